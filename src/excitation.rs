@@ -62,19 +62,31 @@ pub fn exciting_motion(asked: &MotionRequest) -> Result<MotionProposal> {
         [one] => vec![one * unit; n],
         all if all.len() == n => all.iter().map(|value| value * unit).collect(),
         all => {
-            faults.push(Fault::new(option, format!("has {} numbers; give one, or {n}: one a joint", all.len())));
+            faults.push(Fault::new(
+                option,
+                format!("has {} numbers; give one, or {n}: one a joint", all.len()),
+            ));
             Vec::new()
         }
     };
     let degrees = 1f64.to_radians();
-    let (speed, acceleration) = (list("--speed", &asked.speed, degrees), list("--acceleration", &asked.acceleration, degrees));
+    let (speed, acceleration) = (
+        list("--speed", &asked.speed, degrees),
+        list("--acceleration", &asked.acceleration, degrees),
+    );
     let noise = list("--noise", &asked.noise, 1.0);
     let range = match &asked.limits {
         Some(limits) if limits.len() != n => {
-            faults.push(Fault::new("--limits", format!("has {} ranges, the robot {n} joints", limits.len())));
+            faults.push(Fault::new(
+                "--limits",
+                format!("has {} ranges, the robot {n} joints", limits.len()),
+            ));
             Vec::new()
         }
-        Some(limits) => limits.iter().map(|range| range.map(f64::to_radians)).collect(),
+        Some(limits) => limits
+            .iter()
+            .map(|range| range.map(f64::to_radians))
+            .collect(),
         None => declared(&asked.robot, &robot.joints, &mut faults),
     };
     if !faults.is_empty() {
@@ -97,24 +109,38 @@ pub fn exciting_motion(asked: &MotionRequest) -> Result<MotionProposal> {
         jobs: asked.jobs,
     };
     let motion = found(&arm, &request)?;
-    Ok(MotionProposal { robot: robot.name, request, motion, joints: n })
+    Ok(MotionProposal {
+        robot: robot.name,
+        request,
+        motion,
+        joints: n,
+    })
 }
 
 fn found(arm: &DynamicArm, request: &ExciteRequest) -> Result<ExcitingMotion> {
     excite(arm, request).map_err(|error| match error {
-        Error::Spec(faults) => {
-            Error::Spec(faults.into_iter().map(|fault| Fault::new(format!("--{}", fault.place), fault.message)).collect())
-        }
+        Error::Spec(faults) => Error::Spec(
+            faults
+                .into_iter()
+                .map(|fault| Fault::new(format!("--{}", fault.place), fault.message))
+                .collect(),
+        ),
         other => other,
     })
 }
 
 /// Ranges of the robot file, rad.
 fn declared(file: &Path, joints: &[JointDescription], faults: &mut Vec<Fault>) -> Vec<[f64; 2]> {
-    let missing: Vec<String> =
-        (1..).zip(joints).filter(|(_, joint)| joint.limits.is_none()).map(|(number, _): (usize, _)| number.to_string()).collect();
+    let missing: Vec<String> = (1..)
+        .zip(joints)
+        .filter(|(_, joint)| joint.limits.is_none())
+        .map(|(number, _): (usize, _)| number.to_string())
+        .collect();
     if !missing.is_empty() {
-        let message = format!("joint {} has no range: give --limits MIN:MAX,.. in deg", missing.join(", "));
+        let message = format!(
+            "joint {} has no range: give --limits MIN:MAX,.. in deg",
+            missing.join(", ")
+        );
         faults.push(Fault::new(file.display().to_string(), message));
     }
     joints.iter().filter_map(|joint| joint.limits).collect()
@@ -124,11 +150,24 @@ impl MotionProposal {
     /// The motion as delimited text in even steps: time_s, q1_deg .., dq1_deg_s .., ddq1_deg_s2 ...
     pub fn csv(&self) -> String {
         let n = self.joints;
-        let names = |name: &str| (1..=n).map(|joint| format!(",{}", name.replace("{j}", &joint.to_string()))).collect::<String>();
-        let mut text = format!("time_s{}{}{}\n", names("q{j}_deg"), names("dq{j}_deg_s"), names("ddq{j}_deg_s2"));
+        let names = |name: &str| {
+            (1..=n)
+                .map(|joint| format!(",{}", name.replace("{j}", &joint.to_string())))
+                .collect::<String>()
+        };
+        let mut text = format!(
+            "time_s{}{}{}\n",
+            names("q{j}_deg"),
+            names("dq{j}_deg_s"),
+            names("ddq{j}_deg_s2")
+        );
         for (row, time) in self.motion.time.iter().enumerate() {
             let _ = write!(text, "{time:.6}");
-            for list in [&self.motion.position, &self.motion.velocity, &self.motion.acceleration] {
+            for list in [
+                &self.motion.position,
+                &self.motion.velocity,
+                &self.motion.acceleration,
+            ] {
                 list[n * row..n * (row + 1)].iter().for_each(|value| {
                     let _ = write!(text, ",{:.7}", value.to_degrees());
                 });
@@ -166,7 +205,11 @@ impl MotionProposal {
         );
         text.push_str("                               expected sigma   of random motions\n");
         for one in &motion.parameters {
-            let _ = writeln!(text, "{:<30} {:>14.4e}      {:>14.4e} {}", one.name, one.sigma, one.random, one.unit);
+            let _ = writeln!(
+                text,
+                "{:<30} {:>14.4e}      {:>14.4e} {}",
+                one.name, one.sigma, one.random, one.unit
+            );
         }
         for line in &motion.unseen {
             let _ = writeln!(text, "will not determine: {line}");
@@ -180,7 +223,11 @@ impl MotionProposal {
         let parameters = motion.parameters.iter().map(|one| {
             json!({ "name": one.name, "unit": one.unit, "sigma": one.sigma, "random_sigma": one.random, "inflation": one.inflation })
         });
-        let rows = |list: &[f64]| list.chunks_exact(self.joints).map(|row| json!(row)).collect::<Vec<Value>>();
+        let rows = |list: &[f64]| {
+            list.chunks_exact(self.joints)
+                .map(|row| json!(row))
+                .collect::<Vec<Value>>()
+        };
         json!({
             "robot": self.robot, "seconds": self.request.seconds, "rate_hz": self.request.rate, "seed": self.request.seed,
             "noise_nm": self.request.noise, "inertial_numbers": motion.inertials, "base_parameters": self.base(),

@@ -85,7 +85,7 @@
 //!
 //! An effect step by step, with a row of the table that a test compiles and fits: `src/numerics/effect/README.md`.
 //!
-//! House rules: one idea one file, named by its noun, 60 to 250 lines, 400 at most; no function above 80 lines; names of types once. Verbs
+//! House rules: files are cohesive, 100 to 600 lines; rustfmt's defaults; names of types once. Verbs
 //! are functions, nouns are data; models are immutable; `f64`, ordered maps. Doc lines say what, shapes, units, failure; comments say why.
 //! Errors name the place and what is allowed, all faults at once. Joints count from 1 for people and from 0 in code. Tests are named as
 //! facts, their numbers come from elsewhere; a bug fix starts with the failing test. Pages are generated where code knows better:
@@ -150,7 +150,10 @@
 #![warn(missing_docs)]
 
 pub use calib_foundation::{description, statistics, units};
-pub use calib_numerics::{compensate, criteria, diagnose, dynamics, effect, error, estimate, observation, robot, spatial, yaml};
+pub use calib_numerics::{
+    compensate, criteria, diagnose, dynamics, effect, error, estimate, observation, robot, spatial,
+    yaml,
+};
 pub use calib_twin as twin;
 
 pub mod program;
@@ -181,8 +184,14 @@ pub mod poses;
 pub mod proof;
 pub mod summary;
 
-#[expect(clippy::disallowed_methods, reason = "shows how long things take, on stderr")]
+#[expect(
+    clippy::disallowed_methods,
+    reason = "shows how long things take, on stderr"
+)]
 pub mod progress;
 
-#[expect(clippy::disallowed_methods, reason = "reads the environment and the clock for all others, and prints")]
+#[expect(
+    clippy::disallowed_methods,
+    reason = "reads the environment and the clock for all others, and prints"
+)]
 pub mod cli;

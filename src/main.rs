@@ -2,7 +2,10 @@
 
 use std::process::ExitCode;
 
-#[expect(clippy::disallowed_methods, reason = "the command line comes from here")]
+#[expect(
+    clippy::disallowed_methods,
+    reason = "the command line comes from here"
+)]
 fn main() -> ExitCode {
     ExitCode::from(calib::cli::main(std::env::args_os().collect()))
 }

@@ -54,14 +54,31 @@ struct State {
 impl Progress {
     /// Progress on stderr; `width` is that of the longest stage id.
     pub fn new(verbosity: Verbosity, width: usize) -> Self {
-        let terminal = matches!(verbosity, Verbosity::Detailed | Verbosity::Normal) && std::io::stderr().is_terminal();
-        let bar = terminal.then(|| ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr_with_hz(10)));
+        let terminal = matches!(verbosity, Verbosity::Detailed | Verbosity::Normal)
+            && std::io::stderr().is_terminal();
+        let bar = terminal
+            .then(|| ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr_with_hz(10)));
         let now = Instant::now();
-        let state =
-            State { bar, what: String::new(), unit: String::new(), total: None, begun: now, said: now, warned: BTreeSet::new() };
-        let columns =
-            std::io::stderr().is_terminal().then(terminal_size::terminal_size).flatten().map(|(width, _)| usize::from(width.0));
-        Self { verbosity, width, columns, state: Mutex::new(state) }
+        let state = State {
+            bar,
+            what: String::new(),
+            unit: String::new(),
+            total: None,
+            begun: now,
+            said: now,
+            warned: BTreeSet::new(),
+        };
+        let columns = std::io::stderr()
+            .is_terminal()
+            .then(terminal_size::terminal_size)
+            .flatten()
+            .map(|(width, _)| usize::from(width.0));
+        Self {
+            verbosity,
+            width,
+            columns,
+            state: Mutex::new(state),
+        }
     }
 
     /// Takes the bar away.
@@ -90,7 +107,9 @@ impl Progress {
         }
         // A reader that has gone away is no fault.
         let text = format!("{id:width$}  {text}", width = self.width);
-        let text = self.columns.map_or_else(|| text.clone() + "\n", |columns| folded(&text, columns));
+        let text = self
+            .columns
+            .map_or_else(|| text.clone() + "\n", |columns| folded(&text, columns));
         let write = || drop(std::io::stderr().write_all(text.as_bytes()));
         match &self.state().bar {
             Some(bar) => bar.suspend(write),
@@ -100,12 +119,15 @@ impl Progress {
 }
 
 fn spinner() -> ProgressStyle {
-    ProgressStyle::with_template("{prefix}  {spinner} {msg} ({elapsed})").unwrap_or_else(|_| ProgressStyle::default_spinner())
+    ProgressStyle::with_template("{prefix}  {spinner} {msg} ({elapsed})")
+        .unwrap_or_else(|_| ProgressStyle::default_spinner())
 }
 fn bar_of(unit: &str) -> ProgressStyle {
     // Braces in a template are its own.
     let unit = unit.replace(['{', '}'], "");
-    let template = format!("{{prefix}}  {{wide_bar}} {{human_pos}}/{{human_len}} {unit}, {{per_sec}}, {{eta}} left  {{msg}}");
+    let template = format!(
+        "{{prefix}}  {{wide_bar}} {{human_pos}}/{{human_len}} {unit}, {{per_sec}}, {{eta}} left  {{msg}}"
+    );
     ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar())
 }
 
@@ -126,22 +148,44 @@ impl Observer for Progress {
             bar.disable_steady_tick();
             bar.finish_and_clear();
         }
-        let rows: Vec<String> = report.outputs.iter().map(|output| format!("{} {}", output.port, output.table.rows)).collect();
-        let rows = if self.verbosity == Verbosity::Detailed { format!(" (rows: {})", rows.join(", ")) } else { String::new() };
+        let rows: Vec<String> = report
+            .outputs
+            .iter()
+            .map(|output| format!("{} {}", output.port, output.table.rows))
+            .collect();
+        let rows = if self.verbosity == Verbosity::Detailed {
+            format!(" (rows: {})", rows.join(", "))
+        } else {
+            String::new()
+        };
         if report.status != StageStatus::Cached {
-            return self.line(&report.id, &format!("done in {:.1} s{rows}", report.wall_seconds.unwrap_or_default()));
+            return self.line(
+                &report.id,
+                &format!(
+                    "done in {:.1} s{rows}",
+                    report.wall_seconds.unwrap_or_default()
+                ),
+            );
         }
         // What the stage warned of was said when it ran, and still holds.
         let warnings = report.warnings.len();
         match (self.verbosity, warnings) {
             (_, 0) => self.line(&report.id, &format!("cached{rows}")),
             (Verbosity::Detailed, _) => {
-                let warnings: String = report.warnings.iter().map(|line| format!("; warning: {line}")).collect();
+                let warnings: String = report
+                    .warnings
+                    .iter()
+                    .map(|line| format!("; warning: {line}"))
+                    .collect();
                 self.print(&report.id, &format!("cached{rows}{warnings}"));
             }
             _ => self.print(
                 &report.id,
-                &format!("cached; {} as said when it ran: calib show HEAD/{}", counted(warnings, "warning"), report.id),
+                &format!(
+                    "cached; {} as said when it ran: calib show HEAD/{}",
+                    counted(warnings, "warning"),
+                    report.id
+                ),
             ),
         }
     }
@@ -166,7 +210,11 @@ impl Observer for Progress {
 
     fn advance(&self, id: &str, done: u64, message: &str) {
         let mut state = self.state();
-        let text = if message.is_empty() { state.what.clone() } else { format!("{}: {message}", state.what) };
+        let text = if message.is_empty() {
+            state.what.clone()
+        } else {
+            format!("{}: {message}", state.what)
+        };
         if let Some(bar) = &state.bar {
             bar.set_position(done);
             bar.set_message(match state.total {
@@ -183,7 +231,10 @@ impl Observer for Progress {
             Some(total) if total > 0 && done > 0 => {
                 let spent = state.begun.elapsed().as_secs_f64();
                 let left = spent / done as f64 * total.saturating_sub(done) as f64;
-                format!("  {text}, {done}/{total} {}, about {left:.0} s left", state.unit)
+                format!(
+                    "  {text}, {done}/{total} {}, about {left:.0} s left",
+                    state.unit
+                )
             }
             _ => format!("  {text}, {done} {}", state.unit),
         };

@@ -37,7 +37,10 @@ use std::path::Path;
 
 /// What a file's name ends in, in small letters, without the dot; nothing where it has none.
 pub fn ending(path: &Path) -> String {
-    path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase()
+    path.extension()
+        .and_then(|ending| ending.to_str())
+        .unwrap_or_default()
+        .to_ascii_lowercase()
 }
 
 /// Whether two names are of one file that is there.
@@ -52,7 +55,10 @@ pub fn open(path: &Path) -> io::Result<File> {
     if kind.is_file() {
         return File::open(path);
     }
-    Err(io::Error::new(ErrorKind::InvalidInput, format!("{}, not a regular file", what(kind))))
+    Err(io::Error::new(
+        ErrorKind::InvalidInput,
+        format!("{}, not a regular file", what(kind)),
+    ))
 }
 
 /// The text of a regular file in UTF-8.
@@ -82,14 +88,24 @@ fn what(kind: FileType) -> &'static str {
 
 #[cfg(not(unix))]
 fn what(kind: FileType) -> &'static str {
-    if kind.is_dir() { "is a folder" } else { "is a device" }
+    if kind.is_dir() {
+        "is a folder"
+    } else {
+        "is a device"
+    }
 }
 
 /// What a decoder gives; its panic is told in words.
 pub fn decoded<T>(decode: impl FnOnce() -> T) -> Result<T, String> {
     catch_unwind(AssertUnwindSafe(decode)).map_err(|panic| {
-        let text = panic.downcast_ref::<&str>().copied().or_else(|| panic.downcast_ref::<String>().map(String::as_str));
-        format!("it is damaged, its decoder gives up ({})", text.unwrap_or("without a word"))
+        let text = panic
+            .downcast_ref::<&str>()
+            .copied()
+            .or_else(|| panic.downcast_ref::<String>().map(String::as_str));
+        format!(
+            "it is damaged, its decoder gives up ({})",
+            text.unwrap_or("without a word")
+        )
     })
 }
 
@@ -109,7 +125,11 @@ pub fn parquet(input: impl ChunkReader + 'static, batch: usize) -> Result<Parque
         let schema = builder.schema().clone();
         let rows = u64::try_from(builder.metadata().file_metadata().num_rows()).unwrap_or_default();
         let reader = builder.with_batch_size(batch).build()?;
-        Ok(ParquetFile { schema, rows, reader: Some(reader) })
+        Ok(ParquetFile {
+            schema,
+            rows,
+            reader: Some(reader),
+        })
     });
     opened?.map_err(|error: parquet::errors::ParquetError| error.to_string())
 }

@@ -8,5 +8,9 @@ pub fn quoted(text: &str) -> String {
 /// A word as a person types it: in quotes only where it must be.
 pub fn typed(text: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./:=,@%+~".contains(c);
-    if !text.is_empty() && text.chars().all(plain) { text.into() } else { quoted(text) }
+    if !text.is_empty() && text.chars().all(plain) {
+        text.into()
+    } else {
+        quoted(text)
+    }
 }

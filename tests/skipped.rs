@@ -18,6 +18,9 @@ fn main() {
     let _ = fs::remove_dir_all(folder);
     match lines.len() {
         0 => println!("\nnothing was skipped"),
-        _ => println!("\nskipped, for want of what they need:\n{}", lines.into_iter().collect::<String>()),
+        _ => println!(
+            "\nskipped, for want of what they need:\n{}",
+            lines.into_iter().collect::<String>()
+        ),
     }
 }

@@ -26,17 +26,40 @@ pub struct Explanation {
 pub fn explain(store: &Store, run: &str, stage: &str) -> Result<Explanation> {
     let manifest = Manifest::of(store, run)?;
     let Some(report) = manifest.stage(stage) else {
-        let ids: Vec<&str> = manifest.stages.iter().map(|stage| stage.id.as_str()).collect();
-        let hint = nearest(stage, ids.iter().copied()).map(|near| format!("; did you mean `{near}`?"));
-        let message = format!("run {run} has no such stage{} Its stages: {}", hint.unwrap_or_else(|| ".".into()), ids.join(", "));
+        let ids: Vec<&str> = manifest
+            .stages
+            .iter()
+            .map(|stage| stage.id.as_str())
+            .collect();
+        let hint =
+            nearest(stage, ids.iter().copied()).map(|near| format!("; did you mean `{near}`?"));
+        let message = format!(
+            "run {run} has no such stage{} Its stages: {}",
+            hint.unwrap_or_else(|| ".".into()),
+            ids.join(", ")
+        );
         return Err(Error::spec(format!("stage {stage}"), message));
     };
-    let mut explanation =
-        Explanation { run: run.into(), stage: report.clone(), before: None, changes: Vec::new(), writers: Vec::new() };
-    let Some(key) = &report.key else { return Ok(explanation) };
-    for id in store.runs()?.into_iter().rev().filter(|id| id.as_str() < run) {
+    let mut explanation = Explanation {
+        run: run.into(),
+        stage: report.clone(),
+        before: None,
+        changes: Vec::new(),
+        writers: Vec::new(),
+    };
+    let Some(key) = &report.key else {
+        return Ok(explanation);
+    };
+    for id in store
+        .runs()?
+        .into_iter()
+        .rev()
+        .filter(|id| id.as_str() < run)
+    {
         // A manifest that cannot be read explains nothing.
-        let Ok(earlier) = Manifest::of(store, &id) else { continue };
+        let Ok(earlier) = Manifest::of(store, &id) else {
+            continue;
+        };
         let alike = !manifest.is_complete() || earlier.is_complete();
         if earlier.pipeline.name != manifest.pipeline.name || !alike {
             continue;
@@ -47,8 +70,15 @@ pub fn explain(store: &Store, run: &str, stage: &str) -> Result<Explanation> {
             break;
         }
     }
-    let changed = |port: &str| explanation.changes.iter().any(|change| change.what == "input" && change.name == port);
+    let changed = |port: &str| {
+        explanation
+            .changes
+            .iter()
+            .any(|change| change.what == "input" && change.name == port)
+    };
     let inputs = report.inputs.iter().filter(|input| changed(&input.port));
-    explanation.writers = inputs.map(|input| (input.port.clone(), input.from.clone())).collect();
+    explanation.writers = inputs
+        .map(|input| (input.port.clone(), input.from.clone()))
+        .collect();
     Ok(explanation)
 }

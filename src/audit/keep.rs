@@ -24,11 +24,20 @@ pub fn kept_actions(store: &Store, last: usize) -> Result<BTreeSet<String>> {
         let manifest = Manifest::of(store, &run)?;
         let met = seen.entry(manifest.pipeline.name.clone()).or_default();
         // Failed and partial runs and those of other verbs keep their stages, but take no complete run's place.
-        let place = if manifest.is_complete() { &mut met.complete } else { &mut met.others };
+        let place = if manifest.is_complete() {
+            &mut met.complete
+        } else {
+            &mut met.others
+        };
         *place += 1;
         let recent = *place <= last && (manifest.is_complete() || met.complete < last);
         if recent || tagged.contains(&run) {
-            keep.extend(manifest.stages.iter().filter_map(|stage| Some(stage.action.as_ref()?.to_string())));
+            keep.extend(
+                manifest
+                    .stages
+                    .iter()
+                    .filter_map(|stage| Some(stage.action.as_ref()?.to_string())),
+            );
         }
     }
     Ok(keep)

@@ -54,30 +54,51 @@ pub fn lineage(store: &Store, start: &str) -> Result<LineageNode> {
     for record in store.records()? {
         for (port, table) in &record.tables {
             // A table that several actions gave is traced to the first of them in the order of their ids.
-            makers.entry(table.table_hash.clone()).or_insert_with(|| (record.clone(), port.clone()));
+            makers
+                .entry(table.table_hash.clone())
+                .or_insert_with(|| (record.clone(), port.clone()));
         }
     }
     let wanted = start.to_lowercase();
-    let found: Vec<&TableHash> = makers.keys().filter(|hash| hash.as_str().starts_with(&wanted)).collect();
+    let found: Vec<&TableHash> = makers
+        .keys()
+        .filter(|hash| hash.as_str().starts_with(&wanted))
+        .collect();
     match found.as_slice() {
         [hash] => Ok(trace(hash, &makers, &mut BTreeSet::new())),
-        [] => Err(Error::spec(format!("table {start}"), "no action in the store made it: is it another store's? (--store DIR)")),
+        [] => Err(Error::spec(
+            format!("table {start}"),
+            "no action in the store made it: is it another store's? (--store DIR)",
+        )),
         several => Err(Error::spec(
             format!("table {start}"),
-            format!("the hashes of {} tables begin like this; give more of the hash", several.len()),
+            format!(
+                "the hashes of {} tables begin like this; give more of the hash",
+                several.len()
+            ),
         )),
     }
 }
 
-fn trace(hash: &TableHash, makers: &BTreeMap<TableHash, (ActionRecord, String)>, told: &mut BTreeSet<String>) -> LineageNode {
+fn trace(
+    hash: &TableHash,
+    makers: &BTreeMap<TableHash, (ActionRecord, String)>,
+    told: &mut BTreeSet<String>,
+) -> LineageNode {
     let made = makers.get(hash).map(|(record, port)| {
         let told_before = !told.insert(record.id.to_string());
         let table = record.tables.get(port);
-        let reads = record.key.reads.iter().flat_map(|(port, tables)| tables.iter().map(move |table| (port, table)));
+        let reads = record
+            .key
+            .reads
+            .iter()
+            .flat_map(|(port, tables)| tables.iter().map(move |table| (port, table)));
         let reads = if told_before {
             Vec::new()
         } else {
-            reads.map(|(port, read)| (port.clone(), trace(&read.table, makers, told))).collect()
+            reads
+                .map(|(port, read)| (port.clone(), trace(&read.table, makers, told)))
+                .collect()
         };
         Provenance {
             stage: record.key.id.clone(),
@@ -91,10 +112,18 @@ fn trace(hash: &TableHash, makers: &BTreeMap<TableHash, (ActionRecord, String)>,
             when: record.account.started.clone(),
             settings: record.key.settings.clone(),
             seed: record.key.seed,
-            files: record.key.files.values().map(|file| (file.name.clone(), file.content.to_string())).collect(),
+            files: record
+                .key
+                .files
+                .values()
+                .map(|file| (file.name.clone(), file.content.to_string()))
+                .collect(),
             reads,
             told_before,
         }
     });
-    LineageNode { table_hash: hash.clone(), made }
+    LineageNode {
+        table_hash: hash.clone(),
+        made,
+    }
 }

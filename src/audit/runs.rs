@@ -61,46 +61,87 @@ pub struct TableChange {
 impl RunDiff {
     /// Whether neither settings nor tables differ.
     pub fn is_same(&self) -> bool {
-        self.tables.iter().all(|table| table.status == "same" || table.diff.as_ref().is_some_and(TableDiff::is_same))
+        self.tables.iter().all(|table| {
+            table.status == "same" || table.diff.as_ref().is_some_and(TableDiff::is_same)
+        })
     }
 }
 
 /// Compares run `a` with run `b`: all stages or one, all its ports or one. Tolerances and columns that are left out hold in every table
 /// that has the column; fails where no table that both have does.
-pub fn compare_runs(store: &Store, a: &RunAddress, b: &RunAddress, options: &DiffOptions) -> Result<RunDiff> {
+pub fn compare_runs(
+    store: &Store,
+    a: &RunAddress,
+    b: &RunAddress,
+    options: &DiffOptions,
+) -> Result<RunDiff> {
     let (left, right) = (Manifest::of(store, &a.run)?, Manifest::of(store, &b.run)?);
     let (outputs_a, outputs_b) = (outputs(&left, a), outputs(&right, b));
-    let names: BTreeSet<&String> = outputs_a.iter().chain(&outputs_b).map(|(name, _)| name).collect();
+    let names: BTreeSet<&String> = outputs_a
+        .iter()
+        .chain(&outputs_b)
+        .map(|(name, _)| name)
+        .collect();
     // In the order of the pipeline, what only A has last.
     let mut order: Vec<&String> = outputs_b.iter().map(|(name, _)| name).collect();
-    order.extend(names.into_iter().filter(|name| !outputs_b.iter().any(|(other, _)| other == *name)));
-    let common = outputs_b.iter().filter(|(name, _)| outputs_a.iter().any(|(other, _)| other == name));
-    known_columns(&common.map(|(_, output)| output.kind.as_str()).collect(), options)?;
-    let options = &DiffOptions { where_present: true, ..options.clone() };
+    order.extend(
+        names
+            .into_iter()
+            .filter(|name| !outputs_b.iter().any(|(other, _)| other == *name)),
+    );
+    let common = outputs_b
+        .iter()
+        .filter(|(name, _)| outputs_a.iter().any(|(other, _)| other == name));
+    known_columns(
+        &common.map(|(_, output)| output.kind.as_str()).collect(),
+        options,
+    )?;
+    let options = &DiffOptions {
+        where_present: true,
+        ..options.clone()
+    };
     let mut tables = Vec::new();
     for name in order {
         let of = |outputs: &[(String, OutputRecord)]| {
-            outputs.iter().find(|(other, _)| other == name).map(|(_, output)| output.clone())
+            outputs
+                .iter()
+                .find(|(other, _)| other == name)
+                .map(|(_, output)| output.clone())
         };
         tables.push(table(store, name, of(&outputs_a), of(&outputs_b), options)?);
     }
-    Ok(RunDiff { a: told(&left), b: told(&right), causes: causes(&left, &right), tables })
+    Ok(RunDiff {
+        a: told(&left),
+        b: told(&right),
+        causes: causes(&left, &right),
+        tables,
+    })
 }
 
 /// Columns in the options must be those of some of these kinds of tables.
 fn known_columns(kinds: &BTreeSet<&str>, options: &DiffOptions) -> Result<()> {
-    let schemas: Vec<&TableSchema> = schema::all().filter(|schema| kinds.contains(schema.name.as_str())).collect();
+    let schemas: Vec<&TableSchema> = schema::all()
+        .filter(|schema| kinds.contains(schema.name.as_str()))
+        .collect();
     let wishes = [
         ("--ignore", options.ignore.iter().collect::<Vec<_>>()),
         ("--atol", options.atol.columns.keys().collect()),
         ("--rtol", options.rtol.columns.keys().collect()),
     ];
     for (flag, names) in wishes {
-        let unknown = names.into_iter().find(|name| schemas.iter().all(|schema| schema.field_of(name).is_none()));
+        let unknown = names
+            .into_iter()
+            .find(|name| schemas.iter().all(|schema| schema.field_of(name).is_none()));
         if let Some(name) = unknown {
-            let columns = schemas.iter().flat_map(|schema| &schema.fields).map(|field| field.name.as_str());
+            let columns = schemas
+                .iter()
+                .flat_map(|schema| &schema.fields)
+                .map(|field| field.name.as_str());
             let hint = nearest(name, columns).map(|near| format!("; did you mean `{near}`?"));
-            let message = format!("no column `{name}` in any table that both runs have{}", hint.unwrap_or_default());
+            let message = format!(
+                "no column `{name}` in any table that both runs have{}",
+                hint.unwrap_or_default()
+            );
             return Err(Error::spec(flag, message));
         }
     }
@@ -128,32 +169,69 @@ fn told(manifest: &Manifest) -> RunSummary {
 }
 
 fn outputs(manifest: &Manifest, place: &RunAddress) -> Vec<(String, OutputRecord)> {
-    let stages = manifest.stages.iter().filter(|stage| place.stage.as_ref().is_none_or(|id| id == &stage.id));
+    let stages = manifest
+        .stages
+        .iter()
+        .filter(|stage| place.stage.as_ref().is_none_or(|id| id == &stage.id));
     let named = stages.flat_map(|stage| stage.outputs.iter().map(move |output| (stage, output)));
-    let wanted = named.filter(|(_, output)| place.port.as_ref().is_none_or(|port| port == &output.port));
-    wanted.map(|(stage, output)| (format!("{}.{}", stage.id, output.port), output.clone())).collect()
+    let wanted =
+        named.filter(|(_, output)| place.port.as_ref().is_none_or(|port| port == &output.port));
+    wanted
+        .map(|(stage, output)| (format!("{}.{}", stage.id, output.port), output.clone()))
+        .collect()
 }
 
 fn causes(a: &Manifest, b: &Manifest) -> Vec<SettingChange> {
     let mut causes = Vec::new();
     if a.tool.version != b.tool.version {
-        let change =
-            KeyChange { what: "calib", name: String::new(), before: a.tool.version.clone(), now: b.tool.version.clone() };
-        causes.push(SettingChange { stage: String::new(), change });
+        let change = KeyChange {
+            what: "calib",
+            name: String::new(),
+            before: a.tool.version.clone(),
+            now: b.tool.version.clone(),
+        };
+        causes.push(SettingChange {
+            stage: String::new(),
+            change,
+        });
     }
     for stage in &b.stages {
         let before = a.stage(&stage.id);
         if before.is_none() {
-            let change = KeyChange { what: "stage", name: stage.id.clone(), before: "-".into(), now: stage.uses.clone() };
-            causes.push(SettingChange { stage: stage.id.clone(), change });
+            let change = KeyChange {
+                what: "stage",
+                name: stage.id.clone(),
+                before: "-".into(),
+                now: stage.uses.clone(),
+            };
+            causes.push(SettingChange {
+                stage: stage.id.clone(),
+                change,
+            });
         }
-        let (Some(old), Some(new)) = (before.and_then(|stage| stage.key.as_ref()), &stage.key) else { continue };
-        let own = changes_of(old, new).into_iter().filter(|change| change.what != "input");
-        causes.extend(own.map(|change| SettingChange { stage: stage.id.clone(), change }));
+        let (Some(old), Some(new)) = (before.and_then(|stage| stage.key.as_ref()), &stage.key)
+        else {
+            continue;
+        };
+        let own = changes_of(old, new)
+            .into_iter()
+            .filter(|change| change.what != "input");
+        causes.extend(own.map(|change| SettingChange {
+            stage: stage.id.clone(),
+            change,
+        }));
     }
     for stage in a.stages.iter().filter(|stage| b.stage(&stage.id).is_none()) {
-        let change = KeyChange { what: "stage", name: stage.id.clone(), before: stage.uses.clone(), now: "-".into() };
-        causes.push(SettingChange { stage: stage.id.clone(), change });
+        let change = KeyChange {
+            what: "stage",
+            name: stage.id.clone(),
+            before: stage.uses.clone(),
+            now: "-".into(),
+        };
+        causes.push(SettingChange {
+            stage: stage.id.clone(),
+            change,
+        });
     }
     causes
 }
@@ -165,11 +243,26 @@ fn table(
     b: Option<OutputRecord>,
     options: &DiffOptions,
 ) -> Result<TableChange> {
-    let kind = b.as_ref().or(a.as_ref()).map(|output| output.kind.clone()).unwrap_or_default();
-    let change =
-        |status: &'static str, diff: Option<TableDiff>| TableChange { name: name.into(), kind: kind.clone(), status, diff };
+    let kind = b
+        .as_ref()
+        .or(a.as_ref())
+        .map(|output| output.kind.clone())
+        .unwrap_or_default();
+    let change = |status: &'static str, diff: Option<TableDiff>| TableChange {
+        name: name.into(),
+        kind: kind.clone(),
+        status,
+        diff,
+    };
     let (Some(a), Some(b)) = (&a, &b) else {
-        return Ok(change(if a.is_some() { "only in A" } else { "only in B" }, None));
+        return Ok(change(
+            if a.is_some() {
+                "only in A"
+            } else {
+                "only in B"
+            },
+            None,
+        ));
     };
     if a.table.table_hash == b.table.table_hash && !options.reread {
         return Ok(change("same", None));
@@ -179,5 +272,12 @@ fn table(
         return Ok(change("changed, but no longer in the store", None));
     }
     let diff = compare(&paths[0], &paths[1], options)?;
-    Ok(change(if diff.is_same() { "within tolerance" } else { "changed" }, Some(diff)))
+    Ok(change(
+        if diff.is_same() {
+            "within tolerance"
+        } else {
+            "changed"
+        },
+        Some(diff),
+    ))
 }

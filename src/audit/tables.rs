@@ -51,7 +51,12 @@ pub struct QueryColumn {
 impl QueryTables {
     /// The tables that a run wrote or took.
     pub fn of(manifest: &Manifest) -> Self {
-        let outputs = || manifest.stages.iter().flat_map(|stage| stage.outputs.iter().map(move |output| (&stage.id, output)));
+        let outputs = || {
+            manifest
+                .stages
+                .iter()
+                .flat_map(|stage| stage.outputs.iter().map(move |output| (&stage.id, output)))
+        };
         let alone = |kind: &str| outputs().filter(|(_, output)| output.kind == kind).count() == 1;
         let table = |(stage, output): (&String, &crate::pipeline::OutputRecord)| QueryTable {
             name: format!("{stage}_{}", output.port).replace('-', "_"),
@@ -61,7 +66,10 @@ impl QueryTables {
             kind: output.kind.clone(),
             table: output.table.clone(),
         };
-        Self { run: manifest.run_id.clone(), tables: outputs().map(table).collect() }
+        Self {
+            run: manifest.run_id.clone(),
+            tables: outputs().map(table).collect(),
+        }
     }
 
     /// In the order of the pipeline.
@@ -74,32 +82,54 @@ impl QueryTables {
         let exact: Vec<&QueryTable> = self.iter().filter(|table| table.is_called(name)).collect();
         let (found, what) = match exact.is_empty() {
             false => (exact, "is the name of several tables"),
-            true => (self.iter().filter(|table| table.kind == name).collect(), "is written by several stages"),
+            true => (
+                self.iter().filter(|table| table.kind == name).collect(),
+                "is written by several stages",
+            ),
         };
         match found[..] {
             [table] => Ok(table),
             [] => Err(self.unknown(name)),
             _ => {
-                let names: Vec<String> = found.iter().map(|table| format!("{}.{}", table.stage, table.port)).collect();
-                Err(Error::spec("SQL", format!("`{name}` {what}; say which: {}", names.join(", "))))
+                let names: Vec<String> = found
+                    .iter()
+                    .map(|table| format!("{}.{}", table.stage, table.port))
+                    .collect();
+                Err(Error::spec(
+                    "SQL",
+                    format!("`{name}` {what}; say which: {}", names.join(", ")),
+                ))
             }
         }
     }
 
     fn unknown(&self, name: &str) -> Error {
         let spelled = name.replace(['.', '/', '-'], "_");
-        let names: Vec<&str> =
-            self.iter().flat_map(|table| [Some(table.name.as_str()), table.short.as_deref()]).flatten().collect();
-        let hint = nearest(&spelled, names.iter().copied()).map(|near| format!("; did you mean `{near}`?"));
+        let names: Vec<&str> = self
+            .iter()
+            .flat_map(|table| [Some(table.name.as_str()), table.short.as_deref()])
+            .flatten()
+            .collect();
+        let hint = nearest(&spelled, names.iter().copied())
+            .map(|near| format!("; did you mean `{near}`?"));
         let known: Vec<&str> = self.iter().map(|table| table.name.as_str()).collect();
         let hint = hint.unwrap_or_else(|| ".".into());
-        Error::spec("SQL", format!("run {} has no table `{name}`{hint} Its tables: {}", self.run, known.join(", ")))
+        Error::spec(
+            "SQL",
+            format!(
+                "run {} has no table `{name}`{hint} Its tables: {}",
+                self.run,
+                known.join(", ")
+            ),
+        )
     }
 }
 
 impl QueryTable {
     fn is_called(&self, name: &str) -> bool {
-        let separated = |separator: char| name.split_once(separator) == Some((self.stage.as_str(), self.port.as_str()));
+        let separated = |separator: char| {
+            name.split_once(separator) == Some((self.stage.as_str(), self.port.as_str()))
+        };
         name == self.name || ['.', '/', '_'].into_iter().any(separated)
     }
 
@@ -111,9 +141,16 @@ impl QueryTable {
     /// The columns that its file has.
     pub fn columns(&self, store: &Store) -> Result<Vec<QueryColumn>> {
         let path = self.file(store)?;
-        let file = File::open(&path).map_err(|error| error.to_string()).and_then(|file| parquet(file, 1));
+        let file = File::open(&path)
+            .map_err(|error| error.to_string())
+            .and_then(|file| parquet(file, 1));
         let file = file.map_err(|error| self.fault(&path, format!("cannot be read: {error}")))?;
-        Ok(file.schema.fields().iter().map(|field| self.column(field.name().clone())).collect())
+        Ok(file
+            .schema
+            .fields()
+            .iter()
+            .map(|field| self.column(field.name().clone()))
+            .collect())
     }
 
     /// Where its file is; of a store in a bucket it is fetched first. Fails where it has left the store.
@@ -121,18 +158,29 @@ impl QueryTable {
         let path = store.object(&self.table)?;
         match path.is_file() {
             true => Ok(path),
-            false => Err(self.fault(&path, "its file is no longer in the store; run the pipeline again to make it again")),
+            false => Err(self.fault(
+                &path,
+                "its file is no longer in the store; run the pipeline again to make it again",
+            )),
         }
     }
 
     /// What is wrong with its file.
     pub(super) fn fault(&self, path: &Path, why: impl std::fmt::Display) -> Error {
-        Error::store(path.display().to_string(), format!("table {}: {why}", self.name))
+        Error::store(
+            path.display().to_string(),
+            format!("table {}: {why}", self.name),
+        )
     }
 
     fn column(&self, name: String) -> QueryColumn {
         let Some((field, joint)) = self.schema().and_then(|schema| schema.field_of(&name)) else {
-            return QueryColumn { name, column_type: String::new(), unit: None, description: String::new() };
+            return QueryColumn {
+                name,
+                column_type: String::new(),
+                unit: None,
+                description: String::new(),
+            };
         };
         let joint = joint.map_or_else(String::new, |joint| joint.to_string());
         let column_type = match field.column_type {
@@ -142,6 +190,11 @@ impl QueryTable {
             ColumnType::Boolean => "boolean",
         };
         let description = field.description.replace("{j}", &joint);
-        QueryColumn { name, column_type: column_type.into(), unit: field.unit.clone(), description }
+        QueryColumn {
+            name,
+            column_type: column_type.into(),
+            unit: field.unit.clone(),
+            description,
+        }
     }
 }

@@ -45,8 +45,15 @@ pub(super) fn main(arguments: &CheckArguments, command_line: &[OsString]) -> Res
             return Err(error);
         }
     };
-    let files = plan.stages.iter().filter(|stage| stage.entry.name == "robot").flat_map(|stage| &stage.files);
-    let described: Vec<&Path> = files.map(|file| file.path.as_path()).chain([arguments.pipeline.as_path()]).collect();
+    let files = plan
+        .stages
+        .iter()
+        .filter(|stage| stage.entry.name == "robot")
+        .flat_map(|stage| &stage.files);
+    let described: Vec<&Path> = files
+        .map(|file| file.path.as_path())
+        .chain([arguments.pipeline.as_path()])
+        .collect();
     let (to_fill, marks) = left(&described);
     let seen = look(&plan);
     let mut text = marks;
@@ -63,35 +70,68 @@ pub(super) fn main(arguments: &CheckArguments, command_line: &[OsString]) -> Res
         0 if arguments.means.overrides() || !arguments.means.store_again().is_empty() => {
             labelled("ready", &format!("{stages} can run"))
         }
-        0 => labelled("ready", &format!("{stages} can run: calib run {}", arguments.pipeline.display())),
-        1 => labelled("not yet", &format!("a line is left to fill in; {stages} are wired")),
-        lines => labelled("not yet", &format!("{lines} lines are left to fill in; {stages} are wired")),
+        0 => labelled(
+            "ready",
+            &format!(
+                "{stages} can run: calib run {}",
+                arguments.pipeline.display()
+            ),
+        ),
+        1 => labelled(
+            "not yet",
+            &format!("a line is left to fill in; {stages} are wired"),
+        ),
+        lines => labelled(
+            "not yet",
+            &format!("{lines} lines are left to fill in; {stages} are wired"),
+        ),
     })?;
-    if arguments.data { fitted(arguments, plan, command_line) } else { Ok(()) }
+    if arguments.data {
+        fitted(arguments, plan, command_line)
+    } else {
+        Ok(())
+    }
 }
 
 /// How many lines are left to fill in, and all that are marked.
 fn left(paths: &[&Path]) -> (usize, String) {
     let marks = marked(paths);
-    let to_fill = marks.iter().find(|kind| kind.label == "replace").map_or(0, |kind| kind.lines.len());
+    let to_fill = marks
+        .iter()
+        .find(|kind| kind.label == "replace")
+        .map_or(0, |kind| kind.lines.len());
     let one = |MarkedLines { label, what, lines }: &MarkedLines| {
         let head = labelled(label, &format!("{}: {what}", counted(lines.len(), "line")));
-        lines.iter().fold(head, |text, (file, number, line)| text + &labelled("", &format!("{file}:{number}: {line}")))
+        lines.iter().fold(head, |text, (file, number, line)| {
+            text + &labelled("", &format!("{file}:{number}: {line}"))
+        })
     };
     (to_fill, marks.iter().map(one).collect())
 }
 
 /// Runs up to the last fit of base and geometry before anything else is computed, and says what is seen.
 fn fitted(arguments: &CheckArguments, plan: Plan, command_line: &[OsString]) -> Result<()> {
-    let fits = plan.stages.iter().enumerate().filter(|(_, stage)| stage.entry.name == Identify::NAME).map(|(at, _)| at);
+    let fits = plan
+        .stages
+        .iter()
+        .enumerate()
+        .filter(|(_, stage)| stage.entry.name == Identify::NAME)
+        .map(|(at, _)| at);
     let fits: Vec<usize> = fits.collect();
     if fits.is_empty() {
         let file = arguments.pipeline.display().to_string();
-        return Err(Error::spec(file, "has no stage `identify`, and --data fits base and geometry; leave --data out"));
+        return Err(Error::spec(
+            file,
+            "has no stage `identify`, and --data fits base and geometry; leave --data out",
+        ));
     }
     let plan = plan.needed_for_all(&fits);
     let store = arguments.means.store()?;
-    let task = CommandTask { purpose: Purpose::Diagnose, selection: Selection::default(), shown: Verbosity::Silent };
+    let task = CommandTask {
+        purpose: Purpose::Diagnose,
+        selection: Selection::default(),
+        shown: Verbosity::Silent,
+    };
     let outcome = arguments.means.run(&plan, &store, task, command_line)?;
     emit_lines(&first_look(&outcome.manifest, &store)?)
 }

@@ -43,7 +43,12 @@ fn execute(arguments: &CheckExportArguments, command_line: &[OsString]) -> Resul
     let serial = |serial: &Option<String>| serial.clone().unwrap_or_else(|| "not stated".into());
     let (statement, code) = match export.check(&label, &text)? {
         Belonging::Same(mark) => (
-            format!("is the export of {origin}: {}, model {}, robot serial {}", mark.format, mark.model, serial(&mark.serial)),
+            format!(
+                "is the export of {origin}: {}, model {}, robot serial {}",
+                mark.format,
+                mark.model,
+                serial(&mark.serial)
+            ),
             0,
         ),
         Belonging::Edited(mark, line) => (
@@ -53,10 +58,21 @@ fn execute(arguments: &CheckExportArguments, command_line: &[OsString]) -> Resul
             ),
             1,
         ),
-        Belonging::Other(file, own) if file.serial != own.serial => {
-            (format!("is of the robot with serial {}; that of {origin} is {}", serial(&file.serial), serial(&own.serial)), 1)
-        }
-        Belonging::Other(file, own) => (format!("is of the model {}; that of {origin} is {}", file.model, own.model), 1),
+        Belonging::Other(file, own) if file.serial != own.serial => (
+            format!(
+                "is of the robot with serial {}; that of {origin} is {}",
+                serial(&file.serial),
+                serial(&own.serial)
+            ),
+            1,
+        ),
+        Belonging::Other(file, own) => (
+            format!(
+                "is of the model {}; that of {origin} is {}",
+                file.model, own.model
+            ),
+            1,
+        ),
     };
     emit(&format!("{label}: {statement}\n"))?;
     Ok(code)

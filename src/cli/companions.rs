@@ -17,11 +17,22 @@ pub(super) struct Companions(Vec<(String, Vec<u8>)>);
 impl Companions {
     /// The files beside a program: those of its name with other endings of its language, the system's data, and those that are named.
     pub fn of(program: &Path, language: Language, named: &[PathBuf]) -> Result<Self> {
-        let mut paths = if language == Language::Krl { found(program) } else { Vec::new() };
-        paths.extend(named.iter().filter(|path| !paths.contains(path)).cloned().collect::<Vec<_>>());
+        let mut paths = if language == Language::Krl {
+            found(program)
+        } else {
+            Vec::new()
+        };
+        paths.extend(
+            named
+                .iter()
+                .filter(|path| !paths.contains(path))
+                .cloned()
+                .collect::<Vec<_>>(),
+        );
         let read = |path: PathBuf| {
             let place = path.display().to_string();
-            let bytes = raw::bytes(&path).map_err(|error| Error::spec(&place, format!("cannot be read: {error}")))?;
+            let bytes = raw::bytes(&path)
+                .map_err(|error| Error::spec(&place, format!("cannot be read: {error}")))?;
             Ok((place, bytes))
         };
         paths.into_iter().map(read).collect::<Result<_>>().map(Self)
@@ -29,7 +40,10 @@ impl Companions {
 
     /// As programs take them.
     pub fn files(&self) -> Vec<Companion<'_>> {
-        self.0.iter().map(|(place, text)| Companion { place, text }).collect()
+        self.0
+            .iter()
+            .map(|(place, text)| Companion { place, text })
+            .collect()
     }
 
     /// What was read beside the program, in a line; none where nothing was.
@@ -41,33 +55,55 @@ impl Companions {
 
 /// Files of the same name, then the system's data.
 fn found(program: &Path) -> Vec<PathBuf> {
-    let folder = program.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let name = |path: &Path| path.file_name().map(|name| name.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let folder = program
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
+    let name = |path: &Path| {
+        path.file_name()
+            .map(|name| name.to_string_lossy().to_lowercase())
+            .unwrap_or_default()
+    };
     let (own, stem) = (name(program), stem(program));
     let is_other = |path: &PathBuf| {
         let known = Language::of_ending(&raw::ending(path)) == Some(Language::Krl);
         known && self::stem(path) == stem && name(path) != own
     };
     let mut out: Vec<PathBuf> = files(folder).into_iter().filter(is_other).collect();
-    let whole = folder.canonicalize().unwrap_or_else(|_| folder.to_path_buf());
+    let whole = folder
+        .canonicalize()
+        .unwrap_or_else(|_| folder.to_path_buf());
     let system = whole.ancestors().take(ABOVE).flat_map(|above| {
-        files(above).into_iter().filter(move |path| path.is_dir() && name(path) == "system").collect::<Vec<_>>()
+        files(above)
+            .into_iter()
+            .filter(move |path| path.is_dir() && name(path) == "system")
+            .collect::<Vec<_>>()
     });
     let configuration = std::iter::once(folder.to_path_buf()).chain(system);
-    let configuration = configuration.flat_map(|folder| files(&folder)).find(|path| name(path) == CONFIGURATION);
+    let configuration = configuration
+        .flat_map(|folder| files(&folder))
+        .find(|path| name(path) == CONFIGURATION);
     out.extend(configuration.filter(|path| name(path) != own));
     out
 }
 
 fn stem(path: &Path) -> String {
-    path.file_stem().map(|stem| stem.to_string_lossy().to_lowercase()).unwrap_or_default()
+    path.file_stem()
+        .map(|stem| stem.to_string_lossy().to_lowercase())
+        .unwrap_or_default()
 }
 
 /// What a folder holds, in the order of its names; nothing where it cannot be read.
 fn files(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     // A path that was given without a folder stays one.
-    let path = |entry: std::fs::DirEntry| if folder == Path::new(".") { entry.file_name().into() } else { entry.path() };
+    let path = |entry: std::fs::DirEntry| {
+        if folder == Path::new(".") {
+            entry.file_name().into()
+        } else {
+            entry.path()
+        }
+    };
     let mut all: Vec<PathBuf> = entries.map(path).collect();
     all.sort();
     all

@@ -3,11 +3,15 @@
 use super::companions::Companions;
 use super::feed_forward::{FeedForward, feed_forward};
 use super::model_arguments::ModelArguments;
-use crate::compensate::{CorrectionOptions, Corrector, Gate, GateLimits, IdentifiedArm, Stated, load_matters};
+use crate::compensate::{
+    CorrectionOptions, Corrector, Gate, GateLimits, IdentifiedArm, Stated, load_matters,
+};
 use crate::error::{Error, Fault, Result, counted};
 use crate::identified::IdentifiedModel;
 use crate::pipeline::Purpose;
-use crate::program::{self, Frames, Language, Partial, ProgramFile, ProgramLoad, ProgramRules, RobotTool, mark};
+use crate::program::{
+    self, Frames, Language, Partial, ProgramFile, ProgramLoad, ProgramRules, RobotTool, mark,
+};
 use crate::raw;
 use crate::robot::{JointConvention, Measurements};
 use crate::targets::{Layout, Units, Unreached, parquet, text, unwritten, whole};
@@ -114,7 +118,12 @@ pub(super) struct CompensateArguments {
     #[arg(long, value_name = "SIGN", allow_hyphen_values = true)]
     direction: Option<f64>,
     /// Where the first Cartesian target is searched from, deg (mm for a prismatic joint)
-    #[arg(long, value_name = "Q1,..", value_delimiter = ',', allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "Q1,..",
+        value_delimiter = ',',
+        allow_hyphen_values = true
+    )]
     start: Option<Vec<f64>>,
     /// Unit of angles whose column does not name one: deg, rad
     #[arg(long, value_name = "UNIT")]
@@ -179,14 +188,28 @@ pub(super) fn main(arguments: &CompensateArguments, command_line: &[OsString]) -
     let arm = IdentifiedArm::new(identified.model.clone(), identified.correction.clone());
     let coverage = identified.coverage();
     let uncertainty = identified.uncertainty(&arm);
-    let mut corrector = Corrector::new(&arm, coverage, uncertainty, manner(arguments, &identified)?);
+    let mut corrector =
+        Corrector::new(&arm, coverage, uncertainty, manner(arguments, &identified)?);
     let threads = rayon::ThreadPoolBuilder::new()
         .num_threads(arguments.model.jobs())
         .build()
         .map_err(|error| Error::store("--jobs", error.to_string()))?;
-    let place = if arguments.targets.as_os_str() == "-" { "stdin".into() } else { arguments.targets.display().to_string() };
-    let load = if arguments.payload.is_some() { None } else { identified.heaviest().filter(|load| load_matters(&arm, *load)) };
-    let units = Units { angle: unit(arguments.angle.as_deref()), length: unit(arguments.length.as_deref()) };
+    let place = if arguments.targets.as_os_str() == "-" {
+        "stdin".into()
+    } else {
+        arguments.targets.display().to_string()
+    };
+    let load = if arguments.payload.is_some() {
+        None
+    } else {
+        identified
+            .heaviest()
+            .filter(|load| load_matters(&arm, *load))
+    };
+    let units = Units {
+        angle: unit(arguments.angle.as_deref()),
+        length: unit(arguments.length.as_deref()),
+    };
     let cartesian = arguments.target == What::Pose;
     let layout = Layout {
         place: &place,
@@ -201,52 +224,125 @@ pub(super) fn main(arguments: &CompensateArguments, command_line: &[OsString]) -
     let unreached = threads.install(|| corrected(arguments, &layout, &remarks, &mut corrector))?;
     let mut text = String::new();
     if !arguments.model.quiet {
-        let counting = identified.counting().map(|line| format!("{line}\n")).unwrap_or_default();
-        text = format!("model: {}\n{counting}{}", identified.origin, corrector.tally.summary());
+        let counting = identified
+            .counting()
+            .map(|line| format!("{line}\n"))
+            .unwrap_or_default();
+        text = format!(
+            "model: {}\n{counting}{}",
+            identified.origin,
+            corrector.tally.summary()
+        );
     }
-    let column = if language(&arguments.targets).is_some() || arguments.plain { "" } else { " (column `remark`)" };
-    text.extend(corrector.tally.warnings().map(|line| format!("warning: {line}{column}\n")));
+    let column = if language(&arguments.targets).is_some() || arguments.plain {
+        ""
+    } else {
+        " (column `remark`)"
+    };
+    text.extend(
+        corrector
+            .tally
+            .warnings()
+            .map(|line| format!("warning: {line}{column}\n")),
+    );
     let _ = std::io::stderr().write_all(text.as_bytes());
-    if unreached.faults.is_empty() { Ok(()) } else { Err(Error::Data(unreached.faults)) }
+    if unreached.faults.is_empty() {
+        Ok(())
+    } else {
+        Err(Error::Data(unreached.faults))
+    }
 }
 
 fn check(arguments: &CompensateArguments) -> Result<()> {
     let mut faults = Vec::new();
-    for (option, given, quantity) in
-        [("--angle", &arguments.angle, Quantity::Angle), ("--length", &arguments.length, Quantity::Length)]
-    {
-        if let Some(given) = given.as_deref().filter(|given| Unit::parse(given).is_none_or(|unit| unit.quantity() != quantity)) {
-            faults.push(Fault::new(option, format!("unknown unit `{given}`; allowed: {}", Unit::symbols(quantity).join(", "))));
+    for (option, given, quantity) in [
+        ("--angle", &arguments.angle, Quantity::Angle),
+        ("--length", &arguments.length, Quantity::Length),
+    ] {
+        if let Some(given) = given
+            .as_deref()
+            .filter(|given| Unit::parse(given).is_none_or(|unit| unit.quantity() != quantity))
+        {
+            faults.push(Fault::new(
+                option,
+                format!(
+                    "unknown unit `{given}`; allowed: {}",
+                    Unit::symbols(quantity).join(", ")
+                ),
+            ));
         }
     }
-    let payload = arguments.payload.and_then(|payload| Stated::Payload.fault(payload));
+    let payload = arguments
+        .payload
+        .and_then(|payload| Stated::Payload.fault(payload));
     faults.extend(payload.map(|message| Fault::new("--payload", message)));
-    if let Some(since) = arguments.since_start.filter(|since| !(since.is_finite() && *since >= 0.0)) {
-        faults.push(Fault::new("--since-start", format!("expected 0 or more, s, found {since}")));
+    if let Some(since) = arguments
+        .since_start
+        .filter(|since| !(since.is_finite() && *since >= 0.0))
+    {
+        faults.push(Fault::new(
+            "--since-start",
+            format!("expected 0 or more, s, found {since}"),
+        ));
     }
-    let limits = [("--max-correction", arguments.max_correction), ("--max-turn", arguments.max_turn)];
-    for (option, given) in limits.into_iter().chain(arguments.max_uncertainty.map(|most| ("--max-uncertainty", most))) {
+    let limits = [
+        ("--max-correction", arguments.max_correction),
+        ("--max-turn", arguments.max_turn),
+    ];
+    for (option, given) in limits.into_iter().chain(
+        arguments
+            .max_uncertainty
+            .map(|most| ("--max-uncertainty", most)),
+    ) {
         if !(given.is_finite() && given > 0.0) {
-            faults.push(Fault::new(option, format!("expected a number above 0, found {given}")));
+            faults.push(Fault::new(
+                option,
+                format!("expected a number above 0, found {given}"),
+            ));
         }
     }
-    let temperature = arguments.temperature.and_then(|temperature| Stated::Temperature.fault(temperature));
+    let temperature = arguments
+        .temperature
+        .and_then(|temperature| Stated::Temperature.fault(temperature));
     faults.extend(temperature.map(|message| Fault::new("--temperature", message)));
-    if let Some(direction) = arguments.direction.filter(|direction| direction.abs() != 1.0) {
-        faults.push(Fault::new("--direction", format!("expected 1 or -1, found {direction}")));
+    if let Some(direction) = arguments
+        .direction
+        .filter(|direction| direction.abs() != 1.0)
+    {
+        faults.push(Fault::new(
+            "--direction",
+            format!("expected 1 or -1, found {direction}"),
+        ));
     }
-    let tool = arguments.tool.as_deref().and_then(|tool| RobotTool::parse(tool).err());
+    let tool = arguments
+        .tool
+        .as_deref()
+        .and_then(|tool| RobotTool::parse(tool).err());
     faults.extend(tool.map(|message| Fault::new("--tool", message)));
     if arguments.targets.as_os_str() != "-" {
         faults.extend(open(&arguments.targets).err());
     }
-    faults.extend(arguments.out.as_deref().and_then(|out| misplaced(out, &arguments.targets)));
-    if faults.is_empty() { Ok(()) } else { Err(Error::Spec(faults)) }
+    faults.extend(
+        arguments
+            .out
+            .as_deref()
+            .and_then(|out| misplaced(out, &arguments.targets)),
+    );
+    if faults.is_empty() {
+        Ok(())
+    } else {
+        Err(Error::Spec(faults))
+    }
 }
 
 /// Opens targets; what is wrong is known before a pipeline is run for them.
 fn open(targets: &Path) -> Result<File, Fault> {
-    raw::open(targets).map_err(|error| Fault::new(targets.display().to_string(), format!("cannot be read: {error}")))
+    raw::open(targets).map_err(|error| {
+        Fault::new(
+            targets.display().to_string(),
+            format!("cannot be read: {error}"),
+        )
+    })
 }
 
 /// Why the targets cannot be written to this file.
@@ -257,7 +353,11 @@ fn misplaced(out: &Path, targets: &Path) -> Option<Fault> {
     } else if out.is_dir() {
         format!("{} is a folder: name a file", out.display())
     } else if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
-        format!("{}: there is no folder {}; make it, or name a file in another one", out.display(), folder.display())
+        format!(
+            "{}: there is no folder {}; make it, or name a file in another one",
+            out.display(),
+            folder.display()
+        )
     } else if language(targets).is_none() && is_parquet(out) != is_parquet(targets) {
         "must have the format of the targets (text or Parquet): give it the same file ending".into()
     } else {
@@ -270,24 +370,49 @@ fn unit(symbol: Option<&str>) -> Option<Unit> {
     symbol.and_then(Unit::parse)
 }
 
-fn manner(arguments: &CompensateArguments, identified: &IdentifiedModel) -> Result<CorrectionOptions> {
+fn manner(
+    arguments: &CompensateArguments,
+    identified: &IdentifiedModel,
+) -> Result<CorrectionOptions> {
     let robot = &identified.model.robot;
     let start = match &arguments.start {
         Some(start) if start.len() != robot.joints() => {
-            let message = format!("has {}, the robot {}", counted(start.len(), "position"), counted(robot.joints(), "joint"));
+            let message = format!(
+                "has {}, the robot {}",
+                counted(start.len(), "position"),
+                counted(robot.joints(), "joint")
+            );
             return Err(Error::spec("--start", message));
         }
         Some(start) => {
-            let unit = |joint| if robot.is_revolute(joint) { Unit::Degree } else { Unit::Millimetre };
-            Some(start.iter().enumerate().map(|(joint, value)| unit(joint).to_si(*value)).collect())
+            let unit = |joint| {
+                if robot.is_revolute(joint) {
+                    Unit::Degree
+                } else {
+                    Unit::Millimetre
+                }
+            };
+            Some(
+                start
+                    .iter()
+                    .enumerate()
+                    .map(|(joint, value)| unit(joint).to_si(*value))
+                    .collect(),
+            )
         }
         None => None,
     };
     let clock = identified.data.as_ref().is_none_or(Measurements::has_clock);
     if arguments.time.is_some() && !clock {
-        return Err(Error::spec("--time", "the recording of the model has no clock: its steps and drifts are known by row only"));
+        return Err(Error::spec(
+            "--time",
+            "the recording of the model has no clock: its steps and drifts are known by row only",
+        ));
     }
-    let convention = identified.convention.clone().unwrap_or_else(|| JointConvention::of_the_robot_file(robot.joints()));
+    let convention = identified
+        .convention
+        .clone()
+        .unwrap_or_else(|| JointConvention::of_the_robot_file(robot.joints()));
     Ok(CorrectionOptions {
         convention,
         cartesian: arguments.target == What::Pose,
@@ -312,7 +437,15 @@ fn gate(arguments: &CompensateArguments, identified: &IdentifiedModel) -> Gate {
         ..GateLimits::default()
     };
     let insisted = arguments.model.force;
-    Gate { limits, insisted, model: if insisted { identified.refusals.clone() } else { Vec::new() } }
+    Gate {
+        limits,
+        insisted,
+        model: if insisted {
+            identified.refusals.clone()
+        } else {
+            Vec::new()
+        },
+    }
 }
 
 fn is_parquet(path: &Path) -> bool {
@@ -325,8 +458,14 @@ fn language(targets: &Path) -> Option<Language> {
 
 /// What the head of a corrected program says of its model.
 fn remarks(arguments: &CompensateArguments, identified: &IdentifiedModel) -> Vec<&'static str> {
-    let insisted = arguments.model.force.then_some("limits overridden by --force");
-    let unexplained = identified.unexplained.as_ref().map(|_| "verdict of the model: unexplained");
+    let insisted = arguments
+        .model
+        .force
+        .then_some("limits overridden by --force");
+    let unexplained = identified
+        .unexplained
+        .as_ref()
+        .map(|_| "verdict of the model: unexplained");
     insisted.into_iter().chain(unexplained).collect()
 }
 
@@ -338,47 +477,98 @@ fn rewritten(
     remarks: &[&str],
     corrector: &mut Corrector,
 ) -> Result<()> {
-    let text = raw::bytes(&arguments.targets).map_err(|error| Error::spec(layout.place, format!("cannot be read: {error}")))?;
-    let partial = if arguments.leave_partial { Partial::Left } else { Partial::Refused };
+    let text = raw::bytes(&arguments.targets)
+        .map_err(|error| Error::spec(layout.place, format!("cannot be read: {error}")))?;
+    let partial = if arguments.leave_partial {
+        Partial::Left
+    } else {
+        Partial::Refused
+    };
     let companions = Companions::of(&arguments.targets, language, &arguments.with)?;
-    let source = ProgramFile { place: layout.place, text: &text, language, companions: &companions.files() };
+    let source = ProgramFile {
+        place: layout.place,
+        text: &text,
+        language,
+        companions: &companions.files(),
+    };
     if mark::stands_in(&text, language) && !arguments.model.force {
         let message = "was compensated by calib already: a second correction would move the robot twice as far. Take the program of before, or insist with --force";
         return Err(Error::data(layout.place, message));
     }
-    let frames = if arguments.assume_frames { Frames::Assumed } else { Frames::Refused };
+    let frames = if arguments.assume_frames {
+        Frames::Assumed
+    } else {
+        Frames::Refused
+    };
     let load = match (arguments.payload, layout.load) {
         (Some(payload), _) => ProgramLoad::Stated(payload),
         (None, Some(most)) => ProgramLoad::Needed(most),
         (None, None) => ProgramLoad::Optional,
     };
-    let tool = arguments.tool.as_deref().and_then(|tool| RobotTool::parse(tool).ok());
-    let told = companions.told().filter(|_| !arguments.model.quiet).unwrap_or_default();
+    let tool = arguments
+        .tool
+        .as_deref()
+        .and_then(|tool| RobotTool::parse(tool).ok());
+    let told = companions
+        .told()
+        .filter(|_| !arguments.model.quiet)
+        .unwrap_or_default();
     let _ = std::io::stderr().write_all(told.as_bytes());
-    let mut rewritten = program::corrected(&source, ProgramRules { partial, frames, load, tool }, layout.robot, corrector)?;
+    let mut rewritten = program::corrected(
+        &source,
+        ProgramRules {
+            partial,
+            frames,
+            load,
+            tool,
+        },
+        layout.robot,
+        corrector,
+    )?;
     rewritten.bytes = mark::written(&rewritten.bytes, &text, language, remarks);
-    let warnings = rewritten.warnings.iter().map(|note| format!("warning: {}: {}\n", source.at(note), note.message));
+    let warnings = rewritten
+        .warnings
+        .iter()
+        .map(|note| format!("warning: {}: {}\n", source.at(note), note.message));
     let _ = std::io::stderr().write_all(warnings.collect::<String>().as_bytes());
     let Some(out) = &arguments.out else {
         return match std::io::stdout().write_all(&rewritten.bytes) {
-            Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
-                Err(Error::store("stdout", format!("cannot be written: {error}")))
-            }
+            Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(Error::store(
+                "stdout",
+                format!("cannot be written: {error}"),
+            )),
             _ => Ok(()),
         };
     };
-    whole(out, |mut file| file.write_all(&rewritten.bytes).map_err(|error| unwritten(out, &error)))
+    whole(out, |mut file| {
+        file.write_all(&rewritten.bytes)
+            .map_err(|error| unwritten(out, &error))
+    })
 }
 
 /// Reads, corrects and writes.
-fn corrected(arguments: &CompensateArguments, layout: &Layout, remarks: &[&str], corrector: &mut Corrector) -> Result<Unreached> {
+fn corrected(
+    arguments: &CompensateArguments,
+    layout: &Layout,
+    remarks: &[&str],
+    corrector: &mut Corrector,
+) -> Result<Unreached> {
     if let Some(language) = language(&arguments.targets) {
-        return rewritten(arguments, language, layout, remarks, corrector).map(|()| Unreached::default());
+        return rewritten(arguments, language, layout, remarks, corrector)
+            .map(|()| Unreached::default());
     }
     let Some(out) = &arguments.out else {
-        return convert(&arguments.targets, std::io::stdout(), is_parquet(&arguments.targets), layout, corrector);
+        return convert(
+            &arguments.targets,
+            std::io::stdout(),
+            is_parquet(&arguments.targets),
+            layout,
+            corrector,
+        );
     };
-    whole(out, |file| convert(&arguments.targets, file, is_parquet(out), layout, corrector))
+    whole(out, |file| {
+        convert(&arguments.targets, file, is_parquet(out), layout, corrector)
+    })
 }
 
 fn convert(
@@ -392,9 +582,17 @@ fn convert(
     let mut output = BufWriter::new(output);
     match columnar {
         true => parquet::stream(opened()?, &mut output, layout, corrector),
-        false if targets.as_os_str() == "-" => {
-            text::stream(&mut BufReader::new(std::io::stdin()), &mut output, layout, corrector)
-        }
-        false => text::stream(&mut BufReader::new(opened()?), &mut output, layout, corrector),
+        false if targets.as_os_str() == "-" => text::stream(
+            &mut BufReader::new(std::io::stdin()),
+            &mut output,
+            layout,
+            corrector,
+        ),
+        false => text::stream(
+            &mut BufReader::new(opened()?),
+            &mut output,
+            layout,
+            corrector,
+        ),
     }
 }

@@ -74,7 +74,11 @@ fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<u
     let (manifest, stage) = if is_pipeline(&arguments.what) {
         let file = arguments.what.display().to_string();
         let plan = arguments.means.plan(&arguments.what)?;
-        let own = plan.stages.iter().enumerate().filter(|(_, stage)| DIAGNOSES.contains(&stage.entry.name));
+        let own = plan
+            .stages
+            .iter()
+            .enumerate()
+            .filter(|(_, stage)| DIAGNOSES.contains(&stage.entry.name));
         let own: Vec<(usize, &str)> = own.map(|(at, stage)| (at, stage.id.as_str())).collect();
         let Some((at, id)) = the_stage(&file, &own, arguments.step.as_deref())? else {
             return Err(Error::spec(
@@ -85,13 +89,23 @@ fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<u
         let id = id.to_string();
         let plan = plan.needed_for(at);
         let shown = shown(arguments.quiet, arguments.details);
-        let task = CommandTask { purpose: Purpose::Diagnose, selection: Selection::default(), shown };
+        let task = CommandTask {
+            purpose: Purpose::Diagnose,
+            selection: Selection::default(),
+            shown,
+        };
         let outcome = arguments.means.run(&plan, &store, task, command_line)?;
         let stage = outcome.manifest.stage(&id).cloned();
-        (outcome.manifest, stage.ok_or_else(|| Error::Bug(format!("a run without its stage `{id}`")))?)
+        (
+            outcome.manifest,
+            stage.ok_or_else(|| Error::Bug(format!("a run without its stage `{id}`")))?,
+        )
     } else {
         if arguments.means.overrides() {
-            return Err(Error::spec("--set", "a finished run cannot be changed; give its pipeline instead"));
+            return Err(Error::spec(
+                "--set",
+                "a finished run cannot be changed; give its pipeline instead",
+            ));
         }
         let name = arguments.what.to_string_lossy();
         let (run, step) = match name.split_once('/') {
@@ -111,17 +125,27 @@ fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<u
     if arguments.json {
         emit_json(&told.document(&store))?;
     } else {
-        let text = if arguments.details { told.text(&store) } else { told.short(&store, columns()) };
+        let text = if arguments.details {
+            told.text(&store)
+        } else {
+            told.short(&store, columns())
+        };
         emit_lines(&(text + &rejected(&manifest)))?;
     }
-    Ok(if told.is_wrong_setup() { WRONG_SETUP } else { 0 })
+    Ok(if told.is_wrong_setup() {
+        WRONG_SETUP
+    } else {
+        0
+    })
 }
 
 /// Writes a file that is not there yet.
 fn write_new(file: &Path, text: &str) -> Result<()> {
     let place = || file.display().to_string();
     match std::fs::File::create_new(file) {
-        Ok(mut open) => open.write_all(text.as_bytes()).map_err(|error| Error::store(place(), error.to_string())),
+        Ok(mut open) => open
+            .write_all(text.as_bytes())
+            .map_err(|error| Error::store(place(), error.to_string())),
         Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {
             Err(Error::spec(place(), "is there already; name another file"))
         }

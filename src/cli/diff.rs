@@ -93,41 +93,81 @@ pub(super) fn main(arguments: &DiffArguments) -> u8 {
 fn execute(arguments: &DiffArguments) -> Result<u8> {
     let options = options(arguments)?;
     let (a, b) = (Path::new(&arguments.a), Path::new(&arguments.b));
-    if a.is_file() || b.is_file() || arguments.a.ends_with(".parquet") || arguments.b.ends_with(".parquet") {
+    if a.is_file()
+        || b.is_file()
+        || arguments.a.ends_with(".parquet")
+        || arguments.b.ends_with(".parquet")
+    {
         return tables(arguments, a, b, &options, None);
     }
     let store = open_store(arguments.store.as_deref())?;
     let (a, b) = (place(&store, &arguments.a)?, place(&store, &arguments.b)?);
     let counting = counting(&store, [&a, &b])?;
     if let (Some(left), Some(right)) = (output(&store, &a)?, output(&store, &b)?) {
-        let counting =
-            counting.filter(|_| [&left, &right].iter().any(|table| table.schema.split('/').next() == Some(Recording::KIND)));
-        return tables(arguments, &store.object(&left)?, &store.object(&right)?, &options, counting);
+        let counting = counting.filter(|_| {
+            [&left, &right]
+                .iter()
+                .any(|table| table.schema.split('/').next() == Some(Recording::KIND))
+        });
+        return tables(
+            arguments,
+            &store.object(&left)?,
+            &store.object(&right)?,
+            &options,
+            counting,
+        );
     }
-    let for_tables =
-        [("--key", !options.key.is_empty()), ("--quaternion", !options.quaternions.is_empty()), ("--out", options.out.is_some())];
+    let for_tables = [
+        ("--key", !options.key.is_empty()),
+        ("--quaternion", !options.quaternions.is_empty()),
+        ("--out", options.out.is_some()),
+    ];
     if let Some((flag, _)) = for_tables.into_iter().find(|(_, given)| *given) {
-        return Err(Error::spec(flag, "is for two tables: name them as RUN/STAGE/PORT"));
+        return Err(Error::spec(
+            flag,
+            "is for two tables: name them as RUN/STAGE/PORT",
+        ));
     }
     let diff = compare_runs(&store, &a, &b, &options)?;
     let rivals = rival_changes(&store, &diff, [&a, &b])?;
     if arguments.json {
-        let mut value = serde_json::to_value(&diff).map_err(|error| Error::Bug(error.to_string()))?;
+        let mut value =
+            serde_json::to_value(&diff).map_err(|error| Error::Bug(error.to_string()))?;
         value["same"] = diff.is_same().into();
         value["counting"] = counting.into();
-        value["rivals"] = serde_json::to_value(&rivals).map_err(|error| Error::Bug(error.to_string()))?;
+        value["rivals"] =
+            serde_json::to_value(&rivals).map_err(|error| Error::Bug(error.to_string()))?;
         emit_json(&value)?;
     } else {
         emit(&(run_diff(&diff, &rivals, arguments.stat) + &line(counting.as_deref())))?;
     }
     if let Some(path) = &arguments.html {
         let text = run_diff(&diff, &rivals, true);
-        let notes: Vec<String> = text.lines().filter(|line| !line.is_empty()).map(String::from).collect();
-        let tables: Vec<(String, TableDiff)> =
-            diff.tables.iter().filter_map(|table| Some((table.name.clone(), table.diff.clone()?))).collect();
-        write(path, &diff::html(&format!("runs {} and {}", diff.a.run, diff.b.run), &notes, &tables)?)?;
+        let notes: Vec<String> = text
+            .lines()
+            .filter(|line| !line.is_empty())
+            .map(String::from)
+            .collect();
+        let tables: Vec<(String, TableDiff)> = diff
+            .tables
+            .iter()
+            .filter_map(|table| Some((table.name.clone(), table.diff.clone()?)))
+            .collect();
+        write(
+            path,
+            &diff::html(
+                &format!("runs {} and {}", diff.a.run, diff.b.run),
+                &notes,
+                &tables,
+            )?,
+        )?;
     }
-    let duplicates: u64 = diff.tables.iter().filter_map(|table| table.diff.as_ref()).map(TableDiff::duplicates).sum();
+    let duplicates: u64 = diff
+        .tables
+        .iter()
+        .filter_map(|table| table.diff.as_ref())
+        .map(TableDiff::duplicates)
+        .sum();
     Ok(code(diff.is_same(), duplicates, arguments))
 }
 
@@ -144,26 +184,43 @@ fn counting(store: &Store, runs: [&RunAddress; 2]) -> Result<Option<String>> {
         (None, Some(b)) => format!("the controller of B counts otherwise ({b})"),
         (Some(a), Some(b)) => format!("the controllers count otherwise (A: {a}; B: {b})"),
     };
-    Ok(Some(format!("joints stand in the robot file's counting; {controllers}")))
+    Ok(Some(format!(
+        "joints stand in the robot file's counting; {controllers}"
+    )))
 }
 
 fn line(sentence: Option<&str>) -> String {
-    sentence.map(|sentence| format!("{sentence}\n")).unwrap_or_default()
+    sentence
+        .map(|sentence| format!("{sentence}\n"))
+        .unwrap_or_default()
 }
 
-fn tables(arguments: &DiffArguments, a: &Path, b: &Path, options: &DiffOptions, counting: Option<String>) -> Result<u8> {
+fn tables(
+    arguments: &DiffArguments,
+    a: &Path,
+    b: &Path,
+    options: &DiffOptions,
+    counting: Option<String>,
+) -> Result<u8> {
     let diff = diff::compare(a, b, options)?;
     if arguments.json {
         let mut value = json(&diff)?;
         value["counting"] = counting.into();
         emit_json(&value)?;
     } else {
-        let detail = if arguments.stat { Detail::Stat } else { Detail::Full };
+        let detail = if arguments.stat {
+            Detail::Stat
+        } else {
+            Detail::Full
+        };
         emit(&(diff::text(&diff, detail) + &line(counting.as_deref())))?;
     }
     let code = code(diff.is_same(), diff.duplicates(), arguments);
     if let Some(path) = &arguments.html {
-        write(path, &diff::html("calib diff", &[], &[("tables".into(), diff)])?)?;
+        write(
+            path,
+            &diff::html("calib diff", &[], &[("tables".into(), diff)])?,
+        )?;
     }
     Ok(code)
 }
@@ -180,18 +237,44 @@ fn code(same: bool, duplicates: u64, arguments: &DiffArguments) -> u8 {
 fn place(store: &Store, text: &str) -> Result<RunAddress> {
     let mut parts = text.split('/').map(String::from);
     let run = find_run(store, &parts.next().unwrap_or_default())?;
-    let place = RunAddress { run, stage: parts.next(), port: parts.next() };
+    let place = RunAddress {
+        run,
+        stage: parts.next(),
+        port: parts.next(),
+    };
     if parts.next().is_some() {
-        return Err(Error::spec(text, "expected a Parquet file, RUN, RUN/STAGE or RUN/STAGE/PORT"));
+        return Err(Error::spec(
+            text,
+            "expected a Parquet file, RUN, RUN/STAGE or RUN/STAGE/PORT",
+        ));
     }
     let manifest = Manifest::of(store, &place.run)?;
     if let Some(id) = &place.stage {
-        let stages: Vec<&str> = manifest.stages.iter().map(|stage| stage.id.as_str()).collect();
+        let stages: Vec<&str> = manifest
+            .stages
+            .iter()
+            .map(|stage| stage.id.as_str())
+            .collect();
         let stage = manifest.stage(id);
-        let stage = stage.ok_or_else(|| Error::spec(text, format!("no stage `{id}`; its stages: {}", stages.join(", "))))?;
-        let ports: Vec<&str> = stage.outputs.iter().map(|output| output.port.as_str()).collect();
+        let stage = stage.ok_or_else(|| {
+            Error::spec(
+                text,
+                format!("no stage `{id}`; its stages: {}", stages.join(", ")),
+            )
+        })?;
+        let ports: Vec<&str> = stage
+            .outputs
+            .iter()
+            .map(|output| output.port.as_str())
+            .collect();
         if let Some(port) = place.port.as_deref().filter(|port| !ports.contains(port)) {
-            return Err(Error::spec(text, format!("stage {id} has no table `{port}`; its tables: {}", ports.join(", "))));
+            return Err(Error::spec(
+                text,
+                format!(
+                    "stage {id} has no table `{port}`; its tables: {}",
+                    ports.join(", ")
+                ),
+            ));
         }
     }
     Ok(place)
@@ -199,9 +282,13 @@ fn place(store: &Store, text: &str) -> Result<RunAddress> {
 
 /// The table of a place that names one.
 fn output(store: &Store, place: &RunAddress) -> Result<Option<TableRef>> {
-    let (Some(stage), Some(port)) = (&place.stage, &place.port) else { return Ok(None) };
+    let (Some(stage), Some(port)) = (&place.stage, &place.port) else {
+        return Ok(None);
+    };
     let manifest = Manifest::of(store, &place.run)?;
-    let output = manifest.stage(stage).and_then(|stage| stage.outputs.iter().find(|output| &output.port == port));
+    let output = manifest
+        .stage(stage)
+        .and_then(|stage| stage.outputs.iter().find(|output| &output.port == port));
     Ok(output.map(|output| output.table.clone()))
 }
 
@@ -215,12 +302,24 @@ fn options(arguments: &DiffArguments) -> Result<DiffOptions> {
         out: arguments.out.clone(),
         ..DiffOptions::default()
     };
-    arguments.atol.iter().try_for_each(|text| options.atol.add("--atol", text))?;
-    arguments.rtol.iter().try_for_each(|text| options.rtol.add("--rtol", text))?;
+    arguments
+        .atol
+        .iter()
+        .try_for_each(|text| options.atol.add("--atol", text))?;
+    arguments
+        .rtol
+        .iter()
+        .try_for_each(|text| options.rtol.add("--rtol", text))?;
     for text in &arguments.quaternion {
-        let names: Vec<String> = text.split(',').map(|name| name.trim().to_string()).collect();
+        let names: Vec<String> = text
+            .split(',')
+            .map(|name| name.trim().to_string())
+            .collect();
         if names.len() != 4 {
-            return Err(Error::spec("--quaternion", format!("`{text}`: expected four columns w,x,y,z")));
+            return Err(Error::spec(
+                "--quaternion",
+                format!("`{text}`: expected four columns w,x,y,z"),
+            ));
         }
         options.quaternions.push(names);
     }

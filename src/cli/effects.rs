@@ -41,7 +41,9 @@ pub(super) fn main(arguments: &EffectsArguments) -> Result<()> {
 }
 
 fn entry(about: &Cause) -> String {
-    let measure = about.measure.map_or_else(String::new, |measure| format!("  measure     {}\n", measure.advice));
+    let measure = about.measure.map_or_else(String::new, |measure| {
+        format!("  measure     {}\n", measure.advice)
+    });
     format!(
         "{} ({})\n  formula     {}\n  usual size  {}\n  confounded  {}\n  needs       {}\n{measure}",
         about.name, about.place, about.formula, about.size, about.confounded, about.needs
@@ -50,5 +52,8 @@ fn entry(about: &Cause) -> String {
 
 fn unknown(name: &str) -> Error {
     let names: Vec<&str> = CAUSES.iter().map(|cause| cause.name()).collect();
-    Error::spec("EFFECT", format!("no effect `{name}`; allowed: {}", names.join(", ")))
+    Error::spec(
+        "EFFECT",
+        format!("no effect `{name}`; allowed: {}", names.join(", ")),
+    )
 }

@@ -43,10 +43,20 @@ pub(super) struct ExciteArguments {
     #[arg(long, value_name = "PERCENT", default_value_t = 2.0)]
     margin: f64,
     /// Greatest speed of the joints, one number or one a joint, deg/s
-    #[arg(long, value_name = "DEG_S,..", value_delimiter = ',', default_value = "60")]
+    #[arg(
+        long,
+        value_name = "DEG_S,..",
+        value_delimiter = ',',
+        default_value = "60"
+    )]
     speed: Vec<f64>,
     /// Greatest acceleration of the joints, one number or one a joint, deg/s2
-    #[arg(long, value_name = "DEG_S2,..", value_delimiter = ',', default_value = "180")]
+    #[arg(
+        long,
+        value_name = "DEG_S2,..",
+        value_delimiter = ',',
+        default_value = "180"
+    )]
     acceleration: Vec<f64>,
     /// Standard deviation of the torque of a row, white, one number or one a joint, Nm
     #[arg(long, value_name = "NM,..", value_delimiter = ',', default_value = "1")]
@@ -94,7 +104,14 @@ pub(super) fn main(arguments: &ExciteArguments) -> Result<()> {
         jobs: arguments.jobs.map_or_else(cores, usize::from),
     })?;
     if let Some(out) = &arguments.out {
-        whole(out, |mut file| file.write_all(proposal.csv().as_bytes()).map_err(|error| unwritten(out, &error)))?;
+        whole(out, |mut file| {
+            file.write_all(proposal.csv().as_bytes())
+                .map_err(|error| unwritten(out, &error))
+        })?;
     }
-    if arguments.json { emit_json(&proposal.document()) } else { emit(&proposal.text()) }
+    if arguments.json {
+        emit_json(&proposal.document())
+    } else {
+        emit(&proposal.text())
+    }
 }

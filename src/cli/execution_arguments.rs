@@ -2,7 +2,9 @@
 
 use super::surroundings::{cores, open_store, surroundings};
 use crate::error::{Error, Fault, Result};
-use crate::pipeline::{CompletedRun, Override, Plan, Purpose, RunOptions, Selection, faults_of_robots, run};
+use crate::pipeline::{
+    CompletedRun, Override, Plan, Purpose, RunOptions, Selection, faults_of_robots, run,
+};
 use crate::progress::{Progress, Verbosity};
 use crate::shell::typed;
 use crate::stage::STAGES;
@@ -51,7 +53,10 @@ impl ExecutionArguments {
         Plan::load(pipeline, &[&self.set, more].concat(), STAGES).map_err(|error| match error {
             Error::Spec(mut faults) => {
                 let robots = faults_of_robots(pipeline, &self.set, STAGES);
-                let new: Vec<Fault> = robots.into_iter().filter(|fault| !faults.contains(fault)).collect();
+                let new: Vec<Fault> = robots
+                    .into_iter()
+                    .filter(|fault| !faults.contains(fault))
+                    .collect();
                 faults.extend(new);
                 Error::Spec(faults)
             }
@@ -70,7 +75,9 @@ impl ExecutionArguments {
 
     /// `--store` as it was given, to be typed again; empty for the usual place.
     pub fn store_again(&self) -> String {
-        self.store.as_ref().map_or_else(String::new, |store| format!(" --store {}", typed(&store.display().to_string())))
+        self.store.as_ref().map_or_else(String::new, |store| {
+            format!(" --store {}", typed(&store.display().to_string()))
+        })
     }
 
     pub fn jobs(&self) -> usize {
@@ -78,11 +85,38 @@ impl ExecutionArguments {
     }
 
     /// Runs the selected stages; with as much progress as is to be shown.
-    pub fn run(&self, plan: &Plan, store: &Store, task: CommandTask, command_line: &[OsString]) -> Result<CompletedRun> {
-        let CommandTask { purpose, selection, shown } = task;
-        let progress = Progress::new(shown, plan.stages.iter().map(|stage| stage.id.len()).max().unwrap_or(0));
-        let options = RunOptions { selection, jobs: self.jobs(), purpose };
-        let result = run(plan, store, &options, &surroundings(command_line), &progress);
+    pub fn run(
+        &self,
+        plan: &Plan,
+        store: &Store,
+        task: CommandTask,
+        command_line: &[OsString],
+    ) -> Result<CompletedRun> {
+        let CommandTask {
+            purpose,
+            selection,
+            shown,
+        } = task;
+        let progress = Progress::new(
+            shown,
+            plan.stages
+                .iter()
+                .map(|stage| stage.id.len())
+                .max()
+                .unwrap_or(0),
+        );
+        let options = RunOptions {
+            selection,
+            jobs: self.jobs(),
+            purpose,
+        };
+        let result = run(
+            plan,
+            store,
+            &options,
+            &surroundings(command_line),
+            &progress,
+        );
         progress.finish();
         result
     }

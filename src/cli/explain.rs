@@ -34,7 +34,9 @@ pub(super) fn main(arguments: &ExplainArguments) -> Result<()> {
     let store = open_store(arguments.store.as_deref())?;
     let explanation = explain(&store, &find_run(&store, &arguments.run)?, &arguments.stage)?;
     if arguments.json {
-        return emit_json(&serde_json::to_value(&explanation).map_err(|error| Error::Bug(error.to_string()))?);
+        return emit_json(
+            &serde_json::to_value(&explanation).map_err(|error| Error::Bug(error.to_string()))?,
+        );
     }
     emit(&summary::explanation(&explanation))
 }

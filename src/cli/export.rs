@@ -36,9 +36,16 @@ struct Chosen(&'static Format);
 
 /// The formats as values of an option, each with its line of help.
 fn formats() -> impl TypedValueParser<Value = Chosen> {
-    let values = FORMATS.iter().map(|format| PossibleValue::new(format.name).help(format.help));
-    PossibleValuesParser::new(values)
-        .try_map(|name| FORMATS.iter().find(|format| format.name == name).map(Chosen).ok_or("no format"))
+    let values = FORMATS
+        .iter()
+        .map(|format| PossibleValue::new(format.name).help(format.help));
+    PossibleValuesParser::new(values).try_map(|name| {
+        FORMATS
+            .iter()
+            .find(|format| format.name == name)
+            .map(Chosen)
+            .ok_or("no format")
+    })
 }
 
 const EXAMPLES: &str = "Examples:
@@ -51,20 +58,34 @@ pub(super) fn main(arguments: &ExportArguments, command_line: &[OsString]) -> Re
     let identified = arguments.model.load(Purpose::Export, command_line)?;
     identified.spare(arguments.out.as_deref())?;
     if identified.is_of_torques_alone() && arguments.format.0.carries == CarriedTorques::Nothing {
-        let allowed: Vec<&str> =
-            FORMATS.iter().filter(|format| format.carries != CarriedTorques::Nothing).map(|format| format.name).collect();
-        let message = format!("torques were identified, no geometry, and it holds none; allowed: {}", allowed.join(", "));
+        let allowed: Vec<&str> = FORMATS
+            .iter()
+            .filter(|format| format.carries != CarriedTorques::Nothing)
+            .map(|format| format.name)
+            .collect();
+        let message = format!(
+            "torques were identified, no geometry, and it holds none; allowed: {}",
+            allowed.join(", ")
+        );
         return Err(Error::spec("--format", message));
     }
     let export = Export::of(identified, arguments.model.force);
     let text = (arguments.format.0.text)(&export)?;
     match &arguments.out {
-        Some(path) => std::fs::write(path, text)
-            .map_err(|error| Error::store(path.display().to_string(), format!("cannot be written: {error}")))?,
+        Some(path) => std::fs::write(path, text).map_err(|error| {
+            Error::store(
+                path.display().to_string(),
+                format!("cannot be written: {error}"),
+            )
+        })?,
         None => emit(&text)?,
     }
     if !arguments.model.quiet {
-        let said: String = export.remarks_in(arguments.format.0).iter().map(|line| format!("{line}\n")).collect();
+        let said: String = export
+            .remarks_in(arguments.format.0)
+            .iter()
+            .map(|line| format!("{line}\n"))
+            .collect();
         let _ = std::io::stderr().write_all(said.as_bytes());
     }
     Ok(())

@@ -31,8 +31,7 @@ pub(super) struct FeedForward<'a> {
 
 pub(super) fn feed_forward(asked: &FeedForward, identified: &IdentifiedModel) -> Result<()> {
     let Some(torques) = &identified.torques else {
-        let message =
-            "the model has no torques: put `- uses: diagnose_torques` after `ingest_torques`, or name such a stage with --step";
+        let message = "the model has no torques: put `- uses: diagnose_torques` after `ingest_torques`, or name such a stage with --step";
         return Err(Error::spec("--torque", message));
     };
     let (place, text) = read(asked.motion)?;
@@ -40,21 +39,38 @@ pub(super) fn feed_forward(asked: &FeedForward, identified: &IdentifiedModel) ->
     let motion = &mut trajectory.motion;
     motion.since_start = asked.since_start;
     if motion.temperature.is_none() {
-        motion.temperature = asked.temperature.map(|temperature| vec![temperature; motion.time.len()]);
+        motion.temperature = asked
+            .temperature
+            .map(|temperature| vec![temperature; motion.time.len()]);
     }
     let mut needed = torques.model.needed(&torques.arm, &trajectory.motion)?;
     if !asked.sigma {
         needed.u95 = None;
     }
-    let model = if asked.force { identified.refusals.clone() } else { Vec::new() };
-    let gate = TorqueGate { uncertainty: asked.max_uncertainty, insisted: asked.force, model };
+    let model = if asked.force {
+        identified.refusals.clone()
+    } else {
+        Vec::new()
+    };
+    let gate = TorqueGate {
+        uncertainty: asked.max_uncertainty,
+        insisted: asked.force,
+        model,
+    };
     let judged = torques.model.judged(&trajectory.motion, &needed, &gate);
     let written = trajectory.written(&needed, torques.per_ampere.as_deref(), &judged);
     match asked.out {
-        Some(out) => whole(out, |mut file| file.write_all(written.as_bytes()).map_err(|error| unwritten(out, &error)))?,
+        Some(out) => whole(out, |mut file| {
+            file.write_all(written.as_bytes())
+                .map_err(|error| unwritten(out, &error))
+        })?,
         None => emit(&written)?,
     }
-    let mut told = if asked.quiet { String::new() } else { said(torques, &trajectory, judged.len()) };
+    let mut told = if asked.quiet {
+        String::new()
+    } else {
+        said(torques, &trajectory, judged.len())
+    };
     if asked.sigma && needed.u95.is_none() {
         told.push_str("warning: a table of parameters alone does not say how certain torques are: nothing is refused for it\n");
     }
@@ -68,28 +84,56 @@ fn warnings(judged: &[JudgedRow]) -> String {
     let rows = counted(judged.len(), "row");
     let line = |is: fn(&JudgedRow) -> bool, what: &str| {
         let count = judged.iter().filter(|row| is(row)).count();
-        if count > 0 { format!("warning: {count} of {rows} {what} (column `remark`)\n") } else { String::new() }
+        if count > 0 {
+            format!("warning: {count} of {rows} {what} (column `remark`)\n")
+        } else {
+            String::new()
+        }
     };
     [
-        line(JudgedRow::is_beyond, "lie beyond the motion that the model was seen in"),
-        line(JudgedRow::is_refused, "are less certain than allowed and have no torques; --force writes them all the same"),
-        line(JudgedRow::is_insisted, "are refused and written because of --force"),
+        line(
+            JudgedRow::is_beyond,
+            "lie beyond the motion that the model was seen in",
+        ),
+        line(
+            JudgedRow::is_refused,
+            "are less certain than allowed and have no torques; --force writes them all the same",
+        ),
+        line(
+            JudgedRow::is_insisted,
+            "are refused and written because of --force",
+        ),
     ]
     .concat()
 }
 
 /// Fails with the rows that have no torques, the first of them.
 fn refused(judged: &[JudgedRow], trajectory: &Trajectory, place: &str) -> Result<()> {
-    let refused = judged.iter().enumerate().filter(|(_, row)| row.is_refused()).take(MOST);
+    let refused = judged
+        .iter()
+        .enumerate()
+        .filter(|(_, row)| row.is_refused())
+        .take(MOST);
     let fault = |(row, judged): (usize, &JudgedRow)| {
-        Fault::new(trajectory.place(row, place), format!("{judged}: no torques are written"))
+        Fault::new(
+            trajectory.place(row, place),
+            format!("{judged}: no torques are written"),
+        )
     };
     let faults: Vec<Fault> = refused.map(fault).collect();
-    if faults.is_empty() { Ok(()) } else { Err(Error::Data(faults)) }
+    if faults.is_empty() {
+        Ok(())
+    } else {
+        Err(Error::Data(faults))
+    }
 }
 
 fn read(motion: &Path) -> Result<(String, String)> {
-    let place = if motion.as_os_str() == "-" { "stdin".to_string() } else { motion.display().to_string() };
+    let place = if motion.as_os_str() == "-" {
+        "stdin".to_string()
+    } else {
+        motion.display().to_string()
+    };
     let bytes = if motion.as_os_str() == "-" {
         let mut bytes = Vec::new();
         std::io::stdin().read_to_end(&mut bytes).map(|_| bytes)
@@ -105,18 +149,37 @@ fn read(motion: &Path) -> Result<(String, String)> {
 fn said(torques: &IdentifiedTorques, trajectory: &Trajectory, rows: usize) -> String {
     let derived = match (&trajectory.motion.velocity, &trajectory.motion.acceleration) {
         (Some(_), Some(_)) => "velocities and accelerations as given",
-        (Some(_), None) => "accelerations by differences of positions, after the low-pass of the recording",
-        (None, Some(_)) => "velocities by differences of positions, after the low-pass of the recording",
-        (None, None) => "velocities and accelerations by differences of positions, after the low-pass of the recording",
+        (Some(_), None) => {
+            "accelerations by differences of positions, after the low-pass of the recording"
+        }
+        (None, Some(_)) => {
+            "velocities by differences of positions, after the low-pass of the recording"
+        }
+        (None, None) => {
+            "velocities and accelerations by differences of positions, after the low-pass of the recording"
+        }
     };
-    let warm = torques.model.terms.iter().any(|term| term.effect == "warmup_friction");
+    let warm = torques
+        .model
+        .terms
+        .iter()
+        .any(|term| term.effect == "warmup_friction");
     let warm = match (warm, trajectory.motion.since_start) {
-        (true, None) => "friction is that of a warm arm (--since-start says how long ago it began to move)\n",
+        (true, None) => {
+            "friction is that of a warm arm (--since-start says how long ago it began to move)\n"
+        }
         _ => "",
     };
-    let currents =
-        if torques.per_ampere.is_some() { ", currents by the declared reduction ratios and motor constants" } else { "" };
-    let left: String = torques.of_the_recording.iter().map(|statement| format!("not fed forward: {statement}\n")).collect();
+    let currents = if torques.per_ampere.is_some() {
+        ", currents by the declared reduction ratios and motor constants"
+    } else {
+        ""
+    };
+    let left: String = torques
+        .of_the_recording
+        .iter()
+        .map(|statement| format!("not fed forward: {statement}\n"))
+        .collect();
     format!(
         "model: {}\n{}: {derived}\ntorques as the drives or sensors of the recording state them, payload as it was there{currents}\n{warm}{left}",
         torques.origin,

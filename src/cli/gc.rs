@@ -35,14 +35,23 @@ pub(super) struct GcArguments {
 
 pub(super) fn main(arguments: &GcArguments) -> Result<()> {
     let store = open_store(arguments.store.as_deref())?;
-    let keep = kept_actions(&store, usize::try_from(arguments.keep_runs).unwrap_or(usize::MAX))?;
+    let keep = kept_actions(
+        &store,
+        usize::try_from(arguments.keep_runs).unwrap_or(usize::MAX),
+    )?;
     let grace = Duration::from_secs(u64::from(arguments.grace_hours) * 3600);
     let before = now().checked_sub(grace).unwrap_or(std::time::UNIX_EPOCH);
     let sweep = store.sweep(&keep, before, arguments.dry_run)?;
     if arguments.json {
-        return emit_json(&serde_json::to_value(&sweep).map_err(|error| Error::Bug(error.to_string()))?);
+        return emit_json(
+            &serde_json::to_value(&sweep).map_err(|error| Error::Bug(error.to_string()))?,
+        );
     }
-    let verb = if arguments.dry_run { "would remove" } else { "removed" };
+    let verb = if arguments.dry_run {
+        "would remove"
+    } else {
+        "removed"
+    };
     let mut text = format!(
         "{verb} {} and {}, {:.1} MB; kept: {}\n",
         counted(sweep.objects, "table"),

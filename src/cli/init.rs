@@ -43,16 +43,25 @@ const EXAMPLES: &str = "Examples:
 
 /// Typical robots as values of an option, each with its line of help; arms of the library are taken by name and listed by `calib robots`.
 fn kinds() -> impl TypedValueParser<Value = RobotFileKind> {
-    let typical = KINDS.iter().map(|kind| PossibleValue::new(kind.name()).help(kind.help()));
-    let arms = LIBRARY.iter().map(|arm| PossibleValue::new(arm.name).hide(true));
-    PossibleValuesParser::new(typical.chain(arms)).try_map(|name| RobotFileKind::find(&name).ok_or("no such arm"))
+    let typical = KINDS
+        .iter()
+        .map(|kind| PossibleValue::new(kind.name()).help(kind.help()));
+    let arms = LIBRARY
+        .iter()
+        .map(|arm| PossibleValue::new(arm.name).hide(true));
+    PossibleValuesParser::new(typical.chain(arms))
+        .try_map(|name| RobotFileKind::find(&name).ok_or("no such arm"))
 }
 
 /// Gives the exit code: 1 where nothing was understood of the recordings.
 pub(super) fn main(arguments: &InitArguments) -> u8 {
     match execute(arguments) {
         Ok(start) if start.understood_nothing() => {
-            let files: Vec<String> = start.accounts.iter().map(|(path, _)| path.display().to_string()).collect();
+            let files: Vec<String> = start
+                .accounts
+                .iter()
+                .map(|(path, _)| path.display().to_string())
+                .collect();
             let message = format!(
                 "neither joints nor a measured point were recognised in {}: name the columns where it says REPLACE",
                 files.join(" and ")
@@ -66,19 +75,40 @@ pub(super) fn main(arguments: &InitArguments) -> u8 {
 }
 
 fn execute(arguments: &InitArguments) -> Result<StarterFiles> {
-    let InitArguments { folder, data, robot, urdf, tip } = arguments;
+    let InitArguments {
+        folder,
+        data,
+        robot,
+        urdf,
+        tip,
+    } = arguments;
     let files = ["robot.yaml", "pipeline.yaml"].map(|name| folder.join(name));
     if files[1].exists() {
-        return Err(Error::spec(files[1].display().to_string(), "is already there; nothing was written"));
+        return Err(Error::spec(
+            files[1].display().to_string(),
+            "is already there; nothing was written",
+        ));
     }
-    let start = start(&InitRequest { folder, data, robot: *robot, urdf: urdf.as_deref(), tip })?;
+    let start = start(&InitRequest {
+        folder,
+        data,
+        robot: *robot,
+        urdf: urdf.as_deref(),
+        tip,
+    })?;
     let refused = |path: &Path| {
         let place = path.display().to_string();
-        move |error: std::io::Error| Error::store(place.clone(), format!("cannot be written: {error}"))
+        move |error: std::io::Error| {
+            Error::store(place.clone(), format!("cannot be written: {error}"))
+        }
     };
     std::fs::create_dir_all(folder).map_err(refused(folder))?;
     let texts = [start.robot.as_ref(), Some(&start.pipeline)];
-    for (path, text) in files.iter().zip(texts).filter_map(|(path, text)| Some((path, text?))) {
+    for (path, text) in files
+        .iter()
+        .zip(texts)
+        .filter_map(|(path, text)| Some((path, text?)))
+    {
         std::fs::write(path, text).map_err(refused(path))?;
     }
     for note in &start.notes {
@@ -96,23 +126,40 @@ fn closing(arguments: &InitArguments, start: &StarterFiles, files: &[PathBuf; 2]
     let [robot, pipeline] = files.each_ref().map(|path| path.display());
     match &start.robot {
         Some(_) => text.push_str(&format!("wrote {robot} and {pipeline}\n\nnext:\n")),
-        None => text.push_str(&format!("wrote {pipeline} beside {robot}, which is used as it is\n\nnext:\n")),
+        None => text.push_str(&format!(
+            "wrote {pipeline} beside {robot}, which is used as it is\n\nnext:\n"
+        )),
     }
     if start.robot.is_none() {
-        text.push_str(&format!("  1. {robot}: see that it is the robot of these recordings\n"));
+        text.push_str(&format!(
+            "  1. {robot}: see that it is the robot of these recordings\n"
+        ));
     } else if let Some(RobotFileKind::Arm(_)) = arguments.robot {
-        text.push_str(&format!("  1. {robot}: the arm's own numbers; put the measured point where it says REPLACE\n"));
+        text.push_str(&format!(
+            "  1. {robot}: the arm's own numbers; put the measured point where it says REPLACE\n"
+        ));
     } else if arguments.urdf.is_none() {
-        text.push_str(&format!("  1. {robot}: put your robot's numbers where it says REPLACE\n"));
+        text.push_str(&format!(
+            "  1. {robot}: put your robot's numbers where it says REPLACE\n"
+        ));
     } else {
-        text.push_str(&format!("  1. {robot}: say where the measured point sits on the tool\n"));
+        text.push_str(&format!(
+            "  1. {robot}: say where the measured point sits on the tool\n"
+        ));
     }
     let name = if start.missing.is_empty() {
         String::new()
     } else {
-        format!("; name {} where it says REPLACE: they were not recognised", start.missing.join(" and "))
+        format!(
+            "; name {} where it says REPLACE: they were not recognised",
+            start.missing.join(" and ")
+        )
     };
-    text.push_str(&format!("  2. {pipeline}: look at the lines marked CHECK{name}\n"));
-    text.push_str(&format!("  3. calib check {pipeline}\n  4. calib run {pipeline}\n"));
+    text.push_str(&format!(
+        "  2. {pipeline}: look at the lines marked CHECK{name}\n"
+    ));
+    text.push_str(&format!(
+        "  3. calib check {pipeline}\n  4. calib run {pipeline}\n"
+    ));
     text
 }

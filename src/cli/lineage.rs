@@ -32,7 +32,9 @@ pub(super) fn main(arguments: &LineageArguments) -> Result<()> {
     let store = open_store(arguments.store.as_deref())?;
     let node = lineage(&store, &hash(&store, &arguments.table)?)?;
     if arguments.json {
-        return emit_json(&serde_json::to_value(&node).map_err(|error| Error::Bug(error.to_string()))?);
+        return emit_json(
+            &serde_json::to_value(&node).map_err(|error| Error::Bug(error.to_string()))?,
+        );
     }
     let mut text = String::new();
     lines(&node, "", 0, &mut text);
@@ -42,35 +44,57 @@ pub(super) fn main(arguments: &LineageArguments) -> Result<()> {
 fn hash(store: &Store, table: &str) -> Result<String> {
     if Path::new(table).is_file() {
         let found = table_hash(Path::new(table))?;
-        return found.ok_or_else(|| Error::spec(table, "carries no content hash: calib did not write it"));
+        return found
+            .ok_or_else(|| Error::spec(table, "carries no content hash: calib did not write it"));
     }
     let parts: Vec<&str> = table.split('/').collect();
-    let [run, stage, port] = parts[..] else { return Ok(table.into()) };
+    let [run, stage, port] = parts[..] else {
+        return Ok(table.into());
+    };
     let manifest = Manifest::of(store, &find_run(store, run)?)?;
-    let output = manifest.stage(stage).and_then(|stage| stage.outputs.iter().find(|output| output.port == port));
+    let output = manifest
+        .stage(stage)
+        .and_then(|stage| stage.outputs.iter().find(|output| output.port == port));
     match output {
         Some(output) => Ok(output.table.table_hash.to_string()),
         None => Err(Error::spec(
             table,
-            format!("run {} has no such table; calib show {run}/{stage} lists a stage's", manifest.run_id),
+            format!(
+                "run {} has no such table; calib show {run}/{stage} lists a stage's",
+                manifest.run_id
+            ),
         )),
     }
 }
 
 fn lines(node: &LineageNode, port: &str, depth: usize, text: &mut String) {
     let indent = "  ".repeat(depth);
-    let port = if port.is_empty() { String::new() } else { format!("{port} <- ") };
+    let port = if port.is_empty() {
+        String::new()
+    } else {
+        format!("{port} <- ")
+    };
     let hash: String = node.table_hash.as_str().chars().take(12).collect();
     let Some(made) = &node.made else {
-        text.push_str(&format!("{indent}{port}{hash}: the store has no record of who made it\n"));
+        text.push_str(&format!(
+            "{indent}{port}{hash}: the store has no record of who made it\n"
+        ));
         return;
     };
-    text.push_str(&format!("{indent}{port}{}.{}  {hash}  {}", made.stage, made.port, counted(made.rows, "row")));
+    text.push_str(&format!(
+        "{indent}{port}{}.{}  {hash}  {}",
+        made.stage,
+        made.port,
+        counted(made.rows, "row")
+    ));
     if made.told_before {
         text.push_str("  (as above)\n");
         return;
     }
-    text.push_str(&format!("  by {} {} in run {}, {:.16}\n", made.uses, made.implementation, made.run, made.when));
+    text.push_str(&format!(
+        "  by {} {} in run {}, {:.16}\n",
+        made.uses, made.implementation, made.run, made.when
+    ));
     for (name, hash) in &made.files {
         text.push_str(&format!("{indent}  file {name}  {hash:.12}\n"));
     }

@@ -46,12 +46,27 @@ pub(super) fn main(arguments: &LogArguments) -> Result<()> {
             text.push_str("older ones: --limit 0\n");
             break;
         }
-        let own: Vec<&str> = tags.iter().filter(|(_, tagged)| **tagged == run).map(|(tag, _)| tag.as_str()).collect();
+        let own: Vec<&str> = tags
+            .iter()
+            .filter(|(_, tagged)| **tagged == run)
+            .map(|(tag, _)| tag.as_str())
+            .collect();
         let is_head = head.as_ref() == Some(&run);
         match Manifest::of(&store, &run) {
-            Ok(manifest) if arguments.pipeline.as_ref().is_some_and(|name| name != &manifest.pipeline.name) => continue,
+            Ok(manifest)
+                if arguments
+                    .pipeline
+                    .as_ref()
+                    .is_some_and(|name| name != &manifest.pipeline.name) =>
+            {
+                continue;
+            }
             Ok(manifest) => {
-                let names: Vec<&str> = is_head.then_some("HEAD").into_iter().chain(own.iter().copied()).collect();
+                let names: Vec<&str> = is_head
+                    .then_some("HEAD")
+                    .into_iter()
+                    .chain(own.iter().copied())
+                    .collect();
                 let [executed, cached] = counts(&store, &manifest);
                 text.push_str(&line(&manifest, [executed, cached], &names));
                 rows.push(json!({
@@ -75,8 +90,14 @@ pub(super) fn main(arguments: &LogArguments) -> Result<()> {
 
 fn line(manifest: &Manifest, [executed, cached]: [usize; 2], tags: &[&str]) -> String {
     let status = status(manifest);
-    let seconds = manifest.wall_seconds.map_or_else(String::new, |seconds| format!("  {seconds:.1} s"));
-    let tags = if tags.is_empty() { String::new() } else { format!("  [{}]", tags.join(", ")) };
+    let seconds = manifest
+        .wall_seconds
+        .map_or_else(String::new, |seconds| format!("  {seconds:.1} s"));
+    let tags = if tags.is_empty() {
+        String::new()
+    } else {
+        format!("  [{}]", tags.join(", "))
+    };
     format!(
         "{}  {:.16}  {:10}  {}  {status}, {executed} run, {cached} cached{seconds}{tags}\n",
         manifest.run_id,
@@ -88,9 +109,21 @@ fn line(manifest: &Manifest, [executed, cached]: [usize; 2], tags: &[&str]) -> S
 
 /// How many stages were executed, and how many cached. The manifest of a run that did not end is older than its events.
 fn counts(store: &Store, manifest: &Manifest) -> [usize; 2] {
-    let events = if manifest.status == RunStatus::Running { store.events(&manifest.run_id) } else { Vec::new() };
+    let events = if manifest.status == RunStatus::Running {
+        store.events(&manifest.run_id)
+    } else {
+        Vec::new()
+    };
     [StageStatus::Executed, StageStatus::Cached].map(|status| {
-        let ended = events.iter().filter(|event| event["event"] == "ends" && event["detail"]["status"] == json!(status)).count();
-        manifest.stages.iter().filter(|stage| stage.status == status).count().max(ended)
+        let ended = events
+            .iter()
+            .filter(|event| event["event"] == "ends" && event["detail"]["status"] == json!(status))
+            .count();
+        manifest
+            .stages
+            .iter()
+            .filter(|stage| stage.status == status)
+            .count()
+            .max(ended)
     })
 }

@@ -93,7 +93,9 @@ pub fn command() -> clap::Command {
 
 /// Runs a command line, prints what comes of it and gives the exit code.
 pub fn main(arguments: Vec<OsString>) -> u8 {
-    let found = command().try_get_matches_from(&arguments).and_then(|found| Arguments::from_arg_matches(&found));
+    let found = command()
+        .try_get_matches_from(&arguments)
+        .and_then(|found| Arguments::from_arg_matches(&found));
     let parsed = match found {
         Ok(parsed) => parsed,
         Err(error) => {
@@ -110,12 +112,22 @@ pub fn main(arguments: Vec<OsString>) -> u8 {
 /// Names the verb that a misspelt one is nearest to, also where letters changed places (`rnu`), which clap's own measure does not see.
 fn with_nearest_verb(mut error: clap::Error) -> clap::Error {
     let given = match error.get(ContextKind::InvalidSubcommand) {
-        Some(ContextValue::String(given)) if error.get(ContextKind::SuggestedSubcommand).is_none() => given.clone(),
+        Some(ContextValue::String(given))
+            if error.get(ContextKind::SuggestedSubcommand).is_none() =>
+        {
+            given.clone()
+        }
         _ => return error,
     };
     let command = Arguments::command();
-    if let Some(near) = nearest(&given, command.get_subcommands().map(clap::Command::get_name)) {
-        error.insert(ContextKind::SuggestedSubcommand, ContextValue::Strings(vec![near.into()]));
+    if let Some(near) = nearest(
+        &given,
+        command.get_subcommands().map(clap::Command::get_name),
+    ) {
+        error.insert(
+            ContextKind::SuggestedSubcommand,
+            ContextValue::Strings(vec![near.into()]),
+        );
     }
     error
 }
@@ -175,24 +187,34 @@ fn message(error: &Error) -> String {
 fn emit(text: &str) -> Result<()> {
     let mut out = std::io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
-        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(Error::store("stdout", error.to_string())),
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(Error::store("stdout", error.to_string()))
+        }
         _ => Ok(()),
     }
 }
 
 /// Writes a page where the command line names it.
 fn write(path: &Path, text: &str) -> Result<()> {
-    std::fs::write(path, text).map_err(|error| Error::spec(path.display().to_string(), format!("cannot write: {error}")))
+    std::fs::write(path, text)
+        .map_err(|error| Error::spec(path.display().to_string(), format!("cannot write: {error}")))
 }
 
 /// Lines of a result, folded and in colour where stdout is a terminal.
 fn emit_lines(text: &str) -> Result<()> {
-    let Some(columns) = surroundings::columns() else { return emit(text) };
+    let Some(columns) = surroundings::columns() else {
+        return emit(text);
+    };
     let text = crate::summary::folded(text, columns);
-    emit(&if surroundings::colours() { paint::painted(&text) } else { text })
+    emit(&if surroundings::colours() {
+        paint::painted(&text)
+    } else {
+        text
+    })
 }
 
 fn emit_json(value: &serde_json::Value) -> Result<()> {
-    let text = serde_json::to_string_pretty(value).map_err(|error| Error::Bug(error.to_string()))?;
+    let text =
+        serde_json::to_string_pretty(value).map_err(|error| Error::Bug(error.to_string()))?;
     emit(&format!("{text}\n"))
 }

@@ -55,10 +55,15 @@ impl ModelArguments {
 
     /// Loads the model and says what is to be known of it; runs the pipeline's stages that are not done.
     pub fn load(&self, purpose: Purpose, command_line: &[OsString]) -> Result<IdentifiedModel> {
-        let wrong = [("--max-shift", self.max_shift), ("--max-tilt", self.max_tilt)]
-            .into_iter()
-            .filter(|(_, given)| !(given.is_finite() && *given > 0.0))
-            .map(|(option, given)| Fault::new(option, format!("expected a number above 0, found {given}")));
+        let wrong = [
+            ("--max-shift", self.max_shift),
+            ("--max-tilt", self.max_tilt),
+        ]
+        .into_iter()
+        .filter(|(_, given)| !(given.is_finite() && *given > 0.0))
+        .map(|(option, given)| {
+            Fault::new(option, format!("expected a number above 0, found {given}"))
+        });
         let wrong: Vec<Fault> = wrong.collect();
         if !wrong.is_empty() {
             return Err(Error::Spec(wrong));
@@ -72,19 +77,36 @@ impl ModelArguments {
 
     /// A model that no commands are to be made of is refused, or insisted on.
     fn judged(&self, mut identified: IdentifiedModel) -> Result<IdentifiedModel> {
-        let limits = GateLimits { shift: self.max_shift * 1e-3, tilt: self.max_tilt.to_radians(), ..GateLimits::default() };
-        identified.refusals.extend(Gate { limits, ..Gate::default() }.beyond(&identified.model));
+        let limits = GateLimits {
+            shift: self.max_shift * 1e-3,
+            tilt: self.max_tilt.to_radians(),
+            ..GateLimits::default()
+        };
+        identified.refusals.extend(
+            Gate {
+                limits,
+                ..Gate::default()
+            }
+            .beyond(&identified.model),
+        );
         if identified.refusals.is_empty() {
             return Ok(identified);
         }
         if self.force {
             for reason in &identified.refusals {
-                let _ = writeln!(std::io::stderr(), "warning: used because of --force: {reason}");
+                let _ = writeln!(
+                    std::io::stderr(),
+                    "warning: used because of --force: {reason}"
+                );
             }
             return Ok(identified);
         }
-        let fault =
-            |reason: &String| Fault::new(&identified.origin, format!("refused: {reason}. Correct that, or insist with --force"));
+        let fault = |reason: &String| {
+            Fault::new(
+                &identified.origin,
+                format!("refused: {reason}. Correct that, or insist with --force"),
+            )
+        };
         Err(Error::Data(identified.refusals.iter().map(fault).collect()))
     }
 
@@ -95,7 +117,11 @@ impl ModelArguments {
                 let message = "say which robot the parameters are of: --robot robot.yaml, or the table `robot` of the same run";
                 return Err(Error::spec(self.model.display().to_string(), message));
             };
-            return IdentifiedModel::of_files(&Files { parameters: self.model.clone(), robot, unchecked: self.unchecked });
+            return IdentifiedModel::of_files(&Files {
+                parameters: self.model.clone(),
+                robot,
+                unchecked: self.unchecked,
+            });
         }
         if self.robot.is_some() {
             return Err(Error::spec(
@@ -107,7 +133,9 @@ impl ModelArguments {
         if !matches!(ending.as_str(), "yaml" | "yml") {
             let manifest = Manifest::of(&store, &self.run(&store)?)?;
             let mut identified = IdentifiedModel::of_run(&store, &manifest, step)?;
-            identified.refusals.extend(LimitsSummary::of(&manifest, &store)?.exceeded());
+            identified
+                .refusals
+                .extend(LimitsSummary::of(&manifest, &store)?.exceeded());
             // A pipeline's stages say it themselves.
             identified.warnings.append(&mut identified.stage_warnings);
             return Ok(identified);
@@ -115,10 +143,18 @@ impl ModelArguments {
         let plan = self.means.plan(&self.model)?;
         // A report with limits says whether the model is accepted.
         let wanted = [steps_of(&plan)?, judges_of(&plan)].concat();
-        let task = CommandTask { purpose, selection: Selection::default(), shown: shown(self.quiet, false) };
-        let outcome = self.means.run(&plan.needed_for_all(&wanted), &store, task, command_line)?;
+        let task = CommandTask {
+            purpose,
+            selection: Selection::default(),
+            shown: shown(self.quiet, false),
+        };
+        let outcome = self
+            .means
+            .run(&plan.needed_for_all(&wanted), &store, task, command_line)?;
         let mut identified = IdentifiedModel::of_run(&store, &outcome.manifest, step)?;
-        identified.refusals.extend(LimitsSummary::of(&outcome.manifest, &store)?.exceeded());
+        identified
+            .refusals
+            .extend(LimitsSummary::of(&outcome.manifest, &store)?.exceeded());
         Ok(identified)
     }
 
@@ -128,8 +164,15 @@ impl ModelArguments {
         let asked = if name == "latest" { "HEAD" } else { &*name };
         find_run(store, asked).map_err(|error| match error {
             Error::Spec(faults) => {
-                let why = faults.into_iter().next().map(|fault| fault.message).unwrap_or_default();
-                Error::spec(&*name, format!("neither a pipeline (.yaml), a table (.parquet) nor a run: {why}"))
+                let why = faults
+                    .into_iter()
+                    .next()
+                    .map(|fault| fault.message)
+                    .unwrap_or_default();
+                Error::spec(
+                    &*name,
+                    format!("neither a pipeline (.yaml), a table (.parquet) nor a run: {why}"),
+                )
             }
             other => other,
         })

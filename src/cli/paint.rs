@@ -39,16 +39,24 @@ pub fn painted(text: &str) -> String {
 }
 
 fn line_of(line: &str) -> String {
-    let Some((label, rest)) = line.split_at_checked(LABEL) else { return line.into() };
+    let Some((label, rest)) = line.split_at_checked(LABEL) else {
+        return line.into();
+    };
     let word = label.trim();
-    let rank = word.strip_suffix('.').is_some_and(|digits| digits.parse::<u32>().is_ok());
+    let rank = word
+        .strip_suffix('.')
+        .is_some_and(|digits| digits.parse::<u32>().is_ok());
     let bold = match () {
-        () if ALARMS.contains(&word) => Style::new().bold().fg_color(Some(AnsiColor::Yellow.into())),
+        () if ALARMS.contains(&word) => {
+            Style::new().bold().fg_color(Some(AnsiColor::Yellow.into()))
+        }
         () if rank || LABELS.contains(&word) => Style::new().bold(),
         () => return line.into(),
     };
     let judges = ["verdict", "limits"].contains(&word);
-    let verdict = VERDICTS.iter().find(|(begins, _)| judges && rest.starts_with(begins));
+    let verdict = VERDICTS
+        .iter()
+        .find(|(begins, _)| judges && rest.starts_with(begins));
     let rest = match verdict {
         Some((word, colour)) => {
             let colour = Style::new().bold().fg_color(Some((*colour).into()));
@@ -70,8 +78,14 @@ mod tests {
             told,
             "\u{1b}[1mverdict   \u{1b}[0m\u{1b}[1m\u{1b}[32mexplained\u{1b}[0m: all of it\n          calib poses --run HEAD\n"
         );
-        assert!(painted("warning   late\n").starts_with("\u{1b}[1m\u{1b}[33mwarning   \u{1b}[0mlate"));
-        for plain in ["short\n", "  step       set             points\n", "          calib poses\n"] {
+        assert!(
+            painted("warning   late\n").starts_with("\u{1b}[1m\u{1b}[33mwarning   \u{1b}[0mlate")
+        );
+        for plain in [
+            "short\n",
+            "  step       set             points\n",
+            "          calib poses\n",
+        ] {
             assert_eq!(painted(plain), plain);
         }
     }

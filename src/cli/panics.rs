@@ -17,13 +17,17 @@ pub(super) fn guarded(verb: impl FnOnce() -> u8) -> u8 {
 
 /// What a verb gives, or the bug that its panic is.
 fn caught(verb: impl FnOnce() -> u8) -> Result<u8> {
-    catch_unwind(AssertUnwindSafe(verb)).map_err(|_| Error::Bug(LAST.lock().unwrap_or_else(PoisonError::into_inner).clone()))
+    catch_unwind(AssertUnwindSafe(verb))
+        .map_err(|_| Error::Bug(LAST.lock().unwrap_or_else(PoisonError::into_inner).clone()))
 }
 
 fn keep(panic: &PanicHookInfo) {
     let said = panic.payload_as_str().unwrap_or("stopped without a word");
-    let place = panic.location().map_or_else(String::new, |place| format!(", at {}:{}", place.file(), place.line()));
-    *LAST.lock().unwrap_or_else(PoisonError::into_inner) = format!("{}{place}", said.replace('\n', " "));
+    let place = panic.location().map_or_else(String::new, |place| {
+        format!(", at {}:{}", place.file(), place.line())
+    });
+    *LAST.lock().unwrap_or_else(PoisonError::into_inner) =
+        format!("{}{place}", said.replace('\n', " "));
 }
 
 #[cfg(test)]
@@ -45,7 +49,15 @@ mod tests {
         std::panic::set_hook(hook);
         assert_eq!((code, sound), (70, 10));
         let said = super::super::message(&bug.unwrap_err());
-        assert!(said.starts_with("error: index out of bounds: the len is 3 but the index is 3, at src/cli/panics.rs:"), "{said}");
-        assert!(said.ends_with("(this is a bug in calib)") && said.lines().count() == 1, "{said}");
+        assert!(
+            said.starts_with(
+                "error: index out of bounds: the len is 3 but the index is 3, at src/cli/panics.rs:"
+            ),
+            "{said}"
+        );
+        assert!(
+            said.ends_with("(this is a bug in calib)") && said.lines().count() == 1,
+            "{said}"
+        );
     }
 }

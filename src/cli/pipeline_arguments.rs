@@ -30,12 +30,28 @@ impl PipelineArguments {
     /// The pipeline, its reports in another language where one is given.
     pub fn plan(&self, language: Option<&str>) -> Result<Plan> {
         let plan = self.means.plan(&self.pipeline)?;
-        let Some(language) = language else { return Ok(plan) };
-        let reports = plan.stages.iter().filter(|stage| stage.entry.name == Report::NAME);
-        let sets: Vec<Override> =
-            reports.map(|stage| Override { target: format!("{}.language", stage.id), value: language.into() }).collect();
+        let Some(language) = language else {
+            return Ok(plan);
+        };
+        let reports = plan
+            .stages
+            .iter()
+            .filter(|stage| stage.entry.name == Report::NAME);
+        let sets: Vec<Override> = reports
+            .map(|stage| Override {
+                target: format!("{}.language", stage.id),
+                value: language.into(),
+            })
+            .collect();
         if sets.is_empty() {
-            return Err(Error::spec("--language", format!("{} has no stage `{}`", self.pipeline.display(), Report::NAME)));
+            return Err(Error::spec(
+                "--language",
+                format!(
+                    "{} has no stage `{}`",
+                    self.pipeline.display(),
+                    Report::NAME
+                ),
+            ));
         }
         self.means.plan_with(&self.pipeline, &sets)
     }
@@ -50,9 +66,19 @@ impl PipelineArguments {
     }
 
     /// Runs the selected stages with progress, and with `details` all that stages note.
-    pub fn run(&self, plan: &Plan, store: &Store, wanted: (Selection, bool), command_line: &[OsString]) -> Result<CompletedRun> {
+    pub fn run(
+        &self,
+        plan: &Plan,
+        store: &Store,
+        wanted: (Selection, bool),
+        command_line: &[OsString],
+    ) -> Result<CompletedRun> {
         let (selection, details) = wanted;
-        let task = CommandTask { purpose: Purpose::Run, selection, shown: shown(self.quiet, details) };
+        let task = CommandTask {
+            purpose: Purpose::Run,
+            selection,
+            shown: shown(self.quiet, details),
+        };
         self.means.run(plan, store, task, command_line)
     }
 

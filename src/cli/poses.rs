@@ -4,7 +4,10 @@ use super::surroundings::open_store;
 use super::{emit, emit_json};
 use crate::effect::identified;
 use crate::error::{Error, Fault, Result, nearest};
-use crate::poses::{PoseAnswer, PoseRequest, RobotFiles, RunStage, apart, fault, is_known, places, proposal, sockets, write};
+use crate::poses::{
+    PoseAnswer, PoseRequest, RobotFiles, RunStage, apart, fault, is_known, places, proposal,
+    sockets, write,
+};
 use clap::Args;
 use std::io::Write;
 use std::path::PathBuf;
@@ -21,7 +24,11 @@ use std::path::PathBuf;
 #[command(after_help = EXAMPLES)]
 pub(super) struct PosesArguments {
     /// The robot file: calib's YAML, or a practice robot.json
-    #[arg(value_name = "ROBOT", required_unless_present = "run", conflicts_with = "run")]
+    #[arg(
+        value_name = "ROBOT",
+        required_unless_present = "run",
+        conflicts_with = "run"
+    )]
     robot: Option<PathBuf>,
     /// The URDF that the robot file refers to
     #[arg(long, value_name = "FILE", requires = "robot")]
@@ -100,14 +107,31 @@ pub(super) fn main(arguments: &PosesArguments) -> Result<()> {
     match (&arguments.run, &arguments.robot) {
         (Some(run), _) => {
             let store = open_store(arguments.store.as_deref())?;
-            show(arguments, &apart(&request, &store, &RunStage { run, step: arguments.step.as_deref() }, pair)?)
+            show(
+                arguments,
+                &apart(
+                    &request,
+                    &store,
+                    &RunStage {
+                        run,
+                        step: arguments.step.as_deref(),
+                    },
+                    pair,
+                )?,
+            )
         }
         (None, Some(file)) => {
-            let robot = RobotFiles { file, urdf: arguments.urdf.as_deref() };
+            let robot = RobotFiles {
+                file,
+                urdf: arguments.urdf.as_deref(),
+            };
             if let Some(places) = &arguments.sockets {
                 return show(arguments, &sockets(&request, &robot, &places.0)?);
             }
-            show(arguments, &proposal(&request, &robot, pair, arguments.against.as_deref())?)
+            show(
+                arguments,
+                &proposal(&request, &robot, pair, arguments.against.as_deref())?,
+            )
         }
         (None, None) => Err(Error::spec("ROBOT", "expected a robot file, or --run")),
     }
@@ -136,7 +160,11 @@ fn show(arguments: &PosesArguments, answer: &impl PoseAnswer) -> Result<()> {
     if let (Some(path), Some(poses)) = (&arguments.out, answer.drive()) {
         write(path, &poses)?;
     }
-    if arguments.json { emit_json(&answer.document()) } else { emit(&answer.text()) }
+    if arguments.json {
+        emit_json(&answer.document())
+    } else {
+        emit(&answer.text())
+    }
 }
 
 /// m, base frame.
@@ -155,54 +183,120 @@ pub(super) struct Ranges(pub Vec<[f64; 2]>);
 pub(super) fn ranges(text: &str) -> Result<Ranges, String> {
     let end = |text: &str, free: f64| match text.trim() {
         "" => Ok(free),
-        number => number.parse::<f64>().ok().filter(|value| value.is_finite()).ok_or_else(|| format!("`{number}` is no number")),
+        number => number
+            .parse::<f64>()
+            .ok()
+            .filter(|value| value.is_finite())
+            .ok_or_else(|| format!("`{number}` is no number")),
     };
     let one = |part: &str| {
-        let (lower, upper) = part.split_once(':').ok_or_else(|| format!("`{part}` is no range; expected MIN:MAX"))?;
+        let (lower, upper) = part
+            .split_once(':')
+            .ok_or_else(|| format!("`{part}` is no range; expected MIN:MAX"))?;
         let range = [end(lower, f64::NEG_INFINITY)?, end(upper, f64::INFINITY)?];
-        if range[0] < range[1] { Ok(range) } else { Err(format!("`{part}` is empty; expected MIN:MAX with MIN below MAX")) }
+        if range[0] < range[1] {
+            Ok(range)
+        } else {
+            Err(format!(
+                "`{part}` is empty; expected MIN:MAX with MIN below MAX"
+            ))
+        }
     };
-    text.split(',').map(one).collect::<Result<_, _>>().map(Ranges)
+    text.split(',')
+        .map(one)
+        .collect::<Result<_, _>>()
+        .map(Ranges)
 }
 
 /// Everything that can be said without a file, all at once.
 fn check(arguments: &PosesArguments) -> Result<()> {
     let mut faults = Vec::new();
     let none = Vec::new();
-    let separate = arguments.separate.as_ref().filter(|_| arguments.run.is_none());
-    for (option, names) in [("--effects", &arguments.effects), ("--separate", separate.unwrap_or(&none))] {
+    let separate = arguments
+        .separate
+        .as_ref()
+        .filter(|_| arguments.run.is_none());
+    for (option, names) in [
+        ("--effects", &arguments.effects),
+        ("--separate", separate.unwrap_or(&none)),
+    ] {
         for name in names.iter().filter(|name| !is_known(name)) {
             let known: Vec<&str> = identified().map(|cause| cause.name()).collect();
-            let hint = nearest(name, known.iter().copied()).map(|near| format!("did you mean `{near}`? ")).unwrap_or_default();
-            faults.push(Fault::new(option, format!("unknown effect `{name}`; {hint}allowed: {}", known.join(", "))));
+            let hint = nearest(name, known.iter().copied())
+                .map(|near| format!("did you mean `{near}`? "))
+                .unwrap_or_default();
+            faults.push(Fault::new(
+                option,
+                format!(
+                    "unknown effect `{name}`; {hint}allowed: {}",
+                    known.join(", ")
+                ),
+            ));
         }
     }
     if separate.is_some_and(|names| names.len() != 2) {
-        faults.push(Fault::new("--separate", "expected two effects, or a run whose findings have rivals (--run)"));
+        faults.push(Fault::new(
+            "--separate",
+            "expected two effects, or a run whose findings have rivals (--run)",
+        ));
     }
     if let Some([a, b]) = separate.map(Vec::as_slice) {
         if a == b {
-            faults.push(Fault::new("--separate", format!("expected two different effects, found `{a}` twice")));
+            faults.push(Fault::new(
+                "--separate",
+                format!("expected two different effects, found `{a}` twice"),
+            ));
         }
-        let chosen = |name: &String| arguments.effects.is_empty() || arguments.effects.contains(name);
+        let chosen =
+            |name: &String| arguments.effects.is_empty() || arguments.effects.contains(name);
         for name in [a, b].into_iter().filter(|name| !chosen(name)) {
-            faults.push(Fault::new("--effects", format!("`{name}` is named by --separate but not here: add it")));
+            faults.push(Fault::new(
+                "--effects",
+                format!("`{name}` is named by --separate but not here: add it"),
+            ));
         }
     }
-    for mass in arguments.payload.iter().filter(|mass| !(mass.is_finite() && **mass >= 0.0)) {
-        faults.push(Fault::new("--payload", format!("expected masses of 0 or more, kg, found {mass}")));
+    for mass in arguments
+        .payload
+        .iter()
+        .filter(|mass| !(mass.is_finite() && **mass >= 0.0))
+    {
+        faults.push(Fault::new(
+            "--payload",
+            format!("expected masses of 0 or more, kg, found {mass}"),
+        ));
     }
-    if let Some(sigma) = arguments.sigma.filter(|sigma| !(sigma.is_finite() && *sigma > 0.0)) {
-        faults.push(Fault::new("--sigma", format!("expected a length above 0, mm, found {sigma}")));
+    if let Some(sigma) = arguments
+        .sigma
+        .filter(|sigma| !(sigma.is_finite() && *sigma > 0.0))
+    {
+        faults.push(Fault::new(
+            "--sigma",
+            format!("expected a length above 0, mm, found {sigma}"),
+        ));
     }
     if !(0.0..=45.0).contains(&arguments.margin) {
-        faults.push(Fault::new("--margin", format!("expected 0 to 45 percent, found {}", arguments.margin)));
+        faults.push(Fault::new(
+            "--margin",
+            format!("expected 0 to 45 percent, found {}", arguments.margin),
+        ));
     }
-    if let Some(bounds) = arguments.bounds.as_ref().filter(|bounds| bounds.0.len() != 3) {
-        faults.push(Fault::new("--box", format!("expected three ranges, x, y, z, found {}", bounds.0.len())));
+    if let Some(bounds) = arguments
+        .bounds
+        .as_ref()
+        .filter(|bounds| bounds.0.len() != 3)
+    {
+        faults.push(Fault::new(
+            "--box",
+            format!("expected three ranges, x, y, z, found {}", bounds.0.len()),
+        ));
     }
     if let Some(path) = &arguments.out {
         faults.extend(fault(path).map(|fault| Fault::new("--out", fault)));
     }
-    if faults.is_empty() { Ok(()) } else { Err(Error::Spec(faults)) }
+    if faults.is_empty() {
+        Ok(())
+    } else {
+        Err(Error::Spec(faults))
+    }
 }

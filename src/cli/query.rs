@@ -54,7 +54,10 @@ pub(super) fn main(arguments: &QueryArguments) -> Result<()> {
 fn execute(arguments: &QueryArguments) -> Result<()> {
     let run = arguments.run.as_str();
     if run.contains(char::is_whitespace) {
-        return Err(Error::spec("RUN", "the run comes before the SQL: calib query HEAD \"SELECT ...\""));
+        return Err(Error::spec(
+            "RUN",
+            "the run comes before the SQL: calib query HEAD \"SELECT ...\"",
+        ));
     }
     let store = open_store(arguments.store.as_deref())?;
     let tables = QueryTables::of(&Manifest::of(&store, &find_run(&store, run)?)?);
@@ -68,14 +71,23 @@ fn execute(arguments: &QueryArguments) -> Result<()> {
 }
 
 #[cfg(feature = "query")]
-fn answer(arguments: &QueryArguments, store: &Store, tables: &QueryTables, sql: &str) -> Result<()> {
+fn answer(
+    arguments: &QueryArguments,
+    store: &Store,
+    tables: &QueryTables,
+    sql: &str,
+) -> Result<()> {
     let answer = crate::audit::query(store, tables, sql)?;
     match (arguments.csv, arguments.json) {
         (true, _) => emit(&summary::csv(&answer)?),
         (_, true) => emit(&summary::json(&answer)?),
         _ => emit(&summary::grid(
             &answer,
-            if arguments.rows == 0 { usize::MAX } else { arguments.rows },
+            if arguments.rows == 0 {
+                usize::MAX
+            } else {
+                arguments.rows
+            },
             super::surroundings::columns(),
         )),
     }
@@ -91,5 +103,9 @@ fn answer(_: &QueryArguments, _: &Store, _: &QueryTables, _: &str) -> Result<()>
 
 /// The tables with their columns.
 fn columns(store: &Store, tables: &[&QueryTable], json: bool) -> Result<()> {
-    if json { emit_json(&summary::columns_json(store, tables)?) } else { emit(&summary::columns(store, tables)?) }
+    if json {
+        emit_json(&summary::columns_json(store, tables)?)
+    } else {
+        emit(&summary::columns(store, tables)?)
+    }
 }

@@ -19,21 +19,34 @@ pub(super) struct RobotsArguments {
 }
 
 pub(super) fn main(arguments: &RobotsArguments) -> Result<()> {
-    let Some(name) = &arguments.name else { return emit(&list()?) };
+    let Some(name) = &arguments.name else {
+        return emit(&list()?);
+    };
     let arm = LibraryArm::find(name).ok_or_else(|| {
         let near = nearest(name, LIBRARY.iter().map(|arm| arm.name));
-        let near = near.map(|near| format!("; did you mean `{near}`?")).unwrap_or_default();
-        Error::spec("NAME", format!("no arm `{name}` in the library{near} (`calib robots` lists all)"))
+        let near = near
+            .map(|near| format!("; did you mean `{near}`?"))
+            .unwrap_or_default();
+        Error::spec(
+            "NAME",
+            format!("no arm `{name}` in the library{near} (`calib robots` lists all)"),
+        )
     })?;
     emit(arm.text)
 }
 
 /// One line an arm.
 fn list() -> Result<String> {
-    let mut out = format!("{:<16} {:<40} {:>6} {:>9}  {}\n", "name", "arm", "joints", "reach mm", "in the file");
+    let mut out = format!(
+        "{:<16} {:<40} {:>6} {:>9}  {}\n",
+        "name", "arm", "joints", "reach mm", "in the file"
+    );
     for arm in LIBRARY {
         let read = arm.read()?;
-        let reach = read.about.reach.map_or_else(|| "-".into(), |reach| Unit::Millimetre.from_si(reach).round().to_string());
+        let reach = read.about.reach.map_or_else(
+            || "-".into(),
+            |reach| Unit::Millimetre.from_si(reach).round().to_string(),
+        );
         let mut holds = Vec::new();
         if read.robot.joints.iter().any(|joint| joint.mass.is_some()) {
             holds.push("masses");
@@ -42,7 +55,15 @@ fn list() -> Result<String> {
             holds.push("coupled counting");
         }
         let joints = read.robot.joints.len();
-        out.push_str(format!("{:<16} {:<40} {joints:>6} {reach:>9}  {}", arm.name, read.robot.name, holds.join(", ")).trim_end());
+        out.push_str(
+            format!(
+                "{:<16} {:<40} {joints:>6} {reach:>9}  {}",
+                arm.name,
+                read.robot.name,
+                holds.join(", ")
+            )
+            .trim_end(),
+        );
         out.push('\n');
     }
     Ok(out)

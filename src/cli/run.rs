@@ -74,9 +74,16 @@ fn execute(arguments: &RunArguments, command_line: &[OsString]) -> Result<u8> {
     let shared = &arguments.shared;
     let (plan, store) = (shared.plan(arguments.language.as_deref())?, shared.store()?);
     // `--force` without a stage stands for all of them.
-    let force = arguments.force.as_ref().map(|ids| ids.iter().filter(|id| !id.is_empty()).cloned().collect());
-    let selection =
-        Selection { only: arguments.only.clone(), from: arguments.from.clone(), until: arguments.until.clone(), force };
+    let force = arguments
+        .force
+        .as_ref()
+        .map(|ids| ids.iter().filter(|id| !id.is_empty()).cloned().collect());
+    let selection = Selection {
+        only: arguments.only.clone(),
+        from: arguments.from.clone(),
+        until: arguments.until.clone(),
+        force,
+    };
     if arguments.dry_run {
         let forecasts = preview(&plan, &store, &selection)?;
         match shared.json {
@@ -87,14 +94,24 @@ fn execute(arguments: &RunArguments, command_line: &[OsString]) -> Result<u8> {
     }
     let outcome = shared.run(&plan, &store, (selection, arguments.details), command_line)?;
     let limits = LimitsSummary::read(&outcome, &store)?;
-    let (standing, wrong) = (standing_of(&outcome.manifest, &store)?, wrong_setup_of(&outcome.manifest, &store)?);
-    let code = if wrong.is_some() { WRONG_SETUP } else { u8::from(limits.accepted() == Some(false)) };
+    let (standing, wrong) = (
+        standing_of(&outcome.manifest, &store)?,
+        wrong_setup_of(&outcome.manifest, &store)?,
+    );
+    let code = if wrong.is_some() {
+        WRONG_SETUP
+    } else {
+        u8::from(limits.accepted() == Some(false))
+    };
     if shared.json {
         emit_json(&document(&outcome, &limits, &store)?)?;
         return Ok(code);
     }
     let (again, columns) = (shared.store_again(), columns());
-    let on = ResultScreen { store: &again, columns };
+    let on = ResultScreen {
+        store: &again,
+        columns,
+    };
     let short = summary::in_short(&outcome, standing.as_ref(), wrong.as_deref(), &store, on)?;
     let mut text = String::new();
     if arguments.details || short.is_none() {
@@ -108,8 +125,16 @@ fn execute(arguments: &RunArguments, command_line: &[OsString]) -> Result<u8> {
         text.push_str(&limits.text());
     }
     text.push_str(&summary::rejected(&outcome.manifest));
-    let more = if arguments.details || short.is_none() { "" } else { " (--details: every step and set)" };
-    for path in outcome.documents.iter().filter(|path| arguments.details || ending(path) == "html") {
+    let more = if arguments.details || short.is_none() {
+        ""
+    } else {
+        " (--details: every step and set)"
+    };
+    for path in outcome
+        .documents
+        .iter()
+        .filter(|path| arguments.details || ending(path) == "html")
+    {
         text.push_str(&labelled("report", &format!("{}{more}", path.display())));
     }
     if arguments.details || short.is_none() || outcome.nothing_done() {
@@ -124,16 +149,37 @@ fn closing(outcome: &CompletedRun, seconds: f64) -> String {
     let stages = &outcome.manifest.stages;
     let count = |status| stages.iter().filter(|stage| stage.status == status).count();
     if outcome.nothing_done() {
-        return labelled("done", &format!("nothing to do: {} cached ({seconds:.1} s)", counted(stages.len(), "stage")));
+        return labelled(
+            "done",
+            &format!(
+                "nothing to do: {} cached ({seconds:.1} s)",
+                counted(stages.len(), "stage")
+            ),
+        );
     }
-    let (executed, cached, not_run) = (count(StageStatus::Executed), count(StageStatus::Cached), count(StageStatus::NotRun));
-    let not_run = if not_run > 0 { format!(", {not_run} not selected") } else { String::new() };
+    let (executed, cached, not_run) = (
+        count(StageStatus::Executed),
+        count(StageStatus::Cached),
+        count(StageStatus::NotRun),
+    );
+    let not_run = if not_run > 0 {
+        format!(", {not_run} not selected")
+    } else {
+        String::new()
+    };
     let (executed, run) = (counted(executed, "stage"), &outcome.manifest.run_id);
-    labelled("done", &format!("{executed} run, {cached} cached{not_run} ({seconds:.1} s), run {run}"))
+    labelled(
+        "done",
+        &format!("{executed} run, {cached} cached{not_run} ({seconds:.1} s), run {run}"),
+    )
 }
 
 fn forecast_lines(forecasts: &[Forecast]) -> String {
-    let width = forecasts.iter().map(|forecast| forecast.id.len()).max().unwrap_or(0);
+    let width = forecasts
+        .iter()
+        .map(|forecast| forecast.id.len())
+        .max()
+        .unwrap_or(0);
     let line = |forecast: &Forecast| {
         let what = match &forecast.prospect {
             Prospect::Cached => "cached".into(),
@@ -147,9 +193,17 @@ fn forecast_lines(forecasts: &[Forecast]) -> String {
 }
 
 /// The result of a run for other programs.
-fn document(outcome: &CompletedRun, limits: &LimitsSummary, store: &Store) -> Result<serde_json::Value> {
+fn document(
+    outcome: &CompletedRun,
+    limits: &LimitsSummary,
+    store: &Store,
+) -> Result<serde_json::Value> {
     let manifest = &outcome.manifest;
-    let documents: Vec<String> = outcome.documents.iter().map(|path| path.display().to_string()).collect();
+    let documents: Vec<String> = outcome
+        .documents
+        .iter()
+        .map(|path| path.display().to_string())
+        .collect();
     let standing = standing_of(&outcome.manifest, store)?.map(|stands| {
         let compared = |gone: &Withdrawn| {
             json!({ "step": gone.step, "rms_mm": gone.rms_mm, "than": gone.than, "than_rms_mm": gone.than_rms_mm, "points": gone.points })

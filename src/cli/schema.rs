@@ -56,34 +56,81 @@ pub(super) fn main(arguments: &SchemaArguments) -> Result<()> {
 }
 
 fn check(file: &Path, kind: Option<&str>) -> Result<()> {
-    let kind = kind.map(find).transpose()?.map(|schema| schema.name.as_str());
+    let kind = kind
+        .map(find)
+        .transpose()?
+        .map(|schema| schema.name.as_str());
     let Loose { table, vouched } = read_table(file, kind)?;
-    let hash = if vouched { "" } else { " (the file carries no content hash: its content cannot be verified)" };
-    emit(&format!("{}: sound, {}, {}{hash}\n", table.schema().id(), counted(table.rows(), "row"), table.table_hash()))
+    let hash = if vouched {
+        ""
+    } else {
+        " (the file carries no content hash: its content cannot be verified)"
+    };
+    emit(&format!(
+        "{}: sound, {}, {}{hash}\n",
+        table.schema().id(),
+        counted(table.rows(), "row"),
+        table.table_hash()
+    ))
 }
 
 fn list() -> String {
-    let width = schema::all().map(|schema| schema.name.len()).max().unwrap_or(0);
-    schema::all().map(|schema| format!("{:width$}  {}  {}\n", schema.name, schema.version, schema.description)).collect()
+    let width = schema::all()
+        .map(|schema| schema.name.len())
+        .max()
+        .unwrap_or(0);
+    schema::all()
+        .map(|schema| {
+            format!(
+                "{:width$}  {}  {}\n",
+                schema.name, schema.version, schema.description
+            )
+        })
+        .collect()
 }
 
 fn find(kind: &str) -> Result<&'static TableSchema> {
-    schema::all().find(|schema| schema.name == kind).ok_or_else(|| {
-        let kinds: Vec<&str> = schema::all().map(|schema| schema.name.as_str()).collect();
-        let hint = nearest(kind, kinds.iter().copied()).map(|near| format!("; did you mean `{near}`?"));
-        Error::spec("KIND", format!("no table `{kind}`{} Allowed: {}", hint.unwrap_or_else(|| ".".into()), kinds.join(", ")))
-    })
+    schema::all()
+        .find(|schema| schema.name == kind)
+        .ok_or_else(|| {
+            let kinds: Vec<&str> = schema::all().map(|schema| schema.name.as_str()).collect();
+            let hint = nearest(kind, kinds.iter().copied())
+                .map(|near| format!("; did you mean `{near}`?"));
+            Error::spec(
+                "KIND",
+                format!(
+                    "no table `{kind}`{} Allowed: {}",
+                    hint.unwrap_or_else(|| ".".into()),
+                    kinds.join(", ")
+                ),
+            )
+        })
 }
 
 fn show(schema: &TableSchema) -> String {
-    let mut text = format!("{} {}: {}\n", schema.name, schema.version, schema.description);
-    text.push_str(&format!("key: {}; sorted by: {}\n\n", schema.primary_key.join(", "), schema.sort.join(", ")));
-    let width = schema.fields.iter().map(|field| field.name.len()).max().unwrap_or(0);
+    let mut text = format!(
+        "{} {}: {}\n",
+        schema.name, schema.version, schema.description
+    );
+    text.push_str(&format!(
+        "key: {}; sorted by: {}\n\n",
+        schema.primary_key.join(", "),
+        schema.sort.join(", ")
+    ));
+    let width = schema
+        .fields
+        .iter()
+        .map(|field| field.name.len())
+        .max()
+        .unwrap_or(0);
     for field in &schema.fields {
         let kind = format!("{:?}", field.column_type).to_lowercase();
         let null = if field.nullable { "or null" } else { "" };
         let unit = field.unit.as_deref().unwrap_or("");
-        text.push_str(&format!("{:width$}  {kind:7} {null:7}  {unit:6}  {}\n", field.name, field.description));
+        text.push_str(&format!(
+            "{:width$}  {kind:7} {null:7}  {unit:6}  {}\n",
+            field.name, field.description
+        ));
     }
     text
 }

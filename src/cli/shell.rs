@@ -28,7 +28,12 @@ pub(super) struct ManArguments {
 
 pub(super) fn completions(arguments: &CompletionsArguments) -> Result<()> {
     let mut text = Vec::new();
-    clap_complete::generate(arguments.shell, &mut Arguments::command(), "calib", &mut text);
+    clap_complete::generate(
+        arguments.shell,
+        &mut Arguments::command(),
+        "calib",
+        &mut text,
+    );
     emit(&String::from_utf8_lossy(&text))
 }
 
@@ -38,14 +43,30 @@ pub(super) fn man(arguments: &ManArguments) -> Result<()> {
     let page = match &arguments.verb {
         None => whole,
         Some(verb) => {
-            let verbs: Vec<String> = whole.get_subcommands().map(|verb| verb.get_name().to_string()).collect();
-            let found = whole.get_subcommands().find(|known| known.get_name() == verb);
-            let unknown = || Error::spec("man", format!("no command `{verb}`; allowed: {}", verbs.join(", ")));
+            let verbs: Vec<String> = whole
+                .get_subcommands()
+                .map(|verb| verb.get_name().to_string())
+                .collect();
+            let found = whole
+                .get_subcommands()
+                .find(|known| known.get_name() == verb);
+            let unknown = || {
+                Error::spec(
+                    "man",
+                    format!("no command `{verb}`; allowed: {}", verbs.join(", ")),
+                )
+            };
             found.ok_or_else(unknown)?.clone()
         }
     };
-    let title = arguments.verb.as_ref().map_or_else(|| "calib".into(), |verb| format!("calib-{verb}"));
+    let title = arguments
+        .verb
+        .as_ref()
+        .map_or_else(|| "calib".into(), |verb| format!("calib-{verb}"));
     let mut text = Vec::new();
-    clap_mangen::Man::new(page).title(title).render(&mut text).map_err(|error| Error::Bug(error.to_string()))?;
+    clap_mangen::Man::new(page)
+        .title(title)
+        .render(&mut text)
+        .map_err(|error| Error::Bug(error.to_string()))?;
     emit(&String::from_utf8_lossy(&text))
 }

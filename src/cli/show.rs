@@ -46,11 +46,23 @@ pub(super) fn main(arguments: &ShowArguments) -> Result<()> {
         };
     };
     let Some(stage) = manifest.stage(id) else {
-        let ids: Vec<&str> = manifest.stages.iter().map(|stage| stage.id.as_str()).collect();
-        return Err(Error::spec(format!("stage {id}"), format!("run {run} has no such stage; its stages: {}", ids.join(", "))));
+        let ids: Vec<&str> = manifest
+            .stages
+            .iter()
+            .map(|stage| stage.id.as_str())
+            .collect();
+        return Err(Error::spec(
+            format!("stage {id}"),
+            format!(
+                "run {run} has no such stage; its stages: {}",
+                ids.join(", ")
+            ),
+        ));
     };
     if arguments.json {
-        return emit_json(&serde_json::to_value(stage).map_err(|error| Error::Bug(error.to_string()))?);
+        return emit_json(
+            &serde_json::to_value(stage).map_err(|error| Error::Bug(error.to_string()))?,
+        );
     }
     emit(&summary::stage(stage))
 }

@@ -25,7 +25,10 @@ pub(super) fn surroundings(command_line: &[OsString]) -> Surroundings {
         },
         user: user(),
         environment: environment(),
-        command_line: command_line.iter().map(|part| part.to_string_lossy().into_owned()).collect(),
+        command_line: command_line
+            .iter()
+            .map(|part| part.to_string_lossy().into_owned())
+            .collect(),
         now: SystemTime::now,
         peak_memory,
         run_id: ulid::Ulid::generate().to_string(),
@@ -39,7 +42,9 @@ pub(super) fn now() -> SystemTime {
 /// The most memory that this process had in use so far, bytes; the kernel tells it on Linux alone.
 fn peak_memory() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    let line = status
+        .lines()
+        .find_map(|line| line.strip_prefix("VmHWM:"))?;
     Some(line.trim().strip_suffix(" kB")?.parse::<u64>().ok()? * 1024)
 }
 
@@ -52,7 +57,9 @@ pub(super) fn colours() -> bool {
 /// Columns of the terminal, where stdout is one.
 pub(super) fn columns() -> Option<usize> {
     let out = std::io::stdout();
-    let size = std::io::IsTerminal::is_terminal(&out).then(|| terminal_size::terminal_size_of(&out)).flatten();
+    let size = std::io::IsTerminal::is_terminal(&out)
+        .then(|| terminal_size::terminal_size_of(&out))
+        .flatten();
     size.map(|(width, _)| usize::from(width.0))
 }
 
@@ -62,19 +69,40 @@ pub(super) fn cores() -> usize {
 
 /// Nobody where `CALIB_NO_USER` is set.
 fn user() -> Option<String> {
-    let named = || std::env::var("USER").or_else(|_| std::env::var("USERNAME")).ok();
-    if std::env::var_os("CALIB_NO_USER").is_some() { None } else { named() }
+    let named = || {
+        std::env::var("USER")
+            .or_else(|_| std::env::var("USERNAME"))
+            .ok()
+    };
+    if std::env::var_os("CALIB_NO_USER").is_some() {
+        None
+    } else {
+        named()
+    }
 }
 
 /// What may change speed, never results; nothing else of the environment is kept.
 fn environment() -> BTreeMap<String, String> {
-    let known = ["RAYON_NUM_THREADS", "SLURM_JOB_ID", "SLURM_ARRAY_TASK_ID", "TZ", "LANG"];
-    known.iter().filter_map(|name| Some((name.to_string(), std::env::var(name).ok()?))).collect()
+    let known = [
+        "RAYON_NUM_THREADS",
+        "SLURM_JOB_ID",
+        "SLURM_ARRAY_TASK_ID",
+        "TZ",
+        "LANG",
+    ];
+    known
+        .iter()
+        .filter_map(|name| Some((name.to_string(), std::env::var(name).ok()?)))
+        .collect()
 }
 
 fn host_name() -> String {
     let from_kernel = std::fs::read_to_string("/proc/sys/kernel/hostname").ok();
-    let name = from_kernel.or_else(|| std::env::var("HOSTNAME").or_else(|_| std::env::var("COMPUTERNAME")).ok());
+    let name = from_kernel.or_else(|| {
+        std::env::var("HOSTNAME")
+            .or_else(|_| std::env::var("COMPUTERNAME"))
+            .ok()
+    });
     name.map_or_else(|| "unknown".into(), |name| name.trim().to_string())
 }
 
@@ -90,15 +118,26 @@ pub(super) fn bucket(store: &Path) -> Option<&str> {
 
 /// Opens what `--store` names: a folder, or a bucket with what was fetched from it below the user's cache.
 pub(super) fn open_store(given: Option<&Path>) -> Result<Store> {
-    let Some(url) = given.and_then(bucket) else { return Store::open(given.map_or_else(default_store, Path::to_path_buf)) };
-    let settings = std::env::vars_os().filter_map(|(name, value)| Some((name.into_string().ok()?, value.into_string().ok()?)));
-    let settings = settings.filter(|(name, _)| name.starts_with("AWS_")).collect();
+    let Some(url) = given.and_then(bucket) else {
+        return Store::open(given.map_or_else(default_store, Path::to_path_buf));
+    };
+    let settings = std::env::vars_os()
+        .filter_map(|(name, value)| Some((name.into_string().ok()?, value.into_string().ok()?)));
+    let settings = settings
+        .filter(|(name, _)| name.starts_with("AWS_"))
+        .collect();
     Store::open_s3(url, &settings, &cache())
 }
 
 /// `CALIB_CACHE`, or where the user's caches are.
 fn cache() -> PathBuf {
-    let told = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+    let told = |name: &str| {
+        std::env::var_os(name)
+            .filter(|value| !value.is_empty())
+            .map(PathBuf::from)
+    };
     let usual = || told("XDG_CACHE_HOME").or_else(|| told("HOME").map(|home| home.join(".cache")));
-    told("CALIB_CACHE").or_else(|| usual().map(|folder| folder.join("calib"))).unwrap_or_else(|| PathBuf::from(".calib-cache"))
+    told("CALIB_CACHE")
+        .or_else(|| usual().map(|folder| folder.join("calib")))
+        .unwrap_or_else(|| PathBuf::from(".calib-cache"))
 }

@@ -42,6 +42,12 @@ pub(super) fn main(arguments: &TagArguments) -> Result<()> {
             let was = before.map_or_else(String::new, |before| format!(", was run {before}"));
             emit(&format!("{name} is run {run}{was}\n"))
         }
-        _ => emit(&store.tags()?.iter().map(|(name, run)| format!("{name}  {run}\n")).collect::<String>()),
+        _ => emit(
+            &store
+                .tags()?
+                .iter()
+                .map(|(name, run)| format!("{name}  {run}\n"))
+                .collect::<String>(),
+        ),
     }
 }

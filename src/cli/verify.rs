@@ -9,7 +9,9 @@ use std::path::PathBuf;
 
 /// Verify a store: read and rehash every table, record, manifest, event and tag; find what was damaged or edited.
 #[derive(Args)]
-#[command(after_help = "Exit codes: 0 all is as it was written; 1 something is not; 2 wrong usage; 75 the disk refuses.")]
+#[command(
+    after_help = "Exit codes: 0 all is as it was written; 1 something is not; 2 wrong usage; 75 the disk refuses."
+)]
 pub(super) struct VerifyArguments {
     /// The store [default: .calib in the working directory]
     #[arg(long, value_name = "DIR")]
@@ -26,12 +28,18 @@ pub(super) fn main(arguments: &VerifyArguments) -> u8 {
 fn execute(arguments: &VerifyArguments) -> Result<u8> {
     let root = arguments.store.clone().unwrap_or_else(default_store);
     if bucket(&root).is_none() && !root.is_dir() {
-        return Err(Error::spec(root.display().to_string(), "no store here; name one with --store DIR"));
+        return Err(Error::spec(
+            root.display().to_string(),
+            "no store here; name one with --store DIR",
+        ));
     }
     let found = match open_store(Some(&root)) {
         Ok(store) => store.verify()?,
         // The format file itself may be what was damaged.
-        Err(Error::Store(fault)) => Verification { faults: vec![fault], ..Verification::default() },
+        Err(Error::Store(fault)) => Verification {
+            faults: vec![fault],
+            ..Verification::default()
+        },
         Err(other) => return Err(other),
     };
     if arguments.json {
@@ -44,7 +52,12 @@ fn execute(arguments: &VerifyArguments) -> Result<u8> {
 
 fn text(found: &Verification) -> String {
     const SHOWN: usize = 50; // a store that is damaged all over need not be listed
-    let mut text: String = found.faults.iter().take(SHOWN).map(|fault| format!("{fault}\n")).collect();
+    let mut text: String = found
+        .faults
+        .iter()
+        .take(SHOWN)
+        .map(|fault| format!("{fault}\n"))
+        .collect();
     if found.faults.len() > SHOWN {
         text.push_str(&format!("and {} more\n", found.faults.len() - SHOWN));
     }

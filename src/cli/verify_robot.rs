@@ -49,11 +49,18 @@ pub(super) struct VerifyRobotArguments {
 
 pub(super) fn main(arguments: &VerifyRobotArguments, command_line: &[OsString]) -> Result<()> {
     let place = arguments.second.display().to_string();
-    let text = raw::text(&arguments.second).map_err(|error| Error::spec(&place, format!("cannot be read: {error}")))?;
+    let text = raw::text(&arguments.second)
+        .map_err(|error| Error::spec(&place, format!("cannot be read: {error}")))?;
     let identified = arguments.model.load(Purpose::Compensate, command_line)?;
     let arm = IdentifiedArm::new(identified.model.clone(), identified.correction.clone());
     // As `compensate`: what depends on load is not predicted without one.
-    let load = if arguments.payload.is_some() { None } else { identified.heaviest().filter(|load| load_matters(&arm, *load)) };
+    let load = if arguments.payload.is_some() {
+        None
+    } else {
+        identified
+            .heaviest()
+            .filter(|load| load_matters(&arm, *load))
+    };
     let layout = Layout {
         place: &place,
         robot: &identified.robot,
@@ -68,11 +75,23 @@ pub(super) fn main(arguments: &VerifyRobotArguments, command_line: &[OsString]) 
         return Err(Error::data(&place, "has no row below its header"));
     }
     let nominal = RobotModel::new(identified.robot.clone());
-    let convention = identified.convention.clone().unwrap_or_else(|| JointConvention::of_the_robot_file(nominal.joints()));
+    let convention = identified
+        .convention
+        .clone()
+        .unwrap_or_else(|| JointConvention::of_the_robot_file(nominal.joints()));
     let clock = identified.data.as_ref().is_none_or(Measurements::has_clock);
     let payload = arguments.payload.unwrap_or(0.0);
-    let options = CorrectionOptions { payload, clock, ..CorrectionOptions::counted_by(convention) };
-    let mut corrector = Corrector::new(&arm, identified.coverage(), identified.uncertainty(&arm), options);
+    let options = CorrectionOptions {
+        payload,
+        clock,
+        ..CorrectionOptions::counted_by(convention)
+    };
+    let mut corrector = Corrector::new(
+        &arm,
+        identified.coverage(),
+        identified.uncertainty(&arm),
+        options,
+    );
     let found = achieved(&arm, &nominal, &mut corrector, &rows, arguments.new_base)?;
     if let Some(path) = &arguments.html {
         write(path, &page(&identified.origin, &found, arguments.new_base)?)?;
@@ -88,60 +107,108 @@ fn figures(lengths: &[f64]) -> [f64; 3] {
     let mut sorted = lengths.to_vec();
     sorted.sort_by(f64::total_cmp);
     let mean = sorted.iter().sum::<f64>() / sorted.len().max(1) as f64;
-    [mean, crate::statistics::quantile(&sorted, 0.95).unwrap_or_default(), sorted.last().copied().unwrap_or_default()]
-        .map(|length| length * 1e3)
+    [
+        mean,
+        crate::statistics::quantile(&sorted, 0.95).unwrap_or_default(),
+        sorted.last().copied().unwrap_or_default(),
+    ]
+    .map(|length| length * 1e3)
 }
 
 /// Before, predicted and achieved: name, mean, 95th percentile and largest, mm, and what they are of.
 fn rows(found: &Achieved, new_base: bool) -> Vec<(&'static str, [f64; 3], String)> {
-    let base = if new_base { ", the tracker's place found anew" } else { "" };
+    let base = if new_base {
+        ", the tracker's place found anew"
+    } else {
+        ""
+    };
     let achieved = format!("measured, {}{base}", counted(found.achieved.len(), "point"));
     let all = [
-        ("before", &found.before, "of the uncorrected targets, by the model".to_string()),
-        ("predicted", &found.predicted, "within which 95 % of corrected targets were to be".to_string()),
+        (
+            "before",
+            &found.before,
+            "of the uncorrected targets, by the model".to_string(),
+        ),
+        (
+            "predicted",
+            &found.predicted,
+            "within which 95 % of corrected targets were to be".to_string(),
+        ),
         ("achieved", &found.achieved, achieved),
     ];
-    let filled = all.into_iter().filter(|(_, lengths, _)| !lengths.is_empty());
-    filled.map(|(name, lengths, what)| (name, figures(lengths), what)).collect()
+    let filled = all
+        .into_iter()
+        .filter(|(_, lengths, _)| !lengths.is_empty());
+    filled
+        .map(|(name, lengths, what)| (name, figures(lengths), what))
+        .collect()
 }
 
 /// How many points are farther off than predicted; none where nothing was predicted.
 fn beyond(found: &Achieved) -> Option<String> {
-    let beyond = found.achieved.iter().zip(&found.predicted).filter(|(achieved, predicted)| achieved > predicted).count();
-    let line = format!("{beyond} of {} points are farther off than predicted", found.achieved.len());
+    let beyond = found
+        .achieved
+        .iter()
+        .zip(&found.predicted)
+        .filter(|(achieved, predicted)| achieved > predicted)
+        .count();
+    let line = format!(
+        "{beyond} of {} points are farther off than predicted",
+        found.achieved.len()
+    );
     (!found.predicted.is_empty()).then_some(line)
 }
 
 /// Targets without a correction; none where all have one.
 fn unreached(found: &Achieved) -> Option<String> {
-    let line = format!("{} cannot be reached by the model and had no correction", counted(found.unreached, "target"));
+    let line = format!(
+        "{} cannot be reached by the model and had no correction",
+        counted(found.unreached, "target")
+    );
     (found.unreached > 0).then_some(line)
 }
 
 fn page(origin: &str, found: &Achieved, new_base: bool) -> Result<String> {
-    let mm = |lengths: &[f64]| lengths.iter().map(|length| 1e3 * length).collect::<Vec<f64>>();
-    let poses = found.poses.iter().map(|pose| (pose.cycles, 1e3 * pose.accuracy, 1e3 * pose.repeatability));
+    let mm = |lengths: &[f64]| {
+        lengths
+            .iter()
+            .map(|length| 1e3 * length)
+            .collect::<Vec<f64>>()
+    };
+    let poses = found
+        .poses
+        .iter()
+        .map(|pose| (pose.cycles, 1e3 * pose.accuracy, 1e3 * pose.repeatability));
     achieved_page(&AchievedTables {
         title: "Before, predicted and achieved",
         model: origin,
         rows: rows(found, new_base),
         errors: [mm(&found.before), mm(&found.achieved)],
         poses: poses.collect(),
-        remarks: beyond(found).into_iter().chain(unreached(found)).map(|line| format!("{line}.")).collect(),
+        remarks: beyond(found)
+            .into_iter()
+            .chain(unreached(found))
+            .map(|line| format!("{line}."))
+            .collect(),
     })
 }
 
 fn told(origin: &str, found: &Achieved, new_base: bool) -> String {
     let mut text = labelled("model", origin);
     for (label, [mean, p95, max], what) in rows(found, new_base) {
-        text.push_str(&labelled(label, &format!("mean {mean:.4} mm, 95 % within {p95:.4} mm, max {max:.4} mm {what}")));
+        text.push_str(&labelled(
+            label,
+            &format!("mean {mean:.4} mm, 95 % within {p95:.4} mm, max {max:.4} mm {what}"),
+        ));
     }
     text.push_str(&beyond(found).map_or_else(String::new, |line| labelled("", &line)));
     text.push_str(&unreached(found).map_or_else(String::new, |line| labelled("warning", &line)));
     for (k, pose) in (1..).zip(&found.poses) {
         let (accuracy, repeatability) = (1e3 * pose.accuracy, 1e3 * pose.repeatability);
-        let text_of =
-            format!("pose {k}, {} cycles: accuracy AP {accuracy:.4} mm, repeatability RP {repeatability:.4} mm", pose.cycles);
+        let text_of = format!(
+            "pose {k}, {} cycles: accuracy AP {accuracy:.4} mm, repeatability RP {repeatability:.4} mm",
+            pose.cycles
+        );
         text.push_str(&labelled("ISO 9283", &text_of));
     }
     text

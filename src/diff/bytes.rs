@@ -10,8 +10,15 @@ const PIECE: u64 = 1 << 20;
 
 /// True where both files can be read and hold the same bytes.
 pub(super) fn same_bytes(a: &Path, b: &Path) -> bool {
-    let length = |path: &Path| std::fs::metadata(path).ok().filter(std::fs::Metadata::is_file).map(|metadata| metadata.len());
-    let Some(bytes) = length(a).filter(|bytes| length(b) == Some(*bytes)) else { return false };
+    let length = |path: &Path| {
+        std::fs::metadata(path)
+            .ok()
+            .filter(std::fs::Metadata::is_file)
+            .map(|metadata| metadata.len())
+    };
+    let Some(bytes) = length(a).filter(|bytes| length(b) == Some(*bytes)) else {
+        return false;
+    };
     // The ends first: there lie the statistics of a Parquet file's columns, which hardly ever agree where the columns do not.
     let pieces = bytes.div_ceil(PIECE);
     let same = |at: u64| same_piece(a, b, at * PIECE).unwrap_or(false);

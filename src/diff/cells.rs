@@ -36,48 +36,97 @@ enum KeyBuilder {
 
 impl CellWriter {
     pub fn create(path: &Path, a: &TableFile, key: &[String]) -> Result<Self> {
-        let refused = |e: &dyn std::fmt::Display| Error::store(path.display().to_string(), format!("cannot write: {e}"));
+        let refused = |e: &dyn std::fmt::Display| {
+            Error::store(path.display().to_string(), format!("cannot write: {e}"))
+        };
         let mut fields = Vec::new();
         let mut keys = Vec::new();
         for name in key {
             let kind = a.position(name).map(|at| a.columns[at].kind);
             let (data_type, builder) = match kind {
-                Some(CellKind::Float) => (DataType::Float64, KeyBuilder::Float(Float64Builder::new())),
-                Some(CellKind::Int | CellKind::Flag) => (DataType::Int64, KeyBuilder::Int(Int64Builder::new())),
+                Some(CellKind::Float) => {
+                    (DataType::Float64, KeyBuilder::Float(Float64Builder::new()))
+                }
+                Some(CellKind::Int | CellKind::Flag) => {
+                    (DataType::Int64, KeyBuilder::Int(Int64Builder::new()))
+                }
                 _ => (DataType::Utf8, KeyBuilder::Text(StringBuilder::new())),
             };
             fields.push(Field::new(name, data_type, true));
             keys.push(builder);
         }
-        fields.extend(["diff_class", "diff_column", "diff_unit"].map(|name| Field::new(name, DataType::Utf8, true)));
-        fields
-            .extend(["diff_a", "diff_b", "diff_difference", "diff_sigmas"].map(|name| Field::new(name, DataType::Float64, true)));
-        fields.extend(["diff_a_text", "diff_b_text"].map(|name| Field::new(name, DataType::Utf8, true)));
+        fields.extend(
+            ["diff_class", "diff_column", "diff_unit"]
+                .map(|name| Field::new(name, DataType::Utf8, true)),
+        );
+        fields.extend(
+            ["diff_a", "diff_b", "diff_difference", "diff_sigmas"]
+                .map(|name| Field::new(name, DataType::Float64, true)),
+        );
+        fields.extend(
+            ["diff_a_text", "diff_b_text"].map(|name| Field::new(name, DataType::Utf8, true)),
+        );
         let schema = Arc::new(Schema::new(fields));
         let level = ZstdLevel::try_new(3).map_err(|e| Error::Bug(e.to_string()))?;
-        let properties = WriterProperties::builder().set_compression(Compression::ZSTD(level)).build();
+        let properties = WriterProperties::builder()
+            .set_compression(Compression::ZSTD(level))
+            .build();
         let file = File::create(path).map_err(|e| refused(&e))?;
-        let writer = ArrowWriter::try_new(file, schema.clone(), Some(properties)).map_err(|e| refused(&e))?;
-        Ok(Self { path: path.into(), schema, writer, keys, texts: Default::default(), numbers: Default::default(), rows: 0 })
+        let writer = ArrowWriter::try_new(file, schema.clone(), Some(properties))
+            .map_err(|e| refused(&e))?;
+        Ok(Self {
+            path: path.into(),
+            schema,
+            writer,
+            keys,
+            texts: Default::default(),
+            numbers: Default::default(),
+            rows: 0,
+        })
     }
 
     /// Rows without a partner, those of A first.
-    pub fn unpaired(&mut self, keys: &Keys, pairing: &Pairing, only_b: &[Vec<KeyCell>]) -> Result<()> {
-        for (rows, class) in [(&pairing.only_a, "only_a"), (&pairing.twice_a, "duplicate_a")] {
+    pub fn unpaired(
+        &mut self,
+        keys: &Keys,
+        pairing: &Pairing,
+        only_b: &[Vec<KeyCell>],
+    ) -> Result<()> {
+        for (rows, class) in [
+            (&pairing.only_a, "only_a"),
+            (&pairing.twice_a, "duplicate_a"),
+        ] {
             for &row in rows {
                 self.row(keys.cells(row as usize), class, None)?;
             }
         }
         for (at, cells) in only_b.iter().enumerate() {
-            let class = if at < pairing.only_b.len() { "only_b" } else { "duplicate_b" };
+            let class = if at < pairing.only_b.len() {
+                "only_b"
+            } else {
+                "duplicate_b"
+            };
             self.row(cells.iter().cloned(), class, None)?;
         }
         Ok(())
     }
 
-    pub fn cell(&mut self, keys: &Keys, comparison: &ColumnPair, cell: &CellDifference) -> Result<()> {
-        let class = if cell.changed { "changed" } else { "within_tolerance" };
-        self.row(keys.cells(cell.row as usize), class, Some((comparison, cell)))
+    pub fn cell(
+        &mut self,
+        keys: &Keys,
+        comparison: &ColumnPair,
+        cell: &CellDifference,
+    ) -> Result<()> {
+        let class = if cell.changed {
+            "changed"
+        } else {
+            "within_tolerance"
+        };
+        self.row(
+            keys.cells(cell.row as usize),
+            class,
+            Some((comparison, cell)),
+        )
     }
 
     fn row(
@@ -89,9 +138,13 @@ impl CellWriter {
         for (builder, cell) in self.keys.iter_mut().zip(key) {
             match (builder, cell) {
                 (KeyBuilder::Int(builder), KeyCell::Int(value)) => builder.append_value(value),
-                (KeyBuilder::Int(builder), KeyCell::Float(value)) => builder.append_value(value as i64),
+                (KeyBuilder::Int(builder), KeyCell::Float(value)) => {
+                    builder.append_value(value as i64)
+                }
                 (KeyBuilder::Float(builder), KeyCell::Float(value)) => builder.append_value(value),
-                (KeyBuilder::Float(builder), KeyCell::Int(value)) => builder.append_value(value as f64),
+                (KeyBuilder::Float(builder), KeyCell::Int(value)) => {
+                    builder.append_value(value as f64)
+                }
                 (KeyBuilder::Text(builder), KeyCell::Text(value)) => builder.append_value(value),
                 (KeyBuilder::Int(builder), KeyCell::Text(_)) => builder.append_null(),
                 (KeyBuilder::Float(builder), KeyCell::Text(_)) => builder.append_null(),
@@ -99,9 +152,19 @@ impl CellWriter {
             }
         }
         let number = |value: &CellValue| {
-            if let CellValue::Number(number) = value { Some(*number).filter(|x| x.is_finite()) } else { None }
+            if let CellValue::Number(number) = value {
+                Some(*number).filter(|x| x.is_finite())
+            } else {
+                None
+            }
         };
-        let text = |value: &CellValue| if let CellValue::Text(text) = value { Some(text.clone()) } else { None };
+        let text = |value: &CellValue| {
+            if let CellValue::Text(text) = value {
+                Some(text.clone())
+            } else {
+                None
+            }
+        };
         let cell = what.map(|(_, cell)| cell);
         let texts = [
             Some(class.to_string()),
@@ -110,16 +173,26 @@ impl CellWriter {
             cell.and_then(|cell| text(&cell.a)),
             cell.and_then(|cell| text(&cell.b)),
         ];
-        self.texts.iter_mut().zip(texts).for_each(|(builder, text)| builder.append_option(text));
+        self.texts
+            .iter_mut()
+            .zip(texts)
+            .for_each(|(builder, text)| builder.append_option(text));
         let numbers = [
             cell.and_then(|cell| number(&cell.a)),
             cell.and_then(|cell| number(&cell.b)),
             cell.and_then(|cell| cell.difference),
             cell.and_then(|cell| cell.sigmas),
         ];
-        self.numbers.iter_mut().zip(numbers).for_each(|(builder, number)| builder.append_option(number));
+        self.numbers
+            .iter_mut()
+            .zip(numbers)
+            .for_each(|(builder, number)| builder.append_option(number));
         self.rows += 1;
-        if self.rows >= GROUP_ROWS { self.flush() } else { Ok(()) }
+        if self.rows >= GROUP_ROWS {
+            self.flush()
+        } else {
+            Ok(())
+        }
     }
 
     fn flush(&mut self) -> Result<()> {
@@ -145,14 +218,20 @@ impl CellWriter {
         for builder in [a_text, b_text] {
             arrays.push(Arc::new(builder.finish()));
         }
-        let batch = RecordBatch::try_new(self.schema.clone(), arrays).map_err(|e| Error::Bug(e.to_string()))?;
+        let batch = RecordBatch::try_new(self.schema.clone(), arrays)
+            .map_err(|e| Error::Bug(e.to_string()))?;
         let place = self.path.display().to_string();
-        self.writer.write(&batch).map_err(|e| Error::store(place, format!("cannot write: {e}")))
+        self.writer
+            .write(&batch)
+            .map_err(|e| Error::store(place, format!("cannot write: {e}")))
     }
 
     pub fn close(mut self) -> Result<()> {
         self.flush()?;
         let place = self.path.display().to_string();
-        self.writer.close().map(|_| ()).map_err(|e| Error::store(place, format!("cannot write: {e}")))
+        self.writer
+            .close()
+            .map(|_| ())
+            .map_err(|e| Error::store(place, format!("cannot write: {e}")))
     }
 }

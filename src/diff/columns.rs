@@ -47,7 +47,14 @@ pub(super) fn plan(
 ) -> Result<Vec<ColumnPair>> {
     known_names(a, b, options)?;
     let ignored = |name: &String| key.contains(name) || options.ignore.contains(name);
-    let mut pairs = Pairs { a, b, options, used_a: BTreeSet::new(), used_b: BTreeSet::new(), findings };
+    let mut pairs = Pairs {
+        a,
+        b,
+        options,
+        used_a: BTreeSet::new(),
+        used_b: BTreeSet::new(),
+        findings,
+    };
     let mut comparisons = Vec::new();
     for (names, vector) in groups(a, options) {
         if !names.iter().any(ignored) {
@@ -61,7 +68,9 @@ pub(super) fn plan(
     }
     for (at_b, column) in b.columns.iter().enumerate() {
         if !pairs.used_b.contains(&at_b) && !ignored(&column.name) {
-            pairs.findings.push(Discrepancy::new("column", &column.name, "only in B"));
+            pairs
+                .findings
+                .push(Discrepancy::new("column", &column.name, "only in B"));
         }
     }
     comparisons.sort_by_key(|comparison| comparison.a[0]);
@@ -81,12 +90,21 @@ struct Pairs<'p> {
 impl Pairs<'_> {
     /// Columns that are one rotation: a rotation vector, or a quaternion. None where one of the files lacks some of them.
     fn rotation(&mut self, names: &[String], vector: bool) -> Option<ColumnPair> {
-        let at = |source: &TableFile| names.iter().map(|name| source.position(name)).collect::<Option<Vec<usize>>>();
+        let at = |source: &TableFile| {
+            names
+                .iter()
+                .map(|name| source.position(name))
+                .collect::<Option<Vec<usize>>>()
+        };
         let (at_a, at_b) = (at(self.a)?, at(self.b)?);
         self.used_a.extend(&at_a);
         self.used_b.extend(&at_b);
         let factor = angle_unit(self.a, at_a[0]).map_or(1.0, |unit| unit.to_si(1.0));
-        let how = if vector { Comparator::RotationVector(factor) } else { Comparator::Quaternion };
+        let how = if vector {
+            Comparator::RotationVector(factor)
+        } else {
+            Comparator::Quaternion
+        };
         let (atol, rtol) = tolerance(self.a, &names[0], self.options, Unit::Radian);
         Some(ColumnPair {
             name: names.join(","),
@@ -106,7 +124,8 @@ impl Pairs<'_> {
         let (a, b) = (self.a, self.b);
         let column = &a.columns[at_a];
         let Some(at_b) = counterpart(a, b, at_a, &self.used_b) else {
-            self.findings.push(Discrepancy::new("column", &column.name, "only in A"));
+            self.findings
+                .push(Discrepancy::new("column", &column.name, "only in A"));
             return None;
         };
         self.used_b.insert(at_b);
@@ -120,11 +139,16 @@ impl Pairs<'_> {
             (false, Some(turn)) => Comparator::Angle(turn),
             (false, None) => Comparator::Number,
         };
-        let (atol, mut rtol) = tolerance(a, &column.name, self.options, unit_a.unwrap_or(Unit::One));
+        let (atol, mut rtol) =
+            tolerance(a, &column.name, self.options, unit_a.unwrap_or(Unit::One));
         if conversion != (1.0, 0.0) {
             rtol = rtol.max(CONVERTED);
         }
-        let symbol = column.unit.clone().or_else(|| unit_a.map(|unit| unit.symbol().to_string())).unwrap_or_default();
+        let symbol = column
+            .unit
+            .clone()
+            .or_else(|| unit_a.map(|unit| unit.symbol().to_string()))
+            .unwrap_or_default();
         Some(ColumnPair {
             name: column.name.clone(),
             a: vec![at_a],
@@ -141,13 +165,22 @@ impl Pairs<'_> {
     /// Says where two columns are stored, or meant, differently.
     fn kinds_apart(&mut self, ours: &TableColumn, theirs: &TableColumn) {
         if ours.stored != theirs.stored {
-            let text = format!("{} in A, {} in B", shown(&ours.stored), shown(&theirs.stored));
-            self.findings.push(Discrepancy::new("type", &ours.name, text));
+            let text = format!(
+                "{} in A, {} in B",
+                shown(&ours.stored),
+                shown(&theirs.stored)
+            );
+            self.findings
+                .push(Discrepancy::new("type", &ours.name, text));
         }
         if let (Some(our_semantic), Some(semantic)) = (&ours.semantic, &theirs.semantic)
             && our_semantic != semantic
         {
-            self.findings.push(Discrepancy::new("semantic", &ours.name, format!("{our_semantic} in A, {semantic} in B")));
+            self.findings.push(Discrepancy::new(
+                "semantic",
+                &ours.name,
+                format!("{our_semantic} in A, {semantic} in B"),
+            ));
         }
     }
 
@@ -157,14 +190,23 @@ impl Pairs<'_> {
         (column, ours): (&TableColumn, Option<Unit>),
         (other, theirs): (&TableColumn, Option<Unit>),
     ) -> Option<(f64, f64)> {
-        let mut say = |what: &str, text: String| self.findings.push(Discrepancy::new(what, &column.name, text));
+        let mut say = |what: &str, text: String| {
+            self.findings
+                .push(Discrepancy::new(what, &column.name, text))
+        };
         match (ours, theirs) {
             (Some(ours), Some(theirs)) if ours != theirs => {
                 if ours.quantity() != theirs.quantity() {
-                    say("unit", format!("{ours} in A, {theirs} in B: not the same quantity"));
+                    say(
+                        "unit",
+                        format!("{ours} in A, {theirs} in B: not the same quantity"),
+                    );
                     return None;
                 }
-                say("unit", format!("{ours} in A, {theirs} in B; values compared in {ours}"));
+                say(
+                    "unit",
+                    format!("{ours} in A, {theirs} in B; values compared in {ours}"),
+                );
                 let zero = ours.from_si(theirs.to_si(0.0));
                 Some((ours.from_si(theirs.to_si(1.0)) - zero, zero))
             }
@@ -182,7 +224,11 @@ impl Pairs<'_> {
 const CONVERTED: f64 = 4.0 * f64::EPSILON;
 
 fn shown(stored: &str) -> &str {
-    if stored.is_empty() { "nested or binary" } else { stored }
+    if stored.is_empty() {
+        "nested or binary"
+    } else {
+        stored
+    }
 }
 
 /// Names in the options must be columns, unless the options are for other tables, too.
@@ -190,11 +236,17 @@ fn known_names(a: &TableFile, b: &TableFile, options: &DiffOptions) -> Result<()
     if options.where_present {
         return Ok(());
     }
-    let columns: Vec<&str> = a.columns.iter().chain(&b.columns).map(|column| column.name.as_str()).collect();
+    let columns: Vec<&str> = a
+        .columns
+        .iter()
+        .chain(&b.columns)
+        .map(|column| column.name.as_str())
+        .collect();
     let named = |flag: &'static str, names: &mut dyn Iterator<Item = &String>| -> Result<()> {
         for name in names {
             if !columns.contains(&name.as_str()) {
-                let hint = nearest(name, columns.iter().copied()).map(|near| format!("; did you mean `{near}`?"));
+                let hint = nearest(name, columns.iter().copied())
+                    .map(|near| format!("; did you mean `{near}`?"));
                 let message = format!("no column `{name}` in either{}", hint.unwrap_or_default());
                 return Err(Error::spec(flag, message));
             }
@@ -209,19 +261,34 @@ fn known_names(a: &TableFile, b: &TableFile, options: &DiffOptions) -> Result<()
 
 /// Columns that are one rotation together: declared, asked for, or by their names; true for a rotation vector.
 fn groups(a: &TableFile, options: &DiffOptions) -> Vec<(Vec<String>, bool)> {
-    let mut groups: Vec<(Vec<String>, bool)> = options.quaternions.iter().map(|names| (names.clone(), false)).collect();
+    let mut groups: Vec<(Vec<String>, bool)> = options
+        .quaternions
+        .iter()
+        .map(|names| (names.clone(), false))
+        .collect();
     let declared = |semantic: &str, size: usize, groups: &mut Vec<(Vec<String>, bool)>| {
-        let named = a.columns.iter().filter(|column| column.semantic.as_deref() == Some(semantic));
+        let named = a
+            .columns
+            .iter()
+            .filter(|column| column.semantic.as_deref() == Some(semantic));
         let names: Vec<String> = named.map(|column| column.name.clone()).collect();
-        groups.extend(names.chunks_exact(size).map(|names| (names.to_vec(), size == 3)));
+        groups.extend(
+            names
+                .chunks_exact(size)
+                .map(|names| (names.to_vec(), size == 3)),
+        );
     };
     declared("quaternion", 4, &mut groups);
     declared("rotation_vector", 3, &mut groups);
     for column in &a.columns {
-        let Some(at) = column.name.find("qw") else { continue };
+        let Some(at) = column.name.find("qw") else {
+            continue;
+        };
         let with = |axis: &str| format!("{}q{axis}{}", &column.name[..at], &column.name[at + 2..]);
         let names: Vec<String> = ["w", "x", "y", "z"].map(with).to_vec();
-        if names.iter().all(|name| a.position(name).is_some()) && !groups.iter().any(|(known, _)| known.contains(&names[0])) {
+        if names.iter().all(|name| a.position(name).is_some())
+            && !groups.iter().any(|(known, _)| known.contains(&names[0]))
+        {
             groups.push((names, false));
         }
     }
@@ -242,7 +309,9 @@ fn unit(source: &TableFile, column: usize) -> Option<Unit> {
 
 /// A name before its unit, and the unit.
 fn split(name: &str) -> Option<(&str, &str)> {
-    name.rsplit_once('_').filter(|(stem, end)| !stem.is_empty() && Unit::parse(end).is_some_and(|unit| unit != Unit::One))
+    name.rsplit_once('_').filter(|(stem, end)| {
+        !stem.is_empty() && Unit::parse(end).is_some_and(|unit| unit != Unit::One)
+    })
 }
 
 /// The column of B of the same name, or of the same name but for the unit at its end.
@@ -270,26 +339,47 @@ fn angle_unit(source: &TableFile, column: usize) -> Option<Unit> {
 /// A full turn in the column's unit, where values compare modulo a turn: as a known schema says; in a foreign file, all angles.
 fn turn(source: &TableFile, column: usize) -> Option<f64> {
     let unit = angle_unit(source, column)?;
-    let known = source.schema().is_some_and(|schema| schema.field_of(&source.columns[column].name).is_some());
+    let known = source
+        .schema()
+        .is_some_and(|schema| schema.field_of(&source.columns[column].name).is_some());
     let declared = source.columns[column].semantic.as_deref() == Some("angle");
     (declared || !known).then(|| unit.from_si(std::f64::consts::TAU))
 }
 
 fn tolerance(a: &TableFile, name: &str, options: &DiffOptions, unit: Unit) -> (f64, f64) {
-    let field = a.schema().and_then(|schema| schema.field_of(name)).map(|(field, _)| &field.diff);
-    let of = |wish: &Tolerances, schema: Option<f64>| wish.of(name, unit).unwrap_or(schema.unwrap_or(0.0));
-    (of(&options.atol, field.map(|field| field.atol)), of(&options.rtol, field.map(|field| field.rtol)))
+    let field = a
+        .schema()
+        .and_then(|schema| schema.field_of(name))
+        .map(|(field, _)| &field.diff);
+    let of = |wish: &Tolerances, schema: Option<f64>| {
+        wish.of(name, unit).unwrap_or(schema.unwrap_or(0.0))
+    };
+    (
+        of(&options.atol, field.map(|field| field.atol)),
+        of(&options.rtol, field.map(|field| field.rtol)),
+    )
 }
 
 /// The column with one standard deviation of `name`: as the schema says, or by its name.
 fn sigma(a: &TableFile, b: &TableFile, name: &str) -> Option<(usize, usize)> {
-    let named = a.schema().and_then(|schema| schema.field_of(name)).and_then(|(field, _)| field.diff.sigma.clone());
-    let (stem, end) = split(name).map_or((name, String::new()), |(stem, end)| (stem, format!("_{end}")));
-    let by_name = ["_std", "_sigma"].into_iter().flat_map(|word| [format!("{name}{word}"), format!("{stem}{word}{end}")]);
-    let candidates = named.into_iter().chain(by_name).chain([format!("sigma_{name}")]);
+    let named = a
+        .schema()
+        .and_then(|schema| schema.field_of(name))
+        .and_then(|(field, _)| field.diff.sigma.clone());
+    let (stem, end) = split(name).map_or((name, String::new()), |(stem, end)| {
+        (stem, format!("_{end}"))
+    });
+    let by_name = ["_std", "_sigma"]
+        .into_iter()
+        .flat_map(|word| [format!("{name}{word}"), format!("{stem}{word}{end}")]);
+    let candidates = named
+        .into_iter()
+        .chain(by_name)
+        .chain([format!("sigma_{name}")]);
     candidates.into_iter().find_map(|candidate| {
         let (at_a, at_b) = (a.position(&candidate)?, b.position(&candidate)?);
-        let numbers = a.columns[at_a].kind == CellKind::Float && b.columns[at_b].kind == CellKind::Float;
+        let numbers =
+            a.columns[at_a].kind == CellKind::Float && b.columns[at_b].kind == CellKind::Float;
         (numbers && candidate != name).then_some((at_a, at_b))
     })
 }

@@ -11,7 +11,10 @@ use super::columns::{self, ColumnPair};
 use super::key::{self, Keys, Pairing};
 use super::measure::{self, CHANGED, CellDifference, CellValue, ComparedTables, SAME, WITHIN};
 use super::source::TableFile;
-use super::{ColumnDiff, DiffOptions, DiffedTable, Discrepancy, Equal, Examples, RowCounts, TableDiff, WorstCell, WorstRow};
+use super::{
+    ColumnDiff, DiffOptions, DiffedTable, Discrepancy, Equal, Examples, RowCounts, TableDiff,
+    WorstCell, WorstRow,
+};
 use crate::error::{Error, Result};
 use crate::raw::same_file;
 
@@ -24,7 +27,10 @@ pub fn compare(a: &Path, b: &Path, options: &DiffOptions) -> Result<TableDiff> {
     if let Some(out) = options.out.as_deref()
         && [&a, &b].iter().any(|source| same_file(&source.path, out))
     {
-        return Err(Error::spec("--out", format!("{} is one of the tables that are compared", out.display())));
+        return Err(Error::spec(
+            "--out",
+            format!("{} is one of the tables that are compared", out.display()),
+        ));
     }
     let mut diff = TableDiff {
         a: side(&a),
@@ -53,20 +59,38 @@ pub fn compare(a: &Path, b: &Path, options: &DiffOptions) -> Result<TableDiff> {
     let pairing = key::pair(&keys, &keys_b, options.by_occurrence);
     diff.examples = examples(&keys, &keys_b, &pairing);
     // Only A's keys are needed from here on, and they are large.
-    let only_b = pairing.only_b.iter().chain(&pairing.twice_b).map(|&row| keys_b.cells(row as usize).collect::<Vec<_>>());
-    let only_b: Vec<Vec<key::KeyCell>> = if options.out.is_some() { only_b.collect() } else { Vec::new() };
+    let only_b = pairing
+        .only_b
+        .iter()
+        .chain(&pairing.twice_b)
+        .map(|&row| keys_b.cells(row as usize).collect::<Vec<_>>());
+    let only_b: Vec<Vec<key::KeyCell>> = if options.out.is_some() {
+        only_b.collect()
+    } else {
+        Vec::new()
+    };
     drop(keys_b);
     let rows: Vec<AtomicU8> = (0..a.rows).map(|_| AtomicU8::new(SAME)).collect();
-    let files = ComparedTables { a: &a, b: &b, pairing: &pairing, rows: &rows };
+    let files = ComparedTables {
+        a: &a,
+        b: &b,
+        pairing: &pairing,
+        rows: &rows,
+    };
     let measured = match &options.out {
         None => {
             let one = |comparison: &ColumnPair| judge(files, comparison, options, None);
-            comparisons.par_iter().map(one).collect::<Result<Vec<_>>>()?
+            comparisons
+                .par_iter()
+                .map(one)
+                .collect::<Result<Vec<_>>>()?
         }
         Some(path) => {
             let mut writer = CellWriter::create(path, &a, &diff.key)?;
             writer.unpaired(&keys, &pairing, &only_b)?;
-            let one = |comparison: &ColumnPair| judge(files, comparison, options, Some((&mut writer, &keys)));
+            let one = |comparison: &ColumnPair| {
+                judge(files, comparison, options, Some((&mut writer, &keys)))
+            };
             let measured = comparisons.iter().map(one).collect::<Result<Vec<_>>>()?;
             writer.close()?;
             measured
@@ -77,7 +101,10 @@ pub fn compare(a: &Path, b: &Path, options: &DiffOptions) -> Result<TableDiff> {
     let mut cells: Vec<(usize, CellDifference)> = Vec::new();
     for (at, (column, worst)) in measured.into_iter().enumerate() {
         let worst_key = column.worst_row.map(|row| keys.text(row as usize));
-        diff.columns.push(ColumnDiff { worst_key, ..column });
+        diff.columns.push(ColumnDiff {
+            worst_key,
+            ..column
+        });
         cells.extend(worst.into_iter().map(|cell| (at, cell)));
     }
     diff.worst = worst_rows(&a, &keys, &comparisons, cells, options.limit)?;
@@ -92,7 +119,10 @@ pub fn table_hash(path: &Path) -> Result<Option<String>> {
 fn side(source: &TableFile) -> DiffedTable {
     DiffedTable {
         path: source.path.display().to_string(),
-        schema: source.table.as_ref().map(|(kind, version)| format!("{kind}/{version}")),
+        schema: source
+            .table
+            .as_ref()
+            .map(|(kind, version)| format!("{kind}/{version}")),
         table_hash: source.table_hash.clone(),
         rows: source.rows as u64,
     }
@@ -109,39 +139,76 @@ fn equal(a: &TableFile, b: &TableFile) -> Option<Equal> {
     same_bytes(&a.path, &b.path).then_some(Equal::Bytes)
 }
 
-fn schema_findings(a: &TableFile, b: &TableFile, options: &DiffOptions) -> Result<Vec<Discrepancy>> {
-    let (Some((kind_a, version_a)), Some((kind_b, version_b))) = (&a.table, &b.table) else { return Ok(Vec::new()) };
+fn schema_findings(
+    a: &TableFile,
+    b: &TableFile,
+    options: &DiffOptions,
+) -> Result<Vec<Discrepancy>> {
+    let (Some((kind_a, version_a)), Some((kind_b, version_b))) = (&a.table, &b.table) else {
+        return Ok(Vec::new());
+    };
     if kind_a != kind_b && options.key.is_empty() {
-        let message =
-            format!("A is a table of {kind_a}, B of {kind_b}: not comparable unless --key names the columns that identify rows");
+        let message = format!(
+            "A is a table of {kind_a}, B of {kind_b}: not comparable unless --key names the columns that identify rows"
+        );
         return Err(Error::spec(b.path.display().to_string(), message));
     }
     if kind_a != kind_b {
-        return Ok(vec![Discrepancy::new("schema", "", format!("{kind_a} in A, {kind_b} in B"))]);
+        return Ok(vec![Discrepancy::new(
+            "schema",
+            "",
+            format!("{kind_a} in A, {kind_b} in B"),
+        )]);
     }
     if version_a == version_b {
         return Ok(Vec::new());
     }
-    let step = match (version_a.major == version_b.major, version_a.minor == version_b.minor) {
+    let step = match (
+        version_a.major == version_b.major,
+        version_a.minor == version_b.minor,
+    ) {
         (false, _) => "major: columns changed their meaning",
         (true, false) => "minor: columns were added",
         (true, true) => "patch: descriptions changed",
     };
-    Ok(vec![Discrepancy::new("schema", "", format!("{kind_a} {version_a} in A, {version_b} in B ({step})"))])
+    Ok(vec![Discrepancy::new(
+        "schema",
+        "",
+        format!("{kind_a} {version_a} in A, {version_b} in B ({step})"),
+    )])
 }
 
-fn key_columns(a: &TableFile, b: &TableFile, options: &DiffOptions, findings: &mut Vec<Discrepancy>) -> Result<Vec<String>> {
+fn key_columns(
+    a: &TableFile,
+    b: &TableFile,
+    options: &DiffOptions,
+    findings: &mut Vec<Discrepancy>,
+) -> Result<Vec<String>> {
     if !options.key.is_empty() {
-        options.key.iter().try_for_each(|name| a.key_column(name).and(b.key_column(name)).map(|_| ()))?;
+        options
+            .key
+            .iter()
+            .try_for_each(|name| a.key_column(name).and(b.key_column(name)).map(|_| ()))?;
         return Ok(options.key.clone());
     }
     if !a.key.is_empty() && !b.key.is_empty() && a.key != b.key {
-        findings.push(Discrepancy::new("key", "", format!("{} in A, {} in B", a.key.join(", "), b.key.join(", "))));
+        findings.push(Discrepancy::new(
+            "key",
+            "",
+            format!("{} in A, {} in B", a.key.join(", "), b.key.join(", ")),
+        ));
     }
     let key = if a.key.is_empty() { &b.key } else { &a.key };
     if key.is_empty() {
-        let columns: Vec<&str> = a.columns.iter().map(|column| column.name.as_str()).collect();
-        let message = format!("does not say which columns identify its rows; name them with --key, of: {}", columns.join(", "));
+        let columns: Vec<&str> = a
+            .columns
+            .iter()
+            .map(|column| column.name.as_str())
+            .collect();
+        let message = format!(
+            "does not say which columns identify its rows; name them with --key, of: {}",
+            columns.join(", ")
+        );
         return Err(Error::spec(a.path.display().to_string(), message));
     }
     Ok(key.clone())
@@ -166,7 +233,11 @@ fn examples(a: &Keys, b: &Keys, pairing: &Pairing) -> Examples {
     duplicate.sort();
     duplicate.dedup();
     duplicate.truncate(EXAMPLES);
-    Examples { only_a: some(a, &pairing.only_a), only_b: some(b, &pairing.only_b), duplicate }
+    Examples {
+        only_a: some(a, &pairing.only_a),
+        only_b: some(b, &pairing.only_b),
+        duplicate,
+    }
 }
 
 /// Measures a column and keeps its worst cells.
@@ -181,7 +252,10 @@ fn judge(
         if let Some((writer, keys)) = &mut out {
             writer.cell(keys, comparison, cell)?;
         }
-        if cell.changed && (worst.len() < options.limit || worst.last().is_some_and(|least| cell.score > least.score)) {
+        if cell.changed
+            && (worst.len() < options.limit
+                || worst.last().is_some_and(|least| cell.score > least.score))
+        {
             let at = worst.partition_point(|other| other.score >= cell.score);
             worst.insert(at, cell.clone());
             worst.truncate(options.limit);
@@ -193,7 +267,11 @@ fn judge(
 }
 
 fn count(rows: &[AtomicU8], pairing: &Pairing) -> RowCounts {
-    let of = |class: u8| rows.iter().filter(|row| row.load(Ordering::Relaxed) == class).count() as u64;
+    let of = |class: u8| {
+        rows.iter()
+            .filter(|row| row.load(Ordering::Relaxed) == class)
+            .count() as u64
+    };
     let (within, changed) = (of(WITHIN), of(CHANGED));
     RowCounts {
         same: pairing.paired as u64 - within - changed,
@@ -215,7 +293,12 @@ fn worst_rows(
     mut cells: Vec<(usize, CellDifference)>,
     limit: usize,
 ) -> Result<Vec<WorstRow>> {
-    cells.sort_by(|(column, l), (other, r)| r.score.total_cmp(&l.score).then(l.row.cmp(&r.row)).then(column.cmp(other)));
+    cells.sort_by(|(column, l), (other, r)| {
+        r.score
+            .total_cmp(&l.score)
+            .then(l.row.cmp(&r.row))
+            .then(column.cmp(other))
+    });
     let mut order: Vec<u32> = Vec::new();
     for (_, cell) in &cells {
         if !order.contains(&cell.row) {
@@ -228,8 +311,11 @@ fn worst_rows(
         let own = cells.iter().filter(|(_, cell)| cell.row == row);
         let cells = own.map(|(at, cell)| {
             let comparison = &comparisons[*at];
-            let unit =
-                if comparison.unit == "row" { units.get(&row).cloned().unwrap_or_default() } else { comparison.unit.clone() };
+            let unit = if comparison.unit == "row" {
+                units.get(&row).cloned().unwrap_or_default()
+            } else {
+                comparison.unit.clone()
+            };
             WorstCell {
                 column: comparison.name.clone(),
                 a: json(&cell.a),
@@ -239,7 +325,10 @@ fn worst_rows(
                 sigmas: cell.sigmas,
             }
         });
-        WorstRow { key: keys.text(row as usize), cells: cells.collect() }
+        WorstRow {
+            key: keys.text(row as usize),
+            cells: cells.collect(),
+        }
     });
     Ok(rows.collect())
 }
@@ -253,10 +342,23 @@ fn json(value: &CellValue) -> serde_json::Value {
 }
 
 /// The units that the given rows name in the table's column of units.
-fn row_units(a: &TableFile, comparisons: &[ColumnPair], rows: &[u32]) -> Result<BTreeMap<u32, String>> {
+fn row_units(
+    a: &TableFile,
+    comparisons: &[ColumnPair],
+    rows: &[u32],
+) -> Result<BTreeMap<u32, String>> {
     let mut units = BTreeMap::new();
-    let column = a.columns.iter().position(|column| column.semantic.as_deref() == Some("unit"));
-    let Some(column) = column.filter(|_| comparisons.iter().any(|comparison| comparison.unit == "row")) else { return Ok(units) };
+    let column = a
+        .columns
+        .iter()
+        .position(|column| column.semantic.as_deref() == Some("unit"));
+    let Some(column) = column.filter(|_| {
+        comparisons
+            .iter()
+            .any(|comparison| comparison.unit == "row")
+    }) else {
+        return Ok(units);
+    };
     let mut start = 0;
     for batch in a.stream(&[column])? {
         let array = &batch?[0];

@@ -61,12 +61,22 @@ pub(super) struct Pairing {
 
 impl Pairing {
     pub fn partner(&self, row: usize) -> u32 {
-        if self.partner.is_empty() { row as u32 } else { self.partner[row] }
+        if self.partner.is_empty() {
+            row as u32
+        } else {
+            self.partner[row]
+        }
     }
 
     /// What stands in B beside `count` rows of A from `start` on; nought where a row has no partner. All are fetched in one go, since
     /// their places in memory are far apart.
-    pub fn beside<T: Copy + Default>(&self, theirs: &[T], start: usize, count: usize, out: &mut Vec<T>) {
+    pub fn beside<T: Copy + Default>(
+        &self,
+        theirs: &[T],
+        start: usize,
+        count: usize,
+        out: &mut Vec<T>,
+    ) {
         out.clear();
         let fetch = |at: usize| theirs.get(at).copied().unwrap_or_default();
         match self.partner.get(start..start + count) {
@@ -84,7 +94,12 @@ impl Keys {
             KeyCell::Float(value) => format!("{} {value}", column.name),
             KeyCell::Text(value) => format!("{} {value}", column.name),
         };
-        self.columns.iter().zip(self.cells(row)).map(part).collect::<Vec<_>>().join(", ")
+        self.columns
+            .iter()
+            .zip(self.cells(row))
+            .map(part)
+            .collect::<Vec<_>>()
+            .join(", ")
     }
 
     pub fn cells(&self, row: usize) -> impl Iterator<Item = KeyCell> {
@@ -92,7 +107,11 @@ impl Keys {
             let code = self.codes.code(row, at);
             match &column.meaning {
                 Meaning::Int => KeyCell::Int((code ^ SIGN) as i64),
-                Meaning::Float => KeyCell::Float(f64::from_bits(if code & SIGN != 0 { code ^ SIGN } else { !code })),
+                Meaning::Float => KeyCell::Float(f64::from_bits(if code & SIGN != 0 {
+                    code ^ SIGN
+                } else {
+                    !code
+                })),
                 Meaning::Text(list) => KeyCell::Text(list[code as usize].clone()),
             }
         })
@@ -107,7 +126,10 @@ pub(super) fn read(a: &TableFile, b: &TableFile, names: &[String]) -> Result<(Ke
         let (at_a, at_b) = (a.key_column(name)?, b.key_column(name)?);
         let (kind_a, kind_b) = (a.columns[at_a].kind, b.columns[at_b].kind);
         if (kind_a == CellKind::Text) != (kind_b == CellKind::Text) {
-            let message = format!("is {} in A and {} in B", a.columns[at_a].stored, b.columns[at_b].stored);
+            let message = format!(
+                "is {} in A and {} in B",
+                a.columns[at_a].stored, b.columns[at_b].stored
+            );
             return Err(Error::spec(format!("key column {name}"), message));
         }
         let (left, right) = if kind_a == CellKind::Text {
@@ -119,20 +141,38 @@ pub(super) fn read(a: &TableFile, b: &TableFile, names: &[String]) -> Result<(Ke
             let meaning = if real { Meaning::Float } else { Meaning::Int };
             ((left?, meaning.clone()), (right?, meaning))
         };
-        columns.0.push(KeyColumn { name: name.clone(), meaning: left.1 });
-        columns.1.push(KeyColumn { name: name.clone(), meaning: right.1 });
+        columns.0.push(KeyColumn {
+            name: name.clone(),
+            meaning: left.1,
+        });
+        columns.1.push(KeyColumn {
+            name: name.clone(),
+            meaning: right.1,
+        });
         all.0.push(left.0);
         all.1.push(right.0);
     }
     let (left, right) = pack(all.0, all.1);
-    Ok((Keys { columns: columns.0, codes: left }, Keys { columns: columns.1, codes: right }))
+    Ok((
+        Keys {
+            columns: columns.0,
+            codes: left,
+        },
+        Keys {
+            columns: columns.1,
+            codes: right,
+        },
+    ))
 }
 
 fn no_null(source: &TableFile, column: usize, array: &ArrayRef) -> Result<()> {
     if array.null_count() == 0 {
         return Ok(());
     }
-    let message = format!("key column {} has nulls; name another key with --key", source.columns[column].name);
+    let message = format!(
+        "key column {} has nulls; name another key with --key",
+        source.columns[column].name
+    );
     Err(Error::spec(source.path.display().to_string(), message))
 }
 
@@ -147,15 +187,41 @@ fn codes(source: &TableFile, column: usize, real: bool) -> Result<Vec<u64>> {
         let array = &batch?[0];
         no_null(source, column, array)?;
         match source.columns[column].kind {
-            CellKind::Float => codes.extend(array.as_primitive::<Float64Type>().values().iter().map(|&value| of_float(value))),
-            CellKind::Int if real => {
-                codes.extend(array.as_primitive::<Int64Type>().values().iter().map(|&value| of_float(value as f64)))
-            }
-            CellKind::Int => codes.extend(array.as_primitive::<Int64Type>().values().iter().map(|&value| value as u64 ^ SIGN)),
-            CellKind::Flag if real => {
-                codes.extend(array.as_boolean().values().iter().map(|flag| of_float(f64::from(u8::from(flag)))))
-            }
-            _ => codes.extend(array.as_boolean().values().iter().map(|flag| u64::from(flag) ^ SIGN)),
+            CellKind::Float => codes.extend(
+                array
+                    .as_primitive::<Float64Type>()
+                    .values()
+                    .iter()
+                    .map(|&value| of_float(value)),
+            ),
+            CellKind::Int if real => codes.extend(
+                array
+                    .as_primitive::<Int64Type>()
+                    .values()
+                    .iter()
+                    .map(|&value| of_float(value as f64)),
+            ),
+            CellKind::Int => codes.extend(
+                array
+                    .as_primitive::<Int64Type>()
+                    .values()
+                    .iter()
+                    .map(|&value| value as u64 ^ SIGN),
+            ),
+            CellKind::Flag if real => codes.extend(
+                array
+                    .as_boolean()
+                    .values()
+                    .iter()
+                    .map(|flag| of_float(f64::from(u8::from(flag)))),
+            ),
+            _ => codes.extend(
+                array
+                    .as_boolean()
+                    .values()
+                    .iter()
+                    .map(|flag| u64::from(flag) ^ SIGN),
+            ),
         }
     }
     Ok(codes)
@@ -198,8 +264,13 @@ fn unite(mut a: (Vec<u64>, Vec<Box<str>>), mut b: (Vec<u64>, Vec<Box<str>>)) -> 
     all.sort_unstable();
     all.dedup();
     for (codes, list) in [&mut a, &mut b] {
-        let place: Vec<u64> = list.iter().map(|text| all.partition_point(|known| known < text) as u64).collect();
-        codes.iter_mut().for_each(|code| *code = place[*code as usize]);
+        let place: Vec<u64> = list
+            .iter()
+            .map(|text| all.partition_point(|known| known < text) as u64)
+            .collect();
+        codes
+            .iter_mut()
+            .for_each(|code| *code = place[*code as usize]);
         list.clear();
     }
     let all = Arc::new(all);
@@ -233,7 +304,11 @@ pub(super) fn pair(a: &Keys, b: &Keys, occurrence: bool) -> Pairing {
         let count_b = if order.is_ge() { b.equal_from(at_b) } else { 0 };
         let twice = count_a > 1 || count_b > 1;
         pairing.keys_twice += usize::from(twice);
-        let paired = if twice && !occurrence { 0 } else { count_a.min(count_b) };
+        let paired = if twice && !occurrence {
+            0
+        } else {
+            count_a.min(count_b)
+        };
         for k in 0..paired {
             let (left, right) = (a.row(at_a + k), b.row(at_b + k));
             if identity && left != right {
@@ -270,7 +345,11 @@ impl Pairing {
     fn spell_out(&mut self, rows: usize) {
         if self.partner.is_empty() {
             self.partner = vec![NONE; rows];
-            self.partner.iter_mut().take(self.paired).enumerate().for_each(|(row, partner)| *partner = row as u32);
+            self.partner
+                .iter_mut()
+                .take(self.paired)
+                .enumerate()
+                .for_each(|(row, partner)| *partner = row as u32);
         }
     }
 }

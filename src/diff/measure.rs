@@ -47,7 +47,11 @@ pub(super) struct ComparedTables<'d> {
 }
 
 /// Judges a comparison; `sees` is told of every pair of cells that are not the same, in the order of A.
-pub(super) fn measure(files: ComparedTables, comparison: &ColumnPair, sees: &mut Seer) -> Result<ColumnDiff> {
+pub(super) fn measure(
+    files: ComparedTables,
+    comparison: &ColumnPair,
+    sees: &mut Seer,
+) -> Result<ColumnDiff> {
     let mut tally = DifferenceSums::new(comparison);
     if comparison.how == Comparator::Text {
         texts(files, comparison, &mut tally, sees)?;
@@ -59,8 +63,18 @@ pub(super) fn measure(files: ComparedTables, comparison: &ColumnPair, sees: &mut
 
 type Seer<'s> = dyn FnMut(&CellDifference) -> Result<()> + 's;
 
-fn numbers(files: ComparedTables, comparison: &ColumnPair, tally: &mut DifferenceSums, sees: &mut Seer) -> Result<()> {
-    let ComparedTables { a, b, pairing, rows } = files;
+fn numbers(
+    files: ComparedTables,
+    comparison: &ColumnPair,
+    tally: &mut DifferenceSums,
+    sees: &mut Seer,
+) -> Result<()> {
+    let ComparedTables {
+        a,
+        b,
+        pairing,
+        rows,
+    } = files;
     let size = comparison.a.len();
     let theirs = Theirs::read(a, b, comparison)?;
     let mut wanted = comparison.a.clone();
@@ -78,7 +92,8 @@ fn numbers(files: ComparedTables, comparison: &ColumnPair, tally: &mut Differenc
         for (values, (theirs, _)) in beside.iter_mut().zip(&theirs.columns) {
             pairing.beside(theirs, start, batch[0].len(), values);
         }
-        let plain = size == 1 && theirs.integers.is_none() && no_null_there && batch[0].null_count() == 0;
+        let plain =
+            size == 1 && theirs.integers.is_none() && no_null_there && batch[0].null_count() == 0;
         for at in 0..batch[0].len() {
             let partner = pairing.partner(start + at);
             if partner == NONE {
@@ -88,7 +103,13 @@ fn numbers(files: ComparedTables, comparison: &ColumnPair, tally: &mut Differenc
                 tally.pairs += 1;
                 continue;
             }
-            let pair = Pair { batch: &batch, ours: &ours, beside: &beside, at, partner: partner as usize };
+            let pair = Pair {
+                batch: &batch,
+                ours: &ours,
+                beside: &beside,
+                at,
+                partner: partner as usize,
+            };
             if let Some(cell) = theirs.cell(comparison, &pair, start + at, tally) {
                 judge(&cell, rows, tally);
                 sees(&cell)?;
@@ -126,24 +147,49 @@ fn is_null(nulls: &[bool], row: usize) -> bool {
 
 impl Theirs {
     fn read(a: &TableFile, b: &TableFile, comparison: &ColumnPair) -> Result<Self> {
-        let mut columns = comparison.b.iter().map(|&column| b.numbers(column)).collect::<Result<Vec<_>>>()?;
+        let mut columns = comparison
+            .b
+            .iter()
+            .map(|&column| b.numbers(column))
+            .collect::<Result<Vec<_>>>()?;
         let (scale, shift) = comparison.conversion;
         if comparison.conversion != (1.0, 0.0) {
-            columns.iter_mut().flat_map(|(values, _)| values).for_each(|value| *value = *value * scale + shift);
+            columns
+                .iter_mut()
+                .flat_map(|(values, _)| values)
+                .for_each(|value| *value = *value * scale + shift);
         }
         let whole = comparison.a.len() == 1
             && a.columns[comparison.a[0]].kind == CellKind::Int
             && b.columns[comparison.b[0]].kind == CellKind::Int;
         let integers = whole.then(|| b.integers(comparison.b[0])).transpose()?;
-        let sigma = comparison.sigma.map(|(_, column)| b.numbers(column)).transpose()?;
-        Ok(Self { columns, integers, sigma })
+        let sigma = comparison
+            .sigma
+            .map(|(_, column)| b.numbers(column))
+            .transpose()?;
+        Ok(Self {
+            columns,
+            integers,
+            sigma,
+        })
     }
 
     /// What a pair shows; none where both are the same.
-    fn cell(&self, comparison: &ColumnPair, pair: &Pair, row: usize, tally: &mut DifferenceSums) -> Option<CellDifference> {
+    fn cell(
+        &self,
+        comparison: &ColumnPair,
+        pair: &Pair,
+        row: usize,
+        tally: &mut DifferenceSums,
+    ) -> Option<CellDifference> {
         let size = comparison.a.len();
-        let null_a = pair.batch[..size].iter().any(|array| array.is_null(pair.at));
-        let null_b = self.columns.iter().any(|(_, nulls)| is_null(nulls, pair.partner));
+        let null_a = pair.batch[..size]
+            .iter()
+            .any(|array| array.is_null(pair.at));
+        let null_b = self
+            .columns
+            .iter()
+            .any(|(_, nulls)| is_null(nulls, pair.partner));
         let difference = match (null_a, null_b) {
             (true, true) => return None,
             (false, false) => {
@@ -153,11 +199,24 @@ impl Theirs {
             _ => f64::NAN,
         };
         let (left, right) = (pair.ours[0][pair.at], pair.beside[0][pair.at]);
-        let value = |null: bool, value: f64| if null { CellValue::Null } else { CellValue::Number(value) };
-        let largest = if size == 1 { left.abs().max(right.abs()) } else { 0.0 };
+        let value = |null: bool, value: f64| {
+            if null {
+                CellValue::Null
+            } else {
+                CellValue::Number(value)
+            }
+        };
+        let largest = if size == 1 {
+            left.abs().max(right.abs())
+        } else {
+            0.0
+        };
         let allowed = comparison.atol + comparison.rtol * largest;
         let finite = difference.is_finite();
-        let sigmas = self.sigma(size, pair).filter(|_| finite).map(|sigma| difference.abs() / sigma);
+        let sigmas = self
+            .sigma(size, pair)
+            .filter(|_| finite)
+            .map(|sigma| difference.abs() / sigma);
         Some(CellDifference {
             row: row as u32,
             changed: !(finite && difference.abs() <= allowed),
@@ -173,13 +232,21 @@ impl Theirs {
     fn difference(&self, comparison: &ColumnPair, pair: &Pair) -> Option<f64> {
         let difference = if comparison.a.len() == 1 {
             let (left, right) = (pair.ours[0][pair.at], pair.beside[0][pair.at]);
-            let whole = self.integers.as_ref().map(|theirs| apart(&pair.batch[0], pair.at, theirs[pair.partner]));
+            let whole = self
+                .integers
+                .as_ref()
+                .map(|theirs| apart(&pair.batch[0], pair.at, theirs[pair.partner]));
             if (left == right && whole.unwrap_or(0.0) == 0.0) || (left.is_nan() && right.is_nan()) {
                 return None;
             }
-            whole.filter(|_| comparison.conversion == (1.0, 0.0)).unwrap_or_else(|| one(comparison.how, right - left))
+            whole
+                .filter(|_| comparison.conversion == (1.0, 0.0))
+                .unwrap_or_else(|| one(comparison.how, right - left))
         } else {
-            let left: Vec<f64> = pair.ours[..comparison.a.len()].iter().map(|values| values[pair.at]).collect();
+            let left: Vec<f64> = pair.ours[..comparison.a.len()]
+                .iter()
+                .map(|values| values[pair.at])
+                .collect();
             let right: Vec<f64> = pair.beside.iter().map(|values| values[pair.at]).collect();
             if left == right {
                 return None;
@@ -228,8 +295,17 @@ fn rotation(how: Comparator, left: &[f64], right: &[f64]) -> f64 {
             let v = [cells[0] * factor, cells[1] * factor, cells[2] * factor];
             let angle = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
             // sin(x/2)/x is 1/2 within f64 below this.
-            let ratio = if angle < 1e-9 { 0.5 } else { (angle / 2.0).sin() / angle };
-            [(angle / 2.0).cos(), v[0] * ratio, v[1] * ratio, v[2] * ratio]
+            let ratio = if angle < 1e-9 {
+                0.5
+            } else {
+                (angle / 2.0).sin() / angle
+            };
+            [
+                (angle / 2.0).cos(),
+                v[0] * ratio,
+                v[1] * ratio,
+                v[2] * ratio,
+            ]
         }
         _ => [cells[0], cells[1], cells[2], cells[3]],
     };
@@ -242,11 +318,25 @@ fn rotation(how: Comparator, left: &[f64], right: &[f64]) -> f64 {
         l[0] * r[3] - l[3] * r[0] - l[1] * r[2] + l[2] * r[1],
     ];
     let sine = vector.iter().map(|x| x * x).sum::<f64>().sqrt();
-    if sine == 0.0 && dot == 0.0 { f64::NAN } else { 2.0 * sine.atan2(dot.abs()) }
+    if sine == 0.0 && dot == 0.0 {
+        f64::NAN
+    } else {
+        2.0 * sine.atan2(dot.abs())
+    }
 }
 
-fn texts(files: ComparedTables, comparison: &ColumnPair, tally: &mut DifferenceSums, sees: &mut Seer) -> Result<()> {
-    let ComparedTables { a, b, pairing, rows } = files;
+fn texts(
+    files: ComparedTables,
+    comparison: &ColumnPair,
+    tally: &mut DifferenceSums,
+    sees: &mut Seer,
+) -> Result<()> {
+    let ComparedTables {
+        a,
+        b,
+        pairing,
+        rows,
+    } = files;
     let (column_a, column_b) = (comparison.a[0], comparison.b[0]);
     let mut bytes = String::new();
     let mut ends: Vec<(usize, bool)> = Vec::with_capacity(b.rows);
@@ -274,7 +364,9 @@ fn texts(files: ComparedTables, comparison: &ColumnPair, tally: &mut DifferenceS
             if left.as_deref() == right {
                 continue;
             }
-            let value = |text: Option<&str>| text.map_or(CellValue::Null, |text| CellValue::Text(text.into()));
+            let value = |text: Option<&str>| {
+                text.map_or(CellValue::Null, |text| CellValue::Text(text.into()))
+            };
             let cell = CellDifference {
                 row: (start + at) as u32,
                 changed: true,
@@ -302,11 +394,20 @@ fn text(array: &ArrayRef, kind: CellKind, row: usize) -> Option<std::borrow::Cow
     }
     let mut numbers = Vec::with_capacity(1);
     push_numbers(&array.slice(row, 1), &mut numbers);
-    Some(numbers.first().map(f64::to_string).unwrap_or_default().into())
+    Some(
+        numbers
+            .first()
+            .map(f64::to_string)
+            .unwrap_or_default()
+            .into(),
+    )
 }
 
 fn judge(cell: &CellDifference, rows: &[AtomicU8], tally: &mut DifferenceSums) {
-    rows[cell.row as usize].fetch_max(if cell.changed { CHANGED } else { WITHIN }, Ordering::Relaxed);
+    rows[cell.row as usize].fetch_max(
+        if cell.changed { CHANGED } else { WITHIN },
+        Ordering::Relaxed,
+    );
     tally.add(cell);
 }
 
@@ -344,17 +445,27 @@ impl DifferenceSums {
     }
 
     fn add(&mut self, cell: &CellDifference) {
-        *(if cell.changed { &mut self.changed } else { &mut self.within }) += 1;
+        *(if cell.changed {
+            &mut self.changed
+        } else {
+            &mut self.within
+        }) += 1;
         if let Some(sigmas) = cell.sigmas {
             self.sigma_squares += sigmas * sigmas;
             self.sigma_count += 1;
             self.worst_sigmas = Some(self.worst_sigmas.map_or(sigmas, |worst| worst.max(sigmas)));
         }
-        let Some(difference) = cell.difference else { return };
+        let Some(difference) = cell.difference else {
+            return;
+        };
         self.sum += difference;
         self.squares += difference * difference;
         self.sizes.push(difference.abs());
-        let rank = if self.mixed { cell.score } else { difference.abs() };
+        let rank = if self.mixed {
+            cell.score
+        } else {
+            difference.abs()
+        };
         if self.worst.is_none_or(|(worst, _)| rank > worst) {
             self.worst = Some((rank, cell.row));
         }
@@ -362,12 +473,13 @@ impl DifferenceSums {
 
     fn finish(mut self, comparison: &ColumnPair) -> ColumnDiff {
         let pairs = self.pairs as f64;
-        let statistics = (self.pairs > 0 && comparison.how != Comparator::Text && !self.mixed).then(|| DifferenceStatistics {
-            max: self.sizes.iter().copied().fold(0.0, f64::max),
-            rms: (self.squares / pairs).sqrt(),
-            bias: self.sum / pairs,
-            p95: percentile(&mut self.sizes, self.pairs, 0.95),
-        });
+        let statistics = (self.pairs > 0 && comparison.how != Comparator::Text && !self.mixed)
+            .then(|| DifferenceStatistics {
+                max: self.sizes.iter().copied().fold(0.0, f64::max),
+                rms: (self.squares / pairs).sqrt(),
+                bias: self.sum / pairs,
+                p95: percentile(&mut self.sizes, self.pairs, 0.95),
+            });
         ColumnDiff {
             name: comparison.name.clone(),
             unit: comparison.unit.clone(),
@@ -378,7 +490,8 @@ impl DifferenceSums {
             rtol: comparison.rtol,
             statistics,
             max_sigmas: self.worst_sigmas,
-            rms_sigmas: (self.sigma_count > 0).then(|| (self.sigma_squares / pairs.max(1.0)).sqrt()),
+            rms_sigmas: (self.sigma_count > 0)
+                .then(|| (self.sigma_squares / pairs.max(1.0)).sqrt()),
             worst_row: self.worst.map(|(_, row)| row),
             worst_key: None,
         }
@@ -392,6 +505,8 @@ fn percentile(sizes: &mut [f64], pairs: u64, part: f64) -> f64 {
     if rank <= noughts {
         return 0.0;
     }
-    let at = usize::try_from(rank - noughts - 1).unwrap_or(usize::MAX).min(sizes.len().saturating_sub(1));
+    let at = usize::try_from(rank - noughts - 1)
+        .unwrap_or(usize::MAX)
+        .min(sizes.len().saturating_sub(1));
     *sizes.select_nth_unstable_by(at, f64::total_cmp).1
 }

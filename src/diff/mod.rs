@@ -62,17 +62,29 @@ pub struct Tolerances {
 impl Tolerances {
     /// Takes in `0.1`, `x_mm=0.1` or `x_mm=100um`.
     pub fn add(&mut self, flag: &str, text: &str) -> Result<()> {
-        let fault =
-            || Error::spec(flag, format!("`{text}`: expected a number not below 0, or COLUMN=NUMBER with or without a unit"));
+        let fault = || {
+            Error::spec(
+                flag,
+                format!(
+                    "`{text}`: expected a number not below 0, or COLUMN=NUMBER with or without a unit"
+                ),
+            )
+        };
         let (column, value) = match text.rsplit_once('=') {
             Some((column, value)) => (Some(column), value),
             None => (None, text),
         };
-        let digits = value.trim_end_matches(|c: char| c.is_alphabetic() || c == '/').len();
+        let digits = value
+            .trim_end_matches(|c: char| c.is_alphabetic() || c == '/')
+            .len();
         // An exponent's letter is followed by digits, a unit's is not.
         let (number, symbol) = value.split_at(digits);
         let number: f64 = number.trim().parse().map_err(|_| fault())?;
-        let unit = if symbol.is_empty() { None } else { Some(Unit::parse(symbol).ok_or_else(fault)?) };
+        let unit = if symbol.is_empty() {
+            None
+        } else {
+            Some(Unit::parse(symbol).ok_or_else(fault)?)
+        };
         if !number.is_finite() || number < 0.0 || (column.is_none() && unit.is_some()) {
             return Err(fault());
         }
@@ -89,8 +101,13 @@ impl Tolerances {
             Some(wish) => *wish,
             None => (self.all?, None),
         };
-        let convert = |given: Unit| unit.from_si(given.to_si(number)) - unit.from_si(given.to_si(0.0));
-        Some(given.filter(|given| given.quantity() == unit.quantity()).map_or(number, convert))
+        let convert =
+            |given: Unit| unit.from_si(given.to_si(number)) - unit.from_si(given.to_si(0.0));
+        Some(
+            given
+                .filter(|given| given.quantity() == unit.quantity())
+                .map_or(number, convert),
+        )
     }
 }
 
@@ -166,7 +183,11 @@ pub struct Discrepancy {
 
 impl Discrepancy {
     fn new(what: &str, column: &str, says: impl Into<String>) -> Self {
-        Self { what: what.into(), column: column.into(), says: says.into() }
+        Self {
+            what: what.into(),
+            column: column.into(),
+            says: says.into(),
+        }
     }
 }
 
@@ -274,7 +295,8 @@ impl TableDiff {
     /// True where nothing differs beyond tolerance.
     pub fn is_same(&self) -> bool {
         let rows = &self.rows;
-        self.findings.is_empty() && rows.changed + rows.only_a + rows.only_b + self.duplicates() == 0
+        self.findings.is_empty()
+            && rows.changed + rows.only_a + rows.only_b + self.duplicates() == 0
     }
 
     /// Rows that could not be paired because their key is not theirs alone.

@@ -1,13 +1,18 @@
 //! Codes of keys in one number a row where they fit, and rows in the order of the key.
 
-use rayon::iter::{IndexedParallelIterator, IntoParallelRefIterator, IntoParallelRefMutIterator, ParallelIterator};
+use rayon::iter::{
+    IndexedParallelIterator, IntoParallelRefIterator, IntoParallelRefMutIterator, ParallelIterator,
+};
 use rayon::slice::ParallelSliceMut;
 use std::cmp::Ordering;
 
 /// The codes of the key columns of one file.
 pub(super) enum Codes {
     /// All columns in one number, the first in the highest bits.
-    Packed { rows: Vec<u64>, fields: Vec<BitField> },
+    Packed {
+        rows: Vec<u64>,
+        fields: Vec<BitField>,
+    },
     /// Key columns whose ranges do not fit together into 64 bits.
     Columns(Vec<Vec<u64>>),
 }
@@ -23,8 +28,14 @@ pub(super) struct BitField {
 pub(super) fn pack(a: Vec<Vec<u64>>, b: Vec<Vec<u64>>) -> (Codes, Codes) {
     let range = |(left, right): (&Vec<u64>, &Vec<u64>)| {
         let all = || left.par_iter().chain(right.par_iter()).copied();
-        let (least, most) = all().map(|code| (code, code)).reduce(|| (u64::MAX, 0), |x, y| (x.0.min(y.0), x.1.max(y.1)));
-        BitField { least, shift: 0, bits: u64::BITS - most.saturating_sub(least).leading_zeros() }
+        let (least, most) = all()
+            .map(|code| (code, code))
+            .reduce(|| (u64::MAX, 0), |x, y| (x.0.min(y.0), x.1.max(y.1)));
+        BitField {
+            least,
+            shift: 0,
+            bits: u64::BITS - most.saturating_sub(least).leading_zeros(),
+        }
     };
     let mut fields: Vec<BitField> = a.iter().zip(&b).map(range).collect();
     let mut shift = 0;
@@ -43,10 +54,15 @@ pub(super) fn pack(a: Vec<Vec<u64>>, b: Vec<Vec<u64>>) -> (Codes, Codes) {
                 rows = codes;
                 rows.par_iter_mut().for_each(|code| *code = place(*code));
             } else {
-                rows.par_iter_mut().zip(codes.par_iter()).for_each(|(row, code)| *row |= place(*code));
+                rows.par_iter_mut()
+                    .zip(codes.par_iter())
+                    .for_each(|(row, code)| *row |= place(*code));
             }
         }
-        Codes::Packed { rows, fields: fields.clone() }
+        Codes::Packed {
+            rows,
+            fields: fields.clone(),
+        }
     };
     (one(a), one(b))
 }
@@ -73,10 +89,18 @@ impl Codes {
 
     fn compare(&self, row: usize, other: &Self, other_row: usize) -> Ordering {
         match (self, other) {
-            (Self::Packed { rows, .. }, Self::Packed { rows: others, .. }) => rows[row].cmp(&others[other_row]),
+            (Self::Packed { rows, .. }, Self::Packed { rows: others, .. }) => {
+                rows[row].cmp(&others[other_row])
+            }
             (Self::Columns(columns), Self::Columns(others)) => {
-                let order = |(left, right): (&Vec<u64>, &Vec<u64>)| left[row].cmp(&right[other_row]);
-                columns.iter().zip(others).map(order).find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
+                let order =
+                    |(left, right): (&Vec<u64>, &Vec<u64>)| left[row].cmp(&right[other_row]);
+                columns
+                    .iter()
+                    .zip(others)
+                    .map(order)
+                    .find(|order| order.is_ne())
+                    .unwrap_or(Ordering::Equal)
             }
             _ => unreachable!("both files are packed, or neither"),
         }
@@ -107,7 +131,9 @@ impl<'c> SortedRows<'c> {
             Order::Packed(order)
         } else {
             let mut order: Vec<u32> = (0..rows as u32).collect();
-            order.par_sort_unstable_by(|&l, &r| codes.compare(l as usize, codes, r as usize).then(l.cmp(&r)));
+            order.par_sort_unstable_by(|&l, &r| {
+                codes.compare(l as usize, codes, r as usize).then(l.cmp(&r))
+            });
             Order::Rows(order)
         };
         Self { codes, order }
@@ -133,7 +159,9 @@ impl<'c> SortedRows<'c> {
     pub fn compare(&self, at: usize, other: &Self, other_at: usize) -> Ordering {
         match (self.packed(at), other.packed(other_at)) {
             (Some(left), Some(right)) => left.cmp(&right),
-            _ => self.codes.compare(self.row(at), other.codes, other.row(other_at)),
+            _ => self
+                .codes
+                .compare(self.row(at), other.codes, other.row(other_at)),
         }
     }
 
@@ -147,7 +175,9 @@ impl<'c> SortedRows<'c> {
 
     /// How many places from `at` on have its key.
     pub fn equal_from(&self, at: usize) -> usize {
-        (at..self.rows()).take_while(|&next| next == at || self.compare(at, self, next).is_eq()).count()
+        (at..self.rows())
+            .take_while(|&next| next == at || self.compare(at, self, next).is_eq())
+            .count()
     }
 }
 
@@ -157,20 +187,46 @@ mod tests {
 
     #[test]
     fn packed_codes_come_back_and_order_as_their_columns_do() {
-        let widths = [[3_u64, 1], [1 << 40, 1 << 23], [u64::MAX, 1], [u64::MAX, u64::MAX], [1, u64::MAX]];
+        let widths = [
+            [3_u64, 1],
+            [1 << 40, 1 << 23],
+            [u64::MAX, 1],
+            [u64::MAX, u64::MAX],
+            [1, u64::MAX],
+        ];
         for (case, width) in widths.into_iter().enumerate() {
             let make = |salt: u64| -> Vec<Vec<u64>> {
-                let code =
-                    |k: u64, n: u64| n.wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(29 * k as u32 + 7).wrapping_add(salt);
-                (0..2).map(|k| (0..50).map(|n| code(k as u64, n) % width[k].max(1)).collect()).collect()
+                let code = |k: u64, n: u64| {
+                    n.wrapping_mul(0x9E37_79B9_7F4A_7C15)
+                        .rotate_left(29 * k as u32 + 7)
+                        .wrapping_add(salt)
+                };
+                (0..2)
+                    .map(|k| {
+                        (0..50)
+                            .map(|n| code(k as u64, n) % width[k].max(1))
+                            .collect()
+                    })
+                    .collect()
             };
             let (a, b) = (make(1), make(2));
             let (packed_a, packed_b) = pack(a.clone(), b.clone());
-            assert_eq!(matches!(packed_a, Codes::Columns(_)), case == 3, "case {case}");
+            assert_eq!(
+                matches!(packed_a, Codes::Columns(_)),
+                case == 3,
+                "case {case}"
+            );
             for (left, right) in (0..50).flat_map(|left| (0..50).map(move |right| (left, right))) {
-                assert_eq!([0, 1].map(|k| packed_a.code(left, k)), [a[0][left], a[1][left]]);
+                assert_eq!(
+                    [0, 1].map(|k| packed_a.code(left, k)),
+                    [a[0][left], a[1][left]]
+                );
                 let wanted = (a[0][left], a[1][left]).cmp(&(b[0][right], b[1][right]));
-                assert_eq!(packed_a.compare(left, &packed_b, right), wanted, "case {case}");
+                assert_eq!(
+                    packed_a.compare(left, &packed_b, right),
+                    wanted,
+                    "case {case}"
+                );
             }
             let order = SortedRows::of(&packed_a);
             assert!((1..50).all(|at| order.compare(at - 1, &order, at).is_le()));

@@ -3,7 +3,9 @@
 use arrow::array::{Array, ArrayRef, AsArray, BooleanArray, RecordBatch};
 use arrow::compute::cast;
 use arrow::datatypes::{DataType, Float64Type, Int64Type, Schema};
-use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
+use parquet::arrow::arrow_reader::{
+    ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder,
+};
 use parquet::arrow::{ProjectionMask, parquet_to_arrow_schema};
 use parquet::errors::ParquetError;
 use std::collections::BTreeMap;
@@ -52,17 +54,26 @@ pub(super) struct TableFile {
 impl TableFile {
     pub fn open(path: &Path) -> Result<Self> {
         let place = path.display().to_string();
-        let unreadable = |e: ParquetError| Error::spec(&place, format!("not a readable Parquet file: {e}"));
-        let file = raw::open(path).map_err(|e| Error::spec(&place, format!("cannot be read: {e}")))?;
+        let unreadable =
+            |e: ParquetError| Error::spec(&place, format!("not a readable Parquet file: {e}"));
+        let file =
+            raw::open(path).map_err(|e| Error::spec(&place, format!("cannot be read: {e}")))?;
         // Arrow's own types (dictionaries, views) are left aside, so that every writer's text is plain text.
         let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
-        let metadata =
-            raw::decoded(|| ArrowReaderMetadata::load(&file, options)).map_err(|e| unreadable(ParquetError::General(e)))?;
+        let metadata = raw::decoded(|| ArrowReaderMetadata::load(&file, options))
+            .map_err(|e| unreadable(ParquetError::General(e)))?;
         let metadata = metadata.map_err(unreadable)?;
         let footer = metadata.metadata().file_metadata();
         let rows = usize::try_from(footer.num_rows()).unwrap_or(0);
         if u32::try_from(rows).is_err() {
-            return Err(Error::spec(place, format!("{}; a comparison takes up to {}", counted(rows, "row"), u32::MAX)));
+            return Err(Error::spec(
+                place,
+                format!(
+                    "{}; a comparison takes up to {}",
+                    counted(rows, "row"),
+                    u32::MAX
+                ),
+            ));
         }
         let said: BTreeMap<String, String> = footer
             .key_value_metadata()
@@ -70,16 +81,24 @@ impl TableFile {
             .flatten()
             .filter_map(|pair| Some((pair.key.clone(), pair.value.clone()?)))
             .collect();
-        let units: BTreeMap<String, String> =
-            said.get("calib.units").and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default();
-        let rich = raw::decoded(|| parquet_to_arrow_schema(footer.schema_descr(), footer.key_value_metadata()));
+        let units: BTreeMap<String, String> = said
+            .get("calib.units")
+            .and_then(|text| serde_json::from_str(text).ok())
+            .unwrap_or_default();
+        let rich = raw::decoded(|| {
+            parquet_to_arrow_schema(footer.schema_descr(), footer.key_value_metadata())
+        });
         let rich = rich.map_err(|e| unreadable(ParquetError::General(e)))?.ok();
         let columns = metadata.schema().fields().iter().map(|field| {
             let about = |key: &str| metadata_of(rich.as_ref(), field.name(), key);
             TableColumn {
                 name: field.name().clone(),
                 kind: kind(field.data_type()).unwrap_or(CellKind::Text),
-                stored: if kind(field.data_type()).is_some() { field.data_type().to_string() } else { String::new() },
+                stored: if kind(field.data_type()).is_some() {
+                    field.data_type().to_string()
+                } else {
+                    String::new()
+                },
                 unit: about("unit").or_else(|| units.get(field.name()).cloned()),
                 semantic: about("semantic"),
             }
@@ -89,9 +108,20 @@ impl TableFile {
             let (kind, version) = id.split_once('/')?;
             Some((kind.to_string(), Version::parse(version)?))
         });
-        let key = said.get("calib.primary_key").map(|key| key.split(',').map(String::from).collect()).unwrap_or_default();
+        let key = said
+            .get("calib.primary_key")
+            .map(|key| key.split(',').map(String::from).collect())
+            .unwrap_or_default();
         let table_hash = said.get("calib.table_hash").cloned();
-        Ok(Self { path: path.into(), rows, columns, table, table_hash, key, metadata })
+        Ok(Self {
+            path: path.into(),
+            rows,
+            columns,
+            table,
+            table_hash,
+            key,
+            metadata,
+        })
     }
 
     /// The schema that this calib knows of the table, whatever the version.
@@ -107,28 +137,46 @@ impl TableFile {
     /// The place of a column that a key needs.
     pub fn key_column(&self, name: &str) -> Result<usize> {
         self.position(name).ok_or_else(|| {
-            let known: Vec<&str> = self.columns.iter().map(|column| column.name.as_str()).collect();
+            let known: Vec<&str> = self
+                .columns
+                .iter()
+                .map(|column| column.name.as_str())
+                .collect();
             let message = format!("no key column `{name}`; its columns: {}", known.join(", "));
             Error::spec(self.path.display().to_string(), message)
         })
     }
 
     /// Batches of the given columns, in the given order, each cast to the type of its kind.
-    pub fn stream(&self, columns: &[usize]) -> Result<impl Iterator<Item = Result<Vec<ArrayRef>>> + use<>> {
+    pub fn stream(
+        &self,
+        columns: &[usize],
+    ) -> Result<impl Iterator<Item = Result<Vec<ArrayRef>>> + use<>> {
         let place = self.path.display().to_string();
         for &column in columns {
             let column = &self.columns[column];
             if column.stored.is_empty() {
-                let message =
-                    format!("column {} is nested or binary, which is not compared: leave it out with --ignore", column.name);
+                let message = format!(
+                    "column {} is nested or binary, which is not compared: leave it out with --ignore",
+                    column.name
+                );
                 return Err(Error::spec(place, message));
             }
         }
-        let file = File::open(&self.path).map_err(|e| Error::spec(&place, format!("cannot be read: {e}")))?;
-        let builder = ParquetRecordBatchReaderBuilder::new_with_metadata(file, self.metadata.clone());
+        let file = File::open(&self.path)
+            .map_err(|e| Error::spec(&place, format!("cannot be read: {e}")))?;
+        let builder =
+            ParquetRecordBatchReaderBuilder::new_with_metadata(file, self.metadata.clone());
         let mask = ProjectionMask::roots(builder.parquet_schema(), columns.iter().copied());
-        let unreadable = |e: String| Error::spec(&place, format!("not a readable Parquet file: {e}"));
-        let reader = raw::decoded(|| builder.with_projection(mask).with_batch_size(BATCH_ROWS).build()).map_err(unreadable)?;
+        let unreadable =
+            |e: String| Error::spec(&place, format!("not a readable Parquet file: {e}"));
+        let reader = raw::decoded(|| {
+            builder
+                .with_projection(mask)
+                .with_batch_size(BATCH_ROWS)
+                .build()
+        })
+        .map_err(unreadable)?;
         let reader = reader.map_err(|e| unreadable(e.to_string()))?;
         // The reader gives columns in the file's order.
         let mut ascending: Vec<usize> = columns.to_vec();
@@ -136,14 +184,29 @@ impl TableFile {
         ascending.dedup();
         let wanted: Vec<(usize, CellKind)> = columns
             .iter()
-            .map(|column| (ascending.binary_search(column).unwrap_or_default(), self.columns[*column].kind))
+            .map(|column| {
+                (
+                    ascending.binary_search(column).unwrap_or_default(),
+                    self.columns[*column].kind,
+                )
+            })
             .collect();
         let mut reader = reader;
-        Ok(std::iter::from_fn(move || raw::decoded(|| reader.next()).transpose()).map(move |batch| {
-            let damaged = |e: &dyn std::fmt::Display| Error::spec(&place, format!("damaged, cannot be read to its end: {e}"));
-            let batch: RecordBatch = batch.map_err(|e| damaged(&e))?.map_err(|e| damaged(&e))?;
-            wanted.iter().map(|&(at, kind)| plain(batch.column(at), kind).map_err(|e| damaged(&e))).collect()
-        }))
+        Ok(
+            std::iter::from_fn(move || raw::decoded(|| reader.next()).transpose()).map(
+                move |batch| {
+                    let damaged = |e: &dyn std::fmt::Display| {
+                        Error::spec(&place, format!("damaged, cannot be read to its end: {e}"))
+                    };
+                    let batch: RecordBatch =
+                        batch.map_err(|e| damaged(&e))?.map_err(|e| damaged(&e))?;
+                    wanted
+                        .iter()
+                        .map(|&(at, kind)| plain(batch.column(at), kind).map_err(|e| damaged(&e)))
+                        .collect()
+                },
+            ),
+        )
     }
 
     /// A whole column of whole numbers; null cells are 0.
@@ -178,7 +241,13 @@ impl TableFile {
 pub(super) fn push_numbers(array: &ArrayRef, values: &mut Vec<f64>) {
     match array.data_type() {
         DataType::Float64 => values.extend_from_slice(array.as_primitive::<Float64Type>().values()),
-        DataType::Int64 => values.extend(array.as_primitive::<Int64Type>().values().iter().map(|&value| value as f64)),
+        DataType::Int64 => values.extend(
+            array
+                .as_primitive::<Int64Type>()
+                .values()
+                .iter()
+                .map(|&value| value as f64),
+        ),
         DataType::Boolean => {
             let flags: &BooleanArray = array.as_boolean();
             values.extend(flags.values().iter().map(|flag| f64::from(u8::from(flag))));
@@ -189,31 +258,54 @@ pub(super) fn push_numbers(array: &ArrayRef, values: &mut Vec<f64>) {
 }
 
 fn metadata_of(schema: Option<&Schema>, column: &str, key: &str) -> Option<String> {
-    schema?.field_with_name(column).ok()?.metadata().get(key).cloned()
+    schema?
+        .field_with_name(column)
+        .ok()?
+        .metadata()
+        .get(key)
+        .cloned()
 }
 
 fn kind(data_type: &DataType) -> Option<CellKind> {
     use DataType as T;
     match data_type {
-        T::Float16 | T::Float32 | T::Float64 | T::Decimal32(..) | T::Decimal64(..) | T::Decimal128(..) | T::Decimal256(..) => {
-            Some(CellKind::Float)
+        T::Float16
+        | T::Float32
+        | T::Float64
+        | T::Decimal32(..)
+        | T::Decimal64(..)
+        | T::Decimal128(..)
+        | T::Decimal256(..) => Some(CellKind::Float),
+        T::Int8 | T::Int16 | T::Int32 | T::Int64 | T::UInt8 | T::UInt16 | T::UInt32 => {
+            Some(CellKind::Int)
         }
-        T::Int8 | T::Int16 | T::Int32 | T::Int64 | T::UInt8 | T::UInt16 | T::UInt32 => Some(CellKind::Int),
         T::Boolean => Some(CellKind::Flag),
-        T::Utf8 | T::LargeUtf8 | T::Utf8View | T::UInt64 | T::Date32 | T::Date64 | T::Time32(_) | T::Time64(_) => {
-            Some(CellKind::Text)
-        }
+        T::Utf8
+        | T::LargeUtf8
+        | T::Utf8View
+        | T::UInt64
+        | T::Date32
+        | T::Date64
+        | T::Time32(_)
+        | T::Time64(_) => Some(CellKind::Text),
         T::Timestamp(..) | T::Duration(_) => Some(CellKind::Text),
         _ => None,
     }
 }
 
-fn plain(array: &ArrayRef, kind: CellKind) -> std::result::Result<ArrayRef, arrow::error::ArrowError> {
+fn plain(
+    array: &ArrayRef,
+    kind: CellKind,
+) -> std::result::Result<ArrayRef, arrow::error::ArrowError> {
     let wanted = match kind {
         CellKind::Float => DataType::Float64,
         CellKind::Int => DataType::Int64,
         CellKind::Flag => DataType::Boolean,
         CellKind::Text => DataType::Utf8,
     };
-    if array.data_type() == &wanted { Ok(array.clone()) } else { cast(array, &wanted) }
+    if array.data_type() == &wanted {
+        Ok(array.clone())
+    } else {
+        cast(array, &wanted)
+    }
 }

@@ -18,10 +18,19 @@ pub fn text(diff: &TableDiff, detail: Detail) -> String {
     if let Some(equal) = diff.equal {
         return format!("same: {}, {}\n", counted(rows.same, "row"), equal.says());
     }
-    let mut text =
-        format!("A  {}  {}\nB  {}  {}\n", diff.a.path, counted(diff.a.rows, "row"), diff.b.path, counted(diff.b.rows, "row"));
+    let mut text = format!(
+        "A  {}  {}\nB  {}  {}\n",
+        diff.a.path,
+        counted(diff.a.rows, "row"),
+        diff.b.path,
+        counted(diff.b.rows, "row")
+    );
     for finding in &diff.findings {
-        let column = if finding.column.is_empty() { String::new() } else { format!(" {}", finding.column) };
+        let column = if finding.column.is_empty() {
+            String::new()
+        } else {
+            format!(" {}", finding.column)
+        };
         text.push_str(&format!("{}{column}: {}\n", finding.what, finding.says));
     }
     text.push_str(&format!(
@@ -31,7 +40,10 @@ pub fn text(diff: &TableDiff, detail: Detail) -> String {
         rows.within_tolerance,
         rows.changed
     ));
-    text.push_str(&format!(", {} only in A, {} only in B\n", rows.only_a, rows.only_b));
+    text.push_str(&format!(
+        ", {} only in A, {} only in B\n",
+        rows.only_a, rows.only_b
+    ));
     if diff.duplicates() > 0 {
         text.push_str(&format!(
             "duplicate keys: {}, {} of A, {} of B, not compared; --occurrence pairs them in their order\n",
@@ -45,7 +57,11 @@ pub fn text(diff: &TableDiff, detail: Detail) -> String {
         return text;
     }
     if !diff.worst.is_empty() {
-        text.push_str(&format!("worst {} of {}\n", diff.worst.len(), counted(rows.changed, "changed row")));
+        text.push_str(&format!(
+            "worst {} of {}\n",
+            diff.worst.len(),
+            counted(rows.changed, "changed row")
+        ));
     }
     for row in &diff.worst {
         const SHOWN: usize = 3; // more do not fit on a line
@@ -57,9 +73,11 @@ pub fn text(diff: &TableDiff, detail: Detail) -> String {
         };
         text.push_str(&format!("  {}: {}{more}\n", row.key, cells.join("; ")));
     }
-    for (keys, what) in
-        [(&diff.examples.only_a, "only in A"), (&diff.examples.only_b, "only in B"), (&diff.examples.duplicate, "duplicate")]
-    {
+    for (keys, what) in [
+        (&diff.examples.only_a, "only in A"),
+        (&diff.examples.only_b, "only in B"),
+        (&diff.examples.duplicate, "duplicate"),
+    ] {
         if !keys.is_empty() {
             text.push_str(&format!("{what}, e.g. {}\n", keys.join(" | ")));
         }
@@ -69,39 +87,77 @@ pub fn text(diff: &TableDiff, detail: Detail) -> String {
 
 /// The cell of a row that changed most; one that has a number before one that appeared or vanished.
 pub fn headline(row: &super::WorstRow) -> String {
-    let told = row.cells.iter().find(|cell| cell.difference.is_some()).or(row.cells.first());
+    let told = row
+        .cells
+        .iter()
+        .find(|cell| cell.difference.is_some())
+        .or(row.cells.first());
     told.map(cell).unwrap_or_default()
 }
 
 /// `x_mm 1.25 -> 1.5 mm (+0.25, 3.1 sigma)`.
 pub(super) fn cell(cell: &WorstCell) -> String {
     let show = |value: &serde_json::Value| match value {
-        serde_json::Value::String(text) => format!("{:?}", text.chars().take(40).collect::<String>()),
-        serde_json::Value::Number(number) => number.as_f64().map_or_else(|| number.to_string(), exact),
+        serde_json::Value::String(text) => {
+            format!("{:?}", text.chars().take(40).collect::<String>())
+        }
+        serde_json::Value::Number(number) => {
+            number.as_f64().map_or_else(|| number.to_string(), exact)
+        }
         other => other.to_string(),
     };
-    let unit = if cell.unit.is_empty() { String::new() } else { format!(" {}", cell.unit) };
+    let unit = if cell.unit.is_empty() {
+        String::new()
+    } else {
+        format!(" {}", cell.unit)
+    };
     let mut notes = Vec::new();
-    notes.extend(cell.difference.map(|difference| format!("{}{}", if difference > 0.0 { "+" } else { "" }, short(difference))));
+    notes.extend(cell.difference.map(|difference| {
+        format!(
+            "{}{}",
+            if difference > 0.0 { "+" } else { "" },
+            short(difference)
+        )
+    }));
     notes.extend(cell.sigmas.map(|sigmas| format!("{} sigma", short(sigmas))));
-    let notes = if notes.is_empty() { String::new() } else { format!(" ({})", notes.join(", ")) };
-    format!("{} {} -> {}{unit}{notes}", cell.column, show(&cell.a), show(&cell.b))
+    let notes = if notes.is_empty() {
+        String::new()
+    } else {
+        format!(" ({})", notes.join(", "))
+    };
+    format!(
+        "{} {} -> {}{unit}{notes}",
+        cell.column,
+        show(&cell.a),
+        show(&cell.b)
+    )
 }
 
 fn columns(columns: &[ColumnDiff]) -> String {
-    let differing: Vec<&ColumnDiff> = columns.iter().filter(|column| column.changed + column.within > 0).collect();
+    let differing: Vec<&ColumnDiff> = columns
+        .iter()
+        .filter(|column| column.changed + column.within > 0)
+        .collect();
     let equal = columns.len() - differing.len();
     if differing.is_empty() {
         return format!("columns: all {equal} equal\n");
     }
-    let name = differing.iter().map(|column| column.name.chars().count()).max().unwrap_or(0).max("column".len());
+    let name = differing
+        .iter()
+        .map(|column| column.name.chars().count())
+        .max()
+        .unwrap_or(0)
+        .max("column".len());
     let mut text = format!(
         "{:name$}  {:>6}  {:>9}  {:>9}  {:>9}  {:>9}  {:>9}  {:>9}  {:>9}  largest at\n",
         "column", "unit", "changed", "within", "max", "rms", "bias", "p95", "max sigma"
     );
     for column in differing {
         let of = |pick: fn(&super::DifferenceStatistics) -> f64| {
-            column.statistics.as_ref().map_or_else(String::new, |found| short(pick(found)))
+            column
+                .statistics
+                .as_ref()
+                .map_or_else(String::new, |found| short(pick(found)))
         };
         text.push_str(&format!(
             "{:name$}  {:>6}  {:>9}  {:>9}  {:>9}  {:>9}  {:>9}  {:>9}  {:>9}  {}\n",
@@ -142,7 +198,15 @@ fn exact(value: f64) -> String {
     if value != 0.0 && !(1e-4..1e7).contains(&size) {
         return format!("{value:.6e}");
     }
-    let decimals = if value == 0.0 { 0 } else { (7 - size.log10().floor() as i32).clamp(0, 12) as usize };
+    let decimals = if value == 0.0 {
+        0
+    } else {
+        (7 - size.log10().floor() as i32).clamp(0, 12) as usize
+    };
     let text = format!("{value:.decimals$}");
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
+    if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.').into()
+    } else {
+        text
+    }
 }

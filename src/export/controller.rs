@@ -17,14 +17,28 @@ pub(super) const CONTROLLER: Format = Format {
 };
 
 fn text(export: &Export) -> Result<String> {
-    let mut text: String = export.remarks_in(&CONTROLLER).iter().map(|line| format!("# {line}\n")).collect();
+    let mut text: String = export
+        .remarks_in(&CONTROLLER)
+        .iter()
+        .map(|line| format!("# {line}\n"))
+        .collect();
     text.push_str(
         "# true position = factor * commanded + zero (+ coupling * the other joint); sigma is one standard deviation\n",
     );
     text.push_str("quantity,where,value,unit,sigma,status\n");
     text.extend(lines(&export.identified));
-    for (axis, (now, nominal)) in ["x", "y", "z"].iter().zip(export.corrected.tool.iter().zip(&export.identified.robot.tool)) {
-        text.push_str(&format!("tool {axis} (zero pose; base frame),tool,{:.6},mm,,was {:.6}\n", now * 1e3, nominal * 1e3));
+    for (axis, (now, nominal)) in ["x", "y", "z"].iter().zip(
+        export
+            .corrected
+            .tool
+            .iter()
+            .zip(&export.identified.robot.tool),
+    ) {
+        text.push_str(&format!(
+            "tool {axis} (zero pose; base frame),tool,{:.6},mm,,was {:.6}\n",
+            now * 1e3,
+            nominal * 1e3
+        ));
     }
     Ok(text)
 }
@@ -59,36 +73,64 @@ fn shares<'a>(identified: &'a IdentifiedModel, convention: &JointConvention) -> 
 /// The numbers that the model has parameters for; as a controller counts, one may be of several parameters.
 fn lines(identified: &IdentifiedModel) -> Vec<String> {
     let robot = &identified.model.robot;
-    let convention = identified.convention.clone().unwrap_or_else(|| JointConvention::of_the_robot_file(robot.joints()));
+    let convention = identified
+        .convention
+        .clone()
+        .unwrap_or_else(|| JointConvention::of_the_robot_file(robot.joints()));
     let shares = shares(identified, &convention);
     let line = |entry: DeviationEntry| {
-        let own: Vec<(&Share, f64)> =
-            shares.iter().filter(|share| share.by.holds(entry)).map(|share| (share, share.by.at(entry))).collect();
+        let own: Vec<(&Share, f64)> = shares
+            .iter()
+            .filter(|share| share.by.holds(entry))
+            .map(|share| (share, share.by.at(entry)))
+            .collect();
         if own.is_empty() {
             return None;
         }
         let (quantity, scale, unit, decimals) = shown(entry, robot);
         let value = own.iter().map(|(share, by)| share.value * by).sum::<f64>() * scale;
         let sigma = sigma(&own, identified.covariance.as_ref());
-        let sigma = sigma.map(|sigma| format!("{:.3e}", sigma * scale)).unwrap_or_default();
+        let sigma = sigma
+            .map(|sigma| format!("{:.3e}", sigma * scale))
+            .unwrap_or_default();
         let statuses: BTreeSet<&str> = own.iter().map(|(share, _)| share.status).collect();
         let status = statuses.into_iter().collect::<Vec<_>>().join(" and ");
-        Some(format!("{quantity},{},{value:.decimals$},{unit},{sigma},{status}\n", entry.place()))
+        Some(format!(
+            "{quantity},{},{value:.decimals$},{unit},{sigma},{status}\n",
+            entry.place()
+        ))
     };
-    DeviationEntry::all(robot.joints()).filter_map(line).collect()
+    DeviationEntry::all(robot.joints())
+        .filter_map(line)
+        .collect()
 }
 
 /// What a number is called, what it is multiplied with from SI, its unit, and the decimals that keep a joint within 1e-9 rad.
 fn shown(entry: DeviationEntry, robot: &RobotModel) -> (&'static str, f64, String, usize) {
     // People enter degrees.
-    let unit = |joint: usize| if robot.is_revolute(joint) { Unit::Degree } else { Unit::Millimetre };
+    let unit = |joint: usize| {
+        if robot.is_revolute(joint) {
+            Unit::Degree
+        } else {
+            Unit::Millimetre
+        }
+    };
     match entry {
-        DeviationEntry::Zero(joint) => ("zero", unit(joint).from_si(1.0), unit(joint).to_string(), 9),
+        DeviationEntry::Zero(joint) => {
+            ("zero", unit(joint).from_si(1.0), unit(joint).to_string(), 9)
+        }
         DeviationEntry::Factor(_) => ("factor - 1", 1.0, "1".into(), 12),
-        DeviationEntry::Coupling { by, moved } if unit(by) == unit(moved) => ("coupling", 1.0, "1".into(), 12),
+        DeviationEntry::Coupling { by, moved } if unit(by) == unit(moved) => {
+            ("coupling", 1.0, "1".into(), 12)
+        }
         DeviationEntry::Coupling { by, moved } => {
             let scale = unit(moved).from_si(1.0) / unit(by).from_si(1.0);
-            ("coupling", scale, format!("{}/{}", unit(moved), unit(by)), 12)
+            (
+                "coupling",
+                scale,
+                format!("{}/{}", unit(moved), unit(by)),
+                12,
+            )
         }
     }
 }
@@ -96,19 +138,31 @@ fn shown(entry: DeviationEntry, robot: &RobotModel) -> (&'static str, f64, Strin
 /// Standard deviation of a sum of parameters, each times a factor: of those that were estimated. None where none was, and of several
 /// where their covariance is not known.
 fn sigma(own: &[(&Share, f64)], covariance: Option<&Covariance>) -> Option<f64> {
-    let estimated: Vec<(&Share, f64, f64)> =
-        own.iter().filter_map(|(share, by)| share.sigma.map(|sigma| (*share, *by, sigma))).collect();
+    let estimated: Vec<(&Share, f64, f64)> = own
+        .iter()
+        .filter_map(|(share, by)| share.sigma.map(|sigma| (*share, *by, sigma)))
+        .collect();
     if let [(_, by, sigma)] = estimated[..] {
         return Some(sigma * by.abs());
     }
     let covariance = covariance?;
-    let known = |share: &Share| share.position.is_some_and(|position| covariance.parameters().contains(&position));
+    let known = |share: &Share| {
+        share
+            .position
+            .is_some_and(|position| covariance.parameters().contains(&position))
+    };
     if estimated.is_empty() || !estimated.iter().all(|(share, ..)| known(share)) {
         return None;
     }
     let by = |position: usize| -> f64 {
-        estimated.iter().filter(|(share, ..)| share.position == Some(position)).map(|(_, by, _)| by).sum()
+        estimated
+            .iter()
+            .filter(|(share, ..)| share.position == Some(position))
+            .map(|(_, by, _)| by)
+            .sum()
     };
-    let part = |(a, b, value, _): (usize, usize, f64, f64)| by(a) * by(b) * value * if a == b { 1.0 } else { 2.0 };
+    let part = |(a, b, value, _): (usize, usize, f64, f64)| {
+        by(a) * by(b) * value * if a == b { 1.0 } else { 2.0 }
+    };
     Some(covariance.pairs().map(part).sum::<f64>().sqrt())
 }

@@ -22,8 +22,13 @@ impl DeviationEntry {
     /// All of so many joints: zeros, factors, couplings.
     pub fn all(joints: usize) -> impl Iterator<Item = Self> {
         let pairs = (0..joints).flat_map(move |by| (0..joints).map(move |moved| (by, moved)));
-        let couplings = pairs.filter(|(by, moved)| by != moved).map(|(by, moved)| Self::Coupling { by, moved });
-        (0..joints).map(Self::Zero).chain((0..joints).map(Self::Factor)).chain(couplings)
+        let couplings = pairs
+            .filter(|(by, moved)| by != moved)
+            .map(|(by, moved)| Self::Coupling { by, moved });
+        (0..joints)
+            .map(Self::Zero)
+            .chain((0..joints).map(Self::Factor))
+            .chain(couplings)
     }
 
     /// The one that a parameter is; none of an effect that no such map holds.
@@ -54,7 +59,10 @@ pub(super) struct JointDeviation {
 impl JointDeviation {
     /// One number of 1, all others 0, in the robot file's counting.
     pub fn unit(entry: DeviationEntry, joints: usize) -> Self {
-        let mut out = Self { slope: DMatrix::zeros(joints, joints), zero: DVector::zeros(joints) };
+        let mut out = Self {
+            slope: DMatrix::zeros(joints, joints),
+            zero: DVector::zeros(joints),
+        };
         match entry {
             DeviationEntry::Zero(joint) => out.zero[joint] = 1.0,
             DeviationEntry::Factor(joint) => out.slope[(joint, joint)] = 1.0,

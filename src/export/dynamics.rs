@@ -18,19 +18,28 @@ pub(super) const DYNAMICS: Format = Format {
 
 fn text(export: &Export) -> Result<String> {
     let Some(torques) = &export.identified.torques else {
-        let message = "no torques were identified: put `- uses: diagnose_torques` after `ingest_torques`";
+        let message =
+            "no torques were identified: put `- uses: diagnose_torques` after `ingest_torques`";
         return Err(Error::spec("--format dynamics", message));
     };
     let mut document = document(export, torques)?;
     document["mark"] = json!(export.mark(DYNAMICS.name).to_string());
-    serde_json::to_string_pretty(&document).map(|text| text + "\n").map_err(|error| Error::Bug(error.to_string()))
+    serde_json::to_string_pretty(&document)
+        .map(|text| text + "\n")
+        .map_err(|error| Error::Bug(error.to_string()))
 }
 
 /// The model of torques as one document.
 pub(super) fn document(export: &Export, torques: &IdentifiedTorques) -> Result<Value> {
     let model = &torques.model;
     let curves = model.friction_curves()?;
-    let rows = |effect: &'static str| torques.parameters.0.iter().filter(move |row| row.effect == effect);
+    let rows = |effect: &'static str| {
+        torques
+            .parameters
+            .0
+            .iter()
+            .filter(move |row| row.effect == effect)
+    };
     let joints = export.corrected.joints.iter().enumerate().map(|(index, joint)| {
         let place = format!("joint {}", index + 1);
         let alone = |effect: &str| {
@@ -135,8 +144,14 @@ fn causes(torques: &IdentifiedTorques) -> Vec<Value> {
             let quantity = row.name.strip_prefix(&prefix);
             quantity.is_some_and(|quantity| quantity == row.quantity)
         });
-        let numbers: Map<String, Value> =
-            own.map(|row| (row.quantity.clone(), json!({ "value": row.value, "unit": row.unit, "sigma": row.sigma }))).collect();
+        let numbers: Map<String, Value> = own
+            .map(|row| {
+                (
+                    row.quantity.clone(),
+                    json!({ "value": row.value, "unit": row.unit, "sigma": row.sigma }),
+                )
+            })
+            .collect();
         json!({
             "effect": term.effect, "where": term.place.to_string(), "alone": stands_alone(torques, term), "numbers": numbers, "with": term.with, "shape": term.shape,
             "rms_nm": term.rms,

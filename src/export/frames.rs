@@ -11,7 +11,11 @@ pub(super) fn moved(frame: &Pose, nominal: &Vector3<f64>, corrected: &JointDescr
     // By the arc tangent: an arc cosine near 1 loses half of the digits.
     let normal = nominal.cross(&axis);
     let sine = normal.norm();
-    let turn = if sine > 0.0 { Rotation3::new(normal * (sine.atan2(nominal.dot(&axis)) / sine)) } else { Rotation3::identity() };
+    let turn = if sine > 0.0 {
+        Rotation3::new(normal * (sine.atan2(nominal.dot(&axis)) / sine))
+    } else {
+        Rotation3::identity()
+    };
     let point = Vector3::from(corrected.point);
     let origin = match corrected.kind {
         JointKind::Revolute => point + axis * axis.dot(&(frame.translation - point)),

@@ -15,7 +15,9 @@ pub(super) const SPRINGS: [&str; 2] = ["cable_stiffness", "spring_balance"];
 
 /// The number of viscous or Coulomb friction that is of the line of both, where one of them grows with another power of speed.
 pub(super) fn of_line(torques: &IdentifiedTorques, term: &TorqueTerm) -> Option<FittedNumber> {
-    let Place::Joint(joint) = term.place else { return None };
+    let Place::Joint(joint) = term.place else {
+        return None;
+    };
     let [viscous, coulomb] = torques.model.friction_line(joint).ok()??;
     match term.effect.as_str() {
         DAMPING => Some(viscous),
@@ -30,37 +32,68 @@ pub(super) fn stands_alone(torques: &IdentifiedTorques, term: &TorqueTerm) -> bo
         return value > 0.0 && value >= *NAMED * sigma;
     }
     let place = term.place.to_string();
-    let mut own = torques.parameters.0.iter().filter(|row| row.effect == term.effect && row.place == place && row.form.is_some());
+    let mut own = torques
+        .parameters
+        .0
+        .iter()
+        .filter(|row| row.effect == term.effect && row.place == place && row.form.is_some());
     let drives = [DAMPING, FRICTION].contains(&term.effect.as_str()) && term.coefficients[0] <= 0.0;
-    !drives && own.any(|row| row.sigma.is_none_or(|sigma| row.value.abs() >= *NAMED * sigma))
+    !drives
+        && own.any(|row| {
+            row.sigma
+                .is_none_or(|sigma| row.value.abs() >= *NAMED * sigma)
+        })
 }
 
 /// The coefficient of a cause of one number at a joint (from 0), SI; none where it was not found or does not stand alone. Of a law with a shape
 /// it is the number that formats can hold, see [`as_one_number`].
 pub(super) fn coefficient(torques: &IdentifiedTorques, effect: &str, joint: usize) -> Option<f64> {
-    let own = torques.model.terms.iter().find(|term| term.effect == effect && term.place == Place::Joint(joint))?;
+    let own = torques
+        .model
+        .terms
+        .iter()
+        .find(|term| term.effect == effect && term.place == Place::Joint(joint))?;
     if !stands_alone(torques, own) {
         return None;
     }
-    let (value, seen) = (own.coefficients.first().copied()?, torques.model.range.get(joint)?);
+    let (value, seen) = (
+        own.coefficients.first().copied()?,
+        torques.model.range.get(joint)?,
+    );
     let held = of_line(torques, own).map(|line| line.value);
-    Some(held.or_else(|| as_one_number(own, value, seen, None).map(|(held, _)| held)).unwrap_or(value))
+    Some(
+        held.or_else(|| as_one_number(own, value, seen, None).map(|(held, _)| held))
+            .unwrap_or(value),
+    )
 }
 
 /// What formats of one number hold of a law that has a shape, and what must be said of it: of friction that grows with another power of speed
 /// its number of `line` over the recorded speeds, of a torque constant that falls with torque what is right at half of the greatest load.
-fn as_one_number(term: &TorqueTerm, value: f64, seen: &JointRange, line: Option<FittedNumber>) -> Option<(f64, String)> {
+fn as_one_number(
+    term: &TorqueTerm,
+    value: f64,
+    seen: &JointRange,
+    line: Option<FittedNumber>,
+) -> Option<(f64, String)> {
     let place = &term.place;
     match (term.effect.as_str(), *term.shape.first()?) {
         (DAMPING, exponent) if exponent != 1.0 => {
             let held = line?.value;
             let law = format!("grows with the power {exponent:.2} of speed");
-            let line = format!("{held:.4} Nm s/rad is written, the line up to {:.3} rad/s", seen.speed);
+            let line = format!(
+                "{held:.4} Nm s/rad is written, the line up to {:.3} rad/s",
+                seen.speed
+            );
             Some((held, format!("{DAMPING} at {place} {law}: {line}")))
         }
         (DRIVE, half) if seen.load.is_finite() => {
             let (load, held) = (0.5 * seen.load, value / (1.0 + 0.5 * seen.load / half));
-            Some((held, format!("{DRIVE} at {place} changes with torque: what is written is right at {load:.3} Nm")))
+            Some((
+                held,
+                format!(
+                    "{DRIVE} at {place} changes with torque: what is written is right at {load:.3} Nm"
+                ),
+            ))
         }
         _ => None,
     }
@@ -73,9 +106,18 @@ pub(super) fn positive(torques: &IdentifiedTorques, effect: &str, joint: usize) 
 
 /// The stiffness of a spring at a joint (from 0), Nm/rad, and the angle at which it rests, rad; none of one that is no straight line.
 pub(super) fn spring(torques: &IdentifiedTorques, joint: usize) -> Option<[f64; 2]> {
-    let at = |term: &&TorqueTerm| SPRINGS.contains(&term.effect.as_str()) && term.place == Place::Joint(joint);
-    let own = torques.model.terms.iter().find(at).filter(|term| stands_alone(torques, term))?;
-    let [stiffness, at_zero] = own.coefficients[..] else { return None };
+    let at = |term: &&TorqueTerm| {
+        SPRINGS.contains(&term.effect.as_str()) && term.place == Place::Joint(joint)
+    };
+    let own = torques
+        .model
+        .terms
+        .iter()
+        .find(at)
+        .filter(|term| stands_alone(torques, term))?;
+    let [stiffness, at_zero] = own.coefficients[..] else {
+        return None;
+    };
     (stiffness > 0.0).then(|| [stiffness, -at_zero / stiffness])
 }
 
@@ -91,34 +133,52 @@ impl Export {
     pub fn remarks_in(&self, format: &Format) -> Vec<String> {
         let mut lines = vec![self.mark(format.name).to_string()];
         lines.extend(self.remarks());
-        let Some(torques) = &self.identified.torques else { return lines };
+        let Some(torques) = &self.identified.torques else {
+            return lines;
+        };
         let attributes = match format.carries {
             CarriedTorques::All => return lines,
             CarriedTorques::Nothing => {
-                lines.push("not carried: the identified torques (formats urdf, mjcf, json, dynamics)".into());
+                lines.push(
+                    "not carried: the identified torques (formats urdf, mjcf, json, dynamics)"
+                        .into(),
+                );
                 return lines;
             }
             CarriedTorques::Causes(attributes) => attributes,
         };
         let holds = |term: &&TorqueTerm| {
-            let named = matches!(term.place, Place::Joint(_)) && attributes.contains(&term.effect.as_str());
+            let named =
+                matches!(term.place, Place::Joint(_)) && attributes.contains(&term.effect.as_str());
             let is_whole = !SPRINGS.contains(&term.effect.as_str()) || term.coefficients.len() == 2;
             named
                 && is_whole
                 && stands_alone(torques, term)
-                && (term.effect == DRIVE || of_line(torques, term).is_some() || term.coefficients[0] >= 0.0)
+                && (term.effect == DRIVE
+                    || of_line(torques, term).is_some()
+                    || term.coefficients[0] >= 0.0)
         };
         let held = torques.model.terms.iter().filter(holds);
         lines.extend(held.filter_map(|term| {
-            let Place::Joint(joint) = term.place else { return None };
+            let Place::Joint(joint) = term.place else {
+                return None;
+            };
             let (value, seen) = (*term.coefficients.first()?, torques.model.range.get(joint)?);
             Some(as_one_number(term, value, seen, of_line(torques, term))?.1)
         }));
         let left = torques.model.terms.iter().filter(|term| !holds(term));
+        lines.extend(left.map(|term| {
+            format!(
+                "not carried: {} at {}, {:.4} Nm rms over the recording",
+                term.effect, term.place, term.rms
+            )
+        }));
         lines.extend(
-            left.map(|term| format!("not carried: {} at {}, {:.4} Nm rms over the recording", term.effect, term.place, term.rms)),
+            torques
+                .of_the_recording
+                .iter()
+                .map(|statement| format!("of the recording alone: {statement}")),
         );
-        lines.extend(torques.of_the_recording.iter().map(|statement| format!("of the recording alone: {statement}")));
         lines
     }
 }
@@ -139,18 +199,44 @@ mod tests {
 
     fn held(effect: &str, shape: &[f64], value: f64) -> Option<(f64, String)> {
         let (place, coefficients) = (Place::Joint(1), vec![value]);
-        let term = TorqueTerm { effect: effect.into(), place, with: [0; 2], shape: shape.to_vec(), coefficients, rms: 1.0 };
-        as_one_number(&term, value, &SEEN, Some(FittedNumber { value: 3.3164, sigma: 0.1 }))
+        let term = TorqueTerm {
+            effect: effect.into(),
+            place,
+            with: [0; 2],
+            shape: shape.to_vec(),
+            coefficients,
+            rms: 1.0,
+        };
+        as_one_number(
+            &term,
+            value,
+            &SEEN,
+            Some(FittedNumber {
+                value: 3.3164,
+                sigma: 0.1,
+            }),
+        )
     }
 
     #[test]
     fn a_law_with_a_shape_is_written_as_one_number_and_with_a_word() {
         let (value, said) = held(DAMPING, &[0.8], 4.0).expect("a remark");
         assert!((value - 3.3164).abs() < 1e-9, "{value}");
-        assert!(said.starts_with("viscous_friction at joint 2 grows with the power 0.80 of speed: 3.31"), "{said}");
-        assert!(said.ends_with("Nm s/rad is written, the line up to 2.000 rad/s"), "{said}");
+        assert!(
+            said.starts_with(
+                "viscous_friction at joint 2 grows with the power 0.80 of speed: 3.31"
+            ),
+            "{said}"
+        );
+        assert!(
+            said.ends_with("Nm s/rad is written, the line up to 2.000 rad/s"),
+            "{said}"
+        );
         let (value, said) = held(DRIVE, &[20.0, 40.0], 0.2).expect("a remark");
-        assert!((value - 0.1).abs() < 1e-15 && said.ends_with("is right at 20.000 Nm"), "{value} {said}");
+        assert!(
+            (value - 0.1).abs() < 1e-15 && said.ends_with("is right at 20.000 Nm"),
+            "{value} {said}"
+        );
         assert_eq!(held(DAMPING, &[1.0], 4.0), None);
         assert_eq!(held(DRIVE, &[], 0.2), None);
     }

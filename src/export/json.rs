@@ -5,12 +5,29 @@ use crate::description::JointKind;
 use crate::error::{Error, Result};
 use serde_json::json;
 
-pub(super) const JSON: Format =
-    Format { name: "json", help: "Everything: description, parameters with sigma, remarks", carries: CarriedTorques::All, text };
+pub(super) const JSON: Format = Format {
+    name: "json",
+    help: "Everything: description, parameters with sigma, remarks",
+    carries: CarriedTorques::All,
+    text,
+};
 
 fn text(export: &Export) -> Result<String> {
-    let finite = |value: f64| if value.is_finite() { json!(value) } else { json!(null) };
-    let Export { identified, corrected, left_out, residual, poses, .. } = export;
+    let finite = |value: f64| {
+        if value.is_finite() {
+            json!(value)
+        } else {
+            json!(null)
+        }
+    };
+    let Export {
+        identified,
+        corrected,
+        left_out,
+        residual,
+        poses,
+        ..
+    } = export;
     let joints = corrected.joints.iter().map(|joint| {
         json!({
             "name": joint.name,
@@ -46,5 +63,7 @@ fn text(export: &Export) -> Result<String> {
     if let Some(torques) = &identified.torques {
         document["torques"] = super::dynamics::document(export, torques)?;
     }
-    serde_json::to_string_pretty(&document).map(|text| text + "\n").map_err(|error| Error::Bug(error.to_string()))
+    serde_json::to_string_pretty(&document)
+        .map(|text| text + "\n")
+        .map_err(|error| Error::Bug(error.to_string()))
 }

@@ -24,7 +24,11 @@ const DIGITS: usize = 16;
 impl fmt::Display for ExportMark {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let serial = self.serial.as_deref().unwrap_or("not stated");
-        write!(f, "{BEGINS}{}, model {}, robot serial {serial}", self.format, self.model)
+        write!(
+            f,
+            "{BEGINS}{}, model {}, robot serial {serial}",
+            self.format, self.model
+        )
     }
 }
 
@@ -32,11 +36,20 @@ impl ExportMark {
     /// The mark of a file; none where it has none.
     fn of(text: &str) -> Option<Self> {
         let (_, rest) = text.split_once(BEGINS)?;
-        let line = rest.lines().next()?.trim_end_matches(['"', ',', ' ']).trim_end_matches("-->").trim_end();
+        let line = rest
+            .lines()
+            .next()?
+            .trim_end_matches(['"', ',', ' '])
+            .trim_end_matches("-->")
+            .trim_end();
         let (format, rest) = line.split_once(", model ")?;
         let (model, serial) = rest.split_once(", robot serial ")?;
         let serial = (serial != "not stated").then(|| serial.to_string());
-        Some(Self { format: format.into(), serial, model: model.into() })
+        Some(Self {
+            format: format.into(),
+            serial,
+            model: model.into(),
+        })
     }
 }
 
@@ -55,16 +68,34 @@ impl Export {
     /// The mark of a file in this format.
     pub fn mark(&self, format: &str) -> ExportMark {
         // As text that holds no sign of another format; hashes of tables are those of their content.
-        let plain = |serial: &String| one_line(serial).replace(['"', '\\', '-'], "_").chars().take(80).collect::<String>();
+        let plain = |serial: &String| {
+            one_line(serial)
+                .replace(['"', '\\', '-'], "_")
+                .chars()
+                .take(80)
+                .collect::<String>()
+        };
         let serial = self.identified.serial.as_ref().map(plain);
-        ExportMark { format: format.into(), serial, model: self.hash() }
+        ExportMark {
+            format: format.into(),
+            serial,
+            model: self.hash(),
+        }
     }
 
     fn hash(&self) -> String {
         let robot = Robot::from_description(&self.identified.robot).to_frame();
-        let torques = self.identified.torques.as_ref().map(|torques| torques.parameters.to_frame());
+        let torques = self
+            .identified
+            .torques
+            .as_ref()
+            .map(|torques| torques.parameters.to_frame());
         let mut hasher = blake3::Hasher::new();
-        for table in [robot, self.identified.parameters.to_frame()].into_iter().chain(torques).flatten() {
+        for table in [robot, self.identified.parameters.to_frame()]
+            .into_iter()
+            .chain(torques)
+            .flatten()
+        {
             hasher.update(table.table_hash().as_str().as_bytes());
         }
         hasher.finalize().to_hex().chars().take(DIGITS).collect()
@@ -72,28 +103,48 @@ impl Export {
 
     /// Whether a file is this model's export. Fails where it carries no mark.
     pub fn check(&self, label: &str, text: &str) -> Result<Belonging> {
-        let none = || Error::data(label, "carries no mark of calib: it is no export, or one of a version before marks");
+        let none = || {
+            Error::data(
+                label,
+                "carries no mark of calib: it is no export, or one of a version before marks",
+            )
+        };
         let found = ExportMark::of(text).ok_or_else(none)?;
-        let format = FORMATS.iter().find(|format| format.name == found.format).ok_or_else(none)?;
+        let format = FORMATS
+            .iter()
+            .find(|format| format.name == found.format)
+            .ok_or_else(none)?;
         let own = self.mark(format.name);
         if own != found {
             return Ok(Belonging::Other(found, own));
         }
         let written = (format.text)(self)?;
         let (theirs, ours) = (content(text), content(&written));
-        let differs =
-            (0..theirs.len().max(ours.len())).find(|k| theirs.get(*k).map(|line| line.1) != ours.get(*k).map(|line| line.1));
+        let differs = (0..theirs.len().max(ours.len()))
+            .find(|k| theirs.get(*k).map(|line| line.1) != ours.get(*k).map(|line| line.1));
         Ok(match differs {
             None => Belonging::Same(own),
-            Some(k) => Belonging::Edited(own, theirs.get(k).map_or(text.lines().count() + 1, |line| line.0)),
+            Some(k) => Belonging::Edited(
+                own,
+                theirs
+                    .get(k)
+                    .map_or(text.lines().count() + 1, |line| line.0),
+            ),
         })
     }
 }
 
 /// The lines that are no comments, with their numbers; of JSON without the one that names the run.
 fn content(text: &str) -> Vec<(usize, &str)> {
-    let is_comment = |line: &str| ["#", "<!--", "\"origin\""].iter().any(|mark| line.trim_start().starts_with(mark));
-    (1..).zip(text.lines()).filter(|(_, line)| !is_comment(line) && !line.trim().is_empty()).collect()
+    let is_comment = |line: &str| {
+        ["#", "<!--", "\"origin\""]
+            .iter()
+            .any(|mark| line.trim_start().starts_with(mark))
+    };
+    (1..)
+        .zip(text.lines())
+        .filter(|(_, line)| !is_comment(line) && !line.trim().is_empty())
+        .collect()
 }
 
 #[cfg(test)]
@@ -102,9 +153,21 @@ mod tests {
 
     #[test]
     fn a_mark_is_read_back_from_every_kind_of_line() {
-        let mark = ExportMark { format: "urdf".into(), serial: Some("2022 3/91".into()), model: "00ff".into() };
-        for line in [format!("<!-- {mark} -->"), format!("# {mark}"), format!("  \"mark\": \"{mark}\",")] {
-            assert_eq!(ExportMark::of(&format!("<?xml?>\n{line}\nmore")), Some(mark.clone()), "{line}");
+        let mark = ExportMark {
+            format: "urdf".into(),
+            serial: Some("2022 3/91".into()),
+            model: "00ff".into(),
+        };
+        for line in [
+            format!("<!-- {mark} -->"),
+            format!("# {mark}"),
+            format!("  \"mark\": \"{mark}\","),
+        ] {
+            assert_eq!(
+                ExportMark::of(&format!("<?xml?>\n{line}\nmore")),
+                Some(mark.clone()),
+                "{line}"
+            );
         }
         assert_eq!(ExportMark::of("calib export: format urdf"), None);
     }

@@ -17,7 +17,14 @@ pub(super) const UR_KINEMATICS: Format = Format {
 };
 
 /// Links as the file calls them, each moved by the joint of its number.
-const LINKS: [&str; 6] = ["shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3"];
+const LINKS: [&str; 6] = [
+    "shoulder",
+    "upper_arm",
+    "forearm",
+    "wrist_1",
+    "wrist_2",
+    "wrist_3",
+];
 /// How near nominal axes must come to those of an arm of the maker: rad and m.
 const NEAR: [f64; 2] = [2e-3, 5e-3];
 
@@ -26,16 +33,21 @@ fn nominal(robot: &RobotDescription) -> Option<(Pose, [Pose; 6])> {
     // The controller's base, and ROS' base_link, which is turned by half a turn.
     let half = Matrix3::from_diagonal(&Vector3::new(-1.0, -1.0, 1.0));
     let bases = [Pose::identity(), Pose::new(half, Vector3::zeros())];
-    let makers = LIBRARY.iter().filter(|arm| arm.name.starts_with("ur")).filter_map(|arm| arm.read().ok());
-    makers.flat_map(|arm| bases.map(|base| (base, frames(&arm.robot).map(|frame| base * frame)))).find(|(_, frames)| {
-        robot.joints.len() == LINKS.len()
-            && robot.joints.iter().zip(frames).all(|(joint, frame)| {
-                let axis = Vector3::from(joint.axis);
-                let away = frame.translation - Vector3::from(joint.point);
-                let apart = (away - axis * axis.dot(&away)).norm();
-                (axis - frame.rotation.column(2)).norm() < NEAR[0] && apart < NEAR[1]
-            })
-    })
+    let makers = LIBRARY
+        .iter()
+        .filter(|arm| arm.name.starts_with("ur"))
+        .filter_map(|arm| arm.read().ok());
+    makers
+        .flat_map(|arm| bases.map(|base| (base, frames(&arm.robot).map(|frame| base * frame))))
+        .find(|(_, frames)| {
+            robot.joints.len() == LINKS.len()
+                && robot.joints.iter().zip(frames).all(|(joint, frame)| {
+                    let axis = Vector3::from(joint.axis);
+                    let away = frame.translation - Vector3::from(joint.point);
+                    let apart = (away - axis * axis.dot(&away)).norm();
+                    (axis - frame.rotation.column(2)).norm() < NEAR[0] && apart < NEAR[1]
+                })
+        })
 }
 
 /// Frames of the maker's arm: z along the joint, x along the base's, the origin where the next link begins.
@@ -43,9 +55,17 @@ fn frames(robot: &RobotDescription) -> [Pose; 6] {
     std::array::from_fn(|index| {
         let joint = &robot.joints[index];
         let (z, point) = (Vector3::from(joint.axis), Vector3::from(joint.point));
-        let next = Vector3::from(robot.joints.get(index + 1).map_or(robot.tool, |next| next.point));
+        let next = Vector3::from(
+            robot
+                .joints
+                .get(index + 1)
+                .map_or(robot.tool, |next| next.point),
+        );
         let x = Vector3::x();
-        Pose::new(Matrix3::from_columns(&[x, z.cross(&x), z]), point + z * z.dot(&(next - point)))
+        Pose::new(
+            Matrix3::from_columns(&[x, z.cross(&x), z]),
+            point + z * z.dot(&(next - point)),
+        )
     })
 }
 
@@ -56,17 +76,26 @@ fn text(export: &Export) -> Result<String> {
                        base_link); allowed for other arms: --format urdf, xacro";
         Error::data(&robot.name, message)
     })?;
-    let mut out: String = export.remarks_in(&UR_KINEMATICS).iter().map(|line| format!("# {line}\n")).collect();
+    let mut out: String = export
+        .remarks_in(&UR_KINEMATICS)
+        .iter()
+        .map(|line| format!("# {line}\n"))
+        .collect();
     let (mut before, mut links) = (base, String::new());
     for (index, (link, frame)) in LINKS.iter().zip(&nominal).enumerate() {
-        let own = moved(frame, &frame.rotation.column(2).into(), &corrected.joints[index]);
+        let own = moved(
+            frame,
+            &frame.rotation.column(2).into(),
+            &corrected.joints[index],
+        );
         let ([x, y, z], [roll, pitch, yaw]) = origin(&before, &own);
         links.push_str(&format!(
             "  {link}:\n    x: {x:?}\n    y: {y:?}\n    z: {z:?}\n    roll: {roll:?}\n    pitch: {pitch:?}\n    yaw: {yaw:?}\n"
         ));
         before = own;
     }
-    let ([x, y, z], [roll, pitch, yaw]) = origin(&before, &tool(corrected.tool, &corrected.tool_rotation));
+    let ([x, y, z], [roll, pitch, yaw]) =
+        origin(&before, &tool(corrected.tool, &corrected.tool_rotation));
     out.push_str(&format!(
         "# not carried: the tool, {:.4} mm from tool0; in tool0 it stands at {x:?} {y:?} {z:?} m, turned by {roll:?} {pitch:?} {yaw:?} rad\n",
         1e3 * x.hypot(y).hypot(z)

@@ -20,14 +20,21 @@ const UNKNOWN: &str = "1e9";
 
 fn text(export: &Export) -> Result<String> {
     let mut remarks = export.remarks_in(&URDF);
-    if export.corrected.joints.iter().any(|joint| joint.limits.is_some() || joint.kind == JointKind::Prismatic) {
+    if export
+        .corrected
+        .joints
+        .iter()
+        .any(|joint| joint.limits.is_some() || joint.kind == JointKind::Prismatic)
+    {
         remarks.push(format!(
             "largest torques and speeds of the joints are not known: {UNKNOWN} stands for none, which URDF does not have"
         ));
     }
     xml::document(&remarks, |xml| {
         let name = one_line(&export.corrected.name);
-        xml.create_element("robot").with_attribute(("name", name.as_str())).write_inner_content(|xml| robot(xml, export))?;
+        xml.create_element("robot")
+            .with_attribute(("name", name.as_str()))
+            .write_inner_content(|xml| robot(xml, export))?;
         Ok(())
     })
 }
@@ -47,10 +54,19 @@ fn robot(xml: &mut Xml, export: &Export) -> io::Result<()> {
     let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_fn(|i, k| r[i][k]));
     let (roll, pitch, yaw) = rotation.euler_angles();
     empty(xml, "link", &[("name", "tool0")])?;
-    let tool = xml.create_element("joint").with_attributes([("name", "tool"), ("type", "fixed")]);
+    let tool = xml
+        .create_element("joint")
+        .with_attributes([("name", "tool"), ("type", "fixed")]);
     tool.write_inner_content(|xml| {
         between(xml, &parent, "tool0")?;
-        empty(xml, "origin", &[("xyz", &offset(robot.tool, before)), ("rpy", &numbers([roll, pitch, yaw]))])
+        empty(
+            xml,
+            "origin",
+            &[
+                ("xyz", &offset(robot.tool, before)),
+                ("rpy", &numbers([roll, pitch, yaw])),
+            ],
+        )
     })?;
     Ok(())
 }
@@ -60,23 +76,41 @@ fn link(xml: &mut Xml, export: &Export, index: usize, name: &str) -> io::Result<
     let Some(body) = export.body(index) else {
         return empty(xml, "link", &[("name", name)]);
     };
-    xml.create_element("link").with_attribute(("name", name)).write_inner_content(|xml| {
-        body.remark.map_or(Ok(()), |remark| xml::comment(xml, remark))?;
-        xml.create_element("inertial").write_inner_content(|xml| {
-            empty(xml, "origin", &[("xyz", &numbers(body.centre))])?;
-            empty(xml, "mass", &[("value", &numbers([body.mass]))])?;
-            let moments = body.inertia.map(|moment| if moment == 0.0 { "0".to_string() } else { numbers([moment]) });
-            let names = ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"];
-            let moments: Vec<(&str, &str)> = names.into_iter().zip(moments.iter().map(String::as_str)).collect();
-            empty(xml, "inertia", &moments)
+    xml.create_element("link")
+        .with_attribute(("name", name))
+        .write_inner_content(|xml| {
+            body.remark
+                .map_or(Ok(()), |remark| xml::comment(xml, remark))?;
+            xml.create_element("inertial").write_inner_content(|xml| {
+                empty(xml, "origin", &[("xyz", &numbers(body.centre))])?;
+                empty(xml, "mass", &[("value", &numbers([body.mass]))])?;
+                let moments = body.inertia.map(|moment| {
+                    if moment == 0.0 {
+                        "0".to_string()
+                    } else {
+                        numbers([moment])
+                    }
+                });
+                let names = ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"];
+                let moments: Vec<(&str, &str)> = names
+                    .into_iter()
+                    .zip(moments.iter().map(String::as_str))
+                    .collect();
+                empty(xml, "inertia", &moments)
+            })?;
+            Ok(())
         })?;
-        Ok(())
-    })?;
     Ok(())
 }
 
 /// A joint whose frame lies on its axis, seen from that of the joint before, at `before`.
-fn joint(xml: &mut Xml, export: &Export, index: usize, before: [f64; 3], [parent, child]: [&str; 2]) -> io::Result<()> {
+fn joint(
+    xml: &mut Xml,
+    export: &Export,
+    index: usize,
+    before: [f64; 3],
+    [parent, child]: [&str; 2],
+) -> io::Result<()> {
     let joint = &export.corrected.joints[index];
     let kind = match (joint.kind, joint.limits) {
         (JointKind::Prismatic, _) => "prismatic",
@@ -89,15 +123,28 @@ fn joint(xml: &mut Xml, export: &Export, index: usize, before: [f64; 3], [parent
         (None, JointKind::Revolute) => None,
     };
     let name = one_line(&joint.name);
-    let element = xml.create_element("joint").with_attributes([("name", name.as_str()), ("type", kind)]);
+    let element = xml
+        .create_element("joint")
+        .with_attributes([("name", name.as_str()), ("type", kind)]);
     element.write_inner_content(|xml| {
         between(xml, parent, child)?;
-        empty(xml, "origin", &[("xyz", &offset(joint.point, before)), ("rpy", "0 0 0")])?;
+        empty(
+            xml,
+            "origin",
+            &[("xyz", &offset(joint.point, before)), ("rpy", "0 0 0")],
+        )?;
         empty(xml, "axis", &[("xyz", &numbers(joint.axis))])?;
         match &limits {
-            Some([lower, upper]) => {
-                empty(xml, "limit", &[("lower", lower), ("upper", upper), ("effort", UNKNOWN), ("velocity", UNKNOWN)])
-            }
+            Some([lower, upper]) => empty(
+                xml,
+                "limit",
+                &[
+                    ("lower", lower),
+                    ("upper", upper),
+                    ("effort", UNKNOWN),
+                    ("velocity", UNKNOWN),
+                ],
+            ),
             None => Ok(()),
         }?;
         dynamics(xml, export, index)
@@ -109,11 +156,17 @@ fn joint(xml: &mut Xml, export: &Export, index: usize, before: [f64; 3], [parent
 fn dynamics(xml: &mut Xml, export: &Export, index: usize) -> io::Result<()> {
     let torques = export.identified.torques.as_ref();
     let number = |(name, effect)| Some((name, numbers([positive(torques?, effect, index)?])));
-    let found: Vec<(&str, String)> = [("damping", DAMPING), ("friction", FRICTION)].into_iter().filter_map(number).collect();
+    let found: Vec<(&str, String)> = [("damping", DAMPING), ("friction", FRICTION)]
+        .into_iter()
+        .filter_map(number)
+        .collect();
     if found.is_empty() {
         return Ok(());
     }
-    let found: Vec<(&str, &str)> = found.iter().map(|(name, value)| (*name, value.as_str())).collect();
+    let found: Vec<(&str, &str)> = found
+        .iter()
+        .map(|(name, value)| (*name, value.as_str()))
+        .collect();
     empty(xml, "dynamics", &found)
 }
 

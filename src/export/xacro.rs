@@ -29,21 +29,42 @@ struct OwnJoint<'a> {
 }
 
 fn text(export: &Export) -> Result<String> {
-    let place = |wanted: &[&str]| export.identified.sources.iter().find(|source| wanted.contains(&ending(source).as_str()));
+    let place = |wanted: &[&str]| {
+        export
+            .identified
+            .sources
+            .iter()
+            .find(|source| wanted.contains(&ending(source).as_str()))
+    };
     let own = place(&["urdf", "xml"]).ok_or_else(|| {
         let message = "no URDF stands behind this model; allowed: a robot file with `kinematics: {urdf: ...}`, or --format urdf, which writes a whole arm";
         Error::data(&export.identified.origin, message)
     })?;
     let label = own.display().to_string();
-    let read = |path: &std::path::Path| raw::text(path).map_err(|error| Error::unreadable(path.display().to_string(), &error));
+    let read = |path: &std::path::Path| {
+        raw::text(path).map_err(|error| Error::unreadable(path.display().to_string(), &error))
+    };
     let urdf = read(own)?;
     let mut base = None;
-    for file in export.identified.sources.iter().filter(|source| ["yaml", "yml"].contains(&ending(source).as_str())) {
-        base = base.or(yaml::parse(&read(file)?).0.and_then(|tree| tree.at("kinematics.urdf.base")?.text()));
+    for file in export
+        .identified
+        .sources
+        .iter()
+        .filter(|source| ["yaml", "yml"].contains(&ending(source).as_str()))
+    {
+        base = base.or(yaml::parse(&read(file)?)
+            .0
+            .and_then(|tree| tree.at("kinematics.urdf.base")?.text()));
     }
-    let document = Document::parse(&urdf).map_err(|error| Error::data(&label, error.to_string()))?;
-    let origins = origins(export, &document, base.as_deref().unwrap_or("base_link"))
-        .ok_or_else(|| Error::data(&label, "is not the description that the model was identified with: its joints are others"))?;
+    let document =
+        Document::parse(&urdf).map_err(|error| Error::data(&label, error.to_string()))?;
+    let origins =
+        origins(export, &document, base.as_deref().unwrap_or("base_link")).ok_or_else(|| {
+            Error::data(
+                &label,
+                "is not the description that the model was identified with: its joints are others",
+            )
+        })?;
     let mut remarks = export.remarks_in(&XACRO);
     remarks.push(format!(
         "in {}: include this file, and in each joint below have",
@@ -51,21 +72,39 @@ fn text(export: &Export) -> Result<String> {
     ));
     remarks.push("<xacro:calib_origin joint=\"NAME\"/> in the place of its <origin .../>".into());
     remarks.push(origins.tool.clone());
-    let quoted = |[place, turn]: &[[f64; 3]; 2]| format!("('{}', '{}')", numbers(*place), numbers(*turn));
-    let all: Vec<String> = origins.joints.iter().map(|(name, origin)| format!("('{name}', {})", quoted(origin))).collect();
+    let quoted =
+        |[place, turn]: &[[f64; 3]; 2]| format!("('{}', '{}')", numbers(*place), numbers(*turn));
+    let all: Vec<String> = origins
+        .joints
+        .iter()
+        .map(|(name, origin)| format!("('{name}', {})", quoted(origin)))
+        .collect();
     xml::document(&remarks, |xml| {
-        xml.create_element("robot").with_attribute(("xmlns:xacro", "http://www.ros.org/wiki/xacro")).write_inner_content(
-            |xml| {
+        xml.create_element("robot")
+            .with_attribute(("xmlns:xacro", "http://www.ros.org/wiki/xacro"))
+            .write_inner_content(|xml| {
                 // xacro ends an expression at the first brace.
                 let value = format!("${{dict([{}])}}", all.join(", "));
-                xml::empty(xml, "xacro:property", &[("name", "calib_origins"), ("value", &value)])?;
-                let makes = xml.create_element("xacro:macro").with_attributes([("name", "calib_origin"), ("params", "joint")]);
+                xml::empty(
+                    xml,
+                    "xacro:property",
+                    &[("name", "calib_origins"), ("value", &value)],
+                )?;
+                let makes = xml
+                    .create_element("xacro:macro")
+                    .with_attributes([("name", "calib_origin"), ("params", "joint")]);
                 makes.write_inner_content(|xml| {
-                    xml::empty(xml, "origin", &[("xyz", "${calib_origins[joint][0]}"), ("rpy", "${calib_origins[joint][1]}")])
+                    xml::empty(
+                        xml,
+                        "origin",
+                        &[
+                            ("xyz", "${calib_origins[joint][0]}"),
+                            ("rpy", "${calib_origins[joint][1]}"),
+                        ],
+                    )
                 })?;
                 Ok(())
-            },
-        )?;
+            })?;
         Ok(())
     })
 }
@@ -79,31 +118,63 @@ struct Origins {
 
 /// Three numbers of an attribute; `otherwise` where it is not there.
 fn three(node: Option<Node>, name: &str, otherwise: [f64; 3]) -> Option<[f64; 3]> {
-    let Some(text) = node.and_then(|node| node.attribute(name)) else { return Some(otherwise) };
-    let numbers: Vec<f64> = text.split_whitespace().map(|word| word.parse().ok()).collect::<Option<_>>()?;
+    let Some(text) = node.and_then(|node| node.attribute(name)) else {
+        return Some(otherwise);
+    };
+    let numbers: Vec<f64> = text
+        .split_whitespace()
+        .map(|word| word.parse().ok())
+        .collect::<Option<_>>()?;
     numbers.try_into().ok()
 }
 
 /// The corrected origins of the moving joints; none where the description has not the model's joints.
 fn origins(export: &Export, document: &Document, base: &str) -> Option<Origins> {
     let mut own: BTreeMap<&str, OwnJoint> = BTreeMap::new();
-    for node in document.root_element().children().filter(|node| node.has_tag_name("joint")) {
+    for node in document
+        .root_element()
+        .children()
+        .filter(|node| node.has_tag_name("joint"))
+    {
         let child = |name: &str| node.children().find(|child| child.has_tag_name(name));
         let end = |name: &str| child(name).and_then(|end| end.attribute("link"));
         let [roll, pitch, yaw] = three(child("origin"), "rpy", [0.0; 3])?;
         let place = three(child("origin"), "xyz", [0.0; 3])?;
-        let origin = Pose::new(Rotation3::from_euler_angles(roll, pitch, yaw).into_inner(), place.into());
-        let axis = Vector3::from(three(child("axis"), "xyz", [1.0, 0.0, 0.0])?).try_normalize(0.0)?;
-        let (Some(parent), Some(child), Some(name)) = (end("parent"), end("child"), node.attribute("name")) else { continue };
-        own.insert(child, OwnJoint { name, parent, child, origin, axis });
+        let origin = Pose::new(
+            Rotation3::from_euler_angles(roll, pitch, yaw).into_inner(),
+            place.into(),
+        );
+        let axis =
+            Vector3::from(three(child("axis"), "xyz", [1.0, 0.0, 0.0])?).try_normalize(0.0)?;
+        let (Some(parent), Some(child), Some(name)) =
+            (end("parent"), end("child"), node.attribute("name"))
+        else {
+            continue;
+        };
+        own.insert(
+            child,
+            OwnJoint {
+                name,
+                parent,
+                child,
+                origin,
+                axis,
+            },
+        );
     }
     let robot = &export.corrected;
     // From the last joint back to the base.
-    let last = own.values().find(|joint| robot.joints.last().is_some_and(|last| last.name == joint.name))?;
-    let mut path: Vec<&OwnJoint> =
-        std::iter::successors(Some(last), |joint| own.get(joint.parent).filter(|_| joint.parent != base))
-            .take(own.len())
-            .collect();
+    let last = own.values().find(|joint| {
+        robot
+            .joints
+            .last()
+            .is_some_and(|last| last.name == joint.name)
+    })?;
+    let mut path: Vec<&OwnJoint> = std::iter::successors(Some(last), |joint| {
+        own.get(joint.parent).filter(|_| joint.parent != base)
+    })
+    .take(own.len())
+    .collect();
     path.reverse();
     let (mut nominal, mut corrected) = (Pose::identity(), Pose::identity());
     let mut joints = Vec::new();
@@ -113,10 +184,17 @@ fn origins(export: &Export, document: &Document, base: &str) -> Option<Origins> 
             corrected = corrected * joint.origin;
             continue;
         };
-        let own = moved(&nominal, &(nominal.rotation * joint.axis), &robot.joints[at]);
+        let own = moved(
+            &nominal,
+            &(nominal.rotation * joint.axis),
+            &robot.joints[at],
+        );
         let (place, turn) = origin(&corrected, &own);
         // Names stand in an expression between quotes.
-        let plain = joint.name.chars().all(|c| c.is_ascii_alphanumeric() || "_-./ ".contains(c));
+        let plain = joint
+            .name
+            .chars()
+            .all(|c| c.is_ascii_alphanumeric() || "_-./ ".contains(c));
         joints.push((plain.then(|| joint.name.to_string())?, [place, turn]));
         corrected = own;
     }

@@ -9,16 +9,23 @@ use std::io;
 pub(super) type Xml = Writer<Vec<u8>>;
 
 /// A document: the remarks, then what `root` writes.
-pub(super) fn document(remarks: &[String], root: impl FnOnce(&mut Xml) -> io::Result<()>) -> Result<String> {
+pub(super) fn document(
+    remarks: &[String],
+    root: impl FnOnce(&mut Xml) -> io::Result<()>,
+) -> Result<String> {
     let mut xml = Writer::new_with_indent(Vec::new(), b' ', 2);
     let written = || -> io::Result<Vec<u8>> {
         xml.write_event(Event::Decl(BytesDecl::new("1.0", None, None)))?;
-        remarks.iter().try_for_each(|line| comment(&mut xml, line))?;
+        remarks
+            .iter()
+            .try_for_each(|line| comment(&mut xml, line))?;
         root(&mut xml)?;
         Ok(xml.into_inner())
     };
     let text = written().map_err(|error| Error::Bug(error.to_string()))?;
-    String::from_utf8(text).map(|text| text + "\n").map_err(|error| Error::Bug(error.to_string()))
+    String::from_utf8(text)
+        .map(|text| text + "\n")
+        .map_err(|error| Error::Bug(error.to_string()))
 }
 
 pub(super) fn comment(xml: &mut Xml, text: &str) -> io::Result<()> {
@@ -29,7 +36,9 @@ pub(super) fn comment(xml: &mut Xml, text: &str) -> io::Result<()> {
 
 /// An element without content.
 pub(super) fn empty(xml: &mut Xml, name: &str, attributes: &[(&str, &str)]) -> io::Result<()> {
-    xml.create_element(name).with_attributes(attributes.iter().copied()).write_empty()?;
+    xml.create_element(name)
+        .with_attributes(attributes.iter().copied())
+        .write_empty()?;
     Ok(())
 }
 
@@ -40,7 +49,11 @@ pub(super) fn offset(point: [f64; 3], from: [f64; 3]) -> String {
 
 /// Numbers with blanks between them, each the shortest text that reads as the same number.
 pub(super) fn numbers(values: impl IntoIterator<Item = f64>) -> String {
-    values.into_iter().map(|value| format!("{value:?}")).collect::<Vec<_>>().join(" ")
+    values
+        .into_iter()
+        .map(|value| format!("{value:?}"))
+        .collect::<Vec<_>>()
+        .join(" ")
 }
 
 #[cfg(test)]
@@ -50,8 +63,12 @@ mod tests {
     #[test]
     fn hyphens_of_a_name_end_no_comment() {
         for name in ["a--b", "---", "-----", "-", "<!-- -->"] {
-            let text = document(&[name.to_string()], |xml| xml.create_element("robot").write_empty().map(drop)).unwrap();
-            let read = roxmltree::Document::parse(&text).unwrap_or_else(|error| panic!("{error} in {text}"));
+            let text = document(&[name.to_string()], |xml| {
+                xml.create_element("robot").write_empty().map(drop)
+            })
+            .unwrap();
+            let read = roxmltree::Document::parse(&text)
+                .unwrap_or_else(|error| panic!("{error} in {text}"));
             assert_eq!(read.root_element().tag_name().name(), "robot");
         }
     }
@@ -59,7 +76,10 @@ mod tests {
     #[test]
     fn numbers_read_back_as_they_are() {
         let values = [0.1 + 0.2, -0.0, 1e-300, 1594.0];
-        let read = numbers(values).split(' ').map(|number| number.parse::<f64>().unwrap().to_bits()).collect::<Vec<_>>();
+        let read = numbers(values)
+            .split(' ')
+            .map(|number| number.parse::<f64>().unwrap().to_bits())
+            .collect::<Vec<_>>();
         assert_eq!(read, values.map(f64::to_bits));
     }
 }

@@ -40,20 +40,40 @@ pub struct Script {
 impl ClusterOptions {
     /// Everything that goes into a directive is a plain word: sbatch has no quoting that all its versions share.
     fn check(&self) -> Result<()> {
-        let plain = |text: &str| !text.is_empty() && text.chars().all(|c| c.is_ascii_alphanumeric() || "_./-+=,:@".contains(c));
+        let plain = |text: &str| {
+            !text.is_empty()
+                && text
+                    .chars()
+                    .all(|c| c.is_ascii_alphanumeric() || "_./-+=,:@".contains(c))
+        };
         let store = self.store.to_string_lossy().into_owned();
-        let words = [("--partition", &self.partition), ("--mem", &self.memory), ("--time", &self.time)];
-        let words = words.into_iter().filter_map(|(option, word)| Some((option, word.as_ref()?.clone())));
+        let words = [
+            ("--partition", &self.partition),
+            ("--mem", &self.memory),
+            ("--time", &self.time),
+        ];
+        let words = words
+            .into_iter()
+            .filter_map(|(option, word)| Some((option, word.as_ref()?.clone())));
         let more = self.more.iter().map(|word| ("--sbatch-arg", word.clone()));
         let faults: Vec<Fault> = words
             .chain(more)
             .chain([("--store", store)])
             .filter(|(_, word)| !plain(word))
             .map(|(option, word)| {
-                Fault::new(option, format!("{word:?}: allowed in a job file are letters, digits and _ . / - + = , : @"))
+                Fault::new(
+                    option,
+                    format!(
+                        "{word:?}: allowed in a job file are letters, digits and _ . / - + = , : @"
+                    ),
+                )
             })
             .collect();
-        if faults.is_empty() { Ok(()) } else { Err(Error::Spec(faults)) }
+        if faults.is_empty() {
+            Ok(())
+        } else {
+            Err(Error::Spec(faults))
+        }
     }
 }
 
@@ -99,9 +119,17 @@ pub fn slurm(note: &RunNote, options: &ClusterOptions) -> Result<Vec<Script>> {
 /// An Indexed Job for Kubernetes. Experimental: rendered, never run here.
 pub fn kubernetes(note: &RunNote, options: &ClusterOptions, image: &str, claim: &str) -> String {
     let yaml = crate::yaml::quoted;
-    let name: String = format!("calib-{}-{}", note.fleet, note.run).to_lowercase().replace('_', "-").chars().take(63).collect();
-    let limit =
-        options.memory.as_ref().map(|memory| format!("            limits: {{memory: {}}}\n", yaml(memory))).unwrap_or_default();
+    let name: String = format!("calib-{}-{}", note.fleet, note.run)
+        .to_lowercase()
+        .replace('_', "-")
+        .chars()
+        .take(63)
+        .collect();
+    let limit = options
+        .memory
+        .as_ref()
+        .map(|memory| format!("            limits: {{memory: {}}}\n", yaml(memory)))
+        .unwrap_or_default();
     format!(
         "# Experimental. Memory is in Kubernetes' own spelling, e.g. 2Gi.\n\
          apiVersion: batch/v1\nkind: Job\nmetadata:\n  name: {}\nspec:\n  completionMode: Indexed\n  completions: {}\n  parallelism: {}\n  \

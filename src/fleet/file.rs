@@ -167,11 +167,17 @@ impl FleetFile {
         let label = path.display().to_string();
         let text = raw::text(path).map_err(|error| Error::spec(&label, unreadable(&error)))?;
         let (tree, mut troubles) = yaml::parse(&text);
-        let Some(tree) = tree else { return Err(faulty(&label, troubles)) };
+        let Some(tree) = tree else {
+            return Err(faulty(&label, troubles));
+        };
         match typed::<Self>(&tree) {
             Ok(file) => {
                 troubles.extend(file.check(&tree));
-                if troubles.is_empty() { Ok((file, tree)) } else { Err(faulty(&label, troubles)) }
+                if troubles.is_empty() {
+                    Ok((file, tree))
+                } else {
+                    Err(faulty(&label, troubles))
+                }
             }
             Err(more) => {
                 troubles.extend(more);
@@ -184,21 +190,41 @@ impl FleetFile {
     fn check(&self, tree: &Node) -> Vec<Trouble> {
         let mut troubles = Vec::new();
         let mut fault = |path: &str, message: String| {
-            troubles.push(Trouble::new(message).at(tree.nearest_mark(path)).below(path));
+            troubles.push(
+                Trouble::new(message)
+                    .at(tree.nearest_mark(path))
+                    .below(path),
+            );
         };
         if self.calib != FORMAT {
-            fault("calib", format!("format {} is not known to this calib, which reads {FORMAT}", self.calib));
+            fault(
+                "calib",
+                format!(
+                    "format {} is not known to this calib, which reads {FORMAT}",
+                    self.calib
+                ),
+            );
         }
         if let Some(message) = misnamed(&self.name) {
             fault("name", message);
         }
         if self.robots.is_empty() {
-            fault("robots", "expected at least one of `- folders:`, `- list:` and `- recording:`".into());
+            fault(
+                "robots",
+                "expected at least one of `- folders:`, `- list:` and `- recording:`".into(),
+            );
         }
         for (index, source) in self.robots.iter().enumerate() {
-            let given = [source.folders.is_some(), source.list.is_some(), source.recording.is_some()];
+            let given = [
+                source.folders.is_some(),
+                source.list.is_some(),
+                source.recording.is_some(),
+            ];
             if given.iter().filter(|given| **given).count() != 1 {
-                fault(&format!("robots[{index}]"), "expected exactly one of `folders`, `list` and `recording`".into());
+                fault(
+                    &format!("robots[{index}]"),
+                    "expected exactly one of `folders`, `list` and `recording`".into(),
+                );
             }
             if source.recording.is_some() && source.variable.is_none() {
                 let message = "missing: the variable of the pipeline that takes a robot's part of the recording";
@@ -207,10 +233,16 @@ impl FleetFile {
         }
         if let Some(previous) = &self.previous {
             if !(previous.alpha > 0.0 && previous.alpha < 1.0) {
-                fault("previous.alpha", "expected a significance level between 0 and 1, e.g. 0.05".into());
+                fault(
+                    "previous.alpha",
+                    "expected a significance level between 0 and 1, e.g. 0.05".into(),
+                );
             }
             if previous.fleet == self.name {
-                fault("previous.fleet", "is this fleet itself; give every campaign a name of its own".into());
+                fault(
+                    "previous.fleet",
+                    "is this fleet itself; give every campaign a name of its own".into(),
+                );
             }
         }
         troubles
@@ -220,8 +252,14 @@ impl FleetFile {
 /// The text of the pipeline, or the place in FLEET.yaml that names it.
 pub(super) fn pipeline_text(path: &Path, tree: &Node, pipeline: &Path) -> Result<String> {
     raw::text(pipeline).map_err(|error| {
-        let message = format!("`{}`: {} (relative to this file)", pipeline.display(), unreadable(&error));
-        let trouble = Trouble::new(message).at(tree.nearest_mark("pipeline")).below("pipeline");
+        let message = format!(
+            "`{}`: {} (relative to this file)",
+            pipeline.display(),
+            unreadable(&error)
+        );
+        let trouble = Trouble::new(message)
+            .at(tree.nearest_mark("pipeline"))
+            .below("pipeline");
         Error::Spec(vec![trouble.fault(&path.display().to_string())])
     })
 }
@@ -240,12 +278,18 @@ pub(super) fn faulty(label: &str, mut troubles: Vec<Trouble>) -> Error {
         Some(Mark::Line { line, column }) => (line, column),
         _ => (u64::MAX, 0),
     });
-    let faults: Vec<Fault> = troubles.into_iter().map(|trouble| trouble.fault(label)).collect();
+    let faults: Vec<Fault> = troubles
+        .into_iter()
+        .map(|trouble| trouble.fault(label))
+        .collect();
     Error::Spec(faults)
 }
 
 /// The JSON Schema of FLEET.yaml, for editors.
 pub fn json_schema() -> String {
-    let schema = SchemaSettings::draft07().into_generator().into_root_schema_for::<FleetFile>().to_value();
+    let schema = SchemaSettings::draft07()
+        .into_generator()
+        .into_root_schema_for::<FleetFile>()
+        .to_value();
     serde_json::to_string_pretty(&schema).expect("a schema is plain data") + "\n"
 }

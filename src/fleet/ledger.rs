@@ -91,11 +91,17 @@ pub struct RobotRecord {
 impl RobotRecord {
     /// The last table of a kind.
     pub fn last(&self, kind: &str) -> Option<&TableRef> {
-        self.tables.iter().rfind(|made| made.kind == kind).map(|made| &made.table)
+        self.tables
+            .iter()
+            .rfind(|made| made.kind == kind)
+            .map(|made| &made.table)
     }
     /// The table of a kind that a stage wrote.
     pub fn of_stage(&self, stage: &str, kind: &str) -> Option<&TableRef> {
-        self.tables.iter().rfind(|made| made.stage == stage && made.kind == kind).map(|made| &made.table)
+        self.tables
+            .iter()
+            .rfind(|made| made.stage == stage && made.kind == kind)
+            .map(|made| &made.table)
     }
     pub(super) fn blank(robot: &FleetRobot, key: String, worker: &str) -> Self {
         Self {
@@ -174,11 +180,19 @@ impl Drop for Claim {
 impl<'a> Ledger<'a> {
     /// The records of a fleet in a store.
     pub fn new(store: &'a Store, fleet: &str) -> Self {
-        Self { store, fleet: fleet.into() }
+        Self {
+            store,
+            fleet: fleet.into(),
+        }
     }
 
     fn records<'p>(&'p self, key: &'p str) -> [&'p str; 4] {
-        ["fleets", &self.fleet, "records", key.get(..2).unwrap_or("00")]
+        [
+            "fleets",
+            &self.fleet,
+            "records",
+            key.get(..2).unwrap_or("00"),
+        ]
     }
     fn runs(&self) -> [&str; 3] {
         ["fleets", &self.fleet, "runs"]
@@ -186,11 +200,14 @@ impl<'a> Ledger<'a> {
 
     /// The record of a key; one that is torn, or whose tables are gone, is none.
     pub fn find(&self, key: &str) -> Result<Option<RobotRecord>> {
-        let note = self.store.note(&self.records(key), &format!("{key}.json"))?;
+        let note = self
+            .store
+            .note(&self.records(key), &format!("{key}.json"))?;
         let record = note.and_then(|note| serde_json::from_value::<RobotRecord>(note).ok());
         let whole = |record: &RobotRecord| {
             let there = |made: &RobotTable| {
-                fs::metadata(self.store.object_path(&made.table)).is_ok_and(|metadata| metadata.len() == made.table.bytes)
+                fs::metadata(self.store.object_path(&made.table))
+                    .is_ok_and(|metadata| metadata.len() == made.table.bytes)
             };
             record.record_format == RECORD_FORMAT && record.tables.iter().all(there)
         };
@@ -205,31 +222,44 @@ impl<'a> Ledger<'a> {
         }
         match self.find(&record.key)? {
             Some(standing) => Ok(standing),
-            None => self.store.put_note(&place, &name, &record).map(|()| record.clone()),
+            None => self
+                .store
+                .put_note(&place, &name, &record)
+                .map(|()| record.clone()),
         }
     }
 
     /// Reads a table of a record; none where the record has none.
     pub(super) fn load<T: Table>(&self, table: Option<&TableRef>) -> Result<Option<T>> {
-        table.map(|table| T::from_frame(&self.store.load(table)?)).transpose()
+        table
+            .map(|table| T::from_frame(&self.store.load(table)?))
+            .transpose()
     }
 
     /// Takes a record away, so that the robot is computed again.
     pub fn forget(&self, key: &str) -> Result<()> {
-        self.store.drop_note(&self.records(key), &format!("{key}.json"))
+        self.store
+            .drop_note(&self.records(key), &format!("{key}.json"))
     }
 
     /// The right to compute a robot; none while another living process has it. Where locks cannot be had, both compute and the
     /// first record stands.
     pub(super) fn claim(&self, key: &str) -> Result<Option<Claim>> {
-        let path = self.store.place_of_note(&["fleets", &self.fleet, "claims"], &format!("{key}.lock"))?;
+        let path = self
+            .store
+            .place_of_note(&["fleets", &self.fleet, "claims"], &format!("{key}.lock"))?;
         let open = || {
             path.parent().map_or(Ok(()), fs::create_dir_all)?;
             File::options().create(true).append(true).open(&path)
         };
-        let Ok(file) = open() else { return Ok(Some(Claim { path, _file: None })) };
+        let Ok(file) = open() else {
+            return Ok(Some(Claim { path, _file: None }));
+        };
         match file.try_lock() {
-            Ok(()) => Ok(Some(Claim { path, _file: Some(file) })),
+            Ok(()) => Ok(Some(Claim {
+                path,
+                _file: Some(file),
+            })),
             Err(fs::TryLockError::WouldBlock) => Ok(None),
             Err(fs::TryLockError::Error(_)) => Ok(Some(Claim { path, _file: None })),
         }
@@ -237,7 +267,8 @@ impl<'a> Ledger<'a> {
 
     /// Keeps what a run of the fleet is about.
     pub fn put_run(&self, note: &RunNote) -> Result<()> {
-        self.store.put_note(&self.runs(), &format!("{}.json", note.run), note)
+        self.store
+            .put_note(&self.runs(), &format!("{}.json", note.run), note)
     }
 
     /// The run of an id, or the latest.
@@ -248,7 +279,10 @@ impl<'a> Ledger<'a> {
                 let folder = self.store.place_of_note(&self.runs()[..2], "runs")?;
                 let entries = fs::read_dir(folder).into_iter().flatten().flatten();
                 // Ids sort by time.
-                entries.filter_map(|entry| entry.file_name().into_string().ok()).filter(|name| name.ends_with(".json")).max()
+                entries
+                    .filter_map(|entry| entry.file_name().into_string().ok())
+                    .filter(|name| name.ends_with(".json"))
+                    .max()
             }
         };
         let Some(name) = name else { return Ok(None) };
@@ -258,7 +292,8 @@ impl<'a> Ledger<'a> {
 
     /// Keeps the roster with the keys of its records, for status and later campaigns.
     pub fn close(&self, note: &RunNote) -> Result<()> {
-        self.store.put_note(&["fleets", &self.fleet], "roster.json", note)
+        self.store
+            .put_note(&["fleets", &self.fleet], "roster.json", note)
     }
     /// The roster as the last run left it.
     pub fn closed(&self) -> Result<Option<RunNote>> {
@@ -268,11 +303,19 @@ impl<'a> Ledger<'a> {
 
     /// Asks the workers of a run to stop after the robots that they have in hand.
     pub fn cancel(&self, run: &str) -> Result<()> {
-        self.store.put_note(&["fleets", &self.fleet], "cancelled.json", &serde_json::json!({ "run": run }))
+        self.store.put_note(
+            &["fleets", &self.fleet],
+            "cancelled.json",
+            &serde_json::json!({ "run": run }),
+        )
     }
     /// Whether a run was asked to stop.
     pub fn cancelled(&self, run: &str) -> bool {
-        let note = self.store.note(&["fleets", &self.fleet], "cancelled.json").ok().flatten();
+        let note = self
+            .store
+            .note(&["fleets", &self.fleet], "cancelled.json")
+            .ok()
+            .flatten();
         note.is_some_and(|note| note["run"] == run)
     }
 }

@@ -31,7 +31,12 @@ pub struct FleetResults {
 }
 
 /// Works through robots of the roster, by position. Fails where the store does; then all workers stop.
-pub fn work(workshop: &Workshop, robots: &[usize], options: &WorkerOptions, watcher: &dyn Watcher) -> Result<FleetResults> {
+pub fn work(
+    workshop: &Workshop,
+    robots: &[usize],
+    options: &WorkerOptions,
+    watcher: &dyn Watcher,
+) -> Result<FleetResults> {
     let roster = &workshop.fleet.roster.0;
     let slots: Vec<Mutex<Option<RobotRecord>>> = roster.iter().map(|_| Mutex::new(None)).collect();
     let (next, computed) = (AtomicUsize::new(0), AtomicUsize::new(0));
@@ -61,14 +66,18 @@ pub fn work(workshop: &Workshop, robots: &[usize], options: &WorkerOptions, watc
     };
     let one = |worker: usize| {
         while !over() {
-            let Some(index) = robots.get(next.fetch_add(1, Ordering::Relaxed)) else { break };
+            let Some(index) = robots.get(next.fetch_add(1, Ordering::Relaxed)) else {
+                break;
+            };
             if !visit(*index, worker) {
                 lock(&busy).push(*index);
             }
         }
         // What others had in hand: their record, or the work where they died.
         while !over() {
-            let Some(index) = lock(&busy).pop() else { break };
+            let Some(index) = lock(&busy).pop() else {
+                break;
+            };
             if !visit(index, worker) {
                 lock(&busy).insert(0, index);
                 std::thread::sleep(PAUSE);
@@ -78,8 +87,12 @@ pub fn work(workshop: &Workshop, robots: &[usize], options: &WorkerOptions, watc
     std::thread::scope(|scope| -> Result<()> {
         let one = &one;
         for worker in 0..options.workers.clamp(1, robots.len().max(1)) {
-            let builder = std::thread::Builder::new().name(format!("worker {worker}")).stack_size(STACK);
-            builder.spawn_scoped(scope, move || one(worker)).map_err(|error| Error::store("--jobs", error.to_string()))?;
+            let builder = std::thread::Builder::new()
+                .name(format!("worker {worker}"))
+                .stack_size(STACK);
+            builder
+                .spawn_scoped(scope, move || one(worker))
+                .map_err(|error| Error::store("--jobs", error.to_string()))?;
         }
         Ok(())
     })?;
@@ -88,8 +101,14 @@ pub fn work(workshop: &Workshop, robots: &[usize], options: &WorkerOptions, watc
     if let Some(error) = failure.into_inner().unwrap_or_else(PoisonError::into_inner) {
         return Err(error);
     }
-    let records = slots.into_iter().map(|slot| slot.into_inner().unwrap_or_else(PoisonError::into_inner)).collect();
-    Ok(FleetResults { records, computed: computed.into_inner() })
+    let records = slots
+        .into_iter()
+        .map(|slot| slot.into_inner().unwrap_or_else(PoisonError::into_inner))
+        .collect();
+    Ok(FleetResults {
+        records,
+        computed: computed.into_inner(),
+    })
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {

@@ -47,7 +47,12 @@ impl Fleet {
         let pipeline = folder.join(&file.pipeline);
         let text = file::pipeline_text(path, &tree, &pipeline)?;
         let roster = Roster::gather(path, &file, &tree, store)?;
-        let mut fleet = Self { file, pipeline, text, roster };
+        let mut fleet = Self {
+            file,
+            pipeline,
+            text,
+            roster,
+        };
         let ledger = Ledger::new(store, &fleet.file.name);
         fleet.look_back(&ledger)?;
         Ok(fleet)

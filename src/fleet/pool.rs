@@ -26,12 +26,22 @@ impl Fleet {
         if let Some(previous) = self.file.previous.clone() {
             let earlier = Earlier::named(&previous.fleet, "previous.fleet", ledger)?;
             for robot in &mut self.roster.0 {
-                let record = earlier.record(ledger, &robot.name)?.filter(|record| record.ending == Ending::Done);
+                let record = earlier
+                    .record(ledger, &robot.name)?
+                    .filter(|record| record.ending == Ending::Done);
                 let Some(record) = record else { continue };
-                if let (Some(parameters), Some(recording)) = (record.last("parameters"), record.last("recording")) {
-                    for (port, table) in [("previous_parameters", parameters), ("previous_recording", recording)] {
+                if let (Some(parameters), Some(recording)) =
+                    (record.last("parameters"), record.last("recording"))
+                {
+                    for (port, table) in [
+                        ("previous_parameters", parameters),
+                        ("previous_recording", recording),
+                    ] {
                         let path = ledger.store.object(table)?;
-                        robot.set_text(&format!("{}.{port}", previous.stage), &path.to_string_lossy());
+                        robot.set_text(
+                            &format!("{}.{port}", previous.stage),
+                            &path.to_string_lossy(),
+                        );
                     }
                 }
             }
@@ -45,9 +55,13 @@ impl Fleet {
                     PriorBy::Model => known.pooled(&robot.name, &robot.groups),
                 };
                 if !priors.is_empty() {
-                    let entry = |(name, (mean, sigma))| (name, json!({ "mean": mean, "sigma": sigma }));
+                    let entry =
+                        |(name, (mean, sigma))| (name, json!({ "mean": mean, "sigma": sigma }));
                     let priors = Value::Object(priors.into_iter().map(entry).collect());
-                    robot.set_values(&BTreeMap::from([(format!("{}.prior", wanted.stage), priors)]));
+                    robot.set_values(&BTreeMap::from([(
+                        format!("{}.prior", wanted.stage),
+                        priors,
+                    )]));
                 }
             }
         }
@@ -65,26 +79,50 @@ impl EarlierChanges {
         let mut robots = BTreeMap::new();
         for member in earlier.members() {
             let record = earlier.record(ledger, &member.name)?;
-            let table = record.as_ref().and_then(|record| record.of_stage(&wanted.stage, Parameters::KIND));
-            let Some(table) = ledger.load::<Parameters>(table)? else { continue };
-            let estimated = table.0.into_iter().filter(|row| row.status == "free" && wanted.effects.contains(&row.effect));
-            let values = estimated.filter_map(|row| Some((row.name, (row.change, row.sigma.filter(|sigma| *sigma > 0.0)?))));
-            robots.insert(member.name.clone(), (member.groups.clone(), values.collect()));
+            let table = record
+                .as_ref()
+                .and_then(|record| record.of_stage(&wanted.stage, Parameters::KIND));
+            let Some(table) = ledger.load::<Parameters>(table)? else {
+                continue;
+            };
+            let estimated = table
+                .0
+                .into_iter()
+                .filter(|row| row.status == "free" && wanted.effects.contains(&row.effect));
+            let values = estimated.filter_map(|row| {
+                Some((
+                    row.name,
+                    (row.change, row.sigma.filter(|sigma| *sigma > 0.0)?),
+                ))
+            });
+            robots.insert(
+                member.name.clone(),
+                (member.groups.clone(), values.collect()),
+            );
         }
         Ok(Self { robots })
     }
 
     fn own(&self, robot: &str) -> BTreeMap<String, PooledPrior> {
-        self.robots.get(robot).map(|(_, values)| values.clone()).unwrap_or_default()
+        self.robots
+            .get(robot)
+            .map(|(_, values)| values.clone())
+            .unwrap_or_default()
     }
 
     fn pooled(&self, robot: &str, groups: &Groups) -> BTreeMap<String, PooledPrior> {
-        let kin = self.robots.iter().filter(|(name, (other, _))| *name != robot && other.model == groups.model);
+        let kin = self
+            .robots
+            .iter()
+            .filter(|(name, (other, _))| *name != robot && other.model == groups.model);
         let mut values: BTreeMap<&str, Vec<PooledPrior>> = BTreeMap::new();
         for (name, value) in kin.flat_map(|(_, (_, values))| values) {
             values.entry(name).or_default().push(*value);
         }
-        values.into_iter().filter_map(|(name, values)| Some((name.to_string(), pool(&values)?))).collect()
+        values
+            .into_iter()
+            .filter_map(|(name, values)| Some((name.to_string(), pool(&values)?)))
+            .collect()
     }
 }
 
@@ -113,11 +151,21 @@ mod tests {
     #[test]
     fn a_pool_tells_scatter_from_error() {
         // Two-sided by construction: +-1 about 5 with errors far smaller, then with errors far larger.
-        let values = |error: f64| (0..40).map(|k| (if k % 2 == 0 { 4.0 } else { 6.0 }, error)).collect::<Vec<_>>();
+        let values = |error: f64| {
+            (0..40)
+                .map(|k| (if k % 2 == 0 { 4.0 } else { 6.0 }, error))
+                .collect::<Vec<_>>()
+        };
         let (mean, sigma) = pool(&values(0.01)).unwrap();
-        assert!((mean - 5.0).abs() < 1e-9 && (sigma - 1.026).abs() < 0.01, "{mean} {sigma}");
+        assert!(
+            (mean - 5.0).abs() < 1e-9 && (sigma - 1.026).abs() < 0.01,
+            "{mean} {sigma}"
+        );
         let (mean, sigma) = pool(&values(3.0)).unwrap();
-        assert!((mean - 5.0).abs() < 1e-9 && (sigma - 3.0 / 40f64.sqrt()).abs() < 1e-9, "{mean} {sigma}");
+        assert!(
+            (mean - 5.0).abs() < 1e-9 && (sigma - 3.0 / 40f64.sqrt()).abs() < 1e-9,
+            "{mean} {sigma}"
+        );
         assert_eq!(pool(&values(1.0)[..2]), None);
     }
 }

@@ -14,7 +14,11 @@ pub(super) struct FalseAlarmRate {
 
 /// Changes of all robots with their control limits: alpha shared by every robot and parameter that was tested (Bonferroni).
 pub(super) fn with_limits(robots: &[(&str, &Changes)], limits: &FalseAlarmRate) -> FleetChanges {
-    let tests = robots.iter().map(|(_, changes)| changes.0.len()).sum::<usize>().max(1);
+    let tests = robots
+        .iter()
+        .map(|(_, changes)| changes.0.len())
+        .sum::<usize>()
+        .max(1);
     let each = limits.alpha / tests as f64;
     // A normal variable is farther from its mean, either way, with this chance.
     let width = normal_quantile(0.5 * each);
@@ -37,7 +41,9 @@ pub(super) fn with_limits(robots: &[(&str, &Changes)], limits: &FalseAlarmRate) 
             });
         }
     }
-    table.0.sort_by(|a, b| (&a.robot, &a.parameter).cmp(&(&b.robot, &b.parameter)));
+    table
+        .0
+        .sort_by(|a, b| (&a.robot, &a.parameter).cmp(&(&b.robot, &b.parameter)));
     table
 }
 
@@ -50,13 +56,31 @@ pub(super) struct Earlier {
 impl Earlier {
     /// The latest run of the fleet that the file names as `previous`, if it names one; fails where that fleet has none.
     pub fn find(fleet: &Fleet, ledger: &Ledger) -> Result<Option<Self>> {
-        fleet.file.previous.as_ref().map(|previous| Self::named(&previous.fleet, "previous.fleet", ledger)).transpose()
+        fleet
+            .file
+            .previous
+            .as_ref()
+            .map(|previous| Self::named(&previous.fleet, "previous.fleet", ledger))
+            .transpose()
     }
 
     pub fn named(name: &str, place: &str, ledger: &Ledger) -> Result<Self> {
-        let missing = || Error::spec(place, format!("no fleet `{name}` was run in store {}", ledger.store.root().display()));
-        let note = Ledger::new(ledger.store, name).closed()?.ok_or_else(missing)?;
-        Ok(Self { fleet: name.into(), note })
+        let missing = || {
+            Error::spec(
+                place,
+                format!(
+                    "no fleet `{name}` was run in store {}",
+                    ledger.store.root().display()
+                ),
+            )
+        };
+        let note = Ledger::new(ledger.store, name)
+            .closed()?
+            .ok_or_else(missing)?;
+        Ok(Self {
+            fleet: name.into(),
+            note,
+        })
     }
 
     pub fn members(&self) -> &[Member] {
@@ -66,7 +90,9 @@ impl Earlier {
     /// The record of a robot, where it has one there.
     pub fn record(&self, ledger: &Ledger, robot: &str) -> Result<Option<RobotRecord>> {
         let member = self.note.robots.iter().find(|member| member.name == robot);
-        let Some(key) = member.and_then(|member| member.key.as_deref()) else { return Ok(None) };
+        let Some(key) = member.and_then(|member| member.key.as_deref()) else {
+            return Ok(None);
+        };
         Ledger::new(ledger.store, &self.fleet).find(key)
     }
 
@@ -78,12 +104,22 @@ impl Earlier {
         mut changed: Vec<&FleetChangeRow>,
         findings: Option<&Findings>,
     ) -> Result<Vec<String>> {
-        let Some(record) = self.record(ledger, robot)? else { return Ok(vec!["not in the campaign before".into()]) };
+        let Some(record) = self.record(ledger, robot)? else {
+            return Ok(vec!["not in the campaign before".into()]);
+        };
         let member = self.note.robots.iter().find(|member| member.name == robot);
-        let since = member.and_then(|member| member.groups.campaign.as_deref()).unwrap_or(&self.fleet);
+        let since = member
+            .and_then(|member| member.groups.campaign.as_deref())
+            .unwrap_or(&self.fleet);
         changed.sort_by_key(|row| row.rank);
-        let mut flags: Vec<String> = changed.into_iter().map(|row| sentence(row, since)).collect();
-        if let (Some(now), Some(before)) = (findings, ledger.load::<Findings>(record.last(Findings::KIND))?) {
+        let mut flags: Vec<String> = changed
+            .into_iter()
+            .map(|row| sentence(row, since))
+            .collect();
+        if let (Some(now), Some(before)) = (
+            findings,
+            ledger.load::<Findings>(record.last(Findings::KIND))?,
+        ) {
             flags.extend(diagnosed(&causes(&before), &causes(now), since));
         }
         Ok(flags)
@@ -96,21 +132,31 @@ const OUTLIER: &str = "outlier";
 /// `backlash joint 2`, strongest first.
 fn causes(findings: &Findings) -> Vec<String> {
     let physical = findings.0.iter().filter(|row| row.effect != OUTLIER);
-    physical.map(|row| format!("{} {}", row.effect, row.place)).collect()
+    physical
+        .map(|row| format!("{} {}", row.effect, row.place))
+        .collect()
 }
 
 /// `backlash joint 2 since 2026-04-01: diagnosed, it was not before`, for every cause that only one of two diagnoses names.
 fn diagnosed(before: &[String], now: &[String], since: &str) -> Vec<String> {
     let come = now.iter().filter(|cause| !before.contains(cause));
     let gone = before.iter().filter(|cause| !now.contains(cause));
-    let mut flags: Vec<String> = come.map(|cause| format!("{cause} since {since}: diagnosed, it was not before")).collect();
-    flags.extend(gone.map(|cause| format!("{cause} since {since}: diagnosed before, it is not now")));
+    let mut flags: Vec<String> = come
+        .map(|cause| format!("{cause} since {since}: diagnosed, it was not before"))
+        .collect();
+    flags.extend(
+        gone.map(|cause| format!("{cause} since {since}: diagnosed before, it is not now")),
+    );
     flags
 }
 
 /// `zero_shift joint 3 since 2026-04-01: +0.021 +- 0.002 deg`.
 fn sentence(row: &FleetChangeRow, since: &str) -> String {
-    let (factor, unit) = if row.unit == "rad" { (180.0 / std::f64::consts::PI, "deg") } else { (1.0, row.unit.as_str()) };
+    let (factor, unit) = if row.unit == "rad" {
+        (180.0 / std::f64::consts::PI, "deg")
+    } else {
+        (1.0, row.unit.as_str())
+    };
     format!(
         "{} {} since {since}: {} {unit} {} ({:.1} sigma)",
         row.effect,
@@ -124,7 +170,11 @@ fn sentence(row: &FleetChangeRow, since: &str) -> String {
 /// A value with two digits of its uncertainty.
 fn figure(value: f64, sigma: f64) -> String {
     let digits = (1.0 - sigma.abs().log10().floor()).clamp(0.0, 12.0);
-    let digits = if digits.is_finite() { digits as usize } else { 6 };
+    let digits = if digits.is_finite() {
+        digits as usize
+    } else {
+        6
+    };
     if digits > 6 {
         return format!("{value:+.3e} +- {sigma:.1e}");
     }

@@ -19,7 +19,12 @@ const FOLDER: &str = "case";
 
 impl Roster {
     /// Finds the robots of all sources; every fault at once.
-    pub(super) fn gather(path: &Path, file: &FleetFile, tree: &Node, store: &Store) -> Result<Self> {
+    pub(super) fn gather(
+        path: &Path,
+        file: &FleetFile,
+        tree: &Node,
+        store: &Store,
+    ) -> Result<Self> {
         let folder = path.parent().unwrap_or(Path::new(""));
         let mut robots: Vec<FleetRobot> = Vec::new();
         let mut troubles = Vec::new();
@@ -29,11 +34,11 @@ impl Roster {
                 Ok(found) => found,
                 Err(Error::Spec(faults)) => {
                     let mark = tree.nearest_mark(&place);
-                    troubles.extend(
-                        faults
-                            .into_iter()
-                            .map(|fault| Trouble::new(fault.message).at(mark).below(&format!("{place}.{}", fault.place))),
-                    );
+                    troubles.extend(faults.into_iter().map(|fault| {
+                        Trouble::new(fault.message)
+                            .at(mark)
+                            .below(&format!("{place}.{}", fault.place))
+                    }));
                     continue;
                 }
                 Err(other) => return Err(other),
@@ -53,24 +58,40 @@ impl Roster {
         }
         for (name, times) in seen.into_iter().filter(|(_, times)| *times > 1) {
             let message = format!("{times} robots have the name {name:?}; names identify robots");
-            troubles.push(Trouble::new(message).at(tree.nearest_mark("robots")).below("robots"));
+            troubles.push(
+                Trouble::new(message)
+                    .at(tree.nearest_mark("robots"))
+                    .below("robots"),
+            );
         }
         for (index, exception) in file.overrides.iter().enumerate() {
             for (k, pattern) in exception.robots.iter().enumerate() {
                 if !robots.iter().any(|robot| matches(pattern, &robot.name)) {
                     let place = format!("overrides[{index}].robots[{k}]");
                     let message = format!("no robot has a name like {pattern:?}");
-                    troubles.push(Trouble::new(message).at(tree.nearest_mark(&place)).below(&place));
+                    troubles.push(
+                        Trouble::new(message)
+                            .at(tree.nearest_mark(&place))
+                            .below(&place),
+                    );
                 }
             }
             for robot in &mut robots {
-                if exception.robots.iter().any(|pattern| matches(pattern, &robot.name)) {
+                if exception
+                    .robots
+                    .iter()
+                    .any(|pattern| matches(pattern, &robot.name))
+                {
                     robot.set_values(&exception.set);
                     robot.groups = exception.groups.or(&robot.groups);
                 }
             }
         }
-        if troubles.is_empty() { Ok(Self(robots)) } else { Err(faulty(&path.display().to_string(), troubles)) }
+        if troubles.is_empty() {
+            Ok(Self(robots))
+        } else {
+            Err(faulty(&path.display().to_string(), troubles))
+        }
     }
 
     /// The position of a robot by its name.
@@ -79,23 +100,47 @@ impl Roster {
     }
 }
 
-fn found(folder: &Path, file: &FleetFile, source: &RobotSource, store: &Store) -> Result<Vec<FleetRobot>> {
+fn found(
+    folder: &Path,
+    file: &FleetFile,
+    source: &RobotSource,
+    store: &Store,
+) -> Result<Vec<FleetRobot>> {
     if let Some(pattern) = &source.folders {
-        return folders(folder, pattern, source.variable.as_deref().unwrap_or(FOLDER));
+        return folders(
+            folder,
+            pattern,
+            source.variable.as_deref().unwrap_or(FOLDER),
+        );
     }
     if let Some(path) = &source.list {
-        return list::read(&folder.join(path), source.variable.as_deref().unwrap_or(FOLDER));
+        return list::read(
+            &folder.join(path),
+            source.variable.as_deref().unwrap_or(FOLDER),
+        );
     }
     match (&source.recording, &source.variable) {
-        (Some(path), Some(variable)) => partition::read(&folder.join(path), &source.by, variable, &file.name, store),
+        (Some(path), Some(variable)) => {
+            partition::read(&folder.join(path), &source.by, variable, &file.name, store)
+        }
         _ => Ok(Vec::new()),
     }
 }
 
 fn folders(folder: &Path, pattern: &str, variable: &str) -> Result<Vec<FleetRobot>> {
-    let base = folder.to_str().ok_or_else(|| Error::spec("folders", "the folder of this file has a name that is not UTF-8"))?;
-    let whole = if base.is_empty() { pattern.to_string() } else { format!("{}/{pattern}", glob::Pattern::escape(base)) };
-    let paths = glob::glob(&whole).map_err(|error| Error::spec("folders", format!("`{pattern}` is no pattern: {error}")))?;
+    let base = folder.to_str().ok_or_else(|| {
+        Error::spec(
+            "folders",
+            "the folder of this file has a name that is not UTF-8",
+        )
+    })?;
+    let whole = if base.is_empty() {
+        pattern.to_string()
+    } else {
+        format!("{}/{pattern}", glob::Pattern::escape(base))
+    };
+    let paths = glob::glob(&whole)
+        .map_err(|error| Error::spec("folders", format!("`{pattern}` is no pattern: {error}")))?;
     let mut robots = Vec::new();
     for path in paths {
         let path = path.map_err(|error| Error::spec("folders", format!("`{pattern}`: {error}")))?;
@@ -108,14 +153,21 @@ fn folders(folder: &Path, pattern: &str, variable: &str) -> Result<Vec<FleetRobo
             Some(text) => robot.set_text(variable, text),
             None => {
                 // Two such names may look alike once they are text.
-                robot.name = format!("{} ({})", robot.name, &blake3::hash(raw.as_encoded_bytes()).to_hex()[..8]);
+                robot.name = format!(
+                    "{} ({})",
+                    robot.name,
+                    &blake3::hash(raw.as_encoded_bytes()).to_hex()[..8]
+                );
                 robot.unreadable = Some("the folder's name is not UTF-8: rename it".into());
             }
         }
         robots.push(robot);
     }
     if robots.is_empty() {
-        return Err(Error::spec("folders", format!("no folder matches `{pattern}` (relative to this file)")));
+        return Err(Error::spec(
+            "folders",
+            format!("no folder matches `{pattern}` (relative to this file)"),
+        ));
     }
     robots.sort_by(|a, b| a.name.cmp(&b.name));
     Ok(robots)

@@ -17,11 +17,19 @@ pub fn submit(ledger: &Ledger, note: &mut RunNote, options: &ClusterOptions) -> 
     let scripts = slurm(note, options)?;
     ledger.put_run(note)?;
     let folder = logs(&options.store, &note.fleet);
-    std::fs::create_dir_all(&folder).map_err(|error| Error::store(folder.display().to_string(), error.to_string()))?;
+    std::fs::create_dir_all(&folder)
+        .map_err(|error| Error::store(folder.display().to_string(), error.to_string()))?;
     for script in scripts {
         let answer = said("sbatch", &["--parsable"], Some(&script.text))?;
         // `id` or `id;cluster`.
-        note.jobs.push(answer.trim().split(';').next().unwrap_or_default().to_string());
+        note.jobs.push(
+            answer
+                .trim()
+                .split(';')
+                .next()
+                .unwrap_or_default()
+                .to_string(),
+        );
         ledger.put_run(note)?;
     }
     Ok(())
@@ -39,7 +47,11 @@ pub enum Waited {
 }
 
 /// Waits until `missing` says 0. The scheduler is only asked whether it still has the jobs.
-pub fn wait(jobs: &[String], mut missing: impl FnMut() -> Result<usize>, stop: &dyn Fn() -> bool) -> Result<Waited> {
+pub fn wait(
+    jobs: &[String],
+    mut missing: impl FnMut() -> Result<usize>,
+    stop: &dyn Fn() -> bool,
+) -> Result<Waited> {
     let (mut looks, mut empty) = (0, 0);
     loop {
         if missing()? == 0 {
@@ -52,11 +64,20 @@ pub fn wait(jobs: &[String], mut missing: impl FnMut() -> Result<usize>, stop: &
         looks += 1;
         if looks % LOOKS == 0 {
             // A job that is long over is unknown to squeue, which then complains.
-            let queued = said("squeue", &["--noheader", "--jobs", &jobs.join(",")], None).unwrap_or_default();
-            empty = if queued.trim().is_empty() { empty + 1 } else { 0 };
+            let queued = said("squeue", &["--noheader", "--jobs", &jobs.join(",")], None)
+                .unwrap_or_default();
+            empty = if queued.trim().is_empty() {
+                empty + 1
+            } else {
+                0
+            };
             // Twice, so that records of the last task have time to show on shared storage.
             if empty >= 2 {
-                return Ok(if missing()? == 0 { Waited::Complete } else { Waited::Gone });
+                return Ok(if missing()? == 0 {
+                    Waited::Complete
+                } else {
+                    Waited::Gone
+                });
             }
         }
     }
@@ -65,7 +86,11 @@ pub fn wait(jobs: &[String], mut missing: impl FnMut() -> Result<usize>, stop: &
 /// Takes the jobs of a run from the scheduler.
 pub fn cancel(jobs: &[String]) -> Result<()> {
     let words: Vec<&str> = jobs.iter().map(String::as_str).collect();
-    if words.is_empty() { Ok(()) } else { said("scancel", &words, None).map(drop) }
+    if words.is_empty() {
+        Ok(())
+    } else {
+        said("scancel", &words, None).map(drop)
+    }
 }
 
 /// Runs a program of Slurm, without a shell, and gives what it printed.
@@ -73,17 +98,30 @@ fn said(program: &str, words: &[&str], input: Option<&str>) -> Result<String> {
     let fault = |message: String| Error::store(program, message);
     let mut child = Command::new(program)
         .args(words)
-        .stdin(if input.is_some() { Stdio::piped() } else { Stdio::null() })
+        .stdin(if input.is_some() {
+            Stdio::piped()
+        } else {
+            Stdio::null()
+        })
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
-        .map_err(|error| fault(format!("cannot be started: {error}; is Slurm installed on this machine?")))?;
+        .map_err(|error| {
+            fault(format!(
+                "cannot be started: {error}; is Slurm installed on this machine?"
+            ))
+        })?;
     if let (Some(input), Some(mut pipe)) = (input, child.stdin.take()) {
-        pipe.write_all(input.as_bytes()).map_err(|error| fault(error.to_string()))?;
+        pipe.write_all(input.as_bytes())
+            .map_err(|error| fault(error.to_string()))?;
     }
-    let output = child.wait_with_output().map_err(|error| fault(error.to_string()))?;
+    let output = child
+        .wait_with_output()
+        .map_err(|error| fault(error.to_string()))?;
     if !output.status.success() {
-        return Err(fault(String::from_utf8_lossy(&output.stderr).trim().to_string()));
+        return Err(fault(
+            String::from_utf8_lossy(&output.stderr).trim().to_string(),
+        ));
     }
     Ok(String::from_utf8_lossy(&output.stdout).into_owned())
 }

@@ -7,7 +7,8 @@ use crate::error::Result;
 use crate::report::fleet as page;
 use crate::store::{Account, KEY_FORMAT, PendingTable, StageKey};
 use crate::table::{
-    Changes, Findings, FleetChangeRow, FleetChanges, FleetRow, FleetTable, Statistics, StatisticsRow, Table, Verdict,
+    Changes, Findings, FleetChangeRow, FleetChanges, FleetRow, FleetTable, Statistics,
+    StatisticsRow, Table, Verdict,
 };
 use rayon::prelude::*;
 use serde_json::json;
@@ -30,13 +31,24 @@ pub struct FleetSummary {
 }
 
 /// Makes the tables and the page from the records (in the order of the roster; none: missing) and publishes them.
-pub fn publish(fleet: &Fleet, ledger: &Ledger, records: &[Option<RobotRecord>]) -> Result<FleetSummary> {
+pub fn publish(
+    fleet: &Fleet,
+    ledger: &Ledger,
+    records: &[Option<RobotRecord>],
+) -> Result<FleetSummary> {
     let earlier = recalibration::Earlier::find(fleet, ledger)?;
-    let read: Vec<Read> = records.par_iter().map(|record| Read::of(ledger, record.as_ref())).collect::<Result<_>>()?;
+    let read: Vec<Read> = records
+        .par_iter()
+        .map(|record| Read::of(ledger, record.as_ref()))
+        .collect::<Result<_>>()?;
     let changes: Vec<(&str, &Changes)> = (fleet.roster.0.iter().zip(&read))
         .filter_map(|(robot, read)| Some((robot.name.as_str(), read.changes.as_ref()?)))
         .collect();
-    let alpha = fleet.file.previous.as_ref().map_or(1.0, |previous| previous.alpha);
+    let alpha = fleet
+        .file
+        .previous
+        .as_ref()
+        .map_or(1.0, |previous| previous.alpha);
     let changes = recalibration::with_limits(&changes, &FalseAlarmRate { alpha });
     let mut flagged: BTreeMap<&str, Vec<&FleetChangeRow>> = BTreeMap::new();
     for change in changes.0.iter().filter(|change| change.flagged) {
@@ -45,7 +57,12 @@ pub fn publish(fleet: &Fleet, ledger: &Ledger, records: &[Option<RobotRecord>]) 
     let mut table = FleetTable::default();
     for ((robot, record), read) in fleet.roster.0.iter().zip(records).zip(&read) {
         let mut row = read.row(robot, record.as_ref());
-        if let (Some(earlier), Some(_)) = (&earlier, record.as_ref().filter(|record| record.ending == Ending::Done)) {
+        if let (Some(earlier), Some(_)) = (
+            &earlier,
+            record
+                .as_ref()
+                .filter(|record| record.ending == Ending::Done),
+        ) {
             let changed = flagged.remove(robot.name.as_str()).unwrap_or_default();
             row.changes = Some(changed.len() as i64);
             let flags = earlier.flags(ledger, &robot.name, changed, read.findings.as_ref())?;
@@ -57,14 +74,20 @@ pub fn publish(fleet: &Fleet, ledger: &Ledger, records: &[Option<RobotRecord>]) 
         .filter_map(|(robot, record)| {
             let record = record.as_ref()?;
             let document = record.documents.first()?;
-            Some((robot.name.clone(), format!("../{}.{}/{document}", fleet.name(), record.handle)))
+            Some((
+                robot.name.clone(),
+                format!("../{}.{}/{document}", fleet.name(), record.handle),
+            ))
         })
         .collect();
     let html = page::html(fleet.name(), &table, &changes, &links)?;
     let key = key(fleet, &table, records);
     let products = vec![
         ("fleet".to_string(), PendingTable::Frame(table.to_frame()?)),
-        ("fleet_changes".into(), PendingTable::Frame(changes.to_frame()?)),
+        (
+            "fleet_changes".into(),
+            PendingTable::Frame(changes.to_frame()?),
+        ),
     ];
     let published = ledger.store.publish(&key, products, Account::default())?;
     let mut tables = Vec::new();
@@ -73,18 +96,43 @@ pub fn publish(fleet: &Fleet, ledger: &Ledger, records: &[Option<RobotRecord>]) 
     }
     // By this note a sweep knows that the tables are needed.
     let note = json!({ "action": published.record.id, "tables": published.record.tables });
-    ledger.store.put_note(&["fleets", fleet.name()], "tables.json", &note)?;
-    let page = ledger.store.expose_document(fleet.name(), "fleet.html", html.as_bytes())?;
+    ledger
+        .store
+        .put_note(&["fleets", fleet.name()], "tables.json", &note)?;
+    let page = ledger
+        .store
+        .expose_document(fleet.name(), "fleet.html", html.as_bytes())?;
     ledger.store.sync()?;
-    Ok(FleetSummary { fleet: table, changes, tables, page })
+    Ok(FleetSummary {
+        fleet: table,
+        changes,
+        tables,
+        page,
+    })
 }
 
 /// What the tables were made of: the settings and the robots' own tables.
 fn key(fleet: &Fleet, table: &FleetTable, records: &[Option<RobotRecord>]) -> StageKey {
-    let robots = fleet.roster.0.iter().zip(&table.0).zip(records).map(|((robot, row), record)| {
-        let tables = record.iter().flat_map(|record| &record.tables).map(|made| made.table.table_hash.to_string());
-        json!([robot.name, robot.groups, row.status, row.reason, row.flags, tables.collect::<Vec<_>>()])
-    });
+    let robots = fleet
+        .roster
+        .0
+        .iter()
+        .zip(&table.0)
+        .zip(records)
+        .map(|((robot, row), record)| {
+            let tables = record
+                .iter()
+                .flat_map(|record| &record.tables)
+                .map(|made| made.table.table_hash.to_string());
+            json!([
+                robot.name,
+                robot.groups,
+                row.status,
+                row.reason,
+                row.flags,
+                tables.collect::<Vec<_>>()
+            ])
+        });
     let alpha = fleet.file.previous.as_ref().map(|previous| previous.alpha);
     StageKey {
         key_format: KEY_FORMAT,
@@ -110,7 +158,9 @@ struct Read {
 
 impl Read {
     fn of(ledger: &Ledger, record: Option<&RobotRecord>) -> Result<Self> {
-        let Some(record) = record else { return Ok(Self::default()) };
+        let Some(record) = record else {
+            return Ok(Self::default());
+        };
         Ok(Self {
             statistics: ledger.load(record.last(Statistics::KIND))?,
             verdict: ledger.load(record.last(Verdict::KIND))?,
@@ -125,28 +175,58 @@ impl Read {
         let verdict = self.verdict.as_ref().and_then(|verdict| verdict.0.first());
         // A pipeline that does not predict with what it found still says how much better that is.
         let diagnosed = verdict.filter(|_| last.is_none());
-        let course = rows.iter().map(|row| format!("{:.4}", row.rms_mm)).collect::<Vec<_>>().join(" ");
+        let course = rows
+            .iter()
+            .map(|row| format!("{:.4}", row.rms_mm))
+            .collect::<Vec<_>>()
+            .join(" ");
         FleetRow {
             robot: robot.name.clone(),
             model: robot.groups.model.clone(),
             plant: robot.groups.plant.clone(),
             campaign: robot.groups.campaign.clone(),
-            status: record.map_or("missing", |record| record.ending.name()).into(),
+            status: record
+                .map_or("missing", |record| record.ending.name())
+                .into(),
             reason: record.and_then(|record| record.reason.clone()),
             points: last.map(|row| row.points),
             held_out: last.map(|row| row.held_out),
-            before_mean_mm: first.map(|row| row.mean_mm).or(diagnosed.and_then(|v| v.before_mean_mm)),
-            before_rms_mm: first.map(|row| row.rms_mm).or(diagnosed.and_then(|v| v.before_rms_mm)),
-            before_max_mm: first.map(|row| row.max_mm).or(diagnosed.and_then(|v| v.before_max_mm)),
-            after_mean_mm: last.map(|row| row.mean_mm).or(diagnosed.and_then(|v| v.after_mean_mm)),
-            after_rms_mm: last.map(|row| row.rms_mm).or(diagnosed.and_then(|v| v.after_rms_mm)),
-            after_max_mm: last.map(|row| row.max_mm).or(diagnosed.and_then(|v| v.after_max_mm)),
-            floor_mm: verdict.and_then(|v| v.noise_floor_mm).or(last.map(|row| row.noise_rms_mm)),
-            noise_basis: verdict.map_or_else(|| last.and_then(|row| row.noise_basis.clone()), |v| v.noise_basis.clone()),
+            before_mean_mm: first
+                .map(|row| row.mean_mm)
+                .or(diagnosed.and_then(|v| v.before_mean_mm)),
+            before_rms_mm: first
+                .map(|row| row.rms_mm)
+                .or(diagnosed.and_then(|v| v.before_rms_mm)),
+            before_max_mm: first
+                .map(|row| row.max_mm)
+                .or(diagnosed.and_then(|v| v.before_max_mm)),
+            after_mean_mm: last
+                .map(|row| row.mean_mm)
+                .or(diagnosed.and_then(|v| v.after_mean_mm)),
+            after_rms_mm: last
+                .map(|row| row.rms_mm)
+                .or(diagnosed.and_then(|v| v.after_rms_mm)),
+            after_max_mm: last
+                .map(|row| row.max_mm)
+                .or(diagnosed.and_then(|v| v.after_max_mm)),
+            floor_mm: verdict
+                .and_then(|v| v.noise_floor_mm)
+                .or(last.map(|row| row.noise_rms_mm)),
+            noise_basis: verdict.map_or_else(
+                || last.and_then(|row| row.noise_basis.clone()),
+                |v| v.noise_basis.clone(),
+            ),
             course: (!course.is_empty()).then_some(course),
             verdict: verdict.map(|v| v.verdict.clone()),
-            findings: self.findings.as_ref().map(|findings| findings.0.len() as i64),
-            causes: self.findings.as_ref().map(causes).filter(|causes| !causes.is_empty()),
+            findings: self
+                .findings
+                .as_ref()
+                .map(|findings| findings.0.len() as i64),
+            causes: self
+                .findings
+                .as_ref()
+                .map(causes)
+                .filter(|causes| !causes.is_empty()),
             changes: None,
             flags: None,
         }
@@ -155,14 +235,33 @@ impl Read {
 
 /// `effect at place`, strongest first.
 fn causes(findings: &Findings) -> String {
-    findings.0.iter().map(|row| format!("{} at {}", row.effect, row.place)).collect::<Vec<_>>().join("; ")
+    findings
+        .0
+        .iter()
+        .map(|row| format!("{} at {}", row.effect, row.place))
+        .collect::<Vec<_>>()
+        .join("; ")
 }
 
 /// One row a step, in pipeline order: of held-out points where the last step has some, of the set with most of them.
 fn told_rows(statistics: &Statistics) -> Vec<&StatisticsRow> {
-    let Some(last) = statistics.0.iter().map(|row| row.order).max() else { return Vec::new() };
-    let of = |order: i64, held_out: bool| statistics.0.iter().filter(move |row| row.order == order && row.held_out == held_out);
+    let Some(last) = statistics.0.iter().map(|row| row.order).max() else {
+        return Vec::new();
+    };
+    let of = |order: i64, held_out: bool| {
+        statistics
+            .0
+            .iter()
+            .filter(move |row| row.order == order && row.held_out == held_out)
+    };
     let held_out = of(last, true).next().is_some();
-    let Some(set) = of(last, held_out).max_by_key(|row| row.points).map(|row| row.set.as_str()) else { return Vec::new() };
-    (0..=last).filter_map(|order| of(order, held_out).find(|row| row.set == set)).collect()
+    let Some(set) = of(last, held_out)
+        .max_by_key(|row| row.points)
+        .map(|row| row.set.as_str())
+    else {
+        return Vec::new();
+    };
+    (0..=last)
+        .filter_map(|order| of(order, held_out).find(|row| row.set == set))
+        .collect()
 }

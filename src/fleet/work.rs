@@ -4,7 +4,9 @@ use super::Fleet;
 use super::ledger::{Ending, LATER, Ledger, RobotRecord, RobotTable};
 use super::robot::FleetRobot;
 use crate::error::{Error, Result};
-use crate::pipeline::{Observer, Plan, Purpose, RunOptions, Selection, StageReport, Surroundings, run};
+use crate::pipeline::{
+    Observer, Plan, Purpose, RunOptions, Selection, StageReport, Surroundings, run,
+};
 use crate::stage::STAGES;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -53,7 +55,12 @@ impl Workshop<'_> {
         if let Some(reason) = &robot.unreadable {
             return Err(Error::data("", reason.clone()));
         }
-        let mut plan = Plan::parse(&self.fleet.pipeline, self.fleet.text.clone(), &robot.sets, STAGES)?;
+        let mut plan = Plan::parse(
+            &self.fleet.pipeline,
+            self.fleet.text.clone(),
+            &robot.sets,
+            STAGES,
+        )?;
         // Tables and documents of every robot have a folder of their own.
         plan.name = format!("{}.{}", self.fleet.name(), robot.handle());
         Ok(plan)
@@ -61,7 +68,9 @@ impl Workshop<'_> {
 
     /// The plan, or why there is none, and the key of the robot's record.
     fn prepared(&self, robot: &FleetRobot) -> (Result<Plan>, String) {
-        let plan = self.plan(robot).and_then(|plan| plan.identity().map(|identity| (plan, identity)));
+        let plan = self
+            .plan(robot)
+            .and_then(|plan| plan.identity().map(|identity| (plan, identity)));
         let (plan, content) = match plan {
             Ok((plan, identity)) => (Ok(plan), identity),
             // With the reason mended it is another key.
@@ -87,12 +96,18 @@ impl Workshop<'_> {
     /// Computes a robot unless it is recorded. Fails where the store does.
     pub fn visit(&self, robot: &FleetRobot, worker: usize, watcher: &dyn Watcher) -> Result<Visit> {
         let (plan, key) = self.prepared(robot);
-        let standing = |ledger: &Ledger| ledger.find(&key).map(|found| found.filter(|record| record.exit_code != LATER));
+        let standing = |ledger: &Ledger| {
+            ledger
+                .find(&key)
+                .map(|found| found.filter(|record| record.exit_code != LATER))
+        };
         if let Some(record) = standing(&self.ledger)? {
             watcher.ends(worker, &record, false);
             return Ok(Visit::Recorded(record));
         }
-        let Some(claim) = self.ledger.claim(&key)? else { return Ok(Visit::Busy) };
+        let Some(claim) = self.ledger.claim(&key)? else {
+            return Ok(Visit::Busy);
+        };
         if let Some(record) = standing(&self.ledger)? {
             watcher.ends(worker, &record, false);
             return Ok(Visit::Recorded(record));
@@ -107,22 +122,39 @@ impl Workshop<'_> {
         Ok(Visit::Made(record))
     }
 
-    fn compute(&self, robot: &FleetRobot, plan: Result<Plan>, key: String, worker: usize, watcher: &dyn Watcher) -> RobotRecord {
+    fn compute(
+        &self,
+        robot: &FleetRobot,
+        plan: Result<Plan>,
+        key: String,
+        worker: usize,
+        watcher: &dyn Watcher,
+    ) -> RobotRecord {
         let mut surroundings = (self.surroundings)();
         let begun = (surroundings.now)();
         let mut record = RobotRecord::blank(robot, key, &format!("{}/{worker}", self.name));
         record.log.clone_from(&self.log);
         let observer = Relay { worker, watcher };
-        let options = RunOptions { selection: Selection::default(), jobs: self.threads, purpose: Purpose::Fleet };
+        let options = RunOptions {
+            selection: Selection::default(),
+            jobs: self.threads,
+            purpose: Purpose::Fleet,
+        };
         let result = plan.and_then(|plan| {
             surroundings.run_id = self.ledger.store.reserve_run(&surroundings.run_id)?;
             record.run = Some(surroundings.run_id.clone());
             let body = || run(&plan, self.ledger.store, &options, &surroundings, &observer);
-            catch_unwind(AssertUnwindSafe(body)).unwrap_or_else(|_| Err(Error::Bug("the run panicked".into())))
+            catch_unwind(AssertUnwindSafe(body))
+                .unwrap_or_else(|_| Err(Error::Bug("the run panicked".into())))
         });
         let ended = (surroundings.now)();
-        record.wall_seconds = ended.duration_since(begun).unwrap_or_default().as_secs_f64();
-        record.ended = jiff::Timestamp::try_from(ended).map(|time| format!("{time:.3}")).unwrap_or_default();
+        record.wall_seconds = ended
+            .duration_since(begun)
+            .unwrap_or_default()
+            .as_secs_f64();
+        record.ended = jiff::Timestamp::try_from(ended)
+            .map(|time| format!("{time:.3}"))
+            .unwrap_or_default();
         match result {
             Ok(outcome) => {
                 record.documents = outcome
@@ -147,7 +179,11 @@ impl Workshop<'_> {
                     Error::Store(_) | Error::Bug(_) => Ending::Failed,
                 };
                 // A setting that one robot's data do not bear is a fault of its data, as the pipeline serves others.
-                record.exit_code = if record.ending == Ending::Rejected { 10 } else { error.exit_code() };
+                record.exit_code = if record.ending == Ending::Rejected {
+                    10
+                } else {
+                    error.exit_code()
+                };
                 record.reason = Some(error.to_string().chars().take(REASON).collect());
             }
         }

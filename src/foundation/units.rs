@@ -129,9 +129,21 @@ const UNITS: &[(Unit, &str, Quantity, f64, f64)] = &[
     (Unit::Metre, "m", Q::Length, 1.0, 0.0),
     (Unit::Inch, "in", Q::Length, 25.4e-3, 0.0),
     (Unit::Radian, "rad", Q::Angle, 1.0, 0.0),
-    (Unit::Degree, "deg", Q::Angle, std::f64::consts::PI / 180.0, 0.0),
+    (
+        Unit::Degree,
+        "deg",
+        Q::Angle,
+        std::f64::consts::PI / 180.0,
+        0.0,
+    ),
     (Unit::Milliradian, "mrad", Q::Angle, 1e-3, 0.0),
-    (Unit::Arcsecond, "arcsec", Q::Angle, std::f64::consts::PI / 648_000.0, 0.0),
+    (
+        Unit::Arcsecond,
+        "arcsec",
+        Q::Angle,
+        std::f64::consts::PI / 648_000.0,
+        0.0,
+    ),
     (Unit::Second, "s", Q::Time, 1.0, 0.0),
     (Unit::Millisecond, "ms", Q::Time, 1e-3, 0.0),
     (Unit::Minute, "min", Q::Time, 60.0, 0.0),
@@ -147,16 +159,58 @@ const UNITS: &[(Unit, &str, Quantity, f64, f64)] = &[
     // Celsius is kept as the base of temperature: effects need differences, people need degrees.
     (Unit::Celsius, "C", Q::Temperature, 1.0, 0.0),
     (Unit::Kelvin, "K", Q::Temperature, 1.0, -273.15),
-    (Unit::NewtonMetrePerAmpere, "Nm/A", Q::TorqueConstant, 1.0, 0.0),
-    (Unit::RadianPerNewtonMetre, "rad/Nm", Q::Compliance, 1.0, 0.0),
-    (Unit::RadianPerAmpere, "rad/A", Q::CurrentCompliance, 1.0, 0.0),
-    (Unit::MetrePerSecondSquared, "m/s2", Q::Acceleration, 1.0, 0.0),
+    (
+        Unit::NewtonMetrePerAmpere,
+        "Nm/A",
+        Q::TorqueConstant,
+        1.0,
+        0.0,
+    ),
+    (
+        Unit::RadianPerNewtonMetre,
+        "rad/Nm",
+        Q::Compliance,
+        1.0,
+        0.0,
+    ),
+    (
+        Unit::RadianPerAmpere,
+        "rad/A",
+        Q::CurrentCompliance,
+        1.0,
+        0.0,
+    ),
+    (
+        Unit::MetrePerSecondSquared,
+        "m/s2",
+        Q::Acceleration,
+        1.0,
+        0.0,
+    ),
     (Unit::RadianPerSecond, "rad/s", Q::AngularRate, 1.0, 0.0),
-    (Unit::DegreePerSecond, "deg/s", Q::AngularRate, std::f64::consts::PI / 180.0, 0.0),
+    (
+        Unit::DegreePerSecond,
+        "deg/s",
+        Q::AngularRate,
+        std::f64::consts::PI / 180.0,
+        0.0,
+    ),
     (Unit::MillimetrePerSecond, "mm/s", Q::LinearRate, 1e-3, 0.0),
     (Unit::MetrePerSecond, "m/s", Q::LinearRate, 1.0, 0.0),
-    (Unit::RadianPerRadianPerSecond, "rad/(rad/s)", Q::Trailing, 1.0, 0.0),
-    (Unit::ArcsecondPerDegreePerSecond, "arcsec/(deg/s)", Q::Trailing, 1.0 / 3600.0, 0.0),
+    (
+        Unit::RadianPerRadianPerSecond,
+        "rad/(rad/s)",
+        Q::Trailing,
+        1.0,
+        0.0,
+    ),
+    (
+        Unit::ArcsecondPerDegreePerSecond,
+        "arcsec/(deg/s)",
+        Q::Trailing,
+        1.0 / 3600.0,
+        0.0,
+    ),
 ];
 
 impl Unit {
@@ -190,14 +244,24 @@ impl Unit {
     }
     /// All symbols of a quantity, for "allowed: mm, um, m, in".
     pub fn symbols(quantity: Quantity) -> Vec<&'static str> {
-        UNITS.iter().filter(|row| row.2 == quantity).map(|row| row.1).collect()
+        UNITS
+            .iter()
+            .filter(|row| row.2 == quantity)
+            .map(|row| row.1)
+            .collect()
     }
     /// The unit in which tables store a quantity: mm and mm/s for lengths and their rates, rad for angles, else the SI unit.
     pub fn stored(quantity: Quantity) -> Unit {
         match quantity {
             Quantity::Length => Unit::Millimetre,
             Quantity::LinearRate => Unit::MillimetrePerSecond,
-            other => UNITS.iter().find(|row| row.2 == other && row.3 == 1.0 && row.4 == 0.0).expect("SI unit").0,
+            other => {
+                UNITS
+                    .iter()
+                    .find(|row| row.2 == other && row.3 == 1.0 && row.4 == 0.0)
+                    .expect("SI unit")
+                    .0
+            }
         }
     }
 }
@@ -215,9 +279,15 @@ mod tests {
     #[test]
     fn every_unit_finds_its_own_row() {
         for (unit, symbol, quantity, ..) in UNITS {
-            assert_eq!((unit.row().0, unit.symbol(), unit.quantity()), (*unit, *symbol, *quantity));
+            assert_eq!(
+                (unit.row().0, unit.symbol(), unit.quantity()),
+                (*unit, *symbol, *quantity)
+            );
         }
         // Of a unit without a row the index would be that of another, or none.
-        assert_eq!(UNITS.iter().map(|row| row.0 as usize).collect::<Vec<_>>(), (0..UNITS.len()).collect::<Vec<_>>());
+        assert_eq!(
+            UNITS.iter().map(|row| row.0 as usize).collect::<Vec<_>>(),
+            (0..UNITS.len()).collect::<Vec<_>>()
+        );
     }
 }

@@ -55,21 +55,44 @@ pub fn achieved(
     };
     let wanted: Vec<Vector3<f64>> = rows.iter().map(wanted).collect();
     let points: Vec<Vector3<f64>> = rows.iter().map(|row| row.point).collect();
-    let base = if new_base { placed(&wanted, &points)? } else { *arm.base() };
-    let off: Vec<Vector3<f64>> = wanted.iter().zip(&points).map(|(wanted, point)| point - base.point(wanted)).collect();
-    let mut found = Achieved { achieved: off.iter().map(Vector3::norm).collect(), ..Achieved::default() };
+    let base = if new_base {
+        placed(&wanted, &points)?
+    } else {
+        *arm.base()
+    };
+    let off: Vec<Vector3<f64>> = wanted
+        .iter()
+        .zip(&points)
+        .map(|(wanted, point)| point - base.point(wanted))
+        .collect();
+    let mut found = Achieved {
+        achieved: off.iter().map(Vector3::norm).collect(),
+        ..Achieved::default()
+    };
     for answer in corrector.batch(rows.iter().map(|row| row.target.clone()).collect()) {
         found.before.push(answer.uncorrected);
-        found.predicted.extend(answer.uncertainty.map(|known| answer.residual + known.u95));
+        found
+            .predicted
+            .extend(answer.uncertainty.map(|known| answer.residual + known.u95));
         found.unreached += usize::from(answer.q.is_none());
     }
     let mut repeated: BTreeMap<Vec<i64>, Vec<Vector3<f64>>> = BTreeMap::new();
     for (row, off) in rows.iter().zip(&off) {
         // Commands are the same where they agree to a nanoradian.
-        let key = row.target.q.iter().flatten().map(|q| (q * 1e9).round() as i64).collect();
+        let key = row
+            .target
+            .q
+            .iter()
+            .flatten()
+            .map(|q| (q * 1e9).round() as i64)
+            .collect();
         repeated.entry(key).or_default().push(*off);
     }
-    found.poses = repeated.into_values().filter(|cycles| cycles.len() >= CYCLES).map(|cycles| repeated_pose(&cycles)).collect();
+    found.poses = repeated
+        .into_values()
+        .filter(|cycles| cycles.len() >= CYCLES)
+        .map(|cycles| repeated_pose(&cycles))
+        .collect();
     Ok(found)
 }
 
@@ -79,20 +102,34 @@ fn repeated_pose(off: &[Vector3<f64>]) -> RepeatedPose {
     let mean = off.iter().sum::<Vector3<f64>>() / count;
     let from: Vec<f64> = off.iter().map(|one| (one - mean).norm()).collect();
     let average = from.iter().sum::<f64>() / count;
-    let deviation = (from.iter().map(|one| (one - average).powi(2)).sum::<f64>() / (count - 1.0)).sqrt();
-    RepeatedPose { cycles: off.len(), accuracy: mean.norm(), repeatability: average + 3.0 * deviation }
+    let deviation =
+        (from.iter().map(|one| (one - average).powi(2)).sum::<f64>() / (count - 1.0)).sqrt();
+    RepeatedPose {
+        cycles: off.len(),
+        accuracy: mean.norm(),
+        repeatability: average + 3.0 * deviation,
+    }
 }
 
 /// The rigid motion that brings points of the base onto measured ones, least squares (Kabsch).
 fn placed(base: &[Vector3<f64>], measured: &[Vector3<f64>]) -> Result<Pose> {
     if base.len() < FEWEST {
-        return Err(Error::spec("--new-base", format!("needs {FEWEST} points or more, found {}", base.len())));
+        return Err(Error::spec(
+            "--new-base",
+            format!("needs {FEWEST} points or more, found {}", base.len()),
+        ));
     }
     let mean = |points: &[Vector3<f64>]| points.iter().sum::<Vector3<f64>>() / points.len() as f64;
     let (from, to) = (mean(base), mean(measured));
-    let spread: Matrix3<f64> = base.iter().zip(measured).map(|(a, b)| (b - to) * (a - from).transpose()).sum();
+    let spread: Matrix3<f64> = base
+        .iter()
+        .zip(measured)
+        .map(|(a, b)| (b - to) * (a - from).transpose())
+        .sum();
     let svd = spread.svd(true, true);
-    let (Some(u), Some(v)) = (svd.u, svd.v_t) else { return Err(Error::Bug("a 3 x 3 SVD without vectors".into())) };
+    let (Some(u), Some(v)) = (svd.u, svd.v_t) else {
+        return Err(Error::Bug("a 3 x 3 SVD without vectors".into()));
+    };
     let mirror = (u * v).determinant().signum();
     let rotation = u * Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, mirror)) * v;
     Ok(Pose::new(rotation, to - rotation * from))
@@ -104,15 +141,26 @@ mod tests {
 
     #[test]
     fn the_base_is_found_again_and_repeats_have_the_figures_of_the_standard() {
-        let base: Vec<Vector3<f64>> =
-            (0..6).map(|k| Vector3::new(f64::from(k), f64::from(k * k) * 0.3, f64::from(7 - k).sin())).collect();
-        let truth = Pose::from_rotation_vector(Vector3::new(0.2, -0.4, 0.7), Vector3::new(1.0, -2.0, 0.5));
+        let base: Vec<Vector3<f64>> = (0..6)
+            .map(|k| Vector3::new(f64::from(k), f64::from(k * k) * 0.3, f64::from(7 - k).sin()))
+            .collect();
+        let truth =
+            Pose::from_rotation_vector(Vector3::new(0.2, -0.4, 0.7), Vector3::new(1.0, -2.0, 0.5));
         let seen: Vec<Vector3<f64>> = base.iter().map(|point| truth.point(point)).collect();
         let found = placed(&base, &seen).expect("a base");
-        assert!((found.translation - truth.translation).norm() < 1e-12 && (found.rotation - truth.rotation).norm() < 1e-12);
+        assert!(
+            (found.translation - truth.translation).norm() < 1e-12
+                && (found.rotation - truth.rotation).norm() < 1e-12
+        );
         // Two places 2 mm apart, by turns, about a mean that is 3 mm off: every cycle is 1 mm from the mean.
-        let off: Vec<Vector3<f64>> = (0..30).map(|k| Vector3::new(0.003, if k % 2 == 0 { 0.001 } else { -0.001 }, 0.0)).collect();
+        let off: Vec<Vector3<f64>> = (0..30)
+            .map(|k| Vector3::new(0.003, if k % 2 == 0 { 0.001 } else { -0.001 }, 0.0))
+            .collect();
         let pose = repeated_pose(&off);
-        assert!((pose.accuracy - 0.003).abs() < 1e-12 && (pose.repeatability - 0.001).abs() < 1e-12 && pose.cycles == 30);
+        assert!(
+            (pose.accuracy - 0.003).abs() < 1e-12
+                && (pose.repeatability - 0.001).abs() < 1e-12
+                && pose.cycles == 30
+        );
     }
 }

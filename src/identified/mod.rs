@@ -28,8 +28,8 @@ use crate::stage::{Diagnose, Stage};
 use crate::store::frame::Frame;
 use crate::store::{Store, TableRef};
 use crate::table::{
-    Corrected, CovarianceTable, Document, Loose, Network, Parameters, Recording, Robot, Standing, Table, TorqueParameters,
-    from_file,
+    Corrected, CovarianceTable, Document, Loose, Network, Parameters, Recording, Robot, Standing,
+    Table, TorqueParameters, from_file,
 };
 use std::path::{Path, PathBuf};
 use written::written;
@@ -85,9 +85,12 @@ pub struct Files {
 
 /// The stages of a plan that identify or learn: which of them stands is known once all have predicted.
 pub fn steps_of(plan: &Plan) -> Result<Vec<usize>> {
-    let writes = |at: usize, kind: &str| plan.stages[at].outputs.iter().any(|port| port.kind == kind);
+    let writes =
+        |at: usize, kind: &str| plan.stages[at].outputs.iter().any(|port| port.kind == kind);
     let kinds = [Parameters::KIND, Network::KIND, TorqueParameters::KIND];
-    let steps: Vec<usize> = (0..plan.stages.len()).filter(|at| kinds.iter().any(|kind| writes(*at, kind))).collect();
+    let steps: Vec<usize> = (0..plan.stages.len())
+        .filter(|at| kinds.iter().any(|kind| writes(*at, kind)))
+        .collect();
     if steps.is_empty() {
         return Err(Error::spec(
             plan.file.display().to_string(),
@@ -104,8 +107,16 @@ pub fn judges_of(plan: &Plan) -> Vec<usize> {
         let limits = settings.get("limits").and_then(|limits| limits.as_object());
         limits.is_some_and(|limits| limits.values().any(|limit| !limit.is_null()))
     };
-    let report = |at: &usize| plan.stages[*at].outputs.iter().any(|port| port.kind == Document::KIND);
-    (0..plan.stages.len()).filter(report).filter(limited).collect()
+    let report = |at: &usize| {
+        plan.stages[*at]
+            .outputs
+            .iter()
+            .any(|port| port.kind == Document::KIND)
+    };
+    (0..plan.stages.len())
+        .filter(report)
+        .filter(limited)
+        .collect()
 }
 
 impl IdentifiedModel {
@@ -113,8 +124,15 @@ impl IdentifiedModel {
     pub fn of_run(store: &Store, manifest: &Manifest, step: Option<&str>) -> Result<Self> {
         let run = &manifest.run_id;
         if manifest.status != RunStatus::Done {
-            let status = if manifest.status == RunStatus::Failed { "failed" } else { "running or was killed" };
-            return Err(Error::spec(run, format!("the run {status}, it is not done")));
+            let status = if manifest.status == RunStatus::Failed {
+                "failed"
+            } else {
+                "running or was killed"
+            };
+            return Err(Error::spec(
+                run,
+                format!("the run {status}, it is not done"),
+            ));
         }
         let wrong = wrong_setup_of(manifest, store)?;
         if let (None, Some(wrong)) = (step, &wrong) {
@@ -123,35 +141,80 @@ impl IdentifiedModel {
             );
             return Err(Error::data(run, message));
         }
-        let stands = if step.is_none() { standing_of(manifest, store)? } else { None };
+        let stands = if step.is_none() {
+            standing_of(manifest, store)?
+        } else {
+            None
+        };
         let load = |table: &TableRef| load(store, table, manifest);
-        let last = |kind: &str| manifest.stages.iter().flat_map(|stage| &stage.outputs).rfind(|output| output.kind == kind);
-        let robot = last(Robot::KIND).ok_or_else(|| Error::spec(run, "the run has no table `robot`"))?;
+        let last = |kind: &str| {
+            manifest
+                .stages
+                .iter()
+                .flat_map(|stage| &stage.outputs)
+                .rfind(|output| output.kind == kind)
+        };
+        let robot =
+            last(Robot::KIND).ok_or_else(|| Error::spec(run, "the run has no table `robot`"))?;
         let robot = Robot::from_frame(&load(&robot.table)?)?.to_description()?;
-        let read = manifest.stages.iter().flat_map(|stage| &stage.files).map(|file| &file.path);
-        let sources: Vec<PathBuf> = read.chain(std::iter::once(&manifest.pipeline.file)).map(PathBuf::from).collect();
+        let read = manifest
+            .stages
+            .iter()
+            .flat_map(|stage| &stage.files)
+            .map(|file| &file.path);
+        let sources: Vec<PathBuf> = read
+            .chain(std::iter::once(&manifest.pipeline.file))
+            .map(PathBuf::from)
+            .collect();
         let alone = step.is_some() || last(Parameters::KIND).is_none();
         let torques = match IdentifiedTorques::of_run(manifest, step, &robot, load)? {
             Some(torques) if alone => {
                 let serial = serial(&manifest.pipeline.resolved);
-                return Ok(Self { sources, serial, ..Self::of_torques(robot, torques)? });
+                return Ok(Self {
+                    sources,
+                    serial,
+                    ..Self::of_torques(robot, torques)?
+                });
             }
             other => other,
         };
         let (stage, table) = chosen(manifest, step, stands.as_ref())?;
         let parameters = Parameters::from_frame(&load(table)?)?;
         // A correction was learned on top of one model and belongs to no other.
-        let withdrawn = |id: &str| stands.iter().flat_map(|stands| &stands.withdrawn).any(|gone| gone.step == id);
-        let learned = manifest.stages.iter().filter(|stage| !withdrawn(&stage.id)).rfind(|stage| {
-            stage.inputs.iter().any(|input| input.table.table_hash == table.table_hash)
-                && stage.outputs.iter().any(|output| output.kind == Network::KIND)
+        let withdrawn = |id: &str| {
+            stands
+                .iter()
+                .flat_map(|stands| &stands.withdrawn)
+                .any(|gone| gone.step == id)
+        };
+        let learned = manifest
+            .stages
+            .iter()
+            .filter(|stage| !withdrawn(&stage.id))
+            .rfind(|stage| {
+                stage
+                    .inputs
+                    .iter()
+                    .any(|input| input.table.table_hash == table.table_hash)
+                    && stage
+                        .outputs
+                        .iter()
+                        .any(|output| output.kind == Network::KIND)
+            });
+        let network = learned.and_then(|stage| {
+            stage
+                .outputs
+                .iter()
+                .find(|output| output.kind == Network::KIND)
         });
-        let network = learned.and_then(|stage| stage.outputs.iter().find(|output| output.kind == Network::KIND));
-        let convention =
-            convention_of(manifest, store)?.unwrap_or_else(|| JointConvention::of_the_robot_file(robot.joints.len()));
-        let recording = last(Recording::KIND).map(|output| Recording::from_frame(&load(&output.table)?)).transpose()?;
-        let prismatic: Vec<bool> =
-            (0..robot.joints.len()).map(|joint| !RobotModel::new(robot.clone()).is_revolute(joint)).collect();
+        let convention = convention_of(manifest, store)?
+            .unwrap_or_else(|| JointConvention::of_the_robot_file(robot.joints.len()));
+        let recording = last(Recording::KIND)
+            .map(|output| Recording::from_frame(&load(&output.table)?))
+            .transpose()?;
+        let prismatic: Vec<bool> = (0..robot.joints.len())
+            .map(|joint| !RobotModel::new(robot.clone()).is_revolute(joint))
+            .collect();
         let correction = match network {
             Some(network) => Network::from_frame(&load(&network.table)?)?.correction(&prismatic)?,
             None => None,
@@ -159,27 +222,66 @@ impl IdentifiedModel {
         let data = recording.map(|table| table.measurements());
         let origin = format!("run {run}, stage {}", stage.id);
         let unexplained = unexplained_of(manifest, store)?;
-        let warnings = stands.iter().flat_map(Standing::warnings).chain(unexplained.clone()).collect();
-        let told = manifest.stages.iter().flat_map(|stage| &stage.warnings).find(|line| line.starts_with(WRONG_SETUP)).cloned();
+        let warnings = stands
+            .iter()
+            .flat_map(Standing::warnings)
+            .chain(unexplained.clone())
+            .collect();
+        let told = manifest
+            .stages
+            .iter()
+            .flat_map(|stage| &stage.warnings)
+            .find(|line| line.starts_with(WRONG_SETUP))
+            .cloned();
         let refusals = wrong.or(told).into_iter().collect();
         let learned = learned.filter(|_| correction.is_some());
-        let said = |stage: &StageReport| stage.warnings.iter().map(|line| format!("{}: {line}", stage.id)).collect::<Vec<_>>();
-        let stage_warnings = std::iter::once(stage).chain(learned).flat_map(said).collect();
+        let said = |stage: &StageReport| {
+            stage
+                .warnings
+                .iter()
+                .map(|line| format!("{}: {line}", stage.id))
+                .collect::<Vec<_>>()
+        };
+        let stage_warnings = std::iter::once(stage)
+            .chain(learned)
+            .flat_map(said)
+            .collect();
         let covariance: Option<CovarianceTable> = written(stage, load)?;
         let own = Self::of(robot, parameters, origin)?;
         let covariance = covariance.and_then(|table| table.of_model(&own.model));
         let scatter = scatter::of(stage, learned, load)?;
         let convention = Some(convention);
         let serial = serial(&manifest.pipeline.resolved);
-        let known = Self { serial, torques, correction, covariance, scatter, data, convention, ..own };
-        Ok(Self { unexplained, warnings, stage_warnings, refusals, sources, ..known })
+        let known = Self {
+            serial,
+            torques,
+            correction,
+            covariance,
+            scatter,
+            data,
+            convention,
+            ..own
+        };
+        Ok(Self {
+            unexplained,
+            warnings,
+            stage_warnings,
+            refusals,
+            sources,
+            ..known
+        })
     }
 
     /// Torques alone: positions are those of the robot file.
     fn of_torques(robot: RobotDescription, torques: IdentifiedTorques) -> Result<Self> {
         let (warnings, refusals) = (torques.warnings.clone(), torques.refusals.clone());
         let nominal = Self::of(robot, Parameters::default(), torques.origin.clone())?;
-        Ok(Self { torques: Some(torques), warnings, refusals, ..nominal })
+        Ok(Self {
+            torques: Some(torques),
+            warnings,
+            refusals,
+            ..nominal
+        })
     }
 
     /// Whether torques were identified and positions were not.
@@ -193,19 +295,33 @@ impl IdentifiedModel {
         let torques = from_file::<TorqueParameters>(&files.parameters).ok();
         let parameters = match &torques {
             Some(_) => Parameters::default(),
-            None => files.vouched(&files.parameters, from_file::<Parameters>(&files.parameters)?, &mut warnings)?,
+            None => files.vouched(
+                &files.parameters,
+                from_file::<Parameters>(&files.parameters)?,
+                &mut warnings,
+            )?,
         };
-        if torques.as_ref().map_or(!parameters.says_its_robot(), |torques| !torques.table.says_its_robot()) {
-            let message = "does not say which robot it is the model of, as tables of an earlier calib do not";
+        if torques
+            .as_ref()
+            .map_or(!parameters.says_its_robot(), |torques| {
+                !torques.table.says_its_robot()
+            })
+        {
+            let message =
+                "does not say which robot it is the model of, as tables of an earlier calib do not";
             if !files.unchecked {
-                let message = format!("{message}: identify anew, or take it as the model of this robot with --unchecked");
+                let message = format!(
+                    "{message}: identify anew, or take it as the model of this robot with --unchecked"
+                );
                 return Err(Error::data(files.parameters.display().to_string(), message));
             }
             warnings.push(format!("{} {message}", files.parameters.display()));
         }
         let robot = if ending(&files.robot) == "parquet" {
             let loose = from_file::<Robot>(&files.robot)?;
-            files.vouched(&files.robot, loose, &mut warnings)?.to_description()?
+            files
+                .vouched(&files.robot, loose, &mut warnings)?
+                .to_description()?
         } else {
             robot_file(&files.robot, None)?
         };
@@ -213,10 +329,19 @@ impl IdentifiedModel {
         let sources = vec![files.parameters.clone(), files.robot.clone()];
         if let Some(loose) = torques {
             let table = files.vouched(&files.parameters, loose, &mut warnings)?;
-            let own = Self::of_torques(robot.clone(), IdentifiedTorques::of(&robot, table, origin)?)?;
-            return Ok(Self { warnings: [warnings, own.warnings].concat(), sources, ..own });
+            let own =
+                Self::of_torques(robot.clone(), IdentifiedTorques::of(&robot, table, origin)?)?;
+            return Ok(Self {
+                warnings: [warnings, own.warnings].concat(),
+                sources,
+                ..own
+            });
         }
-        Ok(Self { warnings, sources, ..Self::of(robot, parameters, origin)? })
+        Ok(Self {
+            warnings,
+            sources,
+            ..Self::of(robot, parameters, origin)?
+        })
     }
 
     fn of(robot: RobotDescription, parameters: Parameters, origin: String) -> Result<Self> {
@@ -261,15 +386,26 @@ impl IdentifiedModel {
             );
         };
         let difference = convention.difference(&self.model.robot)?;
-        Some(format!("joints are counted as at the controller: {difference}"))
+        Some(format!(
+            "joints are counted as at the controller: {difference}"
+        ))
     }
 
     /// Refuses to write over a file that the model was made from.
     pub fn spare(&self, out: Option<&Path>) -> Result<()> {
         let Some(out) = out else { return Ok(()) };
-        let Ok(place) = out.canonicalize() else { return Ok(()) };
-        if self.sources.iter().any(|source| source.canonicalize().is_ok_and(|source| source == place)) {
-            let message = format!("{} is a file that the model was made from: name another file", out.display());
+        let Ok(place) = out.canonicalize() else {
+            return Ok(());
+        };
+        if self
+            .sources
+            .iter()
+            .any(|source| source.canonicalize().is_ok_and(|source| source == place))
+        {
+            let message = format!(
+                "{} is a file that the model was made from: name another file",
+                out.display()
+            );
             return Err(Error::spec("--out", message));
         }
         Ok(())
@@ -277,12 +413,18 @@ impl IdentifiedModel {
 
     /// What the uncertainty of a target is made of; none where a table alone was given.
     pub fn coverage(&self) -> Option<Coverage> {
-        self.data.as_ref().filter(|data| data.rows() > 0).map(Coverage::of)
+        self.data
+            .as_ref()
+            .filter(|data| data.rows() > 0)
+            .map(Coverage::of)
     }
 
     /// How far a commanded position may be off, from the rows that the model was fitted to; none for a table of parameters alone.
     pub fn uncertainty(&self, arm: &IdentifiedArm) -> Option<Uncertainty> {
-        let own = self.covariance.clone().map(|covariance| Uncertainty::new(arm, covariance, self.scatter));
+        let own = self
+            .covariance
+            .clone()
+            .map(|covariance| Uncertainty::new(arm, covariance, self.scatter));
         own.map(|own| match &self.data {
             Some(data) => own.beside(arm, data),
             None => own,
@@ -294,28 +436,56 @@ impl IdentifiedModel {
 fn serial(pipeline: &serde_json::Value) -> Option<String> {
     let stages = pipeline.get("stages")?.as_array()?.iter();
     let stated = stages.filter_map(|stage| stage.get("with")?.get("identity")?.as_object());
-    let numbers = stated.flatten().filter(|(key, _)| key.to_lowercase().contains("serial"));
+    let numbers = stated
+        .flatten()
+        .filter(|(key, _)| key.to_lowercase().contains("serial"));
     let robot = |(key, _): &(&String, &serde_json::Value)| !key.to_lowercase().contains("robot");
-    numbers.min_by_key(robot).and_then(|(_, value)| value.as_str()).map(String::from)
+    numbers
+        .min_by_key(robot)
+        .and_then(|(_, value)| value.as_str())
+        .map(String::from)
 }
 
 /// The stage whose parameters are taken, and the parameters.
-fn chosen<'m>(manifest: &'m Manifest, step: Option<&str>, stands: Option<&Standing>) -> Result<(&'m StageReport, &'m TableRef)> {
+fn chosen<'m>(
+    manifest: &'m Manifest,
+    step: Option<&str>,
+    stands: Option<&Standing>,
+) -> Result<(&'m StageReport, &'m TableRef)> {
     let with = |stage: &'m StageReport| {
-        stage.outputs.iter().find(|output| output.kind == Parameters::KIND).map(|output| (stage, &output.table))
+        stage
+            .outputs
+            .iter()
+            .find(|output| output.kind == Parameters::KIND)
+            .map(|output| (stage, &output.table))
     };
     let found: Vec<(&StageReport, &TableRef)> = manifest.stages.iter().filter_map(with).collect();
     let Some(step) = step else {
-        let standing = stands.and_then(|stands| found.iter().find(|(stage, _)| stage.id == stands.model));
-        let diagnosed = found.iter().rfind(|(stage, _)| stage.uses == Diagnose::NAME);
+        let standing =
+            stands.and_then(|stands| found.iter().find(|(stage, _)| stage.id == stands.model));
+        let diagnosed = found
+            .iter()
+            .rfind(|(stage, _)| stage.uses == Diagnose::NAME);
         let taken = standing.or(diagnosed).or(found.last()).copied();
         return taken.ok_or_else(|| Error::spec(&manifest.run_id, "the run identified nothing"));
     };
-    found.iter().find(|(stage, _)| stage.id == *step).copied().ok_or_else(|| {
-        let ids: Vec<&str> = found.iter().map(|(stage, _)| stage.id.as_str()).collect();
-        let hint = nearest(step, ids.iter().copied()).map(|near| format!("did you mean `{near}`? ")).unwrap_or_default();
-        Error::spec("--step", format!("no stage `{step}` writes parameters; {hint}allowed: {}", ids.join(", ")))
-    })
+    found
+        .iter()
+        .find(|(stage, _)| stage.id == *step)
+        .copied()
+        .ok_or_else(|| {
+            let ids: Vec<&str> = found.iter().map(|(stage, _)| stage.id.as_str()).collect();
+            let hint = nearest(step, ids.iter().copied())
+                .map(|near| format!("did you mean `{near}`? "))
+                .unwrap_or_default();
+            Error::spec(
+                "--step",
+                format!(
+                    "no stage `{step}` writes parameters; {hint}allowed: {}",
+                    ids.join(", ")
+                ),
+            )
+        })
 }
 
 /// A table of a run, of which nothing is made anew here: one that is damaged or gone is refused.
@@ -337,7 +507,9 @@ impl Files {
         let place = path.display().to_string();
         match (loose.vouched, self.unchecked) {
             (true, _) => {}
-            (false, true) => warnings.push(format!("{place} carries no content hash: its numbers cannot be verified")),
+            (false, true) => warnings.push(format!(
+                "{place} carries no content hash: its numbers cannot be verified"
+            )),
             (false, false) => {
                 let message = "carries no content hash, so another program wrote it: calib cannot tell whether its numbers were changed since they were \
                                identified, and they will move a robot. Take the file that calib wrote (`tables/` in the store), or give \

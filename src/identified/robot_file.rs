@@ -10,14 +10,23 @@ use std::path::Path;
 pub fn robot_file(path: &Path, urdf: Option<&Path>) -> Result<RobotDescription> {
     let read = |path: &Path| {
         let label = path.display().to_string();
-        let text = raw::text(path).map_err(|error| Error::spec(&label, format!("cannot be read: {error}")))?;
+        let text = raw::text(path)
+            .map_err(|error| Error::spec(&label, format!("cannot be read: {error}")))?;
         Ok((label, text))
     };
     let (label, text) = read(path)?;
-    let file = RobotFileText { label: &label, text: &text };
+    let file = RobotFileText {
+        label: &label,
+        text: &text,
+    };
     if raw::ending(path) == "json" {
         return Ok(read_case(file)?.robot);
     }
     let urdf = urdf.map(read).transpose()?;
-    Ok(read_calib(file, urdf.as_ref().map(|(label, text)| RobotFileText { label, text }))?.robot)
+    Ok(read_calib(
+        file,
+        urdf.as_ref()
+            .map(|(label, text)| RobotFileText { label, text }),
+    )?
+    .robot)
 }

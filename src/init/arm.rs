@@ -30,29 +30,66 @@ impl StartingArm {
         if file.exists() {
             return Self::there(request, &file);
         }
-        let Some(urdf) = request.urdf else { return Self::to_start_from(request.robot.unwrap_or(KINDS[0])) };
+        let Some(urdf) = request.urdf else {
+            return Self::to_start_from(request.robot.unwrap_or(KINDS[0]));
+        };
         let (label, text) = read(urdf)?;
-        let UrdfOutline { base, sliding, notes } = urdf_outline(RobotFileText { label: &label, text: &text }, request.tip)?;
-        let chain = format!("the chain from `{base}` to `{}` has {}", request.tip, counted(sliding.len(), "joint"));
+        let UrdfOutline {
+            base,
+            sliding,
+            notes,
+        } = urdf_outline(
+            RobotFileText {
+                label: &label,
+                text: &text,
+            },
+            request.tip,
+        )?;
+        let chain = format!(
+            "the chain from `{base}` to `{}` has {}",
+            request.tip,
+            counted(sliding.len(), "joint")
+        );
         Ok(Self {
             text: Some(robots::of_urdf(&base, request.tip)),
             joints: sliding.len(),
             sliding,
             counting: None,
             notes,
-            other: ("--tip", format!("{chain}, the recording {{}}; name the last link that moves, or one fixed to it")),
+            other: (
+                "--tip",
+                format!(
+                    "{chain}, the recording {{}}; name the last link that moves, or one fixed to it"
+                ),
+            ),
         })
     }
 
     fn there(request: &InitRequest, file: &Path) -> Result<Self> {
         let (label, text) = read(file)?;
         if request.robot.is_some() {
-            return Err(Error::spec(label, "is already there and would be used: leave out --robot, or move the file away"));
+            return Err(Error::spec(
+                label,
+                "is already there and would be used: leave out --robot, or move the file away",
+            ));
         }
         let urdf = request.urdf.map(read).transpose()?;
-        let urdf = urdf.as_ref().map(|(label, text)| RobotFileText { label, text });
-        let read = read_calib(RobotFileText { label: &label, text: &text }, urdf)?;
-        let sliding: Vec<bool> = read.robot.joints.iter().map(|joint| joint.kind == JointKind::Prismatic).collect();
+        let urdf = urdf
+            .as_ref()
+            .map(|(label, text)| RobotFileText { label, text });
+        let read = read_calib(
+            RobotFileText {
+                label: &label,
+                text: &text,
+            },
+            urdf,
+        )?;
+        let sliding: Vec<bool> = read
+            .robot
+            .joints
+            .iter()
+            .map(|joint| joint.kind == JointKind::Prismatic)
+            .collect();
         let own = counted(sliding.len(), "joint");
         Ok(Self {
             text: None,
@@ -60,7 +97,12 @@ impl StartingArm {
             sliding,
             counting: read.about.counting(),
             notes: Vec::new(),
-            other: ("robot.yaml", format!("{label} has {own}, the recording {{}}; put the robot of the recording there")),
+            other: (
+                "robot.yaml",
+                format!(
+                    "{label} has {own}, the recording {{}}; put the robot of the recording there"
+                ),
+            ),
         })
     }
 
@@ -72,19 +114,33 @@ impl StartingArm {
             sliding: Vec::new(),
             counting: kind.counting()?,
             notes: Vec::new(),
-            other: ("--robot", format!("{name} has {}, the recording {{}}; choose another kind", counted(joints, "joint"))),
+            other: (
+                "--robot",
+                format!(
+                    "{name} has {}, the recording {{}}; choose another kind",
+                    counted(joints, "joint")
+                ),
+            ),
         })
     }
 
     /// Fails unless a recording has as many joints.
     pub fn agrees(&self, joints: usize) -> Result<()> {
         let (place, message) = &self.other;
-        if joints == self.joints { Ok(()) } else { Err(Error::spec(*place, message.replace("{}", &joints.to_string()))) }
+        if joints == self.joints {
+            Ok(())
+        } else {
+            Err(Error::spec(
+                *place,
+                message.replace("{}", &joints.to_string()),
+            ))
+        }
     }
 }
 
 fn read(path: &Path) -> Result<(String, String)> {
     let label = path.display().to_string();
-    let text = raw::text(path).map_err(|error| Error::spec(&label, format!("cannot be read: {error}")))?;
+    let text =
+        raw::text(path).map_err(|error| Error::spec(&label, format!("cannot be read: {error}")))?;
     Ok((label, text))
 }

@@ -30,7 +30,11 @@ pub(super) struct Choice {
 
 impl Choice {
     pub fn of(lines: Vec<String>, columns: Vec<usize>) -> Self {
-        Self { lines, columns, beside: None }
+        Self {
+            lines,
+            columns,
+            beside: None,
+        }
     }
 }
 
@@ -53,51 +57,103 @@ pub(super) struct ExaminedFile {
 impl ExaminedFile {
     /// Nothing is known yet of its columns.
     pub fn unknown(path: &Path, sheet: Sheet) -> Self {
-        let own = path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned());
-        let part = |what: &str, part: &Option<String>| part.as_ref().map(|part| format!("{own} {what} `{part}`"));
-        let name = part("sheet", &sheet.of_book).or_else(|| part("topic", &sheet.topic)).unwrap_or_else(|| own.clone());
+        let own = path.file_name().map_or_else(
+            || path.display().to_string(),
+            |name| name.to_string_lossy().into_owned(),
+        );
+        let part = |what: &str, part: &Option<String>| {
+            part.as_ref().map(|part| format!("{own} {what} `{part}`"))
+        };
+        let name = part("sheet", &sheet.of_book)
+            .or_else(|| part("topic", &sheet.topic))
+            .unwrap_or_else(|| own.clone());
         let mut said: Vec<Name> = sheet.names.iter().map(|name| Name::of(name)).collect();
         for (name, unit) in said.iter_mut().zip(&sheet.units) {
             name.unit = name.unit.or(*unit);
         }
         let mut named = BTreeMap::new();
-        sheet.names.iter().for_each(|name| *named.entry(name.clone()).or_insert(0) += 1);
-        Self { path: path.into(), name, sheet, said, named, mappings: Vec::new(), second: 1.0, remarks: Vec::new() }
+        sheet
+            .names
+            .iter()
+            .for_each(|name| *named.entry(name.clone()).or_insert(0) += 1);
+        Self {
+            path: path.into(),
+            name,
+            sheet,
+            said,
+            named,
+            mappings: Vec::new(),
+            second: 1.0,
+            remarks: Vec::new(),
+        }
     }
 
     /// Whether a column without a header may name points: texts or whole numbers, each another.
     pub fn may_be_names(&self, column: usize) -> bool {
-        let whole = self.sheet.texts(column).all(|cell| number(cell).is_none() || !cell.contains(['.', ',']));
+        let whole = self
+            .sheet
+            .texts(column)
+            .all(|cell| number(cell).is_none() || !cell.contains(['.', ',']));
         whole && !self.sheet.rows.is_empty() && self.distinct(column) == self.sheet.rows.len()
     }
 
     pub fn get(&self, quantity: &str) -> Option<&Mapping> {
-        self.mappings.iter().find(|mapping| mapping.quantity == quantity)
+        self.mappings
+            .iter()
+            .find(|mapping| mapping.quantity == quantity)
     }
 
     /// Takes a quantity out and leaves it as a remark.
     pub fn drop(&mut self, quantity: &str, why: &str) {
-        if let Some(at) = self.mappings.iter().position(|mapping| mapping.quantity == quantity) {
+        if let Some(at) = self
+            .mappings
+            .iter()
+            .position(|mapping| mapping.quantity == quantity)
+        {
             let dropped = self.mappings.remove(at);
-            let lines = dropped.choices.first().map(|choice| choice.beside.iter().chain(&choice.lines).cloned().collect());
+            let lines = dropped
+                .choices
+                .first()
+                .map(|choice| choice.beside.iter().chain(&choice.lines).cloned().collect());
             let lines: Vec<String> = lines.unwrap_or_default();
             self.remarks.extend(
                 lines
                     .into_iter()
                     .zip([why].into_iter().chain(std::iter::repeat("")))
-                    .map(|(line, why)| if why.is_empty() { line } else { format!("{line}   # CHECK: {why}") }),
+                    .map(|(line, why)| {
+                        if why.is_empty() {
+                            line
+                        } else {
+                            format!("{line}   # CHECK: {why}")
+                        }
+                    }),
             );
         }
     }
 
     /// What was found, for the terminal.
     pub fn account(&self) -> String {
-        let mut parts: Vec<String> = self.sheet.notes.iter().chain(&self.sheet.trouble).cloned().collect();
+        let mut parts: Vec<String> = self
+            .sheet
+            .notes
+            .iter()
+            .chain(&self.sheet.trouble)
+            .cloned()
+            .collect();
         parts.extend(self.mappings.iter().map(|mapping| mapping.account.clone()));
-        let unused = (0..self.said.len()).filter(|column| !self.is_taken(*column)).collect::<Vec<usize>>();
+        let unused = (0..self.said.len())
+            .filter(|column| !self.is_taken(*column))
+            .collect::<Vec<usize>>();
         if !unused.is_empty() && self.sheet.trouble.is_none() {
-            let more = if unused.len() > MOST_NAMED { format!(" and {} more", unused.len() - MOST_NAMED) } else { String::new() };
-            parts.push(format!("not used: {}{more}", self.shown(&unused[..unused.len().min(MOST_NAMED)])));
+            let more = if unused.len() > MOST_NAMED {
+                format!(" and {} more", unused.len() - MOST_NAMED)
+            } else {
+                String::new()
+            };
+            parts.push(format!(
+                "not used: {}{more}",
+                self.shown(&unused[..unused.len().min(MOST_NAMED)])
+            ));
         }
         parts.join("; ")
     }
@@ -106,13 +162,25 @@ impl ExaminedFile {
     pub fn state(&mut self, quantity: &'static str, value: &str, check: &str) {
         let choice = Choice::of(vec![format!("{quantity}: {{value: {value}}}")], Vec::new());
         let account = format!("{quantity} {value}");
-        self.mappings.push(Mapping { quantity, choices: vec![choice], check: Some(check.into()), account });
+        self.mappings.push(Mapping {
+            quantity,
+            choices: vec![choice],
+            check: Some(check.into()),
+            account,
+        });
     }
 
     /// Adds a setting to a quantity's line.
     pub fn add(&mut self, quantity: &str, setting: &str) {
-        let mapping = self.mappings.iter_mut().find(|mapping| mapping.quantity == quantity);
-        for line in mapping.into_iter().flat_map(|mapping| &mut mapping.choices).flat_map(|choice| &mut choice.lines) {
+        let mapping = self
+            .mappings
+            .iter_mut()
+            .find(|mapping| mapping.quantity == quantity);
+        for line in mapping
+            .into_iter()
+            .flat_map(|mapping| &mut mapping.choices)
+            .flat_map(|choice| &mut choice.lines)
+        {
             if let Some(open) = line.strip_suffix('}') {
                 *line = format!("{open}, {setting}}}");
             }
@@ -120,7 +188,12 @@ impl ExaminedFile {
     }
 
     pub fn is_taken(&self, column: usize) -> bool {
-        self.mappings.iter().any(|mapping| mapping.choices.first().is_some_and(|choice| choice.columns.contains(&column)))
+        self.mappings.iter().any(|mapping| {
+            mapping
+                .choices
+                .first()
+                .is_some_and(|choice| choice.columns.contains(&column))
+        })
     }
 
     /// A column as the pipeline names it: by its number where the name is not its alone.
@@ -135,42 +208,81 @@ impl ExaminedFile {
     }
 
     pub fn shown(&self, columns: &[usize]) -> String {
-        columns.iter().map(|column| self.sheet.names[*column].as_str()).collect::<Vec<_>>().join(", ")
+        columns
+            .iter()
+            .map(|column| self.sheet.names[*column].as_str())
+            .collect::<Vec<_>>()
+            .join(", ")
     }
 
     pub fn line(&self, quantity: &str, column: usize, unit: Option<&str>) -> String {
-        let unit = unit.map(|unit| format!(", unit: {unit}")).unwrap_or_default();
+        let unit = unit
+            .map(|unit| format!(", unit: {unit}"))
+            .unwrap_or_default();
         format!("{quantity}: {{column: {}{unit}}}", self.reference(column))
     }
 
     /// Maps a quantity to single columns, best first.
-    pub fn map(&mut self, quantity: &'static str, columns: &[usize], unit: Option<&'static str>, check: Option<String>) {
-        let choice = |column: &usize| Choice::of(vec![self.line(quantity, *column, unit)], vec![*column]);
+    pub fn map(
+        &mut self,
+        quantity: &'static str,
+        columns: &[usize],
+        unit: Option<&'static str>,
+        check: Option<String>,
+    ) {
+        let choice =
+            |column: &usize| Choice::of(vec![self.line(quantity, *column, unit)], vec![*column]);
         let Some(first) = columns.first() else { return };
-        let word = if quantity == "point_id" { "names" } else { quantity };
+        let word = if quantity == "point_id" {
+            "names"
+        } else {
+            quantity
+        };
         let account = format!("{word} ({})", self.sheet.names[*first]);
-        let check = check.or_else(|| (columns.len() > 1).then(|| "several columns fit".to_string()));
-        self.mappings.push(Mapping { quantity, choices: columns.iter().map(choice).collect(), check, account });
+        let check =
+            check.or_else(|| (columns.len() > 1).then(|| "several columns fit".to_string()));
+        self.mappings.push(Mapping {
+            quantity,
+            choices: columns.iter().map(choice).collect(),
+            check,
+            account,
+        });
     }
 
     /// A pattern where the names follow one, else a list.
     pub fn joints_line(&self, quantity: &str, columns: &[usize], unit: Option<&str>) -> String {
-        let unit = unit.map(|unit| format!(", unit: {unit}")).unwrap_or_default();
-        let names: Vec<&str> = columns.iter().map(|column| self.sheet.names[*column].as_str()).collect();
-        let alone = columns.iter().all(|column| self.reference(*column).starts_with('"'));
+        let unit = unit
+            .map(|unit| format!(", unit: {unit}"))
+            .unwrap_or_default();
+        let names: Vec<&str> = columns
+            .iter()
+            .map(|column| self.sheet.names[*column].as_str())
+            .collect();
+        let alone = columns
+            .iter()
+            .all(|column| self.reference(*column).starts_with('"'));
         // A pattern stands for all that are called so.
-        let more = |pattern: &String| self.named.contains_key(&pattern.replace("{j}", &(names.len() + 1).to_string()));
+        let more = |pattern: &String| {
+            self.named
+                .contains_key(&pattern.replace("{j}", &(names.len() + 1).to_string()))
+        };
         match pattern(&names).filter(|pattern| alone && !more(pattern)) {
             Some(pattern) => format!("{quantity}: {{column: {}{unit}}}", quoted(&pattern)),
             None => {
-                let list: Vec<String> = columns.iter().map(|column| self.reference(*column)).collect();
+                let list: Vec<String> = columns
+                    .iter()
+                    .map(|column| self.reference(*column))
+                    .collect();
                 format!("{quantity}: {{columns: [{}]{unit}}}", list.join(", "))
             }
         }
     }
 
     pub fn distinct(&self, column: usize) -> usize {
-        self.sheet.texts(column).collect::<std::collections::BTreeSet<_>>().len()
+        self.sheet
+            .texts(column)
+            .collect::<std::collections::BTreeSet<_>>()
+            .len()
     }
 
     /// Columns that may name points by their header, whole, best first: texts before numbers, each of different cells.
@@ -179,10 +291,14 @@ impl ExaminedFile {
         let named = |column: &usize| {
             let stem = self.said[*column].stem();
             let name = self.sheet.names[*column].trim();
-            let ends = stem.ends_with("_id") || stem.ends_with("_name") || ["#", "n\u{b0}", "n\u{ba}"].contains(&name);
+            let ends = stem.ends_with("_id")
+                || stem.ends_with("_name")
+                || ["#", "n\u{b0}", "n\u{ba}"].contains(&name);
             let whole = self.sheet.texts(*column).count() == rows;
             let first = !self.sheet.header && *column == 0 && self.may_be_names(0);
-            (words::IDS.contains(&stem.as_str()) || ends || first) && whole && !self.is_taken(*column)
+            (words::IDS.contains(&stem.as_str()) || ends || first)
+                && whole
+                && !self.is_taken(*column)
         };
         let mut columns: Vec<usize> = (0..self.said.len()).filter(named).collect();
         let rank = |column: usize| (self.distinct(column) < rows, self.sheet.is_numeric(column));

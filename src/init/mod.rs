@@ -65,7 +65,11 @@ pub fn start(request: &InitRequest) -> Result<StarterFiles> {
     // Joints and points may stand in two sheets of one workbook.
     let places = if request.data.len() == 1 { 2 } else { 1 };
     let arm = StartingArm::of(request)?;
-    let tables = request.data.iter().map(|path| examine(path, places, arm.joints)).collect::<Result<Vec<_>>>()?;
+    let tables = request
+        .data
+        .iter()
+        .map(|path| examine(path, places, arm.joints))
+        .collect::<Result<Vec<_>>>()?;
     let mut found: Vec<ExaminedFile> = tables.into_iter().flatten().collect();
     let of_torques = drives::of_torques(&mut found);
     let more = together::other_reflectors(&mut found);
@@ -77,24 +81,39 @@ pub fn start(request: &InitRequest) -> Result<StarterFiles> {
         );
         return Err(Error::spec("--data", message));
     }
-    let joints = found.iter().filter_map(|file| file.get("q")).map(|joints| joints.choices[0].columns.len()).max();
+    let joints = found
+        .iter()
+        .filter_map(|file| file.get("q"))
+        .map(|joints| joints.choices[0].columns.len())
+        .max();
     joints.map_or(Ok(()), |joints| arm.agrees(joints))?;
     let pipeline = if of_torques {
         pipeline::of_torques(request, &found, &arm)
     } else {
         let mut joined = together::join(&mut found);
-        joined.lines.extend(pipeline::later(request.folder, &found, &more));
+        joined
+            .lines
+            .extend(pipeline::later(request.folder, &found, &more));
         pipeline::text(request, &found, (&joined, &arm))
     };
-    let unknown = ["columns of joints", "the measured point"].into_iter().zip(missing(&found));
+    let unknown = ["columns of joints", "the measured point"]
+        .into_iter()
+        .zip(missing(&found));
     Ok(StarterFiles {
         robot: arm.text,
         pipeline,
-        accounts: found.iter().chain(more.iter().map(|(_, file)| file)).map(|file| (file.path.clone(), file.account())).collect(),
+        accounts: found
+            .iter()
+            .chain(more.iter().map(|(_, file)| file))
+            .map(|file| (file.path.clone(), file.account()))
+            .collect(),
         missing: if found.is_empty() || of_torques {
             Vec::new()
         } else {
-            unknown.filter(|(_, missing)| *missing).map(|(what, _)| what).collect()
+            unknown
+                .filter(|(_, missing)| *missing)
+                .map(|(what, _)| what)
+                .collect()
         },
         notes: arm.notes,
     })

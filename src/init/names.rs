@@ -19,8 +19,16 @@ impl Name {
     pub fn of(text: &str) -> Self {
         let lower = text.trim().to_lowercase();
         let Header { stem, unit, ending } = Header::of(&lower);
-        let words = stem.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).map(str::to_string).collect();
-        Self { words, unit: unit.map(Unit::symbol), ending: ending.map(str::to_string) }
+        let words = stem
+            .split(|c: char| !c.is_alphanumeric())
+            .filter(|word| !word.is_empty())
+            .map(str::to_string)
+            .collect();
+        Self {
+            words,
+            unit: unit.map(Unit::symbol),
+            ending: ending.map(str::to_string),
+        }
     }
 
     pub fn stem(&self) -> String {
@@ -36,34 +44,70 @@ impl Name {
     pub fn is(&self, listed: &[&str]) -> bool {
         let listed = |text: &str| listed.contains(&text);
         // A letter alone says little beside other words: `x_t` is no time.
-        let mut ends = [self.words.first(), self.words.last()].into_iter().flatten().filter(|word| word.len() > 1);
+        let mut ends = [self.words.first(), self.words.last()]
+            .into_iter()
+            .flatten()
+            .filter(|word| word.len() > 1);
         listed(&self.stem()) || ends.any(|word| listed(word))
     }
 
     /// What the joints are called here, `#` for the number, and which one this is: `q1`, `A1_deg`, `joint_3`, `wrist 4 act [deg]`.
     pub fn joint(&self) -> Option<(String, usize)> {
-        let at = self.words.iter().rposition(|word| word.ends_with(|c: char| c.is_ascii_digit()))?;
+        let at = self
+            .words
+            .iter()
+            .rposition(|word| word.ends_with(|c: char| c.is_ascii_digit()))?;
         let stem = self.words[at].trim_end_matches(|c: char| c.is_ascii_digit());
         let number: usize = self.words[at][stem.len()..].parse().ok()?;
         let before = self.words[..at].iter().map(String::as_str);
         // Yaskawa's URDFs say both: `joint_1_s`, `joint_2_l`.
-        let letter = number.checked_sub(1).and_then(|k| words::NAMED_JOINTS[0].get(k));
-        let after = self.words[at + 1..].iter().map(String::as_str).filter(|word| Some(word) != letter);
+        let letter = number
+            .checked_sub(1)
+            .and_then(|k| words::NAMED_JOINTS[0].get(k));
+        let after = self.words[at + 1..]
+            .iter()
+            .map(String::as_str)
+            .filter(|word| Some(word) != letter);
         let place = format!("{stem}#");
-        Some((before.chain([place.as_str()]).chain(after).collect::<Vec<_>>().join("_").replace("_#", "#"), number))
+        Some((
+            before
+                .chain([place.as_str()])
+                .chain(after)
+                .collect::<Vec<_>>()
+                .join("_")
+                .replace("_#", "#"),
+            number,
+        ))
     }
 
     /// The axis (0 to 2) that this is the coordinate of, and what else the name says: `x_ist`, `Goal X`, `dx`, `Xsoll`.
     pub fn axis(&self) -> Option<(usize, Vec<String>)> {
-        let (at, (axis, more)) = self.words.iter().enumerate().find_map(|(at, word)| Some((at, axis(word)?)))?;
-        let rest = self.words.iter().enumerate().filter(|(k, _)| *k != at).map(|(_, word)| word.clone());
+        let (at, (axis, more)) = self
+            .words
+            .iter()
+            .enumerate()
+            .find_map(|(at, word)| Some((at, axis(word)?)))?;
+        let rest = self
+            .words
+            .iter()
+            .enumerate()
+            .filter(|(k, _)| *k != at)
+            .map(|(_, word)| word.clone());
         let lengthless = self.unit.is_some() && self.unit_of(&LENGTHS).is_none();
         // No length, so that a single letter behind the name is a word: the point A of `x_a`.
-        let ending = self.ending.clone().filter(|ending| lengthless && ending.len() == 1);
+        let ending = self
+            .ending
+            .clone()
+            .filter(|ending| lengthless && ending.len() == 1);
         if lengthless && ending.is_none() {
             return None;
         }
-        Some((axis, rest.chain((!more.is_empty()).then(|| more.to_string())).chain(ending).collect()))
+        Some((
+            axis,
+            rest.chain((!more.is_empty()).then(|| more.to_string()))
+                .chain(ending)
+                .collect(),
+        ))
     }
 }
 
@@ -73,38 +117,76 @@ pub(super) const LENGTHS: [&str; 4] = ["mm", "m", "um", "in"];
 /// The axis that a word names, and what it says besides: `x`, `dx`, `xist`, `x2`.
 fn axis(word: &str) -> Option<(usize, &str)> {
     let known = |more: &str| {
-        let listed =
-            [&words::MEASURED[..], &words::WANTED, &words::DIFFERENCE, &words::SIGMA, &["pos", "p", "coord", "tcp", "t"]];
-        more.is_empty() || more.bytes().all(|byte| byte.is_ascii_digit()) || listed.iter().any(|list| list.contains(&more))
+        let listed = [
+            &words::MEASURED[..],
+            &words::WANTED,
+            &words::DIFFERENCE,
+            &words::SIGMA,
+            &["pos", "p", "coord", "tcp", "t"],
+        ];
+        more.is_empty()
+            || more.bytes().all(|byte| byte.is_ascii_digit())
+            || listed.iter().any(|list| list.contains(&more))
     };
-    let named = ["x", "y", "z"].iter().enumerate().find_map(|(axis, letter)| {
-        let more = [word.strip_prefix(letter), word.strip_suffix(letter)].into_iter().flatten().find(|more| known(more))?;
-        Some((axis, more))
-    });
+    let named = ["x", "y", "z"]
+        .iter()
+        .enumerate()
+        .find_map(|(axis, letter)| {
+            let more = [word.strip_prefix(letter), word.strip_suffix(letter)]
+                .into_iter()
+                .flatten()
+                .find(|more| known(more))?;
+            Some((axis, more))
+        });
     named.filter(|(_, more)| more.len() < word.len())
 }
 
 /// Whether a word says that a numbered column is no joint position.
 fn is_other(word: &str) -> bool {
-    [&words::NO_JOINTS[..], &words::TORQUES, &words::CURRENTS, &words::VELOCITIES].iter().any(|listed| listed.contains(&word))
+    [
+        &words::NO_JOINTS[..],
+        &words::TORQUES,
+        &words::CURRENTS,
+        &words::VELOCITIES,
+    ]
+    .iter()
+    .any(|listed| listed.contains(&word))
 }
 
 /// Rows of columns that may be the joints, best first: those of usual names, else those of an arm's `count` that `angle` takes for angles.
-pub(super) fn joints(names: &[Name], count: usize, angle: impl Fn(usize) -> bool) -> Vec<Vec<usize>> {
-    let mut found: Vec<Vec<usize>> = words::NAMED_JOINTS.iter().filter_map(|listed| named(names, listed)).collect();
+pub(super) fn joints(
+    names: &[Name],
+    count: usize,
+    angle: impl Fn(usize) -> bool,
+) -> Vec<Vec<usize>> {
+    let mut found: Vec<Vec<usize>> = words::NAMED_JOINTS
+        .iter()
+        .filter_map(|listed| named(names, listed))
+        .collect();
     // The letters of a Yaskawa with seven axes hold those of one with six.
     found.sort_by_key(|columns| std::cmp::Reverse(columns.len()));
     found.truncate(1);
     let parts: Vec<Option<(String, usize)>> = names.iter().map(Name::joint).collect();
     let mut numbered: BTreeMap<&str, BTreeMap<usize, usize>> = BTreeMap::new();
-    for (column, (key, number)) in parts.iter().enumerate().filter_map(|(column, part)| Some((column, part.as_ref()?))) {
-        numbered.entry(key).or_default().entry(*number).or_insert(column);
+    for (column, (key, number)) in parts
+        .iter()
+        .enumerate()
+        .filter_map(|(column, part)| Some((column, part.as_ref()?)))
+    {
+        numbered
+            .entry(key)
+            .or_default()
+            .entry(*number)
+            .or_insert(column);
     }
     let run = |columns: &BTreeMap<usize, usize>| -> Vec<usize> {
         let first = usize::from(!columns.contains_key(&0));
         (first..).map_while(|n| columns.get(&n).copied()).collect()
     };
-    let runs: Vec<(&str, Vec<usize>)> = numbered.iter().map(|(key, columns)| (*key, run(columns))).collect();
+    let runs: Vec<(&str, Vec<usize>)> = numbered
+        .iter()
+        .map(|(key, columns)| (*key, run(columns)))
+        .collect();
     let mut usual: Vec<(usize, usize, Vec<usize>)> = Vec::new();
     for (key, columns) in runs.iter().filter(|(_, columns)| columns.len() > 1) {
         if let Some(rank) = usual_name(key) {
@@ -132,7 +214,11 @@ fn named(names: &[Name], listed: &[&str]) -> Option<Vec<usize>> {
     let column = |wanted: &&str| {
         names.iter().position(|name| {
             let stem = name.stem();
-            if letters { stem == *wanted } else { stem.contains(wanted) && !name.words.iter().any(|word| is_other(word)) }
+            if letters {
+                stem == *wanted
+            } else {
+                stem.contains(wanted) && !name.words.iter().any(|word| is_other(word))
+            }
         })
     };
     listed.iter().map(column).collect()
@@ -140,8 +226,23 @@ fn named(names: &[Name], listed: &[&str]) -> Option<Vec<usize>> {
 
 /// How plain a usual name of joints is: 0 for the name and number alone, 1 with `ist` or the like, 2 with `soll` or the like.
 fn usual_name(key: &str) -> Option<usize> {
-    const SAID: [&str; 11] = ["pos", "position", "positions", "angle", "angles", "ang", "winkel", "value", "deg", "rad", "data"];
-    let mut pieces: Vec<&str> = key.split(['_', '#']).filter(|word| !word.is_empty() && !SAID.contains(word)).collect();
+    const SAID: [&str; 11] = [
+        "pos",
+        "position",
+        "positions",
+        "angle",
+        "angles",
+        "ang",
+        "winkel",
+        "value",
+        "deg",
+        "rad",
+        "data",
+    ];
+    let mut pieces: Vec<&str> = key
+        .split(['_', '#'])
+        .filter(|word| !word.is_empty() && !SAID.contains(word))
+        .collect();
     let before = pieces.len();
     pieces.retain(|word| !words::MEASURED.contains(word));
     let measured = pieces.len() < before;
@@ -149,18 +250,27 @@ fn usual_name(key: &str) -> Option<usize> {
     pieces.retain(|word| !words::WANTED.contains(word));
     let wanted = pieces.len() < before;
     let joined = pieces.join("_");
-    (words::JOINTS.contains(&joined.as_str()) && key.contains('#')).then_some(match (measured, wanted) {
-        (_, true) => 2,
-        (true, false) => 1,
-        _ => 0,
-    })
+    (words::JOINTS.contains(&joined.as_str()) && key.contains('#')).then_some(
+        match (measured, wanted) {
+            (_, true) => 2,
+            (true, false) => 1,
+            _ => 0,
+        },
+    )
 }
 
 /// The names of all joints in one: the 1 that becomes a 2 in the next name, and so on, is the joint's number.
 pub(super) fn pattern(names: &[&str]) -> Option<String> {
     let first = names.first()?;
-    let ones = first.match_indices('1').map(|(at, _)| format!("{}{{j}}{}", &first[..at], &first[at + 1..]));
-    let fits = |pattern: &String| names.iter().enumerate().all(|(k, name)| pattern.replace("{j}", &(k + 1).to_string()) == *name);
+    let ones = first
+        .match_indices('1')
+        .map(|(at, _)| format!("{}{{j}}{}", &first[..at], &first[at + 1..]));
+    let fits = |pattern: &String| {
+        names
+            .iter()
+            .enumerate()
+            .all(|(k, name)| pattern.replace("{j}", &(k + 1).to_string()) == *name)
+    };
     ones.into_iter().find(fits)
 }
 
@@ -193,25 +303,69 @@ mod tests {
 
     #[test]
     fn joints_are_found_under_names_that_nobody_foresaw() {
-        let all = names(&["Nr", "wrist_1", "R1", "R2", "R3", "R4", "R5", "X_soll", "Y_soll", "Z_soll", "X_ist"]);
+        let all = names(&[
+            "Nr", "wrist_1", "R1", "R2", "R3", "R4", "R5", "X_soll", "Y_soll", "Z_soll", "X_ist",
+        ]);
         assert_eq!(joints(&all, 5, |_| true), [[2, 3, 4, 5, 6]]);
         assert!(joints(&all, 5, |column| column != 4).is_empty());
-        assert_eq!(joints(&names(&["i1", "i2", "Achse 1", "Achse 2"]), 6, |_| false), [[2, 3]]);
-        assert_eq!(joints(&names(&["T", "S", "L", "U", "R", "B"]), 6, |_| false), [[1, 2, 3, 4, 5, 0]]);
-        assert_eq!(joints(&names(&["q1_cmd", "q2_cmd", "q1_act", "q2_act"]), 6, |_| true), [[2, 3], [0, 1]]);
-        let yaskawa = ["joint_1_s", "joint_2_l", "joint_3_u", "joint_4_r", "joint_5_b", "joint_6_t"];
+        assert_eq!(
+            joints(&names(&["i1", "i2", "Achse 1", "Achse 2"]), 6, |_| false),
+            [[2, 3]]
+        );
+        assert_eq!(
+            joints(&names(&["T", "S", "L", "U", "R", "B"]), 6, |_| false),
+            [[1, 2, 3, 4, 5, 0]]
+        );
+        assert_eq!(
+            joints(&names(&["q1_cmd", "q2_cmd", "q1_act", "q2_act"]), 6, |_| {
+                true
+            }),
+            [[2, 3], [0, 1]]
+        );
+        let yaskawa = [
+            "joint_1_s",
+            "joint_2_l",
+            "joint_3_u",
+            "joint_4_r",
+            "joint_5_b",
+            "joint_6_t",
+        ];
         assert_eq!(joints(&names(&yaskawa), 6, |_| true), [[0, 1, 2, 3, 4, 5]]);
-        for pattern in
-            ["J#", "A#", "Axis_#", "q_#", "panda_joint#", "iiwa_joint_#", "lbr_A#", "robot1/joint_#", "joint_#_position"]
-        {
-            let all: Vec<String> = (1..=6).map(|n| pattern.replace('#', &n.to_string())).collect();
+        for pattern in [
+            "J#",
+            "A#",
+            "Axis_#",
+            "q_#",
+            "panda_joint#",
+            "iiwa_joint_#",
+            "lbr_A#",
+            "robot1/joint_#",
+            "joint_#_position",
+        ] {
+            let all: Vec<String> = (1..=6)
+                .map(|n| pattern.replace('#', &n.to_string()))
+                .collect();
             let all: Vec<&str> = all.iter().map(String::as_str).collect();
-            assert_eq!(joints(&names(&all), 6, |_| true), [[0, 1, 2, 3, 4, 5]], "{pattern}");
+            assert_eq!(
+                joints(&names(&all), 6, |_| true),
+                [[0, 1, 2, 3, 4, 5]],
+                "{pattern}"
+            );
         }
-        assert_eq!(joints(&names(&["dq1", "dq2", "q0", "q1"]), 6, |_| true), [[2, 3]]);
-        let robot = ["ur_shoulder_pan_joint", "ur_shoulder_lift_joint", "ur_elbow_joint"];
+        assert_eq!(
+            joints(&names(&["dq1", "dq2", "q0", "q1"]), 6, |_| true),
+            [[2, 3]]
+        );
+        let robot = [
+            "ur_shoulder_pan_joint",
+            "ur_shoulder_lift_joint",
+            "ur_elbow_joint",
+        ];
         let wrist = ["ur_wrist_1_joint", "ur_wrist_2_joint", "ur_wrist_3_joint"];
-        assert_eq!(joints(&names(&[robot, wrist].concat()), 6, |_| true), [[0, 1, 2, 3, 4, 5]]);
+        assert_eq!(
+            joints(&names(&[robot, wrist].concat()), 6, |_| true),
+            [[0, 1, 2, 3, 4, 5]]
+        );
     }
 
     #[test]
@@ -229,7 +383,8 @@ mod tests {
             ("measurement_rx", None),
             ("Rz", None),
         ] {
-            let expected = expected.map(|(axis, rest)| (axis, rest.into_iter().map(String::from).collect()));
+            let expected =
+                expected.map(|(axis, rest)| (axis, rest.into_iter().map(String::from).collect()));
             assert_eq!(Name::of(text).axis(), expected, "{text}");
         }
     }

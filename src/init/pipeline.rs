@@ -12,40 +12,75 @@ use std::path::Path;
 /// How the pipeline's folder names a file.
 fn from_folder(folder: &Path, file: &Path) -> String {
     let whole = |path: &Path| path.canonicalize().ok();
-    let inside = whole(folder).zip(whole(file)).and_then(|(folder, file)| Some(file.strip_prefix(folder).ok()?.to_path_buf()));
-    let path = inside.or_else(|| whole(file)).unwrap_or_else(|| file.to_path_buf());
+    let inside = whole(folder)
+        .zip(whole(file))
+        .and_then(|(folder, file)| Some(file.strip_prefix(folder).ok()?.to_path_buf()));
+    let path = inside
+        .or_else(|| whole(file))
+        .unwrap_or_else(|| file.to_path_buf());
     quoted(&path.display().to_string())
 }
 
 /// Name, and the stage that reads the robot.
 fn head(request: &InitRequest) -> String {
     // A folder that is still to be made has its name already.
-    let folder = request.folder.canonicalize().unwrap_or_else(|_| request.folder.to_path_buf());
-    let name = folder.file_name().map(|name| name.to_string_lossy().into_owned());
-    let name: String = name.unwrap_or_default().chars().filter(|c| c.is_ascii_alphanumeric() || "_-".contains(*c)).collect();
+    let folder = request
+        .folder
+        .canonicalize()
+        .unwrap_or_else(|_| request.folder.to_path_buf());
+    let name = folder
+        .file_name()
+        .map(|name| name.to_string_lossy().into_owned());
+    let name: String = name
+        .unwrap_or_default()
+        .chars()
+        .filter(|c| c.is_ascii_alphanumeric() || "_-".contains(*c))
+        .collect();
     let name = if name.is_empty() { "cell".into() } else { name };
     let mut out = format!(
         "# A calibration, step by step. `calib check` reports every fault with its line, `calib run` computes what is not yet done.\ncalib: 1\nname: {name}\nseed: 1                 # everything random derives from it\n\nstages:\n"
     );
-    let urdf = request.urdf.as_ref().map(|path| format!(", urdf: {}", from_folder(request.folder, path)));
-    out.push_str(&format!("  - uses: robot\n    with: {{file: robot.yaml{}}}\n\n", urdf.unwrap_or_default()));
+    let urdf = request
+        .urdf
+        .as_ref()
+        .map(|path| format!(", urdf: {}", from_folder(request.folder, path)));
+    out.push_str(&format!(
+        "  - uses: robot\n    with: {{file: robot.yaml{}}}\n\n",
+        urdf.unwrap_or_default()
+    ));
     out + "  # Which column holds what, in which unit. Nothing is guessed when this runs: only what is written here counts.\n"
 }
 
 /// The pipeline of an arm that moves while its torques are recorded.
-pub(super) fn of_torques(request: &InitRequest, found: &[ExaminedFile], arm: &StartingArm) -> String {
+pub(super) fn of_torques(
+    request: &InitRequest,
+    found: &[ExaminedFile],
+    arm: &StartingArm,
+) -> String {
     let mut out = head(request) + "  - uses: ingest_torques\n    with:\n      files:\n";
     out.push_str(&files(request, found, arm, [false; 2]));
     out + OF_TORQUES
 }
 
-pub(super) fn text(request: &InitRequest, found: &[ExaminedFile], (joined, arm): (&Joined, &StartingArm)) -> String {
+pub(super) fn text(
+    request: &InitRequest,
+    found: &[ExaminedFile],
+    (joined, arm): (&Joined, &StartingArm),
+) -> String {
     let mut out = head(request) + "  - uses: ingest\n    with:\n      files:\n";
     if found.is_empty() {
-        out.push_str(&EMPTY.lines().map(|line| counted(line, counting(found, arm).as_deref()) + "\n").collect::<String>());
+        out.push_str(
+            &EMPTY
+                .lines()
+                .map(|line| counted(line, counting(found, arm).as_deref()) + "\n")
+                .collect::<String>(),
+        );
     }
     out.push_str(&files(request, found, arm, missing(found)));
-    joined.lines.iter().for_each(|line| out.push_str(&format!("{line}\n")));
+    joined
+        .lines
+        .iter()
+        .for_each(|line| out.push_str(&format!("{line}\n")));
     out.push_str(&instrument());
     let by_usage = found.iter().any(|file| file.get("usage").is_some());
     out.push_str(if by_usage { BY_USAGE } else { EVERY });
@@ -53,22 +88,44 @@ pub(super) fn text(request: &InitRequest, found: &[ExaminedFile], (joined, arm):
 }
 
 /// The settings of all files; `missing`: whether none has the joints, the point.
-fn files(request: &InitRequest, found: &[ExaminedFile], arm: &StartingArm, missing: [bool; 2]) -> String {
+fn files(
+    request: &InitRequest,
+    found: &[ExaminedFile],
+    arm: &StartingArm,
+    missing: [bool; 2],
+) -> String {
     let counting = counting(found, arm);
     let mut out = String::new();
     for (k, file) in found.iter().enumerate() {
-        out.push_str(&format!("        - file: {}\n", from_folder(request.folder, &file.path)));
+        out.push_str(&format!(
+            "        - file: {}\n",
+            from_folder(request.folder, &file.path)
+        ));
         // Joints come first, in the controller's file; the tracker's is the last.
-        let lacks = Lacks { joints: missing[0] && k == 0, point: missing[1] && k + 1 == found.len(), count: arm.joints };
+        let lacks = Lacks {
+            joints: missing[0] && k == 0,
+            point: missing[1] && k + 1 == found.len(),
+            count: arm.joints,
+        };
         let text = file_text(file, &lacks);
-        out.push_str(&text.lines().map(|line| counted(line, counting.as_deref()) + "\n").collect::<String>());
+        out.push_str(
+            &text
+                .lines()
+                .map(|line| counted(line, counting.as_deref()) + "\n")
+                .collect::<String>(),
+        );
     }
     out
 }
 
 /// The line of joints with how the arm's controller counts them; any other line as it is.
 fn counted(line: &str, counting: Option<&str>) -> String {
-    let (Some(counting), true) = (counting, line.trim_start().trim_start_matches("# ").starts_with("q: {")) else {
+    let (Some(counting), true) = (
+        counting,
+        line.trim_start()
+            .trim_start_matches("# ")
+            .starts_with("q: {"),
+    ) else {
         return line.into();
     };
     // The map ends at the last brace before a comment: names of columns may hold both.
@@ -78,7 +135,10 @@ fn counted(line: &str, counting: Option<&str>) -> String {
 
 /// What else is to be said of joints, as settings of `q`.
 fn counting(found: &[ExaminedFile], arm: &StartingArm) -> Option<String> {
-    let settings: Vec<String> = linear(found, &arm.sliding).into_iter().chain(arm.counting.clone()).collect();
+    let settings: Vec<String> = linear(found, &arm.sliding)
+        .into_iter()
+        .chain(arm.counting.clone())
+        .collect();
     Some(settings.join(", ")).filter(|settings| !settings.is_empty())
 }
 
@@ -93,14 +153,28 @@ fn linear(found: &[ExaminedFile], sliding: &[bool]) -> Option<String> {
 }
 
 /// Files of further reflectors, each beside the file of joints.
-pub(super) fn later(folder: &Path, found: &[ExaminedFile], more: &[(String, ExaminedFile)]) -> Vec<String> {
-    let [joints, _] = found else { return Vec::new() };
+pub(super) fn later(
+    folder: &Path,
+    found: &[ExaminedFile],
+    more: &[(String, ExaminedFile)],
+) -> Vec<String> {
+    let [joints, _] = found else {
+        return Vec::new();
+    };
     let line = |(target, file): &(String, ExaminedFile)| {
-        let files = [joints, file].map(|file| from_folder(folder, &file.path)).join(", ");
+        let files = [joints, file]
+            .map(|file| from_folder(folder, &file.path))
+            .join(", ");
         format!("        - {{files: [{files}], target: {}}}", quoted(target))
     };
-    let head = "      later:                  # CHECK: the other reflectors, measured in the same poses".to_string();
-    (!more.is_empty()).then_some(head).into_iter().chain(more.iter().map(line)).collect()
+    let head =
+        "      later:                  # CHECK: the other reflectors, measured in the same poses"
+            .to_string();
+    (!more.is_empty())
+        .then_some(head)
+        .into_iter()
+        .chain(more.iter().map(line))
+        .collect()
 }
 
 /// A line to fill in: nobody but the person knows what measured.
@@ -131,7 +205,10 @@ fn file_text(file: &ExaminedFile, lacks: &Lacks) -> String {
     let mut out = String::new();
     let mut put = |line: &str| out.push_str(&format!("          {line}\n"));
     if let Some(trouble) = &sheet.trouble {
-        put(&format!("# REPLACE what follows by the columns of the file: {}", one_line(trouble)));
+        put(&format!(
+            "# REPLACE what follows by the columns of the file: {}",
+            one_line(trouble)
+        ));
     }
     if let Some(name) = &sheet.of_book {
         put(&format!("sheet: {}", quoted(name)));
@@ -139,7 +216,10 @@ fn file_text(file: &ExaminedFile, lacks: &Lacks) -> String {
     if let Some(topic) = &sheet.topic {
         put(&format!("topic: {}", quoted(topic)));
     }
-    sheet.notes.iter().for_each(|note| put(&format!("# {}", one_line(note))));
+    sheet
+        .notes
+        .iter()
+        .for_each(|note| put(&format!("# {}", one_line(note))));
     match sheet.delimiter {
         ',' => {}
         ' ' => put("delimiter: whitespace"),
@@ -153,7 +233,11 @@ fn file_text(file: &ExaminedFile, lacks: &Lacks) -> String {
         put("header: false");
     }
     if sheet.skip > 0 {
-        put(&format!("skip: {}                 # lines above the {}", sheet.skip, if sheet.header { "header" } else { "data" }));
+        put(&format!(
+            "skip: {}                 # lines above the {}",
+            sheet.skip,
+            if sheet.header { "header" } else { "data" }
+        ));
     }
     if sheet.unit_row {
         put("skip_below_header: 1    # a row of units");
@@ -165,8 +249,15 @@ fn file_text(file: &ExaminedFile, lacks: &Lacks) -> String {
         put("header_in_comment: true");
     }
     for mapping in &file.mappings {
-        if let Some(line) = mapping.choices.first().and_then(|choice| choice.beside.as_ref()) {
-            put(&format!("{line}   # CHECK: {}", one_line(mapping.check.as_deref().unwrap_or("is it so?"))));
+        if let Some(line) = mapping
+            .choices
+            .first()
+            .and_then(|choice| choice.beside.as_ref())
+        {
+            put(&format!(
+                "{line}   # CHECK: {}",
+                one_line(mapping.check.as_deref().unwrap_or("is it so?"))
+            ));
         }
     }
     put("columns:");
@@ -177,19 +268,32 @@ fn file_text(file: &ExaminedFile, lacks: &Lacks) -> String {
     }
     let mut put = |line: &str| out.push_str(&format!("            {line}\n"));
     lacking(file, lacks, &mut put);
-    file.remarks.iter().for_each(|remark| put(&format!("# {}", one_line(remark))));
+    file.remarks
+        .iter()
+        .for_each(|remark| put(&format!("# {}", one_line(remark))));
     if sheet.header && sheet.trouble.is_none() {
-        let unused = || sheet.names.iter().enumerate().filter(|(column, _)| !file.is_taken(*column));
+        let unused = || {
+            sheet
+                .names
+                .iter()
+                .enumerate()
+                .filter(|(column, _)| !file.is_taken(*column))
+        };
         let more = unused().count().saturating_sub(MOST_NAMED);
         for (column, name) in unused().take(MOST_NAMED) {
-            let name = if name.is_empty() { format!("column {}", column + 1) } else { quoted(name) };
+            let name = if name.is_empty() {
+                format!("column {}", column + 1)
+            } else {
+                quoted(name)
+            };
             put(&format!("# not used: {name}"));
         }
         if more > 0 {
             put(&format!("# not used: {more} more"));
         }
     } else {
-        (0..sheet.names.len().min(MOST_NAMED)).for_each(|column| put(&format!("# seen: {}", one_line(&sheet.seen(column)))));
+        (0..sheet.names.len().min(MOST_NAMED))
+            .for_each(|column| put(&format!("# seen: {}", one_line(&sheet.seen(column)))));
     }
     out
 }
@@ -234,7 +338,9 @@ fn mapped(mapping: &Mapping) -> String {
 fn lacking(file: &ExaminedFile, lacks: &Lacks, put: &mut impl FnMut(&str)) {
     let header = file.sheet.header;
     if lacks.joints && header {
-        put("q: {column: \"A{j}\", unit: deg}   # REPLACE: no columns of joints were recognised; {j} is the joint's number");
+        put(
+            "q: {column: \"A{j}\", unit: deg}   # REPLACE: no columns of joints were recognised; {j} is the joint's number",
+        );
     } else if lacks.joints {
         let list: Vec<String> = (1..=lacks.count).map(|number| number.to_string()).collect();
         put(&format!(
@@ -245,13 +351,21 @@ fn lacking(file: &ExaminedFile, lacks: &Lacks, put: &mut impl FnMut(&str)) {
     if lacks.point {
         let first = if lacks.joints { lacks.count } else { 0 };
         for (k, axis) in ["x", "y", "z"].into_iter().enumerate() {
-            let column = if header { axis.to_string() } else { (first + k + 1).to_string() };
-            put(&format!("{axis}: {{column: {column}, unit: mm}}   # REPLACE: the measured point was not recognised"));
+            let column = if header {
+                axis.to_string()
+            } else {
+                (first + k + 1).to_string()
+            };
+            put(&format!(
+                "{axis}: {{column: {column}, unit: mm}}   # REPLACE: the measured point was not recognised"
+            ));
         }
     }
     if !lacks.joints && !lacks.point && file.mappings.is_empty() {
         let column = if header { "name" } else { "1" };
-        put(&format!("point_id: {{column: {column}}}   # REPLACE: no column was recognised"));
+        put(&format!(
+            "point_id: {{column: {column}}}   # REPLACE: no column was recognised"
+        ));
     }
 }
 

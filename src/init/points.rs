@@ -48,7 +48,9 @@ pub(super) struct Points {
 pub(super) fn families(names: &[Name]) -> Vec<Family> {
     let mut groups: BTreeMap<Vec<String>, [Vec<usize>; 3]> = BTreeMap::new();
     for (column, name) in names.iter().enumerate() {
-        let Some((axis, mut rest)) = name.axis() else { continue };
+        let Some((axis, mut rest)) = name.axis() else {
+            continue;
+        };
         rest.sort();
         groups.entry(rest).or_default()[axis].push(column);
     }
@@ -56,7 +58,11 @@ pub(super) fn families(names: &[Name]) -> Vec<Family> {
     for (words, [x, y, z]) in groups {
         // Names that stand twice make two points.
         for ((x, y), z) in x.iter().zip(&y).zip(&z) {
-            found.push(Family { columns: [*x, *y, *z], role: role(&words), words: words.clone() });
+            found.push(Family {
+                columns: [*x, *y, *z],
+                role: role(&words),
+                words: words.clone(),
+            });
         }
     }
     found.sort_by_key(|family| family.columns[0]);
@@ -65,7 +71,12 @@ pub(super) fn families(names: &[Name]) -> Vec<Family> {
 
 fn role(rest: &[String]) -> PointRole {
     let has = |listed: &[&str]| rest.iter().any(|word| listed.contains(&word.as_str()));
-    match (has(&words::SIGMA), has(&words::DIFFERENCE), has(&words::MEASURED), has(&words::WANTED)) {
+    match (
+        has(&words::SIGMA),
+        has(&words::DIFFERENCE),
+        has(&words::MEASURED),
+        has(&words::WANTED),
+    ) {
         (true, ..) => PointRole::Sigma,
         (_, true, ..) => PointRole::Difference,
         (_, _, true, false) => PointRole::Measured,
@@ -78,22 +89,42 @@ fn role(rest: &[String]) -> PointRole {
 pub(super) fn points(names: &[Name]) -> Points {
     let mut families = families(names);
     let of = |families: &[Family], role: PointRole| -> Vec<Family> {
-        families.iter().filter(|family| family.role == role).cloned().collect()
+        families
+            .iter()
+            .filter(|family| family.role == role)
+            .cloned()
+            .collect()
     };
     // `x_t` beside `x_dif` is the target; alone it may be the tracker's.
-    let others = families.iter().any(|family| family.role == PointRole::Difference || family.words.is_empty());
+    let others = families
+        .iter()
+        .any(|family| family.role == PointRole::Difference || family.words.is_empty());
     for family in &mut families {
         if family.role == PointRole::Plain && family.words == ["t"] && others {
             family.role = PointRole::Wanted;
         }
     }
-    let [measured, plain, wanted, differences, sigma] =
-        [PointRole::Measured, PointRole::Plain, PointRole::Wanted, PointRole::Difference, PointRole::Sigma]
-            .map(|role| of(&families, role));
-    let direct = |family: &Family| PointColumns { columns: family.columns, difference: None };
+    let [measured, plain, wanted, differences, sigma] = [
+        PointRole::Measured,
+        PointRole::Plain,
+        PointRole::Wanted,
+        PointRole::Difference,
+        PointRole::Sigma,
+    ]
+    .map(|role| of(&families, role));
+    let direct = |family: &Family| PointColumns {
+        columns: family.columns,
+        difference: None,
+    };
     let by = |target: &Family, difference: &Family| {
-        let minus = difference.words.iter().any(|word| words::TARGET_LESS_MEASURED.contains(&word.as_str()));
-        PointColumns { columns: target.columns, difference: Some((difference.columns, minus)) }
+        let minus = difference
+            .words
+            .iter()
+            .any(|word| words::TARGET_LESS_MEASURED.contains(&word.as_str()));
+        PointColumns {
+            columns: target.columns,
+            difference: Some((difference.columns, minus)),
+        }
     };
     let sides = "minus: target less measured point; plus: measured point less target";
     let mut found = Points {
@@ -102,7 +133,11 @@ pub(super) fn points(names: &[Name]) -> Points {
         said: !measured.is_empty(),
         ..Points::default()
     };
-    let candidates = if measured.is_empty() { &plain } else { &measured };
+    let candidates = if measured.is_empty() {
+        &plain
+    } else {
+        &measured
+    };
     found.ways = candidates.iter().map(direct).collect();
     if candidates.len() > 1 {
         found.targets = targets(candidates);
@@ -110,7 +145,9 @@ pub(super) fn points(names: &[Name]) -> Points {
     } else if measured.is_empty() && !plain.is_empty() {
         if let (Some(difference), true) = (differences.first(), wanted.is_empty()) {
             found.ways.push(by(&plain[0], difference));
-            found.question = Some(format!("is this the measured point, or the target of the differences next to it ({sides})?"));
+            found.question = Some(format!(
+                "is this the measured point, or the target of the differences next to it ({sides})?"
+            ));
         } else if !plain[0].words.is_empty() && wanted.is_empty() {
             found.question = Some("is this the measured point, or the target?".into());
         }
@@ -118,8 +155,15 @@ pub(super) fn points(names: &[Name]) -> Points {
         && let (Some(target), Some(difference)) = (wanted.first(), differences.first())
     {
         found.ways = vec![by(target, difference)];
-        found.question = Some(format!("the measured point by its target and the difference ({sides})"));
-        found.ways.extend(differences.iter().skip(1).map(|difference| by(target, difference)));
+        found.question = Some(format!(
+            "the measured point by its target and the difference ({sides})"
+        ));
+        found.ways.extend(
+            differences
+                .iter()
+                .skip(1)
+                .map(|difference| by(target, difference)),
+        );
     }
     found
 }
@@ -134,14 +178,32 @@ fn targets(candidates: &[Family]) -> Vec<(String, [usize; 3])> {
         words.sort_by_key(|word| word.bytes().all(|byte| byte.is_ascii_digit()));
         let name = words.concat();
         let stem = name.trim_end_matches(|c: char| c.is_ascii_digit());
-        let letter = name.strip_suffix(|c: char| c.is_ascii_alphabetic()).filter(|stem| stem.len() > 1);
-        let stem = if stem.len() < name.len() { Some(stem) } else { letter };
-        let Some(stem) = stem.map(String::from) else { return Vec::new() };
-        named.push((if stem.is_empty() { format!("target_{name}") } else { name }, family.columns));
+        let letter = name
+            .strip_suffix(|c: char| c.is_ascii_alphabetic())
+            .filter(|stem| stem.len() > 1);
+        let stem = if stem.len() < name.len() {
+            Some(stem)
+        } else {
+            letter
+        };
+        let Some(stem) = stem.map(String::from) else {
+            return Vec::new();
+        };
+        named.push((
+            if stem.is_empty() {
+                format!("target_{name}")
+            } else {
+                name
+            },
+            family.columns,
+        ));
         stems.push(stem);
     }
-    let is_one = |(k, (name, _)): (usize, &(String, [usize; 3]))| named[..k].iter().all(|(other, _)| other != name);
-    let alike = stems.windows(2).all(|pair| pair[0] == pair[1]) && named.iter().enumerate().all(is_one);
+    let is_one = |(k, (name, _)): (usize, &(String, [usize; 3]))| {
+        named[..k].iter().all(|(other, _)| other != name)
+    };
+    let alike =
+        stems.windows(2).all(|pair| pair[0] == pair[1]) && named.iter().enumerate().all(is_one);
     if alike { named } else { Vec::new() }
 }
 
@@ -155,7 +217,12 @@ mod tests {
 
     #[test]
     fn the_measured_point_is_never_its_target() {
-        let way = |columns: [usize; 3]| vec![PointColumns { columns, difference: None }];
+        let way = |columns: [usize; 3]| {
+            vec![PointColumns {
+                columns,
+                difference: None,
+            }]
+        };
         for texts in [
             ["X_soll", "Y_soll", "Z_soll", "X_ist", "Y_ist", "Z_ist"],
             ["Goal x", "Goal y", "Goal z", "x", "y", "z"],
@@ -164,10 +231,20 @@ mod tests {
             ["std_x", "std_y", "std_z", "x_act", "y_act", "z_act"],
         ] {
             let found = found(&texts);
-            assert_eq!((found.ways, found.question), (way([3, 4, 5]), None), "{texts:?}");
+            assert_eq!(
+                (found.ways, found.question),
+                (way([3, 4, 5]), None),
+                "{texts:?}"
+            );
         }
         let target = found(&["x_t", "y_t", "z_t", "x_dif", "y_dif", "z_dif"]);
-        assert_eq!(target.ways, [PointColumns { columns: [0, 1, 2], difference: Some(([3, 4, 5], true)) }]);
+        assert_eq!(
+            target.ways,
+            [PointColumns {
+                columns: [0, 1, 2],
+                difference: Some(([3, 4, 5], true))
+            }]
+        );
         assert!(target.question.is_some());
         let alone = found(&["x_soll", "y_soll", "z_soll"]);
         assert_eq!((alone.ways.len(), alone.wanted), (0, Some([0, 1, 2])));
@@ -178,14 +255,44 @@ mod tests {
     fn points_that_fit_alike_are_asked_about() {
         let two = found(&["smrA_x", "smrA_y", "smrA_z", "smrB_x", "smrB_y", "smrB_z"]);
         assert_eq!((two.ways.len(), two.question.is_some()), (2, true));
-        assert_eq!(two.targets, [("smra".to_string(), [0, 1, 2]), ("smrb".to_string(), [3, 4, 5])]);
+        assert_eq!(
+            two.targets,
+            [
+                ("smra".to_string(), [0, 1, 2]),
+                ("smrb".to_string(), [3, 4, 5])
+            ]
+        );
         let numbered = found(&["X1", "Y1", "Z1", "X2", "Y2", "Z2"]).targets;
-        assert_eq!(numbered, [("target_1".to_string(), [0, 1, 2]), ("target_2".to_string(), [3, 4, 5])]);
-        let apart = found(&["SMR 1 x", "SMR 1 y", "SMR 1 z", "SMR 2 x", "SMR 2 y", "SMR 2 z"]).targets;
-        assert_eq!(apart.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(), ["smr1", "smr2"]);
-        assert_eq!(found(&["x_before", "y_before", "z_before", "x_after", "y_after", "z_after"]).targets, []);
+        assert_eq!(
+            numbered,
+            [
+                ("target_1".to_string(), [0, 1, 2]),
+                ("target_2".to_string(), [3, 4, 5])
+            ]
+        );
+        let apart = found(&[
+            "SMR 1 x", "SMR 1 y", "SMR 1 z", "SMR 2 x", "SMR 2 y", "SMR 2 z",
+        ])
+        .targets;
+        assert_eq!(
+            apart
+                .iter()
+                .map(|(name, _)| name.as_str())
+                .collect::<Vec<_>>(),
+            ["smr1", "smr2"]
+        );
+        assert_eq!(
+            found(&[
+                "x_before", "y_before", "z_before", "x_after", "y_after", "z_after"
+            ])
+            .targets,
+            []
+        );
         let twice = found(&["X", "Y", "Z", "X", "Y", "Z"]);
-        assert_eq!((twice.ways[1].columns, twice.question.is_some()), ([3, 4, 5], true));
+        assert_eq!(
+            (twice.ways[1].columns, twice.question.is_some()),
+            ([3, 4, 5], true)
+        );
         let beside = found(&["X", "Y", "Z", "dX", "dY", "dZ"]);
         assert_eq!(beside.ways[1].difference, Some(([3, 4, 5], false)));
     }

@@ -45,12 +45,18 @@ impl ExaminedFile {
         if !columns.iter().all(|column| self.sheet.is_numeric(*column)) {
             return;
         }
-        let most = columns.iter().map(|column| self.sheet.largest(*column)).fold(0.0, f64::max);
+        let most = columns
+            .iter()
+            .map(|column| self.sheet.largest(*column))
+            .fold(0.0, f64::max);
         let check = "no header says so; is it right?";
         let mapping = match columns[..] {
             [x, y, z] => {
                 let unit = self.length_unit(&[x, y, z]).0;
-                let lines = ["x", "y", "z"].iter().zip([x, y, z]).map(|(name, column)| self.line(name, column, Some(unit)));
+                let lines = ["x", "y", "z"]
+                    .iter()
+                    .zip([x, y, z])
+                    .map(|(name, column)| self.line(name, column, Some(unit)));
                 let account = format!("the point ({})", self.shown(&columns));
                 Mapping {
                     quantity: "x",
@@ -60,11 +66,18 @@ impl ExaminedFile {
                 }
             }
             // Seven numbers may be a point with a quaternion.
-            [_, _, _, _, _, _] | [_, _, _, _, _, _, _] if most <= 400.0 && !self.is_unit(&columns[columns.len() - 4..]) => {
+            [_, _, _, _, _, _] | [_, _, _, _, _, _, _]
+                if most <= 400.0 && !self.is_unit(&columns[columns.len() - 4..]) =>
+            {
                 let unit = if most > MOST_RADIANS { "deg" } else { "rad" };
                 let lines = vec![self.joints_line("q", &columns, Some(unit))];
                 let account = format!("{} joints ({})", columns.len(), self.shown(&columns));
-                Mapping { quantity: "q", choices: vec![Choice::of(lines, columns.clone())], check: Some(check.into()), account }
+                Mapping {
+                    quantity: "q",
+                    choices: vec![Choice::of(lines, columns.clone())],
+                    check: Some(check.into()),
+                    account,
+                }
             }
             _ => return,
         };
@@ -76,28 +89,58 @@ impl ExaminedFile {
         let angle = |column: usize| {
             self.sheet.is_numeric(column)
                 && self.sheet.largest(column) <= 400.0
-                && self.said[column].unit.is_none_or(|unit| ["deg", "rad"].contains(&unit))
+                && self.said[column]
+                    .unit
+                    .is_none_or(|unit| ["deg", "rad"].contains(&unit))
         };
         let mut rows = joints(&self.said, count, angle);
-        rows.retain(|columns| columns.iter().all(|column| self.sheet.is_numeric(*column)) && !self.is_unit(columns));
+        rows.retain(|columns| {
+            columns.iter().all(|column| self.sheet.is_numeric(*column)) && !self.is_unit(columns)
+        });
         // A list holds what else an arm has beside its joints: a gripper.
-        let numbers = rows.first().filter(|row| self.sheet.names[row[0]].ends_with(']')).map_or(0, Vec::len);
-        rows.iter_mut().filter(|_| numbers > count).for_each(|row| row.truncate(count));
+        let numbers = rows
+            .first()
+            .filter(|row| self.sheet.names[row[0]].ends_with(']'))
+            .map_or(0, Vec::len);
+        rows.iter_mut()
+            .filter(|_| numbers > count)
+            .for_each(|row| row.truncate(count));
         let Some(best) = rows.first() else { return };
         let turning = |column: &&usize| self.said[**column].unit_of(&LENGTHS).is_none();
-        let degrees = best.iter().filter(turning).any(|column| self.sheet.largest(*column) > MOST_RADIANS);
-        let named = best.iter().find_map(|column| self.said[*column].unit_of(&["deg", "rad"]));
+        let degrees = best
+            .iter()
+            .filter(turning)
+            .any(|column| self.sheet.largest(*column) > MOST_RADIANS);
+        let named = best
+            .iter()
+            .find_map(|column| self.said[*column].unit_of(&["deg", "rad"]));
         let (unit, why) = match named {
             Some(unit) => (unit, None),
-            None if degrees => ("deg", Some("values beyond 6.5 cannot be radians".to_string())),
-            None => ("rad", Some("no value is beyond 6.5; are these degrees?".to_string())),
+            None if degrees => (
+                "deg",
+                Some("values beyond 6.5 cannot be radians".to_string()),
+            ),
+            None => (
+                "rad",
+                Some("no value is beyond 6.5; are these degrees?".to_string()),
+            ),
         };
         let several = (rows.len() > 1).then(|| "several columns of joints fit".to_string());
-        let of_list = (numbers > count).then(|| format!("of the {numbers} numbers of the list the first {count}"));
+        let of_list = (numbers > count)
+            .then(|| format!("of the {numbers} numbers of the list the first {count}"));
         let check: Vec<String> = several.into_iter().chain(of_list).chain(why).collect();
-        let account =
-            format!("{} joints ({} to {})", best.len(), self.sheet.names[best[0]], self.sheet.names[best[best.len() - 1]]);
-        let choice = |columns: &Vec<usize>| Choice::of(vec![self.joints_line("q", columns, Some(unit))], columns.clone());
+        let account = format!(
+            "{} joints ({} to {})",
+            best.len(),
+            self.sheet.names[best[0]],
+            self.sheet.names[best[best.len() - 1]]
+        );
+        let choice = |columns: &Vec<usize>| {
+            Choice::of(
+                vec![self.joints_line("q", columns, Some(unit))],
+                columns.clone(),
+            )
+        };
         let mapping = Mapping {
             quantity: "q",
             choices: rows.iter().map(choice).collect(),
@@ -109,13 +152,28 @@ impl ExaminedFile {
 
     /// Whether four columns are a quaternion.
     fn is_unit(&self, columns: &[usize]) -> bool {
-        let square = |row: &Vec<String>| columns.iter().filter_map(|column| number(&row[*column])).map(|x| x * x).sum::<f64>();
-        columns.len() == 4 && self.sheet.rows.iter().all(|row| (square(row) - 1.0).abs() < 1e-3)
+        let square = |row: &Vec<String>| {
+            columns
+                .iter()
+                .filter_map(|column| number(&row[*column]))
+                .map(|x| x * x)
+                .sum::<f64>()
+        };
+        columns.len() == 4
+            && self
+                .sheet
+                .rows
+                .iter()
+                .all(|row| (square(row) - 1.0).abs() < 1e-3)
     }
 
     fn point(&mut self) {
         let found = points(&self.said);
-        if found.targets.iter().flat_map(|(_, columns)| columns).all(|column| self.sheet.holds_numbers(*column))
+        if found
+            .targets
+            .iter()
+            .flat_map(|(_, columns)| columns)
+            .all(|column| self.sheet.holds_numbers(*column))
             && let Some(mapping) = self.targets(&found)
         {
             self.mappings.push(mapping);
@@ -123,32 +181,58 @@ impl ExaminedFile {
         }
         let numeric = |way: &PointColumns| {
             let more = way.difference.iter().flat_map(|(columns, _)| columns);
-            way.columns.iter().chain(more).all(|column| self.sheet.is_numeric(*column))
+            way.columns
+                .iter()
+                .chain(more)
+                .all(|column| self.sheet.is_numeric(*column))
         };
         let ways: Vec<&PointColumns> = found.ways.iter().filter(|way| numeric(way)).collect();
         let Some(best) = ways.first() else {
             if let Some(wanted) = found.wanted {
-                self.remarks.push(format!("only a target is there, no measured point: {}", quoted(&self.shown(&wanted))));
+                self.remarks.push(format!(
+                    "only a target is there, no measured point: {}",
+                    quoted(&self.shown(&wanted))
+                ));
             }
             return;
         };
         if let Some(sigma) = found.sigma {
             // In the unit of the point, unless the name says another.
-            let unit = self.said[sigma[0]].unit_of(&LENGTHS).unwrap_or(self.length_unit(&best.columns).0);
+            let unit = self.said[sigma[0]]
+                .unit_of(&LENGTHS)
+                .unwrap_or(self.length_unit(&best.columns).0);
             let (names, what) = match self.said[sigma[0]].stem().contains(words::U95) {
                 true => (["u95_x", "u95_y", "u95_z"], "two standard deviations"),
                 false => (["sigma_x", "sigma_y", "sigma_z"], "one standard deviation"),
             };
-            let lines = names.iter().zip(sigma).map(|(name, column)| self.line(name, column, Some(unit)));
+            let lines = names
+                .iter()
+                .zip(sigma)
+                .map(|(name, column)| self.line(name, column, Some(unit)));
             let lines: Vec<String> = lines.collect();
-            self.remarks.push(format!("{}   # CHECK: {what}, if rows are to be weighted by it", lines[0]));
+            self.remarks.push(format!(
+                "{}   # CHECK: {what}, if rows are to be weighted by it",
+                lines[0]
+            ));
             self.remarks.extend(lines.into_iter().skip(1));
         }
-        let by_size = self.length_unit(&best.columns).1.then(|| "the unit, by the size of the numbers".to_string());
+        let by_size = self
+            .length_unit(&best.columns)
+            .1
+            .then(|| "the unit, by the size of the numbers".to_string());
         let check: Vec<String> = found.question.into_iter().chain(by_size).collect();
-        let said = if found.said { "the measured point" } else { "the point" };
-        let less =
-            best.difference.map(|(columns, minus)| format!("; {} {}", if minus { "less" } else { "plus" }, self.shown(&columns)));
+        let said = if found.said {
+            "the measured point"
+        } else {
+            "the point"
+        };
+        let less = best.difference.map(|(columns, minus)| {
+            format!(
+                "; {} {}",
+                if minus { "less" } else { "plus" },
+                self.shown(&columns)
+            )
+        });
         let less = less.unwrap_or_default();
         let mapping = Mapping {
             quantity: "x",
@@ -162,51 +246,106 @@ impl ExaminedFile {
     /// A quaternion beside the point, as lines to take in: with a standard deviation, which only the instrument's owner knows, rows are full
     /// poses.
     fn quaternion(&mut self) {
-        let column = |name: &str| (0..self.said.len()).find(|k| self.said[*k].stem() == name && self.sheet.holds_numbers(*k));
-        let all = |prefix: &&str| ["w", "x", "y", "z"].map(|axis| column(&format!("{prefix}{axis}")));
-        let found = words::QUATERNIONS.iter().map(all).find_map(|columns| columns.into_iter().collect::<Option<Vec<usize>>>());
-        let unit = |columns: &Vec<usize>| columns.iter().all(|column| self.sheet.largest(*column) <= 1.0 + 1e-3);
-        let Some(columns) = found.filter(unit).filter(|_| self.get("x").is_some()) else { return };
-        let names = columns.iter().map(|column| self.reference(*column)).collect::<Vec<_>>().join(", ");
+        let column = |name: &str| {
+            (0..self.said.len())
+                .find(|k| self.said[*k].stem() == name && self.sheet.holds_numbers(*k))
+        };
+        let all =
+            |prefix: &&str| ["w", "x", "y", "z"].map(|axis| column(&format!("{prefix}{axis}")));
+        let found = words::QUATERNIONS
+            .iter()
+            .map(all)
+            .find_map(|columns| columns.into_iter().collect::<Option<Vec<usize>>>());
+        let unit = |columns: &Vec<usize>| {
+            columns
+                .iter()
+                .all(|column| self.sheet.largest(*column) <= 1.0 + 1e-3)
+        };
+        let Some(columns) = found.filter(unit).filter(|_| self.get("x").is_some()) else {
+            return;
+        };
+        let names = columns
+            .iter()
+            .map(|column| self.reference(*column))
+            .collect::<Vec<_>>()
+            .join(", ");
         self.remarks.push(format!(
             "orientation: {{quaternion: [{names}]}}   # CHECK: full poses, with the line below and your instrument's figure"
         ));
-        self.remarks.push("sigma_orientation: {value: 30, unit: arcsec}".into());
+        self.remarks
+            .push("sigma_orientation: {value: 30, unit: arcsec}".into());
     }
 
     /// Several targets side by side, or one of them alone.
     fn targets(&self, found: &Points) -> Option<Mapping> {
         let unit = self.length_unit(&found.targets.first()?.1).0;
         let one = |(name, columns): &(String, [usize; 3])| {
-            format!("{name}: [{}]", columns.each_ref().map(|column| self.reference(*column)).join(", "))
+            format!(
+                "{name}: [{}]",
+                columns
+                    .each_ref()
+                    .map(|column| self.reference(*column))
+                    .join(", ")
+            )
         };
         let all: Vec<String> = found.targets.iter().map(one).collect();
-        let columns = found.targets.iter().flat_map(|(_, columns)| *columns).collect();
-        let beside = Some(format!("targets: {{unit: {unit}, columns: {{{}}}}}", all.join(", ")));
-        let choices =
-            [Choice { lines: Vec::new(), columns, beside }].into_iter().chain(found.ways.iter().map(|way| self.way(way)));
-        let names: Vec<&str> = found.targets.iter().map(|(name, _)| name.as_str()).collect();
+        let columns = found
+            .targets
+            .iter()
+            .flat_map(|(_, columns)| *columns)
+            .collect();
+        let beside = Some(format!(
+            "targets: {{unit: {unit}, columns: {{{}}}}}",
+            all.join(", ")
+        ));
+        let choices = [Choice {
+            lines: Vec::new(),
+            columns,
+            beside,
+        }]
+        .into_iter()
+        .chain(found.ways.iter().map(|way| self.way(way)));
+        let names: Vec<&str> = found
+            .targets
+            .iter()
+            .map(|(name, _)| name.as_str())
+            .collect();
         Some(Mapping {
             quantity: "x",
             choices: choices.collect(),
-            check: Some("are these several reflectors, each measured in every pose, and is the unit right?".into()),
-            account: format!("the points of {} targets ({})", names.len(), names.join(", ")),
+            check: Some(
+                "are these several reflectors, each measured in every pose, and is the unit right?"
+                    .into(),
+            ),
+            account: format!(
+                "the points of {} targets ({})",
+                names.len(),
+                names.join(", ")
+            ),
         })
     }
 
     fn way(&self, way: &PointColumns) -> Choice {
         let unit = self.length_unit(&way.columns).0;
         let mut columns = way.columns.to_vec();
-        let lines = ["x", "y", "z"].iter().enumerate().map(|(axis, name)| match &way.difference {
-            None => self.line(name, way.columns[axis], Some(unit)),
-            Some((difference, minus)) => {
-                let (key, column) = (if *minus { "minus" } else { "plus" }, difference[axis]);
-                let other = self.said[column].unit_of(&LENGTHS).filter(|other| *other != unit);
-                let other = other.map(|other| format!(", difference_unit: {other}")).unwrap_or_default();
-                let (target, column) = (self.reference(way.columns[axis]), self.reference(column));
-                format!("{name}: {{column: {target}, {key}: {column}, unit: {unit}{other}}}")
-            }
-        });
+        let lines = ["x", "y", "z"]
+            .iter()
+            .enumerate()
+            .map(|(axis, name)| match &way.difference {
+                None => self.line(name, way.columns[axis], Some(unit)),
+                Some((difference, minus)) => {
+                    let (key, column) = (if *minus { "minus" } else { "plus" }, difference[axis]);
+                    let other = self.said[column]
+                        .unit_of(&LENGTHS)
+                        .filter(|other| *other != unit);
+                    let other = other
+                        .map(|other| format!(", difference_unit: {other}"))
+                        .unwrap_or_default();
+                    let (target, column) =
+                        (self.reference(way.columns[axis]), self.reference(column));
+                    format!("{name}: {{column: {target}, {key}: {column}, unit: {unit}{other}}}")
+                }
+            });
         let lines = lines.collect();
         columns.extend(way.difference.iter().flat_map(|(columns, _)| columns));
         Choice::of(lines, columns)
@@ -214,63 +353,112 @@ impl ExaminedFile {
 
     /// The unit of coordinates, and whether their size alone says so.
     pub(super) fn length_unit(&self, columns: &[usize]) -> (&'static str, bool) {
-        if let Some(unit) = columns.iter().find_map(|column| self.said[*column].unit_of(&LENGTHS)) {
+        if let Some(unit) = columns
+            .iter()
+            .find_map(|column| self.said[*column].unit_of(&LENGTHS))
+        {
             return (unit, false);
         }
-        let farthest = columns.iter().map(|column| self.sheet.largest(*column)).fold(0.0, f64::max);
+        let farthest = columns
+            .iter()
+            .map(|column| self.sheet.largest(*column))
+            .fold(0.0, f64::max);
         (if farthest > MOST_METRES { "mm" } else { "m" }, true)
     }
 
     /// Motor currents, directions of approach and velocities under calib's own names.
     fn per_joint(&mut self) {
-        let Some(count) = self.get("q").map(|joints| joints.choices[0].columns.len()) else { return };
-        for (quantity, pattern, unit) in
-            [("current", "i{j}_a", Some("A")), ("direction", "dir{j}", None), ("velocity", "dq{j}_deg_s", Some("deg/s"))]
-        {
-            let column = |n: usize| self.sheet.names.iter().position(|name| *name == pattern.replace("{j}", &n.to_string()));
+        let Some(count) = self.get("q").map(|joints| joints.choices[0].columns.len()) else {
+            return;
+        };
+        for (quantity, pattern, unit) in [
+            ("current", "i{j}_a", Some("A")),
+            ("direction", "dir{j}", None),
+            ("velocity", "dq{j}_deg_s", Some("deg/s")),
+        ] {
+            let column = |n: usize| {
+                self.sheet
+                    .names
+                    .iter()
+                    .position(|name| *name == pattern.replace("{j}", &n.to_string()))
+            };
             let columns: Vec<usize> = (1..).map_while(column).collect();
             if columns.len() == count {
                 let lines = vec![self.joints_line(quantity, &columns, unit)];
                 let account = format!("{quantity} ({pattern})");
-                self.mappings.push(Mapping { quantity, choices: vec![Choice::of(lines, columns)], check: None, account });
+                self.mappings.push(Mapping {
+                    quantity,
+                    choices: vec![Choice::of(lines, columns)],
+                    check: None,
+                    account,
+                });
             }
         }
     }
 
     fn scalars(&mut self) {
-        for (quantity, listed, unit, most) in
-            [("payload", &words::PAYLOADS[..], "kg", 1e4), ("temperature", &words::TEMPERATURES[..], "C", 200.0)]
-        {
+        for (quantity, listed, unit, most) in [
+            ("payload", &words::PAYLOADS[..], "kg", 1e4),
+            ("temperature", &words::TEMPERATURES[..], "C", 200.0),
+        ] {
             let fits = |column: &usize| {
                 let name = &self.said[*column];
-                let named = if quantity == "payload" { listed.contains(&name.stem().as_str()) } else { name.is(listed) };
-                let plausible = self.sheet.is_numeric(*column) && self.sheet.largest(*column) <= most;
-                named && plausible && !self.is_taken(*column) && name.unit.is_none_or(|other| other == unit)
+                let named = if quantity == "payload" {
+                    listed.contains(&name.stem().as_str())
+                } else {
+                    name.is(listed)
+                };
+                let plausible =
+                    self.sheet.is_numeric(*column) && self.sheet.largest(*column) <= most;
+                named
+                    && plausible
+                    && !self.is_taken(*column)
+                    && name.unit.is_none_or(|other| other == unit)
             };
             let columns: Vec<usize> = (0..self.said.len()).filter(fits).collect();
-            let Some(first) = columns.first() else { continue };
+            let Some(first) = columns.first() else {
+                continue;
+            };
             let check = (self.said[*first].unit.is_none()).then(|| "the unit".to_string());
             self.map(quantity, &columns, Some(unit), check);
         }
     }
 
     fn time(&mut self) {
-        let named = |column: &usize| self.said[*column].is(&words::TIMES) && !self.is_taken(*column);
+        let named =
+            |column: &usize| self.said[*column].is(&words::TIMES) && !self.is_taken(*column);
         let unit = |column: usize| match self.said[column].unit {
             // Beyond what ms of a date are, it is finer than any unit that is read.
-            None => Some((if self.sheet.largest(column) > 1e11 { "ms" } else { "s" }, false))
-                .filter(|_| self.sheet.largest(column) < 1e14),
+            None => Some((
+                if self.sheet.largest(column) > 1e11 {
+                    "ms"
+                } else {
+                    "s"
+                },
+                false,
+            ))
+            .filter(|_| self.sheet.largest(column) < 1e14),
             Some(unit) => Some((unit, true)).filter(|(unit, _)| ["s", "ms"].contains(unit)),
         };
         let columns: Vec<usize> = (0..self.said.len()).filter(named).collect();
-        let running: Vec<usize> =
-            columns.iter().copied().filter(|column| unit(*column).is_some() && self.runs(*column)).collect();
+        let running: Vec<usize> = columns
+            .iter()
+            .copied()
+            .filter(|column| unit(*column).is_some() && self.runs(*column))
+            .collect();
         let is_clock = |column: &usize| {
-            let mut texts = self.sheet.texts(*column).filter(|text| !text.is_empty()).peekable();
+            let mut texts = self
+                .sheet
+                .texts(*column)
+                .filter(|text| !text.is_empty())
+                .peekable();
             texts.peek().is_some() && texts.all(is_clock_time)
         };
         let clocks: Vec<usize> = columns.iter().copied().filter(is_clock).collect();
-        for column in columns.iter().filter(|column| !running.contains(column) && !clocks.contains(column)) {
+        for column in columns
+            .iter()
+            .filter(|column| !running.contains(column) && !clocks.contains(column))
+        {
             let name = quoted(&self.sheet.names[*column]);
             self.remarks.push(format!(
                 "{name} cannot be read as time; allowed: s or ms as numbers that never decrease, 08:15:03, or 2026-11-22T08:15:03"
@@ -281,7 +469,12 @@ impl ExaminedFile {
             return;
         };
         self.second = if unit == "ms" { 1e-3 } else { 1.0 };
-        self.map("time", &running, Some(unit), (!said).then(|| "the unit".to_string()));
+        self.map(
+            "time",
+            &running,
+            Some(unit),
+            (!said).then(|| "the unit".to_string()),
+        );
     }
 
     /// Whether numbers do not fall, do not stand still, and are no dates in digits (20201103154500).
@@ -289,7 +482,10 @@ impl ExaminedFile {
         let times: Vec<f64> = self.sheet.numbers(column).collect();
         let falls = times.windows(2).filter(|pair| pair[1] < pair[0]).count();
         let dates = times.iter().all(|time| (1.9e13..2.2e13).contains(time));
-        let moves = times.first().zip(times.last()).is_some_and(|(first, last)| last > first);
+        let moves = times
+            .first()
+            .zip(times.last())
+            .is_some_and(|(first, last)| last > first);
         self.sheet.is_numeric(column) && moves && !dates && 20 * falls <= times.len()
     }
 
@@ -298,17 +494,26 @@ impl ExaminedFile {
         let columns = 0..self.said.len();
         let few = |column: usize| {
             let distinct = self.distinct(column);
-            (2..=10).contains(&distinct) && 3 * distinct <= self.sheet.rows.len() && !self.sheet.is_numeric(column)
+            (2..=10).contains(&distinct)
+                && 3 * distinct <= self.sheet.rows.len()
+                && !self.sheet.is_numeric(column)
         };
-        let listed = |listed: &[&str], column: usize| listed.contains(&self.said[column].stem().as_str());
-        let usages: Vec<usize> = columns.clone().filter(|column| listed(&words::USAGES, *column) && few(*column)).collect();
-        let reflectors: Vec<usize> = columns.filter(|column| listed(&words::REFLECTORS, *column) && few(*column)).collect();
+        let listed =
+            |listed: &[&str], column: usize| listed.contains(&self.said[column].stem().as_str());
+        let usages: Vec<usize> = columns
+            .clone()
+            .filter(|column| listed(&words::USAGES, *column) && few(*column))
+            .collect();
+        let reflectors: Vec<usize> = columns
+            .filter(|column| listed(&words::REFLECTORS, *column) && few(*column))
+            .collect();
         self.map("usage", &usages, None, None);
         self.map(
             "target",
             &reflectors,
             None,
-            Some("which of several reflectors was measured?".into()).filter(|_| !reflectors.is_empty()),
+            Some("which of several reflectors was measured?".into())
+                .filter(|_| !reflectors.is_empty()),
         );
     }
 }

@@ -4,8 +4,8 @@ use super::sheet::Sheet;
 use crate::error::{Error, Result};
 use crate::program::listing;
 use crate::raw::{
-    self, BagRows, BagTopic, ColumnRows, Record, RecordReader, Workbook, bag_content, failed, has_columns, is_bag, is_utf16,
-    is_workbook, not_read, shown,
+    self, BagRows, BagTopic, ColumnRows, Record, RecordReader, Workbook, bag_content, failed,
+    has_columns, is_bag, is_utf16, is_workbook, not_read, shown,
 };
 use crate::stage::ingest::ListedTable;
 use std::io::{BufRead, BufReader, Read};
@@ -18,26 +18,36 @@ const LINES: usize = 20_000;
 /// The table of a file; of a workbook its sheets with rows of numbers, where there are so many places for them.
 pub(super) fn tables(path: &Path, places: usize) -> Result<Vec<Sheet>> {
     let place = path.display().to_string();
-    let file = raw::source(path).map_err(|error| Error::spec(&place, format!("cannot be read: {error}")))?;
+    let file = raw::source(path)
+        .map_err(|error| Error::spec(&place, format!("cannot be read: {error}")))?;
     let failed = |error: std::io::Error| Error::store(&place, format!("cannot be read: {error}"));
     let mut reader = BufReader::new(file);
     let head = reader.fill_buf().map_err(failed)?;
-    let one = |sheet: std::result::Result<Sheet, String>| vec![sheet.unwrap_or_else(Sheet::not_understood)];
+    let one = |sheet: std::result::Result<Sheet, String>| {
+        vec![sheet.unwrap_or_else(Sheet::not_understood)]
+    };
     if is_workbook(head) {
-        return Ok(sheets(reader, places).unwrap_or_else(|trouble| vec![Sheet::not_understood(trouble)]));
+        return Ok(
+            sheets(reader, places).unwrap_or_else(|trouble| vec![Sheet::not_understood(trouble)])
+        );
     }
     if is_bag(head) {
-        return Ok(topics(path, &place).unwrap_or_else(|error| vec![Sheet::not_understood(error.to_string())]));
+        return Ok(topics(path, &place)
+            .unwrap_or_else(|error| vec![Sheet::not_understood(error.to_string())]));
     }
     if let Some(language) = listing(&raw::ending(path), head) {
         let table = ListedTable::read(reader, &place, language);
-        return Ok(one(table.map(Sheet::of_program).map_err(|error| error.to_string())));
+        return Ok(one(table
+            .map(Sheet::of_program)
+            .map_err(|error| error.to_string())));
     }
     if let Some(what) = not_read(head) {
         return Ok(one(Err(what.into())));
     }
     if has_columns(head) {
-        return Ok(one(columns(reader, &place).map_err(|error| error.to_string())));
+        return Ok(one(
+            columns(reader, &place).map_err(|error| error.to_string())
+        ));
     }
     if !is_utf16(head) && head.contains(&0) {
         return Ok(one(Err("no text".into())));
@@ -46,7 +56,12 @@ pub(super) fn tables(path: &Path, places: usize) -> Result<Vec<Sheet>> {
     let text = raw::without_utf16(reader).map_err(failed)?;
     for line in BufReader::new(text).take(LOOKED).split(b'\n').take(LINES) {
         let line = line.map_err(failed)?;
-        lines.push(shown(&line).trim_end_matches('\r').trim_start_matches('\u{feff}').to_string());
+        lines.push(
+            shown(&line)
+                .trim_end_matches('\r')
+                .trim_start_matches('\u{feff}')
+                .to_string(),
+        );
     }
     Ok(vec![Sheet::of(&lines)])
 }
@@ -72,10 +87,24 @@ fn topics(path: &Path, place: &str) -> Result<Vec<Sheet>> {
     let opened = || raw::source(path).map_err(|error| failed(place, &error));
     let content = bag_content(opened()?, place)?;
     let most = |wanted: &[&str]| {
-        let fits = |topic: &&BagTopic| topic.messages > 0 && wanted.iter().any(|kind| topic.kind.ends_with(kind));
-        content.topics.iter().filter(fits).max_by_key(|topic| topic.messages)
+        let fits = |topic: &&BagTopic| {
+            topic.messages > 0 && wanted.iter().any(|kind| topic.kind.ends_with(kind))
+        };
+        content
+            .topics
+            .iter()
+            .filter(fits)
+            .max_by_key(|topic| topic.messages)
     };
-    let chosen = [most(&["/JointState"]), most(&["/PointStamped", "/PoseStamped", "/TransformStamped", "/TFMessage"])];
+    let chosen = [
+        most(&["/JointState"]),
+        most(&[
+            "/PointStamped",
+            "/PoseStamped",
+            "/TransformStamped",
+            "/TFMessage",
+        ]),
+    ];
     let mut sheets = Vec::new();
     for topic in chosen.into_iter().flatten() {
         let (names, rows) = first_rows(&mut BagRows::open(opened()?, place, Some(&topic.name))?)?;
@@ -92,10 +121,19 @@ fn topics(path: &Path, place: &str) -> Result<Vec<Sheet>> {
 fn sheets(source: impl Read, places: usize) -> Result<Vec<Sheet>, String> {
     let mut book = Workbook::read(source)?;
     let tables = book.tables()?;
-    let one = [if (1..=places).contains(&tables.len()) { String::new() } else { book.sheet(None)? }];
+    let one = [if (1..=places).contains(&tables.len()) {
+        String::new()
+    } else {
+        book.sheet(None)?
+    }];
     let names = if one[0].is_empty() { &tables[..] } else { &one };
     let sheet = |name: &String| {
-        let lines: Vec<String> = book.lines(name, '.')?.lines().take(LINES).map(String::from).collect();
+        let lines: Vec<String> = book
+            .lines(name, '.')?
+            .lines()
+            .take(LINES)
+            .map(String::from)
+            .collect();
         Ok(Sheet::of_workbook(name, &lines))
     };
     names.iter().map(sheet).collect()

@@ -20,8 +20,12 @@ pub enum RobotFileKind {
 }
 
 /// Typical arms, in the order of the help.
-pub const KINDS: [RobotFileKind; 4] =
-    [RobotFileKind::Spherical6, RobotFileKind::Offset6, RobotFileKind::Seven, RobotFileKind::Dh6];
+pub const KINDS: [RobotFileKind; 4] = [
+    RobotFileKind::Spherical6,
+    RobotFileKind::Offset6,
+    RobotFileKind::Seven,
+    RobotFileKind::Dh6,
+];
 
 impl RobotFileKind {
     /// The typical arm or the arm of the library that is called so.
@@ -44,7 +48,9 @@ impl RobotFileKind {
     /// What it is, in one line.
     pub fn help(self) -> &'static str {
         match self {
-            Self::Spherical6 => "Six joints, the last three axes meet in a point (most industrial arms)",
+            Self::Spherical6 => {
+                "Six joints, the last three axes meet in a point (most industrial arms)"
+            }
             Self::Offset6 => "Six joints, offset wrist (most cobots)",
             Self::Seven => "Seven joints, alternating axes",
             Self::Dh6 => "Six joints as a table of DH parameters",
@@ -77,7 +83,11 @@ impl RobotFileKind {
             Self::Seven => (SEVEN, "{point: [60, 30, 1300]}"),
             Self::Dh6 => (DH6, "{point: [60, 0, 30]}"),
         };
-        let where_given = if self == Self::Dh6 { "in the last frame" } else { "at the zero pose, base frame" };
+        let where_given = if self == Self::Dh6 {
+            "in the last frame"
+        } else {
+            "at the zero pose, base frame"
+        };
         let mut out = format!(
             "{HEAD}{kinematics}tool: {tool}       # REPLACE: the measured point, {where_given}; off the last axis, else that joint cannot be seen\njoints:                           # REPLACE limits; reduction_ratio (motor turns per turn) only if known\n"
         );
@@ -97,7 +107,8 @@ pub(super) fn of_urdf(base: &str, tip: &str) -> String {
     )
 }
 
-const HEAD: &str = "# The robot as its data sheet describes it; calib identifies how the real one differs.
+const HEAD: &str =
+    "# The robot as its data sheet describes it; calib identifies how the real one differs.
 calib_robot: 1
 name: my robot                    # REPLACE
 units: {length: mm, angle: deg}   # of this file

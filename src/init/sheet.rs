@@ -50,7 +50,9 @@ struct Content<'a> {
 
 /// The last mark of a number.
 fn decimal_mark(text: &str) -> Option<char> {
-    text.chars().rev().find(|letter| ['.', ','].contains(letter))
+    text.chars()
+        .rev()
+        .find(|letter| ['.', ','].contains(letter))
 }
 
 fn numeric(cells: &[String]) -> usize {
@@ -59,9 +61,17 @@ fn numeric(cells: &[String]) -> usize {
 
 /// The fields of a line; a quoted one may hold the delimiter. A blank stands for any run of blanks and tabs.
 fn cells(line: &str, delimiter: char) -> Vec<String> {
-    let delimiter = if delimiter == ' ' { Delimiter::Whitespace } else { Delimiter::Byte(delimiter as u8) };
+    let delimiter = if delimiter == ' ' {
+        Delimiter::Whitespace
+    } else {
+        Delimiter::Byte(delimiter as u8)
+    };
     let line = line.trim_end();
-    fields(line, delimiter).0.into_iter().map(|place| unquoted_text(&line[place]).into_owned()).collect()
+    fields(line, delimiter)
+        .0
+        .into_iter()
+        .map(|place| unquoted_text(&line[place]).into_owned())
+        .collect()
 }
 
 /// Without the blank cells that a delimiter at the end of a line makes.
@@ -75,7 +85,12 @@ fn filled(mut cells: Vec<String>) -> Vec<String> {
 impl Sheet {
     /// What nothing can be said of, and why.
     pub fn not_understood(trouble: String) -> Self {
-        Self { trouble: Some(trouble), delimiter: ',', header: true, ..Self::default() }
+        Self {
+            trouble: Some(trouble),
+            delimiter: ',',
+            header: true,
+            ..Self::default()
+        }
     }
 
     pub fn of(lines: &[String]) -> Self {
@@ -85,7 +100,11 @@ impl Sheet {
     /// A sheet of a workbook, with tabs between its cells.
     pub fn of_workbook(name: &str, lines: &[String]) -> Self {
         // What separates cells is the workbook's own.
-        Self { of_book: Some(name.into()), delimiter: ',', ..Self::delimited(lines, Some('\t')) }
+        Self {
+            of_book: Some(name.into()),
+            delimiter: ',',
+            ..Self::delimited(lines, Some('\t'))
+        }
     }
 
     /// Joints that a program lists, in deg.
@@ -103,20 +122,32 @@ impl Sheet {
 
     /// A file of columns.
     pub fn of_columns(names: Vec<String>, rows: Vec<Vec<String>>) -> Self {
-        Self { delimiter: ',', header: true, names, rows, ..Self::default() }
+        Self {
+            delimiter: ',',
+            header: true,
+            names,
+            rows,
+            ..Self::default()
+        }
     }
 
     /// The first messages of a topic; its times are in s.
     pub fn of_topic(topic: &BagTopic, names: Vec<String>, rows: Vec<Vec<String>>) -> Self {
         // ROS states everything in SI (REP 103); efforts are torques or whatever the driver has.
         let unit = |name: &String| match name.rsplit_once('.') {
-            None => ["received", "stamp"].contains(&name.as_str()).then_some("s"),
+            None => ["received", "stamp"]
+                .contains(&name.as_str())
+                .then_some("s"),
             Some((_, "position")) => Some("rad"),
             Some(("point" | "position" | "translation", _)) => Some("m"),
             _ => None,
         };
         let (units, topic) = (names.iter().map(unit).collect(), Some(topic.name.clone()));
-        Self { topic, units, ..Self::of_columns(names, rows) }
+        Self {
+            topic,
+            units,
+            ..Self::of_columns(names, rows)
+        }
     }
 
     fn delimited(lines: &[String], given: Option<char>) -> Self {
@@ -127,8 +158,16 @@ impl Sheet {
             .map(|(at, text)| Content { at, text })
             .collect();
         let delimiter = given.unwrap_or_else(|| delimiter(&content));
-        let mut sheet = Self { delimiter, comment, header: true, ..Self::default() };
-        let table: Vec<Vec<String>> = content.iter().map(|line| cells(line.text, delimiter)).collect();
+        let mut sheet = Self {
+            delimiter,
+            comment,
+            header: true,
+            ..Self::default()
+        };
+        let table: Vec<Vec<String>> = content
+            .iter()
+            .map(|line| cells(line.text, delimiter))
+            .collect();
         let begins = if let Some(k) = plain_header(&table) {
             sheet.skip = content[k].at;
             sheet.names = filled(table[k].clone());
@@ -136,31 +175,61 @@ impl Sheet {
         } else if let Some((at, names, mark)) = commented_header(lines, &sheet, &content, &table) {
             (sheet.skip, sheet.names, sheet.header_in_comment) = (at, names, mark);
             sheet.comment = sheet.comment.filter(|_| mark);
-            content.iter().position(|line| line.at > at).unwrap_or(content.len())
+            content
+                .iter()
+                .position(|line| line.at > at)
+                .unwrap_or(content.len())
         } else if let Some(k) = bare_rows(&table) {
             sheet.skip = content[k].at;
             sheet.header = false;
-            sheet.names = (1..=table[k].len()).map(|number| number.to_string()).collect();
+            sheet.names = (1..=table[k].len())
+                .map(|number| number.to_string())
+                .collect();
             sheet.trouble = Some("no header found".into());
             k
         } else {
-            let seen = content.iter().take(3).map(|line| format!("`{}`", line.text.trim().chars().take(60).collect::<String>()));
+            let seen = content.iter().take(3).map(|line| {
+                format!(
+                    "`{}`",
+                    line.text.trim().chars().take(60).collect::<String>()
+                )
+            });
             let seen: Vec<String> = seen.collect();
-            let seen = if seen.is_empty() { "the file is empty".into() } else { format!("it begins {}", seen.join(", ")) };
+            let seen = if seen.is_empty() {
+                "the file is empty".into()
+            } else {
+                format!("it begins {}", seen.join(", "))
+            };
             sheet.trouble = Some(format!("no header found and no rows of numbers; {seen}"));
             return sheet;
         };
-        let first = begins + usize::from(table.get(begins).is_some_and(|row| is_units(row)) && sheet.header);
+        let first = begins
+            + usize::from(table.get(begins).is_some_and(|row| is_units(row)) && sheet.header);
         sheet.unit_row = first > begins;
         sheet.units = match table.get(begins).filter(|_| sheet.unit_row) {
             Some(row) => row.iter().map(|cell| unit(cell)).collect(),
             None => Vec::new(),
         };
         let width = sheet.names.len();
-        let rows = table.into_iter().skip(first).map(filled).filter(|row| !row.is_empty() && row.len() <= width);
-        sheet.rows = rows.map(|row| row.into_iter().chain(std::iter::repeat(String::new())).take(width).collect()).collect();
+        let rows = table
+            .into_iter()
+            .skip(first)
+            .map(filled)
+            .filter(|row| !row.is_empty() && row.len() <= width);
+        sheet.rows = rows
+            .map(|row| {
+                row.into_iter()
+                    .chain(std::iter::repeat(String::new()))
+                    .take(width)
+                    .collect()
+            })
+            .collect();
         let marks = |mark: char| {
-            let numbers = sheet.rows.iter().flatten().filter(|cell| decimal_mark(cell) == Some(mark) && number(cell).is_some());
+            let numbers = sheet
+                .rows
+                .iter()
+                .flatten()
+                .filter(|cell| decimal_mark(cell) == Some(mark) && number(cell).is_some());
             numbers.count()
         };
         sheet.comma = marks(',') > marks('.');
@@ -168,11 +237,17 @@ impl Sheet {
     }
 
     pub fn numbers(&self, column: usize) -> impl Iterator<Item = f64> + '_ {
-        self.rows.iter().filter_map(move |row| row.get(column).and_then(|cell| number(cell)))
+        self.rows
+            .iter()
+            .filter_map(move |row| row.get(column).and_then(|cell| number(cell)))
     }
 
     pub fn texts(&self, column: usize) -> impl Iterator<Item = &str> {
-        self.rows.iter().filter_map(move |row| row.get(column)).map(String::as_str).filter(|cell| !cell.is_empty())
+        self.rows
+            .iter()
+            .filter_map(move |row| row.get(column))
+            .map(String::as_str)
+            .filter(|cell| !cell.is_empty())
     }
 
     /// Whether nine of ten cells are numbers.
@@ -194,10 +269,16 @@ impl Sheet {
     /// What a column holds, for a person: `column 3: -12.5 to 80`, `column 1: P1, P2, ...`.
     pub fn seen(&self, column: usize) -> String {
         if self.is_numeric(column) {
-            let (lower, upper) = self.numbers(column).fold((f64::MAX, f64::MIN), |(a, b), x| (a.min(x), b.max(x)));
+            let (lower, upper) = self
+                .numbers(column)
+                .fold((f64::MAX, f64::MIN), |(a, b), x| (a.min(x), b.max(x)));
             return format!("column {}: {lower} to {upper}", column + 1);
         }
-        let texts: Vec<String> = self.texts(column).take(3).map(|text| text.chars().take(20).collect()).collect();
+        let texts: Vec<String> = self
+            .texts(column)
+            .take(3)
+            .map(|text| text.chars().take(20).collect())
+            .collect();
         format!("column {}: {}, ...", column + 1, texts.join(", "))
     }
 }
@@ -206,19 +287,31 @@ impl Sheet {
 fn comment(lines: &[String]) -> Option<&'static str> {
     let filled = lines.iter().filter(|line| !line.trim().is_empty()).count();
     let begun = |mark: &str| lines.iter().filter(|line| line.starts_with(mark)).count();
-    COMMENTS.into_iter().find(|mark| begun(mark) > 0 && 2 * begun(mark) < filled)
+    COMMENTS
+        .into_iter()
+        .find(|mark| begun(mark) > 0 && 2 * begun(mark) < filled)
 }
 
 /// What separates fields: what makes most lines rows of one width with most numbers in them.
 fn delimiter(content: &[Content]) -> char {
     let worth = |delimiter: char| {
-        let rows: Vec<Vec<String>> = content.iter().take(ENOUGH).map(|line| cells(line.text, delimiter)).collect();
+        let rows: Vec<Vec<String>> = content
+            .iter()
+            .take(ENOUGH)
+            .map(|line| cells(line.text, delimiter))
+            .collect();
         let mut widths = std::collections::BTreeMap::new();
-        rows.iter().for_each(|row| *widths.entry(row.len()).or_insert(0) += 1);
-        let usual = widths.into_iter().filter(|(width, _)| *width >= NARROWEST).max_by_key(|(_, rows)| *rows);
+        rows.iter()
+            .for_each(|row| *widths.entry(row.len()).or_insert(0) += 1);
+        let usual = widths
+            .into_iter()
+            .filter(|(width, _)| *width >= NARROWEST)
+            .max_by_key(|(_, rows)| *rows);
         let usual = usual.map_or(0, |(width, _)| width);
         let of_width = rows.iter().filter(|row| row.len() == usual);
-        of_width.map(|row| (1 + numeric(row)) as f64 / (1 + row.len()) as f64).sum::<f64>()
+        of_width
+            .map(|row| (1 + numeric(row)) as f64 / (1 + row.len()) as f64)
+            .sum::<f64>()
     };
     let mut best = (0.0, ',');
     for delimiter in [';', '\t', ',', '|', ' '] {
@@ -232,10 +325,18 @@ fn delimiter(content: &[Content]) -> char {
 
 /// Whether a row of numbers stands here, as wide as most below it.
 fn is_data(table: &[Vec<String>], k: usize, width: usize) -> bool {
-    let Some(row) = table.get(k) else { return false };
+    let Some(row) = table.get(k) else {
+        return false;
+    };
     let below = &table[k..];
-    let alike = below.iter().filter(|other| other.len() == row.len()).count();
-    row.len() >= NARROWEST && filled(row.clone()).len() <= width && numeric(row) >= 2 && 2 * alike >= below.len()
+    let alike = below
+        .iter()
+        .filter(|other| other.len() == row.len())
+        .count();
+    row.len() >= NARROWEST
+        && filled(row.clone()).len() <= width
+        && numeric(row) >= 2
+        && 2 * alike >= below.len()
 }
 
 fn is_names(row: &[String]) -> bool {
@@ -249,7 +350,10 @@ fn unit(cell: &str) -> Option<&'static str> {
 }
 
 fn is_units(row: &[String]) -> bool {
-    let mut said = row.iter().filter(|cell| !cell.is_empty() && *cell != "-").peekable();
+    let mut said = row
+        .iter()
+        .filter(|cell| !cell.is_empty() && *cell != "-")
+        .peekable();
     said.peek().is_some() && said.all(|cell| unit(cell).is_some())
 }
 
@@ -272,15 +376,29 @@ fn commented_header(
 ) -> Option<(usize, Vec<String>, bool)> {
     let mark = sheet.comment?;
     let fits = |names: &[String], at: usize| {
-        let Some(next) = content.iter().position(|line| line.at > at) else { return false };
-        is_names(names) && !names[0].is_empty() && is_data(table, next, names.len()) && table[next].len() == names.len()
+        let Some(next) = content.iter().position(|line| line.at > at) else {
+            return false;
+        };
+        is_names(names)
+            && !names[0].is_empty()
+            && is_data(table, next, names.len())
+            && table[next].len() == names.len()
     };
     let first = content.first()?.at;
-    (0..first).rev().chain(first..lines.len()).filter(|at| lines[*at].starts_with(mark)).find_map(|at| {
-        let [bare, whole] = [&lines[at][mark.len()..], &lines[at]].map(|text| filled(cells(text, sheet.delimiter)));
-        let is_mark = fits(&bare, at);
-        (is_mark || fits(&whole, at)).then_some((at, if is_mark { bare } else { whole }, is_mark))
-    })
+    (0..first)
+        .rev()
+        .chain(first..lines.len())
+        .filter(|at| lines[*at].starts_with(mark))
+        .find_map(|at| {
+            let [bare, whole] = [&lines[at][mark.len()..], &lines[at]]
+                .map(|text| filled(cells(text, sheet.delimiter)));
+            let is_mark = fits(&bare, at);
+            (is_mark || fits(&whole, at)).then_some((
+                at,
+                if is_mark { bare } else { whole },
+                is_mark,
+            ))
+        })
 }
 
 /// The first row of a file without a header.
@@ -298,14 +416,32 @@ mod tests {
 
     #[test]
     fn delimiter_decimal_mark_and_header_follow_from_the_rows() {
-        let german = sheet("Messung vom Dienstag\n\nName;A1;A2;ok\nP1;10,5;-3,25;ja\nP2;11,0;3;ja\n");
-        assert_eq!((german.delimiter, german.comma, german.skip, german.names.len()), (';', true, 2, 4));
+        let german =
+            sheet("Messung vom Dienstag\n\nName;A1;A2;ok\nP1;10,5;-3,25;ja\nP2;11,0;3;ja\n");
+        assert_eq!(
+            (
+                german.delimiter,
+                german.comma,
+                german.skip,
+                german.names.len()
+            ),
+            (';', true, 2, 4)
+        );
         let quoted = sheet("Name,A1,A2\n\"P,1\",\"1,5\",\"2,5\"\n\"P,2\",\"1,5\",\"2,5\"\n");
-        assert_eq!((quoted.delimiter, quoted.comma, quoted.rows[0][0].as_str()), (',', true, "P,1"));
+        assert_eq!(
+            (quoted.delimiter, quoted.comma, quoted.rows[0][0].as_str()),
+            (',', true, "P,1")
+        );
         let blanks = sheet("Name  X   Y  Z\nP1  1.0 2.0 3.0\nP2  1.0 2.0 3.0\n");
-        assert_eq!((blanks.delimiter, blanks.comma, blanks.rows.len()), (' ', false, 2));
+        assert_eq!(
+            (blanks.delimiter, blanks.comma, blanks.rows.len()),
+            (' ', false, 2)
+        );
         let units = sheet("Name;X;Y;Z\n;[mm];[mm];[mm]\nP1;1;2;3\nP2;1;2;3\n");
-        assert_eq!((units.unit_row, units.units[1], units.rows.len()), (true, Some("mm"), 2));
+        assert_eq!(
+            (units.unit_row, units.units[1], units.rows.len()),
+            (true, Some("mm"), 2)
+        );
     }
 
     #[test]
@@ -313,22 +449,39 @@ mod tests {
         let exported = sheet(
             "// made today\n// Collection Group Target X Y Z\nA G P1 1 2 3\nA G P2 1 2 3\nA G P3 1 2 3\n// end\nA G P4 1 2 3\n",
         );
-        assert_eq!((exported.comment, exported.header_in_comment, exported.skip), (Some("//"), true, 1));
-        assert_eq!((exported.names[2].as_str(), exported.rows.len()), ("Target", 4));
+        assert_eq!(
+            (exported.comment, exported.header_in_comment, exported.skip),
+            (Some("//"), true, 1)
+        );
+        assert_eq!(
+            (exported.names[2].as_str(), exported.rows.len()),
+            ("Target", 4)
+        );
         let number = sheet("#,X,Y,Z\n1,1,2,3\n2,1,2,3\n3,1,2,3\n");
-        assert_eq!((number.comment, number.header_in_comment, number.names[0].as_str()), (None, false, "#"));
+        assert_eq!(
+            (
+                number.comment,
+                number.header_in_comment,
+                number.names[0].as_str()
+            ),
+            (None, false, "#")
+        );
     }
 
     #[test]
     fn marks_of_thousands_are_no_decimal_marks() {
-        let german = sheet("Name;X;Y;Z\nP1;1.234,50;-2.000,25;900,5\nP2;1.235,50;-2.001,25;901,5\n");
+        let german =
+            sheet("Name;X;Y;Z\nP1;1.234,50;-2.000,25;900,5\nP2;1.235,50;-2.001,25;901,5\n");
         assert_eq!((german.comma, german.is_numeric(1)), (true, true));
     }
 
     #[test]
     fn without_a_header_columns_have_numbers() {
         let bare = sheet("1.5;2.5;3.5\n4;5;6\n");
-        assert_eq!((bare.header, bare.names.join(" ").as_str(), bare.rows.len()), (false, "1 2 3", 2));
+        assert_eq!(
+            (bare.header, bare.names.join(" ").as_str(), bare.rows.len()),
+            (false, "1 2 3", 2)
+        );
         assert_eq!(bare.seen(0), "column 1: 1.5 to 4");
         assert!(sheet("nothing\n").trouble.is_some());
     }

@@ -44,18 +44,28 @@ pub(super) fn join(found: &mut [ExaminedFile]) -> Joined {
         return Joined::default();
     };
     // A file that was not understood says nothing; ids and points are written as lines to replace.
-    let blind = [&*one, &*two].iter().any(|file| file.sheet.trouble.is_some());
+    let blind = [&*one, &*two]
+        .iter()
+        .any(|file| file.sheet.trouble.is_some());
     single(one, two);
     let pairs = pairs(one, two);
     let timing = timing(one, two);
     let sizes = [one.sheet.rows.len(), two.sheet.rows.len()];
     // Rows that are only counted: where files are of unequal length, numbers say no more than the order of rows.
-    let running =
-        pairs.first().is_some_and(|pair| !pair.text && !pair.numbers && runs(one, pair.columns[0]) && runs(two, pair.columns[1]));
+    let running = pairs.first().is_some_and(|pair| {
+        !pair.text && !pair.numbers && runs(one, pair.columns[0]) && runs(two, pair.columns[1])
+    });
     let doubtful = running && sizes[0] != sizes[1];
-    if let Some(best) = pairs.first().filter(|_| !doubtful || timing.is_none()).cloned() {
+    if let Some(best) = pairs
+        .first()
+        .filter(|_| !doubtful || timing.is_none())
+        .cloned()
+    {
         if one.get("time").is_some() {
-            two.drop("time", "rows are joined by name; time is that of the first file");
+            two.drop(
+                "time",
+                "rows are joined by name; time is that of the first file",
+            );
         }
         return by_id(one, two, &best, &pairs, running);
     }
@@ -76,7 +86,9 @@ pub(super) fn join(found: &mut [ExaminedFile]) -> Joined {
         (_, true) => format!("CHECK: row by row, since neither names nor times were found in both; {a} rows each"),
         _ => format!("REPLACE: neither names nor times were found in both, and {a} and {b} rows cannot be joined by order"),
     };
-    Joined { lines: vec![format!("      join: {{by: order}}       # {why}")] }
+    Joined {
+        lines: vec![format!("      join: {{by: order}}       # {why}")],
+    }
 }
 
 /// Whether a file is a recording of its own: it has joints and points.
@@ -87,17 +99,35 @@ pub(super) fn is_whole(file: &ExaminedFile) -> bool {
 /// Takes out all lists of points but the first, with the reflectors' names, where the files are one of joints and lists of points in one
 /// layout, a reflector each; the first file has the joints then, the second the points of the first reflector. Nothing of other files.
 pub(super) fn other_reflectors(found: &mut Vec<ExaminedFile>) -> Vec<(String, ExaminedFile)> {
-    let is_list = |file: &ExaminedFile| file.get("x").is_some() && file.get("q").is_none() && file.get("target").is_none();
-    let Some(joints) = found.iter().position(|file| file.get("q").is_some() && file.get("x").is_none()) else {
+    let is_list = |file: &ExaminedFile| {
+        file.get("x").is_some() && file.get("q").is_none() && file.get("target").is_none()
+    };
+    let Some(joints) = found
+        .iter()
+        .position(|file| file.get("q").is_some() && file.get("x").is_none())
+    else {
         return Vec::new();
     };
-    if found.len() < 3 || !found.iter().enumerate().all(|(k, file)| k == joints || is_list(file)) {
+    if found.len() < 3
+        || !found
+            .iter()
+            .enumerate()
+            .all(|(k, file)| k == joints || is_list(file))
+    {
         return Vec::new();
     }
     let lead = found.remove(joints);
     let layout = |file: &ExaminedFile| {
         let sheet = &file.sheet;
-        (sheet.names.clone(), sheet.delimiter, sheet.comma, sheet.skip, sheet.unit_row, sheet.comment, sheet.header)
+        (
+            sheet.names.clone(),
+            sheet.delimiter,
+            sheet.comma,
+            sheet.skip,
+            sheet.unit_row,
+            sheet.comment,
+            sheet.header,
+        )
     };
     if !found.iter().all(|file| layout(file) == layout(&found[0])) {
         found.insert(joints, lead);
@@ -105,11 +135,23 @@ pub(super) fn other_reflectors(found: &mut Vec<ExaminedFile>) -> Vec<(String, Ex
     }
     let stems: Vec<String> = found
         .iter()
-        .map(|file| file.path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default())
+        .map(|file| {
+            file.path
+                .file_stem()
+                .map(|stem| stem.to_string_lossy().into_owned())
+                .unwrap_or_default()
+        })
         .collect();
-    let mut named: Vec<(String, ExaminedFile)> = reflectors(&stems).into_iter().zip(found.drain(..)).collect();
+    let mut named: Vec<(String, ExaminedFile)> = reflectors(&stems)
+        .into_iter()
+        .zip(found.drain(..))
+        .collect();
     let (name, mut first) = named.remove(0);
-    first.state("target", &quoted(&name), "which reflector it was, by the file's name");
+    first.state(
+        "target",
+        &quoted(&name),
+        "which reflector it was, by the file's name",
+    );
     found.extend([lead, first]);
     named
 }
@@ -119,52 +161,96 @@ fn reflectors(stems: &[String]) -> Vec<String> {
     let all: Vec<Vec<char>> = stems.iter().map(|stem| stem.chars().collect()).collect();
     let shortest = all.iter().map(Vec::len).min().unwrap_or_default();
     let alike = |same: &dyn Fn(&[char], usize) -> char| {
-        (0..shortest).take_while(|k| all.iter().all(|stem| same(stem, *k) == same(&all[0], *k))).count()
+        (0..shortest)
+            .take_while(|k| all.iter().all(|stem| same(stem, *k) == same(&all[0], *k)))
+            .count()
     };
     let front = alike(&|stem, k| stem[k]);
     let back = alike(&|stem, k| stem[stem.len() - 1 - k]).min(shortest - front);
-    let own = all.iter().map(|stem| stem[front..stem.len() - back].iter().collect::<String>());
-    let own: Vec<String> = own.map(|name| name.trim_matches(['_', '-', ' ', '.']).to_string()).collect();
-    if own.iter().any(String::is_empty) { stems.to_vec() } else { own }
+    let own = all
+        .iter()
+        .map(|stem| stem[front..stem.len() - back].iter().collect::<String>());
+    let own: Vec<String> = own
+        .map(|name| name.trim_matches(['_', '-', ' ', '.']).to_string())
+        .collect();
+    if own.iter().any(String::is_empty) {
+        stems.to_vec()
+    } else {
+        own
+    }
 }
 
 /// Several recordings, e.g. a grid and a check set: rows of the first are fitted to, those of the others judge, unless the files say so
 /// themselves. Points keep their names where no two files have the same.
 fn one_after_the_other(found: &mut [ExaminedFile]) -> Joined {
-    let ids: Vec<Option<usize>> = found.iter().map(|file| file.ids().first().copied()).collect();
-    let mut names = BTreeSet::new();
-    let apart = found
+    let ids: Vec<Option<usize>> = found
         .iter()
-        .zip(&ids)
-        .all(|(file, id)| id.is_some_and(|id| cells(file, id).into_iter().all(|name| names.insert(name.to_string()))));
+        .map(|file| file.ids().first().copied())
+        .collect();
+    let mut names = BTreeSet::new();
+    let apart = found.iter().zip(&ids).all(|(file, id)| {
+        id.is_some_and(|id| {
+            cells(file, id)
+                .into_iter()
+                .all(|name| names.insert(name.to_string()))
+        })
+    });
     let silent = found.iter().all(|file| file.get("usage").is_none());
     for ((k, file), id) in found.iter_mut().enumerate().zip(ids) {
         if let Some(id) = id.filter(|_| apart) {
             file.map("point_id", &[id], None, None);
         }
         if silent {
-            file.state("usage", if k == 0 { "fit" } else { "validate" }, "every row of this file");
+            file.state(
+                "usage",
+                if k == 0 { "fit" } else { "validate" },
+                "every row of this file",
+            );
         }
     }
-    Joined { lines: vec!["      join: {by: append}      # CHECK: separate recordings, one after the other".into()] }
+    Joined {
+        lines: vec![
+            "      join: {by: append}      # CHECK: separate recordings, one after the other"
+                .into(),
+        ],
+    }
 }
 
 /// Names and repeats of a file that stands alone.
 fn alone(found: &mut ExaminedFile) -> Joined {
     let ids = found.ids();
-    let Some(first) = ids.first().copied() else { return Joined::default() };
+    let Some(first) = ids.first().copied() else {
+        return Joined::default();
+    };
     found.map("point_id", &ids, None, None);
     let (rows, distinct) = (found.sheet.rows.len(), found.distinct(first));
-    let line =
-        format!("      duplicates: keep       # CHECK: {distinct} names for {rows} rows; each row counts as a measurement");
-    Joined { lines: if distinct < rows { vec![line] } else { Vec::new() } }
+    let line = format!(
+        "      duplicates: keep       # CHECK: {distinct} names for {rows} rows; each row counts as a measurement"
+    );
+    Joined {
+        lines: if distinct < rows {
+            vec![line]
+        } else {
+            Vec::new()
+        },
+    }
 }
 
 /// Every quantity once: joints and what belongs to them from the first file that has them, the point from the file without joints.
 fn single(one: &mut ExaminedFile, two: &mut ExaminedFile) {
-    let both =
-        |quantity: &str, one: &ExaminedFile, two: &ExaminedFile| one.get(quantity).is_some() && two.get(quantity).is_some();
-    for quantity in ["q", "current", "direction", "velocity", "payload", "temperature", "usage", "target"] {
+    let both = |quantity: &str, one: &ExaminedFile, two: &ExaminedFile| {
+        one.get(quantity).is_some() && two.get(quantity).is_some()
+    };
+    for quantity in [
+        "q",
+        "current",
+        "direction",
+        "velocity",
+        "payload",
+        "temperature",
+        "usage",
+        "target",
+    ] {
         if both(quantity, one, two) {
             two.drop(quantity, "in both files; this one or that of the first?");
         }
@@ -172,7 +258,10 @@ fn single(one: &mut ExaminedFile, two: &mut ExaminedFile) {
     if both("x", one, two) {
         let first = two.get("q").is_some() && one.get("q").is_none();
         let (from, other) = if first { (two, &*one) } else { (one, &*two) };
-        let why = format!("the measured point, or the controller's? that of {} is used", other.name);
+        let why = format!(
+            "the measured point, or the controller's? that of {} is used",
+            other.name
+        );
         from.drop("x", &why);
     }
 }
@@ -180,27 +269,48 @@ fn single(one: &mut ExaminedFile, two: &mut ExaminedFile) {
 /// Pairs of columns with equal values, best first; where there are none, of columns in whose names the numbers are equal.
 fn pairs(one: &ExaminedFile, two: &ExaminedFile) -> Vec<Pair> {
     let whole = pairs_by(one, two, false);
-    if whole.is_empty() { pairs_by(one, two, true) } else { whole }
+    if whole.is_empty() {
+        pairs_by(one, two, true)
+    } else {
+        whole
+    }
 }
 
 fn pairs_by(one: &ExaminedFile, two: &ExaminedFile, numbers: bool) -> Vec<Pair> {
     let [left, right] = [one, two].map(|file| {
         (0..file.said.len())
             .filter(|column| may_name(file, *column))
-            .filter_map(|column| Some((column, if numbers { numbers_of(file, column)? } else { cells(file, column) })))
+            .filter_map(|column| {
+                Some((
+                    column,
+                    if numbers {
+                        numbers_of(file, column)?
+                    } else {
+                        cells(file, column)
+                    },
+                ))
+            })
             .take(MOST_NAMED)
             .collect::<Vec<_>>()
     });
     let mut pairs = Vec::new();
     for (a, names) in &left {
         for (b, others) in &right {
-            let shared = names.intersection(others).count() as f64 / names.len().min(others.len()).max(1) as f64;
+            let shared = names.intersection(others).count() as f64
+                / names.len().min(others.len()).max(1) as f64;
             if shared >= LEAST_SHARED {
                 let text = names.iter().any(|name| number(name).is_none());
-                let listed =
-                    |file: &ExaminedFile, column: usize| usize::from(words::IDS.contains(&file.said[column].stem().as_str()));
+                let listed = |file: &ExaminedFile, column: usize| {
+                    usize::from(words::IDS.contains(&file.said[column].stem().as_str()))
+                };
                 let named = listed(one, *a) + listed(two, *b);
-                pairs.push(Pair { columns: [*a, *b], numbers, text, shared: (100.0 * shared) as u32, named });
+                pairs.push(Pair {
+                    columns: [*a, *b],
+                    numbers,
+                    text,
+                    shared: (100.0 * shared) as u32,
+                    named,
+                });
             }
         }
     }
@@ -210,7 +320,11 @@ fn pairs_by(one: &ExaminedFile, two: &ExaminedFile, numbers: bool) -> Vec<Pair> 
 
 /// The numbers in the names of a column; none where a name has none, or two have the same.
 fn numbers_of(file: &ExaminedFile, column: usize) -> Option<BTreeSet<&str>> {
-    let numbers: BTreeSet<&str> = file.sheet.texts(column).map(last_number).collect::<Option<_>>()?;
+    let numbers: BTreeSet<&str> = file
+        .sheet
+        .texts(column)
+        .map(last_number)
+        .collect::<Option<_>>()?;
     (numbers.len() == file.distinct(column)).then_some(numbers)
 }
 
@@ -222,8 +336,9 @@ fn cells(file: &ExaminedFile, column: usize) -> BTreeSet<&str> {
 fn may_name(file: &ExaminedFile, column: usize) -> bool {
     let distinct = file.distinct(column);
     let rows = file.sheet.rows.len();
-    let whole =
-        file.sheet.texts(column).all(|cell| number(cell).is_none_or(|value| value.fract() == 0.0 && !cell.contains(['.', ','])));
+    let whole = file.sheet.texts(column).all(|cell| {
+        number(cell).is_none_or(|value| value.fract() == 0.0 && !cell.contains(['.', ',']))
+    });
     let listed = words::IDS.contains(&file.said[column].stem().as_str());
     !file.is_taken(column) && distinct >= 2 && 2 * distinct >= rows && (whole || listed)
 }
@@ -234,17 +349,29 @@ fn runs(file: &ExaminedFile, column: usize) -> bool {
     numbers.windows(2).all(|pair| pair[1] - pair[0] == 1.0)
 }
 
-fn by_id(one: &mut ExaminedFile, two: &mut ExaminedFile, best: &Pair, pairs: &[Pair], running: bool) -> Joined {
-    let alike = |pair: &&Pair| (pair.text, pair.shared, pair.named) == (best.text, best.shared, best.named);
+fn by_id(
+    one: &mut ExaminedFile,
+    two: &mut ExaminedFile,
+    best: &Pair,
+    pairs: &[Pair],
+    running: bool,
+) -> Joined {
+    let alike =
+        |pair: &&Pair| (pair.text, pair.shared, pair.named) == (best.text, best.shared, best.named);
     let columns = |file: usize| {
         let fixed = 1 - file;
-        let fit = pairs.iter().filter(alike).filter(|pair| pair.columns[fixed] == best.columns[fixed]);
+        let fit = pairs
+            .iter()
+            .filter(alike)
+            .filter(|pair| pair.columns[fixed] == best.columns[fixed]);
         fit.map(|pair| pair.columns[file]).collect::<Vec<usize>>()
     };
     one.map("point_id", &columns(0), None, None);
     two.map("point_id", &columns(1), None, None);
     if best.numbers {
-        [one, two].into_iter().for_each(|file| file.add("point_id", "match: number"));
+        [one, two]
+            .into_iter()
+            .for_each(|file| file.add("point_id", "match: number"));
         let shared = best.shared;
         let line = format!(
             "      join: {{by: id}}          # CHECK: by the numbers in the names, of which {shared} % stand in both files"
@@ -252,7 +379,10 @@ fn by_id(one: &mut ExaminedFile, two: &mut ExaminedFile, best: &Pair, pairs: &[P
         return Joined { lines: vec![line] };
     }
     let [a, b] = [&*one, &*two].map(|file| file.sheet.rows.len());
-    let repeated = [&*one, &*two].iter().zip(best.columns).any(|(file, column)| file.distinct(column) < file.sheet.rows.len());
+    let repeated = [&*one, &*two]
+        .iter()
+        .zip(best.columns)
+        .any(|(file, column)| file.distinct(column) < file.sheet.rows.len());
     let question = if running && a == b {
         "CHECK: running numbers, which join row by row".into()
     } else if running {
@@ -264,14 +394,20 @@ fn by_id(one: &mut ExaminedFile, two: &mut ExaminedFile, best: &Pair, pairs: &[P
     } else {
         "by the point's name".into()
     };
-    Joined { lines: vec![format!("      join: {{by: id}}          # {question}")] }
+    Joined {
+        lines: vec![format!("      join: {{by: id}}          # {question}")],
+    }
 }
 
 /// Where files are not joined by id, the names of one of them may stand.
 fn label(one: &mut ExaminedFile, two: &mut ExaminedFile) {
     for file in [two, one] {
         let ids = file.ids();
-        if let Some(first) = ids.first().copied().filter(|first| file.distinct(*first) == file.sheet.rows.len()) {
+        if let Some(first) = ids
+            .first()
+            .copied()
+            .filter(|first| file.distinct(*first) == file.sheet.rows.len())
+        {
             file.map("point_id", &[first], None, None);
             return;
         }
@@ -293,26 +429,49 @@ struct Timing {
 fn timing(one: &ExaminedFile, two: &ExaminedFile) -> Option<Timing> {
     let times = |file: &ExaminedFile| -> Option<Vec<f64>> {
         let column = *file.get("time")?.choices.first()?.columns.first()?;
-        let mut times: Vec<f64> = file.sheet.numbers(column).map(|time| time * file.second).collect();
+        let mut times: Vec<f64> = file
+            .sheet
+            .numbers(column)
+            .map(|time| time * file.second)
+            .collect();
         times.sort_by(f64::total_cmp);
         (times.len() > 1).then_some(times)
     };
     let (first, second) = (times(one)?, times(two)?);
-    let (few, many) = if first.len() <= second.len() { (&first, &second) } else { (&second, &first) };
+    let (few, many) = if first.len() <= second.len() {
+        (&first, &second)
+    } else {
+        (&second, &first)
+    };
     let nearest = |time: &f64| {
         let at = many.partition_point(|other| other < time);
-        let around = [at.checked_sub(1), Some(at)].into_iter().flatten().filter_map(|at| many.get(at));
-        around.map(|other| (other - time).abs()).fold(f64::INFINITY, f64::min)
+        let around = [at.checked_sub(1), Some(at)]
+            .into_iter()
+            .flatten()
+            .filter_map(|at| many.get(at));
+        around
+            .map(|other| (other - time).abs())
+            .fold(f64::INFINITY, f64::min)
     };
     let median = |mut values: Vec<f64>| statistics::nearest(&mut values, 0.5);
     let near = median(few.iter().map(nearest).collect())?;
     let step = median(few.windows(2).map(|pair| pair[1] - pair[0]).collect())?;
-    Some(Timing { near, step, overlap: near <= 0.5 * step, apart: second[0] - first[0], rows: [first.len(), second.len()] })
+    Some(Timing {
+        near,
+        step,
+        overlap: near <= 0.5 * step,
+        apart: second[0] - first[0],
+        rows: [first.len(), second.len()],
+    })
 }
 
 fn by_time(timing: &Timing, files: [&ExaminedFile; 2]) -> Joined {
     // Three times the usual distance, rounded up, but never as far as the next row.
-    let wide = if timing.overlap { (3.0 * timing.near).max(1e-3) } else { 0.1 * timing.step };
+    let wide = if timing.overlap {
+        (3.0 * timing.near).max(1e-3)
+    } else {
+        0.1 * timing.step
+    };
     let tolerance = rounded_up(wide.min(0.5 * timing.step).max(1e-4)).min(0.5 * timing.step);
     let line = if timing.overlap {
         format!(
@@ -327,7 +486,11 @@ fn by_time(timing: &Timing, files: [&ExaminedFile; 2]) -> Joined {
     };
     let mut lines = vec![line];
     let [a, b] = timing.rows;
-    let (many, few, name) = if a > b { (a, b, &files[0].name) } else { (b, a, &files[1].name) };
+    let (many, few, name) = if a > b {
+        (a, b, &files[0].name)
+    } else {
+        (b, a, &files[1].name)
+    };
     // Beyond a half, by default, a file is refused; here up to half of the other file's rows may lack their partner.
     if 5 * few < 3 * many {
         let fraction = ((1.0 - 0.5 * few as f64 / many as f64) * 1e4).ceil() / 1e4;
@@ -341,7 +504,10 @@ fn by_time(timing: &Timing, files: [&ExaminedFile; 2]) -> Joined {
 /// Up to the next 1, 2 or 5 times a power of ten.
 fn rounded_up(value: f64) -> f64 {
     let power = 10f64.powf(value.log10().floor());
-    let digit = [1.0, 2.0, 5.0, 10.0].into_iter().find(|digit| digit * power >= value * (1.0 - 1e-9)).unwrap_or(10.0);
+    let digit = [1.0, 2.0, 5.0, 10.0]
+        .into_iter()
+        .find(|digit| digit * power >= value * (1.0 - 1e-9))
+        .unwrap_or(10.0);
     // Without the digits of the power's own rounding.
     format!("{:.6}", digit * power).parse().unwrap_or(value)
 }

@@ -28,7 +28,14 @@ pub(super) const JOINTS: [&str; 20] = [
 pub(super) const NAMED_JOINTS: [&[&str]; 3] = [
     &["s", "l", "u", "r", "b", "t"],
     &["s", "l", "e", "u", "r", "b", "t"],
-    &["shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3"],
+    &[
+        "shoulder_pan",
+        "shoulder_lift",
+        "elbow",
+        "wrist_1",
+        "wrist_2",
+        "wrist_3",
+    ],
 ];
 
 /// What joint torques, motor currents and joint velocities are called beside the number or name of a joint.
@@ -48,8 +55,19 @@ pub(super) const TORQUES: [&str; 14] = [
     "momento",
     "momente",
 ];
-pub(super) const CURRENTS: [&str; 11] =
-    ["i", "iq", "cur", "curr", "current", "currents", "strom", "courant", "corriente", "corrente", "amps"];
+pub(super) const CURRENTS: [&str; 11] = [
+    "i",
+    "iq",
+    "cur",
+    "curr",
+    "current",
+    "currents",
+    "strom",
+    "courant",
+    "corriente",
+    "corrente",
+    "amps",
+];
 pub(super) const VELOCITIES: [&str; 14] = [
     "dq",
     "qd",
@@ -67,7 +85,15 @@ pub(super) const VELOCITIES: [&str; 14] = [
     "rate",
 ];
 /// Which of several movements a row belongs to.
-pub(super) const TRAJECTORIES: [&str; 7] = ["traj", "trajectory", "trajectory_id", "episode", "episode_index", "run", "segment"];
+pub(super) const TRAJECTORIES: [&str; 7] = [
+    "traj",
+    "trajectory",
+    "trajectory_id",
+    "episode",
+    "episode_index",
+    "run",
+    "segment",
+];
 
 /// What else a numbered column that is no joint position is called.
 pub(super) const NO_JOINTS: [&str; 38] = [
@@ -112,7 +138,8 @@ pub(super) const NO_JOINTS: [&str; 38] = [
 ];
 
 /// What the parts of a quaternion are called before `w`, `x`, `y`, `z`.
-pub(super) const QUATERNIONS: [&str; 6] = ["q", "q_", "quat_", "quaternion_", "rot_", "orientation_"];
+pub(super) const QUATERNIONS: [&str; 6] =
+    ["q", "q_", "quat_", "quaternion_", "rot_", "orientation_"];
 
 /// What stands beside the name of an axis where several points are in one table.
 pub(super) const MEASURED: [&str; 19] = [
@@ -189,8 +216,21 @@ pub(super) const DIFFERENCE: [&str; 18] = [
 ];
 /// Differences that are usually target less measured point; others are measured point less target.
 pub(super) const TARGET_LESS_MEASURED: [&str; 4] = ["dif", "diff", "difference", "differenz"];
-pub(super) const SIGMA: [&str; 13] =
-    ["std", "stdev", "stddev", "sigma", "sd", "u", "unc", "uncertainty", "unsicherheit", "rms", "\u{3c3}", "s", U95];
+pub(super) const SIGMA: [&str; 13] = [
+    "std",
+    "stdev",
+    "stddev",
+    "sigma",
+    "sd",
+    "u",
+    "unc",
+    "uncertainty",
+    "unsicherheit",
+    "rms",
+    "\u{3c3}",
+    "s",
+    U95,
+];
 /// What columns of uncertainties with 95 % coverage are called.
 pub(super) const U95: &str = "u95";
 
@@ -260,8 +300,15 @@ pub(super) const PAYLOADS: [&str; 23] = [
     "load_mass",
     "tool_load",
 ];
-pub(super) const TEMPERATURES: [&str; 7] =
-    ["temp", "temperature", "temperatur", "temp\u{e9}rature", "temperatura", "temps_c", "raumtemperatur"];
+pub(super) const TEMPERATURES: [&str; 7] = [
+    "temp",
+    "temperature",
+    "temperatur",
+    "temp\u{e9}rature",
+    "temperatura",
+    "temps_c",
+    "raumtemperatur",
+];
 pub(super) const TIMES: [&str; 15] = [
     "time",
     "t",
@@ -281,4 +328,5 @@ pub(super) const TIMES: [&str; 15] = [
 ];
 pub(super) const USAGES: [&str; 5] = ["use", "usage", "set", "verwendung", "split"];
 /// Which of several reflectors was measured.
-pub(super) const REFLECTORS: [&str; 6] = ["target", "smr", "reflector", "reflektor", "retro", "prism"];
+pub(super) const REFLECTORS: [&str; 6] =
+    ["target", "smr", "reflector", "reflektor", "retro", "prism"];

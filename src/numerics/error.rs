@@ -14,13 +14,20 @@ pub struct Fault {
 impl Fault {
     /// A fault at a place.
     pub fn new(place: impl Into<String>, message: impl Into<String>) -> Self {
-        Self { place: place.into(), message: message.into() }
+        Self {
+            place: place.into(),
+            message: message.into(),
+        }
     }
 }
 
 impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.place.is_empty() { write!(f, "{}", self.message) } else { write!(f, "{}: {}", self.place, self.message) }
+        if self.place.is_empty() {
+            write!(f, "{}", self.message)
+        } else {
+            write!(f, "{}: {}", self.place, self.message)
+        }
     }
 }
 
@@ -75,7 +82,11 @@ impl Error {
 }
 
 fn join(faults: &[Fault]) -> String {
-    faults.iter().map(Fault::to_string).collect::<Vec<_>>().join("\n")
+    faults
+        .iter()
+        .map(Fault::to_string)
+        .collect::<Vec<_>>()
+        .join("\n")
 }
 
 /// A result whose error is an [`Error`] unless another one is named.
@@ -96,15 +107,27 @@ pub fn counted(count: impl fmt::Display, noun: &str) -> String {
 
 /// A text from a file on one line: control characters become blanks.
 pub fn one_line(text: &str) -> String {
-    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
+    text.chars()
+        .map(|c| if c.is_control() { ' ' } else { c })
+        .collect()
 }
 
 /// A text from outside on one line, without a terminal's commands; what cannot be seen, as marks that turn the direction of writing, is
 /// written out.
 pub fn visible(text: &str) -> String {
-    let hidden =
-        |c: char| c.is_control() || matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
-    text.chars().map(|c| if hidden(c) { c.escape_default().to_string() } else { c.to_string() }).collect()
+    let hidden = |c: char| {
+        c.is_control()
+            || matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+    };
+    text.chars()
+        .map(|c| {
+            if hidden(c) {
+                c.escape_default().to_string()
+            } else {
+                c.to_string()
+            }
+        })
+        .collect()
 }
 
 /// The nearest of `allowed` to `given`, for "did you mean".
@@ -113,15 +136,22 @@ pub fn nearest<'a>(given: &str, allowed: impl IntoIterator<Item = &'a str>) -> O
         .into_iter()
         .map(|name| (strsim::damerau_levenshtein(given, name), name))
         // A single letter is not near to another.
-        .filter(|(distance, name)| *distance <= 1 + name.len() / 3 && *distance < given.len().max(name.len()))
+        .filter(|(distance, name)| {
+            *distance <= 1 + name.len() / 3 && *distance < given.len().max(name.len())
+        })
         .min()
         .map(|(_, name)| name)
 }
 
 /// What may stand there instead: `; did you mean X? Allowed: X, Y`.
 pub fn instead(found: &str, allowed: &[&str]) -> String {
-    let hint = nearest(found, allowed.iter().copied()).map(|name| format!("; did you mean `{name}`?"));
-    format!("{} Allowed: {}", hint.unwrap_or_else(|| ".".into()), allowed.join(", "))
+    let hint =
+        nearest(found, allowed.iter().copied()).map(|name| format!("; did you mean `{name}`?"));
+    format!(
+        "{} Allowed: {}",
+        hint.unwrap_or_else(|| ".".into()),
+        allowed.join(", ")
+    )
 }
 
 #[cfg(test)]
@@ -130,17 +160,50 @@ mod tests {
     use std::io::{self, ErrorKind};
 
     #[test]
-    fn a_file_that_is_refused_now_may_open_later_and_one_that_is_not_there_is_a_fault_of_the_data() {
-        let code = |kind: ErrorKind| Error::unreadable("day2.csv", &io::Error::from(kind)).exit_code();
-        assert_eq!([ErrorKind::PermissionDenied, ErrorKind::Other, ErrorKind::StaleNetworkFileHandle].map(code), [75; 3]);
-        assert_eq!([ErrorKind::NotFound, ErrorKind::InvalidInput].map(code), [10; 2]);
+    fn a_file_that_is_refused_now_may_open_later_and_one_that_is_not_there_is_a_fault_of_the_data()
+    {
+        let code =
+            |kind: ErrorKind| Error::unreadable("day2.csv", &io::Error::from(kind)).exit_code();
+        assert_eq!(
+            [
+                ErrorKind::PermissionDenied,
+                ErrorKind::Other,
+                ErrorKind::StaleNetworkFileHandle
+            ]
+            .map(code),
+            [75; 3]
+        );
+        assert_eq!(
+            [ErrorKind::NotFound, ErrorKind::InvalidInput].map(code),
+            [10; 2]
+        );
     }
 
     #[test]
     fn one_of_a_thing_is_named_as_one() {
-        let said =
-            [(1, "row"), (2, "row"), (0, "fault"), (1, "copy"), (3, "copy"), (2, "key"), (2, "class"), (5, "action record")];
+        let said = [
+            (1, "row"),
+            (2, "row"),
+            (0, "fault"),
+            (1, "copy"),
+            (3, "copy"),
+            (2, "key"),
+            (2, "class"),
+            (5, "action record"),
+        ];
         let said = said.map(|(count, noun)| counted(count, noun));
-        assert_eq!(said, ["1 row", "2 rows", "0 faults", "1 copy", "3 copies", "2 keys", "2 classes", "5 action records"]);
+        assert_eq!(
+            said,
+            [
+                "1 row",
+                "2 rows",
+                "0 faults",
+                "1 copy",
+                "3 copies",
+                "2 keys",
+                "2 classes",
+                "5 action records"
+            ]
+        );
     }
 }

@@ -30,16 +30,30 @@ pub(super) fn stage(
     let stage = &state.plan.stages[index];
     let inputs = load(state, index, place.store)?;
     let services = StageServices::new(&stage.id, place.store, &stage.files, place.observer);
-    let context =
-        Context { id: &stage.id, seed: state.seed(index), jobs: place.threads.current_num_threads(), services: &services };
+    let context = Context {
+        id: &stage.id,
+        seed: state.seed(index),
+        jobs: place.threads.current_num_threads(),
+        services: &services,
+    };
     let body = || place.threads.install(|| stage.stage.run(inputs, &context));
-    let outputs = catch_unwind(AssertUnwindSafe(body))
-        .unwrap_or_else(|panic| Err(Error::Bug(format!("stage {} panicked: {}", stage.id, panic_message(&*panic)))));
+    let outputs = catch_unwind(AssertUnwindSafe(body)).unwrap_or_else(|panic| {
+        Err(Error::Bug(format!(
+            "stage {} panicked: {}",
+            stage.id,
+            panic_message(&*panic)
+        )))
+    });
     let lines = services.lines();
     (account.notes, account.warnings) = (lines.notes, lines.warnings);
     let outputs = outputs.map_err(|error| place::placed(error, state.plan, &stage.id))?;
     if outputs.len() != stage.outputs.len() {
-        return Err(Error::Bug(format!("stage {} gave {} tables for {} ports", stage.id, outputs.len(), stage.outputs.len())));
+        return Err(Error::Bug(format!(
+            "stage {} gave {} tables for {} ports",
+            stage.id,
+            outputs.len(),
+            stage.outputs.len()
+        )));
     }
     stage
         .outputs
@@ -50,12 +64,20 @@ pub(super) fn stage(
                 Output::Frame(frame) => (frame.kind(), PendingTable::Frame(frame)),
                 Output::Streamed(streamed) => {
                     let file = streamed.handle.downcast::<FinishedFile>();
-                    let file = file.map_err(|_| Error::Bug(format!("stage {}: a sink that is not the engine's", stage.id)))?;
+                    let file = file.map_err(|_| {
+                        Error::Bug(format!(
+                            "stage {}: a sink that is not the engine's",
+                            stage.id
+                        ))
+                    })?;
                     (streamed.kind, PendingTable::File(*file))
                 }
             };
             if kind != port.kind {
-                return Err(Error::Bug(format!("stage {}: a table of {kind} on port {}", stage.id, port.name)));
+                return Err(Error::Bug(format!(
+                    "stage {}: a table of {kind} on port {}",
+                    stage.id, port.name
+                )));
             }
             Ok((port.name.to_string(), product))
         })
@@ -99,10 +121,14 @@ fn load(state: &RunState, index: usize, store: &Store) -> Result<Vec<Vec<(String
             let tables = input.from.iter().map(|origin| {
                 let from = &stages[origin.stage];
                 let tables = state.tables[origin.stage].as_ref();
-                let tables = tables.ok_or_else(|| Error::Bug(format!("stage {} has no tables yet", from.id)))?;
+                let tables = tables
+                    .ok_or_else(|| Error::Bug(format!("stage {} has no tables yet", from.id)))?;
                 let table = run_state::table(tables, from, origin.port)?;
                 let input: InputTable = match input.port.chunked {
-                    true => Box::new(LongTable { table: store.published(table)?, whole: OnceLock::new() }),
+                    true => Box::new(LongTable {
+                        table: store.published(table)?,
+                        whole: OnceLock::new(),
+                    }),
                     false => Box::new(store.load(table)?),
                 };
                 Ok((from.id.clone(), input))
@@ -117,10 +143,15 @@ pub(super) fn documents(store: &Store, pipeline: &str, table: &TableRef) -> Resu
     let frame = store.load(table)?;
     let names = frame.read::<String>("name")?;
     let contents = frame.read::<String>("content")?;
-    names.iter().zip(&contents).map(|(name, content)| store.expose_document(pipeline, name, content.as_bytes())).collect()
+    names
+        .iter()
+        .zip(&contents)
+        .map(|(name, content)| store.expose_document(pipeline, name, content.as_bytes()))
+        .collect()
 }
 
 fn panic_message(panic: &(dyn Any + Send)) -> &str {
     let text = panic.downcast_ref::<&str>().copied();
-    text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("without a message")
+    text.or_else(|| panic.downcast_ref::<String>().map(String::as_str))
+        .unwrap_or("without a message")
 }

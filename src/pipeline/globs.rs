@@ -14,20 +14,40 @@ const MOST: usize = 10_000;
 /// Fills in the entries of `files` below the settings of a stage; relative paths start at `folder`.
 pub(super) fn expand(with: &mut Node, folder: &Path) -> Vec<Trouble> {
     let mut troubles = Vec::new();
-    let Some(Node { value: YamlValue::List(items), .. }) = with.at_mut("files") else { return troubles };
+    let Some(Node {
+        value: YamlValue::List(items),
+        ..
+    }) = with.at_mut("files")
+    else {
+        return troubles;
+    };
     let mut all = Vec::with_capacity(items.len());
     for (index, item) in std::mem::take(items).into_iter().enumerate() {
         let place = format!("files[{index}].file");
-        let file = item.get("file").and_then(|node| Some((node.text()?, node.overridden, node.mark)));
-        let Some((pattern, overridden, mark)) = file.filter(|(pattern, ..)| pattern.contains(['*', '?'])) else {
+        let file = item
+            .get("file")
+            .and_then(|node| Some((node.text()?, node.overridden, node.mark)));
+        let Some((pattern, overridden, mark)) =
+            file.filter(|(pattern, ..)| pattern.contains(['*', '?']))
+        else {
             all.push(item);
             continue;
         };
-        let start = if overridden { PathBuf::new() } else { folder.to_path_buf() };
+        let start = if overridden {
+            PathBuf::new()
+        } else {
+            folder.to_path_buf()
+        };
         match matching(&start, &pattern) {
             Ok(found) if found.is_empty() => {
-                troubles
-                    .push(Trouble::new(format!("no file matches `{}`", start.join(&pattern).display())).at(mark).below(&place));
+                troubles.push(
+                    Trouble::new(format!(
+                        "no file matches `{}`",
+                        start.join(&pattern).display()
+                    ))
+                    .at(mark)
+                    .below(&place),
+                );
             }
             Ok(found) => all.extend(found.into_iter().map(|path| {
                 let mut own = item.clone();
@@ -42,13 +62,26 @@ pub(super) fn expand(with: &mut Node, folder: &Path) -> Vec<Trouble> {
     *items = all;
     for (index, item) in items.iter_mut().enumerate() {
         let path = item.get("file").and_then(Node::text).unwrap_or_default();
-        let Some(Node { value: YamlValue::Map(columns), .. }) = item.at_mut("columns") else { continue };
+        let Some(Node {
+            value: YamlValue::Map(columns),
+            ..
+        }) = item.at_mut("columns")
+        else {
+            continue;
+        };
         for (key, _, column) in columns.iter_mut() {
-            let Some((pattern, mark)) = column.get("path").and_then(|node| Some((node.text()?, node.mark))) else { continue };
+            let Some((pattern, mark)) = column
+                .get("path")
+                .and_then(|node| Some((node.text()?, node.mark)))
+            else {
+                continue;
+            };
             let place = format!("files[{index}].columns.{key}.path");
             match named(&pattern, &path) {
                 Ok(name) => {
-                    let YamlValue::Map(entries) = &mut column.value else { continue };
+                    let YamlValue::Map(entries) = &mut column.value else {
+                        continue;
+                    };
                     entries.retain(|(key, ..)| key != "path");
                     entries.push(("value".into(), mark, Node::new(YamlValue::Text(name), mark)));
                 }
@@ -61,20 +94,36 @@ pub(super) fn expand(with: &mut Node, folder: &Path) -> Vec<Trouble> {
 
 /// Files below `start` whose path matches, as the pattern writes them, sorted.
 fn matching(start: &Path, pattern: &str) -> Result<Vec<String>, String> {
-    let mut found = vec![if pattern.starts_with('/') { "/".to_string() } else { String::new() }];
+    let mut found = vec![if pattern.starts_with('/') {
+        "/".to_string()
+    } else {
+        String::new()
+    }];
     for part in pattern.split('/').filter(|part| !part.is_empty()) {
         let mut next = Vec::new();
         for before in &found {
             let below = |name: &str| {
-                if before.is_empty() || before.ends_with('/') { format!("{before}{name}") } else { format!("{before}/{name}") }
+                if before.is_empty() || before.ends_with('/') {
+                    format!("{before}{name}")
+                } else {
+                    format!("{before}/{name}")
+                }
             };
             if !part.contains(['*', '?']) {
                 next.push(below(part));
                 continue;
             }
-            let Ok(entries) = std::fs::read_dir(start.join(if before.is_empty() { "." } else { before })) else { continue };
+            let Ok(entries) =
+                std::fs::read_dir(start.join(if before.is_empty() { "." } else { before }))
+            else {
+                continue;
+            };
             let names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
-            next.extend(names.filter(|name| !name.starts_with('.') && fits(part, name)).map(|name| below(&name)));
+            next.extend(
+                names
+                    .filter(|name| !name.starts_with('.') && fits(part, name))
+                    .map(|name| below(&name)),
+            );
         }
         if next.len() > MOST {
             return Err(format!("more than {MOST} files match; name a folder"));
@@ -91,36 +140,66 @@ fn fits(pattern: &str, name: &str) -> bool {
     let mut rest = pattern.chars();
     match rest.next() {
         None => name.is_empty(),
-        Some('*') => name.char_indices().map(|(at, _)| &name[at..]).chain([""]).any(|end| fits(rest.as_str(), end)),
-        Some('?') => name.chars().next().is_some_and(|first| fits(rest.as_str(), &name[first.len_utf8()..])),
-        Some(letter) => name.strip_prefix(letter).is_some_and(|end| fits(rest.as_str(), end)),
+        Some('*') => name
+            .char_indices()
+            .map(|(at, _)| &name[at..])
+            .chain([""])
+            .any(|end| fits(rest.as_str(), end)),
+        Some('?') => name
+            .chars()
+            .next()
+            .is_some_and(|first| fits(rest.as_str(), &name[first.len_utf8()..])),
+        Some(letter) => name
+            .strip_prefix(letter)
+            .is_some_and(|end| fits(rest.as_str(), end)),
     }
 }
 
 /// What stands for the braces of a pattern at the end of a path, joined by `/`.
 fn named(pattern: &str, path: &str) -> Result<String, String> {
-    let wrong = || format!("`{path}` does not end like `{pattern}`; braces stand for text within a folder's or file's name");
-    let (parts, all): (Vec<&str>, Vec<&str>) = (pattern.split('/').collect(), path.split('/').collect());
-    let own = all.len().checked_sub(parts.len()).map(|first| &all[first..]).ok_or_else(wrong)?;
+    let wrong = || {
+        format!(
+            "`{path}` does not end like `{pattern}`; braces stand for text within a folder's or file's name"
+        )
+    };
+    let (parts, all): (Vec<&str>, Vec<&str>) =
+        (pattern.split('/').collect(), path.split('/').collect());
+    let own = all
+        .len()
+        .checked_sub(parts.len())
+        .map(|first| &all[first..])
+        .ok_or_else(wrong)?;
     let mut names = Vec::new();
     for (pattern, text) in parts.iter().zip(own) {
         names.extend(braces(pattern, text).ok_or_else(wrong)?);
     }
     if names.is_empty() {
-        return Err(format!("`{pattern}` has no braces; e.g. \"{{position}}/hole_{{n}}.csv\""));
+        return Err(format!(
+            "`{pattern}` has no braces; e.g. \"{{position}}/hole_{{n}}.csv\""
+        ));
     }
     Ok(names.join("/"))
 }
 
 /// What stands for the braces of one name: each the shortest text that lets the rest match.
 fn braces(pattern: &str, text: &str) -> Option<Vec<String>> {
-    let Some((before, rest)) = pattern.split_once('{') else { return (pattern == text).then(Vec::new) };
+    let Some((before, rest)) = pattern.split_once('{') else {
+        return (pattern == text).then(Vec::new);
+    };
     let (_, after) = rest.split_once('}')?;
     let text = text.strip_prefix(before)?;
-    let ends = text.char_indices().skip(1).map(|(at, _)| at).chain([text.len()]);
+    let ends = text
+        .char_indices()
+        .skip(1)
+        .map(|(at, _)| at)
+        .chain([text.len()]);
     ends.filter(|end| *end > 0).find_map(|end| {
         let more = braces(after, &text[end..])?;
-        Some(std::iter::once(text[..end].to_string()).chain(more).collect())
+        Some(
+            std::iter::once(text[..end].to_string())
+                .chain(more)
+                .collect(),
+        )
     })
 }
 
@@ -137,9 +216,17 @@ mod tests {
     #[test]
     fn braces_name_what_stands_in_a_path() {
         let pattern = "{position}/hole_{n}.csv";
-        assert_eq!(named(pattern, "../data/front_left/hole_0.csv"), Ok("front_left/0".into()));
-        assert!(named(pattern, "../data/front/socket_0.csv").is_err_and(|message| message.contains("does not end like")));
+        assert_eq!(
+            named(pattern, "../data/front_left/hole_0.csv"),
+            Ok("front_left/0".into())
+        );
+        assert!(
+            named(pattern, "../data/front/socket_0.csv")
+                .is_err_and(|message| message.contains("does not end like"))
+        );
         assert!(named(pattern, "hole_0.csv").is_err());
-        assert!(named("hole.csv", "a/hole.csv").is_err_and(|message| message.contains("has no braces")));
+        assert!(
+            named("hole.csv", "a/hole.csv").is_err_and(|message| message.contains("has no braces"))
+        );
     }
 }

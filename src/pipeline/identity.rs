@@ -16,10 +16,18 @@ impl Plan {
         for stage in &self.stages {
             let mut files = Vec::new();
             for file in &stage.files {
-                files.push(json!([file.place, label(&file.path), state.hash(&file.path)?]));
+                files.push(json!([
+                    file.place,
+                    label(&file.path),
+                    state.hash(&file.path)?
+                ]));
             }
             let origins = stage.inputs.iter().map(|input| {
-                let from: Vec<_> = input.from.iter().map(|origin| (origin.stage, origin.port)).collect();
+                let from: Vec<_> = input
+                    .from
+                    .iter()
+                    .map(|origin| (origin.stage, origin.port))
+                    .collect();
                 (input.port.name, from)
             });
             stages.push(json!({
@@ -28,6 +36,8 @@ impl Plan {
             }));
         }
         let whole = json!({ "seed": self.seed, "stages": stages });
-        Ok(blake3::hash(canonical(&whole).as_bytes()).to_hex().to_string())
+        Ok(blake3::hash(canonical(&whole).as_bytes())
+            .to_hex()
+            .to_string())
     }
 }

@@ -19,13 +19,22 @@ impl ActionLock {
     pub fn take(store: &Store, action: &ActionId, waiting: &mut dyn FnMut()) -> Self {
         let folder = store.root().join("locks");
         let path = folder.join(format!("{action}.lock"));
-        let open = || fs::create_dir_all(&folder).and_then(|()| File::options().create(true).append(true).open(&path));
+        let open = || {
+            fs::create_dir_all(&folder)
+                .and_then(|()| File::options().create(true).append(true).open(&path))
+        };
         // Where locks cannot be had the work may be done twice, which is harmless.
-        let Ok(file) = open() else { return Self { held: None } };
+        let Ok(file) = open() else {
+            return Self { held: None };
+        };
         let mut waited = Duration::ZERO;
         loop {
             match file.try_lock() {
-                Ok(()) => return Self { held: Some((file, path)) },
+                Ok(()) => {
+                    return Self {
+                        held: Some((file, path)),
+                    };
+                }
                 Err(fs::TryLockError::WouldBlock) if waited < PATIENCE => {
                     if waited.is_zero() {
                         waiting();

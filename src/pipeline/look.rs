@@ -15,11 +15,27 @@ pub fn look(plan: &Plan) -> Result<Vec<String>> {
     let mut tables: Vec<Option<Vec<Frame>>> = Vec::new();
     let (mut spec, mut data, mut warnings) = (Vec::new(), Vec::new(), Vec::new());
     for stage in &plan.stages {
-        let services = Onlooker { id: &stage.id, files: &stage.files, warnings: Mutex::default() };
-        let context = Context { id: &stage.id, seed: 0, jobs: 1, services: &services };
+        let services = Onlooker {
+            id: &stage.id,
+            files: &stage.files,
+            warnings: Mutex::default(),
+        };
+        let context = Context {
+            id: &stage.id,
+            seed: 0,
+            jobs: 1,
+            services: &services,
+        };
         let seen = stage.stage.look(frames(plan, stage, &tables), &context);
-        let warned = services.warnings.into_inner().unwrap_or_else(PoisonError::into_inner);
-        warnings.extend(warned.into_iter().map(|line| format!("{}: {line}", stage.id)));
+        let warned = services
+            .warnings
+            .into_inner()
+            .unwrap_or_else(PoisonError::into_inner);
+        warnings.extend(
+            warned
+                .into_iter()
+                .map(|line| format!("{}: {line}", stage.id)),
+        );
         tables.push(match seen {
             Ok(outputs) => outputs.and_then(in_memory),
             Err(Error::Spec(faults)) => {
@@ -50,13 +66,39 @@ pub fn look(plan: &Plan) -> Result<Vec<String>> {
 
 /// The faults of the robot files of a pipeline whose YAML has faults of its own: where the stage that names one can be read, all are told
 /// in one pass.
-pub fn faults_of_robots(file: &Path, overrides: &[Override], registry: &'static [StageEntry]) -> Vec<Fault> {
+pub fn faults_of_robots(
+    file: &Path,
+    overrides: &[Override],
+    registry: &'static [StageEntry],
+) -> Vec<Fault> {
     let mut faults = Vec::new();
-    let Some(text) = raw::bytes(file).ok().and_then(|bytes| String::from_utf8(bytes).ok()) else { return faults };
+    let Some(text) = raw::bytes(file)
+        .ok()
+        .and_then(|bytes| String::from_utf8(bytes).ok())
+    else {
+        return faults;
+    };
     for draft in spec::read(file, &text, overrides, registry).stages {
-        let Some(stage) = draft.stage.filter(|_| draft.entry.is_some_and(|entry| entry.name == "robot")) else { continue };
-        let services = Onlooker { id: &draft.id, files: &draft.files, warnings: Mutex::default() };
-        let seen = stage.look(Some(Vec::new()), &Context { id: &draft.id, seed: 0, jobs: 1, services: &services });
+        let Some(stage) = draft
+            .stage
+            .filter(|_| draft.entry.is_some_and(|entry| entry.name == "robot"))
+        else {
+            continue;
+        };
+        let services = Onlooker {
+            id: &draft.id,
+            files: &draft.files,
+            warnings: Mutex::default(),
+        };
+        let seen = stage.look(
+            Some(Vec::new()),
+            &Context {
+                id: &draft.id,
+                seed: 0,
+                jobs: 1,
+                services: &services,
+            },
+        );
         if let Err(Error::Spec(own)) = seen {
             faults.extend(own);
         }
@@ -65,7 +107,11 @@ pub fn faults_of_robots(file: &Path, overrides: &[Override], registry: &'static 
 }
 
 /// The tables that a stage reads, if those before it could give them all.
-fn frames(plan: &Plan, stage: &PlannedStage, tables: &[Option<Vec<Frame>>]) -> Option<Vec<Vec<(String, InputTable)>>> {
+fn frames(
+    plan: &Plan,
+    stage: &PlannedStage,
+    tables: &[Option<Vec<Frame>>],
+) -> Option<Vec<Vec<(String, InputTable)>>> {
     let inputs = stage.inputs.iter().map(|input| {
         let frames = input.from.iter().map(|origin| {
             let frame = tables.get(origin.stage)?.as_ref()?.get(origin.port)?;
@@ -97,12 +143,18 @@ impl Services for Onlooker<'_> {
         services::open(self.id, self.files, file)
     }
     fn sink(&self, kind: &'static str) -> Result<Box<dyn Sink>> {
-        Err(Error::Bug(format!("stage {} writes a table of {kind} while it is only looked at", self.id)))
+        Err(Error::Bug(format!(
+            "stage {} writes a table of {kind} while it is only looked at",
+            self.id
+        )))
     }
     fn begin(&self, _what: &str, _total: Option<u64>, _unit: &str) {}
     fn advance(&self, _done: u64, _message: &str) {}
     fn note(&self, _line: String) {}
     fn warn(&self, line: String) {
-        self.warnings.lock().unwrap_or_else(PoisonError::into_inner).push(line);
+        self.warnings
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .push(line);
     }
 }

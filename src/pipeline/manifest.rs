@@ -212,14 +212,22 @@ impl Manifest {
     /// The manifest of a run in the store.
     pub fn of(store: &Store, run: &str) -> Result<Self> {
         let value = store.manifest(run)?;
-        serde_json::from_value(value)
-            .map_err(|e| Error::store(format!("run {run}"), format!("not a manifest that this calib reads: {e}")))
+        serde_json::from_value(value).map_err(|e| {
+            Error::store(
+                format!("run {run}"),
+                format!("not a manifest that this calib reads: {e}"),
+            )
+        })
     }
 
     /// Whether this is a run of `calib run` that has the tables of every stage.
     pub fn is_complete(&self) -> bool {
-        let has = |stage: &StageReport| matches!(stage.status, StageStatus::Cached | StageStatus::Executed);
-        self.purpose == Purpose::Run && self.status == RunStatus::Done && self.stages.iter().all(has)
+        let has = |stage: &StageReport| {
+            matches!(stage.status, StageStatus::Cached | StageStatus::Executed)
+        };
+        self.purpose == Purpose::Run
+            && self.status == RunStatus::Done
+            && self.stages.iter().all(has)
     }
 
     /// Kind of run as it is listed; only a `run` can be HEAD.
@@ -244,10 +252,18 @@ impl Manifest {
 
     /// The tables of a kind, in pipeline order.
     pub fn tables<'o>(&'o self, kind: &'o str) -> impl Iterator<Item = &'o OutputRecord> {
-        self.stages.iter().flat_map(|stage| &stage.outputs).filter(move |output| output.kind == kind)
+        self.stages
+            .iter()
+            .flat_map(|stage| &stage.outputs)
+            .filter(move |output| output.kind == kind)
     }
 
-    pub(super) fn new(plan: &super::plan::Plan, surroundings: &Surroundings, options: &RunOptions, started: String) -> Self {
+    pub(super) fn new(
+        plan: &super::plan::Plan,
+        surroundings: &Surroundings,
+        options: &RunOptions,
+        started: String,
+    ) -> Self {
         Self {
             manifest_format: MANIFEST_FORMAT,
             run_id: surroundings.run_id.clone(),

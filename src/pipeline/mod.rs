@@ -26,7 +26,9 @@ mod wiring;
 
 pub use history::find_run;
 pub use look::{faults_of_robots, look};
-pub use manifest::{Host, Manifest, OutputRecord, RunStatus, StageReport, StageStatus, Surroundings, Tool};
+pub use manifest::{
+    Host, Manifest, OutputRecord, RunStatus, StageReport, StageStatus, Surroundings, Tool,
+};
 pub use options::{Purpose, RunOptions};
 pub use overrides::Override;
 pub use plan::Plan;

@@ -17,8 +17,13 @@ impl Override {
     /// Reads `target=value`.
     pub fn parse(text: &str) -> Result<Self, String> {
         match text.split_once('=') {
-            Some((target, value)) if !target.is_empty() => Ok(Self { target: target.trim().into(), value: value.into() }),
-            _ => Err(format!("`{text}`: expected TARGET=VALUE, e.g. case=recordings/r7, seed=7 or split.n=4")),
+            Some((target, value)) if !target.is_empty() => Ok(Self {
+                target: target.trim().into(),
+                value: value.into(),
+            }),
+            _ => Err(format!(
+                "`{text}`: expected TARGET=VALUE, e.g. case=recordings/r7, seed=7 or split.n=4"
+            )),
         }
     }
 
@@ -33,12 +38,16 @@ impl Override {
                 Ok(node)
             }
             // An empty value is an empty text.
-            _ if self.value.trim().is_empty() => {
-                Ok(Node { overridden: true, ..Node::new(YamlValue::Text(String::new()), Mark::CommandLine) })
-            }
+            _ if self.value.trim().is_empty() => Ok(Node {
+                overridden: true,
+                ..Node::new(YamlValue::Text(String::new()), Mark::CommandLine)
+            }),
             (_, trouble) => {
                 let why = trouble.map(|trouble| trouble.message).unwrap_or_default();
-                Err(Fault::new(format!("--set {}", self.target), format!("the value is not YAML: {why}")))
+                Err(Fault::new(
+                    format!("--set {}", self.target),
+                    format!("the value is not YAML: {why}"),
+                ))
             }
         }
     }
@@ -66,7 +75,10 @@ pub(super) fn apply(tree: &mut Node, overrides: &[Override]) -> (Variables, Vec<
             }
         };
         let place = format!("--set {}", set.target);
-        let stage = set.target.split_once(['.', '[']).and_then(|(id, _)| ids.iter().position(|known| known == id));
+        let stage = set
+            .target
+            .split_once(['.', '['])
+            .and_then(|(id, _)| ids.iter().position(|known| known == id));
         match stage {
             _ if set.target == "seed" => {
                 if let Err(why) = tree.put("seed", node) {
@@ -106,14 +118,31 @@ fn unknown(target: &str, names: &BTreeSet<String>, ids: &[String]) -> String {
     format!(
         "no variable or setting of that name{} Allowed: {}",
         hint.unwrap_or_else(|| ".".into()),
-        list(&mut names.iter().cloned().chain(["seed".into()]).chain(ids.iter().map(|id| format!("{id}.SETTING"))))
+        list(
+            &mut names
+                .iter()
+                .cloned()
+                .chain(["seed".into()])
+                .chain(ids.iter().map(|id| format!("{id}.SETTING")))
+        )
     )
 }
 
 /// The id of every stage, empty where the YAML gives none.
 pub(super) fn stage_ids(tree: &Node) -> Vec<String> {
-    let id = |stage: &Node| stage.get("id").or_else(|| stage.get("uses")).and_then(Node::text).unwrap_or_default();
-    tree.get("stages").map(Node::items).unwrap_or_default().iter().map(id).collect()
+    let id = |stage: &Node| {
+        stage
+            .get("id")
+            .or_else(|| stage.get("uses"))
+            .and_then(Node::text)
+            .unwrap_or_default()
+    };
+    tree.get("stages")
+        .map(Node::items)
+        .unwrap_or_default()
+        .iter()
+        .map(id)
+        .collect()
 }
 
 fn used_variables(tree: &Node) -> BTreeSet<String> {
@@ -135,9 +164,14 @@ fn used_variables(tree: &Node) -> BTreeSet<String> {
 pub(super) fn substitute(node: &mut Node, path: &str, variables: &Variables) -> Vec<Trouble> {
     let mut troubles = Vec::new();
     node.walk_mut(path, &mut |path, node| {
-        let YamlValue::Text(text) = &node.value else { return };
+        let YamlValue::Text(text) = &node.value else {
+            return;
+        };
         let found: Vec<Piece> = pieces(text).collect();
-        if !found.iter().any(|piece| matches!(piece, Piece::Variable(_))) {
+        if !found
+            .iter()
+            .any(|piece| matches!(piece, Piece::Variable(_)))
+        {
             return;
         }
         let text = text.clone();
@@ -161,25 +195,36 @@ fn fill(node: &Node, text: &str, variables: &Variables) -> Result<Node, String> 
             Piece::Variable(name) => name,
         };
         let Some(variable) = variables.get(name) else {
-            let hint = nearest(name, variables.keys().map(String::as_str)).map(|near| format!("; did you mean `${{{near}}}`?"));
+            let hint = nearest(name, variables.keys().map(String::as_str))
+                .map(|near| format!("; did you mean `${{{near}}}`?"));
             return Err(format!(
                 "`${{{name}}}` is not defined{} Give it under `variables` or by --set {name}=VALUE",
                 hint.unwrap_or_else(|| ".".into())
             ));
         };
         if matches!(variable.value, YamlValue::Null) {
-            return Err(format!("`${{{name}}}` has no value here: give it by --set {name}=VALUE"));
+            return Err(format!(
+                "`${{{name}}}` has no value here: give it by --set {name}=VALUE"
+            ));
         }
         if text.len() == name.len() + 3 {
-            return Ok(Node { mark: node.mark, ..variable.clone() });
+            return Ok(Node {
+                mark: node.mark,
+                ..variable.clone()
+            });
         }
         let Some(value) = variable.text() else {
-            return Err(format!("`${{{name}}}` is a list or a block and cannot stand inside text"));
+            return Err(format!(
+                "`${{{name}}}` is a list or a block and cannot stand inside text"
+            ));
         };
         overridden |= index == 0 && variable.overridden;
         filled.push_str(&value);
     }
-    Ok(Node { overridden, ..Node::new(YamlValue::Text(filled), node.mark) })
+    Ok(Node {
+        overridden,
+        ..Node::new(YamlValue::Text(filled), node.mark)
+    })
 }
 
 enum Piece<'t> {
@@ -198,8 +243,11 @@ fn pieces(text: &str) -> impl Iterator<Item = Piece<'_>> {
             rest = &rest[name.len() + 3..];
             return Some(Piece::Variable(name));
         }
-        let end =
-            rest.char_indices().skip(1).find(|(at, _)| variable_at(&rest[*at..]).is_some()).map_or(rest.len(), |(at, _)| at);
+        let end = rest
+            .char_indices()
+            .skip(1)
+            .find(|(at, _)| variable_at(&rest[*at..]).is_some())
+            .map_or(rest.len(), |(at, _)| at);
         let (plain, after) = rest.split_at(end);
         rest = after;
         Some(Piece::Plain(plain))
@@ -207,5 +255,9 @@ fn pieces(text: &str) -> impl Iterator<Item = Piece<'_>> {
 }
 fn variable_at(text: &str) -> Option<&str> {
     let (name, _) = text.strip_prefix("${")?.split_once('}')?;
-    (!name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-')).then_some(name)
+    (!name.is_empty()
+        && name
+            .chars()
+            .all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-'))
+    .then_some(name)
 }

@@ -15,20 +15,38 @@ pub(super) fn placed(error: Error, plan: &Plan, id: &str) -> Error {
 }
 
 fn all(faults: Vec<Fault>, plan: &Plan, id: &str) -> Vec<Fault> {
-    faults.into_iter().map(|fault| one(&fault, plan, id).unwrap_or(fault)).collect()
+    faults
+        .into_iter()
+        .map(|fault| one(&fault, plan, id).unwrap_or(fault))
+        .collect()
 }
 
 /// None where the fault is not in a setting.
 fn one(fault: &Fault, plan: &Plan, id: &str) -> Option<Fault> {
-    let own = fault.place.strip_prefix(id).and_then(|rest| rest.strip_prefix('.')).unwrap_or(&fault.place);
+    let own = fault
+        .place
+        .strip_prefix(id)
+        .and_then(|rest| rest.strip_prefix('.'))
+        .unwrap_or(&fault.place);
     if own != "with" && !own.starts_with("with.") {
         return None;
     }
     let mut tree = yaml::parse(&plan.text).0?;
     overrides::apply(&mut tree, &plan.overrides);
-    let named = |stage: &Node| stage.get("id").or_else(|| stage.get("uses")).and_then(Node::text).is_some_and(|name| name == id);
+    let named = |stage: &Node| {
+        stage
+            .get("id")
+            .or_else(|| stage.get("uses"))
+            .and_then(Node::text)
+            .is_some_and(|name| name == id)
+    };
     let index = tree.get("stages")?.items().iter().position(named)?;
     let path = format!("stages[{index}].{own}");
     let message = format!("stage `{id}`: {}", fault.message);
-    Some(Trouble::new(message).at(tree.nearest_mark(&path)).below(&path).fault(&plan.file.display().to_string()))
+    Some(
+        Trouble::new(message)
+            .at(tree.nearest_mark(&path))
+            .below(&path)
+            .fault(&plan.file.display().to_string()),
+    )
 }

@@ -46,20 +46,34 @@ pub struct PlannedStage {
 
 impl Plan {
     /// Reads a pipeline; fails with every fault at once.
-    pub fn load(file: &Path, overrides: &[Override], stages: &'static [StageEntry]) -> Result<Self> {
+    pub fn load(
+        file: &Path,
+        overrides: &[Override],
+        stages: &'static [StageEntry],
+    ) -> Result<Self> {
         let label = file.display().to_string();
         let text = raw::bytes(file).map_err(|error| {
             Error::spec(
                 &label,
-                if error.kind() == std::io::ErrorKind::NotFound { "no such file".into() } else { error.to_string() },
+                if error.kind() == std::io::ErrorKind::NotFound {
+                    "no such file".into()
+                } else {
+                    error.to_string()
+                },
             )
         })?;
-        let text = String::from_utf8(text).map_err(|_| Error::spec(&label, "not a text file: expected YAML in UTF-8"))?;
+        let text = String::from_utf8(text)
+            .map_err(|_| Error::spec(&label, "not a text file: expected YAML in UTF-8"))?;
         Self::parse(file, text, overrides, stages)
     }
 
     /// The same for a text that is already read.
-    pub fn parse(file: &Path, text: String, overrides: &[Override], registry: &'static [StageEntry]) -> Result<Self> {
+    pub fn parse(
+        file: &Path,
+        text: String,
+        overrides: &[Override],
+        registry: &'static [StageEntry],
+    ) -> Result<Self> {
         let label = file.display().to_string();
         let mut draft = spec::read(file, &text, overrides, registry);
         let mut inputs = Vec::new();
@@ -67,16 +81,30 @@ impl Plan {
             let (wired, mut troubles) = wiring::wire(&draft.stages, index, registry);
             troubles.extend(sets::unknown(&draft.stages, index, &wired));
             inputs.push(wired);
-            draft.troubles.extend(troubles.into_iter().map(|trouble| trouble.below(&format!("stages[{index}]"))));
+            draft.troubles.extend(
+                troubles
+                    .into_iter()
+                    .map(|trouble| trouble.below(&format!("stages[{index}]"))),
+            );
         }
         let mut faults = draft.all_faults(&label);
         let mut stages = Vec::new();
         for (stage, inputs) in draft.stages.into_iter().zip(inputs) {
             if let (Some(entry), Some(body)) = (stage.entry, stage.stage) {
                 let outputs = (entry.writes)();
-                stages.push(PlannedStage { id: stage.id, entry, stage: body, files: stage.files, inputs, outputs });
+                stages.push(PlannedStage {
+                    id: stage.id,
+                    entry,
+                    stage: body,
+                    files: stage.files,
+                    inputs,
+                    outputs,
+                });
             } else if faults.is_empty() {
-                faults.push(Fault::new(&label, format!("stage `{}` could not be read", stage.id)));
+                faults.push(Fault::new(
+                    &label,
+                    format!("stage `{}` could not be read", stage.id),
+                ));
             }
         }
         if !faults.is_empty() {
@@ -104,29 +132,50 @@ impl Plan {
         stages.iter().for_each(|stage| needed[*stage] = true);
         for at in (0..self.stages.len()).rev() {
             if needed[at] {
-                let origins: Vec<usize> = self.stages[at].inputs.iter().flat_map(|input| &input.from).map(|o| o.stage).collect();
+                let origins: Vec<usize> = self.stages[at]
+                    .inputs
+                    .iter()
+                    .flat_map(|input| &input.from)
+                    .map(|o| o.stage)
+                    .collect();
                 origins.into_iter().for_each(|origin| needed[origin] = true);
             }
         }
-        let place: Vec<usize> =
-            needed.iter().scan(0, |next, needed| Some(std::mem::replace(next, *next + usize::from(*needed)))).collect();
+        let place: Vec<usize> = needed
+            .iter()
+            .scan(0, |next, needed| {
+                Some(std::mem::replace(next, *next + usize::from(*needed)))
+            })
+            .collect();
         let mut at = 0;
         self.stages.retain(|_| {
             at += 1;
             needed[at - 1]
         });
-        let origins = self.stages.iter_mut().flat_map(|stage| &mut stage.inputs).flat_map(|input| &mut input.from);
+        let origins = self
+            .stages
+            .iter_mut()
+            .flat_map(|stage| &mut stage.inputs)
+            .flat_map(|input| &mut input.from);
         origins.for_each(|origin| origin.stage = place[origin.stage]);
         self
     }
 
     /// The place of a stage, or what is allowed.
     pub fn find(&self, id: &str, option: &str) -> Result<usize> {
-        self.stages.iter().position(|stage| stage.id == id).ok_or_else(|| {
-            let ids: Vec<&str> = self.stages.iter().map(|stage| stage.id.as_str()).collect();
-            let hint = crate::error::nearest(id, ids.iter().copied()).map(|near| format!("; did you mean `{near}`?"));
-            let message = format!("no stage `{id}`{} Allowed: {}", hint.unwrap_or_else(|| ".".into()), ids.join(", "));
-            Error::spec(option, message)
-        })
+        self.stages
+            .iter()
+            .position(|stage| stage.id == id)
+            .ok_or_else(|| {
+                let ids: Vec<&str> = self.stages.iter().map(|stage| stage.id.as_str()).collect();
+                let hint = crate::error::nearest(id, ids.iter().copied())
+                    .map(|near| format!("; did you mean `{near}`?"));
+                let message = format!(
+                    "no stage `{id}`{} Allowed: {}",
+                    hint.unwrap_or_else(|| ".".into()),
+                    ids.join(", ")
+                );
+                Error::spec(option, message)
+            })
     }
 }

@@ -48,7 +48,9 @@ pub fn preview(plan: &Plan, store: &Store, selection: &Selection) -> Result<Vec<
     for (index, stage) in plan.stages.iter().enumerate() {
         let inside = selected.stages.contains(&index);
         let prospect = match state.key(index)? {
-            KeyState::Pending(on) if inside => Prospect::Pending { on: plan.stages[on].id.clone() },
+            KeyState::Pending(on) if inside => Prospect::Pending {
+                on: plan.stages[on].id.clone(),
+            },
             KeyState::Pending(_) => Prospect::NotSelected,
             KeyState::Known(key) => match store.action(&key)? {
                 Lookup::Done(record) if !selected.forces(index) => {
@@ -56,10 +58,16 @@ pub fn preview(plan: &Plan, store: &Store, selection: &Selection) -> Result<Vec<
                     Prospect::Cached
                 }
                 _ if !inside => Prospect::NotSelected,
-                found => Prospect::Run { reason: reason::why(store, plan, &key, &found, selected.forces(index))? },
+                found => Prospect::Run {
+                    reason: reason::why(store, plan, &key, &found, selected.forces(index))?,
+                },
             },
         };
-        forecasts.push(Forecast { id: stage.id.clone(), uses: stage.entry.name.into(), prospect });
+        forecasts.push(Forecast {
+            id: stage.id.clone(),
+            uses: stage.entry.name.into(),
+            prospect,
+        });
     }
     Ok(forecasts)
 }

@@ -10,7 +10,13 @@ use std::collections::{BTreeMap, BTreeSet};
 const HISTORY: usize = 200;
 
 /// Why a stage runs whose action was looked up.
-pub(super) fn why(store: &Store, plan: &Plan, key: &StageKey, found: &Lookup, forced: bool) -> Result<String> {
+pub(super) fn why(
+    store: &Store,
+    plan: &Plan,
+    key: &StageKey,
+    found: &Lookup,
+    forced: bool,
+) -> Result<String> {
     match found {
         Lookup::Damaged(why) => Ok(why.clone()),
         _ if forced => Ok("forced".into()),
@@ -29,13 +35,23 @@ fn last_key(store: &Store, pipeline: &str, stage: &str) -> Result<Option<StageKe
     }
     for id in store.runs()?.iter().rev().take(HISTORY) {
         // A manifest that cannot be read explains nothing; it must not stop a run.
-        let Ok(manifest) = store.manifest(id) else { continue };
+        let Ok(manifest) = store.manifest(id) else {
+            continue;
+        };
         if manifest["pipeline"]["name"] != pipeline {
             continue;
         }
-        let stages = manifest["stages"].as_array().map(Vec::as_slice).unwrap_or_default();
-        let done = |entry: &&Value| entry["id"] == stage && (entry["status"] == "executed" || entry["status"] == "cached");
-        let key = stages.iter().find(done).map(|entry| serde_json::from_value(entry["key"].clone()));
+        let stages = manifest["stages"]
+            .as_array()
+            .map(Vec::as_slice)
+            .unwrap_or_default();
+        let done = |entry: &&Value| {
+            entry["id"] == stage && (entry["status"] == "executed" || entry["status"] == "cached")
+        };
+        let key = stages
+            .iter()
+            .find(done)
+            .map(|entry| serde_json::from_value(entry["key"].clone()));
         if let Some(Ok(key)) = key {
             return Ok(Some(key));
         }
@@ -61,19 +77,38 @@ pub fn changes_of(before: &StageKey, now: &StageKey) -> Vec<KeyChange> {
     let mut changes = Vec::new();
     let mut push = |what, name: &str, before: String, now: String| {
         if before != now {
-            changes.push(KeyChange { what, name: name.into(), before, now });
+            changes.push(KeyChange {
+                what,
+                name: name.into(),
+                before,
+                now,
+            });
         }
     };
     push("stage", "", before.stage.clone(), now.stage.clone());
-    push("implementation", "", before.implementation.to_string(), now.implementation.to_string());
+    push(
+        "implementation",
+        "",
+        before.implementation.to_string(),
+        now.implementation.to_string(),
+    );
     let mut settings = BTreeSet::new();
     differing(&before.settings, &now.settings, &now.id, &mut settings);
     for (path, old, new) in settings {
         push("settings", &path, old, new);
     }
-    let reads =
-        |key: &StageKey| key.reads.iter().flat_map(|(port, tables)| tables.iter().map(|read| input(port, read))).collect();
-    let files = |key: &StageKey| key.files.values().map(|file| (file.name.clone(), file.content.to_string())).collect();
+    let reads = |key: &StageKey| {
+        key.reads
+            .iter()
+            .flat_map(|(port, tables)| tables.iter().map(|read| input(port, read)))
+            .collect()
+    };
+    let files = |key: &StageKey| {
+        key.files
+            .values()
+            .map(|file| (file.name.clone(), file.content.to_string()))
+            .collect()
+    };
     type Parts = BTreeMap<String, String>;
     let pairs: [(&'static str, Parts, Parts); 3] = [
         ("input", reads(before), reads(now)),
@@ -83,18 +118,28 @@ pub fn changes_of(before: &StageKey, now: &StageKey) -> Vec<KeyChange> {
     for (what, old, new) in pairs {
         let names: BTreeSet<&String> = old.keys().chain(new.keys()).collect();
         for name in names {
-            let of = |map: &BTreeMap<String, String>| map.get(name).cloned().unwrap_or_else(|| "-".into());
+            let of = |map: &BTreeMap<String, String>| {
+                map.get(name).cloned().unwrap_or_else(|| "-".into())
+            };
             push(what, name, of(&old), of(&new));
         }
     }
     push("seed", "", before.seed.to_string(), now.seed.to_string());
-    push("key format", "", before.key_format.to_string(), now.key_format.to_string());
+    push(
+        "key format",
+        "",
+        before.key_format.to_string(),
+        now.key_format.to_string(),
+    );
     changes
 }
 
 /// A port, with the stage where it takes several tables, and the table.
 fn input(port: &str, read: &crate::store::ReadKey) -> (String, String) {
-    let name = read.stage.as_ref().map_or_else(|| port.to_string(), |stage| format!("{port} ({stage})"));
+    let name = read
+        .stage
+        .as_ref()
+        .map_or_else(|| port.to_string(), |stage| format!("{port} ({stage})"));
     (name, read.table.to_string())
 }
 
@@ -103,7 +148,16 @@ fn changes(before: &StageKey, now: &StageKey) -> String {
     let changes = changes_of(before, now);
     let names = |what: &str| -> Vec<String> {
         let named = changes.iter().filter(|change| change.what == what);
-        let mut names: Vec<String> = named.map(|change| change.name.split(" (").next().unwrap_or_default().to_string()).collect();
+        let mut names: Vec<String> = named
+            .map(|change| {
+                change
+                    .name
+                    .split(" (")
+                    .next()
+                    .unwrap_or_default()
+                    .to_string()
+            })
+            .collect();
         names.dedup();
         names
     };
@@ -128,16 +182,28 @@ fn changes(before: &StageKey, now: &StageKey) -> String {
     if changes.iter().any(|change| change.what == "key format") {
         reasons.push("calib keys its results in another way now".into());
     }
-    if reasons.is_empty() { "its tables are no longer in the store".into() } else { reasons.join("; ") }
+    if reasons.is_empty() {
+        "its tables are no longer in the store".into()
+    } else {
+        reasons.join("; ")
+    }
 }
 
 /// Paths at which two values differ, with both values.
-fn differing(before: &Value, now: &Value, path: &str, paths: &mut BTreeSet<(String, String, String)>) {
+fn differing(
+    before: &Value,
+    now: &Value,
+    path: &str,
+    paths: &mut BTreeSet<(String, String, String)>,
+) {
     match (before, now) {
         (Value::Object(old), Value::Object(new)) => {
             let names: BTreeSet<&String> = old.keys().chain(new.keys()).collect();
             for name in names {
-                let (old, new) = (old.get(name).unwrap_or(&Value::Null), new.get(name).unwrap_or(&Value::Null));
+                let (old, new) = (
+                    old.get(name).unwrap_or(&Value::Null),
+                    new.get(name).unwrap_or(&Value::Null),
+                );
                 differing(old, new, &format!("{path}.{name}"), paths);
             }
         }

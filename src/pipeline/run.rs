@@ -2,7 +2,9 @@
 
 use super::execute::{self, ExecutionSite};
 use super::lock::ActionLock;
-use super::manifest::{FileRecord, InputRecord, Manifest, OutputRecord, RunStatus, StageStatus, Surroundings};
+use super::manifest::{
+    FileRecord, InputRecord, Manifest, OutputRecord, RunStatus, StageStatus, Surroundings,
+};
 use super::options::RunOptions;
 use super::plan::Plan;
 use super::reason;
@@ -28,7 +30,10 @@ pub struct CompletedRun {
 impl CompletedRun {
     /// Whether every stage was cached.
     pub fn nothing_done(&self) -> bool {
-        self.manifest.stages.iter().all(|stage| stage.status == StageStatus::Cached)
+        self.manifest
+            .stages
+            .iter()
+            .all(|stage| stage.status == StageStatus::Cached)
     }
 }
 
@@ -41,8 +46,10 @@ pub fn run(
     observer: &dyn Observer,
 ) -> Result<CompletedRun> {
     let selected = options.selection.of(plan)?;
-    let threads =
-        rayon::ThreadPoolBuilder::new().num_threads(options.jobs).build().map_err(|e| Error::store("--jobs", e.to_string()))?;
+    let threads = rayon::ThreadPoolBuilder::new()
+        .num_threads(options.jobs)
+        .build()
+        .map_err(|e| Error::store("--jobs", e.to_string()))?;
     let begun = (surroundings.now)();
     let mut manifest = Manifest::new(plan, surroundings, options, rfc3339(begun));
     manifest.previous = store.last_ended()?;
@@ -61,17 +68,29 @@ pub fn run(
         at_risk: 0.0,
     };
     let result = (0..plan.stages.len()).try_for_each(|index| running.stage(index));
-    let Running { mut manifest, record, documents, .. } = running;
+    let Running {
+        mut manifest,
+        record,
+        documents,
+        ..
+    } = running;
     let ended = (surroundings.now)();
     manifest.ended = Some(rfc3339(ended));
     manifest.wall_seconds = Some(seconds(begun, ended));
     manifest.peak_memory_bytes = (surroundings.peak_memory)();
-    manifest.status = if result.is_ok() { RunStatus::Done } else { RunStatus::Failed };
+    manifest.status = if result.is_ok() {
+        RunStatus::Done
+    } else {
+        RunStatus::Failed
+    };
     manifest.error = result.as_ref().err().map(ToString::to_string);
     let finished = store.finish_run(record, &manifest);
     // The first error is the one that explains the others.
     result.and(finished)?;
-    Ok(CompletedRun { manifest, documents })
+    Ok(CompletedRun {
+        manifest,
+        documents,
+    })
 }
 
 struct Running<'a> {
@@ -97,7 +116,9 @@ impl Running<'_> {
             KeyState::Pending(_) if !inside => return Ok(()),
             KeyState::Pending(on) => {
                 let (id, on) = (&plan.stages[index].id, &plan.stages[on].id);
-                let message = format!("stage `{id}` reads from `{on}`, which is not cached and was not selected: select it too");
+                let message = format!(
+                    "stage `{id}` reads from `{on}`, which is not cached and was not selected: select it too"
+                );
                 return Err(Error::spec("--only, --from", message));
             }
         };
@@ -113,7 +134,10 @@ impl Running<'_> {
         }
         let reason = reason::why(self.store, plan, &key, &found, forced)?;
         let id = &plan.stages[index].id;
-        let mut waiting = || self.observer.note(id, "waiting for another run that does the same");
+        let mut waiting = || {
+            self.observer
+                .note(id, "waiting for another run that does the same")
+        };
         let lock = ActionLock::take(self.store, &key.id(), &mut waiting);
         if let (false, Lookup::Done(record)) = (forced, self.store.action(&key)?) {
             return self.cached(index, *record);
@@ -135,13 +159,22 @@ impl Running<'_> {
         // Another run may have been waited for since the files were hashed.
         self.state.unchanged(index)?;
         let stage = &self.state.plan.stages[index];
-        self.observer.stage_begins(&stage.id, stage.entry.name, &reason);
+        self.observer
+            .stage_begins(&stage.id, stage.entry.name, &reason);
         let started = (self.now)();
         self.event("begins", index, serde_json::json!({ "reason": reason }))?;
         self.manifest.stages[index].reason = Some(reason);
-        let place =
-            ExecutionSite { store: self.store, threads: &self.threads, observer: self.observer, run: &self.manifest.run_id };
-        let mut account = crate::store::Account { run: place.run.into(), started: rfc3339(started), ..Default::default() };
+        let place = ExecutionSite {
+            store: self.store,
+            threads: &self.threads,
+            observer: self.observer,
+            run: &self.manifest.run_id,
+        };
+        let mut account = crate::store::Account {
+            run: place.run.into(),
+            started: rfc3339(started),
+            ..Default::default()
+        };
         let products = execute::stage(&self.state, index, &place, &mut account)?;
         let ended = (self.now)();
         account.ended = rfc3339(ended);
@@ -155,7 +188,13 @@ impl Running<'_> {
         }
         // The record of an equal earlier result may stand; the report is of this execution.
         self.at_risk += account.wall_seconds;
-        self.settle(index, ActionRecord { account, ..published.record })?;
+        self.settle(
+            index,
+            ActionRecord {
+                account,
+                ..published.record
+            },
+        )?;
         if self.at_risk < GROUP {
             return Ok(());
         }
@@ -171,9 +210,12 @@ impl Running<'_> {
         let mut outputs = Vec::new();
         for (port, output) in stage.outputs.iter().enumerate() {
             let table = run_state::table(&record.tables, stage, port)?;
-            let path = self.store.expose(&plan.name, &stage.id, output.name, table)?;
+            let path = self
+                .store
+                .expose(&plan.name, &stage.id, output.name, table)?;
             if output.kind == "document" {
-                self.documents.extend(execute::documents(self.store, &plan.name, table)?);
+                self.documents
+                    .extend(execute::documents(self.store, &plan.name, table)?);
             }
             outputs.push(OutputRecord {
                 port: output.name.into(),
@@ -202,7 +244,9 @@ impl Running<'_> {
         for input in &stages[index].inputs {
             for origin in &input.from {
                 let from = &stages[origin.stage];
-                let Some(tables) = &self.state.tables[origin.stage] else { continue };
+                let Some(tables) = &self.state.tables[origin.stage] else {
+                    continue;
+                };
                 records.push(InputRecord {
                     port: input.port.name.into(),
                     from: format!("{}.{}", from.id, from.outputs[origin.port].name),
@@ -218,12 +262,16 @@ impl Running<'_> {
         for file in &self.state.plan.stages[index].files {
             let metadata = std::fs::metadata(&file.path).ok();
             // Of a folder of parts all of them.
-            let bounds = crate::raw::source(&file.path).and_then(|mut source| source.bounds()).unwrap_or_default();
+            let bounds = crate::raw::source(&file.path)
+                .and_then(|mut source| source.bounds())
+                .unwrap_or_default();
             records.push(FileRecord {
                 place: file.place.clone(),
                 path: file.path.display().to_string(),
                 bytes: bounds.last().copied().unwrap_or_default(),
-                modified: metadata.and_then(|metadata| metadata.modified().ok()).map(rfc3339),
+                modified: metadata
+                    .and_then(|metadata| metadata.modified().ok())
+                    .map(rfc3339),
                 blake3: self.state.hash(&file.path)?,
             });
         }
@@ -233,12 +281,16 @@ impl Running<'_> {
     fn event(&mut self, event: &str, index: usize, more: serde_json::Value) -> Result<()> {
         let stage = &self.state.plan.stages[index].id;
         let time = rfc3339((self.now)());
-        self.record.append_event(&serde_json::json!({ "time": time, "event": event, "stage": stage, "detail": more }))
+        self.record.append_event(
+            &serde_json::json!({ "time": time, "event": event, "stage": stage, "detail": more }),
+        )
     }
 }
 
 fn rfc3339(time: SystemTime) -> String {
-    jiff::Timestamp::try_from(time).map(|time| format!("{time:.3}")).unwrap_or_default()
+    jiff::Timestamp::try_from(time)
+        .map(|time| format!("{time:.3}"))
+        .unwrap_or_default()
 }
 fn seconds(from: SystemTime, to: SystemTime) -> f64 {
     to.duration_since(from).unwrap_or_default().as_secs_f64()

@@ -30,7 +30,8 @@ impl HashedFile {
         // First the look: of a file that is written meanwhile it is an old one.
         let look = look(path);
         let content = raw::source(path).and_then(FileHash::of_reader);
-        let content = content.map_err(|error| Error::unreadable(path.display().to_string(), &error))?;
+        let content =
+            content.map_err(|error| Error::unreadable(path.display().to_string(), &error))?;
         Ok(Self { content, look })
     }
 }
@@ -40,7 +41,9 @@ type FileLook = (u64, SystemTime);
 
 /// None where the file or its system does not tell, and of a folder of parts.
 fn look(path: &Path) -> Option<FileLook> {
-    let metadata = std::fs::metadata(path).ok().filter(std::fs::Metadata::is_file)?;
+    let metadata = std::fs::metadata(path)
+        .ok()
+        .filter(std::fs::Metadata::is_file)?;
     Some((metadata.len(), metadata.modified().ok()?))
 }
 
@@ -52,7 +55,11 @@ pub(super) enum KeyState {
 
 impl<'a> RunState<'a> {
     pub fn new(plan: &'a Plan) -> Self {
-        Self { plan, tables: vec![None; plan.stages.len()], hashes: BTreeMap::new() }
+        Self {
+            plan,
+            tables: vec![None; plan.stages.len()],
+            hashes: BTreeMap::new(),
+        }
     }
 
     pub fn key(&mut self, index: usize) -> Result<KeyState> {
@@ -61,18 +68,27 @@ impl<'a> RunState<'a> {
         for input in &stage.inputs {
             let mut keys = Vec::new();
             for origin in &input.from {
-                let Some(tables) = &self.tables[origin.stage] else { return Ok(KeyState::Pending(origin.stage)) };
+                let Some(tables) = &self.tables[origin.stage] else {
+                    return Ok(KeyState::Pending(origin.stage));
+                };
                 let table = table(tables, &self.plan.stages[origin.stage], origin.port)?;
                 // Only where a port takes several tables does the stage see whose they are.
-                let writer = (input.port.arity == Arity::Every).then(|| self.plan.stages[origin.stage].id.clone());
-                keys.push(ReadKey { stage: writer, table: table.table_hash.clone() });
+                let writer = (input.port.arity == Arity::Every)
+                    .then(|| self.plan.stages[origin.stage].id.clone());
+                keys.push(ReadKey {
+                    stage: writer,
+                    table: table.table_hash.clone(),
+                });
             }
             reads.insert(input.port.name.to_string(), keys);
         }
         self.hash_all(index)?;
         let mut files = BTreeMap::new();
         for file in &stage.files {
-            let key = FileKey { name: label(&file.path), content: self.hash(&file.path)? };
+            let key = FileKey {
+                name: label(&file.path),
+                content: self.hash(&file.path)?,
+            };
             files.insert(file.place.clone(), key);
         }
         let mut schemas = BTreeMap::new();
@@ -118,7 +134,10 @@ impl<'a> RunState<'a> {
                 fresh.push(path);
             }
         }
-        let hashed: Vec<Result<HashedFile>> = fresh.par_iter().map(|path| HashedFile::read(path)).collect();
+        let hashed: Vec<Result<HashedFile>> = fresh
+            .par_iter()
+            .map(|path| HashedFile::read(path))
+            .collect();
         for (path, hashed) in fresh.into_iter().zip(hashed) {
             self.hashes.insert(path.clone(), hashed?);
         }
@@ -130,7 +149,9 @@ impl<'a> RunState<'a> {
     pub fn unchanged(&mut self, index: usize) -> Result<()> {
         let stage = &self.plan.stages[index];
         for file in &stage.files {
-            let Some(hashed) = self.hashes.get(&file.path) else { continue };
+            let Some(hashed) = self.hashes.get(&file.path) else {
+                continue;
+            };
             if hashed.look.is_some() && hashed.look == look(&file.path) {
                 continue;
             }
@@ -150,7 +171,16 @@ impl<'a> RunState<'a> {
 }
 
 /// The table of an output port, which the record of a stage must have.
-pub(super) fn table<'t>(tables: &'t BTreeMap<String, TableRef>, stage: &PlannedStage, port: usize) -> Result<&'t TableRef> {
+pub(super) fn table<'t>(
+    tables: &'t BTreeMap<String, TableRef>,
+    stage: &PlannedStage,
+    port: usize,
+) -> Result<&'t TableRef> {
     let name = stage.outputs[port].name;
-    tables.get(name).ok_or_else(|| Error::Bug(format!("the record of stage {} has no table {name}", stage.id)))
+    tables.get(name).ok_or_else(|| {
+        Error::Bug(format!(
+            "the record of stage {} has no table {name}",
+            stage.id
+        ))
+    })
 }

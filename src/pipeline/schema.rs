@@ -15,10 +15,12 @@ pub fn json_schema(stages: &[StageEntry]) -> String {
             stage(entry, with_variables(settings))
         })
         .collect();
-    let mut definitions: Map<String, Value> =
-        generator.take_definitions(true).into_iter().map(|(name, schema)| (name, with_variables(schema))).collect();
-    let variable =
-        json!({ "type": "string", "pattern": "^\\$\\{[A-Za-z0-9_-]+\\}$", "description": "A variable of the pipeline." });
+    let mut definitions: Map<String, Value> = generator
+        .take_definitions(true)
+        .into_iter()
+        .map(|(name, schema)| (name, with_variables(schema)))
+        .collect();
+    let variable = json!({ "type": "string", "pattern": "^\\$\\{[A-Za-z0-9_-]+\\}$", "description": "A variable of the pipeline." });
     definitions.insert(VARIABLE.into(), variable);
     let schema = json!({
         "$schema": "http://json-schema.org/draft-07/schema#",
@@ -51,14 +53,27 @@ const VARIABLE: &str = "calib.variable";
 
 /// Lets a variable stand wherever a number, a boolean or one of a few words is expected; text may hold one anyway.
 fn with_variables(schema: Value) -> Value {
-    let Value::Object(map) = schema else { return schema };
-    let members = |key: &str| map.get(key).and_then(Value::as_array).map(Vec::as_slice).unwrap_or_default();
+    let Value::Object(map) = schema else {
+        return schema;
+    };
+    let members = |key: &str| {
+        map.get(key)
+            .and_then(Value::as_array)
+            .map(Vec::as_slice)
+            .unwrap_or_default()
+    };
     let words = members("oneOf").iter().chain(members("anyOf")).any(is_word);
     let scalar = |kind: &Value| matches!(kind.as_str(), Some("number" | "integer" | "boolean"));
-    let typed = map.get("type").is_some_and(|kind| scalar(kind) || kind.as_array().is_some_and(|kinds| kinds.iter().any(scalar)));
+    let typed = map.get("type").is_some_and(|kind| {
+        scalar(kind)
+            || kind
+                .as_array()
+                .is_some_and(|kinds| kinds.iter().any(scalar))
+    });
     if typed || words || map.contains_key("enum") {
         let description = map.get("description").cloned();
-        let mut either = json!({ "anyOf": [inside(map), { "$ref": format!("#/definitions/{VARIABLE}") }] });
+        let mut either =
+            json!({ "anyOf": [inside(map), { "$ref": format!("#/definitions/{VARIABLE}") }] });
         if let (Some(description), Some(object)) = (description, either.as_object_mut()) {
             object.insert("description".into(), description);
         }
@@ -71,13 +86,25 @@ fn with_variables(schema: Value) -> Value {
 fn inside(map: Map<String, Value>) -> Map<String, Value> {
     let each = |(key, value): (String, Value)| {
         let value = match (key.as_str(), value) {
-            ("properties" | "patternProperties", Value::Object(fields)) => {
-                Value::Object(fields.into_iter().map(|(name, field)| (name, with_variables(field))).collect())
-            }
+            ("properties" | "patternProperties", Value::Object(fields)) => Value::Object(
+                fields
+                    .into_iter()
+                    .map(|(name, field)| (name, with_variables(field)))
+                    .collect(),
+            ),
             ("items" | "additionalProperties", value) => with_variables(value),
-            ("anyOf" | "oneOf" | "allOf", Value::Array(members)) => {
-                Value::Array(members.into_iter().map(|member| if is_word(&member) { member } else { plain(member) }).collect())
-            }
+            ("anyOf" | "oneOf" | "allOf", Value::Array(members)) => Value::Array(
+                members
+                    .into_iter()
+                    .map(|member| {
+                        if is_word(&member) {
+                            member
+                        } else {
+                            plain(member)
+                        }
+                    })
+                    .collect(),
+            ),
             (_, value) => value,
         };
         (key, value)
@@ -129,7 +156,10 @@ fn stage(entry: &StageEntry, settings: Value) -> Value {
 fn sorted(value: Value) -> Value {
     match value {
         Value::Object(map) => {
-            let mut entries: Vec<(String, Value)> = map.into_iter().map(|(key, value)| (key, sorted(value))).collect();
+            let mut entries: Vec<(String, Value)> = map
+                .into_iter()
+                .map(|(key, value)| (key, sorted(value)))
+                .collect();
             entries.sort_by(|left, right| left.0.cmp(&right.0));
             Value::Object(entries.into_iter().collect())
         }

@@ -39,11 +39,24 @@ pub(super) struct StageMessages {
 }
 
 impl<'a> StageServices<'a> {
-    pub fn new(id: &'a str, store: &'a Store, files: &'a [super::plan::InputFile], observer: &'a dyn Observer) -> Self {
-        Self { id, store, files, observer, lines: Mutex::default() }
+    pub fn new(
+        id: &'a str,
+        store: &'a Store,
+        files: &'a [super::plan::InputFile],
+        observer: &'a dyn Observer,
+    ) -> Self {
+        Self {
+            id,
+            store,
+            files,
+            observer,
+            lines: Mutex::default(),
+        }
     }
     pub fn lines(self) -> StageMessages {
-        self.lines.into_inner().unwrap_or_else(PoisonError::into_inner)
+        self.lines
+            .into_inner()
+            .unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -52,7 +65,10 @@ impl Services for StageServices<'_> {
         open(self.id, self.files, file)
     }
     fn sink(&self, kind: &'static str) -> Result<Box<dyn Sink>> {
-        Ok(Box::new(StoreSink { kind, writer: self.store.writer(kind)? }))
+        Ok(Box::new(StoreSink {
+            kind,
+            writer: self.store.writer(kind)?,
+        }))
     }
     fn begin(&self, what: &str, total: Option<u64>, unit: &str) {
         self.observer.begin(self.id, what, total, unit);
@@ -62,36 +78,69 @@ impl Services for StageServices<'_> {
     }
     fn note(&self, line: String) {
         self.observer.note(self.id, &line);
-        self.lines.lock().unwrap_or_else(PoisonError::into_inner).notes.push(line);
+        self.lines
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .notes
+            .push(line);
     }
     fn warn(&self, line: String) {
         self.observer.warn(self.id, &line);
-        self.lines.lock().unwrap_or_else(PoisonError::into_inner).warnings.push(line);
+        self.lines
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .warnings
+            .push(line);
     }
 }
 
 /// Opens an input file that the stage listed; settings hold paths as text, whatever bytes they have.
-pub(super) fn open(id: &str, files: &[super::plan::InputFile], file: &RawFile) -> Result<OpenedInput> {
+pub(super) fn open(
+    id: &str,
+    files: &[super::plan::InputFile],
+    file: &RawFile,
+) -> Result<OpenedInput> {
     let asked = file.0.to_string_lossy();
-    let Some(known) = files.iter().find(|known| known.path.to_string_lossy() == asked) else {
-        return Err(Error::Bug(format!("stage {id} opens {asked} without listing it among its files")));
+    let Some(known) = files
+        .iter()
+        .find(|known| known.path.to_string_lossy() == asked)
+    else {
+        return Err(Error::Bug(format!(
+            "stage {id} opens {asked} without listing it among its files"
+        )));
     };
     let shown = known.path.display().to_string();
     let mut reader = raw::source(&known.path).map_err(|error| Error::unreadable(&shown, &error))?;
-    let size = reader.bounds().ok().and_then(|bounds| bounds.last().copied());
-    Ok(OpenedInput { label: told(files, known), reader, size })
+    let size = reader
+        .bounds()
+        .ok()
+        .and_then(|bounds| bounds.last().copied());
+    Ok(OpenedInput {
+        label: told(files, known),
+        reader,
+        size,
+    })
 }
 
 /// A file in messages: by its name, and where the stage has another file of that name, as the YAML names it.
 fn told(files: &[super::plan::InputFile], file: &super::plan::InputFile) -> String {
     let name = label(&file.path);
-    let shared = files.iter().any(|other| other.path != file.path && label(&other.path) == name);
-    if shared { file.named.display().to_string() } else { name }
+    let shared = files
+        .iter()
+        .any(|other| other.path != file.path && label(&other.path) == name);
+    if shared {
+        file.named.display().to_string()
+    } else {
+        name
+    }
 }
 
 /// A file as tables name it: its name alone, so that equal content gives equal tables wherever it lies.
 pub(super) fn label(path: &std::path::Path) -> String {
-    path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
+    path.file_name().map_or_else(
+        || path.display().to_string(),
+        |name| name.to_string_lossy().into_owned(),
+    )
 }
 
 struct StoreSink {
@@ -105,6 +154,10 @@ impl Sink for StoreSink {
     }
     fn finish(self: Box<Self>) -> Result<Streamed> {
         let file: FinishedFile = self.writer.finish()?;
-        Ok(Streamed { kind: self.kind, rows: file.table().rows, handle: Box::new(file) })
+        Ok(Streamed {
+            kind: self.kind,
+            rows: file.table().rows,
+            handle: Box::new(file),
+        })
     }
 }

@@ -11,15 +11,23 @@ const KIND: &str = "split";
 /// The names of sets in the settings of a stage that is wired to `inputs` which cannot be right.
 pub(super) fn unknown(stages: &[StageDraft], index: usize, inputs: &[Input]) -> Vec<Trouble> {
     let stage = &stages[index];
-    let Some(dealt) = dealt(&stages[..index], inputs) else { return Vec::new() };
+    let Some(dealt) = dealt(&stages[..index], inputs) else {
+        return Vec::new();
+    };
     let names: Vec<&str> = dealt.iter().map(String::as_str).collect();
-    let wrong = stage.sets.iter().filter(|set| !names.contains(&set.name.as_str()));
+    let wrong = stage
+        .sets
+        .iter()
+        .filter(|set| !names.contains(&set.name.as_str()));
     let troubles = wrong.map(|set| {
         let allowed = instead(&set.name, &names);
         let message = if set.given {
             format!("no set `{}` in the split{allowed}", set.name)
         } else {
-            format!("not given, which means `{}`: no set of the split{allowed}", set.name)
+            format!(
+                "not given, which means `{}`: no set of the split{allowed}",
+                set.name
+            )
         };
         Trouble::new(message).at(set.mark).below(&set.place)
     });
@@ -30,7 +38,9 @@ pub(super) fn unknown(stages: &[StageDraft], index: usize, inputs: &[Input]) -> 
 fn dealt(earlier: &[StageDraft], inputs: &[Input]) -> Option<Vec<String>> {
     let splits: Vec<usize> = match inputs.iter().find(|input| input.port.kind == KIND) {
         Some(input) => input.from.iter().map(|origin| origin.stage).collect(),
-        None => (0..earlier.len()).filter(|stage| deals(&earlier[*stage])).collect(),
+        None => (0..earlier.len())
+            .filter(|stage| deals(&earlier[*stage]))
+            .collect(),
     };
     // Without a split the wiring has its say, and a stage that is not known may be one.
     if splits.is_empty() || earlier.iter().any(|stage| stage.entry.is_none()) {
@@ -46,5 +56,7 @@ fn dealt(earlier: &[StageDraft], inputs: &[Input]) -> Option<Vec<String>> {
 }
 
 fn deals(stage: &StageDraft) -> bool {
-    stage.entry.is_some_and(|entry| (entry.writes)().iter().any(|port| port.kind == KIND))
+    stage
+        .entry
+        .is_some_and(|entry| (entry.writes)().iter().any(|port| port.kind == KIND))
 }

@@ -69,7 +69,10 @@ pub struct InputFile {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-#[expect(dead_code, reason = "named so that other keys are faults; read from the tree")]
+#[expect(
+    dead_code,
+    reason = "named so that other keys are faults; read from the tree"
+)]
 struct Head {
     calib: u64,
     name: String,
@@ -82,7 +85,10 @@ struct Head {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-#[expect(dead_code, reason = "named so that other keys are faults; read from the tree")]
+#[expect(
+    dead_code,
+    reason = "named so that other keys are faults; read from the tree"
+)]
 struct StageHead {
     #[serde(default)]
     id: Option<String>,
@@ -94,7 +100,12 @@ struct StageHead {
 }
 
 /// Reads `text`, the content of the YAML `file`; relative paths in it start at the folder of the file.
-pub(super) fn read(file: &Path, text: &str, sets: &[Override], stages: &'static [StageEntry]) -> Draft {
+pub(super) fn read(
+    file: &Path,
+    text: &str,
+    sets: &[Override],
+    stages: &'static [StageEntry],
+) -> Draft {
     let (tree, mut troubles) = yaml::parse(text);
     let mut draft = Draft {
         name: String::new(),
@@ -104,14 +115,19 @@ pub(super) fn read(file: &Path, text: &str, sets: &[Override], stages: &'static 
         faults: Vec::new(),
         troubles: Vec::new(),
     };
-    let Some(mut tree) = tree else { return Draft { troubles, ..draft } };
+    let Some(mut tree) = tree else {
+        return Draft { troubles, ..draft };
+    };
     let (variables, faults) = overrides::apply(&mut tree, sets);
     if let Err(more) = typed::<Head>(&tree) {
         troubles.extend(more);
     }
     troubles.extend(check_head(&tree));
     draft.name = tree.get("name").and_then(Node::text).unwrap_or_default();
-    draft.seed = tree.get("seed").and_then(|seed| typed(seed).ok()).unwrap_or_default();
+    draft.seed = tree
+        .get("seed")
+        .and_then(|seed| typed(seed).ok())
+        .unwrap_or_default();
 
     let mut known = BTreeSet::new();
     if let Some(YamlValue::List(items)) = tree.at_mut("stages").map(|list| &mut list.value) {
@@ -120,12 +136,18 @@ pub(super) fn read(file: &Path, text: &str, sets: &[Override], stages: &'static 
             let unfilled = overrides::substitute(item, &path, &variables);
             let (stage, more) = read_stage(file, item, stages);
             // What else is wrong with a value that holds no value yet is not known.
-            let more = more.into_iter().map(|trouble| trouble.at(item.mark).below(&path));
-            let more = more.filter(|trouble| unfilled.iter().all(|other| other.path != trouble.path));
+            let more = more
+                .into_iter()
+                .map(|trouble| trouble.at(item.mark).below(&path));
+            let more =
+                more.filter(|trouble| unfilled.iter().all(|other| other.path != trouble.path));
             troubles.extend(more.collect::<Vec<_>>());
             troubles.extend(unfilled);
             if !stage.id.is_empty() && !known.insert(stage.id.clone()) {
-                let message = format!("two stages have the id `{}`; give one of them another `id`", stage.id);
+                let message = format!(
+                    "two stages have the id `{}`; give one of them another `id`",
+                    stage.id
+                );
                 troubles.push(Trouble::new(message).at(item.mark).below(&path));
             }
             draft.stages.push(stage);
@@ -135,7 +157,11 @@ pub(super) fn read(file: &Path, text: &str, sets: &[Override], stages: &'static 
     troubles.retain(|trouble| infinite.iter().all(|other| other.path != trouble.path));
     troubles.extend(infinite);
     draft.resolved = json(&tree);
-    Draft { faults, troubles, ..draft }
+    Draft {
+        faults,
+        troubles,
+        ..draft
+    }
 }
 
 impl Draft {
@@ -147,7 +173,10 @@ impl Draft {
         });
         let mut seen = BTreeSet::new();
         let mut faults = std::mem::take(&mut self.faults);
-        let troubles = self.troubles.drain(..).filter(|trouble| seen.insert((trouble.path.clone(), trouble.message.clone())));
+        let troubles = self
+            .troubles
+            .drain(..)
+            .filter(|trouble| seen.insert((trouble.path.clone(), trouble.message.clone())));
         faults.extend(troubles.map(|trouble| trouble.fault(file)));
         faults
     }
@@ -161,9 +190,10 @@ fn check_head(tree: &Node) -> Vec<Trouble> {
     };
     match tree.get("calib").map(|node| &node.value) {
         Some(YamlValue::Integer(format)) if *format == i128::from(FORMAT) => {}
-        Some(YamlValue::Integer(format)) => {
-            fault("calib", format!("format {format} is not known to this calib, which reads {FORMAT}"))
-        }
+        Some(YamlValue::Integer(format)) => fault(
+            "calib",
+            format!("format {format} is not known to this calib, which reads {FORMAT}"),
+        ),
         _ => {}
     }
     if let Some(name) = tree.get("name").and_then(Node::text)
@@ -171,7 +201,10 @@ fn check_head(tree: &Node) -> Vec<Trouble> {
     {
         fault("name", message);
     }
-    if tree.get("stages").is_some_and(|stages| matches!(&stages.value, YamlValue::List(items) if items.is_empty())) {
+    if tree
+        .get("stages")
+        .is_some_and(|stages| matches!(&stages.value, YamlValue::List(items) if items.is_empty()))
+    {
         fault("stages", "expected at least one stage".into());
     }
     troubles
@@ -184,36 +217,76 @@ const LONGEST: usize = 64;
 pub(crate) fn misnamed(name: &str) -> Option<String> {
     let allowed = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     if !name.starts_with(|c: char| c.is_ascii_alphanumeric()) || !name.chars().all(allowed) {
-        return Some(format!("`{name}`: expected letters, digits, `-` and `_`, starting with a letter or digit"));
+        return Some(format!(
+            "`{name}`: expected letters, digits, `-` and `_`, starting with a letter or digit"
+        ));
     }
     let letters = name.len();
     (letters > LONGEST).then(|| format!("`{name}`: {letters} letters; allowed: up to {LONGEST}"))
 }
 
-fn read_stage(file: &Path, node: &Node, registry: &'static [StageEntry]) -> (StageDraft, Vec<Trouble>) {
+fn read_stage(
+    file: &Path,
+    node: &Node,
+    registry: &'static [StageEntry],
+) -> (StageDraft, Vec<Trouble>) {
     let mut troubles = typed::<StageHead>(node).err().unwrap_or_default();
     let uses = node.get("uses").and_then(Node::text);
-    let id = node.get("id").and_then(Node::text).or_else(|| uses.clone()).unwrap_or_default();
+    let id = node
+        .get("id")
+        .and_then(Node::text)
+        .or_else(|| uses.clone())
+        .unwrap_or_default();
     if !id.is_empty()
         && node.get("id").is_some()
         && let Some(message) = misnamed(&id)
     {
-        troubles.push(Trouble::new(message).at(node.nearest_mark("id")).below("id"));
+        troubles.push(
+            Trouble::new(message)
+                .at(node.nearest_mark("id"))
+                .below("id"),
+        );
     }
-    let entry = uses.as_ref().and_then(|name| registry.iter().find(|entry| entry.name == name));
+    let entry = uses
+        .as_ref()
+        .and_then(|name| registry.iter().find(|entry| entry.name == name));
     if let (Some(name), None) = (&uses, entry) {
         let names: Vec<&str> = registry.iter().map(|entry| entry.name).collect();
-        let hint = nearest(name, names.iter().copied()).map(|near| format!("; did you mean `{near}`?"));
-        let message = format!("unknown stage `{name}`{} Allowed: {}", hint.unwrap_or_else(|| ".".into()), names.join(", "));
-        troubles.push(Trouble::new(message).at(node.nearest_mark("uses")).below("uses"));
+        let hint =
+            nearest(name, names.iter().copied()).map(|near| format!("; did you mean `{near}`?"));
+        let message = format!(
+            "unknown stage `{name}`{} Allowed: {}",
+            hint.unwrap_or_else(|| ".".into()),
+            names.join(", ")
+        );
+        troubles.push(
+            Trouble::new(message)
+                .at(node.nearest_mark("uses"))
+                .below("uses"),
+        );
     }
-    let mut draft =
-        StageDraft { id, mark: node.mark, entry, stage: None, files: Vec::new(), sets: Vec::new(), reads: BTreeMap::new() };
+    let mut draft = StageDraft {
+        id,
+        mark: node.mark,
+        entry,
+        stage: None,
+        files: Vec::new(),
+        sets: Vec::new(),
+        reads: BTreeMap::new(),
+    };
     for (port, mark, wish) in node.get("reads").map(Node::entries).unwrap_or_default() {
         let path = format!("reads.{port}");
         match stage_names(wish) {
-            Some(names) => drop(draft.reads.insert(port.clone(), PortSources { mark: *mark, names })),
-            None => troubles.push(Trouble::new("expected the id of a stage, or a list of ids").at(wish.mark).below(&path)),
+            Some(names) => drop(
+                draft
+                    .reads
+                    .insert(port.clone(), PortSources { mark: *mark, names }),
+            ),
+            None => troubles.push(
+                Trouble::new("expected the id of a stage, or a list of ids")
+                    .at(wish.mark)
+                    .below(&path),
+            ),
         }
     }
     if let Some(entry) = entry {
@@ -226,9 +299,18 @@ fn read_stage(file: &Path, node: &Node, registry: &'static [StageEntry]) -> (Sta
             more.iter_mut().for_each(moved);
             let named = |(place, name): (String, String)| {
                 let (mark, given) = (with.nearest_mark(&place), with.at(&place).is_some());
-                NamedSet { place: format!("with.{place}"), mark, name, given }
+                NamedSet {
+                    place: format!("with.{place}"),
+                    mark,
+                    name,
+                    given,
+                }
             };
-            draft.sets = stage.iter().flat_map(|stage| stage.sets_named()).map(named).collect();
+            draft.sets = stage
+                .iter()
+                .flat_map(|stage| stage.sets_named())
+                .map(named)
+                .collect();
             (draft.stage, draft.files) = (stage, files);
             troubles.extend(more.into_iter().map(|trouble| trouble.below("with")));
         }
@@ -270,21 +352,36 @@ fn type_settings(file: &Path, mut with: Node, entry: &StageEntry) -> Typed {
     let mut troubles: Vec<Trouble> = stage
         .check()
         .into_iter()
-        .map(|fault| Trouble::new(fault.message).at(with.nearest_mark(&fault.place)).below(&fault.place))
+        .map(|fault| {
+            Trouble::new(fault.message)
+                .at(with.nearest_mark(&fault.place))
+                .below(&fault.place)
+        })
         .collect();
     let mut files = Vec::new();
     for (place, raw) in stage.files() {
         let overridden = with.at(&place).is_some_and(|node| node.overridden);
-        let path = if overridden { raw.0.clone() } else { folder.join(&raw.0) };
+        let path = if overridden {
+            raw.0.clone()
+        } else {
+            folder.join(&raw.0)
+        };
         let mark = with.nearest_mark(&place);
         if let Some(message) = unreadable(&path) {
             troubles.push(Trouble::new(message).at(mark).below(&place));
         }
-        let text = Node { overridden, ..Node::new(YamlValue::Text(path.to_string_lossy().into_owned()), mark) };
+        let text = Node {
+            overridden,
+            ..Node::new(YamlValue::Text(path.to_string_lossy().into_owned()), mark)
+        };
         if let Err(message) = with.put(&place, text) {
             troubles.push(Trouble::new(message).at(mark).below(&place));
         }
-        files.push(InputFile { place, path, named: raw.0 });
+        files.push(InputFile {
+            place,
+            path,
+            named: raw.0,
+        });
     }
     if !troubles.is_empty() || files.is_empty() {
         return (troubles.is_empty().then_some(stage), files, troubles);
@@ -299,7 +396,9 @@ fn type_settings(file: &Path, mut with: Node, entry: &StageEntry) -> Typed {
 fn unreadable(path: &Path) -> Option<String> {
     let shown = path.display();
     match std::fs::metadata(path) {
-        Ok(found) if found.is_dir() => crate::raw::source(path).err().map(|error| format!("`{shown}` {error}")),
+        Ok(found) if found.is_dir() => crate::raw::source(path)
+            .err()
+            .map(|error| format!("`{shown}` {error}")),
         Ok(_) => None,
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Some(format!(
             "no such file: `{shown}` (paths are relative to the YAML file; those given by --set to the working directory)"
@@ -315,7 +414,11 @@ fn non_finite(tree: &Node) -> Vec<Trouble> {
             && !value.is_finite()
         {
             let found = node.raw.clone().unwrap_or_else(|| value.to_string());
-            troubles.push(Trouble::new(format!("expected a finite number; found {found}")).at(node.mark).below(path));
+            troubles.push(
+                Trouble::new(format!("expected a finite number; found {found}"))
+                    .at(node.mark)
+                    .below(path),
+            );
         }
     });
     troubles
@@ -334,6 +437,11 @@ fn json(node: &Node) -> serde_json::Value {
         YamlValue::Float(value) => (*value).into(),
         YamlValue::Text(text) => text.clone().into(),
         YamlValue::List(items) => Json::Array(items.iter().map(json).collect()),
-        YamlValue::Map(entries) => Json::Object(entries.iter().map(|(key, _, value)| (key.clone(), json(value))).collect()),
+        YamlValue::Map(entries) => Json::Object(
+            entries
+                .iter()
+                .map(|(key, _, value)| (key.clone(), json(value)))
+                .collect(),
+        ),
     }
 }

@@ -1,6 +1,9 @@
 //! The engine with small stages of its own: caching, reasons, wiring, panics.
 
-#![expect(clippy::disallowed_methods, reason = "a test is its own cli: it hands the clock down")]
+#![expect(
+    clippy::disallowed_methods,
+    reason = "a test is its own cli: it hands the clock down"
+)]
 
 use super::*;
 use crate::error::{Error, Fault, Result};
@@ -35,22 +38,40 @@ impl Stage for Source {
     type Reads = Nothing;
     type Writes = SourceWrites;
     fn check(&self) -> Vec<Fault> {
-        if self.rows.get() > 1000 { vec![Fault::new("rows", "at most 1000")] } else { Vec::new() }
+        if self.rows.get() > 1000 {
+            vec![Fault::new("rows", "at most 1000")]
+        } else {
+            Vec::new()
+        }
     }
     fn files(&self) -> Vec<(String, RawFile)> {
-        self.file.iter().map(|file| ("file".into(), file.clone())).collect()
+        self.file
+            .iter()
+            .map(|file| ("file".into(), file.clone()))
+            .collect()
     }
     fn run(&self, _: Nothing, context: &Context) -> Result<SourceWrites> {
         let mut rows = i64::from(self.rows.get());
         if let Some(file) = &self.file {
             let mut text = String::new();
-            context.services.open(file)?.reader.read_to_string(&mut text).unwrap();
+            context
+                .services
+                .open(file)?
+                .reader
+                .read_to_string(&mut text)
+                .unwrap();
             rows = text.len() as i64;
         }
         assert!(self.set != "panic", "told to");
         context.services.note(format!("{rows} rows"));
-        let row = |sequence| SplitRow { sequence, point_id: sequence.to_string(), set: self.set.clone() };
-        Ok(SourceWrites { split: Split((0..rows).map(row).collect()) })
+        let row = |sequence| SplitRow {
+            sequence,
+            point_id: sequence.to_string(),
+            set: self.set.clone(),
+        };
+        Ok(SourceWrites {
+            split: Split((0..rows).map(row).collect()),
+        })
     }
 }
 
@@ -76,7 +97,12 @@ impl Stage for Count {
             unit: "1".into(),
         };
         let mut rows = vec![row("last", reads.last.0.len())];
-        rows.extend(reads.all.iter().map(|split| row(&split.stage, split.table.0.len())));
+        rows.extend(
+            reads
+                .all
+                .iter()
+                .map(|split| row(&split.stage, split.table.0.len())),
+        );
         Ok(CountWrites { truth: Truth(rows) })
     }
 }
@@ -95,14 +121,28 @@ impl Observer for Ear {
     fn advance(&self, _: &str, _: u64, _: &str) {}
     fn note(&self, _: &str, _: &str) {}
     fn warn(&self, id: &str, line: &str) {
-        self.0.lock().unwrap().push(format!("{id}: warning: {line}"));
+        self.0
+            .lock()
+            .unwrap()
+            .push(format!("{id}: warning: {line}"));
     }
 }
 
 fn surroundings() -> Surroundings {
     Surroundings {
-        tool: Tool { name: "calib".into(), version: "0".into(), target: "test".into(), revision: None, rustc: None },
-        host: Host { name: "test".into(), os: "test".into(), architecture: "test".into(), cores: 1 },
+        tool: Tool {
+            name: "calib".into(),
+            version: "0".into(),
+            target: "test".into(),
+            revision: None,
+            rustc: None,
+        },
+        host: Host {
+            name: "test".into(),
+            os: "test".into(),
+            architecture: "test".into(),
+            cores: 1,
+        },
         user: None,
         environment: BTreeMap::new(),
         command_line: vec!["calib".into()],
@@ -115,7 +155,10 @@ fn surroundings() -> Surroundings {
 const TWO: &str = "calib: 1\nname: trial\nstages:\n- {id: a, uses: source, with: {rows: 3}}\n- {id: b, uses: source, with: {rows: 5, set: x}}\n- uses: count\n";
 
 fn plan(text: &str, sets: &[&str]) -> Result<Plan> {
-    let sets: Vec<Override> = sets.iter().map(|set| Override::parse(set).unwrap()).collect();
+    let sets: Vec<Override> = sets
+        .iter()
+        .map(|set| Override::parse(set).unwrap())
+        .collect();
     Plan::parse(Path::new("p.yaml"), text.into(), &sets, TRIAL)
 }
 fn faults(text: &str, sets: &[&str]) -> Vec<String> {
@@ -125,7 +168,14 @@ fn faults(text: &str, sets: &[&str]) -> Vec<String> {
     }
 }
 fn options(force: Option<Vec<String>>) -> RunOptions {
-    RunOptions { selection: Selection { force, ..Default::default() }, jobs: 1, purpose: Purpose::Run }
+    RunOptions {
+        selection: Selection {
+            force,
+            ..Default::default()
+        },
+        jobs: 1,
+        purpose: Purpose::Run,
+    }
 }
 /// Runs and returns what was said and what came out of `count`.
 fn go(store: &Path, plan: &Plan, options: &RunOptions) -> Result<(Vec<String>, CompletedRun)> {
@@ -143,15 +193,35 @@ fn what_is_done_is_not_done_again_and_what_changed_says_why() {
     let (said, second) = go(folder.path(), &plan(TWO, &[]).unwrap(), &options(None)).unwrap();
     assert_eq!(said, [""; 0]);
     assert!(second.nothing_done() && !first.nothing_done());
-    assert_eq!(second.manifest.stages[0].notes, ["3 rows"], "a cached stage says what it said");
+    assert_eq!(
+        second.manifest.stages[0].notes,
+        ["3 rows"],
+        "a cached stage says what it said"
+    );
     let changed = plan(TWO, &["b.rows=6"]).unwrap();
     let store = Store::open(folder.path()).unwrap();
-    let prospects: Vec<Prospect> =
-        preview(&changed, &store, &Selection::default()).unwrap().into_iter().map(|forecast| forecast.prospect).collect();
+    let prospects: Vec<Prospect> = preview(&changed, &store, &Selection::default())
+        .unwrap()
+        .into_iter()
+        .map(|forecast| forecast.prospect)
+        .collect();
     let reason = "settings changed: b.rows".to_string();
-    assert_eq!(prospects, [Prospect::Cached, Prospect::Run { reason }, Prospect::Pending { on: "b".into() }]);
+    assert_eq!(
+        prospects,
+        [
+            Prospect::Cached,
+            Prospect::Run { reason },
+            Prospect::Pending { on: "b".into() }
+        ]
+    );
     let (said, _) = go(folder.path(), &changed, &options(None)).unwrap();
-    assert_eq!(said, ["b: settings changed: b.rows", "count: input all, last changed"]);
+    assert_eq!(
+        said,
+        [
+            "b: settings changed: b.rows",
+            "count: input all, last changed"
+        ]
+    );
     let (said, _) = go(folder.path(), &plan(TWO, &[]).unwrap(), &options(None)).unwrap();
     assert_eq!(said, [""; 0], "going back costs nothing");
 }
@@ -162,11 +232,18 @@ fn a_stage_whose_inputs_came_out_equal_is_not_run_again() {
     let store = folder.path().join("store");
     let file = folder.path().join("raw.txt");
     std::fs::write(&file, "abc").unwrap();
-    let text = format!("{TWO}\n").replace("rows: 3", &format!("rows: 3, file: {:?}", file.display().to_string()));
+    let text = format!("{TWO}\n").replace(
+        "rows: 3",
+        &format!("rows: 3, file: {:?}", file.display().to_string()),
+    );
     go(&store, &plan(&text, &[]).unwrap(), &options(None)).unwrap();
     std::fs::write(&file, "xyz").unwrap();
     let (said, _) = go(&store, &plan(&text, &[]).unwrap(), &options(None)).unwrap();
-    assert_eq!(said, ["a: file raw.txt changed"], "another file of the same length gives the same table");
+    assert_eq!(
+        said,
+        ["a: file raw.txt changed"],
+        "another file of the same length gives the same table"
+    );
 }
 
 /// Writes a file as soon as a stage begins: after the file was hashed, before the stage opens it.
@@ -192,15 +269,31 @@ fn nothing_is_kept_of_a_file_that_changed_after_it_was_hashed() {
     let folder = tempfile::tempdir().unwrap();
     let (store, file) = (folder.path().join("store"), folder.path().join("raw.txt"));
     std::fs::write(&file, "abc").unwrap();
-    let text = TWO.replace("rows: 3", &format!("rows: 3, file: {:?}", file.display().to_string()));
+    let text = TWO.replace(
+        "rows: 3",
+        &format!("rows: 3, file: {:?}", file.display().to_string()),
+    );
     let plan = plan(&text, &[]).unwrap();
     let with = |text: &str| {
         let hand = Hand { file: &file, text };
-        run(&plan, &Store::open(&store).unwrap(), &options(None), &surroundings(), &hand)
+        run(
+            &plan,
+            &Store::open(&store).unwrap(),
+            &options(None),
+            &surroundings(),
+            &hand,
+        )
     };
     let error = with("abcdef").err().unwrap();
-    let said = format!("{}: the file changed while stage `a` waited or ran: nothing of the stage was kept", file.display());
-    assert_eq!((error.exit_code(), error.to_string().starts_with(&said)), (75, true), "{error}");
+    let said = format!(
+        "{}: the file changed while stage `a` waited or ran: nothing of the stage was kept",
+        file.display()
+    );
+    assert_eq!(
+        (error.exit_code(), error.to_string().starts_with(&said)),
+        (75, true),
+        "{error}"
+    );
     // Were the table of six rows kept under the key of three bytes, it would be taken from here on.
     std::fs::write(&file, "abc").unwrap();
     let outcome = with("abc").unwrap();
@@ -216,9 +309,25 @@ fn nothing_is_kept_of_a_file_that_changed_after_it_was_hashed() {
 #[test]
 fn inputs_are_wired_by_kind_or_by_wish() {
     let plan_by_kind = plan(TWO, &[]).unwrap();
-    let from = |plan: &Plan, port: usize| plan.stages[2].inputs[port].from.iter().map(|origin| origin.stage).collect::<Vec<_>>();
-    assert_eq!((from(&plan_by_kind, 0), from(&plan_by_kind, 1)), (vec![1], vec![0, 1]));
-    let wished = plan(&TWO.replace("- uses: count", "- {uses: count, reads: {last: a, all: [b]}}"), &[]).unwrap();
+    let from = |plan: &Plan, port: usize| {
+        plan.stages[2].inputs[port]
+            .from
+            .iter()
+            .map(|origin| origin.stage)
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(
+        (from(&plan_by_kind, 0), from(&plan_by_kind, 1)),
+        (vec![1], vec![0, 1])
+    );
+    let wished = plan(
+        &TWO.replace(
+            "- uses: count",
+            "- {uses: count, reads: {last: a, all: [b]}}",
+        ),
+        &[],
+    )
+    .unwrap();
     assert_eq!((from(&wished, 0), from(&wished, 1)), (vec![0], vec![1]));
 }
 
@@ -237,18 +346,29 @@ fn forcing_runs_what_is_cached() {
 fn a_selected_stage_needs_its_inputs() {
     let folder = tempfile::tempdir().unwrap();
     let only = |id: &str| RunOptions {
-        selection: Selection { only: Some(id.into()), ..Default::default() },
+        selection: Selection {
+            only: Some(id.into()),
+            ..Default::default()
+        },
         jobs: 1,
         purpose: Purpose::Run,
     };
     let plan = plan(TWO, &[]).unwrap();
     let error = go(folder.path(), &plan, &only("count")).err().unwrap();
-    assert!(error.to_string().contains("stage `count` reads from `b`, which is not cached"), "{error}");
+    assert!(
+        error
+            .to_string()
+            .contains("stage `count` reads from `b`, which is not cached"),
+        "{error}"
+    );
     let (said, outcome) = go(folder.path(), &plan, &only("a")).unwrap();
     assert_eq!(said, ["a: never run"]);
     assert_eq!(outcome.manifest.stages[2].status, StageStatus::NotRun);
     let error = go(folder.path(), &plan, &only("cuont")).err().unwrap();
-    assert_eq!(error.to_string(), "--only: no stage `cuont`; did you mean `count`? Allowed: a, b, count");
+    assert_eq!(
+        error.to_string(),
+        "--only: no stage `cuont`; did you mean `count`? Allowed: a, b, count"
+    );
 }
 
 #[test]
@@ -256,7 +376,14 @@ fn a_panic_is_a_bug_of_the_stage_and_leaves_the_others_done() {
     let folder = tempfile::tempdir().unwrap();
     let broken = plan(&TWO.replace("set: x", "set: panic"), &[]).unwrap();
     let error = go(folder.path(), &broken, &options(None)).err().unwrap();
-    assert_eq!((error.exit_code(), error.to_string().contains("stage b panicked: told to")), (70, true), "{error}");
+    assert_eq!(
+        (
+            error.exit_code(),
+            error.to_string().contains("stage b panicked: told to")
+        ),
+        (70, true),
+        "{error}"
+    );
     let (said, _) = go(folder.path(), &plan(TWO, &[]).unwrap(), &options(None)).unwrap();
     assert_eq!(said, ["b: never run", "count: never run"]);
 }

@@ -24,18 +24,33 @@ pub struct Input {
 }
 
 /// Wires one stage to the stages before it; all faults at once.
-pub(super) fn wire(stages: &[StageDraft], index: usize, registry: &[StageEntry]) -> (Vec<Input>, Vec<Trouble>) {
+pub(super) fn wire(
+    stages: &[StageDraft],
+    index: usize,
+    registry: &[StageEntry],
+) -> (Vec<Input>, Vec<Trouble>) {
     let stage = &stages[index];
-    let Some(entry) = stage.entry else { return (Vec::new(), Vec::new()) };
+    let Some(entry) = stage.entry else {
+        return (Vec::new(), Vec::new());
+    };
     let ports = (entry.reads)();
     let mut troubles = Vec::new();
     for (name, wish) in &stage.reads {
         if !ports.iter().any(|port| port.name == name) {
             let names: Vec<&str> = ports.iter().map(|port| port.name).collect();
-            let hint = nearest(name, names.iter().copied()).map(|near| format!("; did you mean `{near}`?"));
+            let hint = nearest(name, names.iter().copied())
+                .map(|near| format!("; did you mean `{near}`?"));
             let hint = hint.unwrap_or_else(|| ".".into());
-            let message = format!("stage `{}` has no input `{name}`{hint} Allowed: {}", entry.name, list(&names));
-            troubles.push(Trouble::new(message).at(wish.mark).below(&format!("reads.{name}")));
+            let message = format!(
+                "stage `{}` has no input `{name}`{hint} Allowed: {}",
+                entry.name,
+                list(&names)
+            );
+            troubles.push(
+                Trouble::new(message)
+                    .at(wish.mark)
+                    .below(&format!("reads.{name}")),
+            );
         }
     }
     let inputs = ports
@@ -71,12 +86,19 @@ fn by_kind(earlier: &[StageDraft], port: Port) -> Vec<Origin> {
     for (stage, draft) in earlier.iter().enumerate() {
         let Some(entry) = draft.entry else { continue };
         let outputs = (entry.writes)();
-        let matching = || outputs.iter().enumerate().filter(|(_, output)| output.kind == port.kind);
+        let matching = || {
+            outputs
+                .iter()
+                .enumerate()
+                .filter(|(_, output)| output.kind == port.kind)
+        };
         match port.arity {
             Arity::Every => origins.extend(matching().map(|(port, _)| Origin { stage, port })),
             // Where several outputs are of one kind, the one that bears the kind's name is read.
             Arity::One | Arity::Optional => {
-                let best = matching().find(|(_, output)| output.name == port.kind).or_else(|| matching().next_back());
+                let best = matching()
+                    .find(|(_, output)| output.name == port.kind)
+                    .or_else(|| matching().next_back());
                 if let Some((port, _)) = best {
                     origins = vec![Origin { stage, port }];
                 }
@@ -86,45 +108,96 @@ fn by_kind(earlier: &[StageDraft], port: Port) -> Vec<Origin> {
     origins
 }
 
-fn wished(stages: &[StageDraft], index: usize, port: Port, wish: &PortSources, troubles: &mut Vec<Trouble>) -> Vec<Origin> {
+fn wished(
+    stages: &[StageDraft],
+    index: usize,
+    port: Port,
+    wish: &PortSources,
+    troubles: &mut Vec<Trouble>,
+) -> Vec<Origin> {
     let mut origins = Vec::new();
     for name in &wish.names {
         match find(stages, index, port, name) {
             Ok(Some(origin)) => origins.push(origin),
             Ok(None) => {}
-            Err(message) => troubles.push(Trouble::new(message).at(wish.mark).below(&format!("reads.{}", port.name))),
+            Err(message) => troubles.push(
+                Trouble::new(message)
+                    .at(wish.mark)
+                    .below(&format!("reads.{}", port.name)),
+            ),
         }
     }
     if port.arity != Arity::Every && wish.names.len() != 1 {
-        let message = format!("input `{}` takes one table; found {} names", port.name, wish.names.len());
-        troubles.push(Trouble::new(message).at(wish.mark).below(&format!("reads.{}", port.name)));
+        let message = format!(
+            "input `{}` takes one table; found {} names",
+            port.name,
+            wish.names.len()
+        );
+        troubles.push(
+            Trouble::new(message)
+                .at(wish.mark)
+                .below(&format!("reads.{}", port.name)),
+        );
     }
     origins.sort_by_key(|origin| (origin.stage, origin.port));
     origins
 }
 
 /// The output that `stage` or `stage.port` names; nothing where the stage has a fault of its own.
-fn find(stages: &[StageDraft], index: usize, port: Port, name: &str) -> Result<Option<Origin>, String> {
-    let (id, output) = name.split_once('.').map_or((name, None), |(id, output)| (id, Some(output)));
+fn find(
+    stages: &[StageDraft],
+    index: usize,
+    port: Port,
+    name: &str,
+) -> Result<Option<Origin>, String> {
+    let (id, output) = name
+        .split_once('.')
+        .map_or((name, None), |(id, output)| (id, Some(output)));
     let Some(stage) = stages.iter().position(|stage| stage.id == id) else {
         let ids = stages[..index].iter().map(|stage| stage.id.as_str());
-        let hint = nearest(id, ids.clone()).map(|near| format!("; did you mean `{near}`?")).unwrap_or_else(|| ".".into());
-        return Err(format!("no stage `{id}`{hint} Allowed: {}", list(&ids.collect::<Vec<_>>())));
+        let hint = nearest(id, ids.clone())
+            .map(|near| format!("; did you mean `{near}`?"))
+            .unwrap_or_else(|| ".".into());
+        return Err(format!(
+            "no stage `{id}`{hint} Allowed: {}",
+            list(&ids.collect::<Vec<_>>())
+        ));
     };
     if stage >= index {
-        let own = if stage == index { "is this stage itself" } else { "comes later" };
-        return Err(format!("`{id}` {own}, which would be a cycle; a stage reads from stages before it"));
+        let own = if stage == index {
+            "is this stage itself"
+        } else {
+            "comes later"
+        };
+        return Err(format!(
+            "`{id}` {own}, which would be a cycle; a stage reads from stages before it"
+        ));
     }
-    let Some(entry) = stages[stage].entry else { return Ok(None) };
+    let Some(entry) = stages[stage].entry else {
+        return Ok(None);
+    };
     let outputs = (entry.writes)();
-    let fits = |candidate: &&Port| candidate.kind == port.kind && output.is_none_or(|output| candidate.name == output);
-    let best = outputs.iter().filter(fits).find(|candidate| candidate.name == port.kind).or_else(|| outputs.iter().rfind(fits));
+    let fits = |candidate: &&Port| {
+        candidate.kind == port.kind && output.is_none_or(|output| candidate.name == output)
+    };
+    let best = outputs
+        .iter()
+        .filter(fits)
+        .find(|candidate| candidate.name == port.kind)
+        .or_else(|| outputs.iter().rfind(fits));
     match best.and_then(|best| outputs.iter().position(|candidate| candidate == best)) {
         Some(port) => Ok(Some(Origin { stage, port })),
         None => {
-            let written: Vec<String> = outputs.iter().map(|output| format!("{} ({})", output.name, output.kind)).collect();
+            let written: Vec<String> = outputs
+                .iter()
+                .map(|output| format!("{} ({})", output.name, output.kind))
+                .collect();
             let written: Vec<&str> = written.iter().map(String::as_str).collect();
-            Err(format!("`{name}` is no `{}` table; stage `{id}` writes: {}", port.kind, list(&written)))
+            Err(format!(
+                "`{name}` is no `{}` table; stage `{id}` writes: {}",
+                port.kind,
+                list(&written)
+            ))
         }
     }
 }
@@ -133,5 +206,9 @@ fn writes(entry: &StageEntry, kind: &str) -> bool {
     (entry.writes)().iter().any(|port| port.kind == kind)
 }
 fn list(names: &[&str]) -> String {
-    if names.is_empty() { "(none)".into() } else { names.join(", ") }
+    if names.is_empty() {
+        "(none)".into()
+    } else {
+        names.join(", ")
+    }
 }

@@ -50,30 +50,50 @@ pub struct RunStage<'a> {
 }
 
 /// Proposes poses that tell a finding from a rival; `names` say which, or nothing for the first that has one.
-pub fn apart<'a>(request: &'a PoseRequest, store: &Store, of: &RunStage, names: &[String]) -> Result<Apart<'a>> {
+pub fn apart<'a>(
+    request: &'a PoseRequest,
+    store: &Store,
+    of: &RunStage,
+    names: &[String],
+) -> Result<Apart<'a>> {
     let (manifest, stage) = diagnosis(store, of.run, of.step, &POSITIONS)?;
     let place = format!("run {}", manifest.run_id);
     let findings: Findings = written(store, &stage)?;
     let rivals: Rivals = written(store, &stage)?;
     let (finding, rival) = pair(&place, &findings, &rivals, names)?;
-    let forms: Vec<Form> =
-        serde_json::from_str(&finding.forms).map_err(|error| Error::store(&place, format!("its findings: {error}")))?;
+    let forms: Vec<Form> = serde_json::from_str(&finding.forms)
+        .map_err(|error| Error::store(&place, format!("its findings: {error}")))?;
     if forms.is_empty() {
-        let message =
-            format!("finding {}, {}, is a fault of the recording: correct it there, no pose helps", finding.rank, finding.effect);
+        let message = format!(
+            "finding {}, {}, is a fault of the recording: correct it there, no pose helps",
+            finding.rank, finding.effect
+        );
         return Err(Error::spec(place, message));
     }
     let robot = read::<Robot>(store, &stage)?.to_description()?;
-    let convention = convention_of(&manifest, store)?.unwrap_or_else(|| JointConvention::of_the_robot_file(robot.joints.len()));
+    let convention = convention_of(&manifest, store)?
+        .unwrap_or_else(|| JointConvention::of_the_robot_file(robot.joints.len()));
     let parameters: Parameters = written(store, &stage)?;
     let model = parameters.model(RobotModel::new(robot.clone()), &[], Load::GravityTorque)?;
     let recording: Recording = read(store, &stage)?;
     let mut data = recording.measurements();
     let predicted = model.predict(&data);
     let rows = as_fitted(&mut data, &written(store, &stage)?, &predicted);
-    let estimated = |name: &String| parameters.0.iter().any(|row| row.name == *name && row.status == "free");
-    let free: Vec<usize> = (0..model.x.len()).filter(|k| estimated(&model.stack.specs()[*k].name)).collect();
-    let diagnosed = DiagnosedModel { model: &model, data: &data, rows: &rows, free: &free };
+    let estimated = |name: &String| {
+        parameters
+            .0
+            .iter()
+            .any(|row| row.name == *name && row.status == "free")
+    };
+    let free: Vec<usize> = (0..model.x.len())
+        .filter(|k| estimated(&model.stack.specs()[*k].name))
+        .collect();
+    let diagnosed = DiagnosedModel {
+        model: &model,
+        data: &data,
+        rows: &rows,
+        free: &free,
+    };
     let recorded = ranges(&data, &rows);
     let mut site = site(request, &robot, &place, Some(&recorded))?;
     if request.payloads.is_empty() {
@@ -82,25 +102,44 @@ pub fn apart<'a>(request: &'a PoseRequest, store: &Store, of: &RunStage, names: 
     let usual = median(rows.iter().map(|row| data.points.sigma[*row].x).collect());
     let sigma = request.sigma.map_or(usual, |sigma| sigma * 1e-3);
     let circumstances = circumstances(&data, &rows);
-    let listed = rivals.0.iter().any(|row| row.rank == finding.rank && row.effect == rival.0 && is_at(&row.place, rival.1));
-    if cause(&rival.0).is_none() && !model.stack.effects().any(|(effect, _)| effect.name() == rival.0) {
-        let message =
-            format!("`{}` is a declared effect; a run keeps only those that it found, and it did not find this one", rival.0);
+    let listed = rivals
+        .0
+        .iter()
+        .any(|row| row.rank == finding.rank && row.effect == rival.0 && is_at(&row.place, rival.1));
+    if cause(&rival.0).is_none()
+        && !model
+            .stack
+            .effects()
+            .any(|(effect, _)| effect.name() == rival.0)
+    {
+        let message = format!(
+            "`{}` is a declared effect; a run keeps only those that it found, and it did not find this one",
+            rival.0
+        );
         return Err(Error::spec("--separate", message));
     }
     let mut tried = None;
     let told = match discrimination_problem(&diagnosed, &forms, (&rival.0, rival.1)) {
         Ok((problem, form)) => {
             // A free curve is known where points were fitted, and nowhere else.
-            if forms.iter().chain([&form]).any(|form| form.cause().is_nameless()) {
+            if forms
+                .iter()
+                .chain([&form])
+                .any(|form| form.cause().is_nameless())
+            {
                 within(&mut site, &recorded);
             }
             tried = Some(form);
             let wish = wish(request, Aim::Information, sigma);
-            tell(&problem, (&data, &rows), (&site, &circumstances), &wish).map_err(|fault| Error::spec(&place, fault))?
+            tell(&problem, (&data, &rows), (&site, &circumstances), &wish)
+                .map_err(|fault| Error::spec(&place, fault))?
         }
         // An identity of kinematics or statics: there is nothing of the rival's own to be tried.
-        Err(_) if listed => Discrimination { before: [0.0; 2], alike: [true; 2], proposed: None },
+        Err(_) if listed => Discrimination {
+            before: [0.0; 2],
+            alike: [true; 2],
+            proposed: None,
+        },
         Err(fault) => return Err(Error::spec("--separate", fault)),
     };
     Ok(Apart {
@@ -120,16 +159,28 @@ pub fn apart<'a>(request: &'a PoseRequest, store: &Store, of: &RunStage, names: 
 }
 
 fn written<T: Table>(store: &Store, stage: &StageReport) -> Result<T> {
-    let own = stage.outputs.iter().find(|output| output.kind == T::KIND).map(|output| &output.table);
+    let own = stage
+        .outputs
+        .iter()
+        .find(|output| output.kind == T::KIND)
+        .map(|output| &output.table);
     table(store, own)
 }
 
 fn read<T: Table>(store: &Store, stage: &StageReport) -> Result<T> {
-    table(store, stage.inputs.iter().find(|input| input.port == T::KIND).map(|input| &input.table))
+    table(
+        store,
+        stage
+            .inputs
+            .iter()
+            .find(|input| input.port == T::KIND)
+            .map(|input| &input.table),
+    )
 }
 
 fn table<T: Table>(store: &Store, table: Option<&TableRef>) -> Result<T> {
-    let table = table.ok_or_else(|| Error::Bug(format!("a diagnosis without a table `{}`", T::KIND)))?;
+    let table =
+        table.ok_or_else(|| Error::Bug(format!("a diagnosis without a table `{}`", T::KIND)))?;
     T::from_frame(&store.load(table)?)
 }
 
@@ -140,23 +191,47 @@ fn name<'t>(text: &'t str, told: &[&str]) -> Result<(&'t str, Option<Place>)> {
         Some((effect, place)) => (effect.trim(), Some(place.trim())),
         None => (text.trim(), None),
     };
-    let known = || CAUSES.iter().map(|cause| cause.name()).chain(told.iter().copied());
+    let known = || {
+        CAUSES
+            .iter()
+            .map(|cause| cause.name())
+            .chain(told.iter().copied())
+    };
     let named = |place: &str| {
         let allowed = "allowed are e.g. `joint 2`, `joint 4->5`, `link 3`, `link 2-4`, `base`, `tool`, `tracker`, `recording`";
-        place.parse().map_err(|()| Error::spec("--separate", format!("`{place}` is no place; {allowed}")))
+        place
+            .parse()
+            .map_err(|()| Error::spec("--separate", format!("`{place}` is no place; {allowed}")))
     };
     if known().any(|name| name == effect) {
         return Ok((effect, place.map(named).transpose()?));
     }
-    let near = nearest(effect, known()).map(|near| format!("did you mean `{near}`? ")).unwrap_or_default();
-    Err(Error::spec("--separate", format!("unknown effect `{effect}`; {near}`calib effects` lists them")))
+    let near = nearest(effect, known())
+        .map(|near| format!("did you mean `{near}`? "))
+        .unwrap_or_default();
+    Err(Error::spec(
+        "--separate",
+        format!("unknown effect `{effect}`; {near}`calib effects` lists them"),
+    ))
 }
 
 /// The finding that is meant, and what to tell it from.
-fn pair(place: &str, findings: &Findings, rivals: &Rivals, names: &[String]) -> Result<(FindingRow, EffectAtPlace)> {
-    let list: Vec<String> = findings.0.iter().map(|row| format!("{} ({}@{})", row.rank, row.effect, row.place)).collect();
+fn pair(
+    place: &str,
+    findings: &Findings,
+    rivals: &Rivals,
+    names: &[String],
+) -> Result<(FindingRow, EffectAtPlace)> {
+    let list: Vec<String> = findings
+        .0
+        .iter()
+        .map(|row| format!("{} ({}@{})", row.rank, row.effect, row.place))
+        .collect();
     if list.is_empty() {
-        return Err(Error::spec(place, "has no finding that could be separated from another cause"));
+        return Err(Error::spec(
+            place,
+            "has no finding that could be separated from another cause",
+        ));
     }
     // The first by name of equally close rivals, as the table is sorted.
     let closest = |row: &FindingRow| {
@@ -172,15 +247,26 @@ fn pair(place: &str, findings: &Findings, rivals: &Rivals, names: &[String]) -> 
         Error::spec("--separate", message)
     };
     let Some(first) = names.first() else {
-        let found = findings.0.iter().find_map(|row| Some((row.clone(), closest(row)?)));
-        let message = format!("no finding has a rival; name a finding and the cause to separate it from: --separate {list:?}");
+        let found = findings
+            .0
+            .iter()
+            .find_map(|row| Some((row.clone(), closest(row)?)));
+        let message = format!(
+            "no finding has a rival; name a finding and the cause to separate it from: --separate {list:?}"
+        );
         return found.ok_or_else(|| Error::spec(place, message.replace(['[', ']', '"'], "")));
     };
-    let told: Vec<&str> =
-        findings.0.iter().map(|row| row.effect.as_str()).chain(rivals.0.iter().map(|row| row.effect.as_str())).collect();
+    let told: Vec<&str> = findings
+        .0
+        .iter()
+        .map(|row| row.effect.as_str())
+        .chain(rivals.0.iter().map(|row| row.effect.as_str()))
+        .collect();
     let fits = |row: &&FindingRow| match (first.trim().parse::<i64>(), name(first, &told)) {
         (Ok(rank), _) => row.rank == rank,
-        (_, Ok((effect, place))) => row.effect == effect && place.is_none_or(|place| is_at(&row.place, place)),
+        (_, Ok((effect, place))) => {
+            row.effect == effect && place.is_none_or(|place| is_at(&row.place, place))
+        }
         _ => false,
     };
     let fitting: Vec<&FindingRow> = findings.0.iter().filter(fits).collect();
@@ -188,8 +274,18 @@ fn pair(place: &str, findings: &Findings, rivals: &Rivals, names: &[String]) -> 
         if first.trim().parse::<i64>().is_err() {
             name(first, &told)?;
         }
-        let many = if fitting.is_empty() { "no finding" } else { "several findings" };
-        return Err(Error::spec("--separate", format!("`{first}` matches {many} of {place}; its findings: {}", list.join(", "))));
+        let many = if fitting.is_empty() {
+            "no finding"
+        } else {
+            "several findings"
+        };
+        return Err(Error::spec(
+            "--separate",
+            format!(
+                "`{first}` matches {many} of {place}; its findings: {}",
+                list.join(", ")
+            ),
+        ));
     };
     let Some(second) = names.get(1) else {
         let rival = closest(found).ok_or_else(|| name_one(found))?;
@@ -197,10 +293,16 @@ fn pair(place: &str, findings: &Findings, rivals: &Rivals, names: &[String]) -> 
     };
     let (effect, at) = name(second, &told)?;
     let Some(at) = at else {
-        return Err(Error::spec("--separate", format!("`{second}`: say where, e.g. '{effect}@{}'", found.place)));
+        return Err(Error::spec(
+            "--separate",
+            format!("`{second}`: say where, e.g. '{effect}@{}'", found.place),
+        ));
     };
     if effect == found.effect && is_at(&found.place, at) {
-        return Err(Error::spec("--separate", format!("`{second}` is the finding itself")));
+        return Err(Error::spec(
+            "--separate",
+            format!("`{second}` is the finding itself"),
+        ));
     }
     Ok((found.clone(), (effect.into(), at)))
 }
@@ -211,14 +313,22 @@ fn is_at(text: &str, place: Place) -> bool {
 }
 
 /// Puts noise and residuals as they were fitted into the recording; returns the fitted rows.
-fn as_fitted(data: &mut Measurements, prediction: &Prediction, predicted: &[Vector3<f64>]) -> Vec<usize> {
+fn as_fitted(
+    data: &mut Measurements,
+    prediction: &Prediction,
+    predicted: &[Vector3<f64>],
+) -> Vec<usize> {
     let mut rows = Vec::new();
     for (row, seen) in prediction.0.iter().enumerate().take(data.rows()) {
         let sigma = seen.noise_mm * 1e-3 / 3f64.sqrt();
         if seen.measured.is_some() || !(sigma.is_finite() && sigma > 0.0) {
             continue;
         }
-        data.points.set(row, predicted[row] + Vector3::new(seen.dx_mm, seen.dy_mm, seen.dz_mm) * 1e-3, sigma);
+        data.points.set(
+            row,
+            predicted[row] + Vector3::new(seen.dx_mm, seen.dy_mm, seen.dz_mm) * 1e-3,
+            sigma,
+        );
         if !seen.held_out && !seen.suspect {
             rows.push(row);
         }
@@ -230,7 +340,9 @@ fn as_fitted(data: &mut Measurements, prediction: &Prediction, predicted: &[Vect
 fn ranges(data: &Measurements, rows: &[usize]) -> Vec<[f64; 2]> {
     let of = |joint: usize| {
         let all = rows.iter().map(|row| data.q(*row)[joint]);
-        all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], q| [low.min(q), high.max(q)])
+        all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], q| {
+            [low.min(q), high.max(q)]
+        })
     };
     (0..data.joints).map(of).collect()
 }
@@ -249,7 +361,9 @@ fn payloads(data: &Measurements, rows: &[usize]) -> Vec<f64> {
     let last = all.len().saturating_sub(1);
     match all.len() {
         0..=PAYLOADS => all,
-        _ => (0..PAYLOADS).map(|k| all[k * last / (PAYLOADS - 1)]).collect(),
+        _ => (0..PAYLOADS)
+            .map(|k| all[k * last / (PAYLOADS - 1)])
+            .collect(),
     }
 }
 
@@ -262,6 +376,9 @@ fn circumstances(data: &Measurements, rows: &[usize]) -> Circumstances {
     Circumstances {
         time: Some(last + 1.0),
         temperature: temperatures().max_by(|a, b| away(a).total_cmp(&away(b))),
-        target: data.target.as_ref().and_then(|_| rows.first().map(|row| data.target(*row).to_string())),
+        target: data
+            .target
+            .as_ref()
+            .and_then(|_| rows.first().map(|row| data.target(*row).to_string())),
     }
 }

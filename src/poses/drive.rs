@@ -27,7 +27,10 @@ pub struct Drive<'a> {
 /// In which counting joints stand, in the words of a JSON document.
 pub(super) fn counting(convention: &JointConvention, robot: &RobotDescription) -> String {
     let difference = convention.difference(&RobotModel::new(robot.clone()));
-    difference.map_or_else(|| "robot file".into(), |difference| format!("controller: {difference}"))
+    difference.map_or_else(
+        || "robot file".into(),
+        |difference| format!("controller: {difference}"),
+    )
 }
 
 /// A column: its name, its values, and the decimals that people read (none: whole numbers).
@@ -41,7 +44,13 @@ struct DriveColumn {
 const JOINT_DECIMALS: usize = 4;
 
 fn columns(drive: &Drive) -> Vec<DriveColumn> {
-    let Drive { robot, poses, direction, convention, .. } = *drive;
+    let Drive {
+        robot,
+        poses,
+        direction,
+        convention,
+        ..
+    } = *drive;
     let n = poses.joints;
     let rows = 0..poses.rows();
     let column = |name: String, decimals, value: &dyn Fn(usize) -> f64| DriveColumn {
@@ -52,25 +61,55 @@ fn columns(drive: &Drive) -> Vec<DriveColumn> {
     let shown: Vec<Vec<f64>> = rows.clone().map(|row| shown(drive, poses.q(row))).collect();
     let mut out = vec![column("sequence".into(), 0, &|row| (row + 1) as f64)];
     for (j, joint) in robot.joints.iter().enumerate() {
-        let ending = if joint.kind == JointKind::Revolute { "deg" } else { "mm" };
-        out.push(column(format!("q{}_{ending}", j + 1), JOINT_DECIMALS, &|row| shown[row][j]));
+        let ending = if joint.kind == JointKind::Revolute {
+            "deg"
+        } else {
+            "mm"
+        };
+        out.push(column(
+            format!("q{}_{ending}", j + 1),
+            JOINT_DECIMALS,
+            &|row| shown[row][j],
+        ));
     }
     out.push(column("payload_kg".into(), 3, &|row| poses.payload[row]));
     for j in 0..n {
-        out.push(column(format!("dir{}", j + 1), 0, &|row| direction[row * n + j] * convention.sign()[j]));
+        out.push(column(format!("dir{}", j + 1), 0, &|row| {
+            direction[row * n + j] * convention.sign()[j]
+        }));
     }
     for (axis, name) in ["x_mm", "y_mm", "z_mm"].into_iter().enumerate() {
-        let values = poses.points.position.iter().map(|point| Unit::Millimetre.from_si(point[axis])).collect();
-        out.push(DriveColumn { name: name.into(), values, decimals: 3 });
+        let values = poses
+            .points
+            .position
+            .iter()
+            .map(|point| Unit::Millimetre.from_si(point[axis]))
+            .collect();
+        out.push(DriveColumn {
+            name: name.into(),
+            values,
+            decimals: 3,
+        });
     }
     out
 }
 
 /// Joints in the controller's numbers, deg or mm, rounded so that what is written keeps within the limits of every joint.
 fn shown(drive: &Drive, q: &[f64]) -> Vec<f64> {
-    let Drive { robot, ranges, convention, .. } = *drive;
+    let Drive {
+        robot,
+        ranges,
+        convention,
+        ..
+    } = *drive;
     let scale = 10f64.powi(JOINT_DECIMALS as i32);
-    let unit = |j: usize| if robot.joints[j].kind == JointKind::Revolute { Unit::Degree } else { Unit::Millimetre };
+    let unit = |j: usize| {
+        if robot.joints[j].kind == JointKind::Revolute {
+            Unit::Degree
+        } else {
+            Unit::Millimetre
+        }
+    };
     let exact = |change: &dyn Fn(&mut [f64]), values: &[f64]| {
         let mut values = values.to_vec();
         change(&mut values);
@@ -87,11 +126,16 @@ fn shown(drive: &Drive, q: &[f64]) -> Vec<f64> {
     }
     // A joint whose number holds a part of another one's may still be moved out by the rounding of that one.
     for _ in ranges {
-        let numbers: Vec<f64> = steps.iter().enumerate().map(|(j, steps)| unit(j).to_si(steps / scale)).collect();
+        let numbers: Vec<f64> = steps
+            .iter()
+            .enumerate()
+            .map(|(j, steps)| unit(j).to_si(steps / scale))
+            .collect();
         let driven = exact(&|q| convention.to_robot(q), &numbers);
         for (j, [low, high]) in ranges.iter().enumerate() {
             let out = (driven[j] - high).max(0.0) - (low - driven[j]).max(0.0);
-            let back = (unit(j).from_si(out.abs()) * scale).ceil() * out.signum() * convention.sign()[j];
+            let back =
+                (unit(j).from_si(out.abs()) * scale).ceil() * out.signum() * convention.sign()[j];
             steps[j] -= if out == 0.0 { 0.0 } else { back };
         }
     }
@@ -100,32 +144,59 @@ fn shown(drive: &Drive, q: &[f64]) -> Vec<f64> {
 
 /// What is wrong with the ending, if anything.
 pub fn fault(path: &Path) -> Option<String> {
-    kind(path).is_none().then(|| format!("`{}` ends in neither .csv nor .parquet", path.display()))
+    kind(path)
+        .is_none()
+        .then(|| format!("`{}` ends in neither .csv nor .parquet", path.display()))
 }
 
 fn kind(path: &Path) -> Option<&'static str> {
     let ending = ending(path);
-    ["csv", "parquet"].into_iter().find(|known| *known == ending)
+    ["csv", "parquet"]
+        .into_iter()
+        .find(|known| *known == ending)
 }
 
 /// Writes the poses to a .csv or .parquet file. Fails where the file cannot be written.
 pub fn write(path: &Path, drive: &Drive) -> Result<()> {
-    let bytes = if kind(path) == Some("parquet") { parquet(drive)? } else { csv(drive).into_bytes() };
-    std::fs::write(path, bytes).map_err(|error| Error::store(path.display().to_string(), format!("cannot be written: {error}")))
+    let bytes = if kind(path) == Some("parquet") {
+        parquet(drive)?
+    } else {
+        csv(drive).into_bytes()
+    };
+    std::fs::write(path, bytes).map_err(|error| {
+        Error::store(
+            path.display().to_string(),
+            format!("cannot be written: {error}"),
+        )
+    })
 }
 
 /// The poses as JSON, an object each.
 pub(super) fn objects(drive: &Drive) -> Vec<serde_json::Value> {
     let columns = columns(drive);
-    let object = |row: usize| columns.iter().map(|column| (column.name.clone(), serde_json::json!(column.values[row]))).collect();
-    (0..drive.poses.rows()).map(|row| serde_json::Value::Object(object(row))).collect()
+    let object = |row: usize| {
+        columns
+            .iter()
+            .map(|column| (column.name.clone(), serde_json::json!(column.values[row])))
+            .collect()
+    };
+    (0..drive.poses.rows())
+        .map(|row| serde_json::Value::Object(object(row)))
+        .collect()
 }
 
 fn csv(drive: &Drive) -> String {
     let columns = columns(drive);
-    let mut text = columns.iter().map(|column| column.name.as_str()).collect::<Vec<_>>().join(",") + "\n";
+    let mut text = columns
+        .iter()
+        .map(|column| column.name.as_str())
+        .collect::<Vec<_>>()
+        .join(",")
+        + "\n";
     for row in 0..drive.poses.rows() {
-        let cells = columns.iter().map(|column| format!("{:.*}", column.decimals, column.values[row]));
+        let cells = columns
+            .iter()
+            .map(|column| format!("{:.*}", column.decimals, column.values[row]));
         text.push_str(&(cells.collect::<Vec<_>>().join(",") + "\n"));
     }
     text
@@ -135,13 +206,20 @@ fn parquet(drive: &Drive) -> Result<Vec<u8>> {
     let bug = |error: &dyn std::fmt::Display| Error::Bug(error.to_string());
     let arrays = columns(drive).into_iter().map(|column| {
         let array: ArrayRef = match column.name.as_str() {
-            "sequence" => Arc::new(column.values.iter().map(|value| *value as i64).collect::<Int64Array>()),
+            "sequence" => Arc::new(
+                column
+                    .values
+                    .iter()
+                    .map(|value| *value as i64)
+                    .collect::<Int64Array>(),
+            ),
             _ => Arc::new(Float64Array::from(column.values)),
         };
         (column.name, array)
     });
     let batch = RecordBatch::try_from_iter(arrays).map_err(|error| bug(&error))?;
-    let mut writer = ArrowWriter::try_new(Vec::new(), batch.schema(), None).map_err(|error| bug(&error))?;
+    let mut writer =
+        ArrowWriter::try_new(Vec::new(), batch.schema(), None).map_err(|error| bug(&error))?;
     writer.write(&batch).map_err(|error| bug(&error))?;
     writer.into_inner().map_err(|error| bug(&error))
 }

@@ -60,5 +60,11 @@ pub trait PoseAnswer {
 
 /// `sigma` in m.
 fn wish(request: &PoseRequest, aim: Aim, sigma: f64) -> DesignRequest {
-    DesignRequest { aim, count: request.count, candidates: request.candidates, sigma, seed: request.seed }
+    DesignRequest {
+        aim,
+        count: request.count,
+        candidates: request.candidates,
+        sigma,
+        seed: request.seed,
+    }
 }

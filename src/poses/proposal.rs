@@ -63,20 +63,41 @@ pub fn proposal<'a>(
     };
     for name in pair {
         if let Some((_, reason)) = left_out.iter().find(|(left, _)| left == name) {
-            return Err(Error::spec("--separate", format!("`{name}` cannot be separated: {reason}")));
+            return Err(Error::spec(
+                "--separate",
+                format!("`{name}` cannot be separated: {reason}"),
+            ));
         }
     }
-    let mut recording = against.map(|path| recorded::recording(path, &imported)).transpose()?;
-    let usual = recording.as_ref().and_then(|(data, _)| recorded::usual_sigma(data));
-    let shown = request.sigma.or(usual.map(|sigma| sigma * 1e3)).unwrap_or(SIGMA);
+    let mut recording = against
+        .map(|path| recorded::recording(path, &imported))
+        .transpose()?;
+    let usual = recording
+        .as_ref()
+        .and_then(|(data, _)| recorded::usual_sigma(data));
+    let shown = request
+        .sigma
+        .or(usual.map(|sigma| sigma * 1e3))
+        .unwrap_or(SIGMA);
     let sigma = shown * 1e-3;
     // As if measured like the proposed poses: these are compared, not their instruments.
-    recording.iter_mut().for_each(|(data, _)| data.points.sigma = vec![Vector3::repeat(sigma); data.rows()]);
-    let proposal = propose(model(), &site, &wish(request, aim, sigma)).map_err(|fault| Error::spec(place, fault))?;
+    recording
+        .iter_mut()
+        .for_each(|(data, _)| data.points.sigma = vec![Vector3::repeat(sigma); data.rows()]);
+    let proposal = propose(model(), &site, &wish(request, aim, sigma))
+        .map_err(|fault| Error::spec(place, fault))?;
     let score = |data: &Measurements| proposal.jacobian.score(&model(), data, &proposal.workspace);
     let recorded = recording.as_ref().map(|(data, _)| score(data));
-    let warnings = recording.and_then(|(_, warning)| warning).into_iter().collect();
-    let parameters = model().stack.specs().iter().map(|spec| (spec.name.clone(), spec.unit)).collect();
+    let warnings = recording
+        .and_then(|(_, warning)| warning)
+        .into_iter()
+        .collect();
+    let parameters = model()
+        .stack
+        .specs()
+        .iter()
+        .map(|spec| (spec.name.clone(), spec.unit))
+        .collect();
     let ranges = site.ranges;
     let convention = JointConvention::of_the_robot_file(imported.joints.len());
     Ok(PoseProposal {
@@ -125,11 +146,17 @@ pub fn is_known(effect: &str) -> bool {
 }
 
 fn setting() -> EffectContext {
-    EffectContext { base: Pose::identity(), load: Load::GravityTorque }
+    EffectContext {
+        base: Pose::identity(),
+        load: Load::GravityTorque,
+    }
 }
 
 fn model(robot: &RobotModel, effects: &[&str]) -> Model {
     let setting = setting();
-    let made = effects.iter().filter_map(|name| arm_effect(name, &setting)).collect();
+    let made = effects
+        .iter()
+        .filter_map(|name| arm_effect(name, &setting))
+        .collect();
     Model::nominal(robot.clone(), EffectStack::new(robot, setting.base, made))
 }

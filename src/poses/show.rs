@@ -8,8 +8,16 @@ use serde_json::json;
 
 impl PoseAnswer for PoseProposal<'_> {
     fn drive(&self) -> Option<Drive<'_>> {
-        let Proposal { poses, direction, .. } = &self.proposal;
-        Some(Drive { robot: &self.robot, ranges: &self.ranges, poses, direction, convention: &self.convention })
+        let Proposal {
+            poses, direction, ..
+        } = &self.proposal;
+        Some(Drive {
+            robot: &self.robot,
+            ranges: &self.ranges,
+            poses,
+            direction,
+            convention: &self.convention,
+        })
     }
 
     fn text(&self) -> String {
@@ -32,19 +40,35 @@ fn sets(work: &PoseProposal) -> Vec<(String, Score)> {
     let usual = Score {
         points: work.proposal.score.points,
         o1: middle(&|score| score.o1),
-        sigma: (0..work.proposal.jacobian.free().len()).map(|k| middle(&|score| score.sigma[k])).collect(),
+        sigma: (0..work.proposal.jacobian.free().len())
+            .map(|k| middle(&|score| score.sigma[k]))
+            .collect(),
         median: middle(&|score| score.median),
         p95: middle(&|score| score.p95),
         max: middle(&|score| score.max),
     };
-    let mut out = vec![("proposed".into(), work.proposal.score.clone()), (format!("random, median of {}", random.len()), usual)];
-    out.extend(work.recorded.iter().map(|score| ("recorded".to_string(), score.clone())));
+    let mut out = vec![
+        ("proposed".into(), work.proposal.score.clone()),
+        (format!("random, median of {}", random.len()), usual),
+    ];
+    out.extend(
+        work.recorded
+            .iter()
+            .map(|score| ("recorded".to_string(), score.clone())),
+    );
     out
 }
 
 /// Median over the parameters of a set's sigma relative to another's.
 fn relative(score: &Score, to: &Score) -> f64 {
-    median(score.sigma.iter().zip(&to.sigma).map(|(a, b)| a / b).collect())
+    median(
+        score
+            .sigma
+            .iter()
+            .zip(&to.sigma)
+            .map(|(a, b)| a / b)
+            .collect(),
+    )
 }
 
 fn text(work: &PoseProposal) -> String {
@@ -82,7 +106,10 @@ fn text(work: &PoseProposal) -> String {
         ));
     }
     for (name, score) in sets.iter().skip(1) {
-        text.push_str(&format!("O1 {:.2} x that of {name}\n", proposal.score.o1 / score.o1));
+        text.push_str(&format!(
+            "O1 {:.2} x that of {name}\n",
+            proposal.score.o1 / score.o1
+        ));
     }
     text.push_str(&separation(work));
     text.push_str(&format!(
@@ -112,7 +139,11 @@ fn separation(work: &PoseProposal) -> String {
         for (parameter, sigma, random) in &part.sigma {
             let (name, unit) = &work.parameters[*parameter];
             let size = |sigma: f64| unit.from_si(3.0 * sigma);
-            text.push_str(&format!("  {name:28}  {:>9.2e} {unit}  (random {:.2e})\n", size(*sigma), size(*random)));
+            text.push_str(&format!(
+                "  {name:28}  {:>9.2e} {unit}  (random {:.2e})\n",
+                size(*sigma),
+                size(*random)
+            ));
         }
         for parameter in &part.imitated {
             text.push_str(&format!(

@@ -7,15 +7,30 @@ use crate::estimate::choose::Site;
 use crate::units::Unit;
 
 /// Where the arm may go; a joint without limits keeps to its range in `recorded`, where there is one.
-pub(super) fn site(request: &PoseRequest, robot: &RobotDescription, place: &str, recorded: Option<&[[f64; 2]]>) -> Result<Site> {
-    let unit = |kind| if kind == JointKind::Revolute { Unit::Degree } else { Unit::Millimetre };
+pub(super) fn site(
+    request: &PoseRequest,
+    robot: &RobotDescription,
+    place: &str,
+    recorded: Option<&[[f64; 2]]>,
+) -> Result<Site> {
+    let unit = |kind| {
+        if kind == JointKind::Revolute {
+            Unit::Degree
+        } else {
+            Unit::Millimetre
+        }
+    };
     let mut ranges = Vec::new();
     let mut faults = Vec::new();
     let given = request.limits.as_ref();
     if let Some(given) = given.filter(|given| given.len() != robot.joints.len()) {
         return Err(Error::spec(
             "--limits",
-            format!("has {}, the robot {}", counted(given.len(), "range"), counted(robot.joints.len(), "joint")),
+            format!(
+                "has {}, the robot {}",
+                counted(given.len(), "range"),
+                counted(robot.joints.len(), "joint")
+            ),
         ));
     }
     for (index, joint) in robot.joints.iter().enumerate() {
@@ -47,9 +62,20 @@ pub(super) fn site(request: &PoseRequest, robot: &RobotDescription, place: &str,
             *bound = range.map(|value| Unit::Millimetre.to_si(value));
         }
     }
-    let mut payloads = if request.payloads.is_empty() { vec![0.0] } else { request.payloads.clone() };
+    let mut payloads = if request.payloads.is_empty() {
+        vec![0.0]
+    } else {
+        request.payloads.clone()
+    };
     payloads.sort_by(f64::total_cmp);
     payloads.dedup();
-    let floor = request.floor.map_or(f64::NEG_INFINITY, |height| Unit::Millimetre.to_si(height));
-    Ok(Site { ranges, bounds, floor, payloads })
+    let floor = request
+        .floor
+        .map_or(f64::NEG_INFINITY, |height| Unit::Millimetre.to_si(height));
+    Ok(Site {
+        ranges,
+        bounds,
+        floor,
+        payloads,
+    })
 }

@@ -32,7 +32,11 @@ const SIGMA: f64 = 0.1;
 
 /// What a maker's tolerances justify: 0.3 mm and 1 mrad a link, 30 mrad a zero; the ball within 10 mm.
 fn priors() -> Vec<PriorSigma> {
-    let prior = |begins, others, turns| PriorSigma { begins, turns, others };
+    let prior = |begins, others, turns| PriorSigma {
+        begins,
+        turns,
+        others,
+    };
     vec![
         prior("link_geometry.", 3e-4, 1e-3),
         prior("joint_offset.", 0.03, 0.03),
@@ -43,7 +47,8 @@ fn priors() -> Vec<PriorSigma> {
 
 /// Reads `[[x, y, z], ...]`, m in the base frame.
 pub fn places(text: &str) -> std::result::Result<Vec<[f64; 3]>, String> {
-    let expected = "expected sockets as [x, y, z] in m, base frame, e.g. [[0.4, 0.1, 0.0], [0.4, 0.15, 0.0]]";
+    let expected =
+        "expected sockets as [x, y, z] in m, base frame, e.g. [[0.4, 0.1, 0.0], [0.4, 0.15, 0.0]]";
     let places: Vec<[f64; 3]> = serde_json::from_str(text).map_err(|_| expected.to_string())?;
     if places.is_empty() {
         return Err(expected.into());
@@ -55,24 +60,34 @@ pub fn places(text: &str) -> std::result::Result<Vec<[f64; 3]>, String> {
 }
 
 /// Proposes postures for sockets in the base frame, m.
-pub fn sockets<'a>(request: &'a PoseRequest, robot: &RobotFiles, places: &[[f64; 3]]) -> Result<SocketProposal<'a>> {
+pub fn sockets<'a>(
+    request: &'a PoseRequest,
+    robot: &RobotFiles,
+    places: &[[f64; 3]],
+) -> Result<SocketProposal<'a>> {
     let imported = robot_file(robot.file, robot.urdf)?;
     let place = robot.file.display().to_string();
     let site = site(request, &imported, &place, None)?;
     if request.payloads.len() > 1 {
-        return Err(Error::Spec(vec![Fault::new("--payload", "a ball is brought to sockets with one payload")]));
+        return Err(Error::Spec(vec![Fault::new(
+            "--payload",
+            "a ball is brought to sockets with one payload",
+        )]));
     }
     let shown = request.sigma.unwrap_or(SIGMA);
     let wish = BroughtRequest {
         places: places.iter().map(|place| Vector3::from(*place)).collect(),
         count: request.count,
-        candidates: request.candidates.div_ceil(places.len()).max(2 * request.count.div_ceil(places.len())),
+        candidates: request
+            .candidates
+            .div_ceil(places.len())
+            .max(2 * request.count.div_ceil(places.len())),
         sigma: 1e-3 * shown,
         priors: priors(),
         seed: request.seed,
     };
-    let proposal =
-        propose_brought(&RobotModel::new(imported.clone()), &site, &wish).map_err(|fault| Error::spec(place, fault))?;
+    let proposal = propose_brought(&RobotModel::new(imported.clone()), &site, &wish)
+        .map_err(|fault| Error::spec(place, fault))?;
     let joints = imported.joints.len();
     Ok(SocketProposal {
         request,
@@ -96,7 +111,11 @@ impl SocketProposal<'_> {
     fn advice(&self) -> Option<String> {
         let offsets = &self.proposal.offsets;
         let now = offsets.first().filter(|now| now.known < now.directions)?;
-        let best = offsets.iter().map(|other| other.known).max().filter(|best| *best > now.known)?;
+        let best = offsets
+            .iter()
+            .map(|other| other.known)
+            .max()
+            .filter(|best| *best > now.known)?;
         let enough = offsets.iter().find(|other| other.known == best)?;
         Some(format!(
             "the ball lies {:.1} mm off the axis of joint {}: that joint's zero, its axis and the ball are hardly seen. {:.0} mm off the axis \
@@ -114,11 +133,24 @@ impl SocketProposal<'_> {
 impl PoseAnswer for SocketProposal<'_> {
     fn drive(&self) -> Option<Drive<'_>> {
         let (poses, direction) = (&self.proposal.poses, self.direction.as_slice());
-        Some(Drive { robot: &self.robot, ranges: &self.ranges, poses, direction, convention: &self.convention })
+        Some(Drive {
+            robot: &self.robot,
+            ranges: &self.ranges,
+            poses,
+            direction,
+            convention: &self.convention,
+        })
     }
 
     fn text(&self) -> String {
-        let BroughtProposal { poses, sigma, sets, without, offsets, .. } = &self.proposal;
+        let BroughtProposal {
+            poses,
+            sigma,
+            sets,
+            without,
+            offsets,
+            ..
+        } = &self.proposal;
         let mut text = format!(
             "{} in {}, for a ball that comes back to {} mm per axis\n\n  {:32}  {:>8}  {:>24}\n",
             counted(poses.rows(), "posture"),
@@ -129,7 +161,12 @@ impl PoseAnswer for SocketProposal<'_> {
             "without it sigmas are"
         );
         for ([x, y, z], own) in self.places.iter().zip(without) {
-            text.push_str(&format!("  {:32}  {:>8}  {:>22.2} x\n", format!("[{x}, {y}, {z}]"), own.count, own.growth));
+            text.push_str(&format!(
+                "  {:32}  {:>8}  {:>22.2} x\n",
+                format!("[{x}, {y}, {z}]"),
+                own.count,
+                own.growth
+            ));
         }
         text.push_str(&format!(
             "\nwhat is known of the arm, one sigma\n  {:28}  {:>10}  {:>10}  {:>24}\n",
@@ -138,13 +175,25 @@ impl PoseAnswer for SocketProposal<'_> {
             "after",
             format!("random, median of {sets}")
         ));
-        for (k, before, after, random) in sigma.iter().filter(|(k, ..)| !self.name(*k).0.starts_with("link_geometry")) {
+        for (k, before, after, random) in sigma
+            .iter()
+            .filter(|(k, ..)| !self.name(*k).0.starts_with("link_geometry"))
+        {
             let (name, unit) = self.name(*k);
-            let [before, after, random] = [*before, *after, *random].map(|sigma| unit.from_si(sigma));
-            text.push_str(&format!("  {name:28}  {before:>10.2e}  {after:>10.2e}  {random:>24.2e}  {unit}\n"));
+            let [before, after, random] =
+                [*before, *after, *random].map(|sigma| unit.from_si(sigma));
+            text.push_str(&format!(
+                "  {name:28}  {before:>10.2e}  {after:>10.2e}  {random:>24.2e}  {unit}\n"
+            ));
         }
-        let links = || sigma.iter().filter(|(k, ..)| self.name(*k).0.starts_with("link_geometry"));
-        let shown = links().filter(|(_, before, after, _)| 2.0 * after < *before).count();
+        let links = || {
+            sigma
+                .iter()
+                .filter(|(k, ..)| self.name(*k).0.starts_with("link_geometry"))
+        };
+        let shown = links()
+            .filter(|(_, before, after, _)| 2.0 * after < *before)
+            .count();
         text.push_str(&format!(
             "  links: {shown} of {} are known twice as well as by their maker\n",
             counted(links().count(), "parameter")
@@ -158,8 +207,15 @@ impl PoseAnswer for SocketProposal<'_> {
         ));
         for offset in offsets {
             let of = format!("{} of {}", offset.known, offset.directions);
-            let weakest = if offset.weakest.is_finite() { format!("{:.1}", 1e3 * offset.weakest) } else { "not seen".into() };
-            text.push_str(&format!("  {:>8.1}  {of:>28}  {weakest:>24}\n", 1e3 * offset.off));
+            let weakest = if offset.weakest.is_finite() {
+                format!("{:.1}", 1e3 * offset.weakest)
+            } else {
+                "not seen".into()
+            };
+            text.push_str(&format!(
+                "  {:>8.1}  {of:>28}  {weakest:>24}\n",
+                1e3 * offset.off
+            ));
         }
         if let Some(advice) = self.advice() {
             text.push_str(&format!("{advice}\n"));
@@ -170,7 +226,13 @@ impl PoseAnswer for SocketProposal<'_> {
     }
 
     fn document(&self) -> serde_json::Value {
-        let BroughtProposal { sigma, without, offsets, socket, .. } = &self.proposal;
+        let BroughtProposal {
+            sigma,
+            without,
+            offsets,
+            socket,
+            ..
+        } = &self.proposal;
         let parameters = sigma.iter().map(|(k, before, after, random)| {
             let (name, unit) = self.name(*k);
             let [before, after, random] = [*before, *after, *random].map(|sigma| unit.from_si(sigma));

@@ -1,7 +1,10 @@
 //! A program read, corrected and written again, whole: targets that cannot be reached are refused, since a program has no place for a remark.
 
 use super::JOINTS;
-use super::{Companion, Frames, Language, Note, Partial, Program, ProgramRefusal, Rewritten, RobotTool, solve};
+use super::{
+    Companion, Frames, Language, Note, Partial, Program, ProgramRefusal, Rewritten, RobotTool,
+    solve,
+};
 use crate::compensate::Corrector;
 use crate::compensate::unstated_payload;
 use crate::description::RobotDescription;
@@ -31,12 +34,20 @@ impl ProgramFile<'_> {
 
     fn refused(&self, refusal: ProgramRefusal) -> Error {
         let told = refusal.faults.iter().take(MOST_FAULTS);
-        let mut faults: Vec<Fault> = told.map(|note| Fault::new(self.at(note), &note.message)).collect();
+        let mut faults: Vec<Fault> = told
+            .map(|note| Fault::new(self.at(note), &note.message))
+            .collect();
         if refusal.faults.len() > MOST_FAULTS {
-            faults.push(Fault::new(self.place, format!("and {} more", refusal.faults.len() - MOST_FAULTS)));
+            faults.push(Fault::new(
+                self.place,
+                format!("and {} more", refusal.faults.len() - MOST_FAULTS),
+            ));
         }
         if refusal.partial > 0 {
-            faults.push(Fault::new(self.place, "partial targets stay as they are with --leave-partial"));
+            faults.push(Fault::new(
+                self.place,
+                "partial targets stay as they are with --leave-partial",
+            ));
         }
         Error::Data(faults)
     }
@@ -73,10 +84,18 @@ pub fn corrected(
     robot: &RobotDescription,
     corrector: &mut Corrector,
 ) -> Result<Rewritten> {
-    let ProgramRules { partial, frames, load, tool } = rules;
+    let ProgramRules {
+        partial,
+        frames,
+        load,
+        tool,
+    } = rules;
     let robot = RobotModel::new(robot.clone());
     if robot.joints() != JOINTS {
-        let message = format!("programs have targets of {JOINTS} joints, the robot has {}", robot.joints());
+        let message = format!(
+            "programs have targets of {JOINTS} joints, the robot has {}",
+            robot.joints()
+        );
         return Err(Error::spec(source.place, message));
     }
     let mut program = Program::parse_with(source.text, source.language, partial, source.companions)
@@ -84,21 +103,36 @@ pub fn corrected(
     if program.literals().is_empty() {
         return Err(Error::data(source.place, "has no targets"));
     }
-    program.relate_tools(&robot, tool.as_ref()).map_err(|message| Error::spec(source.place, message))?;
+    program
+        .relate_tools(&robot, tool.as_ref())
+        .map_err(|message| Error::spec(source.place, message))?;
     // Joint targets are the same in every frame.
-    let cartesian = program.literals().iter().any(|literal| !literal.kind.is_of_joints());
+    let cartesian = program
+        .literals()
+        .iter()
+        .any(|literal| !literal.kind.is_of_joints());
     if frames == Frames::Refused && cartesian && !program.frames().is_empty() {
-        let refused = |note: &Note| Note { message: format!("{}; --assume-frames accepts it", note.message), ..note.clone() };
+        let refused = |note: &Note| Note {
+            message: format!("{}; --assume-frames accepts it", note.message),
+            ..note.clone()
+        };
         let faults = program.frames().iter().map(refused).collect();
         return Err(source.refused(ProgramRefusal { faults, partial: 0 }));
     }
     match load {
         ProgramLoad::Stated(payload) => program.carries(payload),
-        ProgramLoad::Needed(most) if program.literals().iter().any(|literal| literal.payload.is_none()) => {
+        ProgramLoad::Needed(most)
+            if program
+                .literals()
+                .iter()
+                .any(|literal| literal.payload.is_none()) =>
+        {
             return Err(Error::data(source.place, unstated_payload(most)));
         }
         ProgramLoad::Needed(_) | ProgramLoad::Optional => {}
     }
     let answers = solve(program.literals(), &robot, corrector);
-    program.rewritten(answers).map_err(|refusal| source.refused(refusal))
+    program
+        .rewritten(answers)
+        .map_err(|refusal| source.refused(refusal))
 }

@@ -79,7 +79,10 @@ struct Builder {
 impl Flow {
     /// The order of the lines of a file; fails at a line whose block does not fit.
     pub fn of(lines: &[FlowLine]) -> Result<Self, usize> {
-        let mut builder = Builder { next: vec![Vec::new(); lines.len()], ..Builder::default() };
+        let mut builder = Builder {
+            next: vec![Vec::new(); lines.len()],
+            ..Builder::default()
+        };
         for (at, line) in lines.iter().enumerate() {
             builder.line(at, &line.step).ok_or(at)?;
         }
@@ -87,7 +90,9 @@ impl Flow {
             return Err(block.head);
         }
         // The last routine of a piece of a program.
-        if let (Some((name, first)), Some(last)) = (builder.inside.take(), lines.len().checked_sub(1)) {
+        if let (Some((name, first)), Some(last)) =
+            (builder.inside.take(), lines.len().checked_sub(1))
+        {
             builder.routines.insert(name, (first, last));
         }
         for (at, label) in std::mem::take(&mut builder.jumps) {
@@ -98,7 +103,11 @@ impl Flow {
     }
 
     /// What is known before each line runs, none where it is never reached; `step` takes it through a line.
-    pub fn states<S: JoinedState>(&self, start: &S, step: impl Fn(usize, &mut S)) -> Vec<Option<S>> {
+    pub fn states<S: JoinedState>(
+        &self,
+        start: &S,
+        step: impl Fn(usize, &mut S),
+    ) -> Vec<Option<S>> {
         let mut states: Vec<Option<S>> = vec![None; self.next.len()];
         let mut waiting: BTreeSet<usize> = BTreeSet::new();
         for entry in &self.entries {
@@ -106,10 +115,14 @@ impl Flow {
             waiting.insert(*entry);
         }
         while let Some(at) = waiting.pop_first() {
-            let Some(mut state) = states[at].clone() else { continue };
+            let Some(mut state) = states[at].clone() else {
+                continue;
+            };
             step(at, &mut state);
             for next in &self.next[at] {
-                let joined = states[*next].as_ref().map_or_else(|| state.clone(), |known| known.joined(&state));
+                let joined = states[*next]
+                    .as_ref()
+                    .map_or_else(|| state.clone(), |known| known.joined(&state));
                 if states[*next].as_ref() != Some(&joined) {
                     states[*next] = Some(joined);
                     waiting.insert(*next);
@@ -130,7 +143,9 @@ impl Builder {
     /// Adds a line; none where it fits no block.
     fn line(&mut self, at: usize, step: &FlowStep) -> Option<()> {
         match step {
-            FlowStep::Else | FlowStep::ElseIf | FlowStep::Case | FlowStep::Default => return self.other_way(at, step),
+            FlowStep::Else | FlowStep::ElseIf | FlowStep::Case | FlowStep::Default => {
+                return self.other_way(at, step);
+            }
             FlowStep::Routine(name) => {
                 let sound = self.blocks.is_empty() && self.inside.is_none();
                 self.inside = Some((name.clone(), at));
@@ -138,7 +153,11 @@ impl Builder {
                 return sound.then_some(());
             }
             FlowStep::EndRoutine => {
-                let from = [std::mem::take(&mut self.open), std::mem::take(&mut self.returns)].concat();
+                let from = [
+                    std::mem::take(&mut self.open),
+                    std::mem::take(&mut self.returns),
+                ]
+                .concat();
                 self.link(&from, at);
                 let (name, first) = self.inside.take()?;
                 self.routines.insert(name, (first, at));
@@ -146,8 +165,10 @@ impl Builder {
             }
             FlowStep::EndIf | FlowStep::EndSwitch => {
                 let block = self.blocks.pop()?;
-                let fits =
-                    matches!((step, &block.begun), (FlowStep::EndIf, FlowStep::If) | (FlowStep::EndSwitch, FlowStep::Switch));
+                let fits = matches!(
+                    (step, &block.begun),
+                    (FlowStep::EndIf, FlowStep::If) | (FlowStep::EndSwitch, FlowStep::Switch)
+                );
                 self.open.extend(block.ends);
                 self.open.extend((!block.whole).then_some(block.head));
                 let from = std::mem::take(&mut self.open);
@@ -161,7 +182,12 @@ impl Builder {
         self.link(&from, at);
         match step {
             FlowStep::If | FlowStep::While | FlowStep::Loop | FlowStep::Switch => {
-                self.blocks.push(Block { head: at, begun: step.clone(), ends: Vec::new(), whole: false });
+                self.blocks.push(Block {
+                    head: at,
+                    begun: step.clone(),
+                    ends: Vec::new(),
+                    whole: false,
+                });
                 if *step == FlowStep::Switch {
                     self.open.clear();
                 }
@@ -172,12 +198,14 @@ impl Builder {
                 if *step == FlowStep::EndForever {
                     self.open.clear();
                 }
-                self.open.extend((block.begun == FlowStep::While).then_some(block.head));
+                self.open
+                    .extend((block.begun == FlowStep::While).then_some(block.head));
                 self.open.extend(block.ends);
                 return matches!(block.begun, FlowStep::While | FlowStep::Loop).then_some(());
             }
             FlowStep::Exit => {
-                let of_loop = |block: &&mut Block| matches!(block.begun, FlowStep::While | FlowStep::Loop);
+                let of_loop =
+                    |block: &&mut Block| matches!(block.begun, FlowStep::While | FlowStep::Loop);
                 self.blocks.iter_mut().rev().find(of_loop)?.ends.push(at);
                 self.open.clear();
             }
@@ -200,7 +228,8 @@ impl Builder {
         let block = self.blocks.last_mut()?;
         let fits = matches!(
             (step, &block.begun),
-            (FlowStep::Else | FlowStep::ElseIf, FlowStep::If) | (FlowStep::Case | FlowStep::Default, FlowStep::Switch)
+            (FlowStep::Else | FlowStep::ElseIf, FlowStep::If)
+                | (FlowStep::Case | FlowStep::Default, FlowStep::Switch)
         );
         block.ends.append(&mut self.open);
         block.whole |= matches!(step, FlowStep::Else | FlowStep::Default);
@@ -216,9 +245,16 @@ impl Builder {
         let mut setters: BTreeSet<&String> = BTreeSet::new();
         loop {
             let sets = |(first, last): &(usize, usize)| {
-                lines[*first..=*last].iter().any(|line| line.sets || line.calls.iter().any(|name| setters.contains(name)))
+                lines[*first..=*last]
+                    .iter()
+                    .any(|line| line.sets || line.calls.iter().any(|name| setters.contains(name)))
             };
-            let found: BTreeSet<&String> = self.routines.iter().filter(|(_, span)| sets(span)).map(|(name, _)| name).collect();
+            let found: BTreeSet<&String> = self
+                .routines
+                .iter()
+                .filter(|(_, span)| sets(span))
+                .map(|(name, _)| name)
+                .collect();
             if found.len() == setters.len() {
                 break;
             }
@@ -227,7 +263,9 @@ impl Builder {
         let mut called: BTreeSet<&String> = BTreeSet::new();
         for (at, line) in lines.iter().enumerate() {
             for name in &line.calls {
-                let Some((first, last)) = self.routines.get(name) else { continue };
+                let Some((first, last)) = self.routines.get(name) else {
+                    continue;
+                };
                 called.insert(name);
                 if setters.contains(name) {
                     let after = std::mem::take(&mut self.next[at]);
@@ -238,11 +276,17 @@ impl Builder {
         }
         // The first routine is the program's own, others may be called from elsewhere where nothing here does.
         let own = self.routines.values().map(|(first, _)| *first).min();
-        let routines = self.routines.iter().filter(|(name, (first, _))| !called.contains(name) || Some(*first) == own);
+        let routines = self
+            .routines
+            .iter()
+            .filter(|(name, (first, _))| !called.contains(name) || Some(*first) == own);
         let mut entries: Vec<usize> = routines.map(|(_, (first, _))| *first).collect();
         if !lines.is_empty() && !matches!(lines[0].step, FlowStep::Routine(_)) {
             entries.push(0);
         }
-        Flow { next: self.next, entries }
+        Flow {
+            next: self.next,
+            entries,
+        }
     }
 }

@@ -58,11 +58,13 @@ impl<T: Clone + PartialEq> JoinedState for Setting<T> {
         match (self, other) {
             (Self::Open(_), _) => self.clone(),
             (_, Self::Open(_)) => other.clone(),
-            (Self::Known(own, at), Self::Known(others, also)) if own != others => {
-                Self::Open(format!("differs between the ways to this target: {at} and {also}; expected one"))
-            }
+            (Self::Known(own, at), Self::Known(others, also)) if own != others => Self::Open(
+                format!("differs between the ways to this target: {at} and {also}; expected one"),
+            ),
             (Self::Known(_, at), Self::Unset) | (Self::Unset, Self::Known(_, at)) => {
-                Self::Open(format!("is set on some of the ways to this target alone, by {at}; expected on all"))
+                Self::Open(format!(
+                    "is set on some of the ways to this target alone, by {at}; expected on all"
+                ))
             }
             _ => self.clone(),
         }
@@ -71,17 +73,29 @@ impl<T: Clone + PartialEq> JoinedState for Setting<T> {
 
 impl JoinedState for InForce {
     fn joined(&self, other: &Self) -> Self {
-        Self { base: self.base.joined(&other.base), tool: self.tool.joined(&other.tool), load: self.load.joined(&other.load) }
+        Self {
+            base: self.base.joined(&other.base),
+            tool: self.tool.joined(&other.tool),
+            load: self.load.joined(&other.load),
+        }
     }
 }
 
 impl InForce {
     /// Where nothing is set.
-    pub const NOTHING: Self = Self { base: Setting::Unset, tool: Setting::Unset, load: Setting::Unset };
+    pub const NOTHING: Self = Self {
+        base: Setting::Unset,
+        tool: Setting::Unset,
+        load: Setting::Unset,
+    };
 
     /// Where nothing is known, for one reason.
     pub fn open(why: &str) -> Self {
         let why = || why.to_string();
-        Self { base: Setting::Open(why()), tool: Setting::Open(why()), load: Setting::Open(why()) }
+        Self {
+            base: Setting::Open(why()),
+            tool: Setting::Open(why()),
+            load: Setting::Open(why()),
+        }
     }
 }

@@ -34,38 +34,77 @@ pub struct JointList {
 pub fn listing(ending: &str, head: &[u8]) -> Option<Language> {
     let language = Language::of_ending(ending)?;
     let words: &[&str] = match language {
-        Language::Krl => &["DEFDAT", "DEF ", "E6AXIS", "E3AXIS", "DECL AXIS", "E6POS", "&ACCESS"],
+        Language::Krl => &[
+            "DEFDAT",
+            "DEF ",
+            "E6AXIS",
+            "E3AXIS",
+            "DECL AXIS",
+            "E6POS",
+            "&ACCESS",
+        ],
         Language::Rapid => &["JOINTTARGET", "ROBTARGET", "MODULE"],
         Language::Fanuc => &["/PROG"],
         Language::UrScript => &["DEF ", "MOVEJ", "MOVEL"],
     };
     let head = String::from_utf8_lossy(head).to_ascii_uppercase();
-    words.iter().any(|word| head.contains(word)).then_some(language)
+    words
+        .iter()
+        .any(|word| head.contains(word))
+        .then_some(language)
 }
 
 /// Reads what a program declares; fails with every fault of that.
 pub fn joint_list(bytes: &[u8], language: Language) -> Result<JointList, Vec<Note>> {
     if bytes.len() > MOST_BYTES {
-        let message = format!("a program of more than {} MB; allowed: shorter ones", MOST_BYTES >> 20);
-        return Err(vec![Note { line: 1, column: 1, message }]);
+        let message = format!(
+            "a program of more than {} MB; allowed: shorter ones",
+            MOST_BYTES >> 20
+        );
+        return Err(vec![Note {
+            line: 1,
+            column: 1,
+            message,
+        }]);
     }
-    let Declared { mut found, names, poses } = match language {
+    let Declared {
+        mut found,
+        names,
+        poses,
+    } = match language {
         Language::Krl => krl::listed(bytes),
         Language::Rapid => rapid::listed(bytes),
         Language::Fanuc => fanuc::listed(bytes),
         Language::UrScript => urscript::listed(bytes),
     };
     found.faults.append(&mut found.partial);
-    found.faults.extend(found.literals.iter().flat_map(Literal::beyond_any_robot));
+    found
+        .faults
+        .extend(found.literals.iter().flat_map(Literal::beyond_any_robot));
     let faults = placed(bytes, found.faults);
     if !faults.is_empty() {
         return Err(faults);
     }
     // By the line at which each stands; positions are declared one after the other.
-    let lines = placed(bytes, found.literals.iter().zip(names).map(|(literal, name)| (literal.at(), name)).collect());
+    let lines = placed(
+        bytes,
+        found
+            .literals
+            .iter()
+            .zip(names)
+            .map(|(literal, name)| (literal.at(), name))
+            .collect(),
+    );
     found.literals.sort_by_key(Literal::at);
     let rows = found.literals.into_iter().zip(lines);
-    let row = |(literal, Note { line, message: name, .. }): (Literal, Note)| ListedJoints {
+    let row = |(
+        literal,
+        Note {
+            line,
+            message: name,
+            ..
+        },
+    ): (Literal, Note)| ListedJoints {
         line,
         name,
         joints: match literal.kind {
@@ -74,5 +113,8 @@ pub fn joint_list(bytes: &[u8], language: Language) -> Result<JointList, Vec<Not
         },
         external: literal.external,
     };
-    Ok(JointList { rows: rows.map(row).collect(), poses })
+    Ok(JointList {
+        rows: rows.map(row).collect(),
+        poses,
+    })
 }

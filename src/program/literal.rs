@@ -63,7 +63,18 @@ impl Literal {
         (posture, posture_spans): (PostureStatement, Vec<Range<usize>>),
     ) -> Self {
         let (frame, tool, tool_in_force, payload) = (None, None, None, None);
-        Self { kind, values, spans, external, posture, posture_spans, frame, tool, tool_in_force, payload }
+        Self {
+            kind,
+            values,
+            spans,
+            external,
+            posture,
+            posture_spans,
+            frame,
+            tool,
+            tool_in_force,
+            payload,
+        }
     }
 
     /// Angles and lengths that no robot has, at their bytes.
@@ -73,7 +84,9 @@ impl Literal {
             let fault = match self.kind {
                 TargetKind::Joints => Bound::Angle.fault(value.to_radians()),
                 TargetKind::Radians => Bound::Angle.fault(*value),
-                TargetKind::RotationVector => if k < 3 { Bound::Length } else { Bound::Angle }.fault(*value),
+                TargetKind::RotationVector => {
+                    if k < 3 { Bound::Length } else { Bound::Angle }.fault(*value)
+                }
                 _ if k < 3 => Bound::Length.fault(value * 1e-3),
                 TargetKind::Frame => Bound::Angle.fault(value.to_radians()),
                 TargetKind::Quaternion => None,
@@ -84,7 +97,11 @@ impl Literal {
 
     /// The byte at which its first number stands.
     pub fn at(&self) -> usize {
-        self.spans.iter().map(|span| span.start).min().unwrap_or_default()
+        self.spans
+            .iter()
+            .map(|span| span.start)
+            .min()
+            .unwrap_or_default()
     }
 
     /// Decimals of value `k`: 1e-6 deg is 0.04 um at 2.5 m, 1e-8 rad 0.03 um, 1e-5 mm is 0.01 um.
@@ -99,8 +116,14 @@ impl Literal {
     }
 
     /// The numbers that change, as text, in the order of the program; `bytes`: the program.
-    pub(super) fn replacements(&self, bytes: &[u8], solved: &SolvedLiteral) -> Vec<(Range<usize>, String)> {
-        let SolvedLiteral { values, posture, .. } = solved;
+    pub(super) fn replacements(
+        &self,
+        bytes: &[u8],
+        solved: &SolvedLiteral,
+    ) -> Vec<(Range<usize>, String)> {
+        let SolvedLiteral {
+            values, posture, ..
+        } = solved;
         assert_eq!(values.len(), self.values.len(), "a number for every number");
         let mut out: Vec<(Range<usize>, String)> = Vec::new();
         for (k, (new, old)) in values.iter().zip(&self.values).enumerate() {
@@ -110,9 +133,17 @@ impl Literal {
                 out.push((self.spans[k].clone(), fixed(*new, decimals)));
             }
         }
-        let numbers = self.posture.numbers().into_iter().zip(posture.numbers()).zip(&self.posture_spans);
+        let numbers = self
+            .posture
+            .numbers()
+            .into_iter()
+            .zip(posture.numbers())
+            .zip(&self.posture_spans);
         let changed = numbers.filter(|((old, new), _)| old != new);
-        out.extend(changed.map(|((_, new), span)| (span.clone(), stated::written(&bytes[span.clone()], new))));
+        out.extend(
+            changed
+                .map(|((_, new), span)| (span.clone(), stated::written(&bytes[span.clone()], new))),
+        );
         out.sort_by_key(|(span, _)| span.start);
         out
     }

@@ -11,10 +11,13 @@ const MARK: &str = "corrected by calib";
 /// Whether a program carries the mark.
 pub fn stands_in(bytes: &[u8], language: Language) -> bool {
     lines(bytes).any(|line| {
-        let is_before =
-            |byte: &u8| byte.is_ascii_whitespace() || language == Language::Fanuc && (byte.is_ascii_digit() || *byte == b':');
+        let is_before = |byte: &u8| {
+            byte.is_ascii_whitespace()
+                || language == Language::Fanuc && (byte.is_ascii_digit() || *byte == b':')
+        };
         let line = &line[line.iter().take_while(|byte| is_before(byte)).count()..];
-        line.strip_prefix(sign(language).as_bytes()).is_some_and(|rest| rest.trim_ascii_start().starts_with(MARK.as_bytes()))
+        line.strip_prefix(sign(language).as_bytes())
+            .is_some_and(|rest| rest.trim_ascii_start().starts_with(MARK.as_bytes()))
     })
 }
 
@@ -22,13 +25,25 @@ pub fn stands_in(bytes: &[u8], language: Language) -> bool {
 pub fn written(program: &[u8], source: &[u8], language: Language, remarks: &[&str]) -> Vec<u8> {
     let hash = blake3::hash(source).to_hex();
     let at = place(program, language);
-    let ending = if program.windows(2).any(|two| two == b"\r\n") { "\r\n" } else { "\n" };
+    let ending = if program.windows(2).any(|two| two == b"\r\n") {
+        "\r\n"
+    } else {
+        "\n"
+    };
     // A head that no line ends.
-    let before = if at > 0 && !program[..at].ends_with(b"\n") { ending } else { "" };
+    let before = if at > 0 && !program[..at].ends_with(b"\n") {
+        ending
+    } else {
+        ""
+    };
     let remarks: String = remarks.iter().map(|remark| format!(", {remark}")).collect();
     let comment = match language {
         Language::Fanuc => format!("{before}   :  !{MARK} from {} ;{ending}", &hash[..8]),
-        _ => format!("{before}{} {MARK} from {}{remarks}{ending}", sign(language), &hash[..16]),
+        _ => format!(
+            "{before}{} {MARK} from {}{remarks}{ending}",
+            sign(language),
+            &hash[..16]
+        ),
     };
     [&program[..at], comment.as_bytes(), &program[at..]].concat()
 }

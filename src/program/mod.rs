@@ -70,7 +70,10 @@ pub struct Companion<'a> {
 
 impl<'a> Companion<'a> {
     fn text(&self, language: Language) -> ProgramText<'a> {
-        ProgramText { bytes: self.text, language }
+        ProgramText {
+            bytes: self.text,
+            language,
+        }
     }
 }
 
@@ -192,7 +195,11 @@ impl Gathered {
 
 impl<'p> Program<'p> {
     /// Reads a program that is one file; fails with every fault of it.
-    pub fn parse(bytes: &'p [u8], language: Language, partial: Partial) -> Result<Self, ProgramRefusal> {
+    pub fn parse(
+        bytes: &'p [u8],
+        language: Language,
+        partial: Partial,
+    ) -> Result<Self, ProgramRefusal> {
         Self::parse_with(bytes, language, partial, &[])
     }
 
@@ -215,11 +222,16 @@ impl<'p> Program<'p> {
                 refusal.partial = found.partial.len();
                 found.faults.append(&mut found.partial);
             }
-            Partial::Left => {
-                found.warnings.extend(found.partial.into_iter().map(|(at, what)| (at, format!("left as it is: {what}"))))
-            }
+            Partial::Left => found.warnings.extend(
+                found
+                    .partial
+                    .into_iter()
+                    .map(|(at, what)| (at, format!("left as it is: {what}"))),
+            ),
         }
-        found.faults.extend(found.literals.iter().flat_map(Literal::beyond_any_robot));
+        found
+            .faults
+            .extend(found.literals.iter().flat_map(Literal::beyond_any_robot));
         refusal.faults = placed(bytes, found.faults);
         if !refusal.faults.is_empty() {
             return Err(refusal);
@@ -229,7 +241,13 @@ impl<'p> Program<'p> {
         let mut warnings = placed(bytes, found.warnings);
         warnings.extend(frames.iter().cloned());
         warnings.sort_by_key(|note| (note.line, note.column));
-        Ok(Self { bytes, literals: found.literals, warnings, frames, tools: found.tools })
+        Ok(Self {
+            bytes,
+            literals: found.literals,
+            warnings,
+            frames,
+            tools: found.tools,
+        })
     }
 
     /// The targets that are to be corrected.
@@ -239,8 +257,15 @@ impl<'p> Program<'p> {
 
     /// Takes the tools of its targets from the robot file's, which is the one that is stated, or else the one that the program uses; fails where
     /// the stated one is not known.
-    pub fn relate_tools(&mut self, robot: &RobotModel, stated: Option<&RobotTool>) -> Result<(), String> {
-        let mut found = Gathered { literals: std::mem::take(&mut self.literals), ..Gathered::default() };
+    pub fn relate_tools(
+        &mut self,
+        robot: &RobotModel,
+        stated: Option<&RobotTool>,
+    ) -> Result<(), String> {
+        let mut found = Gathered {
+            literals: std::mem::take(&mut self.literals),
+            ..Gathered::default()
+        };
         let related = tools::relate(&mut found, robot, stated, &self.tools);
         self.literals = found.literals;
         let frames = placed(self.bytes, found.frames);
@@ -256,13 +281,22 @@ impl<'p> Program<'p> {
     /// Takes `payload` (kg) as what all targets carry, and says where the program states another one.
     fn carries(&mut self, payload: f64) {
         let differ = |literal: &&Literal| literal.payload.is_some_and(|stated| stated != payload);
-        let other = self.literals.iter().find(differ).map(|literal| (literal.at(), literal.payload.unwrap_or_default()));
+        let other = self
+            .literals
+            .iter()
+            .find(differ)
+            .map(|literal| (literal.at(), literal.payload.unwrap_or_default()));
         if let Some((at, stated)) = other {
-            let message = format!("the program states a payload of {stated} kg, --payload {payload} kg, which is used");
-            self.warnings.extend(placed(self.bytes, vec![(at, message)]));
+            let message = format!(
+                "the program states a payload of {stated} kg, --payload {payload} kg, which is used"
+            );
+            self.warnings
+                .extend(placed(self.bytes, vec![(at, message)]));
             self.warnings.sort_by_key(|note| (note.line, note.column));
         }
-        self.literals.iter_mut().for_each(|literal| literal.payload = Some(payload));
+        self.literals
+            .iter_mut()
+            .for_each(|literal| literal.payload = Some(payload));
     }
 
     /// The lines that use frames which are not applied; they are among the warnings, too.
@@ -278,7 +312,10 @@ impl<'p> Program<'p> {
     /// The program with every literal's numbers replaced by its answer's; fails where one has none, with all the reasons.
     ///
     /// A number that is, to the decimals written, what it was stays as it was written.
-    pub fn rewritten(&self, answers: Vec<Result<SolvedLiteral, String>>) -> Result<Rewritten, ProgramRefusal> {
+    pub fn rewritten(
+        &self,
+        answers: Vec<Result<SolvedLiteral, String>>,
+    ) -> Result<Rewritten, ProgramRefusal> {
         assert_eq!(answers.len(), self.literals.len(), "one answer a literal");
         let (mut faults, mut remarks) = (Vec::new(), Vec::new());
         let mut bytes = Vec::with_capacity(self.bytes.len() + 16 * answers.len());
@@ -305,7 +342,10 @@ impl<'p> Program<'p> {
             }
         }
         if !faults.is_empty() {
-            return Err(ProgramRefusal { faults: placed(self.bytes, faults), partial: 0 });
+            return Err(ProgramRefusal {
+                faults: placed(self.bytes, faults),
+                partial: 0,
+            });
         }
         bytes.extend_from_slice(&self.bytes[from..]);
         let mut warnings = self.warnings.clone();
@@ -321,11 +361,19 @@ fn placed(bytes: &[u8], mut said: Vec<(usize, String)>) -> Vec<Note> {
     let (mut line, mut start, mut from) = (1, 0, 0);
     said.into_iter()
         .map(|(at, message)| {
-            for (k, _) in bytes[from..at].iter().enumerate().filter(|(_, byte)| **byte == b'\n') {
+            for (k, _) in bytes[from..at]
+                .iter()
+                .enumerate()
+                .filter(|(_, byte)| **byte == b'\n')
+            {
                 (line, start) = (line + 1, from + k + 1);
             }
             from = at;
-            Note { line, column: at - start + 1, message }
+            Note {
+                line,
+                column: at - start + 1,
+                message,
+            }
         })
         .collect()
 }
@@ -335,7 +383,15 @@ fn quoted(bytes: &[u8], span: Range<usize>) -> String {
     const MOST: usize = 40;
     let text = String::from_utf8_lossy(&bytes[span]);
     let words: Vec<&str> = text.split_whitespace().collect();
-    let text: String = words.join(" ").chars().map(|c| if c.is_control() { '?' } else { c }).collect();
+    let text: String = words
+        .join(" ")
+        .chars()
+        .map(|c| if c.is_control() { '?' } else { c })
+        .collect();
     let short: String = text.chars().take(MOST).collect();
-    if short.len() < text.len() { format!("`{short}..`") } else { format!("`{short}`") }
+    if short.len() < text.len() {
+        format!("`{short}..`")
+    } else {
+        format!("`{short}`")
+    }
 }

@@ -5,38 +5,78 @@
 
 use super::stated::PostureReader;
 use super::{Literal, PostureStatement, SolvedLiteral, TargetKind};
-use crate::compensate::{Chain, CommandTarget, CorrectedCommand, Corrector, Nominal, Remark, turns};
+use crate::compensate::{
+    Chain, CommandTarget, CorrectedCommand, Corrector, Nominal, Remark, turns,
+};
 use crate::robot::{JointConvention, RobotModel};
 use crate::spatial::Pose;
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 use std::f64::consts::PI;
 
 /// Every literal corrected, in their order; an error says why there is no command.
-pub fn solve(literals: &[Literal], robot: &RobotModel, corrector: &mut Corrector) -> Vec<Result<SolvedLiteral, String>> {
+pub fn solve(
+    literals: &[Literal],
+    robot: &RobotModel,
+    corrector: &mut Corrector,
+) -> Vec<Result<SolvedLiteral, String>> {
     let targets = {
-        let reader = PostureReader { robot, convention: corrector.convention(), sides: corrector.sides() };
-        literals.iter().map(|literal| target(literal, &reader)).collect()
+        let reader = PostureReader {
+            robot,
+            convention: corrector.convention(),
+            sides: corrector.sides(),
+        };
+        literals
+            .iter()
+            .map(|literal| target(literal, &reader))
+            .collect()
     };
     let answers = corrector.batch(targets);
-    let reader = PostureReader { robot, convention: corrector.convention(), sides: corrector.sides() };
+    let reader = PostureReader {
+        robot,
+        convention: corrector.convention(),
+        sides: corrector.sides(),
+    };
     let first = literals.iter().position(is_unstated);
     let unchecked = |literal: &Literal| reader.unchecked(literal.posture);
-    let first_unchecked = literals.iter().position(|literal| unchecked(literal).is_some());
+    let first_unchecked = literals
+        .iter()
+        .position(|literal| unchecked(literal).is_some());
     let solved = |(k, (literal, answer)): (usize, (&Literal, &CorrectedCommand))| match &answer.q {
         Some(q) => {
             let posture = reader.restated(literal.posture, q);
-            let changed = (posture != literal.posture)
-                .then(|| format!("posture {} of the corrected joints, was {}", posture, literal.posture));
+            let changed = (posture != literal.posture).then(|| {
+                format!(
+                    "posture {} of the corrected joints, was {}",
+                    posture, literal.posture
+                )
+            });
             let nearest = (Some(k) == first).then(|| NEAREST.to_string());
             let unchecked = unchecked(literal).filter(|_| Some(k) == first_unchecked);
             let known = Some(answer.remark()).filter(|remark| !remark.is_empty());
-            let remark = known.into_iter().chain(changed).chain(nearest).chain(unchecked).collect::<Vec<_>>().join("; ");
-            Ok(SolvedLiteral { values: values(literal, robot, corrector.convention(), q), posture, remark })
+            let remark = known
+                .into_iter()
+                .chain(changed)
+                .chain(nearest)
+                .chain(unchecked)
+                .collect::<Vec<_>>()
+                .join("; ");
+            Ok(SolvedLiteral {
+                values: values(literal, robot, corrector.convention(), q),
+                posture,
+                remark,
+            })
         }
-        None if answer.remarks.contains(&Remark::OtherPosture) => Err(format!("{} ({})", answer.remark(), literal.posture)),
+        None if answer.remarks.contains(&Remark::OtherPosture) => {
+            Err(format!("{} ({})", answer.remark(), literal.posture))
+        }
         None => Err(answer.remark()),
     };
-    literals.iter().zip(&answers).enumerate().map(solved).collect()
+    literals
+        .iter()
+        .zip(&answers)
+        .enumerate()
+        .map(solved)
+        .collect()
 }
 
 /// Once a program, at its first such target.
@@ -48,18 +88,39 @@ fn is_unstated(literal: &Literal) -> bool {
 
 fn target(literal: &Literal, reader: &PostureReader) -> CommandTarget {
     let v = &literal.values;
-    let stated = CommandTarget { payload: literal.payload, ..CommandTarget::default() };
+    let stated = CommandTarget {
+        payload: literal.payload,
+        ..CommandTarget::default()
+    };
     let posed = |rotation: Matrix3<f64>, unit: f64| {
-        let pose = literal.frame.unwrap_or_else(Pose::identity) * Pose::new(rotation, Vector3::new(v[0], v[1], v[2]) * unit);
+        let pose = literal.frame.unwrap_or_else(Pose::identity)
+            * Pose::new(rotation, Vector3::new(v[0], v[1], v[2]) * unit);
         let pose = pose * literal.tool.unwrap_or_else(Pose::identity).inverse();
         let (point, rotation) = (Some(pose.translation), Some(pose.rotation));
-        CommandTarget { point, rotation, posture: reader.posture(literal.posture), ..stated.clone() }
+        CommandTarget {
+            point,
+            rotation,
+            posture: reader.posture(literal.posture),
+            ..stated.clone()
+        }
     };
     match literal.kind {
-        TargetKind::Joints => CommandTarget { q: Some(v.iter().map(|deg| deg.to_radians()).collect()), ..stated },
-        TargetKind::Radians => CommandTarget { q: Some(v.clone()), ..stated },
-        TargetKind::Frame => posed(turns(v[3].to_radians(), v[4].to_radians(), v[5].to_radians()), 1e-3),
-        TargetKind::RotationVector => posed(Rotation3::new(Vector3::new(v[3], v[4], v[5])).into_inner(), 1.0),
+        TargetKind::Joints => CommandTarget {
+            q: Some(v.iter().map(|deg| deg.to_radians()).collect()),
+            ..stated
+        },
+        TargetKind::Radians => CommandTarget {
+            q: Some(v.clone()),
+            ..stated
+        },
+        TargetKind::Frame => posed(
+            turns(v[3].to_radians(), v[4].to_radians(), v[5].to_radians()),
+            1e-3,
+        ),
+        TargetKind::RotationVector => posed(
+            Rotation3::new(Vector3::new(v[3], v[4], v[5])).into_inner(),
+            1.0,
+        ),
         TargetKind::Quaternion => {
             let turn = UnitQuaternion::from_quaternion(Quaternion::new(v[3], v[4], v[5], v[6]));
             posed(turn.to_rotation_matrix().into_inner(), 1e-3)
@@ -67,7 +128,12 @@ fn target(literal: &Literal, reader: &PostureReader) -> CommandTarget {
     }
 }
 
-fn values(literal: &Literal, robot: &RobotModel, convention: &JointConvention, q: &[f64]) -> Vec<f64> {
+fn values(
+    literal: &Literal,
+    robot: &RobotModel,
+    convention: &JointConvention,
+    q: &[f64],
+) -> Vec<f64> {
     match literal.kind {
         TargetKind::Joints => return q.iter().map(|q| q.to_degrees()).collect(),
         TargetKind::Radians => return q.to_vec(),
@@ -75,17 +141,30 @@ fn values(literal: &Literal, robot: &RobotModel, convention: &JointConvention, q
     }
     let mut own = q.to_vec();
     convention.to_robot(&mut own);
-    let pose = literal.frame.unwrap_or_else(Pose::identity).inverse() * Nominal::new(robot).place(&own);
+    let pose =
+        literal.frame.unwrap_or_else(Pose::identity).inverse() * Nominal::new(robot).place(&own);
     let pose = pose * literal.tool.unwrap_or_else(Pose::identity);
-    let unit = if literal.kind == TargetKind::RotationVector { 1.0 } else { 1e3 };
-    let mut out: Vec<f64> = pose.translation.iter().map(|metres| metres * unit).collect();
+    let unit = if literal.kind == TargetKind::RotationVector {
+        1.0
+    } else {
+        1e3
+    };
+    let mut out: Vec<f64> = pose
+        .translation
+        .iter()
+        .map(|metres| metres * unit)
+        .collect();
     let rotation = Rotation3::from_matrix_unchecked(pose.rotation);
     let given = &literal.values[3..];
     if literal.kind == TargetKind::RotationVector {
         let (vector, given) = (pose.rotation_vector(), Vector3::from_column_slice(given));
         let angle = vector.norm();
         // A turn is the same with whole ones added: the nearest to the given is taken, whose axis is that of a turn by nothing.
-        let axis = if angle > 1e-9 { vector / angle } else { given.try_normalize(1e-9).unwrap_or_else(Vector3::x) };
+        let axis = if angle > 1e-9 {
+            vector / angle
+        } else {
+            given.try_normalize(1e-9).unwrap_or_else(Vector3::x)
+        };
         let alike = (-1..=1).map(|turn| axis * (angle + std::f64::consts::TAU * f64::from(turn)));
         let nearest = alike.min_by(|a, b| (a - given).norm().total_cmp(&(b - given).norm()));
         out.extend(nearest.unwrap_or(vector).iter());
@@ -94,16 +173,28 @@ fn values(literal: &Literal, robot: &RobotModel, convention: &JointConvention, q
         // One rotation has several sets of angles: those nearest to the given are taken, so that 180 does not become -180.
         let near = |angle: f64, given: f64| angle + 360.0 * ((given - angle) / 360.0).round();
         let alike = [[a, b, c], [a + PI, PI - b, c + PI]].map(|angles| {
-            let angles: Vec<f64> = angles.iter().zip(given).map(|(angle, given)| near(angle.to_degrees(), *given)).collect();
+            let angles: Vec<f64> = angles
+                .iter()
+                .zip(given)
+                .map(|(angle, given)| near(angle.to_degrees(), *given))
+                .collect();
             let apart: f64 = angles.iter().zip(given).map(|(a, b)| (a - b).abs()).sum();
             (apart, angles)
         });
         let [first, second] = alike;
-        out.extend(if second.0 < first.0 { second.1 } else { first.1 });
+        out.extend(if second.0 < first.0 {
+            second.1
+        } else {
+            first.1
+        });
     } else {
         let turn = UnitQuaternion::from_rotation_matrix(&rotation);
         let new = [turn.w, turn.i, turn.j, turn.k];
-        let sign = if new.iter().zip(given).map(|(a, b)| a * b).sum::<f64>() < 0.0 { -1.0 } else { 1.0 };
+        let sign = if new.iter().zip(given).map(|(a, b)| a * b).sum::<f64>() < 0.0 {
+            -1.0
+        } else {
+            1.0
+        };
         out.extend(new.iter().map(|part| sign * part));
     }
     out

@@ -23,15 +23,32 @@ pub(super) struct Reached {
 impl Reached {
     /// For each literal what is in force wherever it is reached; `names`: numbers of literals that a variable holds, and its name. Both are in the
     /// order of the program.
-    pub fn uses(&self, literals: &[Literal], names: &[(Range<usize>, String)]) -> Vec<Vec<InForce>> {
+    pub fn uses(
+        &self,
+        literals: &[Literal],
+        names: &[(Range<usize>, String)],
+    ) -> Vec<Vec<InForce>> {
         let of = |(k, literal): (usize, &Literal)| {
             let name = names.get(names.partition_point(|(literals, _)| literals.end <= k));
             if let Some((_, name)) = name.filter(|(literals, _)| literals.contains(&k)) {
-                return self.named.get(name).into_iter().flatten().chain(self.mentioned.get(name)).cloned().collect();
+                return self
+                    .named
+                    .get(name)
+                    .into_iter()
+                    .flatten()
+                    .chain(self.mentioned.get(name))
+                    .cloned()
+                    .collect();
             }
             let at = literal.at();
-            let placed = self.placed.get(self.placed.partition_point(|(span, _)| span.end <= at));
-            placed.filter(|(span, _)| span.contains(&at)).map(|(_, force)| force.clone()).into_iter().collect()
+            let placed = self
+                .placed
+                .get(self.placed.partition_point(|(span, _)| span.end <= at));
+            placed
+                .filter(|(span, _)| span.contains(&at))
+                .map(|(_, force)| force.clone())
+                .into_iter()
+                .collect()
         };
         literals.iter().enumerate().map(of).collect()
     }
@@ -95,6 +112,10 @@ pub(super) fn settle(found: &mut Gathered, uses: Vec<Vec<InForce>>, words: &Word
         }
     }
     for (refuses, at, note) in notes {
-        if refuses { found.frame(at, note) } else { found.warn(at, note) }
+        if refuses {
+            found.frame(at, note)
+        } else {
+            found.warn(at, note)
+        }
     }
 }

@@ -64,7 +64,11 @@ impl PostureStatement {
             Self::Unstated | Self::Near(_) => Vec::new(),
             Self::Config { turns, .. } => turns.to_vec(),
             Self::Configuration(numbers) => numbers.to_vec(),
-            Self::StatusTurn { status, turn } => [status, turn].into_iter().flatten().map(|bits| *bits as i32).collect(),
+            Self::StatusTurn { status, turn } => [status, turn]
+                .into_iter()
+                .flatten()
+                .map(|bits| *bits as i32)
+                .collect(),
         }
     }
 
@@ -72,9 +76,14 @@ impl PostureStatement {
     fn sides(self) -> StatedSides {
         match self {
             Self::Configuration([.., cfx]) => [4, 2, 1].map(|bit| Some(cfx & bit == 0)),
-            Self::StatusTurn { status: Some(status), .. } => {
-                [Some(status & 1 == 0), Some(status & 2 != 0), Some(status & 4 == 0)]
-            }
+            Self::StatusTurn {
+                status: Some(status),
+                ..
+            } => [
+                Some(status & 1 == 0),
+                Some(status & 2 != 0),
+                Some(status & 4 == 0),
+            ],
             Self::Config { flip, up, .. } => [Some(true), Some(up), Some(flip)],
             Self::Unstated | Self::Near(_) | Self::StatusTurn { status: None, .. } => [None; 3],
         }
@@ -86,9 +95,13 @@ impl PostureReader<'_> {
     pub fn unchecked(&self, stated: PostureStatement) -> Option<String> {
         let name = match stated {
             PostureStatement::Configuration(_) => "cfx",
-            PostureStatement::StatusTurn { status: Some(_), .. } => "S",
+            PostureStatement::StatusTurn {
+                status: Some(_), ..
+            } => "S",
             PostureStatement::Config { .. } => "CONFIG",
-            PostureStatement::Unstated | PostureStatement::Near(_) | PostureStatement::StatusTurn { status: None, .. } => {
+            PostureStatement::Unstated
+            | PostureStatement::Near(_)
+            | PostureStatement::StatusTurn { status: None, .. } => {
                 return None;
             }
         };
@@ -97,31 +110,52 @@ impl PostureReader<'_> {
                 "{name} is not checked: it is told of arms with parallel axes 2 and 3 and a wrist whose axes meet"
             ));
         }
-        (!self.uses_sides(stated)).then(|| format!("{name} is not checked: an arm with a parallelogram does not use it"))
+        (!self.uses_sides(stated))
+            .then(|| format!("{name} is not checked: an arm with a parallelogram does not use it"))
     }
 
     fn uses_sides(&self, stated: PostureStatement) -> bool {
-        let parallelogram = self.convention.coupled().iter().any(|coupling| (coupling.joint, coupling.by) == (2, 1));
-        self.sides.is_some() && !(parallelogram && matches!(stated, PostureStatement::Configuration(_)))
+        let parallelogram = self
+            .convention
+            .coupled()
+            .iter()
+            .any(|coupling| (coupling.joint, coupling.by) == (2, 1));
+        self.sides.is_some()
+            && !(parallelogram && matches!(stated, PostureStatement::Configuration(_)))
     }
 
     /// What a target states as a posture; none where it states nothing.
     pub fn posture(&self, stated: PostureStatement) -> Option<StatedPosture> {
-        let sides = if self.uses_sides(stated) { stated.sides() } else { [None; 3] };
+        let sides = if self.uses_sides(stated) {
+            stated.sides()
+        } else {
+            [None; 3]
+        };
         match stated {
-            PostureStatement::Unstated | PostureStatement::StatusTurn { status: None, turn: None } => None,
-            PostureStatement::Near(q) => Some(StatedPosture::near(&q.map(|micro| f64::from(micro) * 1e-6))),
-            PostureStatement::Config { turns: [one, four, six], .. } => {
-                Some(StatedPosture::of_turns(JOINTS, &[(0, one), (3, four), (5, six)]).on(sides))
+            PostureStatement::Unstated
+            | PostureStatement::StatusTurn {
+                status: None,
+                turn: None,
+            } => None,
+            PostureStatement::Near(q) => {
+                Some(StatedPosture::near(&q.map(|micro| f64::from(micro) * 1e-6)))
             }
-            PostureStatement::Configuration([one, four, six, _]) => {
-                Some(StatedPosture::of_quadrants(JOINTS, &[(0, one), (3, four), (5, six)]).on(sides))
-            }
-            PostureStatement::StatusTurn { turn: Some(turn), .. } => {
+            PostureStatement::Config {
+                turns: [one, four, six],
+                ..
+            } => Some(StatedPosture::of_turns(JOINTS, &[(0, one), (3, four), (5, six)]).on(sides)),
+            PostureStatement::Configuration([one, four, six, _]) => Some(
+                StatedPosture::of_quadrants(JOINTS, &[(0, one), (3, four), (5, six)]).on(sides),
+            ),
+            PostureStatement::StatusTurn {
+                turn: Some(turn), ..
+            } => {
                 let below: Vec<bool> = (0..JOINTS).map(|joint| turn >> joint & 1 == 1).collect();
                 Some(StatedPosture::of_signs(&below).on(sides))
             }
-            PostureStatement::StatusTurn { turn: None, .. } => Some(StatedPosture::of_sides(JOINTS, sides)),
+            PostureStatement::StatusTurn { turn: None, .. } => {
+                Some(StatedPosture::of_sides(JOINTS, sides))
+            }
         }
     }
 
@@ -129,16 +163,24 @@ impl PostureReader<'_> {
     pub fn restated(&self, stated: PostureStatement, q: &[f64]) -> PostureStatement {
         let mut own = q.to_vec();
         self.convention.to_robot(&mut own);
-        let shares = self.sides.filter(|_| self.uses_sides(stated)).map(|sides| sides.at(self.robot, &own));
+        let shares = self
+            .sides
+            .filter(|_| self.uses_sides(stated))
+            .map(|sides| sides.at(self.robot, &own));
         // Whether side `side` is above zero, as it was stated at a border.
         let above = |side: usize, was: bool| match shares {
             Some(shares) if shares[side].abs() > AT_BORDER => shares[side] > 0.0,
             _ => was,
         };
-        let [shoulder, elbow, wrist] = [0, 1, 2].map(|side| above(side, stated.sides()[side].unwrap_or(true)));
+        let [shoulder, elbow, wrist] =
+            [0, 1, 2].map(|side| above(side, stated.sides()[side].unwrap_or(true)));
         match stated {
             PostureStatement::Unstated | PostureStatement::Near(_) => stated,
-            PostureStatement::Config { flip, up, mut turns } => {
+            PostureStatement::Config {
+                flip,
+                up,
+                mut turns,
+            } => {
                 for (number, joint) in turns.iter_mut().zip(QUADRANTS) {
                     let beyond = q[joint] / TAU - 0.5;
                     if (beyond - beyond.round()).abs() > AT_BORDER {
@@ -161,11 +203,23 @@ impl PostureReader<'_> {
             }
             PostureStatement::StatusTurn { status, turn } => {
                 let bits = u32::from(!shoulder) + 2 * u32::from(elbow) + 4 * u32::from(!wrist);
-                let status = status.map(|status| if shares.is_some() { status & !7 | bits } else { status });
+                let status = status.map(|status| {
+                    if shares.is_some() {
+                        status & !7 | bits
+                    } else {
+                        status
+                    }
+                });
                 let turn = turn.map(|turn| {
                     (0..JOINTS)
                         .filter(|joint| q[*joint].abs() > AT_BORDER)
-                        .fold(turn, |turn, joint| if q[joint] < 0.0 { turn | 1 << joint } else { turn & !(1 << joint) })
+                        .fold(turn, |turn, joint| {
+                            if q[joint] < 0.0 {
+                                turn | 1 << joint
+                            } else {
+                                turn & !(1 << joint)
+                            }
+                        })
                 });
                 PostureStatement::StatusTurn { status, turn }
             }
@@ -178,13 +232,24 @@ impl fmt::Display for PostureStatement {
         match self {
             Self::Unstated => f.write_str("no posture"),
             Self::Near(_) => f.write_str("near the joints that are named"),
-            Self::Config { flip, up, turns: [one, four, six] } => {
-                write!(f, "{} {} T, {one}, {four}, {six}", if *flip { 'F' } else { 'N' }, if *up { 'U' } else { 'D' })
+            Self::Config {
+                flip,
+                up,
+                turns: [one, four, six],
+            } => {
+                write!(
+                    f,
+                    "{} {} T, {one}, {four}, {six}",
+                    if *flip { 'F' } else { 'N' },
+                    if *up { 'U' } else { 'D' }
+                )
             }
             Self::Configuration([one, four, six, x]) => write!(f, "[{one},{four},{six},{x}]"),
             Self::StatusTurn { status, turn } => {
                 let named = [("S", status), ("T", turn)].into_iter();
-                let given: Vec<String> = named.filter_map(|(name, bits)| bits.map(|bits| format!("{name} {bits}"))).collect();
+                let given: Vec<String> = named
+                    .filter_map(|(name, bits)| bits.map(|bits| format!("{name} {bits}")))
+                    .collect();
                 f.write_str(&given.join(", "))
             }
         }

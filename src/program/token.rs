@@ -51,7 +51,10 @@ impl ProgramText<'_> {
 
     pub fn is_word(&self, token: &Token, words: &[&str]) -> bool {
         let text = &self.bytes[token.span.clone()];
-        token.sort == TokenKind::Word && words.iter().any(|word| word.as_bytes().eq_ignore_ascii_case(text))
+        token.sort == TokenKind::Word
+            && words
+                .iter()
+                .any(|word| word.as_bytes().eq_ignore_ascii_case(text))
     }
 
     /// The number that these tokens are, sign included, and its bytes; none where they are anything else.
@@ -66,7 +69,11 @@ impl ProgramText<'_> {
         if token.sort != TokenKind::Number || !is_number(text, self.language) {
             return None;
         }
-        let value = std::str::from_utf8(text).ok()?.parse::<f64>().ok().filter(|value| value.is_finite())?;
+        let value = std::str::from_utf8(text)
+            .ok()?
+            .parse::<f64>()
+            .ok()
+            .filter(|value| value.is_finite())?;
         let start = tokens[0].span.start;
         Some((if negative { -value } else { value }, start..token.span.end))
     }
@@ -124,7 +131,11 @@ pub(super) fn tokens(source: ProgramText, found: &mut Gathered) -> Vec<Token> {
     };
     let byte = |at: usize| bytes.get(at).copied();
     let mut out: Vec<Token> = Vec::with_capacity(bytes.len() / 4);
-    let mut at = if bytes.starts_with(b"\xEF\xBB\xBF") { 3 } else { 0 };
+    let mut at = if bytes.starts_with(b"\xEF\xBB\xBF") {
+        3
+    } else {
+        0
+    };
     let mut line_begins = true;
     doubtful(bytes, found);
     while let Some(here) = byte(at) {
@@ -148,18 +159,26 @@ pub(super) fn tokens(source: ProgramText, found: &mut Gathered) -> Vec<Token> {
                 match bytes[at..end].iter().position(|byte| *byte == here) {
                     Some(length) => at += length + 1,
                     None => {
-                        found.fault(start, format!("`{}` is not closed on its line", here as char));
+                        found.fault(
+                            start,
+                            format!("`{}` is not closed on its line", here as char),
+                        );
                         at = end;
                     }
                 }
                 TokenKind::Text
             }
-            b'.' | b'0'..=b'9' if here != b'.' || byte(at).is_some_and(|next| next.is_ascii_digit()) => {
+            b'.' | b'0'..=b'9'
+                if here != b'.' || byte(at).is_some_and(|next| next.is_ascii_digit()) =>
+            {
                 at = number_end(bytes, start);
                 TokenKind::Number
             }
             here if in_word(here) => {
-                at += bytes[at..].iter().take_while(|byte| in_word(**byte)).count();
+                at += bytes[at..]
+                    .iter()
+                    .take_while(|byte| in_word(**byte))
+                    .count();
                 TokenKind::Word
             }
             _ => match (here, byte(at)) {
@@ -174,7 +193,10 @@ pub(super) fn tokens(source: ProgramText, found: &mut Gathered) -> Vec<Token> {
                 _ => TokenKind::Sign(here),
             },
         };
-        out.push(Token { sort, span: start..at });
+        out.push(Token {
+            sort,
+            span: start..at,
+        });
     }
     out
 }
@@ -184,7 +206,9 @@ fn doubtful(bytes: &[u8], found: &mut Gathered) {
     for (at, byte) in bytes.iter().enumerate() {
         match byte {
             0 => found.fault(at, "a zero byte: no program text (UTF-16 is not read)"),
-            b'\r' if bytes.get(at + 1) != Some(&b'\n') => found.fault(at, "a carriage return without a line feed"),
+            b'\r' if bytes.get(at + 1) != Some(&b'\n') => {
+                found.fault(at, "a carriage return without a line feed")
+            }
             _ => {}
         }
         // Text of another kind is all of them.
@@ -195,13 +219,18 @@ fn doubtful(bytes: &[u8], found: &mut Gathered) {
 }
 
 fn line_end(bytes: &[u8], from: usize) -> usize {
-    bytes[from..].iter().position(|byte| *byte == b'\n').map_or(bytes.len(), |length| from + length)
+    bytes[from..]
+        .iter()
+        .position(|byte| *byte == b'\n')
+        .map_or(bytes.len(), |length| from + length)
 }
 
 fn number_end(bytes: &[u8], start: usize) -> usize {
     let mut at = start;
     while let Some(byte) = bytes.get(at) {
-        let plain = bytes[start..at].iter().all(|byte| byte.is_ascii_digit() || *byte == b'.');
+        let plain = bytes[start..at]
+            .iter()
+            .all(|byte| byte.is_ascii_digit() || *byte == b'.');
         if plain && matches!(byte, b'e' | b'E') && matches!(bytes.get(at + 1), Some(b'+' | b'-')) {
             at += 2;
         } else if in_word(*byte) || *byte == b'.' {

@@ -14,7 +14,8 @@ use nalgebra::Vector3;
 /// m: a tool whose distance from axis 6 differs by more is another one.
 const SAME: f64 = 10e-3;
 
-const EXPECTED: &str = "the name of a tool, its number in TOOL_DATA, or its frame X,Y,Z,A,B,C at the flange (mm, deg)";
+const EXPECTED: &str =
+    "the name of a tool, its number in TOOL_DATA, or its frame X,Y,Z,A,B,C at the flange (mm, deg)";
 
 /// The robot file's tool, as a person states it.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,14 +30,31 @@ impl RobotTool {
     /// The tool by a name, a number, or `X,Y,Z,A,B,C` in mm and deg; fails where the text is none of them.
     pub fn parse(text: &str) -> Result<Self, String> {
         if !text.contains(',') {
-            let named = !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_');
-            return if named { Ok(Self::Named(text.into())) } else { Err(format!("expected {EXPECTED}, found `{text}`")) };
+            let named = !text.is_empty()
+                && text
+                    .bytes()
+                    .all(|byte| byte.is_ascii_alphanumeric() || byte == b'_');
+            return if named {
+                Ok(Self::Named(text.into()))
+            } else {
+                Err(format!("expected {EXPECTED}, found `{text}`"))
+            };
         }
-        let numbers: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+        let numbers: Option<Vec<f64>> = text
+            .split(',')
+            .map(|part| part.trim().parse().ok())
+            .collect();
         match numbers.as_deref() {
-            Some([x, y, z, a, b, c]) if [x, y, z, a, b, c].into_iter().all(|number| number.is_finite()) => {
+            Some([x, y, z, a, b, c])
+                if [x, y, z, a, b, c]
+                    .into_iter()
+                    .all(|number| number.is_finite()) =>
+            {
                 let turn = turns(a.to_radians(), b.to_radians(), c.to_radians());
-                Ok(Self::Frame(Pose::new(turn, Vector3::new(*x, *y, *z) * 1e-3)))
+                Ok(Self::Frame(Pose::new(
+                    turn,
+                    Vector3::new(*x, *y, *z) * 1e-3,
+                )))
             }
             _ => Err(format!("expected {EXPECTED}, found `{text}`")),
         }
@@ -46,15 +64,22 @@ impl RobotTool {
     fn frame(&self, known: &[ToolInForce]) -> Result<Pose, String> {
         let name = match self {
             Self::Frame(frame) => return Ok(*frame),
-            Self::Named(name) if name.bytes().all(|byte| byte.is_ascii_digit()) => format!("TOOL_DATA[{name}]"),
+            Self::Named(name) if name.bytes().all(|byte| byte.is_ascii_digit()) => {
+                format!("TOOL_DATA[{name}]")
+            }
             Self::Named(name) => name.to_ascii_uppercase(),
         };
         if ["TOOL0", "TOOL_DATA[0]"].contains(&name.as_str()) {
             return Ok(Pose::identity());
         }
-        let known: Vec<(&str, &Pose)> =
-            known.iter().filter_map(|tool| Some((tool.name.as_str(), tool.frame.as_ref()?))).collect();
-        let found = known.iter().find(|(own, _)| *own == name).map(|(_, frame)| **frame);
+        let known: Vec<(&str, &Pose)> = known
+            .iter()
+            .filter_map(|tool| Some((tool.name.as_str(), tool.frame.as_ref()?)))
+            .collect();
+        let found = known
+            .iter()
+            .find(|(own, _)| *own == name)
+            .map(|(_, frame)| **frame);
         found.ok_or_else(|| {
             let names: Vec<&str> = known.iter().map(|(name, _)| *name).collect();
             let names = if names.is_empty() { "none".into() } else { names.join(", ") };
@@ -74,7 +99,9 @@ pub(super) fn relate(
 ) -> Result<(), String> {
     let of_the_file = stated.map(|stated| stated.frame(known)).transpose()?;
     let is_cartesian = |literal: &&Literal| !literal.kind.is_of_joints();
-    let Some(first) = found.literals.iter().find(is_cartesian).map(Literal::at) else { return Ok(()) };
+    let Some(first) = found.literals.iter().find(is_cartesian).map(Literal::at) else {
+        return Ok(());
+    };
     let mut notes: Vec<(bool, usize, String)> = Vec::new();
     let mut one: Option<ToolInForce> = None;
     let mut unset = None;
@@ -84,14 +111,20 @@ pub(super) fn relate(
         .filter(|literal| literal.kind.is_of_joints())
         .filter_map(|literal| Some((literal.at(), literal.tool_in_force.take()?)))
         .collect();
-    for literal in found.literals.iter_mut().filter(|literal| !literal.kind.is_of_joints()) {
+    for literal in found
+        .literals
+        .iter_mut()
+        .filter(|literal| !literal.kind.is_of_joints())
+    {
         let at = literal.at();
         let Some(tool) = literal.tool_in_force.take() else {
             unset.get_or_insert(at);
             continue;
         };
         match (of_the_file, &tool.frame) {
-            (Some(own), Some(frame)) => literal.tool = Some(own.inverse() * *frame).filter(|by| *by != Pose::identity()),
+            (Some(own), Some(frame)) => {
+                literal.tool = Some(own.inverse() * *frame).filter(|by| *by != Pose::identity())
+            }
             (Some(_), None) => {
                 let name = &tool.name;
                 notes.push((true, at, format!("is reached with the tool {name}, whose frame no file that was read declares")));
@@ -108,7 +141,10 @@ pub(super) fn relate(
         }
         one.get_or_insert(tool);
     }
-    let carried = found.literals.iter().find_map(|literal| Some((literal.at(), literal.tool?.translation.norm())));
+    let carried = found
+        .literals
+        .iter()
+        .find_map(|literal| Some((literal.at(), literal.tool?.translation.norm())));
     if let Some((at, far)) = carried {
         let message = format!(
             "its tool stands {:.1} mm from the robot file's: the correction there rests on how well orientations are identified",
@@ -121,22 +157,44 @@ pub(super) fn relate(
         None => one.as_ref().is_some_and(|one| one != tool),
     };
     if let Some((at, tool)) = of_joints.into_iter().find(|(_, tool)| is_other(tool)) {
-        let message = format!("joints with the tool {}: they are corrected where the robot file's tool is", tool.name);
+        let message = format!(
+            "joints with the tool {}: they are corrected where the robot file's tool is",
+            tool.name
+        );
         notes.push((false, at, message));
     }
     let frame = of_the_file.or_else(|| one.as_ref().and_then(|tool| tool.frame));
     if let Some(apart) = frame.and_then(|frame| apart(robot, &frame)) {
         notes.push((true, first, apart));
     } else if let Some(tool) = one.as_ref().filter(|_| of_the_file.is_none()) {
-        notes.push((false, first, format!("the tool {} is taken as the robot file's; --tool states another one", tool.name)));
+        notes.push((
+            false,
+            first,
+            format!(
+                "the tool {} is taken as the robot file's; --tool states another one",
+                tool.name
+            ),
+        ));
     }
     if let (Some(at), true) = (unset, one.is_some()) {
-        notes.push((true, at, "no tool is set before this target, and others are reached with one".into()));
+        notes.push((
+            true,
+            at,
+            "no tool is set before this target, and others are reached with one".into(),
+        ));
     } else if let Some(at) = unset {
-        notes.push((false, at, "no tool is set before this target: calib assumed that it is the robot file's".into()));
+        notes.push((
+            false,
+            at,
+            "no tool is set before this target: calib assumed that it is the robot file's".into(),
+        ));
     }
     for (refuses, at, note) in notes {
-        if refuses { found.frame(at, note) } else { found.warn(at, note) }
+        if refuses {
+            found.frame(at, note)
+        } else {
+            found.warn(at, note)
+        }
     }
     Ok(())
 }

@@ -13,7 +13,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 /// Motions, and how many of their arguments are targets.
-const MOTIONS: [(&str, usize); 6] = [("movej", 1), ("movel", 1), ("movep", 1), ("movec", 2), ("servoj", 1), ("servoc", 1)];
+const MOTIONS: [(&str, usize); 6] = [
+    ("movej", 1),
+    ("movel", 1),
+    ("movep", 1),
+    ("movec", 2),
+    ("servoj", 1),
+    ("servoc", 1),
+];
 /// Functions whose arguments are no targets, whatever their form.
 const OTHERS: [&str; 20] = [
     "set_tcp",
@@ -83,23 +90,45 @@ pub(super) fn listed(bytes: &[u8]) -> Declared {
             true => poses += 1,
             false => {
                 names.push(name);
-                reader.found.literals.push(six.literal(PostureStatement::Unstated));
+                reader
+                    .found
+                    .literals
+                    .push(six.literal(PostureStatement::Unstated));
             }
         }
     }
     // Positions are listed, whatever the program does with them.
-    let found = Gathered { literals: reader.found.literals, ..Gathered::default() };
-    Declared { found, names, poses }
+    let found = Gathered {
+        literals: reader.found.literals,
+        ..Gathered::default()
+    };
+    Declared {
+        found,
+        names,
+        poses,
+    }
 }
 
 impl SixNumbers {
     fn literal(self, posture: PostureStatement) -> Literal {
-        let kind = if self.is_pose { TargetKind::RotationVector } else { TargetKind::Radians };
-        Literal::read(kind, (self.values, self.spans), Vec::new(), (posture, Vec::new()))
+        let kind = if self.is_pose {
+            TargetKind::RotationVector
+        } else {
+            TargetKind::Radians
+        };
+        Literal::read(
+            kind,
+            (self.values, self.spans),
+            Vec::new(),
+            (posture, Vec::new()),
+        )
     }
     fn pose(&self) -> Option<Pose> {
-        let [x, y, z, a, b, c] = self.values[..] else { return None };
-        self.is_pose.then(|| Pose::from_rotation_vector(Vector3::new(a, b, c), Vector3::new(x, y, z)))
+        let [x, y, z, a, b, c] = self.values[..] else {
+            return None;
+        };
+        self.is_pose
+            .then(|| Pose::from_rotation_vector(Vector3::new(a, b, c), Vector3::new(x, y, z)))
     }
 }
 
@@ -134,12 +163,25 @@ fn arguments(tokens: &[Token]) -> impl Iterator<Item = &[Token]> {
 
 impl<'p> Reader<'p> {
     fn of(bytes: &'p [u8]) -> Self {
-        let source = ProgramText { bytes, language: Language::UrScript };
+        let source = ProgramText {
+            bytes,
+            language: Language::UrScript,
+        };
         let mut found = Gathered::default();
         let all = tokens(source, &mut found);
         let (uses, held, tools, loads) = (Uses::default(), Vec::new(), Vec::new(), Vec::new());
-        let mut reader = Self { source, found, held, uses, tools, loads };
-        for line in all.split(|token| token.sort == TokenKind::LineEnd).filter(|line| !line.is_empty()) {
+        let mut reader = Self {
+            source,
+            found,
+            held,
+            uses,
+            tools,
+            loads,
+        };
+        for line in all
+            .split(|token| token.sort == TokenKind::LineEnd)
+            .filter(|line| !line.is_empty())
+        {
             if reader.brackets_match(line) {
                 reader.line(line);
             }
@@ -167,19 +209,28 @@ impl<'p> Reader<'p> {
                         _ => b'{',
                     };
                     if open.pop().is_none_or(|(last, _)| last != opens) {
-                        self.found.fault(token.span.start, format!("`{}` without `{}`", char::from(sign), char::from(opens)));
+                        self.found.fault(
+                            token.span.start,
+                            format!("`{}` without `{}`", char::from(sign), char::from(opens)),
+                        );
                         return false;
                     }
                 }
                 _ => {}
             }
             if open.len() == DEPTH {
-                self.found.fault(token.span.start, "brackets are nested too deep");
+                self.found
+                    .fault(token.span.start, "brackets are nested too deep");
                 return false;
             }
         }
-        let Some((sign, at)) = open.first() else { return true };
-        self.found.fault(*at, format!("`{}` is not closed on its line", char::from(*sign)));
+        let Some((sign, at)) = open.first() else {
+            return true;
+        };
+        self.found.fault(
+            *at,
+            format!("`{}` is not closed on its line", char::from(*sign)),
+        );
         false
     }
 
@@ -189,13 +240,26 @@ impl<'p> Reader<'p> {
         let open = usize::from(is_pose);
         line.get(open).filter(|token| token.is(b'['))?;
         let close = closing(line, open);
-        let numbers: Option<Vec<_>> = arguments(&line[open + 1..close]).map(|item| self.source.number(item)).collect();
-        let (values, spans): (Vec<f64>, Vec<_>) = numbers.filter(|numbers| numbers.len() == 6)?.into_iter().unzip();
-        Some(SixNumbers { is_pose, values, spans, tokens: close + 1 })
+        let numbers: Option<Vec<_>> = arguments(&line[open + 1..close])
+            .map(|item| self.source.number(item))
+            .collect();
+        let (values, spans): (Vec<f64>, Vec<_>) = numbers
+            .filter(|numbers| numbers.len() == 6)?
+            .into_iter()
+            .unzip();
+        Some(SixNumbers {
+            is_pose,
+            values,
+            spans,
+            tokens: close + 1,
+        })
     }
 
     fn line(&mut self, line: &[Token]) {
-        let skipped = line.iter().take_while(|token| ["global", "local"].iter().any(|word| self.is(token, word))).count();
+        let skipped = line
+            .iter()
+            .take_while(|token| ["global", "local"].iter().any(|word| self.is(token, word)))
+            .count();
         let line = &line[skipped..];
         let [first, rest @ ..] = line else { return };
         let assigns = rest.iter().position(|token| token.is(b'='));
@@ -222,7 +286,8 @@ impl<'p> Reader<'p> {
     fn value(&mut self, tokens: &[Token]) {
         let mut k = 0;
         while k < tokens.len() {
-            let is_call = tokens[k].sort == TokenKind::Word && tokens.get(k + 1).is_some_and(|next| next.is(b'('));
+            let is_call = tokens[k].sort == TokenKind::Word
+                && tokens.get(k + 1).is_some_and(|next| next.is(b'('));
             if is_call {
                 let close = closing(tokens, k + 1);
                 self.call(&tokens[k], &tokens[k + 2..close]);
@@ -230,14 +295,18 @@ impl<'p> Reader<'p> {
                 continue;
             }
             // A literal, or a list that may hold some.
-            let opens = tokens[k].is(b'[') || self.is(&tokens[k], "p") && tokens.get(k + 1).is_some_and(|next| next.is(b'['));
+            let opens = tokens[k].is(b'[')
+                || self.is(&tokens[k], "p") && tokens.get(k + 1).is_some_and(|next| next.is(b'['));
             if opens {
                 let open = k + usize::from(!tokens[k].is(b'['));
                 let close = closing(tokens, open);
                 if self.six(&tokens[k..]).is_some() {
                     self.others(&tokens[k..=close], "an expression");
                 } else if open > k {
-                    self.found.fault(tokens[k].span.start, "a pose that is not written in six numbers: `p[x,y,z,rx,ry,rz]`");
+                    self.found.fault(
+                        tokens[k].span.start,
+                        "a pose that is not written in six numbers: `p[x,y,z,rx,ry,rz]`",
+                    );
                 } else {
                     self.value(&tokens[open + 1..close]);
                 }
@@ -255,16 +324,21 @@ impl<'p> Reader<'p> {
             for (k, argument) in all.iter().enumerate() {
                 match k < *count {
                     true => self.target(argument),
-                    false => self.others(argument, &format!("an argument of `{name}` that is no target")),
+                    false => self.others(
+                        argument,
+                        &format!("an argument of `{name}` that is no target"),
+                    ),
                 }
             }
             return;
         }
         let first = all.first().copied().unwrap_or_default();
         if name == "set_tcp" {
-            self.tools.push((at, self.known(first).and_then(|six| six.pose())));
+            self.tools
+                .push((at, self.known(first).and_then(|six| six.pose())));
         } else if SET_LOAD.contains(&&*name) {
-            self.loads.push((at, self.source.number(first).map(|(mass, _)| mass)));
+            self.loads
+                .push((at, self.source.number(first).map(|(mass, _)| mass)));
         }
         if OTHERS.contains(&&*name) {
             return;
@@ -278,10 +352,19 @@ impl<'p> Reader<'p> {
         let six = match tokens {
             [word] if word.sort == TokenKind::Word => {
                 let name = self.name(word);
-                let mut own = self.held.iter().filter(|(held, _)| *held == name).map(|(_, six)| six);
+                let mut own = self
+                    .held
+                    .iter()
+                    .filter(|(held, _)| *held == name)
+                    .map(|(_, six)| six);
                 let (one, more) = (own.next()?, own.next());
                 let (is_pose, values, spans) = (one.is_pose, one.values.clone(), one.spans.clone());
-                more.is_none().then_some(SixNumbers { is_pose, values, spans, tokens: 1 })
+                more.is_none().then_some(SixNumbers {
+                    is_pose,
+                    values,
+                    spans,
+                    tokens: 1,
+                })
             }
             _ => self.six(tokens),
         };
@@ -290,33 +373,52 @@ impl<'p> Reader<'p> {
 
     /// Where a motion leads.
     fn target(&mut self, argument: &[Token]) {
-        let Some(first) = argument.first() else { return };
+        let Some(first) = argument.first() else {
+            return;
+        };
         let named = argument.get(1).is_some_and(|sign| sign.is(b'='));
         let argument = if named { &argument[2..] } else { argument };
         let at = first.span.start;
-        if let Some(six) = self.six(argument).filter(|six| six.tokens == argument.len()) {
-            return self.found.literals.push(six.literal(PostureStatement::Unstated));
+        if let Some(six) = self
+            .six(argument)
+            .filter(|six| six.tokens == argument.len())
+        {
+            return self
+                .found
+                .literals
+                .push(six.literal(PostureStatement::Unstated));
         }
         match argument {
-            [word] if word.sort == TokenKind::Word => drop(self.uses.moved_to.insert(self.name(word))),
+            [word] if word.sort == TokenKind::Word => {
+                drop(self.uses.moved_to.insert(self.name(word)))
+            }
             [word, open, inside @ .., _]
-                if self.is(word, INVERSE) && open.is(b'(') && closing(argument, 1) + 1 == argument.len() =>
+                if self.is(word, INVERSE)
+                    && open.is(b'(')
+                    && closing(argument, 1) + 1 == argument.len() =>
             {
                 self.inverse(inside);
             }
-            [first, ..] if first.is(b'[') || self.is(first, "p") && argument.get(1).is_some_and(|next| next.is(b'[')) => {
+            [first, ..]
+                if first.is(b'[')
+                    || self.is(first, "p") && argument.get(1).is_some_and(|next| next.is(b'[')) =>
+            {
                 let text = quoted(self.source.bytes, self.source.over(argument, at));
-                self.found.fault(at, format!("{text} is no list of six numbers"));
+                self.found
+                    .fault(at, format!("{text} is no list of six numbers"));
             }
             _ => {
                 let text = quoted(self.source.bytes, self.source.over(argument, at));
-                let holds = argument.iter().any(|token| self.held.iter().any(|(name, _)| self.is(token, name)));
+                let holds = argument
+                    .iter()
+                    .any(|token| self.held.iter().any(|(name, _)| self.is(token, name)));
                 let writes = (0..argument.len()).any(|k| self.six(&argument[k..]).is_some());
                 if holds || writes {
                     self.found
                         .fault(at, format!("{text} computes a target from a literal; calib corrects targets that are written"));
                 } else {
-                    self.found.warn(at, format!("left as it is: {text} computes the target"));
+                    self.found
+                        .warn(at, format!("left as it is: {text} computes the target"));
                 }
             }
         }
@@ -335,9 +437,13 @@ impl<'p> Reader<'p> {
                 self.uses.moved_to.insert(name);
             }
             Some(pose) => {
-                let posture =
-                    near.and_then(|near| self.known(near)).map_or(PostureStatement::Unstated, |near| near_to(&near.values));
-                match self.six(pose).filter(|six| six.is_pose && six.tokens == pose.len()) {
+                let posture = near
+                    .and_then(|near| self.known(near))
+                    .map_or(PostureStatement::Unstated, |near| near_to(&near.values));
+                match self
+                    .six(pose)
+                    .filter(|six| six.is_pose && six.tokens == pose.len())
+                {
                     Some(six) => self.found.literals.push(six.literal(posture)),
                     None => self.target(pose),
                 }
@@ -351,9 +457,14 @@ impl<'p> Reader<'p> {
         let mut k = 0;
         while k < tokens.len() {
             if let Some(six) = self.six(&tokens[k..]) {
-                let what = if six.is_pose { "a pose" } else { "a list of six numbers" };
-                let message =
-                    format!("{what} in {place}: calib cannot say whether it is a target; hold it in a variable of a motion");
+                let what = if six.is_pose {
+                    "a pose"
+                } else {
+                    "a list of six numbers"
+                };
+                let message = format!(
+                    "{what} in {place}: calib cannot say whether it is a target; hold it in a variable of a motion"
+                );
                 self.found.fault(tokens[k].span.start, message);
                 k += six.tokens;
             } else {
@@ -364,7 +475,10 @@ impl<'p> Reader<'p> {
 
     fn hand_on(&mut self, tokens: &[Token], how: &str) {
         for word in tokens.iter().filter(|token| token.sort == TokenKind::Word) {
-            self.uses.handed_on.entry(self.name(word)).or_insert_with(|| (word.span.start, how.to_string()));
+            self.uses
+                .handed_on
+                .entry(self.name(word))
+                .or_insert_with(|| (word.span.start, how.to_string()));
         }
     }
 
@@ -372,23 +486,47 @@ impl<'p> Reader<'p> {
     fn settle(&mut self) {
         let near: BTreeMap<String, Vec<f64>> = (self.uses.near.iter())
             .filter_map(|(pose, joints)| {
-                let mut own = self.held.iter().filter(|(name, six)| name == joints && !six.is_pose);
-                Some((pose.clone(), own.next().filter(|_| own.next().is_none())?.1.values.clone()))
+                let mut own = self
+                    .held
+                    .iter()
+                    .filter(|(name, six)| name == joints && !six.is_pose);
+                Some((
+                    pose.clone(),
+                    own.next()
+                        .filter(|_| own.next().is_none())?
+                        .1
+                        .values
+                        .clone(),
+                ))
             })
             .collect();
         let mut reported = BTreeSet::new();
         for (name, six) in std::mem::take(&mut self.held) {
-            let (is_target, handed) = (self.uses.moved_to.contains(&name), self.uses.handed_on.get(&name));
+            let (is_target, handed) = (
+                self.uses.moved_to.contains(&name),
+                self.uses.handed_on.get(&name),
+            );
             match (is_target, handed) {
                 (true, Some((at, how))) if reported.insert(name.clone()) => {
-                    self.found.fault(*at, format!("the target `{name}` {how}: calib cannot say what becomes of it there"));
+                    self.found.fault(
+                        *at,
+                        format!(
+                            "the target `{name}` {how}: calib cannot say what becomes of it there"
+                        ),
+                    );
                 }
                 (true, None) => {
-                    let posture = near.get(&name).filter(|_| six.is_pose).map_or(PostureStatement::Unstated, |q| near_to(q));
+                    let posture = near
+                        .get(&name)
+                        .filter(|_| six.is_pose)
+                        .map_or(PostureStatement::Unstated, |q| near_to(q));
                     self.found.literals.push(six.literal(posture));
                 }
                 (false, Some((at, how))) if six.is_pose && reported.insert(name.clone()) => {
-                    self.found.fault(*at, format!("the pose `{name}` {how}: calib cannot say whether it is a target"));
+                    self.found.fault(
+                        *at,
+                        format!("the pose `{name}` {how}: calib cannot say whether it is a target"),
+                    );
                 }
                 _ => {}
             }
@@ -397,30 +535,52 @@ impl<'p> Reader<'p> {
     }
 
     fn in_force(&mut self) {
-        let is_one = |poses: &[(usize, Option<Pose>)]| poses.windows(2).all(|two| two[0].1.is_some() && two[0].1 == two[1].1);
+        let is_one = |poses: &[(usize, Option<Pose>)]| {
+            poses
+                .windows(2)
+                .all(|two| two[0].1.is_some() && two[0].1 == two[1].1)
+        };
         if let Some((at, tool)) = self.tools.first() {
             if is_one(&self.tools) {
-                let tool = ToolInForce { name: "SET_TCP".into(), frame: *tool };
-                self.found.literals.iter_mut().for_each(|literal| literal.tool_in_force = Some(tool.clone()));
+                let tool = ToolInForce {
+                    name: "SET_TCP".into(),
+                    frame: *tool,
+                };
+                self.found
+                    .literals
+                    .iter_mut()
+                    .for_each(|literal| literal.tool_in_force = Some(tool.clone()));
                 self.found.tools = vec![tool];
             } else {
                 self.found
                     .frame(*at, "set_tcp sets several tools: calib assumed that all targets are reached with the robot file's");
             }
         }
-        match (self.loads.first(), self.loads.windows(2).all(|two| two[0].1 == two[1].1)) {
+        match (
+            self.loads.first(),
+            self.loads.windows(2).all(|two| two[0].1 == two[1].1),
+        ) {
             (Some((at, Some(mass))), true) => {
-                self.found.literals.iter_mut().for_each(|literal| literal.payload = Some(*mass));
-                self.found.warn(*at, format!("payload {mass} kg, as the program states"));
+                self.found
+                    .literals
+                    .iter_mut()
+                    .for_each(|literal| literal.payload = Some(*mass));
+                self.found
+                    .warn(*at, format!("payload {mass} kg, as the program states"));
             }
-            (Some((at, _)), _) => self.found.warn(*at, "no payload is stated: the program sets several, or computes it"),
+            (Some((at, _)), _) => self.found.warn(
+                *at,
+                "no payload is stated: the program sets several, or computes it",
+            ),
             (None, _) => {}
         }
     }
 }
 
 fn near_to(q: &[f64]) -> PostureStatement {
-    PostureStatement::Near(std::array::from_fn(|joint| (q[joint] * 1e6).round().clamp(-1e9, 1e9) as i32))
+    PostureStatement::Near(std::array::from_fn(|joint| {
+        (q[joint] * 1e6).round().clamp(-1e9, 1e9) as i32
+    }))
 }
 
 /// Tokens behind `name =`, where they begin so.

@@ -54,11 +54,27 @@ impl FleetProgress {
             });
             let style = style.unwrap_or_else(|_| ProgressStyle::default_bar());
             let total = all.add(ProgressBar::new(total as u64).with_style(style));
-            Bars { all, workers, total }
+            Bars {
+                all,
+                workers,
+                total,
+            }
         });
         let now = Instant::now();
-        let state = State { names: vec![String::new(); workers], over: 0, fresh: 0, bad: 0, said: now };
-        Self { verbosity, total, begun: now, bars, state: Mutex::new(state) }
+        let state = State {
+            names: vec![String::new(); workers],
+            over: 0,
+            fresh: 0,
+            bad: 0,
+            said: now,
+        };
+        Self {
+            verbosity,
+            total,
+            begun: now,
+            bars,
+            state: Mutex::new(state),
+        }
     }
 
     /// Takes the bars away.
@@ -100,7 +116,11 @@ impl FleetProgress {
         let minutes = self.begun.elapsed().as_secs_f64() / 60.0;
         let rate = state.fresh as f64 / minutes.max(1e-9);
         let left = self.total.saturating_sub(state.over) as f64 / rate.max(1e-9);
-        let bad = if state.bad > 0 { format!("; {} not done", state.bad) } else { String::new() };
+        let bad = if state.bad > 0 {
+            format!("; {} not done", state.bad)
+        } else {
+            String::new()
+        };
         let pace = match (state.fresh, state.over) {
             (0, over) if over == self.total => "all recorded before".to_string(),
             (0, _) => "no new one yet".into(),
@@ -112,7 +132,11 @@ impl FleetProgress {
             bars.total.set_message(format!("{pace}{bad}"));
         } else if state.said.elapsed() >= PAUSE || state.over == self.total {
             state.said = Instant::now();
-            let line = format!("{}/{}, {pace}{bad}", state.over, counted(self.total, "robot"));
+            let line = format!(
+                "{}/{}, {pace}{bad}",
+                state.over,
+                counted(self.total, "robot")
+            );
             drop(state);
             self.say(&line);
         }
@@ -154,8 +178,17 @@ impl Watcher for FleetProgress {
         }
         self.show(state);
         if record.ending != Ending::Done && fresh {
-            let reason = record.reason.as_deref().and_then(|reason| reason.lines().next()).unwrap_or_default();
-            self.say(&format!("{}: {}: {}", visible(&record.robot), record.ending.name(), visible(reason)));
+            let reason = record
+                .reason
+                .as_deref()
+                .and_then(|reason| reason.lines().next())
+                .unwrap_or_default();
+            self.say(&format!(
+                "{}: {}: {}",
+                visible(&record.robot),
+                record.ending.name(),
+                visible(reason)
+            ));
         }
     }
 }

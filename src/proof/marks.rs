@@ -19,13 +19,24 @@ pub const LEFT_OUT: &str = "left_out";
 /// what was said in their stead.
 pub fn board(folder: &Path, files: &[String], verdicts: &Path) -> Result<Board> {
     let mut board = Board::default();
-    for name in files.iter().filter(|name| Path::new(name).starts_with(SEALED)) {
+    for name in files
+        .iter()
+        .filter(|name| Path::new(name).starts_with(SEALED))
+    {
         let path = folder.join(name);
-        let truth: Truth = read(&path).map_err(|why| Error::data(path.display().to_string(), why))?;
+        let truth: Truth =
+            read(&path).map_err(|why| Error::data(path.display().to_string(), why))?;
         match read::<Answer>(&verdicts.join(path.file_name().unwrap_or_default())) {
             Ok(answer) => {
-                let without = read::<Answer>(&verdicts.join(LEFT_OUT).join(path.file_name().unwrap_or_default())).ok();
-                board.left_out.extend(without.and_then(|without| left_out(&truth, &answer, &without)));
+                let without = read::<Answer>(
+                    &verdicts
+                        .join(LEFT_OUT)
+                        .join(path.file_name().unwrap_or_default()),
+                )
+                .ok();
+                board
+                    .left_out
+                    .extend(without.and_then(|without| left_out(&truth, &answer, &without)));
                 board.cases.push(mark(&truth, &answer));
             }
             Err(why) => board.missing.push((truth.case, why)),
@@ -37,8 +48,13 @@ pub fn board(folder: &Path, files: &[String], verdicts: &Path) -> Result<Board> 
 /// The cause to leave out of a recording whose truth lies at `path`; none where no single cause of the list is concealed.
 pub fn single_cause(path: &Path) -> Result<Option<String>> {
     let truth: Truth = read(path).map_err(|why| Error::data(path.display().to_string(), why))?;
-    let listed = truth.content == "single" && truth.effects.iter().all(|cause| cause.effect != NAMELESS);
-    Ok(truth.effects.into_iter().find(|cause| cause.wanted && listed).map(|cause| cause.effect))
+    let listed =
+        truth.content == "single" && truth.effects.iter().all(|cause| cause.effect != NAMELESS);
+    Ok(truth
+        .effects
+        .into_iter()
+        .find(|cause| cause.wanted && listed)
+        .map(|cause| cause.effect))
 }
 
 fn read<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, String> {
@@ -71,26 +87,38 @@ fn rows(case: &Case) -> Vec<ScoreboardRow> {
     if case.causes.is_empty() {
         return vec![row(0, None)];
     }
-    let causes = case.causes.iter().enumerate().map(|(number, cause)| ScoreboardRow {
-        place: Some(cause.place.clone()),
-        form: Some(cause.form.clone()),
-        visibility: Some(cause.strength),
-        outcome: Some(cause.outcome.name().into()),
-        place_right: Some(cause.placed.place),
-        name_or_unknown: Some(cause.placed.name_or_unknown),
-        wrong_name: Some(cause.placed.wrong_name),
-        ..row(number, Some(cause.effect.clone()))
-    });
+    let causes = case
+        .causes
+        .iter()
+        .enumerate()
+        .map(|(number, cause)| ScoreboardRow {
+            place: Some(cause.place.clone()),
+            form: Some(cause.form.clone()),
+            visibility: Some(cause.strength),
+            outcome: Some(cause.outcome.name().into()),
+            place_right: Some(cause.placed.place),
+            name_or_unknown: Some(cause.placed.name_or_unknown),
+            wrong_name: Some(cause.placed.wrong_name),
+            ..row(number, Some(cause.effect.clone()))
+        });
     causes.collect()
 }
 
 /// One row per concealed effect, as Parquet.
 pub fn write_scoreboard(path: &Path, board: &Board) -> Result<()> {
     let frame = Scoreboard(board.cases.iter().flat_map(rows).collect()).to_frame()?;
-    let fault = |error: String| Error::store(path.display().to_string(), format!("cannot be written: {error}"));
+    let fault = |error: String| {
+        Error::store(
+            path.display().to_string(),
+            format!("cannot be written: {error}"),
+        )
+    };
     let file = std::fs::File::create(path).map_err(|error| fault(error.to_string()))?;
-    let mut writer = ArrowWriter::try_new(file, frame.batch().schema(), None).map_err(|error| fault(error.to_string()))?;
-    writer.write(frame.batch()).map_err(|error| fault(error.to_string()))?;
+    let mut writer = ArrowWriter::try_new(file, frame.batch().schema(), None)
+        .map_err(|error| fault(error.to_string()))?;
+    writer
+        .write(frame.batch())
+        .map_err(|error| fault(error.to_string()))?;
     writer.close().map_err(|error| fault(error.to_string()))?;
     Ok(())
 }

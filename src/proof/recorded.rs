@@ -6,9 +6,16 @@ use crate::twin::folder::{self, Decimals, Log};
 use std::collections::BTreeMap;
 
 /// 1e-9 deg is 0.00005 um at 3 m.
-const DECIMALS: Decimals = Decimals { angle: 9, length: 9, time: 2 };
+const DECIMALS: Decimals = Decimals {
+    angle: 9,
+    length: 9,
+    time: 2,
+};
 /// Decimals for a moving arm: a microsecond counts.
-const MOVING: Decimals = Decimals { time: 6, ..DECIMALS };
+const MOVING: Decimals = Decimals {
+    time: 6,
+    ..DECIMALS
+};
 
 /// The files by their names; of an arm that `moves` times are finer. Fails with a sentence where the layout cannot hold the robot.
 pub fn recorded(
@@ -23,12 +30,18 @@ pub fn recorded(
     let log = log(recording, moves);
     let mut numbers = "name,effect,where,unit,value\n".to_string();
     for row in &truth.0 {
-        numbers.push_str(&format!("{},{},{},{},{}\n", row.name, row.effect, row.place, row.unit, row.value));
+        numbers.push_str(&format!(
+            "{},{},{},{},{}\n",
+            row.name, row.effect, row.place, row.unit, row.value
+        ));
     }
     let own = |name: &str, text: String| (name.to_string(), text);
     let mut files = vec![own("robot.json", description), own("truth.csv", numbers)];
     if touched.is_empty() {
-        files.extend([own("controller.csv", log.controller(decimals)), own("tracker.csv", log.tracker(decimals))]);
+        files.extend([
+            own("controller.csv", log.controller(decimals)),
+            own("tracker.csv", log.tracker(decimals)),
+        ]);
     }
     files.extend(touched);
     Ok(files)
@@ -39,8 +52,15 @@ fn touched(recording: &Recording) -> BTreeMap<String, String> {
     let mut files: BTreeMap<String, String> = BTreeMap::new();
     for row in 0..recording.rows() {
         if let Some(name) = recording.brought(row) {
-            let joints: Vec<String> = recording.q(row).iter().map(|q| format!("{q:.12}")).collect();
-            files.entry(format!("{name}.csv")).or_default().push_str(&(joints.join(",") + "\n"));
+            let joints: Vec<String> = recording
+                .q(row)
+                .iter()
+                .map(|q| format!("{q:.12}"))
+                .collect();
+            files
+                .entry(format!("{name}.csv"))
+                .or_default()
+                .push_str(&(joints.join(",") + "\n"));
         }
     }
     files
@@ -52,7 +72,11 @@ fn log(recording: Recording, at_once: bool) -> Log {
     Log {
         joints: recording.joints,
         time_s: recording.time,
-        usage: recording.usage.into_iter().map(Option::unwrap_or_default).collect(),
+        usage: recording
+            .usage
+            .into_iter()
+            .map(Option::unwrap_or_default)
+            .collect(),
         payload_kg: recording.payload.unwrap_or_else(|| vec![0.0; rows]),
         q: recording.q,
         current: recording.current,

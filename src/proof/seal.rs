@@ -34,7 +34,12 @@ pub struct Seal {
 
 impl Seal {
     pub(super) fn new(design: &ConcealedSet) -> Seal {
-        Seal { calib_seal: FORMAT, hash: HASH.into(), design: digest(format!("{design:?}").as_bytes()), files: BTreeMap::new() }
+        Seal {
+            calib_seal: FORMAT,
+            hash: HASH.into(),
+            design: digest(format!("{design:?}").as_bytes()),
+            files: BTreeMap::new(),
+        }
     }
 
     /// Whether the set was drawn from this design.
@@ -45,7 +50,8 @@ impl Seal {
     /// Writes a file of the set below `folder` and takes its hash in.
     pub(super) fn write(&mut self, folder: &Path, name: String, text: &str) -> Result<()> {
         let path = folder.join(&name);
-        let fault = |error: std::io::Error| Error::store(path.display().to_string(), error.to_string());
+        let fault =
+            |error: std::io::Error| Error::store(path.display().to_string(), error.to_string());
         if let Some(parent) = path.parent() {
             fs::create_dir_all(parent).map_err(fault)?;
         }
@@ -59,9 +65,13 @@ impl Seal {
         let path = folder.join(SEAL);
         let place = path.display().to_string();
         let text = raw::text(&path).map_err(|error| Error::data(&place, error.to_string()))?;
-        let seal: Seal = serde_json::from_str(&text).map_err(|error| Error::data(&place, error.to_string()))?;
+        let seal: Seal =
+            serde_json::from_str(&text).map_err(|error| Error::data(&place, error.to_string()))?;
         if seal.calib_seal != FORMAT || seal.hash != HASH {
-            return Err(Error::data(place, format!("is no seal of format {FORMAT} with {HASH}")));
+            return Err(Error::data(
+                place,
+                format!("is no seal of format {FORMAT} with {HASH}"),
+            ));
         }
         Ok(seal)
     }
@@ -73,26 +83,44 @@ impl Seal {
         let mut faults = Vec::new();
         for (name, hash) in &seal.files {
             // A seal comes from a file: it may not lead out of its folder.
-            let inside = Path::new(name).components().all(|part| matches!(part, Component::Normal(_)));
-            match if inside { raw::bytes(&folder.join(name)) } else { Err(ErrorKind::InvalidFilename.into()) } {
+            let inside = Path::new(name)
+                .components()
+                .all(|part| matches!(part, Component::Normal(_)));
+            match if inside {
+                raw::bytes(&folder.join(name))
+            } else {
+                Err(ErrorKind::InvalidFilename.into())
+            } {
                 Ok(bytes) if digest(&bytes) == *hash => (),
                 Ok(_) => faults.push(Fault::new(name, "was changed since it was sealed")),
-                Err(error) => faults.push(Fault::new(name, format!("was sealed, but cannot be read: {error}"))),
+                Err(error) => faults.push(Fault::new(
+                    name,
+                    format!("was sealed, but cannot be read: {error}"),
+                )),
             }
         }
-        if faults.is_empty() { Ok(seal.files.into_keys().collect()) } else { Err(Error::Data(faults)) }
+        if faults.is_empty() {
+            Ok(seal.files.into_keys().collect())
+        } else {
+            Err(Error::Data(faults))
+        }
     }
 
     /// Writes the seal itself.
     pub(super) fn close(&self, folder: &Path) -> Result<PathBuf> {
         let path = folder.join(SEAL);
-        let text = serde_json::to_string_pretty(self).map_err(|error| Error::Bug(error.to_string()))?;
-        fs::write(&path, text + "\n").map_err(|error| Error::store(path.display().to_string(), error.to_string()))?;
+        let text =
+            serde_json::to_string_pretty(self).map_err(|error| Error::Bug(error.to_string()))?;
+        fs::write(&path, text + "\n")
+            .map_err(|error| Error::store(path.display().to_string(), error.to_string()))?;
         Ok(path)
     }
 }
 
 /// SHA-256 in hexadecimal digits.
 fn digest(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+    Sha256::digest(bytes)
+        .iter()
+        .map(|byte| format!("{byte:02x}"))
+        .collect()
 }

@@ -43,22 +43,44 @@ struct Written {
 
 fn points(design: &Design, number: usize, content: Content) -> Result<Written, String> {
     let case = Case::make(design, number, content)?;
-    Ok(Written { recording: case.recording()?.into(), sealed: case.sealed(), rows: case.shots.len(), name: case.name })
+    Ok(Written {
+        recording: case.recording()?.into(),
+        sealed: case.sealed(),
+        rows: case.shots.len(),
+        name: case.name,
+    })
 }
 
 fn torques(design: &TorqueDesign, number: usize) -> Written {
     let case = TorqueCase::draw(design, number);
     let recording: Vec<(&'static str, String)> = case.recording().into();
     // The header is a line of its own.
-    let rows = recording.iter().map(|(name, text)| if name.ends_with(".csv") { text.lines().count() - 1 } else { 0 }).sum();
-    Written { recording, sealed: case.sealed(), rows, name: case.name }
+    let rows = recording
+        .iter()
+        .map(|(name, text)| {
+            if name.ends_with(".csv") {
+                text.lines().count() - 1
+            } else {
+                0
+            }
+        })
+        .sum();
+    Written {
+        recording,
+        sealed: case.sealed(),
+        rows,
+        name: case.name,
+    }
 }
 
 /// Nothing is overwritten: the folder is new or empty.
 pub fn vacant(folder: &Path) -> Result<()> {
     let taken = std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
     if taken {
-        return Err(Error::spec(folder.display().to_string(), "is not empty; name a new folder"));
+        return Err(Error::spec(
+            folder.display().to_string(),
+            "is not empty; name a new folder",
+        ));
     }
     Ok(())
 }

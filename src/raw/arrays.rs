@@ -15,8 +15,13 @@ const WIDEST: usize = 256;
 
 /// Whether a file that begins so is an archive of arrays: its first entry is called so.
 pub(super) fn is_arrays(head: &[u8]) -> bool {
-    let length = head.get(26..28).map_or(0, |two| usize::from(two[0]) | usize::from(two[1]) << 8);
-    head.starts_with(b"PK\x03\x04") && head.get(30..30 + length).is_some_and(|name| name.ends_with(b".npy"))
+    let length = head
+        .get(26..28)
+        .map_or(0, |two| usize::from(two[0]) | usize::from(two[1]) << 8);
+    head.starts_with(b"PK\x03\x04")
+        && head
+            .get(30..30 + length)
+            .is_some_and(|name| name.ends_with(b".npy"))
 }
 
 struct PlainArray {
@@ -30,19 +35,48 @@ struct PlainArray {
 /// The arrays as one table, and what was left out.
 pub(super) fn arrays(content: Vec<u8>) -> Result<(RecordBatch, Option<String>), String> {
     let found = decoded(|| entries(content))??;
-    let rows = found.iter().map(|array| array.rows).max().unwrap_or_default();
-    let (used, left): (Vec<PlainArray>, Vec<PlainArray>) = found.into_iter().partition(|array| array.rows == rows && rows > 0);
+    let rows = found
+        .iter()
+        .map(|array| array.rows)
+        .max()
+        .unwrap_or_default();
+    let (used, left): (Vec<PlainArray>, Vec<PlainArray>) = found
+        .into_iter()
+        .partition(|array| array.rows == rows && rows > 0);
     let named = |array: &PlainArray| {
-        let name = |k: usize| if array.is_plain { array.name.clone() } else { format!("{}[{}]", array.name, k + 1) };
-        array.columns.iter().enumerate().map(|(k, column)| (name(k), column.clone())).collect::<Vec<_>>()
+        let name = |k: usize| {
+            if array.is_plain {
+                array.name.clone()
+            } else {
+                format!("{}[{}]", array.name, k + 1)
+            }
+        };
+        array
+            .columns
+            .iter()
+            .enumerate()
+            .map(|(k, column)| (name(k), column.clone()))
+            .collect::<Vec<_>>()
     };
     let columns: Vec<(String, ArrayRef)> = used.iter().flat_map(named).collect();
     if columns.is_empty() {
         return Err("it has no array of numbers or texts in rows".into());
     }
-    let table = RecordBatch::try_from_iter_with_nullable(columns.into_iter().map(|(name, column)| (name, column, true)));
-    let left: Vec<String> = left.iter().map(|array| format!("`{}` ({} rows)", array.name, array.rows)).collect();
-    let remark = (!left.is_empty()).then(|| format!("arrays of another length than {rows} left out: {}", left.join(", ")));
+    let table = RecordBatch::try_from_iter_with_nullable(
+        columns
+            .into_iter()
+            .map(|(name, column)| (name, column, true)),
+    );
+    let left: Vec<String> = left
+        .iter()
+        .map(|array| format!("`{}` ({} rows)", array.name, array.rows))
+        .collect();
+    let remark = (!left.is_empty()).then(|| {
+        format!(
+            "arrays of another length than {rows} left out: {}",
+            left.join(", ")
+        )
+    });
     Ok((table.map_err(|error| error.to_string())?, remark))
 }
 
@@ -53,10 +87,18 @@ fn entries(content: Vec<u8>) -> Result<Vec<PlainArray>, String> {
     let mut found = Vec::new();
     for index in 0..archive.len() {
         let part = archive.by_index(index).map_err(broken)?;
-        let name = part.name().map_err(broken)?.trim_end_matches(".npy").to_string();
+        let name = part
+            .name()
+            .map_err(broken)?
+            .trim_end_matches(".npy")
+            .to_string();
         let mut bytes = Vec::new();
-        part.take(left + 1).read_to_end(&mut bytes).map_err(|error| error.to_string())?;
-        left = left.checked_sub(bytes.len() as u64).ok_or(format!("more than {} MB of arrays", MOST_BYTES >> 20))?;
+        part.take(left + 1)
+            .read_to_end(&mut bytes)
+            .map_err(|error| error.to_string())?;
+        left = left
+            .checked_sub(bytes.len() as u64)
+            .ok_or(format!("more than {} MB of arrays", MOST_BYTES >> 20))?;
         found.push(array(name.clone(), &bytes).map_err(|why| format!("array `{name}`: {why}"))?);
     }
     Ok(found)
@@ -70,18 +112,42 @@ fn value<'h>(head: &'h str, key: &str, ends: char) -> Option<&'h str> {
 
 fn array(name: String, bytes: &[u8]) -> Result<PlainArray, String> {
     const BROKEN: &str = "its head is damaged";
-    let version = bytes.strip_prefix(MAGIC).and_then(|rest| rest.first()).ok_or(BROKEN)?;
+    let version = bytes
+        .strip_prefix(MAGIC)
+        .and_then(|rest| rest.first())
+        .ok_or(BROKEN)?;
     let (length, from) = match version {
-        1 => (bytes.get(8..10).map(|two| usize::from(two[0]) | usize::from(two[1]) << 8), 10),
-        _ => (bytes.get(8..12).and_then(|four| four.first_chunk()).map(|four| u32::from_le_bytes(*four) as usize), 12),
+        1 => (
+            bytes
+                .get(8..10)
+                .map(|two| usize::from(two[0]) | usize::from(two[1]) << 8),
+            10,
+        ),
+        _ => (
+            bytes
+                .get(8..12)
+                .and_then(|four| four.first_chunk())
+                .map(|four| u32::from_le_bytes(*four) as usize),
+            12,
+        ),
     };
     let end = length.ok_or(BROKEN)? + from;
     let head = String::from_utf8_lossy(bytes.get(from..end).ok_or(BROKEN)?).into_owned();
-    let kind = value(&head, "descr", ',').map(|text| text.trim_matches([',', '\'', ' ']).to_string()).ok_or(BROKEN)?;
-    let by_column = value(&head, "fortran_order", ',').ok_or(BROKEN)?.starts_with("True");
-    let shape = value(&head, "shape", ')').ok_or(BROKEN)?.trim_matches(['(', ')']);
-    let shape: Option<Vec<usize>> =
-        shape.split(',').map(str::trim).filter(|size| !size.is_empty()).map(|size| size.parse().ok()).collect();
+    let kind = value(&head, "descr", ',')
+        .map(|text| text.trim_matches([',', '\'', ' ']).to_string())
+        .ok_or(BROKEN)?;
+    let by_column = value(&head, "fortran_order", ',')
+        .ok_or(BROKEN)?
+        .starts_with("True");
+    let shape = value(&head, "shape", ')')
+        .ok_or(BROKEN)?
+        .trim_matches(['(', ')']);
+    let shape: Option<Vec<usize>> = shape
+        .split(',')
+        .map(str::trim)
+        .filter(|size| !size.is_empty())
+        .map(|size| size.parse().ok())
+        .collect();
     let (rows, width, is_plain) = match shape.ok_or(BROKEN)?[..] {
         [] => (0, 0, true),
         [rows] => (rows, 1, true),
@@ -89,50 +155,101 @@ fn array(name: String, bytes: &[u8]) -> Result<PlainArray, String> {
         // Pictures and the like are no columns.
         [rows, ..] => (rows, 0, false),
     };
-    let (order, code, size) =
-        (kind.chars().next(), kind.chars().nth(1), kind.get(2..).and_then(|size| size.parse::<usize>().ok()));
-    let (Some(order), Some(code), Some(size)) = (order, code, size.filter(|size| (1..=1 << 12).contains(size))) else {
-        return Err(format!("type {kind} is not read; allowed: numbers and texts"));
+    let (order, code, size) = (
+        kind.chars().next(),
+        kind.chars().nth(1),
+        kind.get(2..).and_then(|size| size.parse::<usize>().ok()),
+    );
+    let (Some(order), Some(code), Some(size)) = (
+        order,
+        code,
+        size.filter(|size| (1..=1 << 12).contains(size)),
+    ) else {
+        return Err(format!(
+            "type {kind} is not read; allowed: numbers and texts"
+        ));
     };
     let size = if code == 'U' { 4 * size } else { size };
     let data = &bytes[end..];
-    if width > 0 && rows.checked_mul(width).and_then(|cells| cells.checked_mul(size)) != Some(data.len()) {
+    if width > 0
+        && rows
+            .checked_mul(width)
+            .and_then(|cells| cells.checked_mul(size))
+            != Some(data.len())
+    {
         return Err(format!("{} bytes for {rows} rows of {width}", data.len()));
     }
     let cell = |row: usize, column: usize| {
-        let at = if by_column { column * rows + row } else { row * width + column };
+        let at = if by_column {
+            column * rows + row
+        } else {
+            row * width + column
+        };
         let mut own = data[at * size..(at + 1) * size].to_vec();
         if order == '>' {
-            own.chunks_mut(if code == 'U' { 4 } else { size }).for_each(<[u8]>::reverse);
+            own.chunks_mut(if code == 'U' { 4 } else { size })
+                .for_each(<[u8]>::reverse);
         }
         own
     };
     let column = |column: usize| -> Result<ArrayRef, String> {
         let cells = (0..rows).map(|row| cell(row, column));
         Ok(match (code, size) {
-            ('f', 8) => {
-                Arc::new(cells.map(|own| own.first_chunk().map(|own| f64::from_le_bytes(*own))).collect::<Float64Array>())
-            }
-            ('f', 4) => Arc::new(
-                cells.map(|own| own.first_chunk().map(|own| f64::from(f32::from_le_bytes(*own)))).collect::<Float64Array>(),
+            ('f', 8) => Arc::new(
+                cells
+                    .map(|own| own.first_chunk().map(|own| f64::from_le_bytes(*own)))
+                    .collect::<Float64Array>(),
             ),
-            ('i' | 'u' | 'b', 1 | 2 | 4 | 8) => Arc::new(cells.map(|own| whole(&own, code == 'i')).collect::<Int64Array>()),
+            ('f', 4) => Arc::new(
+                cells
+                    .map(|own| {
+                        own.first_chunk()
+                            .map(|own| f64::from(f32::from_le_bytes(*own)))
+                    })
+                    .collect::<Float64Array>(),
+            ),
+            ('i' | 'u' | 'b', 1 | 2 | 4 | 8) => Arc::new(
+                cells
+                    .map(|own| whole(&own, code == 'i'))
+                    .collect::<Int64Array>(),
+            ),
             ('U', _) => {
                 let letters = |own: Vec<u8>| -> Option<String> {
-                    let codes = own.chunks_exact(4).filter_map(|four| four.first_chunk().map(|four| u32::from_le_bytes(*four)));
-                    codes.take_while(|code| *code != 0).map(char::from_u32).collect()
+                    let codes = own.chunks_exact(4).filter_map(|four| {
+                        four.first_chunk().map(|four| u32::from_le_bytes(*four))
+                    });
+                    codes
+                        .take_while(|code| *code != 0)
+                        .map(char::from_u32)
+                        .collect()
                 };
                 Arc::new(cells.map(letters).collect::<StringArray>())
             }
-            _ => return Err(format!("type {kind} is not read; allowed: numbers and texts")),
+            _ => {
+                return Err(format!(
+                    "type {kind} is not read; allowed: numbers and texts"
+                ));
+            }
         })
     };
-    Ok(PlainArray { name, rows, columns: (0..width).map(column).collect::<Result<_, _>>()?, is_plain })
+    Ok(PlainArray {
+        name,
+        rows,
+        columns: (0..width).map(column).collect::<Result<_, _>>()?,
+        is_plain,
+    })
 }
 
 /// A whole number of up to eight bytes; none beyond those of 64 bits with a sign.
 fn whole(bytes: &[u8], signed: bool) -> Option<i64> {
-    let number = bytes.iter().rev().fold(0u64, |number, byte| number << 8 | u64::from(*byte));
+    let number = bytes
+        .iter()
+        .rev()
+        .fold(0u64, |number, byte| number << 8 | u64::from(*byte));
     let unused = 64 - 8 * bytes.len() as u32;
-    if signed { Some(((number << unused) as i64) >> unused) } else { i64::try_from(number).ok() }
+    if signed {
+        Some(((number << unused) as i64) >> unused)
+    } else {
+        i64::try_from(number).ok()
+    }
 }

@@ -35,7 +35,9 @@ struct Topic {
 impl Topic {
     /// What is known of its type, where it is read.
     fn known(&self) -> Option<&'static MessageKind> {
-        KINDS.iter().find(|kind| self.encoding == "cdr" && kind.name == self.kind)
+        KINDS
+            .iter()
+            .find(|kind| self.encoding == "cdr" && kind.name == self.kind)
     }
 }
 
@@ -51,7 +53,11 @@ struct Message {
 /// A file of messages.
 trait Container: Send {
     /// The next message of a topic of which a name is wanted; false at the end. Fails with what is lost, once.
-    fn next(&mut self, wanted: &dyn Fn(&str) -> bool, message: &mut Message) -> std::result::Result<bool, String>;
+    fn next(
+        &mut self,
+        wanted: &dyn Fn(&str) -> bool,
+        message: &mut Message,
+    ) -> std::result::Result<bool, String>;
     /// What a person should know of how it was recorded.
     fn remark(&self) -> Option<String> {
         None
@@ -83,18 +89,31 @@ struct Messages {
 impl Messages {
     fn open(mut source: Box<dyn InputSource>) -> std::io::Result<Self> {
         let bounds = source.bounds()?;
-        Ok(Self { source: Some(source), container: None, bounds, part: 0, topics: Vec::new(), losses: Vec::new() })
+        Ok(Self {
+            source: Some(source),
+            container: None,
+            bounds,
+            part: 0,
+            topics: Vec::new(),
+            losses: Vec::new(),
+        })
     }
     fn lose(&mut self, what: &str) {
         let several = self.bounds.len() > 2;
-        self.losses.push(if several { format!("part {}: {what}", self.part) } else { what.into() });
+        self.losses.push(if several {
+            format!("part {}: {what}", self.part)
+        } else {
+            what.into()
+        });
     }
     fn next(&mut self, wanted: &dyn Fn(&str) -> bool, message: &mut Message) -> bool {
         loop {
             if self.container.is_none() && !self.begin() {
                 return false;
             }
-            let Some(container) = &mut self.container else { continue };
+            let Some(container) = &mut self.container else {
+                continue;
+            };
             let next = container.next(wanted, message);
             if let Ok(true) = next {
                 return true;
@@ -112,17 +131,30 @@ impl Messages {
     }
     /// Opens the next part; false where there is none.
     fn begin(&mut self) -> bool {
-        let Some(bounds) = self.bounds.get(self.part..self.part + 2).map(|two| [two[0], two[1]]) else { return false };
-        let Some(mut source) = self.source.take() else { return false };
+        let Some(bounds) = self
+            .bounds
+            .get(self.part..self.part + 2)
+            .map(|two| [two[0], two[1]])
+        else {
+            return false;
+        };
+        let Some(mut source) = self.source.take() else {
+            return false;
+        };
         self.part += 1;
         let mut head = [0; 16];
         let most = (bounds[1] - bounds[0]).min(16) as usize;
-        let begins = source.seek(std::io::SeekFrom::Start(bounds[0])).and_then(|_| source.read_exact(&mut head[..most]));
+        let begins = source
+            .seek(std::io::SeekFrom::Start(bounds[0]))
+            .and_then(|_| source.read_exact(&mut head[..most]));
         let back = source.seek(std::io::SeekFrom::Start(bounds[0]));
         let opened: std::result::Result<Box<dyn Container>, _> = match begins.and(back) {
-            Ok(_) if head.starts_with(mcap::MAGIC) => Ok(Box::new(mcap::McapMessages::open(source, bounds))),
+            Ok(_) if head.starts_with(mcap::MAGIC) => {
+                Ok(Box::new(mcap::McapMessages::open(source, bounds)))
+            }
             Ok(_) if head.starts_with(sqlite::MAGIC) => {
-                sqlite::SqliteMessages::open(source, bounds).map(|bag| Box::new(bag) as Box<dyn Container>)
+                sqlite::SqliteMessages::open(source, bounds)
+                    .map(|bag| Box::new(bag) as Box<dyn Container>)
             }
             Ok(_) => Err((source, "it is no bag".to_string())),
             Err(error) => Err((source, error.to_string())),
@@ -137,8 +169,15 @@ impl Messages {
         true
     }
     fn position(&self) -> u64 {
-        let before = self.bounds.get(self.part).or(self.bounds.last()).copied().unwrap_or_default();
-        self.container.as_ref().map_or(before, |container| container.position())
+        let before = self
+            .bounds
+            .get(self.part)
+            .or(self.bounds.last())
+            .copied()
+            .unwrap_or_default();
+        self.container
+            .as_ref()
+            .map_or(before, |container| container.position())
     }
 }
 
@@ -171,25 +210,44 @@ impl BagRows {
             Some(topic) => (source, topic.to_string()),
             None => only_topic(source, label)?,
         };
-        let (name, frames) = topic.split_once(' ').map_or((topic.as_str(), None), |(name, frames)| (name, Some(frames)));
+        let (name, frames) = topic
+            .split_once(' ')
+            .map_or((topic.as_str(), None), |(name, frames)| {
+                (name, Some(frames))
+            });
         let mut messages = Messages::open(source).map_err(failed)?;
         let (mut head, mut cells, mut bytes) = (VecDeque::new(), MessageCells::default(), 0);
-        ["received", "stamp"].into_iter().for_each(|name| cells.set(name, FieldValue::Absent));
+        ["received", "stamp"]
+            .into_iter()
+            .for_each(|name| cells.set(name, FieldValue::Absent));
         let (mut message, mut kind) = (Message::default(), None);
-        while head.len() < HEAD && bytes < HEAD_BYTES && messages.next(&|other| other == name, &mut message) {
-            let found = message.topic.known().filter(|kind| kind.of_frames == frames.is_some());
+        while head.len() < HEAD
+            && bytes < HEAD_BYTES
+            && messages.next(&|other| other == name, &mut message)
+        {
+            let found = message
+                .topic
+                .known()
+                .filter(|kind| kind.of_frames == frames.is_some());
             let Some(found) = kind.or(found) else { break };
             kind = Some(found);
             bytes += message.data.len();
             // A message that cannot be read is rejected with its row.
-            if message::read(found, frames, &message.data, &mut cells).unwrap_or(true) && cells.names.len() <= WIDEST {
+            if message::read(found, frames, &message.data, &mut cells).unwrap_or(true)
+                && cells.names.len() <= WIDEST
+            {
                 head.push_back(message.clone());
             }
         }
         let Some(kind) = kind.filter(|_| !head.is_empty()) else {
-            let source = messages.source.or_else(|| messages.container.map(Container::into_source));
+            let source = messages
+                .source
+                .or_else(|| messages.container.map(Container::into_source));
             let source = source.ok_or_else(|| Error::Bug("a bag without its bytes".into()))?;
-            return Err(Error::data(label, no_topic(&topic, &bag_content(source, label)?)));
+            return Err(Error::data(
+                label,
+                no_topic(&topic, &bag_content(source, label)?),
+            ));
         };
         cells.is_closed = true;
         let (label, topic, frames) = (label.into(), name.to_string(), frames.map(String::from));
@@ -216,25 +274,46 @@ impl BagRows {
         if let Err(why) = read {
             return Some((RecordFault::Damaged, why));
         }
-        let needed = self.wanted.iter().flatten().zip(&self.cells.cells).enumerate();
-        if let Some((column, _)) =
-            needed.into_iter().find(|(_, (wanted, cell))| **wanted == Some(true) && **cell == FieldValue::Absent)
+        let needed = self
+            .wanted
+            .iter()
+            .flatten()
+            .zip(&self.cells.cells)
+            .enumerate();
+        if let Some((column, _)) = needed
+            .into_iter()
+            .find(|(_, (wanted, cell))| **wanted == Some(true) && **cell == FieldValue::Absent)
         {
             let names = self.cells.joints();
-            let has = if names.is_empty() { String::new() } else { format!("; its joints: {names}") };
-            return Some((RecordFault::Foreign, format!("the message has no `{}`{has}", self.cells.names[column])));
+            let has = if names.is_empty() {
+                String::new()
+            } else {
+                format!("; its joints: {names}")
+            };
+            return Some((
+                RecordFault::Foreign,
+                format!("the message has no `{}`{has}", self.cells.names[column]),
+            ));
         }
-        let Some(FieldValue::Time(stamp)) = self.cells.cells.get(1) else { return None };
+        let Some(FieldValue::Time(stamp)) = self.cells.cells.get(1) else {
+            return None;
+        };
         let before = self.last.replace((*stamp, self.rows));
         let (_, number) = before.filter(|(before, _)| before == stamp)?;
         self.last = before;
-        Some((RecordFault::DoubledStamp, format!("message {number} has the same stamp, {} s", time(*stamp))))
+        Some((
+            RecordFault::DoubledStamp,
+            format!("message {number} has the same stamp, {} s", time(*stamp)),
+        ))
     }
 }
 
 /// Nanoseconds as seconds, without rounding.
 fn time(ns: i64) -> String {
-    let (whole, rest) = (ns.unsigned_abs() / 1_000_000_000, ns.unsigned_abs() % 1_000_000_000);
+    let (whole, rest) = (
+        ns.unsigned_abs() / 1_000_000_000,
+        ns.unsigned_abs() % 1_000_000_000,
+    );
     format!("{}{whole}.{rest:09}", if ns < 0 { "-" } else { "" })
 }
 
@@ -245,16 +324,26 @@ impl RecordReader for BagRows {
     fn next(&mut self, record: &mut Record) -> Result<bool> {
         record.begin(self.rows);
         if !std::mem::replace(&mut self.is_named, true) {
-            self.cells.names.iter().for_each(|name| record.push(name.as_bytes()));
+            self.cells
+                .names
+                .iter()
+                .for_each(|name| record.push(name.as_bytes()));
             return Ok(true);
         }
         let read = loop {
             match self.head.pop_front() {
                 Some(message) => self.message = message,
-                None if self.messages.next(&|name| name == self.topic, &mut self.message) => {}
+                None if self
+                    .messages
+                    .next(&|name| name == self.topic, &mut self.message) => {}
                 None => return Ok(false),
             }
-            match message::read(self.kind, self.frames.as_deref(), &self.message.data, &mut self.cells) {
+            match message::read(
+                self.kind,
+                self.frames.as_deref(),
+                &self.message.data,
+                &mut self.cells,
+            ) {
                 Ok(false) => {}
                 read => break read,
             }
@@ -264,9 +353,14 @@ impl RecordReader for BagRows {
         self.cells.cells[0] = FieldValue::Time(self.message.received);
         record.fault = self.fault(read);
         for (column, cell) in self.cells.cells.iter().enumerate() {
-            let is_asked = self.wanted.as_ref().is_none_or(|wanted| wanted.get(column).is_some_and(Option::is_some));
+            let is_asked = self
+                .wanted
+                .as_ref()
+                .is_none_or(|wanted| wanted.get(column).is_some_and(Option::is_some));
             match cell {
-                FieldValue::Number(number) if is_asked => record.push(self.text.format(*number).as_bytes()),
+                FieldValue::Number(number) if is_asked => {
+                    record.push(self.text.format(*number).as_bytes())
+                }
                 FieldValue::Time(ns) if is_asked => record.push(time(*ns).as_bytes()),
                 FieldValue::Text(text) if is_asked => record.push(text.as_bytes()),
                 _ => record.push(b""),
@@ -290,7 +384,10 @@ impl RecordReader for BagRows {
         self.wanted = Some(wanted);
     }
     fn remark(&self) -> Option<String> {
-        self.messages.container.as_ref().and_then(|container| container.remark())
+        self.messages
+            .container
+            .as_ref()
+            .and_then(|container| container.remark())
     }
     fn loss(&self) -> Option<String> {
         (!self.messages.losses.is_empty()).then(|| self.messages.losses.join("; "))

@@ -32,7 +32,10 @@ type Batches = Box<dyn Iterator<Item = std::result::Result<RecordBatch, String>>
 
 /// Whether a file that begins so is one of columns.
 pub fn has_columns(head: &[u8]) -> bool {
-    [PARQUET, FEATHER[0], FEATHER[1], STREAM].iter().any(|mark| head.starts_with(mark)) || is_arrays(head)
+    [PARQUET, FEATHER[0], FEATHER[1], STREAM]
+        .iter()
+        .any(|mark| head.starts_with(mark))
+        || is_arrays(head)
 }
 
 /// Reads one file from its names to its last row.
@@ -61,33 +64,68 @@ impl ColumnRows {
     /// Opens a file; fails where it cannot be read.
     pub fn open(mut source: impl Read, label: &str) -> Result<Self> {
         let mut content = Vec::new();
-        source.read_to_end(&mut content).map_err(|error| failed(label, &error))?;
+        source
+            .read_to_end(&mut content)
+            .map_err(|error| failed(label, &error))?;
         let size = content.len() as u64;
         let mut remark = None;
         let (what, opened) = if content.starts_with(PARQUET) {
             let file = parquet(bytes::Bytes::from(content), HELD);
-            ("a Parquet file", file.map(|file| (file.schema.clone(), Some(file.rows), Box::new(file) as Batches)))
+            (
+                "a Parquet file",
+                file.map(|file| {
+                    (
+                        file.schema.clone(),
+                        Some(file.rows),
+                        Box::new(file) as Batches,
+                    )
+                }),
+            )
         } else if content.starts_with(FEATHER[0]) {
-            let message =
-                "is a Feather file of version 1; allowed: version 2, which every writer of today makes, Parquet or text";
+            let message = "is a Feather file of version 1; allowed: version 2, which every writer of today makes, Parquet or text";
             return Err(Error::data(label, message));
         } else if is_arrays(&content) {
             let table = arrays(content).map(|(table, left)| {
                 remark = left;
-                (table.schema(), Some(table.num_rows() as u64), Box::new(std::iter::once(Ok(table))) as Batches)
+                (
+                    table.schema(),
+                    Some(table.num_rows() as u64),
+                    Box::new(std::iter::once(Ok(table))) as Batches,
+                )
             });
             ("an archive of NumPy arrays", table)
         } else if content.starts_with(STREAM) {
-            ("a stream of Arrow", decoded(|| StreamReader::try_new(Cursor::new(content), None)).and_then(batches_of))
+            (
+                "a stream of Arrow",
+                decoded(|| StreamReader::try_new(Cursor::new(content), None)).and_then(batches_of),
+            )
         } else {
-            ("a Feather file", decoded(|| FileReader::try_new(Cursor::new(content), None)).and_then(batches_of))
+            (
+                "a Feather file",
+                decoded(|| FileReader::try_new(Cursor::new(content), None)).and_then(batches_of),
+            )
         };
         let (schema, all, batches) = opened.map_err(|error| broken(label, what, error))?;
         let (schema, batches) = unfolded(schema, batches);
         let label = label.into();
         let (text, cells) = (String::new(), Vec::new());
         let (is_named, batch, held, next, rows) = (false, None, 0, 0, 0);
-        Ok(Self { label, what, schema, batches, size, all, is_named, batch, text, cells, held, next, rows, remark })
+        Ok(Self {
+            label,
+            what,
+            schema,
+            batches,
+            size,
+            all,
+            is_named,
+            batch,
+            text,
+            cells,
+            held,
+            next,
+            rows,
+            remark,
+        })
     }
     /// Makes text of the next rows; false at the end.
     fn refill(&mut self) -> Result<bool> {
@@ -103,7 +141,8 @@ impl ColumnRows {
         self.text.clear();
         self.cells.clear();
         for column in batch.columns() {
-            let cells = ArrayFormatter::try_new(column, &FormatOptions::default()).map_err(|error| broken(&error))?;
+            let cells = ArrayFormatter::try_new(column, &FormatOptions::default())
+                .map_err(|error| broken(&error))?;
             for row in 0..self.held {
                 let start = self.text.len();
                 write!(self.text, "{}", cells.value(row)).map_err(|error| broken(&error))?;
@@ -123,7 +162,10 @@ impl RecordReader for ColumnRows {
     fn next(&mut self, record: &mut Record) -> Result<bool> {
         record.begin(self.rows);
         if !std::mem::replace(&mut self.is_named, true) {
-            self.schema.fields().iter().for_each(|field| record.push(field.name().as_bytes()));
+            self.schema
+                .fields()
+                .iter()
+                .for_each(|field| record.push(field.name().as_bytes()));
             return Ok(true);
         }
         while self.next == self.held {
@@ -157,7 +199,9 @@ fn broken(label: &str, what: &str, error: impl Display) -> Error {
 }
 
 /// Columns of Arrow as they stand in memory, in a Feather file, as pandas, polars and R write them, or in a stream; uncompressed or by zstd.
-fn batches_of<R>(opened: std::result::Result<R, ArrowError>) -> std::result::Result<(SchemaRef, Option<u64>, Batches), String>
+fn batches_of<R>(
+    opened: std::result::Result<R, ArrowError>,
+) -> std::result::Result<(SchemaRef, Option<u64>, Batches), String>
 where
     R: RecordBatchReader + Send + 'static,
 {
@@ -166,9 +210,15 @@ where
     // A decoder that gave up is not asked again.
     let mut whole = true;
     let batches = std::iter::from_fn(move || {
-        let next = if whole { decoded(|| file.next()) } else { Ok(None) };
-        let batch =
-            next.map_or_else(|message| Some(Err(message)), |batch| batch.map(|batch| batch.map_err(|error| said(&error))));
+        let next = if whole {
+            decoded(|| file.next())
+        } else {
+            Ok(None)
+        };
+        let batch = next.map_or_else(
+            |message| Some(Err(message)),
+            |batch| batch.map(|batch| batch.map_err(|error| said(&error))),
+        );
         whole = matches!(batch, Some(Ok(_)));
         batch
     });
@@ -193,15 +243,32 @@ fn unfolded(schema: SchemaRef, mut batches: Batches) -> (SchemaRef, Batches) {
     let first = batches.next();
     let longest = |column: usize| {
         let rows = first.as_ref().and_then(|batch| batch.as_ref().ok());
-        rows.map_or(0, |batch| lists(batch.column(column)).1.windows(2).map(|ends| ends[1] - ends[0]).max().unwrap_or(0))
+        rows.map_or(0, |batch| {
+            lists(batch.column(column))
+                .1
+                .windows(2)
+                .map(|ends| ends[1] - ends[0])
+                .max()
+                .unwrap_or(0)
+        })
     };
     let width = |column: usize| Some(longest(column)).filter(|width| (1..=LONGEST).contains(width));
-    let widths: Vec<Option<usize>> = (0..fields.len()).map(|k| number_of_list(&fields[k]).and_then(|_| width(k))).collect();
-    let columns = fields.iter().zip(&widths).flat_map(|(field, width)| match (number_of_list(field), width) {
-        (Some(number), Some(width)) => {
-            (1..=*width).map(|k| Arc::new(Field::new(format!("{}[{k}]", field.name()), number.clone(), true))).collect()
+    let widths: Vec<Option<usize>> = (0..fields.len())
+        .map(|k| number_of_list(&fields[k]).and_then(|_| width(k)))
+        .collect();
+    let columns = fields.iter().zip(&widths).flat_map(|(field, width)| {
+        match (number_of_list(field), width) {
+            (Some(number), Some(width)) => (1..=*width)
+                .map(|k| {
+                    Arc::new(Field::new(
+                        format!("{}[{k}]", field.name()),
+                        number.clone(),
+                        true,
+                    ))
+                })
+                .collect(),
+            _ => vec![field.clone()],
         }
-        _ => vec![field.clone()],
     });
     let schema = Arc::new(Schema::new(columns.collect::<Vec<FieldRef>>()));
     let (rows, own) = (first.into_iter().chain(batches), schema.clone());
@@ -212,7 +279,9 @@ fn unfolded(schema: SchemaRef, mut batches: Batches) -> (SchemaRef, Batches) {
             .zip(&widths)
             .map(|(column, width)| cells(column, *width))
             .collect::<std::result::Result<Vec<_>, _>>();
-        columns.and_then(|columns| RecordBatch::try_new(own.clone(), columns.concat())).map_err(|error| error.to_string())
+        columns
+            .and_then(|columns| RecordBatch::try_new(own.clone(), columns.concat()))
+            .map_err(|error| error.to_string())
     });
     (schema, Box::new(batches))
 }
@@ -220,7 +289,9 @@ fn unfolded(schema: SchemaRef, mut batches: Batches) -> (SchemaRef, Batches) {
 /// What kind of numbers the lists of a column hold; none where it holds none.
 fn number_of_list(field: &Field) -> Option<&DataType> {
     match field.data_type() {
-        DataType::List(of) | DataType::LargeList(of) | DataType::FixedSizeList(of, _) => Some(of.data_type()),
+        DataType::List(of) | DataType::LargeList(of) | DataType::FixedSizeList(of, _) => {
+            Some(of.data_type())
+        }
         _ => None,
     }
     .filter(|of| of.is_numeric())
@@ -229,22 +300,45 @@ fn number_of_list(field: &Field) -> Option<&DataType> {
 /// The numbers of all lists of a column, and where each list begins among them, with the end of the last.
 fn lists(column: &ArrayRef) -> (&ArrayRef, Vec<usize>) {
     if let Some(list) = column.as_list_opt::<i32>() {
-        return (list.values(), list.value_offsets().iter().map(|at| *at as usize).collect());
+        return (
+            list.values(),
+            list.value_offsets().iter().map(|at| *at as usize).collect(),
+        );
     }
     if let Some(list) = column.as_list_opt::<i64>() {
-        return (list.values(), list.value_offsets().iter().map(|at| *at as usize).collect());
+        return (
+            list.values(),
+            list.value_offsets().iter().map(|at| *at as usize).collect(),
+        );
     }
     let list = column.as_fixed_size_list();
-    (list.values(), (0..=list.len()).map(|row| row * list.value_length() as usize).collect())
+    (
+        list.values(),
+        (0..=list.len())
+            .map(|row| row * list.value_length() as usize)
+            .collect(),
+    )
 }
 
 /// A column as it is, or so many columns of the numbers of its lists.
-fn cells(column: &ArrayRef, width: Option<usize>) -> std::result::Result<Vec<ArrayRef>, ArrowError> {
-    let Some(width) = width else { return Ok(vec![column.clone()]) };
+fn cells(
+    column: &ArrayRef,
+    width: Option<usize>,
+) -> std::result::Result<Vec<ArrayRef>, ArrowError> {
+    let Some(width) = width else {
+        return Ok(vec![column.clone()]);
+    };
     let (values, starts) = lists(column);
     let number = |k: usize| {
-        let at = |row: usize| (starts[row] + k < starts[row + 1] && !column.is_null(row)).then_some((starts[row] + k) as i64);
-        take(values, &(0..column.len()).map(at).collect::<Int64Array>(), None)
+        let at = |row: usize| {
+            (starts[row] + k < starts[row + 1] && !column.is_null(row))
+                .then_some((starts[row] + k) as i64)
+        };
+        take(
+            values,
+            &(0..column.len()).map(at).collect::<Int64Array>(),
+            None,
+        )
     };
     (0..width).map(number).collect()
 }

@@ -140,7 +140,9 @@ pub fn unquoted_text(field: &str) -> Cow<'_, str> {
 /// The same of bytes.
 fn unquoted(field: &[u8]) -> Cow<'_, [u8]> {
     let field = field.trim_ascii();
-    let Some(inner) = field.strip_prefix(b"\"") else { return Cow::Borrowed(field) };
+    let Some(inner) = field.strip_prefix(b"\"") else {
+        return Cow::Borrowed(field);
+    };
     if let Some((b'"', inner)) = inner.split_last()
         && memchr(b'"', inner).is_none()
     {
@@ -187,7 +189,10 @@ impl<R: BufRead> TextRows<R> {
     pub fn open(mut reader: R, label: &str, layout: TextLayout) -> Result<Self> {
         let head = reader.fill_buf().map_err(|error| failed(label, &error))?;
         // Old Macintosh; one at the end may be a CRLF that was cut.
-        let lone = head.iter().position(|byte| *byte == b'\r').is_some_and(|at| at + 1 < head.len());
+        let lone = head
+            .iter()
+            .position(|byte| *byte == b'\r')
+            .is_some_and(|at| at + 1 < head.len());
         if lone && !head.contains(&b'\n') {
             let message = format!(
                 "the lines end in CR alone; allowed: LF or CRLF. Save it again with such line ends, or convert it: \
@@ -196,7 +201,13 @@ impl<R: BufRead> TextRows<R> {
             return Err(Error::data(label, message));
         }
         let skip = layout.skip;
-        let mut rows = Self { reader, label: label.into(), layout, lines: 0, bytes: 0 };
+        let mut rows = Self {
+            reader,
+            label: label.into(),
+            layout,
+            lines: 0,
+            bytes: 0,
+        };
         rows.pass(skip)?;
         Ok(rows)
     }
@@ -213,7 +224,10 @@ impl<R: BufRead> TextRows<R> {
     }
     /// Appends one physical line without its end; false at the end of the file.
     fn line(&mut self, text: &mut Vec<u8>) -> Result<bool> {
-        let buffer = self.reader.fill_buf().map_err(|error| failed(&self.label, &error))?;
+        let buffer = self
+            .reader
+            .fill_buf()
+            .map_err(|error| failed(&self.label, &error))?;
         if let Some(end) = memchr(b'\n', buffer).filter(|end| text.len() + end < LONGEST) {
             text.extend_from_slice(buffer[..end].strip_suffix(b"\r").unwrap_or(&buffer[..end]));
             self.reader.consume(end + 1);
@@ -222,7 +236,10 @@ impl<R: BufRead> TextRows<R> {
         }
         // It ends beyond what is held, or is the last one.
         let room = LONGEST.saturating_sub(text.len()) as u64;
-        let read = (&mut self.reader).take(room).read_until(b'\n', text).map_err(|error| failed(&self.label, &error))?;
+        let read = (&mut self.reader)
+            .take(room)
+            .read_until(b'\n', text)
+            .map_err(|error| failed(&self.label, &error))?;
         if read == 0 && room > 0 {
             return Ok(false);
         }
@@ -231,8 +248,12 @@ impl<R: BufRead> TextRows<R> {
         if room > 0 && text.last() == Some(&b'\n') {
             text.pop();
         } else if read as u64 == room {
-            let message = "a row of more than 1 MiB; allowed: rows ending in LF or CRLF, every quote closed";
-            return Err(Error::data(format!("{}:{}", self.label, self.lines), message));
+            let message =
+                "a row of more than 1 MiB; allowed: rows ending in LF or CRLF, every quote closed";
+            return Err(Error::data(
+                format!("{}:{}", self.label, self.lines),
+                message,
+            ));
         }
         if text.last() == Some(&b'\r') {
             text.pop();
@@ -245,11 +266,18 @@ impl<R: BufRead> TextRows<R> {
             return Ok(());
         }
         self.layout.header_in_comment = false;
-        let mark = self.layout.comment.as_deref().unwrap_or_default().as_bytes();
+        let mark = self
+            .layout
+            .comment
+            .as_deref()
+            .unwrap_or_default()
+            .as_bytes();
         if !record.text.starts_with(mark) {
             let place = format!("{}:{}", self.label, self.lines);
             let mark = shown(mark);
-            let message = format!("the header does not begin with `{mark}`; allowed: so, or `header_in_comment: false`");
+            let message = format!(
+                "the header does not begin with `{mark}`; allowed: so, or `header_in_comment: false`"
+            );
             return Err(Error::data(place, message));
         }
         record.text.drain(..mark.len());
@@ -257,7 +285,11 @@ impl<R: BufRead> TextRows<R> {
     }
     /// Whether a line is no row.
     fn is_passed_over(&self, line: &[u8]) -> bool {
-        let is_comment = self.layout.comment.as_ref().is_some_and(|mark| line.starts_with(mark.as_bytes()));
+        let is_comment = self
+            .layout
+            .comment
+            .as_ref()
+            .is_some_and(|mark| line.starts_with(mark.as_bytes()));
         // A line of delimiters alone is a blank row, also where the delimiter is a tab.
         let delimited = || matches!(self.layout.delimiter, Delimiter::Byte(byte) if byte != b' ' && line.contains(&byte));
         is_comment || (line.trim_ascii().is_empty() && !delimited())
@@ -286,7 +318,10 @@ impl<R: BufRead + Send> RecordReader for TextRows<R> {
         while splitter.open.is_some() {
             record.text.push(b'\n');
             if !self.line(&mut record.text)? {
-                return Err(Error::data(format!("{}:{}", self.label, record.line), "a quoted field is not closed"));
+                return Err(Error::data(
+                    format!("{}:{}", self.label, record.line),
+                    "a quoted field is not closed",
+                ));
             }
             splitter.split(&record.text, self.layout.delimiter, &mut record.fields);
         }
@@ -295,7 +330,9 @@ impl<R: BufRead + Send> RecordReader for TextRows<R> {
             record.unquoted.clear();
             for place in &mut record.fields {
                 let start = record.unquoted.len();
-                record.unquoted.extend_from_slice(&unquoted(&record.text[place.clone()]));
+                record
+                    .unquoted
+                    .extend_from_slice(&unquoted(&record.text[place.clone()]));
                 *place = start..record.unquoted.len();
             }
         }
@@ -322,7 +359,12 @@ mod tests {
 
     fn opened(text: &[u8], delimiter: &str, comment: Option<&str>) -> TextRows<Cursor<Vec<u8>>> {
         let delimiter = Delimiter::parse(delimiter).unwrap();
-        let layout = TextLayout { delimiter, comment: comment.map(Into::into), header_in_comment: false, skip: 0 };
+        let layout = TextLayout {
+            delimiter,
+            comment: comment.map(Into::into),
+            header_in_comment: false,
+            skip: 0,
+        };
         TextRows::open(Cursor::new(text.to_vec()), "a.csv", layout).unwrap()
     }
 
@@ -347,14 +389,29 @@ mod tests {
     #[test]
     fn line_numbers_survive_crlf_comments_and_empty_lines() {
         let text = "a,b\r\n\r\n# no row\r\n1,2\r\n\n3, 4";
-        assert_eq!(rows(text, ",", Some("#")), [row(1, &["a", "b"]), row(4, &["1", "2"]), row(6, &["3", "4"])]);
-        assert_eq!(rows("a\rb,c\r\n\r1\n", ",", None), [row(1, &["a\rb", "c"]), row(2, &["1"])]);
+        assert_eq!(
+            rows(text, ",", Some("#")),
+            [
+                row(1, &["a", "b"]),
+                row(4, &["1", "2"]),
+                row(6, &["3", "4"])
+            ]
+        );
+        assert_eq!(
+            rows("a\rb,c\r\n\r1\n", ",", None),
+            [row(1, &["a\rb", "c"]), row(2, &["1"])]
+        );
     }
 
     #[test]
     fn quoted_fields_hold_delimiters_quotes_and_line_ends() {
         let text = "\"a;\"\"b\"\"\";2\n \"x\ny\" ;3\n4;5;\n;;\n";
-        let expected = [row(1, &["a;\"b\"", "2"]), row(2, &["x\ny", "3"]), row(4, &["4", "5", ""]), row(5, &["", "", ""])];
+        let expected = [
+            row(1, &["a;\"b\"", "2"]),
+            row(2, &["x\ny", "3"]),
+            row(4, &["4", "5", ""]),
+            row(5, &["", "", ""]),
+        ];
         assert_eq!(rows(text, ";", None), expected);
         // A quote inside a field, or behind a closed one, is text.
         assert_eq!(
@@ -370,21 +427,40 @@ mod tests {
     #[test]
     fn runs_of_blanks_separate_where_whitespace_does() {
         let text = "  a\t b  \n1   \"two words\"  3\n \"c\nd\"  e \n f\"g h\"\n";
-        let expected = [row(1, &["a", "b"]), row(2, &["1", "two words", "3"]), row(3, &["c\nd", "e"]), row(5, &["f\"g", "h\""])];
+        let expected = [
+            row(1, &["a", "b"]),
+            row(2, &["1", "two words", "3"]),
+            row(3, &["c\nd", "e"]),
+            row(5, &["f\"g", "h\""]),
+        ];
         assert_eq!(rows(text, "whitespace", None), expected);
-        assert_eq!(rows("a\tb\n\t\n", "tab", None), [row(1, &["a", "b"]), row(2, &["", ""])]);
+        assert_eq!(
+            rows("a\tb\n\t\n", "tab", None),
+            [row(1, &["a", "b"]), row(2, &["", ""])]
+        );
     }
 
     #[test]
     fn a_quote_that_is_never_closed_is_a_fault_of_its_line() {
-        let said = |text: &str| all(&mut opened(text.as_bytes(), ",", None)).unwrap_err().to_string();
+        let said = |text: &str| {
+            all(&mut opened(text.as_bytes(), ",", None))
+                .unwrap_err()
+                .to_string()
+        };
         assert!(
             said("a,b\n\"never closed\n1,2\n").contains("a.csv:2")
                 && said("a,b\n\"never").contains("a quoted field is not closed")
         );
         for length in [LONGEST - 3, LONGEST - 2, LONGEST - 1, LONGEST, LONGEST + 1] {
-            let said = said(&format!("\"{}\n{}\n", "a".repeat(length - 2), "b".repeat(100)));
-            assert!(said.contains("a row of more than 1 MiB"), "{length}: {said}");
+            let said = said(&format!(
+                "\"{}\n{}\n",
+                "a".repeat(length - 2),
+                "b".repeat(100)
+            ));
+            assert!(
+                said.contains("a row of more than 1 MiB"),
+                "{length}: {said}"
+            );
         }
         // At once, however many lines and quotes it takes in.
         for line in ["a\n", "\"\"\n"] {

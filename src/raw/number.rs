@@ -31,10 +31,16 @@ pub enum NumberFault {
 pub fn number(cell: &[u8], mark: DecimalMark) -> Result<f64, NumberFault> {
     let is_pointed = mark == DecimalMark::Comma && cell.contains(&b'.');
     let mut room = [0; 32];
-    let plain = match room.get_mut(..cell.len()).filter(|_| mark == DecimalMark::Comma) {
+    let plain = match room
+        .get_mut(..cell.len())
+        .filter(|_| mark == DecimalMark::Comma)
+    {
         Some(copy) => {
             copy.copy_from_slice(cell);
-            copy.iter_mut().find(|byte| **byte == b',').into_iter().for_each(|comma| *comma = b'.');
+            copy.iter_mut()
+                .find(|byte| **byte == b',')
+                .into_iter()
+                .for_each(|comma| *comma = b'.');
             copy
         }
         None => cell,
@@ -53,7 +59,9 @@ pub fn number_of_any_mark(text: &str) -> Option<f64> {
 }
 
 fn unusual(cell: &[u8], mark: DecimalMark) -> Result<f64, NumberFault> {
-    let Ok(text) = std::str::from_utf8(cell) else { return Err(NumberFault::Text) };
+    let Ok(text) = std::str::from_utf8(cell) else {
+        return Err(NumberFault::Text);
+    };
     if text.is_empty() {
         return Err(NumberFault::Blank);
     }
@@ -66,7 +74,9 @@ fn unusual(cell: &[u8], mark: DecimalMark) -> Result<f64, NumberFault> {
             Ok(_) => NumberFault::Comma,
             Err(_) => fault,
         }),
-        DecimalMark::Comma if text.contains('.') => Err(read(text).map_or(NumberFault::Text, |_| NumberFault::Point)),
+        DecimalMark::Comma if text.contains('.') => {
+            Err(read(text).map_or(NumberFault::Text, |_| NumberFault::Point))
+        }
         DecimalMark::Comma => read(&with_point()),
     }
 }
@@ -74,18 +84,30 @@ fn unusual(cell: &[u8], mark: DecimalMark) -> Result<f64, NumberFault> {
 /// The number without its marks of thousands, with a decimal point, where it has both marks and every group is one: `1.234,56` with a decimal
 /// comma, `1,234.56` with a point.
 fn ungrouped(text: &str, mark: DecimalMark) -> Option<Cow<'_, str>> {
-    let (group, mark) = if mark == DecimalMark::Comma { ('.', ',') } else { (',', '.') };
-    let (whole, rest) = text.split_once(mark).filter(|(whole, rest)| whole.contains(group) && !rest.contains(mark))?;
+    let (group, mark) = if mark == DecimalMark::Comma {
+        ('.', ',')
+    } else {
+        (',', '.')
+    };
+    let (whole, rest) = text
+        .split_once(mark)
+        .filter(|(whole, rest)| whole.contains(group) && !rest.contains(mark))?;
     let mut groups = whole.strip_prefix('-').unwrap_or(whole).split(group);
     let are_digits = |digits: &str| digits.bytes().all(|byte| byte.is_ascii_digit());
-    let first = groups.next().is_some_and(|digits| (1..=3).contains(&digits.len()) && are_digits(digits));
+    let first = groups
+        .next()
+        .is_some_and(|digits| (1..=3).contains(&digits.len()) && are_digits(digits));
     let others = groups.all(|digits| digits.len() == 3 && are_digits(digits));
     (first && others).then(|| format!("{}.{rest}", whole.replace(group, "")).into())
 }
 
 fn read(text: &str) -> Result<f64, NumberFault> {
     let value: f64 = text.parse().map_err(|_| NumberFault::Text)?;
-    if value.is_finite() { Ok(value) } else { Err(NumberFault::NotFinite) }
+    if value.is_finite() {
+        Ok(value)
+    } else {
+        Err(NumberFault::NotFinite)
+    }
 }
 
 #[cfg(test)]
@@ -94,32 +116,61 @@ mod tests {
 
     #[test]
     fn the_announced_decimal_mark_is_the_only_one() {
-        assert_eq!(number(b"-0,000212669", DecimalMark::Comma), Ok(-0.000212669));
+        assert_eq!(
+            number(b"-0,000212669", DecimalMark::Comma),
+            Ok(-0.000212669)
+        );
         assert_eq!(number(b"2,02011E+13", DecimalMark::Comma), Ok(2.02011e13));
         assert_eq!(number(b"17", DecimalMark::Comma), Ok(17.0));
-        assert_eq!(number(b"0.365", DecimalMark::Comma), Err(NumberFault::Point));
+        assert_eq!(
+            number(b"0.365", DecimalMark::Comma),
+            Err(NumberFault::Point)
+        );
         assert_eq!(number(b"+1.5e-3", DecimalMark::Point), Ok(1.5e-3));
-        assert_eq!(number(b"0,365", DecimalMark::Point), Err(NumberFault::Comma));
-        assert_eq!(number(b"1,234,5", DecimalMark::Point), Err(NumberFault::Text));
-        assert_eq!(number(b"1,234,5", DecimalMark::Comma), Err(NumberFault::Text));
+        assert_eq!(
+            number(b"0,365", DecimalMark::Point),
+            Err(NumberFault::Comma)
+        );
+        assert_eq!(
+            number(b"1,234,5", DecimalMark::Point),
+            Err(NumberFault::Text)
+        );
+        assert_eq!(
+            number(b"1,234,5", DecimalMark::Comma),
+            Err(NumberFault::Text)
+        );
     }
 
     #[test]
     fn marks_of_thousands_are_read_where_both_marks_stand_and_every_group_has_three_digits() {
         assert_eq!(number(b"1.234,56", DecimalMark::Comma), Ok(1234.56));
-        assert_eq!(number(b"-12.345.678,5", DecimalMark::Comma), Ok(-12_345_678.5));
+        assert_eq!(
+            number(b"-12.345.678,5", DecimalMark::Comma),
+            Ok(-12_345_678.5)
+        );
         assert_eq!(number(b"1,234.56", DecimalMark::Point), Ok(1234.56));
         // One mark alone may be either.
-        assert_eq!(number(b"1.234", DecimalMark::Comma), Err(NumberFault::Point));
+        assert_eq!(
+            number(b"1.234", DecimalMark::Comma),
+            Err(NumberFault::Point)
+        );
         for cell in ["1.23,4", "1.2345,6", "1234.567,8", ".123,4", "1.234,5,6"] {
-            assert_eq!(number(cell.as_bytes(), DecimalMark::Comma), Err(NumberFault::Text), "{cell}");
+            assert_eq!(
+                number(cell.as_bytes(), DecimalMark::Comma),
+                Err(NumberFault::Text),
+                "{cell}"
+            );
         }
     }
 
     #[test]
     fn what_is_not_finite_is_no_number() {
         for cell in ["NaN", "inf", "-Infinity", "1e999"] {
-            assert_eq!(number(cell.as_bytes(), DecimalMark::Point), Err(NumberFault::NotFinite), "{cell}");
+            assert_eq!(
+                number(cell.as_bytes(), DecimalMark::Point),
+                Err(NumberFault::NotFinite),
+                "{cell}"
+            );
         }
         assert_eq!(number(b"", DecimalMark::Point), Err(NumberFault::Blank));
         assert_eq!(number(b"--", DecimalMark::Point), Err(NumberFault::Text));
@@ -128,7 +179,21 @@ mod tests {
 
     #[test]
     fn without_an_announcement_the_last_mark_is_the_decimal_one() {
-        let read = ["1.234,56", "-1,234.5", "1,5", "1.5", "5,", "1.23,4", "1,2.3"].map(number_of_any_mark);
-        assert_eq!(read, [Some(1234.56), Some(-1234.5), Some(1.5), Some(1.5), None, None, None]);
+        let read = [
+            "1.234,56", "-1,234.5", "1,5", "1.5", "5,", "1.23,4", "1,2.3",
+        ]
+        .map(number_of_any_mark);
+        assert_eq!(
+            read,
+            [
+                Some(1234.56),
+                Some(-1234.5),
+                Some(1.5),
+                Some(1.5),
+                None,
+                None,
+                None
+            ]
+        );
     }
 }

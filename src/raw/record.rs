@@ -59,12 +59,21 @@ impl Record {
     }
     /// A field without the blanks around it; empty beyond the last.
     pub fn field(&self, index: usize) -> &[u8] {
-        let bytes = if self.is_quoted { &self.unquoted } else { &self.text };
-        self.fields.get(index).and_then(|range| bytes.get(range.clone())).map_or(&[], <[u8]>::trim_ascii)
+        let bytes = if self.is_quoted {
+            &self.unquoted
+        } else {
+            &self.text
+        };
+        self.fields
+            .get(index)
+            .and_then(|range| bytes.get(range.clone()))
+            .map_or(&[], <[u8]>::trim_ascii)
     }
     /// The fields as text for people.
     pub fn cells(&self) -> Vec<String> {
-        (0..self.len()).map(|index| super::shown(self.field(index)).into_owned()).collect()
+        (0..self.len())
+            .map(|index| super::shown(self.field(index)).into_owned())
+            .collect()
     }
     /// Whether nothing stands in the fields from this one on.
     pub fn is_blank(&self, from: usize) -> bool {

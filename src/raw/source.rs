@@ -35,9 +35,16 @@ pub fn source(path: &Path) -> io::Result<Box<dyn InputSource>> {
     }
     // run_2 comes before run_10.
     let number = |path: &PathBuf| {
-        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let name = path
+            .file_stem()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned();
         let digits = name.len() - name.trim_end_matches(|c: char| c.is_ascii_digit()).len();
-        (name[..name.len() - digits].to_string(), name[name.len() - digits..].parse::<u64>().ok())
+        (
+            name[..name.len() - digits].to_string(),
+            name[name.len() - digits..].parse::<u64>().ok(),
+        )
     };
     parts.sort_by_cached_key(|part| (number(part), part.clone()));
     let of = |kind: &str| parts.iter().any(|part| ending(part) == kind);
@@ -45,10 +52,15 @@ pub fn source(path: &Path) -> io::Result<Box<dyn InputSource>> {
         let message = "is a folder; allowed: a file, or a folder with the parts of one bag, all .mcap or all .db3";
         return Err(Error::new(ErrorKind::InvalidInput, message));
     }
-    let mut all = JoinedParts { files: Vec::new(), bounds: vec![0], at: 0 };
+    let mut all = JoinedParts {
+        files: Vec::new(),
+        bounds: vec![0],
+        at: 0,
+    };
     for part in parts {
         let file = open(&part)?;
-        all.bounds.push(all.bounds[all.files.len()] + file.metadata()?.len());
+        all.bounds
+            .push(all.bounds[all.files.len()] + file.metadata()?.len());
         all.files.push(file);
     }
     Ok(Box::new(all))
@@ -64,8 +76,15 @@ struct JoinedParts {
 impl Read for JoinedParts {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let part = self.bounds.partition_point(|bound| *bound <= self.at);
-        let (Some(end), Some(file)) = (self.bounds.get(part), self.files.get_mut(part.wrapping_sub(1))) else { return Ok(0) };
-        let most = usize::try_from(end - self.at).unwrap_or(usize::MAX).min(buffer.len());
+        let (Some(end), Some(file)) = (
+            self.bounds.get(part),
+            self.files.get_mut(part.wrapping_sub(1)),
+        ) else {
+            return Ok(0);
+        };
+        let most = usize::try_from(end - self.at)
+            .unwrap_or(usize::MAX)
+            .min(buffer.len());
         file.seek(SeekFrom::Start(self.at - self.bounds[part - 1]))?;
         let read = file.read(&mut buffer[..most])?;
         self.at += read as u64;

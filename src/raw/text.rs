@@ -16,7 +16,10 @@ pub fn is_utf16(head: &[u8]) -> bool {
 
 /// The same bytes without a byte-order mark, UTF-16 as UTF-8.
 pub fn without_utf16(source: impl Read + Send + 'static) -> io::Result<Box<dyn Read + Send>> {
-    let mut text = DecodeReaderBytesBuilder::new().utf8_passthru(true).strip_bom(true).build(source);
+    let mut text = DecodeReaderBytesBuilder::new()
+        .utf8_passthru(true)
+        .strip_bom(true)
+        .build(source);
     // The decoder's first piece is some bytes, and whoever reads looks at how the first lines end.
     let mut head = Vec::new();
     (&mut text).take(HEAD).read_to_end(&mut head)?;
@@ -46,7 +49,10 @@ mod tests {
     fn a_text_is_utf_8_or_windows_1252_or_none() {
         assert_eq!(decoded_text("\u{b5}m".as_bytes()).unwrap(), "\u{b5}m");
         // By Unicode's table CP1252.TXT.
-        assert_eq!(decoded_text(b"\x80 \x9f \xb5 \xb0 \xfc").unwrap(), "\u{20ac} \u{178} \u{b5} \u{b0} \u{fc}");
+        assert_eq!(
+            decoded_text(b"\x80 \x9f \xb5 \xb0 \xfc").unwrap(),
+            "\u{20ac} \u{178} \u{b5} \u{b0} \u{fc}"
+        );
         for byte in [0x81, 0x8d, 0x8f, 0x90, 0x9d] {
             assert_eq!(decoded_text(&[b'a', byte]), None, "{byte:x}");
         }
@@ -57,12 +63,21 @@ mod tests {
     fn both_orders_of_bytes_give_the_same_text() {
         let text = "Punkt;x [\u{b5}m]\r\nP\u{1d54f};1,5\n".repeat(900);
         let units: Vec<u16> = text.encode_utf16().collect();
-        let little: Vec<u8> = std::iter::once(0xfeff).chain(units.iter().copied()).flat_map(u16::to_le_bytes).collect();
-        let big: Vec<u8> = std::iter::once(0xfeff).chain(units.iter().copied()).flat_map(u16::to_be_bytes).collect();
+        let little: Vec<u8> = std::iter::once(0xfeff)
+            .chain(units.iter().copied())
+            .flat_map(u16::to_le_bytes)
+            .collect();
+        let big: Vec<u8> = std::iter::once(0xfeff)
+            .chain(units.iter().copied())
+            .flat_map(u16::to_be_bytes)
+            .collect();
         for bytes in [little, big] {
             assert!(is_utf16(&bytes));
             let mut read = String::new();
-            without_utf16(Cursor::new(bytes)).expect("a reader").read_to_string(&mut read).expect("a text");
+            without_utf16(Cursor::new(bytes))
+                .expect("a reader")
+                .read_to_string(&mut read)
+                .expect("a text");
             assert_eq!(read, text);
         }
         let mut plain = Vec::new();

@@ -31,7 +31,8 @@ const ALLOWED: &str = "allowed: .xlsx, .xlsm, or the sheet saved as CSV";
 
 /// Whether a file that begins so is an archive, as workbooks are, or an older workbook.
 pub fn is_workbook(head: &[u8]) -> bool {
-    head.starts_with(b"PK\x03\x04") && !is_arrays(head) || head.starts_with(&[0xd0, 0xcf, 0x11, 0xe0])
+    head.starts_with(b"PK\x03\x04") && !is_arrays(head)
+        || head.starts_with(&[0xd0, 0xcf, 0x11, 0xe0])
 }
 
 /// An opened workbook.
@@ -44,9 +45,14 @@ impl Workbook {
     /// Reads a workbook from first byte to last; what is wrong comes in words.
     pub fn read(source: impl Read) -> Result<Self, String> {
         let mut bytes = Vec::new();
-        source.take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(|error| format!("could not be read: {error}"))?;
+        source
+            .take(MOST_BYTES + 1)
+            .read_to_end(&mut bytes)
+            .map_err(|error| format!("could not be read: {error}"))?;
         if !bytes.starts_with(b"PK") {
-            return Err(format!("is a workbook of the older kind (.xls), or has a password; {ALLOWED}"));
+            return Err(format!(
+                "is a workbook of the older kind (.xls), or has a password; {ALLOWED}"
+            ));
         }
         unpacked(&bytes)?;
         let book = decode(|| Xlsx::new(Cursor::new(bytes)))?;
@@ -56,25 +62,44 @@ impl Workbook {
 
     /// The sheet that is read: the one of this name, else the only visible one with rows of numbers.
     pub fn sheet(&mut self, wanted: Option<&str>) -> Result<String, String> {
-        let listed = |names: &[String]| names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+        let listed = |names: &[String]| {
+            names
+                .iter()
+                .map(|name| format!("`{name}`"))
+                .collect::<Vec<_>>()
+                .join(", ")
+        };
         let Some(wanted) = wanted else {
             let tables = self.tables()?;
             return match tables.as_slice() {
                 [only] => Ok(only.clone()),
-                [] => Err(format!("has no sheet with rows of numbers; its sheets: {}", listed(&self.book.sheet_names()))),
-                several => Err(format!("has numbers in several sheets; say which, `sheet: NAME`; allowed: {}", listed(several))),
+                [] => Err(format!(
+                    "has no sheet with rows of numbers; its sheets: {}",
+                    listed(&self.book.sheet_names())
+                )),
+                several => Err(format!(
+                    "has numbers in several sheets; say which, `sheet: NAME`; allowed: {}",
+                    listed(several)
+                )),
             };
         };
         let names = self.book.sheet_names();
         match names.iter().any(|name| name == wanted) {
             true => Ok(wanted.into()),
-            false => Err(format!("has no sheet `{wanted}`; allowed: {}", listed(&names))),
+            false => Err(format!(
+                "has no sheet `{wanted}`; allowed: {}",
+                listed(&names)
+            )),
         }
     }
 
     /// The visible sheets with rows of numbers.
     pub fn tables(&mut self) -> Result<Vec<String>, String> {
-        let visible = self.book.sheets_metadata().iter().filter(|sheet| sheet.visible == SheetVisible::Visible);
+        let visible = self
+            .book
+            .sheets_metadata()
+            .iter()
+            .filter(|sheet| sheet.visible == SheetVisible::Visible);
         let mut tables = Vec::new();
         for name in visible.map(|sheet| sheet.name.clone()).collect::<Vec<_>>() {
             if self.has_numbers(&name)? {
@@ -97,7 +122,11 @@ impl Workbook {
     }
 
     /// Hands on the cells of a sheet until there is none left or none wanted.
-    fn cells(&mut self, sheet: &str, mut take: impl FnMut(Cell<DataRef>) -> Result<bool, String>) -> Result<(), String> {
+    fn cells(
+        &mut self,
+        sheet: &str,
+        mut take: impl FnMut(Cell<DataRef>) -> Result<bool, String>,
+    ) -> Result<(), String> {
         let book = &mut self.book;
         let read = decoded(|| {
             let mut reader = match book.worksheet_cells_reader(sheet) {
@@ -128,16 +157,24 @@ impl Workbook {
                 cells.push(([row, column], [start, texts.len()]));
             }
             if cells.len() > MOST_CELLS || texts.len() > MOST_LINES || row >= MOST_ROWS {
-                return Err(format!("more than {MOST_CELLS} cells; allowed: up to that, or the sheet saved as CSV"));
+                return Err(format!(
+                    "more than {MOST_CELLS} cells; allowed: up to that, or the sheet saved as CSV"
+                ));
             }
             Ok(true)
         })?;
         cells.sort_unstable();
         cells.dedup_by_key(|(place, _)| *place);
-        let width = cells.iter().map(|([_, column], _)| *column + 1).max().unwrap_or_default();
+        let width = cells
+            .iter()
+            .map(|([_, column], _)| *column + 1)
+            .max()
+            .unwrap_or_default();
         let rows = cells.chunk_by(|(a, _), (b, _)| a[0] == b[0]);
         if rows.clone().count() * width as usize + texts.len() > MOST_LINES {
-            return Err(format!("sheet `{sheet}`: {width} columns; allowed: fewer, or the sheet saved as CSV"));
+            return Err(format!(
+                "sheet `{sheet}`: {width} columns; allowed: fewer, or the sheet saved as CSV"
+            ));
         }
         let mut lines = String::with_capacity(texts.len() + cells.len());
         let mut line = 0;
@@ -160,7 +197,12 @@ impl Workbook {
 
 /// Whether a cell holds a number, or a text that is one, with a decimal point or comma.
 fn is_number(value: &DataRef) -> bool {
-    let is_text_of = |text: &str| text.trim().replacen(',', ".", 1).parse().is_ok_and(f64::is_finite);
+    let is_text_of = |text: &str| {
+        text.trim()
+            .replacen(',', ".", 1)
+            .parse()
+            .is_ok_and(f64::is_finite)
+    };
     match value {
         DataRef::Float(_) | DataRef::Int(_) => true,
         DataRef::String(text) => is_text_of(text),
@@ -182,12 +224,19 @@ fn decode<T>(work: impl FnOnce() -> Result<T, XlsxError>) -> Result<T, String> {
 
 /// Unpacks every part to nowhere, and refuses what a workbook is not, and what is larger than it may be.
 fn unpacked(bytes: &[u8]) -> Result<(), String> {
-    let foreign = |error: zip::result::ZipError| format!("is an archive that cannot be read ({error}); {ALLOWED}");
+    let foreign = |error: zip::result::ZipError| {
+        format!("is an archive that cannot be read ({error}); {ALLOWED}")
+    };
     let counted = decoded(|| {
         let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).map_err(foreign)?;
         let is_book = |name: &str| name.eq_ignore_ascii_case("xl/workbook.xml");
-        if !archive.file_names().any(|name| name.is_ok_and(|name| is_book(&name))) {
-            return Err(format!("is an archive or a workbook of another kind; {ALLOWED}"));
+        if !archive
+            .file_names()
+            .any(|name| name.is_ok_and(|name| is_book(&name)))
+        {
+            return Err(format!(
+                "is an archive or a workbook of another kind; {ALLOWED}"
+            ));
         }
         let mut left = MOST_BYTES;
         for index in 0..archive.len() {
@@ -204,12 +253,19 @@ fn unpacked(bytes: &[u8]) -> Result<(), String> {
 }
 
 /// Copies a part and gives its size; refuses one of more than so many bytes.
-fn size(part: &mut impl Read, most: u64, name: &str, into: &mut impl std::io::Write) -> Result<u64, String> {
+fn size(
+    part: &mut impl Read,
+    most: u64,
+    name: &str,
+    into: &mut impl std::io::Write,
+) -> Result<u64, String> {
     let copied = std::io::copy(&mut part.take(most + 1), into);
     let size = copied.map_err(|error| format!("is a workbook that cannot be unpacked: {error}"))?;
     if size > most {
         let [all, texts] = [MOST_BYTES, MOST_TEXTS].map(|most| most >> 20);
-        let allowed = format!("allowed: up to {all} MB unpacked, {texts} MB of them texts, or the sheet saved as CSV");
+        let allowed = format!(
+            "allowed: up to {all} MB unpacked, {texts} MB of them texts, or the sheet saved as CSV"
+        );
         return Err(format!("is too large at `{name}`; {allowed}"));
     }
     Ok(size)
@@ -219,18 +275,28 @@ fn size(part: &mut impl Read, most: u64, name: &str, into: &mut impl std::io::Wr
 fn texts(part: &mut impl Read, name: &str) -> Result<u64, String> {
     let mut content = Vec::new();
     let size = size(part, MOST_TEXTS, name, &mut content)?;
-    let text = std::str::from_utf8(&content).ok().filter(|text| !text.contains(['\0', '\x1b']));
-    let text = text.ok_or_else(|| format!("has texts in another encoding than UTF-8 at `{name}`; {ALLOWED}"))?;
+    let text = std::str::from_utf8(&content)
+        .ok()
+        .filter(|text| !text.contains(['\0', '\x1b']));
+    let text = text.ok_or_else(|| {
+        format!("has texts in another encoding than UTF-8 at `{name}`; {ALLOWED}")
+    })?;
     let digits = |stated: &str| {
         let number = stated.trim_start_matches(|c: char| c.is_whitespace() || "='\"".contains(c));
-        let end = number.find(|c: char| !c.is_ascii_digit()).unwrap_or(number.len());
+        let end = number
+            .find(|c: char| !c.is_ascii_digit())
+            .unwrap_or(number.len());
         // No count of texts has more digits than fit.
-        if end == 0 { 0 } else { number[..end].parse().unwrap_or(u64::MAX) }
+        if end == 0 {
+            0
+        } else {
+            number[..end].parse().unwrap_or(u64::MAX)
+        }
     };
     match text.split("uniqueCount").skip(1).map(digits).max() {
-        Some(stated) if stated > size / SHORTEST => {
-            Err(format!("is damaged: `{name}` says that it has more texts than it can hold"))
-        }
+        Some(stated) if stated > size / SHORTEST => Err(format!(
+            "is damaged: `{name}` says that it has more texts than it can hold"
+        )),
         _ => Ok(size),
     }
 }
@@ -248,11 +314,15 @@ fn written(texts: &mut String, value: &DataRef, decimal: char, is_1904: bool) {
             texts.push_str(&clock(moment, is_1904));
             return;
         }
-        DataRef::String(text) | DataRef::DateTimeIso(text) | DataRef::DurationIso(text) => return quoted(texts, text),
+        DataRef::String(text) | DataRef::DateTimeIso(text) | DataRef::DurationIso(text) => {
+            return quoted(texts, text);
+        }
         DataRef::SharedString(text) => return quoted(texts, text),
     };
     if result.is_ok() && decimal != '.' && matches!(value, DataRef::Float(_)) {
-        let own = texts.split_off(start).replace('.', decimal.encode_utf8(&mut [0; 4]));
+        let own = texts
+            .split_off(start)
+            .replace('.', decimal.encode_utf8(&mut [0; 4]));
         texts.push_str(&own);
     }
 }
@@ -272,7 +342,9 @@ fn clock(moment: &ExcelDateTime, is_1904: bool) -> String {
     let days = moment.as_f64();
     // Counted to 10 us: a number of 64 bits holds a day of this century to 1 us.
     let time = SignedDuration::try_from_secs_f64((days * 8.64e9).round() / 1e5);
-    let Ok(time) = time.map(|time| SignedDuration::from_micros(((time.as_micros() + 5) / 10 * 10) as i64)) else {
+    let Ok(time) =
+        time.map(|time| SignedDuration::from_micros(((time.as_micros() + 5) / 10 * 10) as i64))
+    else {
         return days.to_string();
     };
     // There was no 29th of February in 1900, but for workbooks.

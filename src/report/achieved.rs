@@ -29,16 +29,34 @@ pub fn achieved_page(tables: &AchievedTables) -> Result<String> {
         let [mean, p95, max] = figures.map(mm);
         [format!("{name}: {what}"), mean, p95, max]
     };
-    let errors = tables.errors.iter().zip([("before", "s0"), ("achieved", "s-last")]).map(|(lengths, (step, colour))| {
-        let mut sorted_mm = lengths.clone();
-        sorted_mm.sort_by(f64::total_cmp);
-        let mean_mm = sorted_mm.iter().sum::<f64>() / sorted_mm.len().max(1) as f64;
-        StepErrors { step: step.into(), colour: colour.into(), sorted_mm, mean_mm }
-    });
-    let errors: Vec<StepErrors> = errors.filter(|errors| !errors.sorted_mm.is_empty()).collect();
-    let poses = (1..).zip(&tables.poses).map(|(k, (cycles, accuracy, repeatability)): (i64, _)| {
-        [k.to_string(), count(*cycles as i64), mm(*accuracy), mm(*repeatability)]
-    });
+    let errors = tables
+        .errors
+        .iter()
+        .zip([("before", "s0"), ("achieved", "s-last")])
+        .map(|(lengths, (step, colour))| {
+            let mut sorted_mm = lengths.clone();
+            sorted_mm.sort_by(f64::total_cmp);
+            let mean_mm = sorted_mm.iter().sum::<f64>() / sorted_mm.len().max(1) as f64;
+            StepErrors {
+                step: step.into(),
+                colour: colour.into(),
+                sorted_mm,
+                mean_mm,
+            }
+        });
+    let errors: Vec<StepErrors> = errors
+        .filter(|errors| !errors.sorted_mm.is_empty())
+        .collect();
+    let poses = (1..)
+        .zip(&tables.poses)
+        .map(|(k, (cycles, accuracy, repeatability)): (i64, _)| {
+            [
+                k.to_string(),
+                count(*cycles as i64),
+                mm(*accuracy),
+                mm(*repeatability),
+            ]
+        });
     let page = json!({
         "title": tables.title,
         "policy": "",

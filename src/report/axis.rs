@@ -25,19 +25,39 @@ pub(super) struct Scale {
 impl Scale {
     /// Linear over [lower, upper], widened where that is empty.
     pub fn linear(lower: f64, upper: f64) -> Self {
-        let upper = if upper > lower { upper } else { lower + lower.abs().max(1.0) };
-        Self { log: false, lower, upper, from: 0.0, to: 1.0 }
+        let upper = if upper > lower {
+            upper
+        } else {
+            lower + lower.abs().max(1.0)
+        };
+        Self {
+            log: false,
+            lower,
+            upper,
+            from: 0.0,
+            to: 1.0,
+        }
     }
     /// Logarithmic over the next rounder numbers around positive [lower, upper].
     pub fn log(lower: f64, upper: f64) -> Self {
         let upper = round_up(upper.max(1e-9));
         let lower = round_down(lower.max(upper * 1e-16)).min(upper * 0.5);
-        Self { log: true, lower, upper, from: 0.0, to: 1.0 }
+        Self {
+            log: true,
+            lower,
+            upper,
+            from: 0.0,
+            to: 1.0,
+        }
     }
     /// For positive values: logarithmic where they differ by more than a linear axis can show, else linear from zero.
     pub fn positive(lower: f64, upper: f64) -> Self {
         // Over a ratio of 12, the smaller values would share less than a tenth of a linear axis.
-        if lower > 0.0 && upper / lower > 12.0 { Self::log(lower, upper) } else { Self::linear(0.0, upper * 1.04) }
+        if lower > 0.0 && upper / lower > 12.0 {
+            Self::log(lower, upper)
+        } else {
+            Self::linear(0.0, upper * 1.04)
+        }
     }
     /// The same scale drawn from `from` to `to`.
     pub fn over(self, from: f64, to: f64) -> Self {
@@ -66,8 +86,15 @@ impl Scale {
             density if density <= 0.55 => &[1.0, 3.0],
             _ => &[1.0],
         };
-        let every = if per_decade.len() == 1 { (decades / wanted.max(1) as f64).ceil() as i32 } else { 1 };
-        let (first, last) = (self.lower.log10().floor() as i32, self.upper.log10().ceil() as i32);
+        let every = if per_decade.len() == 1 {
+            (decades / wanted.max(1) as f64).ceil() as i32
+        } else {
+            1
+        };
+        let (first, last) = (
+            self.lower.log10().floor() as i32,
+            self.upper.log10().ceil() as i32,
+        );
         (first..=last)
             .filter(|k| k.rem_euclid(every) == 0)
             .flat_map(|k| per_decade.iter().map(move |digit| digit * 10f64.powi(k)))
@@ -92,14 +119,21 @@ impl Scale {
 
 /// The name of a horizontal axis, below its ticks.
 pub(super) fn name_x(svg: &mut Svg, area: Area, name: &str) {
-    svg.text("axis mid", [(area.left + area.right) / 2.0, area.bottom + 30.0], name);
+    svg.text(
+        "axis mid",
+        [(area.left + area.right) / 2.0, area.bottom + 30.0],
+        name,
+    );
 }
 /// The name of a vertical axis, above its upper end: no turned text to read.
 pub(super) fn name_y(svg: &mut Svg, area: Area, name: &str) {
     svg.text("axis", [4.0, area.top - 9.0], name);
 }
 pub(super) fn baseline(svg: &mut Svg, area: Area) {
-    svg.path("base", &[[area.left, area.bottom], [area.right, area.bottom]] as &[SvgPoint]);
+    svg.path(
+        "base",
+        &[[area.left, area.bottom], [area.right, area.bottom]] as &[SvgPoint],
+    );
 }
 
 /// A tick without needless zeros.
@@ -112,7 +146,11 @@ pub(super) fn label(value: f64) -> String {
         return format!("{value:.0e}");
     }
     let text = fixed(value, (2.0 - power).clamp(0.0, 6.0) as usize);
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
+    if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.').into()
+    } else {
+        text
+    }
 }
 
 const ROUND: [f64; 4] = [1.0, 2.0, 5.0, 10.0];
@@ -120,12 +158,21 @@ const ROUND: [f64; 4] = [1.0, 2.0, 5.0, 10.0];
 /// The next of 1, 2, 5, 10, ... at or above a positive value.
 pub(super) fn round_up(value: f64) -> f64 {
     let decade = 10f64.powf(value.log10().floor());
-    ROUND.iter().map(|digit| digit * decade).find(|round| *round >= value * (1.0 - 1e-9)).unwrap_or(10.0 * decade)
+    ROUND
+        .iter()
+        .map(|digit| digit * decade)
+        .find(|round| *round >= value * (1.0 - 1e-9))
+        .unwrap_or(10.0 * decade)
 }
 /// The next of 1, 2, 5, 10, ... at or below a positive value.
 pub(super) fn round_down(value: f64) -> f64 {
     let decade = 10f64.powf(value.log10().floor());
-    ROUND.iter().rev().map(|digit| digit * decade).find(|round| *round <= value * (1.0 + 1e-9)).unwrap_or(decade)
+    ROUND
+        .iter()
+        .rev()
+        .map(|digit| digit * decade)
+        .find(|round| *round <= value * (1.0 + 1e-9))
+        .unwrap_or(decade)
 }
 
 #[cfg(test)]
@@ -136,17 +183,31 @@ mod tests {
     fn ticks_are_round_and_within_the_axis() {
         assert_eq!(Scale::linear(0.0, 1.04).ticks(5), [0.0, 0.5, 1.0]);
         assert_eq!(Scale::linear(-830.0, 410.0).ticks(6), [-500.0, 0.0]);
-        let ticks: Vec<String> = Scale::log(0.03, 4.2).ticks(8).into_iter().map(label).collect();
+        let ticks: Vec<String> = Scale::log(0.03, 4.2)
+            .ticks(8)
+            .into_iter()
+            .map(label)
+            .collect();
         assert_eq!(ticks, ["0.02", "0.05", "0.1", "0.2", "0.5", "1", "2", "5"]);
         assert_eq!(Scale::log(1e-9, 1e3).ticks(5).len(), 5);
     }
 
     #[test]
     fn an_axis_without_extent_or_with_zeros_still_draws() {
-        for scale in [Scale::linear(2.0, 2.0), Scale::log(0.0, 0.0), Scale::positive(0.0, 0.0), Scale::positive(0.0, 3.0)] {
+        for scale in [
+            Scale::linear(2.0, 2.0),
+            Scale::log(0.0, 0.0),
+            Scale::positive(0.0, 0.0),
+            Scale::positive(0.0, 3.0),
+        ] {
             let scale = scale.over(10.0, 90.0);
             assert!((10.0..=90.0).contains(&scale.at(0.0)));
-            assert!(scale.ticks(5).iter().all(|tick| (10.0..=90.0).contains(&scale.at(*tick))));
+            assert!(
+                scale
+                    .ticks(5)
+                    .iter()
+                    .all(|tick| (10.0..=90.0).contains(&scale.at(*tick)))
+            );
         }
     }
 }

@@ -13,31 +13,49 @@ const DECADES: [f64; 6] = [0.003, 0.01, 0.03, 0.1, 0.3, 1.0];
 pub(super) fn picture(cells: &Cells, findings: &Findings) -> Option<Value> {
     let grid = CauseGrid::of(cells, findings);
     let drawn = |cell: &Option<CauseGridCell>, is_found: bool| {
-        let Some(cell) = cell else { return json!({ "class": "", "size": "", "name": "" }) };
-        let Some(mm) = cell.mm.or_else(|| (!cell.effects.is_empty()).then_some(0.0)) else {
+        let Some(cell) = cell else {
+            return json!({ "class": "", "size": "", "name": "" });
+        };
+        let Some(mm) = cell
+            .mm
+            .or_else(|| (!cell.effects.is_empty()).then_some(0.0))
+        else {
             return json!({ "class": "asked", "size": "\u{b7}", "name": "" });
         };
         let step = DECADES.iter().filter(|from| mm >= **from).count();
         let name = if is_found {
-            cell.effects.iter().map(|effect| effect.replace('_', " ")).collect::<Vec<_>>().join(", ")
+            cell.effects
+                .iter()
+                .map(|effect| effect.replace('_', " "))
+                .collect::<Vec<_>>()
+                .join(", ")
         } else {
             String::new()
         };
         json!({ "class": format!("size{step}{}", if is_found && !cell.is_named { " open" } else { "" }), "size": length(mm), "name": name })
     };
     let rows = grid.rows.iter().map(|row| {
-        let of = |cells: &[Option<CauseGridCell>], is_found| cells.iter().map(|cell| drawn(cell, is_found)).collect::<Vec<_>>();
+        let of = |cells: &[Option<CauseGridCell>], is_found| {
+            cells
+                .iter()
+                .map(|cell| drawn(cell, is_found))
+                .collect::<Vec<_>>()
+        };
         json!({ "place": row.place, "found": of(&row.found, true), "left": of(&row.left, false) })
     });
     let rows: Vec<Value> = rows.collect();
-    (!rows.is_empty()).then(|| json!({ "columns": grid.columns, "rows": rows, "others": grid.others }))
+    (!rows.is_empty())
+        .then(|| json!({ "columns": grid.columns, "rows": rows, "others": grid.others }))
 }
 
 /// A size in the unit in which it is short.
 fn length(mm: f64) -> String {
     match mm {
         _ if mm >= 1.0 => format!("{} mm", significant(mm, 2)),
-        _ => format!("{} \u{b5}m", significant(1e3 * mm, if mm >= 0.01 { 2 } else { 1 })),
+        _ => format!(
+            "{} \u{b5}m",
+            significant(1e3 * mm, if mm >= 0.01 { 2 } else { 1 })
+        ),
     }
 }
 
@@ -62,8 +80,14 @@ pub struct DiagnosedTables<'a> {
 /// A diagnosis as one file that needs no other.
 pub fn diagnosed_page(tables: &DiagnosedTables) -> Result<String> {
     let findings = tables.findings.0.iter().map(|finding| {
-        let chance = finding.probability.map(|probability| format!(", probability {probability:.2}")).unwrap_or_default();
-        [finding.statement.clone(), format!("{} at {}{chance}", finding.effect, finding.place)]
+        let chance = finding
+            .probability
+            .map(|probability| format!(", probability {probability:.2}"))
+            .unwrap_or_default();
+        [
+            finding.statement.clone(),
+            format!("{} at {}{chance}", finding.effect, finding.place),
+        ]
     });
     let page = json!({
         "title": tables.title,

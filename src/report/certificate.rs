@@ -25,8 +25,12 @@ pub(super) fn certificate(
     let diagnosis = tables.verdict.iter().flat_map(|table| &table.0).next_back();
     let (kind, verdict) = standing(tables, judgement, diagnosis, first.zip(after));
     let subject = [("robot".to_string(), robot.to_string())];
-    let limit = |(row, found): (&AcceptanceRow, f64)| json!([row.figure, mm(found), mm(row.limit_mm), row.kept]);
-    let given = identity.iter().map(|(name, value)| (name.clone(), value.clone()));
+    let limit = |(row, found): (&AcceptanceRow, f64)| {
+        json!([row.figure, mm(found), mm(row.limit_mm), row.kept])
+    };
+    let given = identity
+        .iter()
+        .map(|(name, value)| (name.clone(), value.clone()));
     json!({
         // `better` (accepted and explained), `open` (not explained, or not asked), `worse` (not accepted), `unknown`: the class of its colour.
         "kind": kind,
@@ -57,13 +61,21 @@ fn standing(
     course: Option<(&StatisticsRow, &StatisticsRow)>,
 ) -> (&'static str, String) {
     if wrong_setup(tables).is_some() {
-        return ("worse", judgement.map(|judged| judged.sentence.clone()).unwrap_or_default());
+        return (
+            "worse",
+            judgement
+                .map(|judged| judged.sentence.clone())
+                .unwrap_or_default(),
+        );
     }
     if let Some(judged) = judgement.filter(|judged| !judged.kept) {
         return ("worse", judged.sentence.clone());
     }
     if course.is_some_and(|(before, after)| after.mean_mm >= before.mean_mm) {
-        return ("worse", "The calibration did not make the robot more accurate.".into());
+        return (
+            "worse",
+            "The calibration did not make the robot more accurate.".into(),
+        );
     }
     let within = judgement.map(|judged| judged.sentence.trim_end_matches('.').to_string());
     let cause = match diagnosis.map(|row| row.verdict.as_str()) {
@@ -74,9 +86,21 @@ fn standing(
     };
     match (within, cause) {
         (Some(within), None) => ("better", format!("{within}. The error is explained.")),
-        (Some(within), Some(cause)) => ("open", format!("{}, but {cause}.", within.replacen("Accepted: within", "Within", 1))),
-        (None, None) => ("unknown", "Explained. No limits were stated, so that nothing is accepted or refused.".into()),
-        (None, Some(cause)) => ("open", format!("Not judged, as no limits were stated; {cause}.")),
+        (Some(within), Some(cause)) => (
+            "open",
+            format!(
+                "{}, but {cause}.",
+                within.replacen("Accepted: within", "Within", 1)
+            ),
+        ),
+        (None, None) => (
+            "unknown",
+            "Explained. No limits were stated, so that nothing is accepted or refused.".into(),
+        ),
+        (None, Some(cause)) => (
+            "open",
+            format!("Not judged, as no limits were stated; {cause}."),
+        ),
     }
 }
 
@@ -86,7 +110,14 @@ fn files(tables: &Tables) -> Option<(String, String)> {
         .intake
         .iter()
         .flat_map(|table| &table.0)
-        .map(|row| format!("{} ({} of {} rows used)", row.file, count(row.accepted), count(row.read)))
+        .map(|row| {
+            format!(
+                "{} ({} of {} rows used)",
+                row.file,
+                count(row.accepted),
+                count(row.read)
+            )
+        })
         .collect();
     (!files.is_empty()).then(|| ("recording".to_string(), files.join("; ")))
 }
@@ -95,13 +126,29 @@ fn files(tables: &Tables) -> Option<(String, String)> {
 fn figures((when, row): (&str, &StatisticsRow)) -> Vec<[String; 5]> {
     let none = || "\u{2013}".to_string();
     let name = format!("{when} ({})", row.step);
-    let mut rows = vec![[name, count(row.points), mm(row.mean_mm), mm(row.p95_mm), mm(row.max_mm)]];
+    let mut rows = vec![[
+        name,
+        count(row.points),
+        mm(row.mean_mm),
+        mm(row.p95_mm),
+        mm(row.max_mm),
+    ]];
     if let Some(mean) = row.mean_without_mm {
         let name = format!(
             "{when}, without {}",
-            if row.suspects == 1 { "a suspect".into() } else { format!("{} suspects", row.suspects) }
+            if row.suspects == 1 {
+                "a suspect".into()
+            } else {
+                format!("{} suspects", row.suspects)
+            }
         );
-        rows.push([name, count(row.points - row.suspects), mm(mean), none(), row.max_without_mm.map_or_else(none, mm)]);
+        rows.push([
+            name,
+            count(row.points - row.suspects),
+            mm(mean),
+            none(),
+            row.max_without_mm.map_or_else(none, mm),
+        ]);
     }
     rows
 }
@@ -118,7 +165,10 @@ fn uncertainty(after: &StatisticsRow) -> Vec<(&'static str, String)> {
             "expanded uncertainty of the corrected robot in the measured region, along an axis (k = 2, from the held-out points)",
             format!("\u{b1}\u{a0}{}\u{a0}mm", mm(COVERAGE * axis)),
         ),
-        ("standard uncertainty of a measured point, rms length", format!("{} mm{basis}", mm(after.noise_rms_mm))),
+        (
+            "standard uncertainty of a measured point, rms length",
+            format!("{} mm{basis}", mm(after.noise_rms_mm)),
+        ),
     ]
 }
 
@@ -126,26 +176,55 @@ fn uncertainty(after: &StatisticsRow) -> Vec<(&'static str, String)> {
 fn conditions(tables: &Tables) -> Vec<(&'static str, String)> {
     let recording = &tables.recording;
     let range = |values: &Option<Vec<f64>>, unit: &str, decimals: usize| {
-        let finite = values.iter().flatten().copied().filter(|value| value.is_finite());
-        let (lower, upper) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+        let finite = values
+            .iter()
+            .flatten()
+            .copied()
+            .filter(|value| value.is_finite());
+        let (lower, upper) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| {
+            (a.min(x), b.max(x))
+        });
         match (lower <= upper, lower == upper) {
             (false, _) => "not recorded".into(),
             (_, true) => format!("{} {unit}", fixed(lower, decimals)),
-            _ => format!("{} to {} {unit}", fixed(lower, decimals), fixed(upper, decimals)),
+            _ => format!(
+                "{} to {} {unit}",
+                fixed(lower, decimals),
+                fixed(upper, decimals)
+            ),
         }
     };
     let joint = |k: usize| {
         let values = (0..recording.rows()).map(|row| recording.q(row)[k]);
-        let (lower, upper) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), q| (a.min(q), b.max(q)));
-        let unit = if recording.prismatic.get(k).copied().unwrap_or(false) { Unit::Millimetre } else { Unit::Degree };
-        format!("J{} {} to {}", k + 1, fixed(unit.from_si(lower), 0), fixed(unit.from_si(upper), 0))
+        let (lower, upper) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), q| {
+            (a.min(q), b.max(q))
+        });
+        let unit = if recording.prismatic.get(k).copied().unwrap_or(false) {
+            Unit::Millimetre
+        } else {
+            Unit::Degree
+        };
+        format!(
+            "J{} {} to {}",
+            k + 1,
+            fixed(unit.from_si(lower), 0),
+            fixed(unit.from_si(upper), 0)
+        )
     };
-    let region: Vec<String> = if recording.rows() == 0 { Vec::new() } else { (0..recording.joints).map(joint).collect() };
+    let region: Vec<String> = if recording.rows() == 0 {
+        Vec::new()
+    } else {
+        (0..recording.joints).map(joint).collect()
+    };
     let sliding = recording.prismatic.iter().any(|prismatic| *prismatic);
     let region = if region.is_empty() {
         "no point was measured".into()
     } else {
-        format!("{} {}", region.join(", "), if sliding { "deg, mm" } else { "deg" })
+        format!(
+            "{} {}",
+            region.join(", "),
+            if sliding { "deg, mm" } else { "deg" }
+        )
     };
     vec![
         ("temperature", range(&recording.temperature, "\u{b0}C", 1)),

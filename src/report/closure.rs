@@ -26,7 +26,11 @@ const MOST: usize = 40;
 /// Nothing where no row was brought to a place, or nothing was predicted.
 pub(super) fn section(tables: &Tables) -> Option<Value> {
     let all = closings(tables)?;
-    let name = |table: Option<&Prediction>| table.and_then(|table| table.0.first()).map(|row| row.step.clone());
+    let name = |table: Option<&Prediction>| {
+        table
+            .and_then(|table| table.0.first())
+            .map(|row| row.step.clone())
+    };
     let rows = all.iter().map(|own| {
         let [before, after] = [own.before, own.after].map(|pair| pair.map(mm));
         let [[a, b], [c, d]] = [before, after];
@@ -44,8 +48,15 @@ pub(super) fn section(tables: &Tables) -> Option<Value> {
 }
 
 fn standing(tables: &Tables) -> Option<&Prediction> {
-    let named = |table: &&Prediction| table.0.first().map(|row| row.step.as_str()) == tables.standing.as_deref();
-    tables.prediction.iter().rev().find(named).or(tables.prediction.last())
+    let named = |table: &&Prediction| {
+        table.0.first().map(|row| row.step.as_str()) == tables.standing.as_deref()
+    };
+    tables
+        .prediction
+        .iter()
+        .rev()
+        .find(named)
+        .or(tables.prediction.last())
 }
 
 /// By the order of names, which is that of the recording's table.
@@ -58,8 +69,15 @@ fn closings(tables: &Tables) -> Option<Vec<FixtureFigures>> {
         }
     }
     let figures = |table: &Prediction, rows: &[usize]| -> [f64; 2] {
-        let errors: Vec<f64> = rows.iter().filter_map(|row| table.0.get(*row)).map(|row: &PredictionRow| row.error_mm).collect();
-        [errors.iter().sum::<f64>() / errors.len().max(1) as f64, errors.iter().copied().fold(0.0, f64::max)]
+        let errors: Vec<f64> = rows
+            .iter()
+            .filter_map(|row| table.0.get(*row))
+            .map(|row: &PredictionRow| row.error_mm)
+            .collect();
+        [
+            errors.iter().sum::<f64>() / errors.len().max(1) as f64,
+            errors.iter().copied().fold(0.0, f64::max),
+        ]
     };
     let all: Vec<FixtureFigures> = rows
         .into_iter()
@@ -74,21 +92,44 @@ fn closings(tables: &Tables) -> Option<Vec<FixtureFigures>> {
 }
 
 fn picture(all: &[FixtureFigures]) -> String {
-    let area = Area { left: LEFT, top: 8.0, right: WIDTH - 12.0, bottom: 8.0 + ROW * all.len() as f64 };
-    let means = || all.iter().flat_map(|own| [own.before[0], own.after[0]]).filter(|mean| *mean > 0.0);
-    let (lower, upper) = (means().fold(f64::INFINITY, f64::min), means().fold(0.0, f64::max));
+    let area = Area {
+        left: LEFT,
+        top: 8.0,
+        right: WIDTH - 12.0,
+        bottom: 8.0 + ROW * all.len() as f64,
+    };
+    let means = || {
+        all.iter()
+            .flat_map(|own| [own.before[0], own.after[0]])
+            .filter(|mean| *mean > 0.0)
+    };
+    let (lower, upper) = (
+        means().fold(f64::INFINITY, f64::min),
+        means().fold(0.0, f64::max),
+    );
     let scale = Scale::positive(0.5 * lower.min(upper), upper).over(area.left, area.right);
     let mut svg = Svg::new(WIDTH, area.bottom + 38.0);
     scale.grid_x(&mut svg, area, 7);
     for (k, own) in all.iter().enumerate() {
         let top = area.top + ROW * k as f64;
         svg.name("tick end", [area.left - 6.0, top + 0.7 * ROW], &own.name);
-        for (bar, (mean, colour)) in [(own.before[0], "s0"), (own.after[0], "s-last")].into_iter().enumerate() {
+        for (bar, (mean, colour)) in [(own.before[0], "s0"), (own.after[0], "s-last")]
+            .into_iter()
+            .enumerate()
+        {
             let width = (scale.at(mean.max(0.5 * lower.min(upper))) - area.left).max(0.8);
-            svg.rect(&format!("fill {colour}"), [area.left, top + 2.0 + 8.0 * bar as f64], [width, 7.0]);
+            svg.rect(
+                &format!("fill {colour}"),
+                [area.left, top + 2.0 + 8.0 * bar as f64],
+                [width, 7.0],
+            );
         }
     }
     baseline(&mut svg, area);
-    name_x(&mut svg, area, "mean distance of the ball from where it lay, mm");
+    name_x(
+        &mut svg,
+        area,
+        "mean distance of the ball from where it lay, mm",
+    );
     svg.finish("Closure by fixture, before and after")
 }

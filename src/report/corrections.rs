@@ -7,7 +7,11 @@ use serde_json::{Value, json};
 
 /// The comparisons in pipeline order; stages that had too few rows compared nothing.
 pub(super) fn comparisons(tables: &Tables) -> Vec<Value> {
-    tables.corrections.iter().filter_map(|table| comparison(&table.0)).collect()
+    tables
+        .corrections
+        .iter()
+        .filter_map(|table| comparison(&table.0))
+        .collect()
 }
 
 fn comparison(rows: &[CorrectionsRow]) -> Option<Value> {
@@ -18,7 +22,10 @@ fn comparison(rows: &[CorrectionsRow]) -> Option<Value> {
         format!("no correction was kept: {}.", chosen.reason)
     } else {
         let (before, after) = (mm(chosen.before_mm), error(chosen.mean_mm));
-        format!("kept is {}; the mean error falls from {before} to {after} mm on rows that it did not see.", words(&chosen.rival))
+        format!(
+            "kept is {}; the mean error falls from {before} to {after} mm on rows that it did not see.",
+            words(&chosen.rival)
+        )
     };
     let view = |row: &CorrectionsRow| {
         json!({
@@ -39,7 +46,9 @@ fn comparison(rows: &[CorrectionsRow]) -> Option<Value> {
             "reason": row.reason,
         })
     };
-    Some(json!({ "step": first.step, "sentence": sentence, "rows": rows.iter().map(view).collect::<Vec<_>>() }))
+    Some(
+        json!({ "step": first.step, "sentence": sentence, "rows": rows.iter().map(view).collect::<Vec<_>>() }),
+    )
 }
 
 /// A rival's name in words; names that are not known stay.
@@ -50,7 +59,10 @@ fn words(rival: &str) -> String {
         "gaussian_process" => "Gaussian process".into(),
         "curves" => "joint curves".into(),
         "mlp_random" => "network, started at random".into(),
-        _ => match (rival.strip_prefix("mlp_joints_"), rival.strip_prefix("mlp_")) {
+        _ => match (
+            rival.strip_prefix("mlp_joints_"),
+            rival.strip_prefix("mlp_"),
+        ) {
             (Some("random"), _) => "joint network, started at random".into(),
             (Some(start), _) => format!("joint network, started by {}", start.to_uppercase()),
             (None, Some(start)) => format!("network, started by {}", start.to_uppercase()),

@@ -16,7 +16,12 @@ const DRAWN: usize = 300;
 
 /// Positive values over a count (iterations, generations).
 pub(super) fn course(lines: &[Line], x_name: &str, y_name: &str, title: &str) -> String {
-    let area = Area { left: 52.0, top: 26.0, right: WIDTH - 14.0, bottom: 220.0 };
+    let area = Area {
+        left: 52.0,
+        top: 26.0,
+        right: WIDTH - 14.0,
+        bottom: 220.0,
+    };
     let all = || lines.iter().flat_map(|line| &line.points);
     let last = all().map(|p| p[0]).fold(1.0, f64::max);
     let upper = all().map(|p| p[1]).fold(0.0, f64::max);
@@ -29,11 +34,17 @@ pub(super) fn course(lines: &[Line], x_name: &str, y_name: &str, title: &str) ->
     for line in lines {
         let every = line.points.len().div_ceil(DRAWN).max(1);
         let end = line.points.len().saturating_sub(1);
-        let drawn = line.points.iter().enumerate().filter(|(i, _)| i % every == 0 || *i == end);
+        let drawn = line
+            .points
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| i % every == 0 || *i == end);
         let points: Vec<[f64; 2]> = drawn.map(|(_, p)| [x.at(p[0]), y.at(p[1])]).collect();
         svg.path(&format!("curve {}", line.colour), &points);
         if points.len() <= 40 {
-            points.iter().for_each(|point| svg.circle(&format!("mark {}", line.colour), *point, 2.2));
+            points
+                .iter()
+                .for_each(|point| svg.circle(&format!("mark {}", line.colour), *point, 2.2));
         }
     }
     baseline(&mut svg, area);
@@ -44,17 +55,34 @@ pub(super) fn course(lines: &[Line], x_name: &str, y_name: &str, title: &str) ->
 
 /// Singular values as (number, value), on a logarithmic axis.
 pub(super) fn spectrum(values: &[(i64, f64)], title: &str) -> String {
-    let area = Area { left: 52.0, top: 26.0, right: WIDTH - 14.0, bottom: 220.0 };
+    let area = Area {
+        left: 52.0,
+        top: 26.0,
+        right: WIDTH - 14.0,
+        bottom: 220.0,
+    };
     let upper = values.iter().map(|v| v.1).fold(0.0, f64::max);
-    let lower = values.iter().map(|v| v.1).filter(|v| *v > 0.0).fold(upper, f64::min);
+    let lower = values
+        .iter()
+        .map(|v| v.1)
+        .filter(|v| *v > 0.0)
+        .fold(upper, f64::min);
     let count = values.iter().map(|v| v.0).max().unwrap_or(1).max(1);
     let x = Scale::linear(0.5, count as f64 + 0.5).over(area.left, area.right);
     // Below 1e-16 of the largest there is only rounding.
     let y = Scale::log(lower.max(upper * 1e-16), upper).over(area.bottom, area.top);
     let mut svg = Svg::new(WIDTH, area.bottom + 38.0);
     y.grid_y(&mut svg, area, 6);
-    for tick in x.ticks(8).into_iter().filter(|tick| tick.fract() == 0.0 && *tick >= 1.0) {
-        svg.text("tick mid", [x.at(tick), area.bottom + 14.0], &format!("{tick:.0}"));
+    for tick in x
+        .ticks(8)
+        .into_iter()
+        .filter(|tick| tick.fract() == 0.0 && *tick >= 1.0)
+    {
+        svg.text(
+            "tick mid",
+            [x.at(tick), area.bottom + 14.0],
+            &format!("{tick:.0}"),
+        );
     }
     for (number, value) in values {
         let top = [x.at(*number as f64), y.at(*value)];

@@ -13,7 +13,10 @@ const LISTED: usize = 50;
 /// The base's name is the robot's.
 pub(super) fn robot_name(robot: &Robot) -> String {
     let base = robot.0.iter().find(|body| body.kind == "base");
-    base.map(|body| body.name.trim()).filter(|name| !name.is_empty()).unwrap_or("a robot without a name").to_owned()
+    base.map(|body| body.name.trim())
+        .filter(|name| !name.is_empty())
+        .unwrap_or("a robot without a name")
+        .to_owned()
 }
 
 pub(super) fn section(tables: &Tables) -> Value {
@@ -52,10 +55,16 @@ pub(super) fn section(tables: &Tables) -> Value {
 
 fn joints(robot: &Robot) -> Vec<Value> {
     let triple = |values: [Option<f64>; 3], decimals| {
-        let texts: Option<Vec<String>> = values.into_iter().map(|v| Some(fixed(v?, decimals))).collect();
+        let texts: Option<Vec<String>> = values
+            .into_iter()
+            .map(|v| Some(fixed(v?, decimals)))
+            .collect();
         texts.map_or_else(String::new, |texts| texts.join(", "))
     };
-    let bodies = robot.0.iter().filter(|body| body.kind == "revolute" || body.kind == "prismatic");
+    let bodies = robot
+        .0
+        .iter()
+        .filter(|body| body.kind == "revolute" || body.kind == "prismatic");
     bodies
         .map(|body| {
             json!({
@@ -78,8 +87,15 @@ fn joints(robot: &Robot) -> Vec<Value> {
 
 fn tool(robot: &Robot) -> Option<String> {
     let tool = robot.0.iter().find(|body| body.kind == "tool")?;
-    let mass = tool.mass_kg.filter(|kg| *kg > 0.0).map_or_else(String::new, |kg| format!(", rated payload {} kg", fixed(kg, 1)));
-    let point = [tool.point_x_mm?, tool.point_y_mm?, tool.point_z_mm?].map(|v| fixed(v, 3)).join(", ");
+    let mass = tool
+        .mass_kg
+        .filter(|kg| *kg > 0.0)
+        .map_or_else(String::new, |kg| {
+            format!(", rated payload {} kg", fixed(kg, 1))
+        });
+    let point = [tool.point_x_mm?, tool.point_y_mm?, tool.point_z_mm?]
+        .map(|v| fixed(v, 3))
+        .join(", ");
     Some(format!("{point} mm{mass}"))
 }
 
@@ -108,23 +124,51 @@ fn reject(row: &RejectedRow) -> Value {
 fn kinds(tables: &Tables) -> Vec<(&'static str, String)> {
     let of = |lengths: Vec<usize>| -> String {
         let texts: Vec<String> = lengths.into_iter().map(|n| count(n as i64)).collect();
-        if texts.is_empty() { "not written".into() } else { format!("{} rows", texts.join(" + ")) }
+        if texts.is_empty() {
+            "not written".into()
+        } else {
+            format!("{} rows", texts.join(" + "))
+        }
     };
     vec![
         ("robot", of(vec![tables.robot.0.len()])),
         ("recording", of(vec![tables.recording.rows()])),
-        ("intake", of(tables.intake.iter().map(|t| t.0.len()).collect())),
-        ("rejected", of(tables.rejected.iter().map(|t| t.0.len()).collect())),
+        (
+            "intake",
+            of(tables.intake.iter().map(|t| t.0.len()).collect()),
+        ),
+        (
+            "rejected",
+            of(tables.rejected.iter().map(|t| t.0.len()).collect()),
+        ),
         ("split", of(vec![tables.split.0.len()])),
         ("parameters", of(vec![tables.parameters.0.len()])),
         ("fit", of(tables.fit.iter().map(|t| t.0.len()).collect())),
-        ("observability", of(tables.observability.iter().map(|t| t.0.len()).collect())),
-        ("training", of(tables.training.iter().map(|t| t.0.len()).collect())),
-        ("corrections", of(tables.corrections.iter().map(|t| t.0.len()).collect())),
-        ("prediction", of(tables.prediction.iter().map(|t| t.0.len()).collect())),
+        (
+            "observability",
+            of(tables.observability.iter().map(|t| t.0.len()).collect()),
+        ),
+        (
+            "training",
+            of(tables.training.iter().map(|t| t.0.len()).collect()),
+        ),
+        (
+            "corrections",
+            of(tables.corrections.iter().map(|t| t.0.len()).collect()),
+        ),
+        (
+            "prediction",
+            of(tables.prediction.iter().map(|t| t.0.len()).collect()),
+        ),
         ("statistics", of(vec![tables.statistics.0.len()])),
-        ("suspects", of(tables.suspects.iter().map(|t| t.0.len()).collect())),
-        ("findings", of(tables.findings.iter().map(|t| t.0.len()).collect())),
+        (
+            "suspects",
+            of(tables.suspects.iter().map(|t| t.0.len()).collect()),
+        ),
+        (
+            "findings",
+            of(tables.findings.iter().map(|t| t.0.len()).collect()),
+        ),
         ("curves", of(vec![tables.curves.0.len()])),
     ]
 }

@@ -27,17 +27,31 @@ const CURVE: usize = 240;
 
 /// One axis for all steps, or the pictures could not be compared.
 fn scale(all: &[StepErrors]) -> Scale {
-    let upper = all.iter().filter_map(|e| e.sorted_mm.last()).fold(0.0, |a: f64, b| a.max(*b));
+    let upper = all
+        .iter()
+        .filter_map(|e| e.sorted_mm.last())
+        .fold(0.0, |a: f64, b| a.max(*b));
     // The smallest single error is luck: the axis starts where the fifth percentile of the best step is.
-    let lower = all.iter().filter_map(|e| e.sorted_mm.get(e.sorted_mm.len() / 20)).fold(upper, |a: f64, b| a.min(*b));
+    let lower = all
+        .iter()
+        .filter_map(|e| e.sorted_mm.get(e.sorted_mm.len() / 20))
+        .fold(upper, |a: f64, b| a.min(*b));
     Scale::positive(lower, upper)
 }
 
 /// Points per equal bin (equal on the axis as drawn), a row per step, one height scale for all.
 pub(super) fn histogram(all: &[StepErrors], title: &str) -> String {
-    let area = Area { left: 16.0, top: TOP, right: WIDTH - 12.0, bottom: TOP + ROW * all.len() as f64 };
+    let area = Area {
+        left: 16.0,
+        top: TOP,
+        right: WIDTH - 12.0,
+        bottom: TOP + ROW * all.len() as f64,
+    };
     let scale = scale(all).over(area.left, area.right);
-    let counts: Vec<[usize; BINS]> = all.iter().map(|errors| bins(&errors.sorted_mm, scale, area)).collect();
+    let counts: Vec<[usize; BINS]> = all
+        .iter()
+        .map(|errors| bins(&errors.sorted_mm, scale, area))
+        .collect();
     let highest = counts.iter().flatten().copied().max().unwrap_or(1).max(1) as f64;
     let mut svg = Svg::new(WIDTH, area.bottom + 38.0);
     scale.grid_x(&mut svg, area, 7);
@@ -52,15 +66,28 @@ pub(super) fn histogram(all: &[StepErrors], title: &str) -> String {
                 [width - 0.8, height],
             );
         }
-        baseline(&mut svg, Area { bottom: foot, ..area });
+        baseline(
+            &mut svg,
+            Area {
+                bottom: foot,
+                ..area
+            },
+        );
         let mean = scale.at(errors.mean_mm);
         svg.line("mean", [mean, foot - ROW + 22.0], [mean, foot]);
         svg.name("name", [area.left, foot - ROW + 18.0], &errors.step);
         // Clear of the name on the left, and of the edge on the right.
         let clear = area.left + GLYPH * errors.step.chars().count() as f64 + 8.0;
-        let (class, x) =
-            if mean > (area.left + area.right) / 2.0 { ("value end", mean - 4.0) } else { ("value", clear.max(mean + 4.0)) };
-        svg.text(class, [x, foot - ROW + 18.0], &format!("mean {}", mm(errors.mean_mm)));
+        let (class, x) = if mean > (area.left + area.right) / 2.0 {
+            ("value end", mean - 4.0)
+        } else {
+            ("value", clear.max(mean + 4.0))
+        };
+        svg.text(
+            class,
+            [x, foot - ROW + 18.0],
+            &format!("mean {}", mm(errors.mean_mm)),
+        );
     }
     name_x(&mut svg, area, "position error, mm");
     svg.finish(title)
@@ -77,7 +104,12 @@ fn bins(errors: &[f64], scale: Scale, area: Area) -> [usize; BINS] {
 
 /// Share of the points whose error is at most so large, a curve per step.
 pub(super) fn cumulative(all: &[StepErrors], title: &str) -> String {
-    let area = Area { left: 44.0, top: 26.0, right: WIDTH - 12.0, bottom: (TOP + ROW * all.len() as f64).clamp(190.0, 330.0) };
+    let area = Area {
+        left: 44.0,
+        top: 26.0,
+        right: WIDTH - 12.0,
+        bottom: (TOP + ROW * all.len() as f64).clamp(190.0, 330.0),
+    };
     let scale = scale(all).over(area.left, area.right);
     let share = Scale::linear(0.0, 100.0).over(area.bottom, area.top);
     let mut svg = Svg::new(WIDTH, area.bottom + 38.0);
@@ -90,11 +122,26 @@ pub(super) fn cumulative(all: &[StepErrors], title: &str) -> String {
         let count = errors.sorted_mm.len();
         let every = count.div_ceil(CURVE).max(1);
         let mut line = vec![[scale.at(errors.sorted_mm[0]), share.at(0.0)]];
-        for (k, error) in errors.sorted_mm.iter().enumerate().filter(|(k, _)| k % every == every - 1 || k + 1 == count) {
-            line.push([scale.at(*error), share.at(100.0 * (k + 1) as f64 / count as f64)]);
+        for (k, error) in errors
+            .sorted_mm
+            .iter()
+            .enumerate()
+            .filter(|(k, _)| k % every == every - 1 || k + 1 == count)
+        {
+            line.push([
+                scale.at(*error),
+                share.at(100.0 * (k + 1) as f64 / count as f64),
+            ]);
         }
         line.push([area.right, share.at(100.0)]);
-        svg.path(&format!("curve {}{}", errors.colour, if i + 1 == all.len() { " last" } else { "" }), &line);
+        svg.path(
+            &format!(
+                "curve {}{}",
+                errors.colour,
+                if i + 1 == all.len() { " last" } else { "" }
+            ),
+            &line,
+        );
     }
     baseline(&mut svg, area);
     name_x(&mut svg, area, "position error, mm");

@@ -20,17 +20,36 @@ pub(super) struct Steps {
 impl Steps {
     /// `standing` is the step that the report speaks of; without one, the last.
     pub fn new(statistics: &Statistics, standing: Option<&str>) -> Self {
-        let names: BTreeMap<i64, String> = statistics.0.iter().map(|row| (row.order, row.step.clone())).collect();
-        let named = names.iter().rev().find(|(_, name)| Some(name.as_str()) == standing).or(names.last_key_value());
-        Self { standing: named.map(|(order, _)| *order), names, withdrawn: BTreeSet::new() }
+        let names: BTreeMap<i64, String> = statistics
+            .0
+            .iter()
+            .map(|row| (row.order, row.step.clone()))
+            .collect();
+        let named = names
+            .iter()
+            .rev()
+            .find(|(_, name)| Some(name.as_str()) == standing)
+            .or(names.last_key_value());
+        Self {
+            standing: named.map(|(order, _)| *order),
+            names,
+            withdrawn: BTreeSet::new(),
+        }
     }
     /// The same with steps that do not stand.
     pub fn without(self, withdrawn: &[Withdrawn]) -> Self {
-        Self { withdrawn: withdrawn.iter().map(|gone| gone.step.clone()).collect(), ..self }
+        Self {
+            withdrawn: withdrawn.iter().map(|gone| gone.step.clone()).collect(),
+            ..self
+        }
     }
     /// How a step is called where its figures stand.
     fn called(&self, step: &str) -> String {
-        if self.withdrawn.contains(step) { format!("{step} (withdrawn)") } else { step.into() }
+        if self.withdrawn.contains(step) {
+            format!("{step} (withdrawn)")
+        } else {
+            step.into()
+        }
     }
     pub fn standing(&self) -> Option<i64> {
         self.standing
@@ -45,7 +64,12 @@ impl Steps {
     }
     /// Colour of a step by name; a step without predictions has the first one's.
     pub fn colour_of(&self, step: &str) -> String {
-        let order = self.names.iter().rev().find(|(_, name)| *name == step).map_or(0, |(order, _)| *order);
+        let order = self
+            .names
+            .iter()
+            .rev()
+            .find(|(_, name)| *name == step)
+            .map_or(0, |(order, _)| *order);
         self.colour(order)
     }
 }
@@ -53,28 +77,43 @@ impl Steps {
 /// What is left out together, beside parts drawn at random.
 fn blocks(rows: &[StatisticsRow]) -> &'static str {
     let folded = || rows.iter().filter(|row| row.fold_rms_mm.is_some());
-    match (folded().any(StatisticsRow::is_brought), folded().all(StatisticsRow::is_brought)) {
+    match (
+        folded().any(StatisticsRow::is_brought),
+        folded().all(StatisticsRow::is_brought),
+    ) {
         (true, true) => "whole places",
         (true, false) => "contiguous parts of the recording; whole places",
         (false, _) => "contiguous parts of the recording",
     }
 }
 
-pub(super) fn errors_section(tables: &Tables, steps: &Steps, wished: Option<&str>) -> Result<Value> {
+pub(super) fn errors_section(
+    tables: &Tables,
+    steps: &Steps,
+    wished: Option<&str>,
+) -> Result<Value> {
     let rows = &tables.statistics.0;
-    let mut last: Vec<&StatisticsRow> = rows.iter().filter(|r| Some(r.order) == steps.standing() && r.held_out).collect();
+    let mut last: Vec<&StatisticsRow> = rows
+        .iter()
+        .filter(|r| Some(r.order) == steps.standing() && r.held_out)
+        .collect();
     if let Some(wished) = wished
         && !last.iter().any(|row| row.set == wished)
     {
         let allowed: Vec<&str> = last.iter().map(|row| row.set.as_str()).collect();
         return Err(Error::spec(
             "with.set",
-            format!("`{wished}` is not a held-out set of the step that the run uses; allowed: {}", allowed.join(", ")),
+            format!(
+                "`{wished}` is not a held-out set of the step that the run uses; allowed: {}",
+                allowed.join(", ")
+            ),
         ));
     }
     last.sort_by_key(|row| (wished != Some(&row.set), -row.points, row.set.clone()));
     let kept: Vec<&str> = last.iter().map(|row| row.set.as_str()).collect();
-    let later = sets(rows, true).into_iter().filter(|set| !kept.contains(set));
+    let later = sets(rows, true)
+        .into_iter()
+        .filter(|set| !kept.contains(set));
     let block = |set: &str, held_out: bool, note| {
         json!({
             "set": set,
@@ -83,7 +122,13 @@ pub(super) fn errors_section(tables: &Tables, steps: &Steps, wished: Option<&str
         })
     };
     let held_out = kept.iter().map(|set| block(set, true, None));
-    let used = later.map(|set| block(set, true, Some("held out until a later step was fitted to it")));
+    let used = later.map(|set| {
+        block(
+            set,
+            true,
+            Some("held out until a later step was fitted to it"),
+        )
+    });
     Ok(json!({
         "verdict": match wrong_setup(tables) {
             Some(_) => nothing_known("Nothing is calibrated before the set-up is right.".into()),
@@ -104,8 +149,13 @@ pub(super) fn errors_section(tables: &Tables, steps: &Steps, wished: Option<&str
 }
 
 fn unfolded(tables: &Tables) -> Vec<(String, String)> {
-    let rows = tables.observability.iter().flat_map(|table| &table.0).filter(|row| row.quantity == UNFOLDED);
-    rows.map(|row| (row.step.clone(), count(row.value as i64))).collect()
+    let rows = tables
+        .observability
+        .iter()
+        .flat_map(|table| &table.0)
+        .filter(|row| row.quantity == UNFOLDED);
+    rows.map(|row| (row.step.clone(), count(row.value as i64)))
+        .collect()
 }
 
 /// Names of sets of this kind, in the order of their first row.
@@ -180,12 +230,21 @@ fn beside(row: &StatisticsRow) -> Option<Value> {
 }
 
 /// The first step with held-out rows of the same set as `after`.
-pub(super) fn before<'a>(rows: &'a [StatisticsRow], after: &StatisticsRow) -> Option<&'a StatisticsRow> {
-    rows.iter().filter(|r| r.held_out && r.set == after.set && r.order < after.order).min_by_key(|r| r.order)
+pub(super) fn before<'a>(
+    rows: &'a [StatisticsRow],
+    after: &StatisticsRow,
+) -> Option<&'a StatisticsRow> {
+    rows.iter()
+        .filter(|r| r.held_out && r.set == after.set && r.order < after.order)
+        .min_by_key(|r| r.order)
 }
 
 fn points(number: i64) -> String {
-    if number == 1 { "one point".into() } else { format!("{} points", count(number)) }
+    if number == 1 {
+        "one point".into()
+    } else {
+        format!("{} points", count(number))
+    }
 }
 
 /// A sentence without figures.
@@ -200,24 +259,47 @@ fn verdict(rows: &[StatisticsRow], last: &[&StatisticsRow], withdrawn: &[Withdra
         return nothing_known(sentence.into());
     };
     let before_row = before(rows, after);
-    let sample = format!("{} of the set \u{201c}{}\u{201d}, to which nothing was fitted", points(after.points), after.set);
+    let sample = format!(
+        "{} of the set \u{201c}{}\u{201d}, to which nothing was fitted",
+        points(after.points),
+        after.set
+    );
     let sentence = match before_row {
         Some(before) if after.mean_mm < before.mean_mm => {
-            format!("The mean position error fell from {} mm to {} mm on {sample}.", mm(before.mean_mm), mm(after.mean_mm))
+            format!(
+                "The mean position error fell from {} mm to {} mm on {sample}.",
+                mm(before.mean_mm),
+                mm(after.mean_mm)
+            )
         }
         Some(before) => format!(
             "The calibration did not help: the mean position error went from {} mm to {} mm on {sample}.",
             mm(before.mean_mm),
             mm(after.mean_mm)
         ),
-        None => format!("The mean position error is {} mm on {sample}.", mm(after.mean_mm)),
+        None => format!(
+            "The mean position error is {} mm on {sample}.",
+            mm(after.mean_mm)
+        ),
     };
-    let uneven = before_row.filter(|before| before.points != after.points).map(|before| {
-        format!("Before, the set had {} held-out points; the two means are not of the same points.", count(before.points))
-    });
+    let uneven = before_row
+        .filter(|before| before.points != after.points)
+        .map(|before| {
+            format!(
+                "Before, the set had {} held-out points; the two means are not of the same points.",
+                count(before.points)
+            )
+        });
     let other = |row: &&StatisticsRow| {
-        let from = before(rows, row).map_or_else(String::new, |before| format!("{} mm \u{2192} ", mm(before.mean_mm)));
-        format!("Set \u{201c}{}\u{201d} ({} held-out points): mean {from}{} mm.", row.set, count(row.points), mm(row.mean_mm))
+        let from = before(rows, row).map_or_else(String::new, |before| {
+            format!("{} mm \u{2192} ", mm(before.mean_mm))
+        });
+        format!(
+            "Set \u{201c}{}\u{201d} ({} held-out points): mean {from}{} mm.",
+            row.set,
+            count(row.points),
+            mm(row.mean_mm)
+        )
     };
     json!({
         "sentence": sentence,
@@ -230,14 +312,23 @@ fn verdict(rows: &[StatisticsRow], last: &[&StatisticsRow], withdrawn: &[Withdra
 }
 
 fn picture(tables: &Tables, set: &StatisticsRow, steps: &Steps) -> Value {
-    let rows = tables.statistics.0.iter().filter(|row| row.held_out && row.set == set.set);
+    let rows = tables
+        .statistics
+        .0
+        .iter()
+        .filter(|row| row.held_out && row.set == set.set);
     let errors: Vec<distribution::StepErrors> = rows
         .map(|row| {
             let table = tables.prediction.iter().flat_map(|table| &table.0);
             let of_row = table.filter(|p| p.step == row.step && p.set == row.set && p.held_out);
             let mut sorted_mm: Vec<f64> = of_row.map(|p| p.error_mm).collect();
             sorted_mm.sort_by(f64::total_cmp);
-            distribution::StepErrors { step: row.step.clone(), colour: steps.colour(row.order), sorted_mm, mean_mm: row.mean_mm }
+            distribution::StepErrors {
+                step: row.step.clone(),
+                colour: steps.colour(row.order),
+                sorted_mm,
+                mean_mm: row.mean_mm,
+            }
         })
         .filter(|errors| !errors.sorted_mm.is_empty())
         .collect();
@@ -250,10 +341,18 @@ fn picture(tables: &Tables, set: &StatisticsRow, steps: &Steps) -> Value {
 }
 
 /// Nothing where nothing was predicted.
-pub(super) fn workspace_section(prediction: &[Prediction], standing: Option<&str>) -> Option<Value> {
+pub(super) fn workspace_section(
+    prediction: &[Prediction],
+    standing: Option<&str>,
+) -> Option<Value> {
     let mut filled = prediction.iter().filter(|table| !table.0.is_empty());
     let first = filled.next()?;
-    let is = |table: &&Prediction| table.0.first().is_some_and(|row| Some(row.step.as_str()) == standing);
+    let is = |table: &&Prediction| {
+        table
+            .0
+            .first()
+            .is_some_and(|row| Some(row.step.as_str()) == standing)
+    };
     let last = filled.clone().rfind(is).or_else(|| filled.next_back());
     let colours = Colours::new(first, last.unwrap_or(first));
     let mut panels = Vec::new();
@@ -261,7 +360,8 @@ pub(super) fn workspace_section(prediction: &[Prediction], standing: Option<&str
         for table in std::iter::once(first).chain(last) {
             let step = table.0.first().map_or("", |row| &row.step);
             let name = format!("{} after \u{201c}{step}\u{201d}", view.name);
-            let (svg, remark) = scatter(view, table, [first, last.unwrap_or(first)], &colours, &name);
+            let (svg, remark) =
+                scatter(view, table, [first, last.unwrap_or(first)], &colours, &name);
             panels.push(json!({ "name": name, "remark": remark, "svg": svg }));
         }
     }

@@ -8,18 +8,32 @@ use crate::table::{FitRow, ObservabilityRow, TrainingRow};
 use serde_json::{Value, json};
 
 pub(super) fn section(tables: &Tables, steps: &Steps) -> Value {
-    let fits = groups(tables.fit.iter().flat_map(|t| &t.0), |row: &FitRow| row.step.clone());
+    let fits = groups(tables.fit.iter().flat_map(|t| &t.0), |row: &FitRow| {
+        row.step.clone()
+    });
     let lines: Vec<Line> = fits
         .iter()
         .map(|(step, rows)| Line {
             colour: steps.colour_of(step),
-            points: rows.iter().map(|row| [row.iteration as f64, row.rms_mm]).collect(),
+            points: rows
+                .iter()
+                .map(|row| [row.iteration as f64, row.rms_mm])
+                .collect(),
         })
         .collect();
     // The networks of an ensemble differ by chance alone: the swarm and the first of them tell how training went.
-    let courses = tables.training.iter().flat_map(|t| &t.0).filter(|row| row.member <= 1);
-    let trainings = groups(courses, |row: &TrainingRow| (row.step.clone(), row.phase.clone()));
-    let seen = groups(tables.observability.iter().flat_map(|t| &t.0), |row: &ObservabilityRow| row.step.clone());
+    let courses = tables
+        .training
+        .iter()
+        .flat_map(|t| &t.0)
+        .filter(|row| row.member <= 1);
+    let trainings = groups(courses, |row: &TrainingRow| {
+        (row.step.clone(), row.phase.clone())
+    });
+    let seen = groups(
+        tables.observability.iter().flat_map(|t| &t.0),
+        |row: &ObservabilityRow| row.step.clone(),
+    );
     json!({
         "courses": (!lines.is_empty())
             .then(|| course(&lines, "iteration", "rms over the rows of the fit, mm", "Convergence of the fits")),
@@ -31,7 +45,10 @@ pub(super) fn section(tables: &Tables, steps: &Steps) -> Value {
 }
 
 /// Rows by a key, in the order in which the keys first come.
-fn groups<'a, R, K: PartialEq>(rows: impl Iterator<Item = &'a R>, key: impl Fn(&R) -> K) -> Vec<(K, Vec<&'a R>)> {
+fn groups<'a, R, K: PartialEq>(
+    rows: impl Iterator<Item = &'a R>,
+    key: impl Fn(&R) -> K,
+) -> Vec<(K, Vec<&'a R>)> {
     let mut groups: Vec<(K, Vec<&R>)> = Vec::new();
     for row in rows {
         let key = key(row);
@@ -56,9 +73,15 @@ fn fit(step: &str, last: &FitRow) -> Value {
 }
 
 fn see(step: String, rows: &[&ObservabilityRow]) -> Value {
-    let values: Vec<(i64, f64)> =
-        rows.iter().filter(|row| row.quantity == "singular_value").map(|row| (row.index, row.value)).collect();
-    let meaning = rows.iter().find(|row| row.quantity == "singular_value").map_or("", |row| &row.meaning);
+    let values: Vec<(i64, f64)> = rows
+        .iter()
+        .filter(|row| row.quantity == "singular_value")
+        .map(|row| (row.index, row.value))
+        .collect();
+    let meaning = rows
+        .iter()
+        .find(|row| row.quantity == "singular_value")
+        .map_or("", |row| &row.meaning);
     let others = rows.iter().filter(|row| row.quantity != "singular_value");
     json!({
         "spectrum": (!values.is_empty()).then(|| spectrum(&values, &format!("Singular values of the step {step}"))),
@@ -81,12 +104,18 @@ fn training(step: String, phase: String, rows: &[&TrainingRow]) -> Option<Value>
     let last = rows.last()?;
     let line = |colour: &str, value: fn(&TrainingRow) -> Option<f64>| Line {
         colour: colour.into(),
-        points: rows.iter().filter_map(|row| Some([row.generation as f64, value(row)?])).collect(),
+        points: rows
+            .iter()
+            .filter_map(|row| Some([row.generation as f64, value(row)?]))
+            .collect(),
     };
-    let lines: Vec<Line> = [line("train", |row| Some(row.train_rms_mm)), line("check", |row| row.check_rms_mm)]
-        .into_iter()
-        .filter(|line| !line.points.is_empty())
-        .collect();
+    let lines: Vec<Line> = [
+        line("train", |row| Some(row.train_rms_mm)),
+        line("check", |row| row.check_rms_mm),
+    ]
+    .into_iter()
+    .filter(|line| !line.points.is_empty())
+    .collect();
     Some(json!({
         "svg": course(&lines, "generation", "rms of the position error, mm", &format!("Training of {step}, {phase}")),
         "last": count(last.generation),

@@ -8,12 +8,18 @@ use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
 /// The page; `links` are the robots' own reports, relative to it.
-pub fn html(name: &str, fleet: &FleetTable, changes: &FleetChanges, links: &BTreeMap<String, String>) -> Result<String> {
+pub fn html(
+    name: &str,
+    fleet: &FleetTable,
+    changes: &FleetChanges,
+    links: &BTreeMap<String, String>,
+) -> Result<String> {
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     for row in &fleet.0 {
         *counts.entry(&row.status).or_default() += 1;
     }
-    let mut rows: Vec<(Option<(u8, String)>, &FleetRow)> = fleet.0.iter().map(|row| (needs(row), row)).collect();
+    let mut rows: Vec<(Option<(u8, String)>, &FleetRow)> =
+        fleet.0.iter().map(|row| (needs(row), row)).collect();
     // Robots that need nobody come last, in the order of the fleet.
     rows.sort_by_key(|(needs, _)| needs.as_ref().map_or(u8::MAX, |(urgency, _)| *urgency));
     let urgent = rows.iter().filter_map(|(needs, row)| {
@@ -57,18 +63,38 @@ fn needs(row: &FleetRow) -> Option<(u8, String)> {
     if row.verdict.as_deref() == Some("wrong_setup") {
         return Some((1, reason("its set-up is wrong", row.causes.as_deref())));
     }
-    if row.before_rms_mm.zip(row.after_rms_mm).is_some_and(|(before, after)| after >= before) {
+    if row
+        .before_rms_mm
+        .zip(row.after_rms_mm)
+        .is_some_and(|(before, after)| after >= before)
+    {
         return Some((2, "the calibration did not make it more accurate".into()));
     }
     if let Some(flags) = &row.flags {
-        return Some((3, reason("changed beyond its limits since the last calibration", Some(flags))));
+        return Some((
+            3,
+            reason(
+                "changed beyond its limits since the last calibration",
+                Some(flags),
+            ),
+        ));
     }
-    (row.verdict.as_deref() == Some("unexplained")).then(|| (4, reason("its error is not explained", row.causes.as_deref())))
+    (row.verdict.as_deref() == Some("unexplained")).then(|| {
+        (
+            4,
+            reason("its error is not explained", row.causes.as_deref()),
+        )
+    })
 }
 
 fn row<'a>(row: &'a FleetRow, links: &'a BTreeMap<String, String>) -> Value {
-    let figure = |value: Option<f64>| value.map(|value| json!({ "shown": format!("{value:.3}"), "value": value }));
-    let group: Vec<&str> = [&row.model, &row.plant, &row.campaign].into_iter().filter_map(|group| group.as_deref()).collect();
+    let figure = |value: Option<f64>| {
+        value.map(|value| json!({ "shown": format!("{value:.3}"), "value": value }))
+    };
+    let group: Vec<&str> = [&row.model, &row.plant, &row.campaign]
+        .into_iter()
+        .filter_map(|group| group.as_deref())
+        .collect();
     json!({
         "name": visible(&row.robot),
         "link": links.get(&row.robot).map(String::as_str),
@@ -88,7 +114,11 @@ fn row<'a>(row: &'a FleetRow, links: &'a BTreeMap<String, String>) -> Value {
 }
 
 fn change(row: &crate::table::FleetChangeRow) -> Value {
-    let (factor, unit) = if row.unit == "rad" { (180.0 / std::f64::consts::PI, "deg") } else { (1.0, row.unit.as_str()) };
+    let (factor, unit) = if row.unit == "rad" {
+        (180.0 / std::f64::consts::PI, "deg")
+    } else {
+        (1.0, row.unit.as_str())
+    };
     let show = |value: f64| format!("{:.3e}", value * factor);
     json!({
         "robot": visible(&row.robot),
@@ -107,16 +137,27 @@ const SIZE: [f64; 2] = [72.0, 18.0];
 
 /// The error after every step on a logarithmic scale, with the noise as a line below.
 fn spark(course: &str, floor: Option<f64>) -> Option<String> {
-    let values: Vec<f64> = course.split(' ').filter_map(|value| value.parse::<f64>().ok()).filter(|value| *value > 0.0).collect();
+    let values: Vec<f64> = course
+        .split(' ')
+        .filter_map(|value| value.parse::<f64>().ok())
+        .filter(|value| *value > 0.0)
+        .collect();
     if values.len() < 2 {
         return None;
     }
     let floor = floor.filter(|floor| *floor > 0.0);
     let all = || values.iter().copied().chain(floor);
-    let (low, high) = (all().fold(f64::INFINITY, f64::min).ln(), all().fold(0.0, f64::max).ln());
+    let (low, high) = (
+        all().fold(f64::INFINITY, f64::min).ln(),
+        all().fold(0.0, f64::max).ln(),
+    );
     let height = |value: f64| 1.0 + (SIZE[1] - 2.0) * (high - value.ln()) / (high - low).max(1e-9);
     let step = (SIZE[0] - 4.0) / (values.len() - 1) as f64;
-    let points: Vec<[f64; 2]> = values.iter().enumerate().map(|(i, value)| [2.0 + step * i as f64, height(*value)]).collect();
+    let points: Vec<[f64; 2]> = values
+        .iter()
+        .enumerate()
+        .map(|(i, value)| [2.0 + step * i as f64, height(*value)])
+        .collect();
     let mut svg = Svg::new(SIZE[0], SIZE[1]);
     if let Some(floor) = floor {
         svg.line("floor", [0.0, height(floor)], [SIZE[0], height(floor)]);

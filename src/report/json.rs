@@ -7,7 +7,12 @@ use crate::table::{FormRow, VerdictTopic};
 use serde_json::{Value, json};
 
 /// The document; `judgement` is that of the page.
-pub(super) fn document(tables: &Tables, options: &ReportOptions, title: &str, judgement: Option<&Judgement>) -> Result<String> {
+pub(super) fn document(
+    tables: &Tables,
+    options: &ReportOptions,
+    title: &str,
+    judgement: Option<&Judgement>,
+) -> Result<String> {
     let statistics = tables.statistics.0.iter().map(|row| {
         json!({
             "step": row.step, "set": row.set, "held_out": row.held_out, "points": row.points, "mean_mm": row.mean_mm, "std_mm": row.std_mm,
@@ -66,7 +71,9 @@ pub(super) fn document(tables: &Tables, options: &ReportOptions, title: &str, ju
         "suspects": tables.suspects.iter().map(|table| table.0.len()).sum::<usize>(),
         "tables": options.hashes.iter().map(|(kind, hash)| json!({ "table": kind, "content": hash })).collect::<Vec<_>>(),
     });
-    serde_json::to_string_pretty(&document).map(|text| text + "\n").map_err(|error| Error::Bug(error.to_string()))
+    serde_json::to_string_pretty(&document)
+        .map(|text| text + "\n")
+        .map_err(|error| Error::Bug(error.to_string()))
 }
 
 fn form(rows: &[FormRow]) -> Value {

@@ -33,9 +33,9 @@ pub use torques::{TorqueTables, torque_page};
 
 use crate::error::Result;
 use crate::table::{
-    Acceptance, Cells, Corrections, Curves, FindingNumbers, Findings, Fit, Forms, Intake, Observability, Parameters, Prediction,
-    Recording, Rejected, Rivals, Robot, Split, Statistics, Suspects, Training, Verdict, VerdictSentences, VerdictTopic,
-    Withdrawn,
+    Acceptance, Cells, Corrections, Curves, FindingNumbers, Findings, Fit, Forms, Intake,
+    Observability, Parameters, Prediction, Recording, Rejected, Rivals, Robot, Split, Statistics,
+    Suspects, Training, Verdict, VerdictSentences, VerdictTopic, Withdrawn,
 };
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -95,7 +95,10 @@ pub struct Tables {
 impl Tables {
     /// What the diagnosis of a step says of a topic.
     fn said(&self, step: &str, topic: VerdictTopic) -> Vec<&str> {
-        self.sentences.iter().flat_map(|table| table.about(step, topic)).collect()
+        self.sentences
+            .iter()
+            .flat_map(|table| table.about(step, topic))
+            .collect()
     }
 }
 
@@ -127,10 +130,13 @@ pub struct Pages {
 
 /// The report; fails where `options.set` is no held-out set.
 pub fn pages(tables: &Tables, options: &ReportOptions) -> Result<Pages> {
-    let steps = errors::Steps::new(&tables.statistics, tables.standing.as_deref()).without(&tables.withdrawn);
+    let steps = errors::Steps::new(&tables.statistics, tables.standing.as_deref())
+        .without(&tables.withdrawn);
     let robot = data::robot_name(&tables.robot);
     let judgement = limits::Judgement::new(tables, &options.limits, options.set);
-    let title = options.title.map_or_else(|| format!("Calibration of {robot}"), str::to_owned);
+    let title = options
+        .title
+        .map_or_else(|| format!("Calibration of {robot}"), str::to_owned);
     let json = json::document(tables, options, &title, judgement.as_ref())?;
     let choices = [("title", options.title), ("set", options.set)];
     let page = json!({
@@ -153,6 +159,14 @@ pub fn pages(tables: &Tables, options: &ReportOptions) -> Result<Pages> {
         "robot": robot,
     });
     let html = page::render("report.html", include_str!("report.html"), &page)?;
-    let acceptance = Acceptance(judgement.map(|judgement| judgement.limits).unwrap_or_default());
-    Ok(Pages { html: options.language.page(html).html, json, acceptance })
+    let acceptance = Acceptance(
+        judgement
+            .map(|judgement| judgement.limits)
+            .unwrap_or_default(),
+    );
+    Ok(Pages {
+        html: options.language.page(html).html,
+        json,
+        acceptance,
+    })
 }

@@ -20,7 +20,11 @@ pub(super) fn mm(value: f64) -> String {
 /// With a sign, for a change; none where it rounds to zero.
 pub(super) fn signed(value: f64, decimals: usize) -> String {
     let text = fixed(value, decimals);
-    if value > 0.0 && text.contains(|c: char| ('1'..='9').contains(&c)) { format!("+{text}") } else { text }
+    if value > 0.0 && text.contains(|c: char| ('1'..='9').contains(&c)) {
+        format!("+{text}")
+    } else {
+        text
+    }
 }
 
 /// To so many significant digits, in powers of ten where that is shorter.
@@ -39,8 +43,16 @@ pub(super) fn significant(value: f64, digits: usize) -> String {
 /// The same without trailing zeros, for a number that is to be copied.
 pub(super) fn exact(value: f64, digits: usize) -> String {
     let text = significant(value, digits);
-    let (number, power) = text.split_once('e').map_or((text.as_str(), None), |(number, power)| (number, Some(power)));
-    let short = if number.contains('.') { number.trim_end_matches('0').trim_end_matches('.') } else { number };
+    let (number, power) = text
+        .split_once('e')
+        .map_or((text.as_str(), None), |(number, power)| {
+            (number, Some(power))
+        });
+    let short = if number.contains('.') {
+        number.trim_end_matches('0').trim_end_matches('.')
+    } else {
+        number
+    };
     power.map_or_else(|| short.to_owned(), |power| format!("{short}e{power}"))
 }
 
@@ -68,16 +80,35 @@ pub(super) struct UnitFormat {
 /// Readings of a value and of a small change of it (degrees, but arcseconds), by the symbol of the stored unit.
 pub(super) fn readings(stored: &str) -> Option<(UnitFormat, UnitFormat)> {
     let unit = Unit::parse(stored)?;
-    let reading = |factor: f64, symbol, decimals| UnitFormat { factor, symbol, decimals };
-    let into = |people: Unit, decimals| reading(unit.to_si(1.0) / people.to_si(1.0), people.symbol(), decimals);
-    let per = |symbol, decimals| reading(unit.to_si(1.0) / Unit::Arcsecond.to_si(1.0), symbol, decimals);
+    let reading = |factor: f64, symbol, decimals| UnitFormat {
+        factor,
+        symbol,
+        decimals,
+    };
+    let into = |people: Unit, decimals| {
+        reading(
+            unit.to_si(1.0) / people.to_si(1.0),
+            people.symbol(),
+            decimals,
+        )
+    };
+    let per = |symbol, decimals| {
+        reading(
+            unit.to_si(1.0) / Unit::Arcsecond.to_si(1.0),
+            symbol,
+            decimals,
+        )
+    };
     let same = |reading| Some((reading, reading));
     match unit.quantity() {
         Quantity::Length => same(into(Unit::Millimetre, MM)),
         Quantity::Angle => Some((into(Unit::Degree, 4), into(Unit::Arcsecond, 1))),
         Quantity::Compliance => same(per("arcsec/Nm", 4)),
         Quantity::CurrentCompliance => same(per("arcsec/A", 3)),
-        Quantity::Number => Some((reading(1.0, "", 6), reading(1e6, "\u{d7}10\u{207b}\u{2076}", 1))),
+        Quantity::Number => Some((
+            reading(1.0, "", 6),
+            reading(1e6, "\u{d7}10\u{207b}\u{2076}", 1),
+        )),
         _ => same(reading(1.0, unit.symbol(), 4)),
     }
 }
@@ -112,15 +143,24 @@ mod tests {
             [0.0, 812.44, 0.0183, 1e-5, 4.2e9].map(|v| significant(v, 4)),
             ["0", "812.4", "0.01830", "1.000e-5", "4.200e9"]
         );
-        assert_eq!([12.5, 0.0, 120.0, 8.2e-7].map(|v| exact(v, 9)), ["12.5", "0", "120", "8.2e-7"]);
-        assert_eq!([7, -1234, 10_000_000].map(count), ["7", "-1\u{202f}234", "10\u{202f}000\u{202f}000"]);
+        assert_eq!(
+            [12.5, 0.0, 120.0, 8.2e-7].map(|v| exact(v, 9)),
+            ["12.5", "0", "120", "8.2e-7"]
+        );
+        assert_eq!(
+            [7, -1234, 10_000_000].map(count),
+            ["7", "-1\u{202f}234", "10\u{202f}000\u{202f}000"]
+        );
     }
 
     #[test]
     fn angles_read_in_degrees_and_their_changes_in_arcseconds() {
         let (coarse, fine) = readings("rad").expect("a unit of the tables");
         let sigma = Some(1e-7);
-        assert_eq!(coarse.show(std::f64::consts::FRAC_PI_2, coarse.decimals_for(None)), "90.0000");
+        assert_eq!(
+            coarse.show(std::f64::consts::FRAC_PI_2, coarse.decimals_for(None)),
+            "90.0000"
+        );
         // A sigma of 0.0206 arcsec is shown with two digits.
         assert_eq!(fine.show(1e-7, fine.decimals_for(sigma)), "0.021");
         assert_eq!((coarse.symbol, fine.symbol), ("deg", "arcsec"));

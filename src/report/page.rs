@@ -20,6 +20,9 @@ pub(super) fn render(name: &str, template: &str, page: &impl Serialize) -> Resul
 /// A statement as a sentence.
 pub(super) fn sentence_case(statement: &str) -> String {
     let mut letters = statement.chars();
-    let first = letters.next().map(|letter| letter.to_uppercase().to_string()).unwrap_or_default();
+    let first = letters
+        .next()
+        .map(|letter| letter.to_uppercase().to_string())
+        .unwrap_or_default();
     format!("{first}{}.", letters.as_str())
 }

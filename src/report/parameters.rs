@@ -6,12 +6,20 @@ use serde_json::{Value, json};
 
 pub(super) fn section(parameters: &Parameters, counting: Option<&str>) -> Value {
     let registered = parameters.effects();
-    let place = |row: &ParameterRow| registered.iter().position(|effect| *effect == row.effect).unwrap_or(registered.len());
+    let place = |row: &ParameterRow| {
+        registered
+            .iter()
+            .position(|effect| *effect == row.effect)
+            .unwrap_or(registered.len())
+    };
     let mut sorted: Vec<&ParameterRow> = parameters.0.iter().collect();
     sorted.sort_by_cached_key(|row| (place(row), row.effect.clone(), along_the_chain(&row.name)));
     let mut effects: Vec<(&str, Vec<&ParameterRow>)> = Vec::new();
     for &parameter in &sorted {
-        match effects.iter_mut().find(|(effect, _)| *effect == parameter.effect) {
+        match effects
+            .iter_mut()
+            .find(|(effect, _)| *effect == parameter.effect)
+        {
             Some((_, rows)) => rows.push(parameter),
             None => effects.push((&parameter.effect, vec![parameter])),
         }
@@ -22,7 +30,9 @@ pub(super) fn section(parameters: &Parameters, counting: Option<&str>) -> Value 
             "rows": rows.iter().map(|parameter| row(parameter, &rows)).collect::<Vec<_>>(),
         })
     });
-    let remarked = sorted.iter().filter(|p| p.remark.is_some() || p.status == "redundant" || p.status == "unseen");
+    let remarked = sorted
+        .iter()
+        .filter(|p| p.remark.is_some() || p.status == "redundant" || p.status == "unseen");
     let counting = counting.map(|difference| {
         format!(
             "Zeros, ratios and couplings of joints stand in the robot file's counting; the controller counts otherwise ({difference}), \
@@ -50,11 +60,17 @@ fn along_the_chain(name: &str) -> Vec<(bool, String, u64)> {
     let mut parts = Vec::new();
     let mut rest = name;
     while !rest.is_empty() {
-        let digits = rest.find(|c: char| c.is_ascii_digit()).unwrap_or(rest.len());
+        let digits = rest
+            .find(|c: char| c.is_ascii_digit())
+            .unwrap_or(rest.len());
         let (text, after) = rest.split_at(digits);
-        let end = after.find(|c: char| !c.is_ascii_digit()).unwrap_or(after.len());
+        let end = after
+            .find(|c: char| !c.is_ascii_digit())
+            .unwrap_or(after.len());
         let (number, next) = after.split_at(end);
-        let turn = [".rx", ".ry", ".rz"].iter().any(|turn| text.ends_with(turn));
+        let turn = [".rx", ".ry", ".rz"]
+            .iter()
+            .any(|turn| text.ends_with(turn));
         parts.push((turn, text.to_owned(), number.parse().unwrap_or(0)));
         rest = next;
     }
@@ -100,14 +116,18 @@ fn read(
 ) -> (String, String, String, String, String, String) {
     let decimals = |reading: UnitFormat| {
         let alike = group.iter().filter(|other| other.unit == p.unit);
-        alike.map(|other| reading.decimals_for(other.sigma)).max().unwrap_or_default()
+        alike
+            .map(|other| reading.decimals_for(other.sigma))
+            .max()
+            .unwrap_or_default()
     };
     (
         coarse.show(p.nominal, decimals(coarse)),
         coarse.show(p.value, decimals(coarse)),
         coarse.symbol.into(),
         fine.show_signed(p.change, decimals(fine)),
-        p.sigma.map_or_else(String::new, |s| fine.show(s, decimals(fine))),
+        p.sigma
+            .map_or_else(String::new, |s| fine.show(s, decimals(fine))),
         fine.symbol.into(),
     )
 }
@@ -118,8 +138,15 @@ mod tests {
 
     #[test]
     fn names_are_in_the_order_of_the_chain() {
-        let mut names = ["j.l10.x", "j.l2.rx", "j.l2.z", "j.j12_j3", "j.j12", "j.j2", "b.rx", "b.z"];
+        let mut names = [
+            "j.l10.x", "j.l2.rx", "j.l2.z", "j.j12_j3", "j.j12", "j.j2", "b.rx", "b.z",
+        ];
         names.sort_by_cached_key(|name| along_the_chain(name));
-        assert_eq!(names, ["b.z", "j.j2", "j.j12", "j.j12_j3", "j.l2.z", "j.l2.rx", "j.l10.x", "b.rx"]);
+        assert_eq!(
+            names,
+            [
+                "b.z", "j.j2", "j.j12", "j.j12_j3", "j.l2.z", "j.l2.rx", "j.l10.x", "b.rx"
+            ]
+        );
     }
 }

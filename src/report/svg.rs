@@ -13,7 +13,11 @@ pub(super) struct Svg {
 
 impl Svg {
     pub fn new(width: f64, height: f64) -> Self {
-        Self { width, height, body: String::new() }
+        Self {
+            width,
+            height,
+            body: String::new(),
+        }
     }
     pub fn line(&mut self, class: &str, from: SvgPoint, to: SvgPoint) {
         self.path(class, &[from, to]);
@@ -22,7 +26,13 @@ impl Svg {
     pub fn path(&mut self, class: &str, points: &[SvgPoint]) {
         let _ = write!(self.body, "<path class=\"{class}\" d=\"");
         for (i, point) in points.iter().enumerate() {
-            let _ = write!(self.body, "{}{} {}", if i == 0 { 'M' } else { 'L' }, tenth(point[0]), tenth(point[1]));
+            let _ = write!(
+                self.body,
+                "{}{} {}",
+                if i == 0 { 'M' } else { 'L' },
+                tenth(point[0]),
+                tenth(point[1])
+            );
         }
         self.body.push_str("\"/>\n");
     }
@@ -55,7 +65,11 @@ impl Svg {
     }
     fn words(&mut self, class: &str, more: &str, at: SvgPoint, text: &str) {
         let [x, y] = at.map(tenth);
-        let _ = writeln!(self.body, "<text class=\"{class}\"{more} x=\"{x}\" y=\"{y}\">{}</text>", escape(text));
+        let _ = writeln!(
+            self.body,
+            "<text class=\"{class}\"{more} x=\"{x}\" y=\"{y}\">{}</text>",
+            escape(text)
+        );
     }
     /// The `svg` element; `title` is what a screen reader says.
     pub fn finish(self, title: &str) -> String {

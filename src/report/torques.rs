@@ -6,9 +6,10 @@ use super::svg::Svg;
 use super::{data, page};
 use crate::error::{Error, Result};
 use crate::table::{
-    BodyConsistencies, BodyConsistencyRow, ContactRow, Contacts, FrictionCurveRow, FrictionCurves, InertialRow, Inertials,
-    JointTorqueRow, JointTorques, Robot, TorqueCourse, TorqueFindingRow, TorqueFindings, TorqueNumbers, TorqueRivals,
-    TorqueVerdict, TorqueVerdictRow, VerdictSentences, VerdictTopic,
+    BodyConsistencies, BodyConsistencyRow, ContactRow, Contacts, FrictionCurveRow, FrictionCurves,
+    InertialRow, Inertials, JointTorqueRow, JointTorques, Robot, TorqueCourse, TorqueFindingRow,
+    TorqueFindings, TorqueNumbers, TorqueRivals, TorqueVerdict, TorqueVerdictRow, VerdictSentences,
+    VerdictTopic,
 };
 use serde_json::{Value, json};
 
@@ -45,7 +46,8 @@ pub struct TorqueTables {
 /// The page; fails where the verdict is missing.
 pub fn torque_page(tables: &TorqueTables, title: Option<&str>) -> Result<String> {
     let verdict = tables.verdict.0.first();
-    let verdict = verdict.ok_or_else(|| Error::Bug("a diagnosis of torques without a verdict".into()))?;
+    let verdict =
+        verdict.ok_or_else(|| Error::Bug("a diagnosis of torques without a verdict".into()))?;
     let robot = data::robot_name(&tables.robot);
     let said = |topic| tables.sentences.about(&verdict.step, topic);
     let page = json!({
@@ -74,9 +76,15 @@ pub fn torque_page(tables: &TorqueTables, title: Option<&str>) -> Result<String>
 }
 
 fn facts(verdict: &TorqueVerdictRow) -> Vec<String> {
-    let rows = if verdict.held_out { "held-out rows" } else { "fitted rows (none are held out: flattered)" };
+    let rows = if verdict.held_out {
+        "held-out rows"
+    } else {
+        "fitted rows (none are held out: flattered)"
+    };
     let masses = match verdict.base_parameters {
-        Some(count) => format!("masses are identified freely, {count} numbers: their errors cannot be findings"),
+        Some(count) => format!(
+            "masses are identified freely, {count} numbers: their errors cannot be findings"
+        ),
         None => "masses are free within their declared tolerance".into(),
     };
     vec![
@@ -89,7 +97,11 @@ fn facts(verdict: &TorqueVerdictRow) -> Vec<String> {
         masses,
         format!(
             "recorded: {}; {} rows at {} Hz after a low-pass of {} Hz on both sides",
-            if verdict.signal == "current" { "motor currents" } else { "joint torques" },
+            if verdict.signal == "current" {
+                "motor currents"
+            } else {
+                "joint torques"
+            },
             count(verdict.rows),
             fixed(verdict.rate_hz, 1),
             fixed(verdict.cutoff_hz, 1)
@@ -99,12 +111,35 @@ fn facts(verdict: &TorqueVerdictRow) -> Vec<String> {
 
 fn findings(tables: &TorqueTables) -> Vec<Value> {
     let view = |row: &TorqueFindingRow| {
-        let numbers = tables.numbers.0.iter().filter(|number| number.rank == row.rank).map(|number| {
-            let sigma = number.sigma.map_or_else(String::new, |sigma| format!(" \u{b1} {}", significant(sigma, 2)));
-            format!("{} {}{sigma} {}", number.name, significant(number.value, 4), number.unit)
+        let numbers = tables
+            .numbers
+            .0
+            .iter()
+            .filter(|number| number.rank == row.rank)
+            .map(|number| {
+                let sigma = number.sigma.map_or_else(String::new, |sigma| {
+                    format!(" \u{b1} {}", significant(sigma, 2))
+                });
+                format!(
+                    "{} {}{sigma} {}",
+                    number.name,
+                    significant(number.value, 4),
+                    number.unit
+                )
+            });
+        let rivals = tables
+            .rivals
+            .0
+            .iter()
+            .filter(|rival| rival.rank == row.rank);
+        let rivals = rivals.map(|rival| {
+            format!(
+                "{} at {} {}",
+                rival.effect,
+                rival.place,
+                fixed(rival.probability, 2)
+            )
         });
-        let rivals = tables.rivals.0.iter().filter(|rival| rival.rank == row.rank);
-        let rivals = rivals.map(|rival| format!("{} at {} {}", rival.effect, rival.place, fixed(rival.probability, 2)));
         json!({
             "statement": row.statement,
             "probability": format!(
@@ -142,9 +177,21 @@ fn errors(joints: &JointTorques) -> Vec<Vec<String>> {
 
 fn contacts(contacts: &Contacts) -> Vec<Vec<String>> {
     let row = |row: &ContactRow| {
-        let force = [(row.force_x_n, row.sigma_x_n), (row.force_y_n, row.sigma_y_n), (row.force_z_n, row.sigma_z_n)];
-        let force = force.map(|(force, sigma)| format!("{} \u{b1} {}", significant(force, 3), significant(sigma, 2)));
-        vec![row.event.to_string(), fixed(row.start_s, 2), fixed(row.end_s, 2), row.joints.clone(), force.join(", ")]
+        let force = [
+            (row.force_x_n, row.sigma_x_n),
+            (row.force_y_n, row.sigma_y_n),
+            (row.force_z_n, row.sigma_z_n),
+        ];
+        let force = force.map(|(force, sigma)| {
+            format!("{} \u{b1} {}", significant(force, 3), significant(sigma, 2))
+        });
+        vec![
+            row.event.to_string(),
+            fixed(row.start_s, 2),
+            fixed(row.end_s, 2),
+            row.joints.clone(),
+            force.join(", "),
+        ]
     };
     contacts.0.iter().map(row).collect()
 }
@@ -154,7 +201,8 @@ fn inertials(inertials: &Inertials) -> Vec<Vec<String>> {
         vec![
             format!("link {}", row.link),
             row.quantity.clone(),
-            row.declared.map_or_else(String::new, |value| significant(value, 4)),
+            row.declared
+                .map_or_else(String::new, |value| significant(value, 4)),
             significant(row.value, 4),
             significant(row.sigma, 2),
             row.unit.clone(),
@@ -169,7 +217,8 @@ fn bodies(consistency: &BodyConsistencies) -> Vec<Vec<String>> {
             format!("link {}", row.link),
             significant(row.mass_kg, 4),
             significant(row.spread_kg_m2, 3),
-            row.sigma_kg_m2.map_or_else(String::new, |sigma| significant(sigma, 2)),
+            row.sigma_kg_m2
+                .map_or_else(String::new, |sigma| significant(sigma, 2)),
             match (row.enforced == Some(true), row.consistent) {
                 (true, _) => "no body had these numbers: moved to the nearest body",
                 (false, true) => "a body has these numbers",
@@ -184,12 +233,31 @@ fn bodies(consistency: &BodyConsistencies) -> Vec<Vec<String>> {
 fn pictures(tables: &TorqueTables, joint: usize) -> Value {
     let course = &tables.course;
     let of = |all: &[f64]| course.of_joint(all, joint).collect::<Vec<f64>>();
-    let (measured, simulated, corrected) = (of(&course.measured), of(&course.simulated), of(&course.corrected));
-    let less = |model: &[f64]| measured.iter().zip(model).map(|(m, model)| m - model).collect::<Vec<f64>>();
+    let (measured, simulated, corrected) = (
+        of(&course.measured),
+        of(&course.simulated),
+        of(&course.corrected),
+    );
+    let less = |model: &[f64]| {
+        measured
+            .iter()
+            .zip(model)
+            .map(|(m, model)| m - model)
+            .collect::<Vec<f64>>()
+    };
     let (before, after) = (less(&simulated), less(&corrected));
     let name = format!("joint {}", joint + 1);
-    let torque = [("s1", simulated.as_slice()), ("s0", &measured), ("s-last", &corrected)];
-    let curve: Vec<&FrictionCurveRow> = tables.friction.0.iter().filter(|row| row.joint == joint as i64 + 1).collect();
+    let torque = [
+        ("s1", simulated.as_slice()),
+        ("s0", &measured),
+        ("s-last", &corrected),
+    ];
+    let curve: Vec<&FrictionCurveRow> = tables
+        .friction
+        .0
+        .iter()
+        .filter(|row| row.joint == joint as i64 + 1)
+        .collect();
     json!({
         "torque": over_time(course, &torque, &format!("torque of {name}: measured, simulated, corrected")),
         "error": over_time(course, &[("s1", &before), ("s-last", &after)], &format!("error of {name} before and after")),
@@ -206,10 +274,21 @@ const GAP: f64 = 8.0;
 
 /// Lines over time; what is held out is shaded.
 fn over_time(course: &TorqueCourse, lines: &[(&str, &[f64])], title: &str) -> String {
-    let area = Area { left: 52.0, top: 26.0, right: WIDTH - 14.0, bottom: 200.0 };
-    let (first, last) = (course.time.first().copied().unwrap_or(0.0), course.time.last().copied().unwrap_or(1.0));
+    let area = Area {
+        left: 52.0,
+        top: 26.0,
+        right: WIDTH - 14.0,
+        bottom: 200.0,
+    };
+    let (first, last) = (
+        course.time.first().copied().unwrap_or(0.0),
+        course.time.last().copied().unwrap_or(1.0),
+    );
     let all = || lines.iter().flat_map(|(_, values)| values.iter().copied());
-    let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max));
+    let (low, high) = (
+        all().fold(f64::INFINITY, f64::min),
+        all().fold(f64::NEG_INFINITY, f64::max),
+    );
     let x = Scale::linear(first, last).over(area.left, area.right);
     let y = Scale::linear(low.min(0.0), high.max(0.0)).over(area.bottom, area.top);
     let mut svg = Svg::new(WIDTH, area.bottom + 38.0);
@@ -218,7 +297,11 @@ fn over_time(course: &TorqueCourse, lines: &[(&str, &[f64])], title: &str) -> St
         let held = |row: &usize| course.held_out.get(*row).copied().unwrap_or(false);
         if let (Some(from), Some(to)) = (rows.clone().find(held), rows.clone().rfind(held)) {
             let (left, right) = (x.at(course.time[from]), x.at(course.time[to]));
-            svg.rect("held", [left, area.top], [right - left, area.bottom - area.top]);
+            svg.rect(
+                "held",
+                [left, area.top],
+                [right - left, area.bottom - area.top],
+            );
         }
     }
     x.grid_x(&mut svg, area, 8);
@@ -232,7 +315,11 @@ fn over_time(course: &TorqueCourse, lines: &[(&str, &[f64])], title: &str) -> St
                 let by_value = |a: &usize, b: &usize| values[*a].total_cmp(&values[*b]);
                 let mut ends = [step.clone().min_by(by_value), step.max_by(by_value)];
                 ends.sort();
-                points.extend(ends.into_iter().flatten().map(|row| [x.at(course.time[row]), y.at(values[row])]));
+                points.extend(
+                    ends.into_iter()
+                        .flatten()
+                        .map(|row| [x.at(course.time[row]), y.at(values[row])]),
+                );
             }
             points.dedup();
             svg.path(&format!("curve {colour}"), &points);
@@ -263,20 +350,44 @@ fn stretches(time: &[f64]) -> Vec<std::ops::Range<usize>> {
 
 /// Friction over velocity with a band of two standard deviations.
 fn friction(curve: &[&FrictionCurveRow], title: &str) -> String {
-    let area = Area { left: 52.0, top: 26.0, right: 406.0, bottom: 200.0 };
-    let ends = |sign: f64| curve.iter().map(move |row| row.torque_nm + sign * 2.0 * row.sigma_nm);
-    let (low, high) = (ends(-1.0).fold(0.0, f64::min), ends(1.0).fold(0.0, f64::max));
+    let area = Area {
+        left: 52.0,
+        top: 26.0,
+        right: 406.0,
+        bottom: 200.0,
+    };
+    let ends = |sign: f64| {
+        curve
+            .iter()
+            .map(move |row| row.torque_nm + sign * 2.0 * row.sigma_nm)
+    };
+    let (low, high) = (
+        ends(-1.0).fold(0.0, f64::min),
+        ends(1.0).fold(0.0, f64::max),
+    );
     let velocity = || curve.iter().map(|row| row.velocity_rad_s);
-    let x = Scale::linear(velocity().fold(0.0, f64::min), velocity().fold(0.0, f64::max)).over(area.left, area.right);
+    let x = Scale::linear(
+        velocity().fold(0.0, f64::min),
+        velocity().fold(0.0, f64::max),
+    )
+    .over(area.left, area.right);
     let y = Scale::linear(low, high).over(area.bottom, area.top);
     let mut svg = Svg::new(420.0, area.bottom + 38.0);
     x.grid_x(&mut svg, area, 6);
     y.grid_y(&mut svg, area, 5);
-    let point = |row: &&FrictionCurveRow, sigmas: f64| [x.at(row.velocity_rad_s), y.at(row.torque_nm + sigmas * row.sigma_nm)];
+    let point = |row: &&FrictionCurveRow, sigmas: f64| {
+        [
+            x.at(row.velocity_rad_s),
+            y.at(row.torque_nm + sigmas * row.sigma_nm),
+        ]
+    };
     let upper = curve.iter().map(|row| point(row, 2.0));
     let lower = curve.iter().rev().map(|row| point(row, -2.0));
     svg.path("band s-last", &upper.chain(lower).collect::<Vec<_>>());
-    svg.path("curve s-last", &curve.iter().map(|row| point(row, 0.0)).collect::<Vec<_>>());
+    svg.path(
+        "curve s-last",
+        &curve.iter().map(|row| point(row, 0.0)).collect::<Vec<_>>(),
+    );
     baseline(&mut svg, area);
     name_x(&mut svg, area, "velocity, rad/s");
     name_y(&mut svg, area, "friction, Nm");

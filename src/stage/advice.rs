@@ -22,15 +22,23 @@ pub fn advice(
         let redundant = matches!(fitted.statuses[*k], ParameterStatus::Redundant(_));
         let sentence = match measure(remedy, last) {
             Some(measure) => format!("{measure} would show it"),
-            None if redundant => "no measured point can: they move every point in the same way".into(),
+            None if redundant => {
+                "no measured point can: they move every point in the same way".into()
+            }
             None => continue,
         };
         sentences.insert(model.stack.specs()[*k].name.clone(), sentence);
     }
     for (remedy, count) in counts {
         if let Some(measure) = measure(remedy, last) {
-            let what = if count == 1 { "one parameter".into() } else { format!("{count} parameters") };
-            context.services.note(format!("{measure} would show {what} that these data do not"));
+            let what = if count == 1 {
+                "one parameter".into()
+            } else {
+                format!("{count} parameters")
+            };
+            context.services.note(format!(
+                "{measure} would show {what} that these data do not"
+            ));
         }
     }
     sentences

@@ -34,13 +34,22 @@ pub(super) fn note(
     recording: &Recording,
     rows: &[usize],
 ) {
-    let brought: Vec<&dyn MeasurementKind> = kinds(data).into_iter().filter(|kind| kind.is_brought()).collect();
-    let own: Vec<usize> = rows.iter().copied().filter(|row| brought.iter().any(|kind| kind.axes(data, *row) > 0)).collect();
+    let brought: Vec<&dyn MeasurementKind> = kinds(data)
+        .into_iter()
+        .filter(|kind| kind.is_brought())
+        .collect();
+    let own: Vec<usize> = rows
+        .iter()
+        .copied()
+        .filter(|row| brought.iter().any(|kind| kind.axes(data, *row) > 0))
+        .collect();
     if own.is_empty() {
         return;
     }
     note_scale(context, model, fitted, data, rows);
-    events(model, fitted, data, recording, rows).into_iter().for_each(|line| context.services.warn(line));
+    events(model, fitted, data, recording, rows)
+        .into_iter()
+        .for_each(|line| context.services.warn(line));
     let weak: Vec<&str> = fitted
         .prior_checks
         .iter()
@@ -49,14 +58,28 @@ pub(super) fn note(
         .collect();
     if !weak.is_empty() {
         let more = weak.len().saturating_sub(NAMED);
-        let tail = if more > 0 { format!(" and {more} more") } else { String::new() };
+        let tail = if more > 0 {
+            format!(" and {more} more")
+        } else {
+            String::new()
+        };
         let shown = weak[..weak.len().min(NAMED)].join(", ");
-        context.services.note(format!("carried by their priors, hardly by the data: {shown}{tail} (table parameters)"));
+        context.services.note(format!(
+            "carried by their priors, hardly by the data: {shown}{tail} (table parameters)"
+        ));
     }
 }
 
-fn note_scale(context: &Context, model: &Model, fitted: &Fitted, data: &Measurements, rows: &[usize]) {
-    let Some(scale) = scale(model, data, rows, fitted.covariance.as_ref()) else { return };
+fn note_scale(
+    context: &Context,
+    model: &Model,
+    fitted: &Fitted,
+    data: &Measurements,
+    rows: &[usize],
+) {
+    let Some(scale) = scale(model, data, rows, fitted.covariance.as_ref()) else {
+        return;
+    };
     let known = match (scale.by_length, scale.by_priors) {
         (true, false) => "by the lengths that were given",
         (true, true) => "by the lengths that were given and the priors of the links",
@@ -97,14 +120,30 @@ fn note_scale(context: &Context, model: &Model, fitted: &Fitted, data: &Measurem
 }
 
 /// What befell ball and fixtures by the rows of a recording, a sentence each: the ball was put back elsewhere, rows do not close.
-pub(super) fn events(model: &Model, fitted: &Fitted, data: &Measurements, recording: &Recording, rows: &[usize]) -> Vec<String> {
-    let brought: Vec<&dyn MeasurementKind> = kinds(data).into_iter().filter(|kind| kind.is_brought()).collect();
-    let own: Vec<usize> = rows.iter().copied().filter(|row| brought.iter().any(|kind| kind.axes(data, *row) > 0)).collect();
+pub(super) fn events(
+    model: &Model,
+    fitted: &Fitted,
+    data: &Measurements,
+    recording: &Recording,
+    rows: &[usize],
+) -> Vec<String> {
+    let brought: Vec<&dyn MeasurementKind> = kinds(data)
+        .into_iter()
+        .filter(|kind| kind.is_brought())
+        .collect();
+    let own: Vec<usize> = rows
+        .iter()
+        .copied()
+        .filter(|row| brought.iter().any(|kind| kind.axes(data, *row) > 0))
+        .collect();
     if own.is_empty() {
         return Vec::new();
     }
     let put_back = put_back(model, fitted, data, recording, &own, &brought);
-    put_back.into_iter().chain(far(model, fitted, data, recording, &brought)).collect()
+    put_back
+        .into_iter()
+        .chain(far(model, fitted, data, recording, &brought))
+        .collect()
 }
 
 fn put_back(
@@ -115,8 +154,15 @@ fn put_back(
     own: &[usize],
     brought: &[&'static dyn MeasurementKind],
 ) -> Option<String> {
-    let stated = |row: &usize| brought.iter().find_map(|kind| kind.reading(data, *row)).map_or(0.0, |reading| reading.sigma);
-    let sigma = (own.iter().map(|row| stated(row).powi(2)).sum::<f64>() / own.len() as f64).sqrt().hypot(fitted.excess_sigma);
+    let stated = |row: &usize| {
+        brought
+            .iter()
+            .find_map(|kind| kind.reading(data, *row))
+            .map_or(0.0, |reading| reading.sigma)
+    };
+    let sigma = (own.iter().map(|row| stated(row).powi(2)).sum::<f64>() / own.len() as f64)
+        .sqrt()
+        .hypot(fitted.excess_sigma);
     let found = reseated(model, data, own, sigma)?;
     Some(format!(
         "from {} on the ball sits elsewhere on the tool, by {:.2} mm or more ({:.0} standard errors): was it taken off? Name it there as \
@@ -148,7 +194,12 @@ fn far(
     let places = places(model);
     let mut far: Vec<Far> = Vec::new();
     for (row, error) in errors.iter().enumerate() {
-        let Some((kind, reading)) = brought.iter().find_map(|kind| Some((kind, kind.reading(data, row)?))) else { continue };
+        let Some((kind, reading)) = brought
+            .iter()
+            .find_map(|kind| Some((kind, kind.reading(data, row)?)))
+        else {
+            continue;
+        };
         let axes = kind.about().axes as f64;
         let sigma = reading.sigma.hypot(fitted.excess_sigma);
         let limit = (FAR + MORE * (axes - 1.0)) * sigma;
@@ -156,10 +207,16 @@ fn far(
             continue;
         }
         let near = |(name, place): &&(String, Vector3<f64>)| {
-            *name != reading.anchor && (predicted[row] - place).norm() < limit.min(0.3 * error.length)
+            *name != reading.anchor
+                && (predicted[row] - place).norm() < limit.min(0.3 * error.length)
         };
         let other = places.iter().find(near).map(|(name, _)| name.clone());
-        far.push(Far { row, fixture: reading.anchor.into(), off: error.length, other });
+        far.push(Far {
+            row,
+            fixture: reading.anchor.into(),
+            off: error.length,
+            other,
+        });
     }
     if far.is_empty() {
         return None;
@@ -171,7 +228,11 @@ fn far(
         .collect();
     Some(format!(
         "{} not close within their noise, and {} down-weighted: {}",
-        if count == 1 { "1 row does".to_string() } else { format!("{count} rows do") },
+        if count == 1 {
+            "1 row does".to_string()
+        } else {
+            format!("{count} rows do")
+        },
         if count == 1 { "is" } else { "are" },
         texts.join("; ")
     ))
@@ -184,7 +245,12 @@ fn run_text(run: &[Far], recording: &Recording) -> String {
     let who = if run.len() == 1 {
         id(first).to_string()
     } else {
-        format!("{} to {} ({})", id(first), id(last), counted(run.len(), "row"))
+        format!(
+            "{} to {} ({})",
+            id(first),
+            id(last),
+            counted(run.len(), "row")
+        )
     };
     let why = match &first.other {
         Some(other) => format!(", where `{other}` is"),
@@ -197,11 +263,22 @@ fn run_text(run: &[Far], recording: &Recording) -> String {
 /// Points that anchors are.
 fn places(model: &Model) -> Vec<(String, Vector3<f64>)> {
     let setup = model.robot.setup();
-    let first = model.stack.parameters_of(names::ANCHOR).next().unwrap_or_default();
-    let all = setup.anchors.iter().enumerate().filter(|(_, anchor)| anchor.shape == Shape::Point);
+    let first = model
+        .stack
+        .parameters_of(names::ANCHOR)
+        .next()
+        .unwrap_or_default();
+    let all = setup
+        .anchors
+        .iter()
+        .enumerate()
+        .filter(|(_, anchor)| anchor.shape == Shape::Point);
     let place = |(number, anchor): (usize, &crate::robot::Anchor)| {
         let at = first + setup.first_of_anchor(number);
-        let shift = model.x.get(at..at + 3).map_or_else(Vector3::zeros, Vector3::from_column_slice);
+        let shift = model
+            .x
+            .get(at..at + 3)
+            .map_or_else(Vector3::zeros, Vector3::from_column_slice);
         (anchor.name.clone(), anchor.place + shift)
     };
     all.map(place).collect()

@@ -41,7 +41,8 @@ writes! {
 
 impl Stage for Compare {
     const NAME: &'static str = "compare";
-    const SUMMARY: &'static str = "tests which parameters changed since an earlier recording of the same robot";
+    const SUMMARY: &'static str =
+        "tests which parameters changed since an earlier recording of the same robot";
     const IMPLEMENTATION: u32 = 5;
     type Reads = CompareReads;
     type Writes = CompareWrites;
@@ -49,33 +50,69 @@ impl Stage for Compare {
     fn check(&self) -> Vec<crate::error::Fault> {
         let fault = |place: &str, message: &str| crate::error::Fault::new(place, message);
         let one = self.previous_parameters.is_some() != self.previous_recording.is_some();
-        let missing = one.then(|| fault("previous_recording", "`previous_parameters` and `previous_recording` go together"));
-        missing.into_iter().chain(self.repeatability.fault()).collect()
+        let missing = one.then(|| {
+            fault(
+                "previous_recording",
+                "`previous_parameters` and `previous_recording` go together",
+            )
+        });
+        missing
+            .into_iter()
+            .chain(self.repeatability.fault())
+            .collect()
     }
 
     fn files(&self) -> Vec<(String, RawFile)> {
-        let files = [("previous_parameters", &self.previous_parameters), ("previous_recording", &self.previous_recording)];
-        files.into_iter().filter_map(|(place, file)| Some((place.to_string(), file.clone()?))).collect()
+        let files = [
+            ("previous_parameters", &self.previous_parameters),
+            ("previous_recording", &self.previous_recording),
+        ];
+        files
+            .into_iter()
+            .filter_map(|(place, file)| Some((place.to_string(), file.clone()?)))
+            .collect()
     }
 
     fn run(&self, reads: CompareReads, context: &Context) -> Result<CompareWrites> {
-        let (Some(parameters), Some(recording)) = (&self.previous_parameters, &self.previous_recording) else {
-            context.services.note("no earlier model to compare with".into());
-            return Ok(CompareWrites { changes: Changes::default() });
+        let (Some(parameters), Some(recording)) =
+            (&self.previous_parameters, &self.previous_recording)
+        else {
+            context
+                .services
+                .note("no earlier model to compare with".into());
+            return Ok(CompareWrites {
+                changes: Changes::default(),
+            });
         };
         let earlier: Parameters = table(context, parameters)?;
         let recording: Recording = table(context, recording)?;
         let robot = RobotModel::new(reads.robot.to_description()?);
         let first = self.session(&robot, &earlier, &recording, None, context)?;
-        let second = self.session(&robot, &earlier, &reads.recording, Some(&reads.split), context)?;
+        let second = self.session(
+            &robot,
+            &earlier,
+            &reads.recording,
+            Some(&reads.split),
+            context,
+        )?;
         let (stack, specs) = (&first.model.stack, first.model.stack.specs());
-        let first_causes: Vec<Vec<usize>> = ORDER.iter().map(|name| stack.parameters_of(name).collect()).collect();
-        let precedence = |k: usize| first_causes.iter().position(|own| own.contains(&k)).unwrap_or(ORDER.len());
+        let first_causes: Vec<Vec<usize>> = ORDER
+            .iter()
+            .map(|name| stack.parameters_of(name).collect())
+            .collect();
+        let precedence = |k: usize| {
+            first_causes
+                .iter()
+                .position(|own| own.contains(&k))
+                .unwrap_or(ORDER.len())
+        };
         let found = changes(&first.as_session(), &second.as_session(), precedence);
         let mut rows = Vec::new();
         for change in found {
             let spec = &specs[change.parameter];
-            let Some(before) = earlier.0.iter().find(|row| row.name == spec.name) else { continue };
+            let Some(before) = earlier.0.iter().find(|row| row.name == spec.name) else {
+                continue;
+            };
             let show = |value: f64| spec.unit.from_si(value);
             if let Some(rank) = change.rank {
                 context.services.note(format!(
@@ -101,12 +138,19 @@ impl Stage for Compare {
             });
         }
         rows.sort_by(|a, b| a.name.cmp(&b.name));
-        Ok(CompareWrites { changes: Changes(rows) })
+        Ok(CompareWrites {
+            changes: Changes(rows),
+        })
     }
 }
 
 /// What changes by itself on a robot, the commonest first: a zero after a collision, a tool, wear of a drive.
-const ORDER: [&str; 4] = ["joint_offset", "tool_offset", "joint_compliance", "link_geometry"];
+const ORDER: [&str; 4] = [
+    "joint_offset",
+    "tool_offset",
+    "joint_compliance",
+    "link_geometry",
+];
 
 /// The effect that a change of a parameter is.
 fn effect(name: &str) -> &str {
@@ -120,11 +164,16 @@ fn effect(name: &str) -> &str {
 fn table<T: Table>(context: &Context, file: &RawFile) -> Result<T> {
     let mut source = context.services.open(file)?;
     let mut bytes = Vec::new();
-    source.reader.read_to_end(&mut bytes).map_err(|error| crate::error::Error::data(&source.label, error.to_string()))?;
+    source
+        .reader
+        .read_to_end(&mut bytes)
+        .map_err(|error| crate::error::Error::data(&source.label, error.to_string()))?;
     let loose = from_parquet(&source.label, bytes)?;
     if !loose.vouched {
         let label = &source.label;
-        context.services.warn(format!("{label} carries no content hash: its content cannot be verified"));
+        context.services.warn(format!(
+            "{label} carries no content hash: its content cannot be verified"
+        ));
     }
     Ok(loose.table)
 }
@@ -139,7 +188,12 @@ struct FittedRecording {
 
 impl FittedRecording {
     fn as_session(&self) -> Session<'_> {
-        Session { data: &self.data, rows: &self.rows, model: &self.model, fitted: &self.fitted }
+        Session {
+            data: &self.data,
+            rows: &self.rows,
+            model: &self.model,
+            fitted: &self.fitted,
+        }
     }
 }
 
@@ -156,22 +210,55 @@ impl Compare {
         let mut data = recording.measurements();
         let rows: Vec<usize> = (0..data.rows()).collect();
         if data.noise_basis == NoiseBasis::Inferred {
-            let which = if split.is_some() { "this" } else { "the earlier" };
-            context.services.note(format!("{which} recording states no noise: rows are weighted by an assumed one"));
+            let which = if split.is_some() {
+                "this"
+            } else {
+                "the earlier"
+            };
+            context.services.note(format!(
+                "{which} recording states no noise: rows are weighted by an assumed one"
+            ));
         }
         let placed = earlier.clone().standing_at(&align(robot, &data, &rows));
         let mut model = placed.model(robot.clone(), &[names::BASE_FRAME], Load::GravityTorque)?;
         let base: Vec<usize> = model.stack.parameters_of(names::BASE_FRAME).collect();
-        for (k, spec) in model.stack.specs().iter().enumerate().filter(|(k, _)| !base.contains(k)) {
-            let prior = Prior { mean: model.x[k], sigma: spec.prior_sigma };
+        for (k, spec) in model
+            .stack
+            .specs()
+            .iter()
+            .enumerate()
+            .filter(|(k, _)| !base.contains(k))
+        {
+            let prior = Prior {
+                mean: model.x[k],
+                sigma: spec.prior_sigma,
+            };
             model.known.entry(k).or_default().prior = Some(prior);
         }
         let candidates: Vec<usize> = (0..model.x.len()).collect();
         self.repeatability.apply(&model, &mut data, &rows, context);
         let whole = Split::default();
-        let options = FitOptions { rows: &rows, candidates: &candidates };
-        let (model, fitted, screening) = fit_rows(&model, &data, &options, split.unwrap_or(&whole), split.is_some());
-        let rows = if split.is_some() { screening.kept } else { rows };
-        Ok(FittedRecording { data, rows, model, fitted })
+        let options = FitOptions {
+            rows: &rows,
+            candidates: &candidates,
+        };
+        let (model, fitted, screening) = fit_rows(
+            &model,
+            &data,
+            &options,
+            split.unwrap_or(&whole),
+            split.is_some(),
+        );
+        let rows = if split.is_some() {
+            screening.kept
+        } else {
+            rows
+        };
+        Ok(FittedRecording {
+            data,
+            rows,
+            model,
+            fitted,
+        })
     }
 }

@@ -35,7 +35,8 @@ writes! {
 
 impl Stage for CompareTorques {
     const NAME: &'static str = "compare_torques";
-    const SUMMARY: &'static str = "tests what changed between two recordings of an arm's torques: payload, friction, offsets";
+    const SUMMARY: &'static str =
+        "tests what changed between two recordings of an arm's torques: payload, friction, offsets";
     const IMPLEMENTATION: u32 = 3;
     type Reads = CompareTorquesReads;
     type Writes = CompareTorquesWrites;
@@ -51,19 +52,32 @@ impl Stage for CompareTorques {
             parameters.must_be_of(&robot)?;
         }
         let (mut arm, _) = dynamic_arm(&robot)?;
-        let (first, second) = (reads.earlier_parameters.to_model()?, reads.parameters.to_model()?);
+        let (first, second) = (
+            reads.earlier_parameters.to_model()?,
+            reads.parameters.to_model()?,
+        );
         let whole = |model: &TorqueModel| (0..model.joints()).all(|link| model.is_whole(link));
         if !whole(&first) {
             arm.links = None;
         }
         let earlier = RecordedTorques::of(&reads.earlier_motion, &robot)?;
         let later = RecordedTorques::of(&reads.motion, &robot)?;
-        let (first_events, second_events) = (reads.earlier_contacts.events(), reads.contacts.events());
-        let diagnosed = |recording, model, events| DiagnosedRecording { recording, model, events };
-        let found = changes(&arm, &diagnosed(&earlier, &first, &first_events), &diagnosed(&later, &second, &second_events))?;
+        let (first_events, second_events) =
+            (reads.earlier_contacts.events(), reads.contacts.events());
+        let diagnosed = |recording, model, events| DiagnosedRecording {
+            recording,
+            model,
+            events,
+        };
+        let found = changes(
+            &arm,
+            &diagnosed(&earlier, &first, &first_events),
+            &diagnosed(&later, &second, &second_events),
+        )?;
         let strongest = found.changes.iter().filter(|change| change.rank.is_some());
         let told: Vec<&TorqueChange> = strongest.collect();
-        told.iter().for_each(|change| context.services.note(sentence(change)));
+        told.iter()
+            .for_each(|change| context.services.note(sentence(change)));
         if told.is_empty() {
             context.services.note("nothing changed beyond noise".into());
         }
@@ -73,10 +87,26 @@ impl Stage for CompareTorques {
                 "joint {joint}: {before:.3} Nm rms are left where nothing changed, {after:.3} Nm with the changes"
             ));
         }
-        let unchanged = found.changes.iter().filter(|change| change.rank.is_none()).count();
-        context.services.note(format!("{} held to be unchanged", counted(unchanged, "number")));
-        let previous = |name: &str| reads.earlier_parameters.0.iter().find(|row| row.name == name).map(|row| row.value);
-        Ok(CompareTorquesWrites { changes: TorqueChangeTable::of(&found, previous) })
+        let unchanged = found
+            .changes
+            .iter()
+            .filter(|change| change.rank.is_none())
+            .count();
+        context.services.note(format!(
+            "{} held to be unchanged",
+            counted(unchanged, "number")
+        ));
+        let previous = |name: &str| {
+            reads
+                .earlier_parameters
+                .0
+                .iter()
+                .find(|row| row.name == name)
+                .map(|row| row.value)
+        };
+        Ok(CompareTorquesWrites {
+            changes: TorqueChangeTable::of(&found, previous),
+        })
     }
 }
 

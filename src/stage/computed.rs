@@ -33,7 +33,11 @@ pub fn suspicion(points: impl Iterator<Item = [f64; 2]>, parameters: usize) -> O
 
 /// To three digits, without a power of ten.
 fn plain(mm: f64) -> String {
-    let digits = if mm > 0.0 { (2.0 - mm.log10().floor()).clamp(0.0, 12.0) } else { 0.0 };
+    let digits = if mm > 0.0 {
+        (2.0 - mm.log10().floor()).clamp(0.0, 12.0)
+    } else {
+        0.0
+    };
     format!("{mm:.*}", digits as usize)
 }
 
@@ -47,7 +51,11 @@ mod tests {
 
     #[test]
     fn only_a_residual_far_below_the_noise_is_suspected() {
-        assert!(suspicion(points(20, 0.0003), 30).unwrap().contains("0.000300 mm rms, far below the 0.0200 mm"));
+        assert!(
+            suspicion(points(20, 0.0003), 30)
+                .unwrap()
+                .contains("0.000300 mm rms, far below the 0.0200 mm")
+        );
         assert!(suspicion(points(20, 0.005), 30).is_none());
         // Ten points and thirty parameters: a fit passes through all of them.
         assert!(suspicion(points(10, 0.0), 30).is_none());

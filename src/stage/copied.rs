@@ -12,11 +12,23 @@ pub(super) fn copied_rows(recording: &Recording) -> Vec<(usize, usize)> {
     let mut first: BTreeMap<(Vec<u64>, Option<&str>), usize> = BTreeMap::new();
     let mut copies = Vec::new();
     for row in 0..recording.rows() {
-        let Some(point) = recording.point(row) else { continue };
-        let values = recording.q(row).iter().chain(&point).map(|value| value.to_bits()).collect();
-        let target = recording.target.as_ref().and_then(|all| all[row].as_deref());
+        let Some(point) = recording.point(row) else {
+            continue;
+        };
+        let values = recording
+            .q(row)
+            .iter()
+            .chain(&point)
+            .map(|value| value.to_bits())
+            .collect();
+        let target = recording
+            .target
+            .as_ref()
+            .and_then(|all| all[row].as_deref());
         match first.entry((values, target)) {
-            std::collections::btree_map::Entry::Occupied(earlier) => copies.push((*earlier.get(), row)),
+            std::collections::btree_map::Entry::Occupied(earlier) => {
+                copies.push((*earlier.get(), row))
+            }
             std::collections::btree_map::Entry::Vacant(own) => {
                 own.insert(row);
             }
@@ -28,9 +40,20 @@ pub(super) fn copied_rows(recording: &Recording) -> Vec<(usize, usize)> {
 /// What is said of them; none where there are none.
 pub(super) fn said(copies: &[(usize, usize)], recording: &Recording) -> Option<String> {
     let id = |row: usize| recording.point_id[row].as_str();
-    let named: Vec<String> = copies.iter().take(NAMED).map(|(one, copy)| format!("{} is {}", id(*copy), id(*one))).collect();
+    let named: Vec<String> = copies
+        .iter()
+        .take(NAMED)
+        .map(|(one, copy)| format!("{} is {}", id(*copy), id(*one)))
+        .collect();
     let more = if copies.len() > NAMED { ", ..." } else { "" };
-    let (rows, repeat) = (counted(copies.len(), "row"), if copies.len() == 1 { "repeats" } else { "repeat" });
+    let (rows, repeat) = (
+        counted(copies.len(), "row"),
+        if copies.len() == 1 {
+            "repeats"
+        } else {
+            "repeat"
+        },
+    );
     (!copies.is_empty()).then(|| {
         format!(
             "{rows} {repeat} another row's joints and point to the last digit under an id of their own ({}{more}): copies, which look like \

@@ -28,8 +28,13 @@ pub(super) fn curves(
 ) -> Result<Curves> {
     let specs = model.stack.specs();
     let named = sigmas(parameters);
-    let sigma: Vec<Option<f64>> = specs.iter().map(|spec| named.get(spec.name.as_str()).copied()).collect();
-    let shown: Vec<usize> = (0..data.rows().min(prediction.0.len())).filter(|row| !prediction.0[*row].suspect).collect();
+    let sigma: Vec<Option<f64>> = specs
+        .iter()
+        .map(|spec| named.get(spec.name.as_str()).copied())
+        .collect();
+    let shown: Vec<usize> = (0..data.rows().min(prediction.0.len()))
+        .filter(|row| !prediction.0[*row].suspect)
+        .collect();
     let whole = model.predict(data);
     let mut traced = Vec::new();
     for finding in &findings.0 {
@@ -37,30 +42,61 @@ pub(super) fn curves(
         // A finding's forms are its identity: what it is called need not be any of theirs. A cause of the whole arm has none.
         let is_own = |effect: &dyn Effect, k: usize| match effect.form() {
             Some(form) => forms.contains(form),
-            None => forms.is_empty() && effect.name() == finding.effect && specs[k].place.to_string() == finding.place,
+            None => {
+                forms.is_empty()
+                    && effect.name() == finding.effect
+                    && specs[k].place.to_string() == finding.place
+            }
         };
-        let own: Vec<usize> =
-            model.stack.effects().flat_map(|(effect, range)| range.filter(move |k| is_own(effect, *k))).collect();
+        let own: Vec<usize> = model
+            .stack
+            .effects()
+            .flat_map(|(effect, range)| range.filter(move |k| is_own(effect, *k)))
+            .collect();
         if !own.is_empty() {
             traced.push(TracedFinding::of(finding, forms, own, model, data, &whole));
         }
     }
     // All derivatives of a row come at once: each row is placed once for all findings.
-    let mut rows: Vec<Vec<CurveRow>> = traced.iter().map(|_| Vec::with_capacity(shown.len())).collect();
+    let mut rows: Vec<Vec<CurveRow>> = traced
+        .iter()
+        .map(|_| Vec::with_capacity(shown.len()))
+        .collect();
     let mut scratch = model.stack.scratch(&model.robot);
     let mut derivatives = vec![Vector3::zeros(); specs.len()];
     for &row in &shown {
         // A curve is drawn along the displacement of a point.
-        let Some(measured) = data.point(row) else { continue };
+        let Some(measured) = data.point(row) else {
+            continue;
+        };
         derivatives.fill(Vector3::zeros());
-        model.stack.derivatives(&model.robot, data, row, &model.x, &mut scratch, |k, derivative| derivatives[k] += derivative);
-        let motion = model.stack.point_motion(&model.robot, data, row, &model.x, &mut scratch);
+        model.stack.derivatives(
+            &model.robot,
+            data,
+            row,
+            &model.x,
+            &mut scratch,
+            |k, derivative| derivatives[k] += derivative,
+        );
+        let motion = model
+            .stack
+            .point_motion(&model.robot, data, row, &model.x, &mut scratch);
         let residual = measured - whole[row];
         for (finding, out) in traced.iter().zip(&mut rows) {
-            let Some((direction, scale)) = finding.direction(row, &motion, model) else { continue };
+            let Some((direction, scale)) = finding.direction(row, &motion, model) else {
+                continue;
+            };
             let along = |v: &Vector3<f64>| direction.dot(v) * scale;
-            let variance: Option<f64> = (finding.own.iter()).map(|k| Some((sigma[*k]? * along(&derivatives[*k])).powi(2))).sum();
-            let (over, x_unit, x) = abscissa((&finding.forms, finding.joint), data, row, &motion.posture.torque, &model.robot);
+            let variance: Option<f64> = (finding.own.iter())
+                .map(|k| Some((sigma[*k]? * along(&derivatives[*k])).powi(2)))
+                .sum();
+            let (over, x_unit, x) = abscissa(
+                (&finding.forms, finding.joint),
+                data,
+                row,
+                &motion.posture.torque,
+                &model.robot,
+            );
             let fitted = along(&finding.shift[row]);
             out.push(CurveRow {
                 rank: finding.rank,
@@ -68,7 +104,11 @@ pub(super) fn curves(
                 over,
                 x_unit: x_unit.map_or(ROW, Unit::symbol).into(),
                 x: x_unit.map_or(x, |unit| unit.from_si(x)),
-                unit: if finding.turns(model) { "rad".into() } else { "mm".into() },
+                unit: if finding.turns(model) {
+                    "rad".into()
+                } else {
+                    "mm".into()
+                },
                 without: along(&residual) + fitted,
                 with: along(&residual),
                 fitted,
@@ -108,29 +148,48 @@ impl TracedFinding {
         own.iter().for_each(|k| without.x[*k] = 0.0);
         let bare = without.predict(data);
         let shift: Vec<Vector3<f64>> = whole.iter().zip(&bare).map(|(a, b)| a - b).collect();
-        let place = forms.first().map_or(model.stack.specs()[own[0]].place, |form| form.place());
+        let place = forms
+            .first()
+            .map_or(model.stack.specs()[own[0]].place, |form| form.place());
         let joint = match place {
             Place::Joint(joint) if joint < data.joints => Some(joint),
             _ => None,
         };
         let largest = shift.iter().map(Vector3::norm).fold(0.0, f64::max);
-        Self { rank: finding.rank, principal: principal(&shift), forms, own, joint, shift, largest }
+        Self {
+            rank: finding.rank,
+            principal: principal(&shift),
+            forms,
+            own,
+            joint,
+            shift,
+            largest,
+        }
     }
 
     /// Whether it is shown as an angle about its joint.
     fn turns(&self, model: &Model) -> bool {
-        self.joint.is_some_and(|joint| model.robot.is_revolute(joint))
+        self.joint
+            .is_some_and(|joint| model.robot.is_revolute(joint))
     }
 
     /// The direction along which a row shows it, and the factor to the column's unit: rad about the joint, or mm. None where the joint
     /// turns the point too little to be seen.
-    fn direction(&self, row: usize, motion: &PointMotion, model: &Model) -> Option<(Vector3<f64>, f64)> {
+    fn direction(
+        &self,
+        row: usize,
+        motion: &PointMotion,
+        model: &Model,
+    ) -> Option<(Vector3<f64>, f64)> {
         match self.joint.filter(|_| self.turns(model)) {
-            Some(joint) if motion.by_joint[joint].norm() > LEVER => {
-                Some((motion.by_joint[joint] / motion.by_joint[joint].norm_squared(), 1.0))
-            }
+            Some(joint) if motion.by_joint[joint].norm() > LEVER => Some((
+                motion.by_joint[joint] / motion.by_joint[joint].norm_squared(),
+                1.0,
+            )),
             Some(_) => None,
-            None if self.shift[row].norm() > SMALL * self.largest => Some((self.shift[row].normalize(), 1e3)),
+            None if self.shift[row].norm() > SMALL * self.largest => {
+                Some((self.shift[row].normalize(), 1e3))
+            }
             None => Some((self.principal, 1e3)),
         }
     }
@@ -138,8 +197,13 @@ impl TracedFinding {
 
 /// One standard deviation (SI) of the parameters that have one, by name.
 fn sigmas(parameters: &Parameters) -> BTreeMap<&str, f64> {
-    let known = parameters.0.iter().filter_map(|row| Some((row, row.sigma?, Unit::parse(&row.unit)?)));
-    known.map(|(row, sigma, unit)| (row.name.as_str(), unit.to_si(sigma))).collect()
+    let known = parameters
+        .0
+        .iter()
+        .filter_map(|row| Some((row, row.sigma?, Unit::parse(&row.unit)?)));
+    known
+        .map(|(row, sigma, unit)| (row.name.as_str(), unit.to_si(sigma)))
+        .collect()
 }
 
 /// What counts time where the recording has no clock.
@@ -147,8 +211,12 @@ const ROW: &str = "row";
 
 /// The forms of a finding. Fails where they cannot be read.
 fn forms(finding: &FindingRow) -> Result<Vec<Form>> {
-    serde_json::from_str(&finding.forms)
-        .map_err(|error| Error::data("table findings", format!("`{}` are no forms of effects: {error}", finding.forms)))
+    serde_json::from_str(&finding.forms).map_err(|error| {
+        Error::data(
+            "table findings",
+            format!("`{}` are no forms of effects: {error}", finding.forms),
+        )
+    })
 }
 
 /// What reveals the effect of these forms at this joint, its stored unit (none: a row's number, from 1), and its value in SI.
@@ -165,13 +233,27 @@ fn abscissa(
         false => ("place in the recording".to_string(), None, row as f64 + 1.0),
     };
     let position = |joint: usize| {
-        let unit = if robot.is_revolute(joint) { Unit::Radian } else { Unit::Millimetre };
+        let unit = if robot.is_revolute(joint) {
+            Unit::Radian
+        } else {
+            Unit::Millimetre
+        };
         with(format!("joint {}", joint + 1), unit, data.q(row)[joint])
     };
-    let load = |joint: usize| with(format!("load torque of joint {}", joint + 1), Unit::NewtonMetre, torque[joint]);
+    let load = |joint: usize| {
+        with(
+            format!("load torque of joint {}", joint + 1),
+            Unit::NewtonMetre,
+            torque[joint],
+        )
+    };
     let variables: Vec<Variable> = forms.iter().flat_map(|form| form.variables()).collect();
     let own = joint.map(|joint| Variable::Angle { joint });
-    match own.filter(|own| variables.contains(own)).or(variables.first().copied()).or(own) {
+    match own
+        .filter(|own| variables.contains(own))
+        .or(variables.first().copied())
+        .or(own)
+    {
         Some(Variable::Time) => time(),
         Some(Variable::Temperature | Variable::Lagging { .. }) => match data.temperature(row) {
             Some(now) => with("temperature".into(), Unit::Celsius, now),

@@ -1,6 +1,8 @@
 //! `diagnose`: where the recording and the robot as its user believes it differ, what physics was left out, and the gain of it.
 
-use crate::diagnose::{Diagnosis, Question, VerdictKind as Said, against_simulation, diagnose, wrong_setup};
+use crate::diagnose::{
+    Diagnosis, Question, VerdictKind as Said, against_simulation, diagnose, wrong_setup,
+};
 use crate::effect::{CAUSES, names};
 use crate::error::{Error, Fault, Result, instead};
 use crate::estimate::{Suspect, gauge};
@@ -16,8 +18,8 @@ use crate::stage::unmoved::must_move;
 use crate::stage::weightless::{WeightlessLinks, weightless_links};
 use crate::stage::{Context, RawFile, Stage, screened};
 use crate::table::{
-    Cells, Corrected, CovarianceTable, FindingNumbers, Findings, Forms, Parameters, Prediction, Recording, Rivals, Robot, Shares,
-    Spectrum, Split, Suspects, Verdict, VerdictSentences,
+    Cells, Corrected, CovarianceTable, FindingNumbers, Findings, Forms, Parameters, Prediction,
+    Recording, Rivals, Robot, Shares, Spectrum, Split, Suspects, Verdict, VerdictSentences,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -68,8 +70,7 @@ const MOST_OPEN: f64 = 0.999;
 /// Fewest rows that place a robot before the tracker; what is missing takes more of them.
 const FEWEST: usize = 3;
 
-const SORTED_OTHERWISE: &str =
-    "rows stand in another order than their times (sorted by name?): approach, lag and drift follow the times";
+const SORTED_OTHERWISE: &str = "rows stand in another order than their times (sorted by name?): approach, lag and drift follow the times";
 
 crate::stage::reads! {
     /// Input ports of [`Diagnose`].
@@ -101,8 +102,7 @@ crate::stage::writes! {
 
 impl Stage for Diagnose {
     const NAME: &'static str = "diagnose";
-    const SUMMARY: &'static str =
-        "locates where simulation and recording differ, and names the physics that the model leaves out";
+    const SUMMARY: &'static str = "locates where simulation and recording differ, and names the physics that the model leaves out";
     const IMPLEMENTATION: u32 = 36;
     type Reads = DiagnoseReads;
     type Writes = DiagnoseWrites;
@@ -110,17 +110,40 @@ impl Stage for Diagnose {
     fn check(&self) -> Vec<Fault> {
         let mut faults: Vec<Fault> = crate::stage::no_set(&self.on, "fit").into_iter().collect();
         if !(0.0..=HEAVIEST).contains(&self.prior_weight) {
-            faults.push(Fault::new("prior_weight", format!("expected a number from 0 to {HEAVIEST}")));
+            faults.push(Fault::new(
+                "prior_weight",
+                format!("expected a number from 0 to {HEAVIEST}"),
+            ));
         }
         if !(MOST_CLOSED..=MOST_OPEN).contains(&self.open_world) {
-            faults.push(Fault::new("open_world", format!("expected a probability from {MOST_CLOSED} to {MOST_OPEN}")));
+            faults.push(Fault::new(
+                "open_world",
+                format!("expected a probability from {MOST_CLOSED} to {MOST_OPEN}"),
+            ));
         }
-        let tried = || CAUSES.iter().filter(|cause| !cause.is_nameless()).map(|cause| cause.name());
-        for (k, name) in self.without.iter().enumerate().filter(|(_, name)| !tried().any(|other| other == name.as_str())) {
+        let tried = || {
+            CAUSES
+                .iter()
+                .filter(|cause| !cause.is_nameless())
+                .map(|cause| cause.name())
+        };
+        for (k, name) in self
+            .without
+            .iter()
+            .enumerate()
+            .filter(|(_, name)| !tried().any(|other| other == name.as_str()))
+        {
             let allowed: Vec<&str> = tried().collect();
-            faults.push(Fault::new(format!("without[{k}]"), format!("`{name}` is no cause{}", instead(name, &allowed))));
+            faults.push(Fault::new(
+                format!("without[{k}]"),
+                format!("`{name}` is no cause{}", instead(name, &allowed)),
+            ));
         }
-        if let Some(k) = self.without.iter().position(|name| name == names::BASE_FRAME) {
+        if let Some(k) = self
+            .without
+            .iter()
+            .position(|name| name == names::BASE_FRAME)
+        {
             let message = "`base_frame` places the robot before the instrument: without it nothing can be diagnosed";
             faults.push(Fault::new(format!("without[{k}]"), message));
         }
@@ -128,10 +151,18 @@ impl Stage for Diagnose {
     }
 
     fn files(&self) -> Vec<(String, RawFile)> {
-        self.effects.iter().enumerate().map(|(k, file)| (format!("effects[{k}]"), file.clone())).collect()
+        self.effects
+            .iter()
+            .enumerate()
+            .map(|(k, file)| (format!("effects[{k}]"), file.clone()))
+            .collect()
     }
 
-    fn look(&self, _reads: Option<DiagnoseReads>, context: &Context) -> Result<Option<DiagnoseWrites>> {
+    fn look(
+        &self,
+        _reads: Option<DiagnoseReads>,
+        context: &Context,
+    ) -> Result<Option<DiagnoseWrites>> {
         own_effects(&self.effects, context).map(|_| None)
     }
 
@@ -149,13 +180,23 @@ impl Stage for Diagnose {
         let measured = |row: &usize| values(&data, *row) > 0;
         let fit: Vec<usize> = asked.iter().copied().filter(measured).collect();
         if fit.len() < FEWEST {
-            let message = format!("{} measured rows to fit do not even place the robot: at least {FEWEST} are needed", fit.len());
+            let message = format!(
+                "{} measured rows to fit do not even place the robot: at least {FEWEST} are needed",
+                fit.len()
+            );
             return Err(Error::data("table recording", message));
         }
         must_move(&data, &fit)?;
-        let validate: Vec<usize> = (0..data.rows()).filter(|row| asked.binary_search(row).is_err() && measured(row)).collect();
-        let (robot, _) = gauge(RobotModel::new(reads.robot.to_description()?), &data, &fit, &BTreeMap::new())
-            .map_err(|message| Error::data("table recording", message))?;
+        let validate: Vec<usize> = (0..data.rows())
+            .filter(|row| asked.binary_search(row).is_err() && measured(row))
+            .collect();
+        let (robot, _) = gauge(
+            RobotModel::new(reads.robot.to_description()?),
+            &data,
+            &fit,
+            &BTreeMap::new(),
+        )
+        .map_err(|message| Error::data("table recording", message))?;
         let set = screened::numbered(&reads.split);
         let question = Question {
             robot: &robot,
@@ -170,7 +211,9 @@ impl Stage for Diagnose {
             beside_simulation: corrected == Corrected::OutsideSimulation,
             seed: context.seed,
         };
-        context.services.begin("looking for what the model lacks", None, "steps");
+        context
+            .services
+            .begin("looking for what the model lacks", None, "steps");
         let mut steps = 0;
         let tell = |line: String| {
             steps += 1;
@@ -179,7 +222,9 @@ impl Stage for Diagnose {
         };
         let diagnosis = wrong_setup(&question).unwrap_or_else(|| diagnose(&question, tell));
         let mut diagnosis = said(diagnosis, &question, context)?;
-        blank_payload(&reads.recording).into_iter().for_each(|line| context.services.warn(line));
+        blank_payload(&reads.recording)
+            .into_iter()
+            .for_each(|line| context.services.warn(line));
         if !matches!(diagnosis.verdict, Said::WrongSetup | Said::NotAsked) {
             remark(&mut diagnosis, &data, &reads.recording, context);
         }
@@ -189,16 +234,37 @@ impl Stage for Diagnose {
         let parameters = Parameters::of(step, &diagnosis.model, &diagnosis.fitted, &[], None);
         let covariance = diagnosis.fitted.covariance.as_ref();
         let kept = &diagnosis.kept;
-        let errors = diagnosis.folds.iter().flat_map(|folds| kept.iter().zip(folds.random.iter().zip(&folds.blocks)));
-        let aside = diagnosis.screening.suspects.iter().filter(|suspect| !suspect.used()).map(|Suspect { row, .. }| *row);
+        let errors = diagnosis
+            .folds
+            .iter()
+            .flat_map(|folds| kept.iter().zip(folds.random.iter().zip(&folds.blocks)));
+        let aside = diagnosis
+            .screening
+            .suspects
+            .iter()
+            .filter(|suspect| !suspect.used())
+            .map(|Suspect { row, .. }| *row);
         let unseen: Vec<usize> = (0..data.rows()).filter(|row| held_out[*row]).collect();
-        let known = covariance.filter(|_| corrected == Corrected::RobotFile && diagnosis.verdict != Said::WrongSetup);
-        let doubtful = KnownModel { model: &diagnosis.model, covariance: known, measured: &data };
-        let prediction = Prediction::of(step, &diagnosis.model, &data, &reads.recording, &reads.split, &held_out, covariance)
-            .with_suspects(aside)
-            .with_weights(&diagnosis.kept, &diagnosis.fitted)
-            .with_folds(errors)
-            .with_remarks(doubtful.remarks(&data, &unseen));
+        let known = covariance
+            .filter(|_| corrected == Corrected::RobotFile && diagnosis.verdict != Said::WrongSetup);
+        let doubtful = KnownModel {
+            model: &diagnosis.model,
+            covariance: known,
+            measured: &data,
+        };
+        let prediction = Prediction::of(
+            step,
+            &diagnosis.model,
+            &data,
+            &reads.recording,
+            &reads.split,
+            &held_out,
+            covariance,
+        )
+        .with_suspects(aside)
+        .with_weights(&diagnosis.kept, &diagnosis.fitted)
+        .with_folds(errors)
+        .with_remarks(doubtful.remarks(&data, &unseen));
         if let Some(line) = doubtful::sentence(&prediction) {
             diagnosis.statement.push_str(&format!("; {line}"));
         }
@@ -221,26 +287,55 @@ impl Stage for Diagnose {
 }
 
 /// What a diagnosed recording shows beside its findings: rounded logs and brought marks in the statement too, a tool out of place as a warning.
-fn remark(diagnosis: &mut Diagnosis, data: &Measurements, recording: &Recording, context: &Context) {
-    let points: Vec<usize> = diagnosis.kept.iter().copied().filter(|row| data.has_point(*row)).collect();
+fn remark(
+    diagnosis: &mut Diagnosis,
+    data: &Measurements,
+    recording: &Recording,
+    context: &Context,
+) {
+    let points: Vec<usize> = diagnosis
+        .kept
+        .iter()
+        .copied()
+        .filter(|row| data.has_point(*row))
+        .collect();
     let rounded = rounded_logs(&diagnosis.model, data, &points);
-    let events = brought::events(&diagnosis.model, &diagnosis.fitted, data, recording, &diagnosis.kept);
+    let events = brought::events(
+        &diagnosis.model,
+        &diagnosis.fitted,
+        data,
+        recording,
+        &diagnosis.kept,
+    );
     for line in rounded.into_iter().chain(events) {
         diagnosis.statement.push_str(&format!("; {line}"));
         context.services.warn(line);
     }
-    misplaced_tool(&diagnosis.model, &diagnosis.fitted).into_iter().for_each(|line| context.services.warn(line));
+    misplaced_tool(&diagnosis.model, &diagnosis.fitted)
+        .into_iter()
+        .for_each(|line| context.services.warn(line));
 }
 
 /// What is diagnosed, and what its parameters correct: the measurements, or what they differ by from an outside simulation.
-fn mismatch(reads: &DiagnoseReads, asked: &[usize], context: &Context) -> Result<(Measurements, Corrected)> {
+fn mismatch(
+    reads: &DiagnoseReads,
+    asked: &[usize],
+    context: &Context,
+) -> Result<(Measurements, Corrected)> {
     let data = reads.recording.measurements();
-    let Some(simulated) = &reads.recording.simulated else { return Ok((data, Corrected::RobotFile)) };
+    let Some(simulated) = &reads.recording.simulated else {
+        return Ok((data, Corrected::RobotFile));
+    };
     let robot = RobotModel::new(reads.robot.to_description()?);
     let message = "aligning simulation and recording needs three rows to fit with sim_x, sim_y, sim_z and a measured point";
-    let data = against_simulation(&robot, &data, simulated, asked).ok_or_else(|| Error::data("table recording", message))?;
-    context.services.note("the mismatch is measured minus simulated (sim_x, sim_y, sim_z)".into());
-    context.services.warn("parameters correct that simulation: they are not the robot file's".into());
+    let data = against_simulation(&robot, &data, simulated, asked)
+        .ok_or_else(|| Error::data("table recording", message))?;
+    context
+        .services
+        .note("the mismatch is measured minus simulated (sim_x, sim_y, sim_z)".into());
+    context
+        .services
+        .warn("parameters correct that simulation: they are not the robot file's".into());
     Ok((data, Corrected::OutsideSimulation))
 }
 
@@ -249,11 +344,15 @@ fn said(mut diagnosis: Diagnosis, question: &Question, context: &Context) -> Res
     match diagnosis.verdict {
         Said::NotAsked => context.services.warn(diagnosis.not_observable.join("; ")),
         Said::WrongSetup => match diagnosis.findings.first() {
-            Some(finding) => context.services.warn(format!("the set-up is wrong: {}", finding.statement)),
+            Some(finding) => context
+                .services
+                .warn(format!("the set-up is wrong: {}", finding.statement)),
             None => return Err(Error::data("table recording", diagnosis.statement)),
         },
         _ => {
-            if let Some(WeightlessLinks { missing, warning }) = weightless_links(question.robot, question.data, question.fit) {
+            if let Some(WeightlessLinks { missing, warning }) =
+                weightless_links(question.robot, question.data, question.fit)
+            {
                 diagnosis.statement.push_str(&format!("; {missing}"));
                 context.services.warn(warning);
             }

@@ -6,8 +6,9 @@ use crate::stage::dynamic_arm::{dynamic_arm, must_be_bodies};
 use crate::stage::torque_signal::{HeldOut, RecordedTorques};
 use crate::stage::{Chunks, Context, Stage, reads, writes};
 use crate::table::{
-    ArmMotion, BodyConsistencies, Contacts, FrictionCurves, Inertials, JointTorques, Robot, TorqueCourse, TorqueCovariance,
-    TorqueFindings, TorqueNumbers, TorqueParameters, TorqueRivals, TorqueVerdict, VerdictSentences,
+    ArmMotion, BodyConsistencies, Contacts, FrictionCurves, Inertials, JointTorques, Robot,
+    TorqueCourse, TorqueCovariance, TorqueFindings, TorqueNumbers, TorqueParameters, TorqueRivals,
+    TorqueVerdict, VerdictSentences,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -108,7 +109,8 @@ writes! {
 
 impl Stage for DiagnoseTorques {
     const NAME: &'static str = "diagnose_torques";
-    const SUMMARY: &'static str = "names the physics that the simulated torques of a moving arm lack";
+    const SUMMARY: &'static str =
+        "names the physics that the simulated torques of a moving arm lack";
     const IMPLEMENTATION: u32 = 11;
     type Reads = DiagnoseTorquesReads;
     type Writes = DiagnoseTorquesWrites;
@@ -120,17 +122,25 @@ impl Stage for DiagnoseTorques {
                 faults.push(Fault::new("hold_out.last", "allowed: above 0 and below 1"));
             }
             Some(HoldOut::Trajectories(all)) if all.is_empty() => {
-                faults.push(Fault::new("hold_out.trajectories", "name at least one, e.g. [4]"));
+                faults.push(Fault::new(
+                    "hold_out.trajectories",
+                    "name at least one, e.g. [4]",
+                ));
             }
             Some(HoldOut::EverySecond(n)) if *n < 2 => {
                 faults.push(Fault::new("hold_out.every_second", "allowed: 2 and above"));
             }
             _ => {}
         }
-        if self.cutoff_hz.is_some_and(|hz| !(hz > 0.0 && hz.is_finite())) {
+        if self
+            .cutoff_hz
+            .is_some_and(|hz| !(hz > 0.0 && hz.is_finite()))
+        {
             faults.push(Fault::new("cutoff_hz", "expected a frequency above 0, Hz"));
         }
-        if self.consistency == ConsistencySetting::Enforce && self.inertials == InertialSetting::Free {
+        if self.consistency == ConsistencySetting::Enforce
+            && self.inertials == InertialSetting::Free
+        {
             let message = "`enforce` needs declared masses: base parameters stand for many arms, of which some are bodies; allowed with \
                            `inertials: free`: report";
             faults.push(Fault::new("consistency", message));
@@ -142,7 +152,9 @@ impl Stage for DiagnoseTorques {
         let robot = reads.robot.to_description()?;
         must_be_bodies(&robot)?;
         let (mut arm, notes) = dynamic_arm(&robot)?;
-        notes.into_iter().for_each(|note| context.services.note(note));
+        notes
+            .into_iter()
+            .for_each(|note| context.services.note(note));
         let free = self.inertials == InertialSetting::Free;
         if free {
             arm.links = None;
@@ -154,10 +166,19 @@ impl Stage for DiagnoseTorques {
             let message = "`enforce` needs declared masses, and the robot file lacks some: base parameters stand for many arms";
             return Err(Error::data("with.consistency", message));
         }
-        let question =
-            TorqueQuestion { free_inertials: free, cutoff: self.cutoff_hz, without: self.without.clone(), enforce_bodies };
-        let diagnosis = diagnose(&arm, &recording, &question, &mut |line| context.services.note(line))?;
-        diagnosis.remarks.iter().for_each(|remark| context.services.note(remark.clone()));
+        let question = TorqueQuestion {
+            free_inertials: free,
+            cutoff: self.cutoff_hz,
+            without: self.without.clone(),
+            enforce_bodies,
+        };
+        let diagnosis = diagnose(&arm, &recording, &question, &mut |line| {
+            context.services.note(line)
+        })?;
+        diagnosis
+            .remarks
+            .iter()
+            .for_each(|remark| context.services.note(remark.clone()));
         let sequence = sequences(&reads.motion, &diagnosis.courses.row)?;
         Ok(DiagnoseTorquesWrites {
             verdict: TorqueVerdict::of(context.id, &diagnosis, recording.is_current()),
@@ -197,7 +218,12 @@ impl MotionLabels {
                 labels.start = chunk.time.first().copied().unwrap_or_default();
             }
             labels.labelled |= chunk.usage.iter().any(Option::is_some);
-            let fresh: Vec<String> = chunk.usages.iter().filter(|label| !labels.usages.contains(label)).cloned().collect();
+            let fresh: Vec<String> = chunk
+                .usages
+                .iter()
+                .filter(|label| !labels.usages.contains(label))
+                .cloned()
+                .collect();
             labels.usages.extend(fresh);
             labels.stretches.extend(&chunk.trajectory);
             Ok(())
@@ -232,7 +258,8 @@ impl DiagnoseTorques {
             Some(HoldOut::Trajectories(all)) => {
                 if let Some(missing) = all.iter().find(|one| !labels.stretches.contains(one)) {
                     let most = labels.stretches.last().copied().unwrap_or_default();
-                    let message = format!("there is no stretch {missing}; the recording has 1 to {most}");
+                    let message =
+                        format!("there is no stretch {missing}; the recording has 1 to {most}");
                     return Err(Error::data("with.hold_out.trajectories", message));
                 }
                 Box::new(|chunk, _, row| all.contains(&chunk.trajectory[row]))
@@ -246,15 +273,18 @@ impl DiagnoseTorques {
                 !label.is_some_and(|label| self.on.contains(label))
             }),
             None => {
-                context
-                    .services
-                    .note(format!("no row is labelled with its use: the last {:.0} % are held out (`hold_out`)", 100.0 * LAST));
+                context.services.note(format!(
+                    "no row is labelled with its use: the last {:.0} % are held out (`hold_out`)",
+                    100.0 * LAST
+                ));
                 last(LAST)
             }
         };
         let (mut judging, mut first) = (0, 0);
         motion.each(|chunk| {
-            judging += (0..chunk.rows()).filter(|row| held_out(&chunk, first, *row)).count();
+            judging += (0..chunk.rows())
+                .filter(|row| held_out(&chunk, first, *row))
+                .count();
             first += chunk.rows();
             Ok(())
         })?;
@@ -266,7 +296,10 @@ impl DiagnoseTorques {
             );
             return Err(Error::data("with.on", message));
         }
-        context.services.note(format!("{} to fit, {judging} held out", counted((rows - judging) as u64, "row")));
+        context.services.note(format!(
+            "{} to fit, {judging} held out",
+            counted((rows - judging) as u64, "row")
+        ));
         Ok(held_out)
     }
 }

@@ -19,9 +19,12 @@ impl KnownModel<'_> {
     /// A remark for each row of `data` among `rows` of which the correction is doubtful, none for all others.
     pub fn remarks(&self, data: &Measurements, rows: &[usize]) -> Vec<Option<String>> {
         let mut out = vec![None; data.rows()];
-        let Some(covariance) = self.covariance else { return out };
+        let Some(covariance) = self.covariance else {
+            return out;
+        };
         let arm = IdentifiedArm::new(self.model.clone(), None);
-        let uncertainty = Uncertainty::new(&arm, covariance.clone(), Scatter::default()).beside(&arm, self.measured);
+        let uncertainty = Uncertainty::new(&arm, covariance.clone(), Scatter::default())
+            .beside(&arm, self.measured);
         for (row, doubt) in rows.iter().zip(doubts(&arm, &uncertainty, data, rows)) {
             out[*row] = doubt.map(|doubt| doubt.to_string());
         }
@@ -56,8 +59,19 @@ pub fn named(rows: &[&PredictionRow]) -> String {
     }
     let more = names.len().saturating_sub(NAMED);
     names.truncate(NAMED);
-    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-    let first = rows.first().and_then(|row| row.remark.as_deref()).unwrap_or_default();
-    let of = if names.len() > 1 { format!("{}: ", names[0]) } else { String::new() };
+    let more = if more > 0 {
+        format!(" and {more} more")
+    } else {
+        String::new()
+    };
+    let first = rows
+        .first()
+        .and_then(|row| row.remark.as_deref())
+        .unwrap_or_default();
+    let of = if names.len() > 1 {
+        format!("{}: ", names[0])
+    } else {
+        String::new()
+    };
     format!("{}{more} ({of}{first})", names.join(", "))
 }

@@ -7,12 +7,23 @@ use crate::robot::import::impossible_inertia;
 use nalgebra::{Matrix3, Point3, Vector3};
 
 /// How far masses may be off where the robot file does not say it: those of CAD models and of data sheets.
-const ASSUMED: InertialTolerance = InertialTolerance { mass_relative: 0.05, centre: 0.01, inertia_relative: 0.2 };
+const ASSUMED: InertialTolerance = InertialTolerance {
+    mass_relative: 0.05,
+    centre: 0.01,
+    inertia_relative: 0.2,
+};
 
 /// The arm, and what a person should know of what the robot file leaves open. Fails with a joint that slides.
 pub(crate) fn dynamic_arm(robot: &RobotDescription) -> Result<(DynamicArm, Vec<String>)> {
-    if let Some(joint) = robot.joints.iter().position(|joint| joint.kind == JointKind::Prismatic) {
-        let message = format!("joint {} slides; torques are diagnosed of revolute joints alone", joint + 1);
+    if let Some(joint) = robot
+        .joints
+        .iter()
+        .position(|joint| joint.kind == JointKind::Prismatic)
+    {
+        let message = format!(
+            "joint {} slides; torques are diagnosed of revolute joints alone",
+            joint + 1
+        );
         return Err(Error::data("table robot", message));
     }
     let mut notes = Vec::new();
@@ -23,7 +34,13 @@ pub(crate) fn dynamic_arm(robot: &RobotDescription) -> Result<(DynamicArm, Vec<S
             _ => Err(index),
         }
     };
-    let links = match robot.joints.iter().enumerate().map(declared).collect::<std::result::Result<Vec<_>, usize>>() {
+    let links = match robot
+        .joints
+        .iter()
+        .enumerate()
+        .map(declared)
+        .collect::<std::result::Result<Vec<_>, usize>>()
+    {
         Ok(links) => Some(links),
         Err(link) => {
             notes.push(format!(
@@ -34,7 +51,11 @@ pub(crate) fn dynamic_arm(robot: &RobotDescription) -> Result<(DynamicArm, Vec<S
         }
     };
     let tolerance = match robot.inertias.tolerance {
-        Some(own) => InertialTolerance { mass_relative: own.mass, centre: own.centre, inertia_relative: own.inertia },
+        Some(own) => InertialTolerance {
+            mass_relative: own.mass,
+            centre: own.centre,
+            inertia_relative: own.inertia,
+        },
         None => {
             if links.is_some() {
                 notes.push(format!(
@@ -53,15 +74,31 @@ pub(crate) fn dynamic_arm(robot: &RobotDescription) -> Result<(DynamicArm, Vec<S
         inertial(robot.payload_mass, robot.payload_centre, &moments)
     });
     let arm = DynamicArm {
-        axes: robot.joints.iter().map(|joint| Vector3::from(joint.axis)).collect(),
-        points: robot.joints.iter().map(|joint| Point3::from(joint.point)).collect(),
+        axes: robot
+            .joints
+            .iter()
+            .map(|joint| Vector3::from(joint.axis))
+            .collect(),
+        points: robot
+            .joints
+            .iter()
+            .map(|joint| Point3::from(joint.point))
+            .collect(),
         prismatic: vec![false; robot.joints.len()],
         tool: Point3::from(robot.tool),
         links,
         payload,
         gravity: Vector3::from(robot.gravity),
-        ratio: robot.joints.iter().map(|joint| joint.reduction_ratio.unwrap_or(1.0)).collect(),
-        coupled: robot.couplings.iter().map(|coupling| (coupling.moved, coupling.by)).collect(),
+        ratio: robot
+            .joints
+            .iter()
+            .map(|joint| joint.reduction_ratio.unwrap_or(1.0))
+            .collect(),
+        coupled: robot
+            .couplings
+            .iter()
+            .map(|coupling| (coupling.moved, coupling.by))
+            .collect(),
         tolerance,
     };
     Ok((arm, notes))
@@ -69,10 +106,14 @@ pub(crate) fn dynamic_arm(robot: &RobotDescription) -> Result<(DynamicArm, Vec<S
 
 /// Fails where no body has the declared moments of inertia of a link: the torques of such an arm are no arm's.
 pub(crate) fn must_be_bodies(robot: &RobotDescription) -> Result<()> {
-    let links = (1..).zip(&robot.inertias.links).map(|(link, moments): (usize, _)| (format!("link {link}"), moments));
+    let links = (1..)
+        .zip(&robot.inertias.links)
+        .map(|(link, moments): (usize, _)| (format!("link {link}"), moments));
     for (body, moments) in links.chain([("the payload".to_string(), &robot.inertias.payload)]) {
         if let Some(message) = moments.as_ref().and_then(impossible_inertia) {
-            let message = format!("{body}: {message}; correct it in the robot file: torques depend on it, positions do not");
+            let message = format!(
+                "{body}: {message}; correct it in the robot file: torques depend on it, positions do not"
+            );
             return Err(Error::data("table robot", message));
         }
     }
@@ -81,15 +122,22 @@ pub(crate) fn must_be_bodies(robot: &RobotDescription) -> Result<()> {
 
 fn inertial(mass: f64, centre: [f64; 3], [xx, xy, xz, yy, yz, zz]: &InertiaMoments) -> Inertial {
     let inertia = Matrix3::new(*xx, *xy, *xz, *xy, *yy, *yz, *xz, *yz, *zz);
-    Inertial { mass, centre: Point3::from(centre), inertia }
+    Inertial {
+        mass,
+        centre: Point3::from(centre),
+        inertia,
+    }
 }
 
 /// Nm at the joint per ampere of its motor, joint by joint. Fails with the joints whose numbers are missing.
 pub(crate) fn torque_per_ampere(robot: &RobotDescription) -> Result<Vec<f64>> {
     let factor = |joint: &JointDescription| Some(joint.reduction_ratio? * joint.motor_constant?);
     let all: Vec<Option<f64>> = robot.joints.iter().map(factor).collect();
-    let missing: Vec<String> =
-        (1..).zip(&all).filter(|(_, factor)| factor.is_none()).map(|(joint, _): (usize, _)| joint.to_string()).collect();
+    let missing: Vec<String> = (1..)
+        .zip(&all)
+        .filter(|(_, factor)| factor.is_none())
+        .map(|(joint, _): (usize, _)| joint.to_string())
+        .collect();
     if missing.is_empty() {
         return Ok(all.into_iter().flatten().collect());
     }

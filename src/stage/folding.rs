@@ -31,7 +31,9 @@ impl Default for FoldSetting {
 
 impl FoldSetting {
     pub(super) fn fault(self) -> Option<Fault> {
-        let Self::Parts(parts) = self else { return None };
+        let Self::Parts(parts) = self else {
+            return None;
+        };
         (parts == 1 || parts > MOST_PARTS).then(|| {
             Fault::new("folds", format!("allowed: 0 for none, 2 to {MOST_PARTS}, or n to leave out one pose after the other"))
         })
@@ -41,7 +43,11 @@ impl FoldSetting {
     pub(super) fn divide(self, whole: &Session, seed: u64) -> Result<Option<Folds>, String> {
         let poses = fold_poses(whole.data, whole.rows);
         let few = |allowed: &str| {
-            format!("{} in {} are too few; allowed: {allowed}", counted(poses, "pose"), counted(whole.rows.len(), "row"))
+            format!(
+                "{} in {} are too few; allowed: {allowed}",
+                counted(poses, "pose"),
+                counted(whole.rows.len(), "row")
+            )
         };
         match self {
             Self::Parts(0) => Ok(None),
@@ -56,7 +62,11 @@ impl FoldSetting {
     }
 
     /// The folds of a fit; where they had to be dropped, the person is told.
-    pub(super) fn folds(self, whole: &Session, context: &Context) -> (Option<Folds>, Option<usize>) {
+    pub(super) fn folds(
+        self,
+        whole: &Session,
+        context: &Context,
+    ) -> (Option<Folds>, Option<usize>) {
         match self.divide(whole, context.seed) {
             Ok(folds) => (folds, None),
             Err(why) => {
@@ -90,13 +100,21 @@ impl Visitor<'_> for NumberOrWord {
         f.write_str("a number of folds (0 for none), or n for one a pose")
     }
     fn visit_u64<E: de::Error>(self, parts: u64) -> Result<FoldSetting, E> {
-        usize::try_from(parts).map(FoldSetting::Parts).map_err(|_| E::invalid_value(Unexpected::Unsigned(parts), &self))
+        usize::try_from(parts)
+            .map(FoldSetting::Parts)
+            .map_err(|_| E::invalid_value(Unexpected::Unsigned(parts), &self))
     }
     fn visit_i64<E: de::Error>(self, parts: i64) -> Result<FoldSetting, E> {
-        usize::try_from(parts).map(FoldSetting::Parts).map_err(|_| E::invalid_value(Unexpected::Signed(parts), &self))
+        usize::try_from(parts)
+            .map(FoldSetting::Parts)
+            .map_err(|_| E::invalid_value(Unexpected::Signed(parts), &self))
     }
     fn visit_str<E: de::Error>(self, word: &str) -> Result<FoldSetting, E> {
-        if word == "n" { Ok(FoldSetting::EachPose) } else { Err(E::invalid_value(Unexpected::Str(word), &self)) }
+        if word == "n" {
+            Ok(FoldSetting::EachPose)
+        } else {
+            Err(E::invalid_value(Unexpected::Str(word), &self))
+        }
     }
 }
 

@@ -9,7 +9,10 @@ use crate::stage::advice::advice;
 use crate::stage::doubtful::KnownModel;
 use crate::stage::folding::FoldSetting;
 use crate::stage::{Context, computed, repeated, screened};
-use crate::table::{CovarianceTable, Fit, FitContext, Observability, Parameters, Prediction, Recording, Split, Suspects};
+use crate::table::{
+    CovarianceTable, Fit, FitContext, Observability, Parameters, Prediction, Recording, Split,
+    Suspects,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -153,41 +156,86 @@ impl Identified {
         let covariance = CovarianceTable::of(model, fitted, fitting.earlier_covariance);
         // Of a fit on top of another without its covariance only the last parameters' uncertainty is known, which would flatter.
         let known = fitting.earlier.is_none() || fitting.earlier_covariance.is_some();
-        let of_model = if known { covariance.of_model(model) } else { None };
+        let of_model = if known {
+            covariance.of_model(model)
+        } else {
+            None
+        };
         note(context, model, fitted, fitting);
         if let Some(repeated) = &fitted.repeated {
             repeated::note(context, repeated);
         }
         screened::note(context, fitting.screening, fitting.recording);
         let Screening { suspects, .. } = fitting.screening;
-        let aside = suspects.iter().filter(|suspect| !suspect.used()).map(|Suspect { row, .. }| *row);
-        let (folds, dropped) = fitting.folds.folds(&Session { data: fitting.data, rows: fitting.rows, model, fitted }, context);
+        let aside = suspects
+            .iter()
+            .filter(|suspect| !suspect.used())
+            .map(|Suspect { row, .. }| *row);
+        let (folds, dropped) = fitting.folds.folds(
+            &Session {
+                data: fitting.data,
+                rows: fitting.rows,
+                model,
+                fitted,
+            },
+            context,
+        );
         let unseen = |(row, _): &(&usize, _)| !fitting.seen_before[**row];
-        let errors =
-            folds.iter().flat_map(|folds| fitting.rows.iter().zip(folds.random.iter().zip(&folds.blocks)).filter(unseen));
+        let errors = folds.iter().flat_map(|folds| {
+            fitting
+                .rows
+                .iter()
+                .zip(folds.random.iter().zip(&folds.blocks))
+                .filter(unseen)
+        });
         let advice = advice(context, model, fitting.data, fitting.rows, fitted);
-        let known = KnownModel { model, covariance: of_model.as_ref(), measured: fitting.measured };
+        let known = KnownModel {
+            model,
+            covariance: of_model.as_ref(),
+            measured: fitting.measured,
+        };
         let beside = FitContext {
             geometry: fitting.geometry,
             repeatability: fitting.repeatability,
             folds: folds.as_ref().map(|folds| folds.count),
             unfolded: dropped,
-            earlier: of_model
-                .as_ref()
-                .map_or(0, |all| all.parameters().len() - fitted.covariance.as_ref().map_or(0, |own| own.parameters().len())),
+            earlier: of_model.as_ref().map_or(0, |all| {
+                all.parameters().len()
+                    - fitted
+                        .covariance
+                        .as_ref()
+                        .map_or(0, |own| own.parameters().len())
+            }),
         };
-        let prediction =
-            Prediction::of(step, model, fitting.data, fitting.recording, fitting.split, &held_out, of_model.as_ref())
-                .with_places(fitting.placed)
-                .with_suspects(aside)
-                .with_weights(fitting.rows, fitted)
-                .with_folds(errors)
-                .with_remarks(known.remarks(fitting.data, &fitting.doubtful));
-        let fitted_points = fitting.rows.iter().map(|row| &prediction.0[*row]).filter(|row| row.measured.is_none());
-        let suspicion = computed::suspicion(fitted_points.map(|row| [row.error_mm, row.noise_mm]), fitted.singular.len());
-        suspicion.into_iter().for_each(|line| context.services.warn(line));
+        let prediction = Prediction::of(
+            step,
+            model,
+            fitting.data,
+            fitting.recording,
+            fitting.split,
+            &held_out,
+            of_model.as_ref(),
+        )
+        .with_places(fitting.placed)
+        .with_suspects(aside)
+        .with_weights(fitting.rows, fitted)
+        .with_folds(errors)
+        .with_remarks(known.remarks(fitting.data, &fitting.doubtful));
+        let fitted_points = fitting
+            .rows
+            .iter()
+            .map(|row| &prediction.0[*row])
+            .filter(|row| row.measured.is_none());
+        let suspicion = computed::suspicion(
+            fitted_points.map(|row| [row.error_mm, row.noise_mm]),
+            fitted.singular.len(),
+        );
+        suspicion
+            .into_iter()
+            .for_each(|line| context.services.warn(line));
         Self {
-            parameters: Parameters::of(step, model, fitted, fitting.held, fitting.earlier).with_advice(&advice),
+            parameters: Parameters::of(step, model, fitted, fitting.held, fitting.earlier)
+                .with_advice(&advice),
             covariance,
             fit: Fit::of(step, fitted),
             observability: Observability::of(step, fitted, &beside),
@@ -211,18 +259,32 @@ fn note(context: &Context, model: &Model, fitted: &Fitted, fitting: &Fitting) {
     if let Some((rank, expected)) = fitting.geometry
         && rank < expected
     {
-        services
-            .note(format!("the data see {rank} of the {expected} geometric parameters of this arm: {}", why_not(&model.robot)));
+        services.note(format!(
+            "the data see {rank} of the {expected} geometric parameters of this arm: {}",
+            why_not(&model.robot)
+        ));
     }
     if fitted.values < 2 * free {
-        let (points, parameters) = (counted(fitting.rows.len(), "point"), counted(free, "parameter"));
+        let (points, parameters) = (
+            counted(fitting.rows.len(), "point"),
+            counted(free, "parameter"),
+        );
         let saturated = match fitted.values <= free {
-            true => "; nothing is left to judge the fit by, and its standard deviations rest on the weights' noise alone",
+            true => {
+                "; nothing is left to judge the fit by, and its standard deviations rest on the weights' noise alone"
+            }
             false => "",
         };
-        services.warn(format!("only {points} for {parameters}: take at least {free}{saturated}"));
+        services.warn(format!(
+            "only {points} for {parameters}: take at least {free}{saturated}"
+        ));
     }
-    let noise: f64 = fitting.rows.iter().map(|row| noise(fitting.data, *row)).sum::<f64>() / fitting.rows.len() as f64;
+    let noise: f64 = fitting
+        .rows
+        .iter()
+        .map(|row| noise(fitting.data, *row))
+        .sum::<f64>()
+        / fitting.rows.len() as f64;
     let noise_axis = noise / 3f64.sqrt();
     if fitted.excess_sigma > noise_axis {
         services.note(format!(
@@ -240,7 +302,8 @@ fn note(context: &Context, model: &Model, fitted: &Fitted, fitting: &Fitting) {
     }
     for (k, prior_check) in &fitted.prior_checks {
         let spec = &model.stack.specs()[*k];
-        if let (Some((alone, sigma)), true) = (prior_check.without, prior_check.conflict > CONFLICT) {
+        if let (Some((alone, sigma)), true) = (prior_check.without, prior_check.conflict > CONFLICT)
+        {
             let show = |value: f64| format!("{:.4}", spec.unit.from_si(value));
             services.warn(format!(
                 "{}: the prior says {} +- {} {unit}, the data say {} +- {} {unit}, {:.1} sigma apart: one of them is wrong",
@@ -262,7 +325,10 @@ fn note(context: &Context, model: &Model, fitted: &Fitted, fitting: &Fitting) {
         services.note(format!("stopped by their bounds: {}", stopped.join(", ")));
     }
     if !fitted.downweighted.is_empty() {
-        services.note(downweighted(&fitted.downweighted, &fitting.recording.point_id));
+        services.note(downweighted(
+            &fitted.downweighted,
+            &fitting.recording.point_id,
+        ));
     }
 }
 
@@ -270,9 +336,17 @@ fn note(context: &Context, model: &Model, fitted: &Fitted, fitting: &Fitting) {
 fn downweighted(weights: &BTreeMap<usize, f64>, names: &[String]) -> String {
     let mut least: Vec<(&usize, &f64)> = weights.iter().collect();
     least.sort_by(|a, b| a.1.total_cmp(b.1));
-    let named: Vec<String> = least.iter().take(NAMED).map(|(row, weight)| format!("{} to {weight:.2}", names[**row])).collect();
+    let named: Vec<String> = least
+        .iter()
+        .take(NAMED)
+        .map(|(row, weight)| format!("{} to {weight:.2}", names[**row]))
+        .collect();
     let more = if least.len() > NAMED { ", ..." } else { "" };
-    format!("far off and down-weighted: {} ({}{more})", counted(weights.len(), "row"), named.join(", "))
+    format!(
+        "far off and down-weighted: {} ({}{more})",
+        counted(weights.len(), "row"),
+        named.join(", ")
+    )
 }
 
 /// Down-weighted rows that are named.
@@ -289,7 +363,11 @@ fn why_not(robot: &RobotModel) -> String {
     let arm = robot.home().translation - robot.point(last);
     let distance = arm.cross(robot.axis(last)).norm();
     if robot.is_revolute(last) && distance < NEAR_AXIS {
-        format!("the measured point lies {:.1} mm off the axis of joint {}", distance * 1e3, last + 1)
+        format!(
+            "the measured point lies {:.1} mm off the axis of joint {}",
+            distance * 1e3,
+            last + 1
+        )
     } else {
         "some joints hardly move, or only together".into()
     }

@@ -5,7 +5,9 @@
 use crate::diagnose::{Question, wrong_setup};
 use crate::effect::{Effect, EffectContext, EffectStack, arm_effect, identified, names};
 use crate::error::{Error, Fault, Result, nearest};
-use crate::estimate::{FitOptions, Fitted, Model, ParameterStatus, fit, gauge, known_places, placed_by_left_out};
+use crate::estimate::{
+    FitOptions, Fitted, Model, ParameterStatus, fit, gauge, known_places, placed_by_left_out,
+};
 use crate::observation;
 use crate::robot::{Measurements, RobotModel};
 use crate::spatial::Pose;
@@ -64,7 +66,8 @@ crate::stage::reads! {
 
 impl Stage for Identify {
     const NAME: &'static str = "identify";
-    const SUMMARY: &'static str = "identifies geometry, transmission and compliance from the nominal robot in one estimation";
+    const SUMMARY: &'static str =
+        "identifies geometry, transmission and compliance from the nominal robot in one estimation";
     const IMPLEMENTATION: u32 = 18;
     type Reads = IdentifyReads;
     type Writes = Identified;
@@ -73,7 +76,10 @@ impl Stage for Identify {
         let mut faults = self.shared_faults("fit");
         faults.extend(known_cell::faults(&self.known_cell()));
         for (name, place) in &self.targets {
-            if !place.iter().all(|value| value.is_finite() && value.abs() < FARTHEST_TARGET) {
+            if !place
+                .iter()
+                .all(|value| value.is_finite() && value.abs() < FARTHEST_TARGET)
+            {
                 faults.push(Fault::new(
                     format!("targets.{name}"),
                     "expected [x, y, z] in mm from the tool point, e.g. [50, 0, 20]",
@@ -83,11 +89,15 @@ impl Stage for Identify {
         for (k, name) in self.effects.iter().enumerate() {
             if !identified().any(|cause| cause.name() == name) {
                 let names: Vec<&str> = identified().map(|cause| cause.name()).collect();
-                let hint =
-                    nearest(name, names.iter().copied()).map(|near| format!("did you mean `{near}`? ")).unwrap_or_default();
+                let hint = nearest(name, names.iter().copied())
+                    .map(|near| format!("did you mean `{near}`? "))
+                    .unwrap_or_default();
                 faults.push(Fault::new(
                     format!("effects[{k}]"),
-                    format!("unknown effect `{name}`; {hint}allowed: {}", names.join(", ")),
+                    format!(
+                        "unknown effect `{name}`; {hint}allowed: {}",
+                        names.join(", ")
+                    ),
                 ));
             }
         }
@@ -102,33 +112,54 @@ impl Stage for Identify {
         let mut data = reads.recording.measurements();
         let rows = reads.split.rows(&reads.recording, &self.on)?;
         must_move(&data, &rows)?;
-        let (robot, base) = self.gauged(RobotModel::new(reads.robot.to_description()?), &data, &rows, context)?;
+        let (robot, base) = self.gauged(
+            RobotModel::new(reads.robot.to_description()?),
+            &data,
+            &rows,
+            context,
+        )?;
         self.question_setup(&robot, &data, &rows, &reads, context);
-        let setting = EffectContext { base, load: self.load.into() };
+        let setting = EffectContext {
+            base,
+            load: self.load.into(),
+        };
         let mut effects = Vec::new();
-        let asked = identified().filter(|cause| self.effects.iter().any(|name| name == cause.name()));
+        let asked =
+            identified().filter(|cause| self.effects.iter().any(|name| name == cause.name()));
         for effect in asked.filter_map(|cause| cause.arm_effect(&setting)) {
             if effect.name() == names::ANCHOR && robot.setup().anchors.is_empty() {
                 continue;
             }
             match effect.missing(&robot, &data) {
-                Some(reason) => context.services.note(format!("{} is left out: {reason}", effect.name())),
+                Some(reason) => context
+                    .services
+                    .note(format!("{} is left out: {reason}", effect.name())),
                 None => {
-                    let by_weight = effect.name() == names::JOINT_COMPLIANCE && matches!(self.load, LoadSetting::Gravity);
-                    if let Some(links) = weightless_links(&robot, &data, &rows).filter(|_| by_weight) {
+                    let by_weight = effect.name() == names::JOINT_COMPLIANCE
+                        && matches!(self.load, LoadSetting::Gravity);
+                    if let Some(links) =
+                        weightless_links(&robot, &data, &rows).filter(|_| by_weight)
+                    {
                         context.services.warn(links.warning);
                     }
                     effects.push(effect);
                 }
             }
         }
-        let mut model = Model::nominal(robot.clone(), EffectStack::new(&robot, setting.base, effects));
+        let mut model = Model::nominal(
+            robot.clone(),
+            EffectStack::new(&robot, setting.base, effects),
+        );
         let all: Vec<usize> = (0..model.x.len()).collect();
         let (candidates, held) = self.parameter_set().apply(&mut model, &all, context);
         known_cell::apply(&mut model, &self.known_cell(), context)?;
         let repeatability = self.repeatability.apply(&model, &mut data, &rows, context);
-        let options = FitOptions { rows: &rows, candidates: &candidates };
-        let (model, fitted, screening) = fit_rows(&model, &data, &options, &reads.split, self.screen);
+        let options = FitOptions {
+            rows: &rows,
+            candidates: &candidates,
+        };
+        let (model, fitted, screening) =
+            fit_rows(&model, &data, &options, &reads.split, self.screen);
         let (model, placed) = placed_by_left_out(&model, &data, &rows);
         let fitting = Fitting {
             data: &data,
@@ -145,10 +176,19 @@ impl Stage for Identify {
             repeatability,
             folds: self.folds,
             measured: &data,
-            doubtful: (0..data.rows()).filter(|row| rows.binary_search(row).is_err()).collect(),
+            doubtful: (0..data.rows())
+                .filter(|row| rows.binary_search(row).is_err())
+                .collect(),
             placed: &placed,
         };
-        brought::note(context, &model, &fitted, &data, &reads.recording, &screening.kept);
+        brought::note(
+            context,
+            &model,
+            &fitted,
+            &data,
+            &reads.recording,
+            &screening.kept,
+        );
         question_ratios(&model, &fitted, &fitting, &setting, context);
         Ok(Identified::of(context, &model, &fitted, &fitting))
     }
@@ -159,12 +199,29 @@ const FARTHEST_TARGET: f64 = 1e4;
 
 impl Identify {
     /// A warning where robot file, joints and points do not belong together: geometry that is estimated would make up for it.
-    fn question_setup(&self, robot: &RobotModel, data: &Measurements, rows: &[usize], reads: &IdentifyReads, context: &Context) {
-        if !self.effects.iter().any(|name| GEOMETRY[OF_THE_ARM].contains(&name.as_str())) {
+    fn question_setup(
+        &self,
+        robot: &RobotModel,
+        data: &Measurements,
+        rows: &[usize],
+        reads: &IdentifyReads,
+        context: &Context,
+    ) {
+        if !self
+            .effects
+            .iter()
+            .any(|name| GEOMETRY[OF_THE_ARM].contains(&name.as_str()))
+        {
             return;
         }
-        unmoved::told(robot, data, rows).into_iter().for_each(|line| context.services.warn(line));
-        let fit: Vec<usize> = rows.iter().copied().filter(|row| data.has_point(*row)).collect();
+        unmoved::told(robot, data, rows)
+            .into_iter()
+            .for_each(|line| context.services.warn(line));
+        let fit: Vec<usize> = rows
+            .iter()
+            .copied()
+            .filter(|row| data.has_point(*row))
+            .collect();
         let question = Question {
             robot,
             data,
@@ -179,54 +236,109 @@ impl Identify {
             seed: context.seed,
         };
         if let Some(wrong) = wrong_setup(&question) {
-            let found =
-                wrong.findings.first().map(|finding| format!("the set-up is wrong: {}", finding.statement.trim_end_matches('.')));
+            let found = wrong.findings.first().map(|finding| {
+                format!(
+                    "the set-up is wrong: {}",
+                    finding.statement.trim_end_matches('.')
+                )
+            });
             context.services.warn(found.unwrap_or(wrong.statement));
         }
     }
 
     /// The robot with what it is measured by, and where its base stands at the start.
-    fn gauged(&self, robot: RobotModel, data: &Measurements, rows: &[usize], context: &Context) -> Result<(RobotModel, Pose)> {
+    fn gauged(
+        &self,
+        robot: RobotModel,
+        data: &Measurements,
+        rows: &[usize],
+        context: &Context,
+    ) -> Result<(RobotModel, Pose)> {
         let known = data.target.as_ref().map_or(&[][..], |named| &named.names);
         if let Some(unknown) = self.targets.keys().find(|name| !known.contains(name)) {
-            let there: Vec<&str> = known.iter().map(|name| if name.is_empty() { "(no name)" } else { name }).collect();
-            let there = if there.is_empty() { "none; map a column to `target` in `ingest`".into() } else { there.join(", ") };
+            let there: Vec<&str> = known
+                .iter()
+                .map(|name| if name.is_empty() { "(no name)" } else { name })
+                .collect();
+            let there = if there.is_empty() {
+                "none; map a column to `target` in `ingest`".into()
+            } else {
+                there.join(", ")
+            };
             return Err(Error::spec(
                 format!("{}.with.targets.{unknown}", context.id),
                 format!("the recording has no such target; it has: {there}"),
             ));
         }
-        let stated = self.targets.iter().map(|(name, place)| (name.clone(), Vector3::from(*place) * 1e-3)).collect();
-        let (robot, base) = gauge(robot, data, rows, &stated).map_err(|message| Error::data("table recording", message))?;
+        let stated = self
+            .targets
+            .iter()
+            .map(|(name, place)| (name.clone(), Vector3::from(*place) * 1e-3))
+            .collect();
+        let (robot, base) = gauge(robot, data, rows, &stated)
+            .map_err(|message| Error::data("table recording", message))?;
         Ok(known_cell::standing(robot, base, &self.points, data, rows))
     }
 
     fn known_cell(&self) -> KnownCell<'_> {
-        KnownCell { distances: &self.distances, spheres: &self.spheres, points: &self.points }
+        KnownCell {
+            distances: &self.distances,
+            spheres: &self.spheres,
+            points: &self.points,
+        }
     }
 }
 
 /// Effects that together are the rigid geometry of the arm and of what measures it.
-const GEOMETRY: [&str; 5] = ["anchor", "base_frame", "tool_offset", "joint_offset", "link_geometry"];
+const GEOMETRY: [&str; 5] = [
+    "anchor",
+    "base_frame",
+    "tool_offset",
+    "joint_offset",
+    "link_geometry",
+];
 /// Those of them that are the arm's own numbers.
 const OF_THE_ARM: std::ops::Range<usize> = 3..5;
 
 /// (found, expected) rank of the geometry, when all of it was asked for and theory has a word on what was measured.
-fn geometric_rank(model: &Model, data: &Measurements, rows: &[usize], fitted: &Fitted) -> Option<(usize, usize)> {
+fn geometric_rank(
+    model: &Model,
+    data: &Measurements,
+    rows: &[usize],
+    fitted: &Fitted,
+) -> Option<(usize, usize)> {
     let anchored = !model.robot.setup().anchors.is_empty();
-    let mut needed = GEOMETRY.iter().filter(|name| **name != names::ANCHOR || anchored);
-    let asked = needed.all(|name| model.stack.effects().any(|(effect, _)| effect.name() == *name));
+    let mut needed = GEOMETRY
+        .iter()
+        .filter(|name| **name != names::ANCHOR || anchored);
+    let asked = needed.all(|name| {
+        model
+            .stack
+            .effects()
+            .any(|(effect, _)| effect.name() == *name)
+    });
     let found = model
         .stack
         .effects()
         .filter(|(effect, _)| GEOMETRY.contains(&effect.name()))
         .flat_map(|(_, range)| range)
-        .filter(|k| matches!(fitted.statuses[*k], ParameterStatus::Free(_) | ParameterStatus::Bound(_)))
+        .filter(|k| {
+            matches!(
+                fitted.statuses[*k],
+                ParameterStatus::Free(_) | ParameterStatus::Bound(_)
+            )
+        })
         .count();
     let held = model.stack.specs().len() != fitted.singular_all.len();
     // A prior makes its parameter known whatever the data see.
     let told = model.known.values().any(|known| known.prior.is_some());
-    let expected = observation::rank(&model.robot, data, rows, !model.lengths.is_empty(), known_places(model))?;
+    let expected = observation::rank(
+        &model.robot,
+        data,
+        rows,
+        !model.lengths.is_empty(),
+        known_places(model),
+    )?;
     (asked && !held && !told).then_some((found, expected))
 }
 
@@ -234,38 +346,79 @@ fn geometric_rank(model: &Model, data: &Measurements, rows: &[usize], fitted: &F
 const PLAUSIBLE_RATIO: f64 = 5e-4;
 
 /// Where ratios are implausible and compliance was not asked for, fits it too and says which explanation the data favour.
-fn question_ratios(model: &Model, fitted: &Fitted, fitting: &Fitting, setting: &EffectContext, context: &Context) {
+fn question_ratios(
+    model: &Model,
+    fitted: &Fitted,
+    fitting: &Fitting,
+    setting: &EffectContext,
+    context: &Context,
+) {
     let implausible = |model: &Model, fitted: &Fitted| -> Vec<usize> {
         let beyond = |k: &usize| match &fitted.statuses[*k] {
             ParameterStatus::Free(sigma) => model.x[*k].abs() > PLAUSIBLE_RATIO.max(3.0 * sigma),
             _ => false,
         };
-        model.stack.parameters_of(names::REDUCTION_RATIO).filter(beyond).collect()
+        model
+            .stack
+            .parameters_of(names::REDUCTION_RATIO)
+            .filter(beyond)
+            .collect()
     };
     let suspects = implausible(model, fitted);
-    let Some(compliance) = arm_effect(names::JOINT_COMPLIANCE, setting) else { return };
-    let asked = model.stack.effects().any(|(effect, _)| effect.name() == names::JOINT_COMPLIANCE);
+    let Some(compliance) = arm_effect(names::JOINT_COMPLIANCE, setting) else {
+        return;
+    };
+    let asked = model
+        .stack
+        .effects()
+        .any(|(effect, _)| effect.name() == names::JOINT_COMPLIANCE);
     if suspects.is_empty() || asked {
         return;
     }
     let list = |model: &Model, which: &[usize]| -> String {
-        let one = |k: &usize| format!("{} {:+.1}e-4", model.stack.specs()[*k].place, model.x[*k] * 1e4);
+        let one = |k: &usize| {
+            format!(
+                "{} {:+.1}e-4",
+                model.stack.specs()[*k].place,
+                model.x[*k] * 1e4
+            )
+        };
         which.iter().map(one).collect::<Vec<_>>().join(", ")
     };
-    let opening = format!("reduction ratios are quotients of tooth counts, yet {}", list(model, &suspects));
+    let opening = format!(
+        "reduction ratios are quotients of tooth counts, yet {}",
+        list(model, &suspects)
+    );
     if let Some(reason) = compliance.missing(&model.robot, fitting.data) {
-        context.services.warn(format!("{opening}; compliance under self-weight cannot be tried as the explanation: {reason}"));
+        context.services.warn(format!(
+            "{opening}; compliance under self-weight cannot be tried as the explanation: {reason}"
+        ));
         return;
     }
     // Known names first, compliance behind them: numbers of the first model stay valid in the second.
-    let mut effects: Vec<Box<dyn Effect>> =
-        model.stack.effects().filter_map(|(effect, _)| arm_effect(effect.name(), setting)).collect();
+    let mut effects: Vec<Box<dyn Effect>> = model
+        .stack
+        .effects()
+        .filter_map(|(effect, _)| arm_effect(effect.name(), setting))
+        .collect();
     effects.push(compliance);
-    let mut rival = Model::nominal(model.robot.clone(), EffectStack::new(&model.robot, setting.base, effects));
+    let mut rival = Model::nominal(
+        model.robot.clone(),
+        EffectStack::new(&model.robot, setting.base, effects),
+    );
     rival.known.clone_from(&model.known);
     rival.lengths.clone_from(&model.lengths);
-    let candidates: Vec<usize> = (0..rival.stack.specs().len()).filter(|k| !fitting.held.contains(k)).collect();
-    let (rival, refitted) = fit(&rival, fitting.data, &FitOptions { rows: fitting.rows, candidates: &candidates });
+    let candidates: Vec<usize> = (0..rival.stack.specs().len())
+        .filter(|k| !fitting.held.contains(k))
+        .collect();
+    let (rival, refitted) = fit(
+        &rival,
+        fitting.data,
+        &FitOptions {
+            rows: fitting.rows,
+            candidates: &candidates,
+        },
+    );
     let gain = evidence(fitted, fitting) - evidence(&refitted, fitting);
     if gain > DECISIVE {
         context.services.warn(format!(
@@ -277,7 +430,9 @@ fn question_ratios(model: &Model, fitted: &Fitted, fitting: &Fitting, setting: &
             refitted.excess_sigma * 1e3
         ));
     } else {
-        context.services.note(format!("{opening}; compliance under self-weight does not explain it better"));
+        context.services.note(format!(
+            "{opening}; compliance under self-weight does not explain it better"
+        ));
     }
 }
 
@@ -287,7 +442,13 @@ const DECISIVE: f64 = 10.0;
 /// BIC of a fit from its robust residual scale.
 fn evidence(fitted: &Fitted, fitting: &Fitting) -> f64 {
     let rows = fitting.rows.len() as f64;
-    let noise: f64 = fitting.rows.iter().map(|row| observation::noise(fitting.data, *row).powi(2) / 3.0).sum::<f64>() / rows;
+    let noise: f64 = fitting
+        .rows
+        .iter()
+        .map(|row| observation::noise(fitting.data, *row).powi(2) / 3.0)
+        .sum::<f64>()
+        / rows;
     let values = 3.0 * rows;
-    values * (noise + fitted.excess_sigma * fitted.excess_sigma).ln() + fitted.singular.len() as f64 * values.ln()
+    values * (noise + fitted.excess_sigma * fitted.excess_sigma).ln()
+        + fitted.singular.len() as f64 * values.ln()
 }

@@ -43,8 +43,8 @@ pub use later::LaterFiles;
 pub use layout::{Axis, Decimal, Duplicates, FileLayout, Join, LimitPolicy};
 pub use listing::ListedTable;
 pub use mapped::{
-    ColumnRef, ConventionColumns, CountColumn, CoupledColumn, JointColumns, NameMatch, ScalarColumn, TextColumn,
-    UncertaintyColumn, last_number,
+    ColumnRef, ConventionColumns, CountColumn, CoupledColumn, JointColumns, NameMatch,
+    ScalarColumn, TextColumn, UncertaintyColumn, last_number,
 };
 pub use motion::VelocitySettings;
 pub use noise::{InstrumentSetting, instruments};
@@ -123,7 +123,8 @@ writes! {
 
 impl Stage for Ingest {
     const NAME: &'static str = "ingest";
-    const SUMMARY: &'static str = "reads raw files into a recording, and lists every rejected row with its reason";
+    const SUMMARY: &'static str =
+        "reads raw files into a recording, and lists every rejected row with its reason";
     const IMPLEMENTATION: u32 = 8;
     type Reads = IngestReads;
     type Writes = IngestWrites;
@@ -132,7 +133,11 @@ impl Stage for Ingest {
         check::faults(self)
     }
     fn files(&self) -> Vec<(String, RawFile)> {
-        let first = self.files.iter().enumerate().map(|(index, file)| (format!("files[{index}].file"), file.file.clone()));
+        let first = self
+            .files
+            .iter()
+            .enumerate()
+            .map(|(index, file)| (format!("files[{index}].file"), file.file.clone()));
         let later = self.later.iter().enumerate().flat_map(|(set, later)| {
             let files = later.files.iter().enumerate();
             files.map(move |(index, file)| (format!("later[{set}].files[{index}]"), file.clone()))
@@ -140,7 +145,9 @@ impl Stage for Ingest {
         first.chain(later).collect()
     }
     fn look(&self, reads: Option<IngestReads>, context: &Context) -> Result<Option<IngestWrites>> {
-        let arm = reads.map(|reads| arm::RobotJoints::of(&reads.robot)).transpose()?;
+        let arm = reads
+            .map(|reads| arm::RobotJoints::of(&reads.robot))
+            .transpose()?;
         let mut faults = Vec::new();
         for layout in self.measurements().iter().flat_map(|one| &one.files) {
             match reading::header(layout, arm.as_ref(), self.limits, context) {
@@ -149,7 +156,11 @@ impl Stage for Ingest {
                 Err(other) => return Err(other),
             }
         }
-        if faults.is_empty() { Ok(None) } else { Err(Error::Data(faults)) }
+        if faults.is_empty() {
+            Ok(None)
+        } else {
+            Err(Error::Data(faults))
+        }
     }
     fn run(&self, reads: IngestReads, context: &Context) -> Result<IngestWrites> {
         self.run_holding(MOST_HELD, reads, context)
@@ -158,7 +169,12 @@ impl Stage for Ingest {
 
 impl Ingest {
     /// Runs the stage with rows held in so many bytes of memory; files of which more would be held are read again to write them.
-    pub fn run_holding(&self, most: usize, reads: IngestReads, context: &Context) -> Result<IngestWrites> {
+    pub fn run_holding(
+        &self,
+        most: usize,
+        reads: IngestReads,
+        context: &Context,
+    ) -> Result<IngestWrites> {
         let faults = self.check();
         if !faults.is_empty() {
             return Err(Error::Spec(faults));
@@ -173,15 +189,36 @@ impl Ingest {
             scanned.push((scans, decisions));
         }
         copies::refuse(&scanned)?;
-        let names = names(scanned.iter().flat_map(|(scans, _)| scans).map(|scan| scan.label.as_str()));
-        let each = measurements.iter().zip(&scanned).zip(names.chunks(self.files.len().max(1)));
+        let names = names(
+            scanned
+                .iter()
+                .flat_map(|(scans, _)| scans)
+                .map(|scan| scan.label.as_str()),
+        );
+        let each = measurements
+            .iter()
+            .zip(&scanned)
+            .zip(names.chunks(self.files.len().max(1)));
         let decided: Vec<joined::JoinDecisions> = each
-            .map(|((settings, (scans, decisions)), names)| joined::JoinDecisions { settings, arm: &arm, scans, decisions, names })
+            .map(
+                |((settings, (scans, decisions)), names)| joined::JoinDecisions {
+                    settings,
+                    arm: &arm,
+                    scans,
+                    decisions,
+                    names,
+                },
+            )
             .collect();
         let gaps: Vec<Option<f64>> = self.later.iter().map(LaterFiles::gap).collect();
         let (recording, rejected) = write::write(&decided, &gaps, &names, context)?;
         let convention = JointConventions::of(&self.convention(&arm), &arm.prismatic);
-        Ok(IngestWrites { recording, rejected, intake: intake(&decided, context), convention })
+        Ok(IngestWrites {
+            recording,
+            rejected,
+            intake: intake(&decided, context),
+            convention,
+        })
     }
 
     /// How the file that holds the joints counts them.
@@ -193,37 +230,60 @@ impl Ingest {
             true => joints.linear_unit.as_deref(),
             false => joints.unit.as_deref(),
         };
-        let zero = |joint: usize| match (joints.zero.get(joint), unit(joint).and_then(Unit::parse)) {
+        let zero = |joint: usize| match (joints.zero.get(joint), unit(joint).and_then(Unit::parse))
+        {
             (Some(zero), Some(unit)) => unit.to_si(*zero),
             _ => 0.0,
         };
         let all = 0..arm.joints();
-        let sign = all.clone().map(|joint| joints.sign.get(joint).copied().unwrap_or(1.0)).collect();
-        let coupled = joints.coupled.iter().map(|one| CountedCoupling { joint: one.joint - 1, by: one.by - 1, ratio: one.ratio });
+        let sign = all
+            .clone()
+            .map(|joint| joints.sign.get(joint).copied().unwrap_or(1.0))
+            .collect();
+        let coupled = joints.coupled.iter().map(|one| CountedCoupling {
+            joint: one.joint - 1,
+            by: one.by - 1,
+            ratio: one.ratio,
+        });
         JointConvention::new(sign, all.map(zero).collect(), coupled.collect())
     }
 }
 
 /// The files' own names, made different where two are the same: a folder is no part of a table.
 fn names<'a>(labels: impl Iterator<Item = &'a str>) -> Vec<String> {
-    let own = |label: &str| Path::new(label).file_name().map_or_else(|| label.into(), |name| name.to_string_lossy().into_owned());
+    let own = |label: &str| {
+        Path::new(label)
+            .file_name()
+            .map_or_else(|| label.into(), |name| name.to_string_lossy().into_owned())
+    };
     let all: Vec<String> = labels.map(own).collect();
     let mut names: Vec<String> = Vec::with_capacity(all.len());
     for name in &all {
         // Another file may be called like a numbered one.
-        let numbered =
-            (2..).map(|number| format!("{name} ({number})")).find(|other| !all.contains(other) && !names.contains(other));
-        names.push(if names.contains(name) { numbered.unwrap_or_default() } else { name.clone() });
+        let numbered = (2..)
+            .map(|number| format!("{name} ({number})"))
+            .find(|other| !all.contains(other) && !names.contains(other));
+        names.push(if names.contains(name) {
+            numbered.unwrap_or_default()
+        } else {
+            name.clone()
+        });
     }
     names
 }
 
 fn intake(decided: &[joined::JoinDecisions], context: &Context) -> Intake {
     let mut rows: Vec<IntakeRow> = Vec::new();
-    for ((scan, decision), name) in decided.iter().flat_map(|one| one.scans.iter().zip(one.decisions).zip(one.names)) {
+    for ((scan, decision), name) in decided
+        .iter()
+        .flat_map(|one| one.scans.iter().zip(one.decisions).zip(one.names))
+    {
         let accepted = verdict::accepted(scan, decision);
         let rejected = scan.read - accepted;
-        context.services.note(format!("{name}: {} read, {accepted} used, {rejected} rejected", counted(scan.read, "row")));
+        context.services.note(format!(
+            "{name}: {} read, {accepted} used, {rejected} rejected",
+            counted(scan.read, "row")
+        ));
         rows.push(IntakeRow {
             file: name.clone(),
             lines: scan.lines as i64,

@@ -54,7 +54,11 @@ pub(super) struct KnownCell<'a> {
 
 /// Faults of known distances, spheres and points.
 pub(super) fn faults(known: &KnownCell) -> Vec<Fault> {
-    let KnownCell { distances, spheres, points } = known;
+    let KnownCell {
+        distances,
+        spheres,
+        points,
+    } = known;
     let mut faults = Vec::new();
     for (name, KnownPoint { mm, sigma }) in *points {
         if !(mm.iter().all(|value| value.is_finite()) && *sigma > 0.0 && sigma.is_finite()) {
@@ -64,21 +68,41 @@ pub(super) fn faults(known: &KnownCell) -> Vec<Fault> {
             ));
         }
     }
-    for (index, KnownDistance { between: [from, to], mm, sigma }) in distances.iter().enumerate() {
-        if from == to || from.matches('*').count() > 1 || from.matches('*').count() != to.matches('*').count() {
+    for (
+        index,
+        KnownDistance {
+            between: [from, to],
+            mm,
+            sigma,
+        },
+    ) in distances.iter().enumerate()
+    {
+        if from == to
+            || from.matches('*').count() > 1
+            || from.matches('*').count() != to.matches('*').count()
+        {
             let message = "expected two different names, with one `*` in each or none, e.g. [front/0, front/1]";
             faults.push(Fault::new(format!("distances[{index}].between"), message));
         }
         if !(*mm > 0.0 && mm.is_finite()) {
-            faults.push(Fault::new(format!("distances[{index}].mm"), "expected a distance above 0"));
+            faults.push(Fault::new(
+                format!("distances[{index}].mm"),
+                "expected a distance above 0",
+            ));
         }
         if !(*sigma > 0.0 && sigma.is_finite()) {
-            faults.push(Fault::new(format!("distances[{index}].sigma"), "expected a standard deviation above 0, e.g. 0.1"));
+            faults.push(Fault::new(
+                format!("distances[{index}].sigma"),
+                "expected a standard deviation above 0, e.g. 0.1",
+            ));
         }
     }
     for (name, KnownSphere { diameter, sigma }) in *spheres {
         if !(*diameter > 0.0 && diameter.is_finite() && *sigma > 0.0 && sigma.is_finite()) {
-            faults.push(Fault::new(format!("spheres.{name}"), "expected both above 0, e.g. {diameter: 40, sigma: 0.01}"));
+            faults.push(Fault::new(
+                format!("spheres.{name}"),
+                "expected both above 0, e.g. {diameter: 40, sigma: 0.01}",
+            ));
         }
     }
     faults
@@ -96,7 +120,12 @@ pub(super) fn standing(
     let setup = robot.setup();
     let pairs: Vec<(Vector3<f64>, Vector3<f64>)> = points
         .iter()
-        .filter_map(|(name, known)| Some((setup.anchors.get(setup.anchor(name)?)?.place, Vector3::from(known.mm) * 1e-3)))
+        .filter_map(|(name, known)| {
+            Some((
+                setup.anchors.get(setup.anchor(name)?)?.place,
+                Vector3::from(known.mm) * 1e-3,
+            ))
+        })
         .collect();
     if pairs.is_empty() || !only_brought(data, rows) {
         return (robot, base);
@@ -104,10 +133,12 @@ pub(super) fn standing(
     let (from, to): (Vec<Vector3<f64>>, Vec<Vector3<f64>>) = pairs.into_iter().unzip();
     let turn = match from.len() {
         1 => Rotation3::identity(),
-        2 => Rotation3::rotation_between(&(from[1] - from[0]), &(to[1] - to[0])).unwrap_or_else(Rotation3::identity),
+        2 => Rotation3::rotation_between(&(from[1] - from[0]), &(to[1] - to[0]))
+            .unwrap_or_else(Rotation3::identity),
         _ => Rotation3::from_matrix_unchecked(align_points(&from, &to).rotation),
     };
-    let middle = |points: &[Vector3<f64>]| points.iter().sum::<Vector3<f64>>() / points.len() as f64;
+    let middle =
+        |points: &[Vector3<f64>]| points.iter().sum::<Vector3<f64>>() / points.len() as f64;
     let change = Pose::new(*turn.matrix(), middle(&to) - turn * middle(&from));
     let mut setup = setup.clone();
     for anchor in &mut setup.anchors {
@@ -121,40 +152,84 @@ pub(super) fn standing(
 
 /// Tells the model what is known. Fails with a name that the recording does not have.
 pub(super) fn apply(model: &mut Model, known: &KnownCell, context: &Context) -> Result<()> {
-    let KnownCell { distances, spheres, points } = *known;
+    let KnownCell {
+        distances,
+        spheres,
+        points,
+    } = *known;
     let setup = model.robot.setup().clone();
-    let names: Vec<&str> = setup.anchors.iter().map(|anchor| anchor.name.as_str()).collect();
-    let there = || if names.is_empty() { "none".to_string() } else { names.join(", ") };
+    let names: Vec<&str> = setup
+        .anchors
+        .iter()
+        .map(|anchor| anchor.name.as_str())
+        .collect();
+    let there = || {
+        if names.is_empty() {
+            "none".to_string()
+        } else {
+            names.join(", ")
+        }
+    };
     let wrong = |place: String, what: String| {
-        Error::spec(format!("{}.with.{place}", context.id), format!("{what}; the recording has: {}", there()))
+        Error::spec(
+            format!("{}.with.{place}", context.id),
+            format!("{what}; the recording has: {}", there()),
+        )
     };
     for (index, known) in distances.iter().enumerate() {
         let [from, to] = &known.between;
         let pairs: Vec<[usize; 2]> = match from.split_once('*').zip(to.split_once('*')) {
             None => vec![[from, to].map(|name| setup.anchor(name).unwrap_or(usize::MAX))],
             Some(((before, after), (head, tail))) => {
-                let same = |name: &&str| name.strip_prefix(before)?.strip_suffix(after).map(str::to_string);
-                let pairs = names
-                    .iter()
-                    .enumerate()
-                    .filter_map(|(at, name)| Some([at, setup.anchor(&format!("{head}{}{tail}", same(name)?))?]));
+                let same = |name: &&str| {
+                    name.strip_prefix(before)?
+                        .strip_suffix(after)
+                        .map(str::to_string)
+                };
+                let pairs = names.iter().enumerate().filter_map(|(at, name)| {
+                    Some([at, setup.anchor(&format!("{head}{}{tail}", same(name)?))?])
+                });
                 pairs.collect()
             }
         };
         if pairs.is_empty() || pairs.as_flattened().contains(&usize::MAX) {
-            return Err(wrong(format!("distances[{index}].between"), format!("no `{from}` and `{to}`")));
+            return Err(wrong(
+                format!("distances[{index}].between"),
+                format!("no `{from}` and `{to}`"),
+            ));
         }
         // One print at several places has one error: all pairs of a pattern together know the length as well as one.
-        let (length, sigma) = (1e-3 * known.mm, 1e-3 * known.sigma * (pairs.len() as f64).sqrt());
-        model.lengths.extend(pairs.into_iter().map(|between| KnownLength { between, length, sigma }));
+        let (length, sigma) = (
+            1e-3 * known.mm,
+            1e-3 * known.sigma * (pairs.len() as f64).sqrt(),
+        );
+        model
+            .lengths
+            .extend(pairs.into_iter().map(|between| KnownLength {
+                between,
+                length,
+                sigma,
+            }));
     }
     for (name, known) in points {
-        let socket = setup.anchors.iter().find(|anchor| anchor.name == *name && anchor.shape == Shape::Point);
-        let socket = socket.ok_or_else(|| wrong(format!("points.{name}"), format!("no socket `{name}`")))?;
+        let socket = setup
+            .anchors
+            .iter()
+            .find(|anchor| anchor.name == *name && anchor.shape == Shape::Point);
+        let socket =
+            socket.ok_or_else(|| wrong(format!("points.{name}"), format!("no socket `{name}`")))?;
         for (axis, ending) in ["x", "y", "z"].into_iter().enumerate() {
             let parameter = format!("{}{ending}", AnchorShift::prefix(name));
-            if let Some(k) = model.stack.specs().iter().position(|spec| spec.name == parameter) {
-                let prior = Prior { mean: 1e-3 * known.mm[axis] - socket.place[axis], sigma: 1e-3 * known.sigma };
+            if let Some(k) = model
+                .stack
+                .specs()
+                .iter()
+                .position(|spec| spec.name == parameter)
+            {
+                let prior = Prior {
+                    mean: 1e-3 * known.mm[axis] - socket.place[axis],
+                    sigma: 1e-3 * known.sigma,
+                };
                 model.known.entry(k).or_default().prior = Some(prior);
             }
         }
@@ -162,11 +237,22 @@ pub(super) fn apply(model: &mut Model, known: &KnownCell, context: &Context) -> 
     for (name, known) in spheres {
         let sphere = setup.anchors.iter().find(|anchor| anchor.name == *name);
         let Some(Shape::Sphere(radius)) = sphere.map(|anchor| anchor.shape) else {
-            return Err(wrong(format!("spheres.{name}"), format!("no sphere `{name}`")));
+            return Err(wrong(
+                format!("spheres.{name}"),
+                format!("no sphere `{name}`"),
+            ));
         };
         let parameter = format!("anchor.{name}.radius");
-        if let Some(k) = model.stack.specs().iter().position(|spec| spec.name == parameter) {
-            let prior = Prior { mean: 0.5e-3 * known.diameter - radius, sigma: 0.5e-3 * known.sigma };
+        if let Some(k) = model
+            .stack
+            .specs()
+            .iter()
+            .position(|spec| spec.name == parameter)
+        {
+            let prior = Prior {
+                mean: 0.5e-3 * known.diameter - radius,
+                sigma: 0.5e-3 * known.sigma,
+            };
             model.known.entry(k).or_default().prior = Some(prior);
         }
     }

@@ -10,12 +10,16 @@ mod told;
 use crate::error::{Error, Fault, Result, counted};
 use crate::estimate::network::correction::features;
 use crate::estimate::network::rivals::{RivalContest, fits, learn};
-use crate::estimate::network::{Activation, OUTPUTS, Recipe, Rival, ScrewArm, TrainingSamples, TrainingStart, compare};
+use crate::estimate::network::{
+    Activation, OUTPUTS, Recipe, Rival, ScrewArm, TrainingSamples, TrainingStart, compare,
+};
 use crate::estimate::swarm::Algorithm;
 use crate::robot::RobotModel;
 use crate::stage::{Context, Stage, reads, writes};
 use crate::statistics::nearest;
-use crate::table::{Corrections, Network, Parameters, Prediction, PredictionRow, Recording, Robot, Split, Training};
+use crate::table::{
+    Corrections, Network, Parameters, Prediction, PredictionRow, Recording, Robot, Split, Training,
+};
 use corrected::corrected;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -74,7 +78,12 @@ impl Default for Learn {
     fn default() -> Self {
         Self {
             on: vec!["fit".into()],
-            rivals: vec![RivalSetting::Ridge, RivalSetting::GaussianProcess, RivalSetting::Curves, RivalSetting::Mlp],
+            rivals: vec![
+                RivalSetting::Ridge,
+                RivalSetting::GaussianProcess,
+                RivalSetting::Curves,
+                RivalSetting::Mlp,
+            ],
             starts: vec![StartSetting::Random, StartSetting::Bso],
             inputs: Inputs::Joints,
             payload: false,
@@ -181,14 +190,15 @@ writes! {
 
 impl Stage for Learn {
     const NAME: &'static str = "learn";
-    const SUMMARY: &'static str =
-        "learns the residual of the model: compares several corrections, and keeps the best only where it helps";
+    const SUMMARY: &'static str = "learns the residual of the model: compares several corrections, and keeps the best only where it helps";
     const IMPLEMENTATION: u32 = 8;
     type Reads = LearnReads;
     type Writes = LearnWrites;
 
     fn check(&self) -> Vec<Fault> {
-        let mut faults: Vec<Fault> = crate::stage::no_set(&self.on, "learn").into_iter().collect();
+        let mut faults: Vec<Fault> = crate::stage::no_set(&self.on, "learn")
+            .into_iter()
+            .collect();
         let counts = [
             ("hidden", self.hidden.unwrap_or(1), 1, 200),
             ("ensemble", self.ensemble, 1, 100),
@@ -199,23 +209,45 @@ impl Stage for Learn {
         ];
         for (name, value, least, most) in counts {
             if !(least..=most).contains(&value) {
-                faults.push(Fault::new(name, format!("expected a whole number from {least} to {most}, not {value}")));
+                faults.push(Fault::new(
+                    name,
+                    format!("expected a whole number from {least} to {most}, not {value}"),
+                ));
             }
         }
         if self.rivals.is_empty() {
-            faults.push(Fault::new("rivals", "expected at least one of ridge, gaussian_process, curves, mlp, mlp_joints"));
+            faults.push(Fault::new(
+                "rivals",
+                "expected at least one of ridge, gaussian_process, curves, mlp, mlp_joints",
+            ));
         }
-        if self.starts.is_empty() && self.rivals.iter().any(|rival| matches!(rival, RivalSetting::Mlp | RivalSetting::MlpJoints))
+        if self.starts.is_empty()
+            && self
+                .rivals
+                .iter()
+                .any(|rival| matches!(rival, RivalSetting::Mlp | RivalSetting::MlpJoints))
         {
-            faults.push(Fault::new("starts", "expected at least one of random, bas, bso, pso, ga, abc"));
+            faults.push(Fault::new(
+                "starts",
+                "expected at least one of random, bas, bso, pso, ga, abc",
+            ));
         }
         if !(0.0..0.5).contains(&self.keep_back) {
-            faults.push(Fault::new("keep_back", format!("expected a share from 0 to below 0.5, not {}", self.keep_back)));
+            faults.push(Fault::new(
+                "keep_back",
+                format!(
+                    "expected a share from 0 to below 0.5, not {}",
+                    self.keep_back
+                ),
+            ));
         }
         if let Some(decay) = self.decay
             && !(0.0..=1e6).contains(&decay)
         {
-            faults.push(Fault::new("decay", format!("expected a number from 0 to 1e6, e.g. 1, not {decay}")));
+            faults.push(Fault::new(
+                "decay",
+                format!("expected a number from 0 to 1e6, e.g. 1, not {decay}"),
+            ));
         }
         faults
     }
@@ -225,32 +257,61 @@ impl Stage for Learn {
     }
 
     fn run(&self, reads: LearnReads, context: &Context) -> Result<LearnWrites> {
-        let LearnReads { robot, recording, split, parameters, prediction } = reads;
-        if !prediction.0.iter().map(|row| row.sequence).eq(recording.sequence.iter().copied()) {
-            return Err(Error::data("table prediction", "does not belong to this recording: their sequence numbers differ"));
+        let LearnReads {
+            robot,
+            recording,
+            split,
+            parameters,
+            prediction,
+        } = reads;
+        if !prediction
+            .0
+            .iter()
+            .map(|row| row.sequence)
+            .eq(recording.sequence.iter().copied())
+        {
+            return Err(Error::data(
+                "table prediction",
+                "does not belong to this recording: their sequence numbers differ",
+            ));
         }
         let arm = robot.zip(parameters).map(|(robot, parameters)| {
-            Ok::<ScrewArm, Error>(ScrewArm::of(&RobotModel::new(robot.to_description()?), &parameters.base_pose()))
+            Ok::<ScrewArm, Error>(ScrewArm::of(
+                &RobotModel::new(robot.to_description()?),
+                &parameters.base_pose(),
+            ))
         });
-        let arm = arm.transpose()?.filter(|arm| arm.hinges.len() == recording.joints);
+        let arm = arm
+            .transpose()?
+            .filter(|arm| arm.hinges.len() == recording.joints);
         let mut rows = split.rows(&recording, &self.on)?;
         // What is learnt are displacements of points: rows of fewer axes or of distances have none.
         let asked = rows.len();
         rows.retain(|row| recording.point(*row).is_some());
         if rows.is_empty() && asked > 0 {
-            let message =
-                format!("learn corrects points: none of the {asked} rows to learn from measured a whole point (x, y, z)");
+            let message = format!(
+                "learn corrects points: none of the {asked} rows to learn from measured a whole point (x, y, z)"
+            );
             return Err(Error::data("table recording", message));
         }
         let sources = self.sources(&recording, &rows)?;
         let near = within_reach(&prediction, &rows, context);
         let samples = TrainingSamples {
             sources: near.iter().map(|row| sources[*row].clone()).collect(),
-            residual: near.iter().map(|row| residual(&prediction.0[*row])).collect(),
+            residual: near
+                .iter()
+                .map(|row| residual(&prediction.0[*row]))
+                .collect(),
         };
-        let (network, corrections, training) = self.learn(&samples, arm.as_ref(), &recording.prismatic, context);
+        let (network, corrections, training) =
+            self.learn(&samples, arm.as_ref(), &recording.prismatic, context);
         let prediction = corrected(&prediction, &network, &recording, &sources, &rows, context)?;
-        Ok(LearnWrites { prediction, network, corrections, training })
+        Ok(LearnWrites {
+            prediction,
+            network,
+            corrections,
+            training,
+        })
     }
 }
 
@@ -258,12 +319,23 @@ impl Learn {
     /// Joints of each row, and the payload where all training rows have it: it bounds where the correction is valid even where the
     /// networks do not see it.
     fn sources(&self, recording: &Recording, trained: &[usize]) -> Result<Vec<Vec<f64>>> {
-        let mut sources: Vec<Vec<f64>> = (0..recording.rows()).map(|row| recording.q(row).to_vec()).collect();
-        let payload = recording.payload.as_ref().filter(|column| trained.iter().all(|row| column[*row].is_finite()));
+        let mut sources: Vec<Vec<f64>> = (0..recording.rows())
+            .map(|row| recording.q(row).to_vec())
+            .collect();
+        let payload = recording
+            .payload
+            .as_ref()
+            .filter(|column| trained.iter().all(|row| column[*row].is_finite()));
         match payload {
-            Some(payload) => sources.iter_mut().zip(payload).for_each(|(row, value)| row.push(*value)),
+            Some(payload) => sources
+                .iter_mut()
+                .zip(payload)
+                .for_each(|(row, value)| row.push(*value)),
             None if self.payload => {
-                return Err(Error::data("with.payload", "the recording has no payload in some of the rows to train on"));
+                return Err(Error::data(
+                    "with.payload",
+                    "the recording has no payload in some of the rows to train on",
+                ));
             }
             None => (),
         }
@@ -303,46 +375,93 @@ impl Learn {
         let services = context.services;
         let rows = samples.rows();
         if rows < FEWEST {
-            services.warn(format!("only {} to learn from, at least {FEWEST} are needed: no correction", counted(rows, "row")));
-            return (Network::default(), Corrections::default(), Training::default());
+            services.warn(format!(
+                "only {} to learn from, at least {FEWEST} are needed: no correction",
+                counted(rows, "row")
+            ));
+            return (
+                Network::default(),
+                Corrections::default(),
+                Training::default(),
+            );
         }
         let contest = self.contest(rows, arm, prismatic, context);
         services.begin("comparing corrections", Some(fits(&contest) as u64), "fits");
-        let comparison = compare(samples, &contest, &|done, what| services.advance(done as u64, what));
+        let comparison = compare(samples, &contest, &|done, what| {
+            services.advance(done as u64, what)
+        });
         let kept = &comparison.judged[comparison.chosen];
         services.begin("learning", Some(self.generations as u64 + 1), "generations");
         let learnt = learn(samples, &contest, kept, &mut |generation| {
-            services.advance(generation.index as u64 + 1, &format!("best {:.4}", generation.best));
+            services.advance(
+                generation.index as u64 + 1,
+                &format!("best {:.4}", generation.best),
+            );
         });
         let corrections = told::table(context.id, &contest, &comparison, learnt.is_some());
         services.note(told::sentence(&comparison, learnt.is_some()));
         match learnt {
-            Some((correction, course)) => (Network::of(&correction, prismatic), corrections, told::history(context.id, course)),
+            Some((correction, course)) => (
+                Network::of(&correction, prismatic),
+                corrections,
+                told::history(context.id, course),
+            ),
             None => (Network::default(), corrections, Training::default()),
         }
     }
 
-    fn contest<'a>(&self, rows: usize, arm: Option<&'a ScrewArm>, prismatic: &'a [bool], context: &Context) -> RivalContest<'a> {
+    fn contest<'a>(
+        &self,
+        rows: usize,
+        arm: Option<&'a ScrewArm>,
+        prismatic: &'a [bool],
+        context: &Context,
+    ) -> RivalContest<'a> {
         let recipe = self.recipe(prismatic, context);
         let decays = self.decay.map_or(DECAYS.to_vec(), |decay| vec![decay]);
         let hidden = self.hidden.map_or(HIDDEN.to_vec(), |hidden| vec![hidden]);
         let affordable = FOLD_WORK / (rows * decays.len() * hidden.len() * self.folds);
         let members = (affordable / self.iterations).clamp(1, 3.min(self.ensemble));
         let iterations = affordable.max(FOLD_ITERATIONS).min(self.iterations);
-        let trial = Recipe { generations: self.generations.min(FOLD_GENERATIONS), members, iterations, ..recipe.clone() };
+        let trial = Recipe {
+            generations: self.generations.min(FOLD_GENERATIONS),
+            members,
+            iterations,
+            ..recipe.clone()
+        };
         let mut rivals: Vec<Rival> = Vec::new();
         for rival in &self.rivals {
             match rival {
                 RivalSetting::Ridge => rivals.push(Rival::Ridge),
                 RivalSetting::GaussianProcess => rivals.push(Rival::Process),
                 RivalSetting::Curves => rivals.push(Rival::Curves),
-                RivalSetting::Mlp => rivals.extend(self.starts.iter().map(|start| Rival::Network((*start).into()))),
-                RivalSetting::MlpJoints => rivals.extend(self.starts.iter().map(|start| Rival::JointNetwork((*start).into()))),
+                RivalSetting::Mlp => rivals.extend(
+                    self.starts
+                        .iter()
+                        .map(|start| Rival::Network((*start).into())),
+                ),
+                RivalSetting::MlpJoints => rivals.extend(
+                    self.starts
+                        .iter()
+                        .map(|start| Rival::JointNetwork((*start).into())),
+                ),
             }
         }
         let twice = |k: usize| rivals[..k].contains(&rivals[k]);
-        let once = (0..rivals.len()).filter(|k| !twice(*k)).map(|k| rivals[k]).collect();
-        RivalContest { rivals: once, arm, prismatic, recipe, trial, decays, hidden, folds: self.folds }
+        let once = (0..rivals.len())
+            .filter(|k| !twice(*k))
+            .map(|k| rivals[k])
+            .collect();
+        RivalContest {
+            rivals: once,
+            arm,
+            prismatic,
+            recipe,
+            trial,
+            decays,
+            hidden,
+            folds: self.folds,
+        }
     }
 }
 
@@ -350,8 +469,11 @@ impl Learn {
 fn within_reach(prediction: &Prediction, rows: &[usize], context: &Context) -> Vec<usize> {
     let mut errors: Vec<f64> = rows.iter().map(|row| prediction.0[*row].error_mm).collect();
     let limit = FAR * nearest(&mut errors, 0.5).unwrap_or(f64::INFINITY);
-    let near: Vec<usize> =
-        rows.iter().copied().filter(|row| prediction.0[*row].error_mm <= limit && !prediction.0[*row].suspect).collect();
+    let near: Vec<usize> = rows
+        .iter()
+        .copied()
+        .filter(|row| prediction.0[*row].error_mm <= limit && !prediction.0[*row].suspect)
+        .collect();
     if near.len() < rows.len() {
         context.services.note(format!(
             "{} of {} rows are not learnt from: their error is over {limit:.3} mm, {FAR} times the median, or they are suspects",

@@ -43,15 +43,28 @@ impl Stage for Masses {
         let (arm, _) = dynamic_arm(&robot)?;
         let model = reads.parameters.to_model()?;
         let declared = |mass: Option<f64>| mass.filter(|mass| *mass > 0.0).unwrap_or(NOTIONAL);
-        let masses: Vec<f64> = robot.joints.iter().map(|joint| declared(joint.mass)).collect();
+        let masses: Vec<f64> = robot
+            .joints
+            .iter()
+            .map(|joint| declared(joint.mass))
+            .collect();
         let links = model.links(&arm, &masses);
         robot.inertias.links.resize(links.len(), None);
         for (index, (joint, link)) in robot.joints.iter_mut().zip(&links).enumerate() {
-            context.services.note(told(index, joint.mass, joint.centre, link));
+            context
+                .services
+                .note(told(index, joint.mass, joint.centre, link));
             joint.mass = Some(link.mass);
             joint.centre = Some(link.centre.into());
             if let Some(i) = &link.inertia {
-                robot.inertias.links[index] = Some([i[(0, 0)], i[(0, 1)], i[(0, 2)], i[(1, 1)], i[(1, 2)], i[(2, 2)]]);
+                robot.inertias.links[index] = Some([
+                    i[(0, 0)],
+                    i[(0, 1)],
+                    i[(0, 2)],
+                    i[(1, 1)],
+                    i[(1, 2)],
+                    i[(2, 2)],
+                ]);
             }
         }
         let friction = reads.parameters.dry_friction(links.len());
@@ -66,13 +79,20 @@ impl Stage for Masses {
             );
         }
         context.services.note("what the tool carried beyond the declared payload is part of the last link from here on".into());
-        Ok(MassesWrites { robot: Robot::from_description(&robot) })
+        Ok(MassesWrites {
+            robot: Robot::from_description(&robot),
+        })
     }
 }
 
 /// Friction of the joints.
 fn told_of_friction(friction: &[Option<f64>]) -> String {
-    let of = |friction: &Option<f64>| friction.map_or_else(|| "none found".into(), |friction| format!("{friction:.3} Nm"));
+    let of = |friction: &Option<f64>| {
+        friction.map_or_else(
+            || "none found".into(),
+            |friction| format!("{friction:.3} Nm"),
+        )
+    };
     let all: Vec<String> = friction.iter().map(of).collect();
     format!(
         "dry friction of joints 1 to {} by the torques: {}; below it approach decides on which side a joint rests",
@@ -82,11 +102,27 @@ fn told_of_friction(friction: &[Option<f64>]) -> String {
 }
 
 /// What changes of a link.
-fn told(index: usize, mass: Option<f64>, centre: Option<[f64; 3]>, link: &LinkFromTorques) -> String {
+fn told(
+    index: usize,
+    mass: Option<f64>,
+    centre: Option<[f64; 3]>,
+    link: &LinkFromTorques,
+) -> String {
     let before = mass.map_or_else(|| "no mass".into(), |mass| format!("{mass:.3} kg"));
     let moved = centre.map_or_else(String::new, |centre| {
-        let off: f64 = centre.iter().zip(link.centre.iter()).map(|(a, b)| (a - b).powi(2)).sum();
-        format!(", its centre {:.1} mm off the declared one", 1e3 * off.sqrt())
+        let off: f64 = centre
+            .iter()
+            .zip(link.centre.iter())
+            .map(|(a, b)| (a - b).powi(2))
+            .sum();
+        format!(
+            ", its centre {:.1} mm off the declared one",
+            1e3 * off.sqrt()
+        )
     });
-    format!("link {}: {before} declared, {:.3} kg by the torques{moved}", index + 1, link.mass)
+    format!(
+        "link {}: {before} declared, {:.3} kg by the torques{moved}",
+        index + 1,
+        link.mass
+    )
 }

@@ -12,7 +12,11 @@ const CLEARLY: f64 = 5.0;
 pub(super) fn misplaced_tool(model: &Model, fitted: &Fitted) -> Option<String> {
     let of = |axis: &str| {
         let name = format!("{}{axis}", ToolOffset::prefix(""));
-        let k = model.stack.specs().iter().position(|spec| spec.name == name)?;
+        let k = model
+            .stack
+            .specs()
+            .iter()
+            .position(|spec| spec.name == name)?;
         match fitted.statuses[k] {
             ParameterStatus::Free(sigma) => Some((model.x[k], sigma)),
             _ => None,
@@ -20,9 +24,17 @@ pub(super) fn misplaced_tool(model: &Model, fitted: &Fitted) -> Option<String> {
     };
     let axes = ["x", "y", "z"].map(|axis| (axis, of(axis)));
     let known = || axes.iter().filter_map(|(axis, own)| Some((axis, (*own)?)));
-    let off = known().map(|(_, (value, _))| value * value).sum::<f64>().sqrt();
-    let sigma = known().map(|(_, (_, sigma))| sigma * sigma).sum::<f64>().sqrt();
-    let each: Vec<String> = known().map(|(axis, (value, _))| format!("{axis} {:+.0}", 1e3 * value)).collect();
+    let off = known()
+        .map(|(_, (value, _))| value * value)
+        .sum::<f64>()
+        .sqrt();
+    let sigma = known()
+        .map(|(_, (_, sigma))| sigma * sigma)
+        .sum::<f64>()
+        .sqrt();
+    let each: Vec<String> = known()
+        .map(|(axis, (value, _))| format!("{axis} {:+.0}", 1e3 * value))
+        .collect();
     (off > FAR && off > CLEARLY * sigma).then(|| {
         format!(
             "the measured point is {} mm from the `tool` of the robot file ({} mm, zero pose): is it that of this recording, with its signs \

@@ -46,7 +46,8 @@ pub use compare::{Compare, CompareReads};
 pub use compare_torques::{CompareTorques, CompareTorquesReads};
 pub use diagnose::{Diagnose, DiagnoseReads};
 pub use diagnose_torques::{
-    ConsistencySetting, DiagnoseTorques, DiagnoseTorquesReads, DiagnoseTorquesWrites, HoldOut, InertialSetting,
+    ConsistencySetting, DiagnoseTorques, DiagnoseTorquesReads, DiagnoseTorquesWrites, HoldOut,
+    InertialSetting,
 };
 pub(crate) use dynamic_arm::{dynamic_arm, must_be_bodies, torque_per_ampere};
 pub use folding::FoldSetting;
@@ -121,21 +122,38 @@ impl<T: Table> PortValue for T {
     const ARITY: Arity = Arity::One;
     const KIND: &'static str = T::KIND;
     fn take(inputs: Vec<(String, InputTable)>) -> Result<Self> {
-        T::from_frame(&inputs.first().expect("the plan wired this port").1.frame()?)
+        T::from_frame(
+            &inputs
+                .first()
+                .expect("the plan wired this port")
+                .1
+                .frame()?,
+        )
     }
 }
 impl<T: Table> PortValue for Option<T> {
     const ARITY: Arity = Arity::Optional;
     const KIND: &'static str = T::KIND;
     fn take(inputs: Vec<(String, InputTable)>) -> Result<Self> {
-        inputs.first().map(|(_, input)| T::from_frame(&input.frame()?)).transpose()
+        inputs
+            .first()
+            .map(|(_, input)| T::from_frame(&input.frame()?))
+            .transpose()
     }
 }
 impl<T: Table> PortValue for Vec<Labelled<T>> {
     const ARITY: Arity = Arity::Every;
     const KIND: &'static str = T::KIND;
     fn take(inputs: Vec<(String, InputTable)>) -> Result<Self> {
-        inputs.into_iter().map(|(stage, input)| Ok(Labelled { stage, table: T::from_frame(&input.frame()?)? })).collect()
+        inputs
+            .into_iter()
+            .map(|(stage, input)| {
+                Ok(Labelled {
+                    stage,
+                    table: T::from_frame(&input.frame()?)?,
+                })
+            })
+            .collect()
     }
 }
 
@@ -261,7 +279,10 @@ pub struct RawFile(pub PathBuf);
 
 impl Serialize for RawFile {
     /// A path is no part of the key: two names of one content are one input.
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+    fn serialize<S: serde::Serializer>(
+        &self,
+        serializer: S,
+    ) -> std::result::Result<S::Ok, S::Error> {
         serializer.serialize_str("<file>")
     }
 }
@@ -334,7 +355,11 @@ pub trait Stage: DeserializeOwned + Serialize + JsonSchema + Send + Sync + 'stat
     }
     /// Looks at the input files without doing the work: at their headers, say. `reads` is there where the stages before could be
     /// looked at so far that they gave their tables; fails with every fault, gives its own tables where that is all of the work.
-    fn look(&self, _reads: Option<Self::Reads>, _context: &Context) -> Result<Option<Self::Writes>> {
+    fn look(
+        &self,
+        _reads: Option<Self::Reads>,
+        _context: &Context,
+    ) -> Result<Option<Self::Writes>> {
         Ok(None)
     }
     /// Does the work. Fails with [`crate::error::Error::Data`] where the tables cannot be used.
@@ -343,12 +368,16 @@ pub trait Stage: DeserializeOwned + Serialize + JsonSchema + Send + Sync + 'stat
 
 /// The fault of a setting `on` that names no set; `example` is one.
 fn no_set(sets: &[String], example: &str) -> Option<Fault> {
-    sets.is_empty().then(|| Fault::new("on", format!("expected at least one set, e.g. [{example}]")))
+    sets.is_empty()
+        .then(|| Fault::new("on", format!("expected at least one set, e.g. [{example}]")))
 }
 
 /// The sets of a setting `on`, as [`Stage::sets_named`].
 fn on(sets: &[String]) -> Vec<(String, String)> {
-    sets.iter().enumerate().map(|(k, set)| (format!("on[{k}]"), set.clone())).collect()
+    sets.iter()
+        .enumerate()
+        .map(|(k, set)| (format!("on[{k}]"), set.clone()))
+        .collect()
 }
 
 /// Stages whose tables are a diagnosis, as `calib diagnose` runs and shows them.

@@ -34,12 +34,34 @@ impl NamedColumn {
 
     /// The names of the rows; blank where a row has none. Fails where the recording has no such column.
     pub(super) fn of<'a>(self, recording: &'a Recording, place: &str) -> Result<Vec<&'a str>> {
-        let column = if self == Self::Target { recording.target.as_ref() } else { recording.names.get(self.name()) };
+        let column = if self == Self::Target {
+            recording.target.as_ref()
+        } else {
+            recording.names.get(self.name())
+        };
         let column = column.ok_or_else(|| {
-            let there: Vec<&str> = recording.names.keys().copied().chain(recording.target.as_ref().map(|_| "target")).collect();
-            let there = if there.is_empty() { "none".to_string() } else { there.join(", ") };
-            Error::data(format!("with.{place}"), format!("the recording has no names of `{}`; it has: {there}", self.name()))
+            let there: Vec<&str> = recording
+                .names
+                .keys()
+                .copied()
+                .chain(recording.target.as_ref().map(|_| "target"))
+                .collect();
+            let there = if there.is_empty() {
+                "none".to_string()
+            } else {
+                there.join(", ")
+            };
+            Error::data(
+                format!("with.{place}"),
+                format!(
+                    "the recording has no names of `{}`; it has: {there}",
+                    self.name()
+                ),
+            )
         })?;
-        Ok(column.iter().map(|name| name.as_deref().unwrap_or_default()).collect())
+        Ok(column
+            .iter()
+            .map(|name| name.as_deref().unwrap_or_default())
+            .collect())
     }
 }

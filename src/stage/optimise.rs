@@ -61,7 +61,11 @@ pub struct PublishedTime {
 impl Default for Optimise {
     fn default() -> Self {
         Self {
-            problems: vec![BenchmarkProblem { function: Landscape::Michalewicz, dimensions: 2, tolerance: 1e-4 }],
+            problems: vec![BenchmarkProblem {
+                function: Landscape::Michalewicz,
+                dimensions: 2,
+                tolerance: 1e-4,
+            }],
             methods: Algorithm::ALL.to_vec(),
             population: 50,
             evaluations: 30_000,
@@ -88,43 +92,59 @@ writes! {
 
 impl Stage for Optimise {
     const NAME: &'static str = "optimise";
-    const SUMMARY: &'static str = "compares swarm optimisers on functions with known minima, over many seeds";
+    const SUMMARY: &'static str =
+        "compares swarm optimisers on functions with known minima, over many seeds";
     const IMPLEMENTATION: u32 = 1;
     type Reads = OptimiseReads;
     type Writes = OptimiseWrites;
 
     fn check(&self) -> Vec<Fault> {
         let mut faults = Vec::new();
-        for (name, value, least, most) in
-            [("population", self.population, 4, 10_000), ("seeds", self.seeds, 1, 100_000), ("courses", self.courses, 0, 1000)]
-        {
+        for (name, value, least, most) in [
+            ("population", self.population, 4, 10_000),
+            ("seeds", self.seeds, 1, 100_000),
+            ("courses", self.courses, 0, 1000),
+        ] {
             if !(least..=most).contains(&value) {
-                faults.push(Fault::new(name, format!("expected a whole number from {least} to {most}, not {value}")));
+                faults.push(Fault::new(
+                    name,
+                    format!("expected a whole number from {least} to {most}, not {value}"),
+                ));
             }
         }
         if !(1..=100_000_000).contains(&self.evaluations) {
-            faults.push(Fault::new("evaluations", format!("expected 1 to 1e8, not {}", self.evaluations)));
+            faults.push(Fault::new(
+                "evaluations",
+                format!("expected 1 to 1e8, not {}", self.evaluations),
+            ));
         }
         for (i, problem) in self.problems.iter().enumerate() {
-            if problem.function.minimum(problem.dimensions).is_none() || !(1..=1000).contains(&problem.dimensions) {
-                let message =
-                    "the minimum is not known there: 2, 5 or 10 for michalewicz, 2 to 1000 for rosenbrock, else 1 to 1000";
+            if problem.function.minimum(problem.dimensions).is_none()
+                || !(1..=1000).contains(&problem.dimensions)
+            {
+                let message = "the minimum is not known there: 2, 5 or 10 for michalewicz, 2 to 1000 for rosenbrock, else 1 to 1000";
                 faults.push(Fault::new(format!("problems[{i}].dimensions"), message));
             }
             if !(problem.tolerance > 0.0 && problem.tolerance.is_finite()) {
-                faults.push(Fault::new(format!("problems[{i}].tolerance"), "expected a number above zero, e.g. 1e-4"));
+                faults.push(Fault::new(
+                    format!("problems[{i}].tolerance"),
+                    "expected a number above zero, e.g. 1e-4",
+                ));
             }
         }
         let twice = |i: usize| {
-            let same =
-                |j: &BenchmarkProblem| j.function == self.problems[i].function && j.dimensions == self.problems[i].dimensions;
+            let same = |j: &BenchmarkProblem| {
+                j.function == self.problems[i].function
+                    && j.dimensions == self.problems[i].dimensions
+            };
             self.problems[..i].iter().any(same)
         };
-        faults.extend(
-            (0..self.problems.len())
-                .filter(|i| twice(*i))
-                .map(|i| Fault::new(format!("problems[{i}]"), "the same function in as many dimensions stands above")),
-        );
+        faults.extend((0..self.problems.len()).filter(|i| twice(*i)).map(|i| {
+            Fault::new(
+                format!("problems[{i}]"),
+                "the same function in as many dimensions stands above",
+            )
+        }));
         faults
     }
 
@@ -133,44 +153,64 @@ impl Stage for Optimise {
         methods.sort_unstable();
         methods.dedup();
         let total = self.problems.len() * methods.len() * self.seeds;
-        context.services.begin("searching", Some(total as u64), "searches");
+        context
+            .services
+            .begin("searching", Some(total as u64), "searches");
         let done = Mutex::new((0_u64, f64::INFINITY));
         let (mut searches, mut course) = (Searches::default(), SearchCourse::default());
         for problem in &self.problems {
             for method in &methods {
                 done.lock().expect("no search panics").1 = f64::INFINITY;
                 let outcomes = in_order(context.jobs, self.seeds, |seed| {
-                    let outcome = self.search(problem, *method, context.seed.wrapping_add(seed as u64));
+                    let outcome =
+                        self.search(problem, *method, context.seed.wrapping_add(seed as u64));
                     let mut done = done.lock().expect("no search panics");
                     *done = (done.0 + 1, done.1.min(outcome.value));
-                    let what = format!("{} on {}-D {}", method.name(), problem.dimensions, problem.function.name());
-                    context.services.advance(done.0, &format!("{what}, best {:.6}", done.1));
+                    let what = format!(
+                        "{} on {}-D {}",
+                        method.name(),
+                        problem.dimensions,
+                        problem.function.name()
+                    );
+                    context
+                        .services
+                        .advance(done.0, &format!("{what}, best {:.6}", done.1));
                     outcome
                 });
-                searches.0.push(self.row(context.id, problem, *method, &outcomes));
+                searches
+                    .0
+                    .push(self.row(context.id, problem, *method, &outcomes));
                 for (seed, outcome) in outcomes.iter().enumerate().take(self.courses) {
-                    course.0.extend(outcome.history.iter().map(|generation| SearchCourseRow {
-                        step: context.id.into(),
-                        function: problem.function.name().into(),
-                        dimensions: problem.dimensions as i64,
-                        method: method.name().into(),
-                        seed: seed as i64,
-                        generation: generation.index as i64,
-                        best: generation.best,
-                        mean: Some(generation.mean).filter(|mean| mean.is_finite()),
-                        evaluations: generation.evaluations as i64,
-                    }));
+                    course
+                        .0
+                        .extend(outcome.history.iter().map(|generation| SearchCourseRow {
+                            step: context.id.into(),
+                            function: problem.function.name().into(),
+                            dimensions: problem.dimensions as i64,
+                            method: method.name().into(),
+                            seed: seed as i64,
+                            generation: generation.index as i64,
+                            best: generation.best,
+                            mean: Some(generation.mean).filter(|mean| mean.is_finite()),
+                            evaluations: generation.evaluations as i64,
+                        }));
                 }
             }
         }
-        Ok(OptimiseWrites { searches, search_course: course })
+        Ok(OptimiseWrites {
+            searches,
+            search_course: course,
+        })
     }
 }
 
 impl Optimise {
     /// One search on one thread.
     pub fn search(&self, problem: &BenchmarkProblem, method: Algorithm, seed: u64) -> SwarmResult {
-        let minimum = problem.function.minimum(problem.dimensions).unwrap_or(f64::NEG_INFINITY);
+        let minimum = problem
+            .function
+            .minimum(problem.dimensions)
+            .unwrap_or(f64::NEG_INFINITY);
         let budget = Budget {
             generations: method.generations(self.population, self.evaluations),
             evaluations: Some(self.evaluations),
@@ -178,18 +218,34 @@ impl Optimise {
             seed,
             jobs: 1,
         };
-        problem.function.search(problem.dimensions, method, self.population, &budget)
+        problem
+            .function
+            .search(problem.dimensions, method, self.population, &budget)
     }
 
-    fn row(&self, step: &str, problem: &BenchmarkProblem, method: Algorithm, outcomes: &[SwarmResult]) -> SearchesRow {
+    fn row(
+        &self,
+        step: &str,
+        problem: &BenchmarkProblem,
+        method: Algorithm,
+        outcomes: &[SwarmResult],
+    ) -> SearchesRow {
         let minimum = problem.function.minimum(problem.dimensions).unwrap_or(0.0);
-        let mut reached: Vec<f64> =
-            outcomes.iter().filter(|o| o.stop == SearchStop::Target).map(|o| o.evaluations as f64).collect();
-        let mut errors: Vec<f64> = outcomes.iter().map(|o| (o.value - minimum).max(0.0)).collect();
+        let mut reached: Vec<f64> = outcomes
+            .iter()
+            .filter(|o| o.stop == SearchStop::Target)
+            .map(|o| o.evaluations as f64)
+            .collect();
+        let mut errors: Vec<f64> = outcomes
+            .iter()
+            .map(|o| (o.value - minimum).max(0.0))
+            .collect();
         reached.sort_by(f64::total_cmp);
         errors.sort_by(f64::total_cmp);
         let stuck = outcomes.iter().filter(|outcome| stuck(outcome)).count();
-        let beside = |r: &&PublishedTime| (r.function, r.dimensions, r.method) == (problem.function, problem.dimensions, method);
+        let beside = |r: &&PublishedTime| {
+            (r.function, r.dimensions, r.method) == (problem.function, problem.dimensions, method)
+        };
         let reference = self.reference.iter().find(beside);
         SearchesRow {
             step: step.into(),

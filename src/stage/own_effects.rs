@@ -26,7 +26,10 @@ const VERSION: &str = "calib_effect";
 const LIST: &str = "effects";
 
 /// The declared effects of some files, in their order. Fails with every fault of all files.
-pub(super) fn own_effects(files: &[RawFile], context: &Context) -> Result<Vec<&'static DeclaredCause>> {
+pub(super) fn own_effects(
+    files: &[RawFile],
+    context: &Context,
+) -> Result<Vec<&'static DeclaredCause>> {
     let (mut causes, mut faults) = (Vec::new(), Vec::new());
     let mut names: BTreeMap<String, String> = BTreeMap::new();
     for file in files {
@@ -35,14 +38,25 @@ pub(super) fn own_effects(files: &[RawFile], context: &Context) -> Result<Vec<&'
         for (path, node, cause) in read(&content, &mut troubles) {
             let name = cause.declaration().name.clone();
             if let Some(other) = names.insert(name.clone(), label.clone()) {
-                let message = format!("`{name}` is declared in {other} already; give each effect a name of its own");
-                troubles.push(Trouble::new(message).at(node.nearest_mark("name")).below("name").below(&path));
+                let message = format!(
+                    "`{name}` is declared in {other} already; give each effect a name of its own"
+                );
+                troubles.push(
+                    Trouble::new(message)
+                        .at(node.nearest_mark("name"))
+                        .below("name")
+                        .below(&path),
+                );
             }
             causes.push(cause);
         }
         faults.extend(troubles.into_iter().map(|trouble| trouble.fault(&label)));
     }
-    if faults.is_empty() { Ok(causes) } else { Err(Error::Spec(faults)) }
+    if faults.is_empty() {
+        Ok(causes)
+    } else {
+        Err(Error::Spec(faults))
+    }
 }
 
 /// The effects of a text that are right, with their paths and places; what is wrong goes to `troubles`.
@@ -52,7 +66,12 @@ fn read(text: &str, troubles: &mut Vec<Trouble>) -> Vec<(String, Node, &'static 
     let Some(root) = root else { return Vec::new() };
     let mut rest = Vec::new();
     let YamlValue::Map(entries) = &root.value else {
-        troubles.push(Trouble::new(format!("expected a block of keys that begins with `{VERSION}: {FORMAT}`")).at(root.mark));
+        troubles.push(
+            Trouble::new(format!(
+                "expected a block of keys that begins with `{VERSION}: {FORMAT}`"
+            ))
+            .at(root.mark),
+        );
         return Vec::new();
     };
     match root.get(VERSION).map(|node| (&node.value, node.mark)) {
@@ -61,29 +80,61 @@ fn read(text: &str, troubles: &mut Vec<Trouble>) -> Vec<(String, Node, &'static 
             let message = format!("expected {FORMAT}, the format of effects that this calib knows");
             troubles.push(Trouble::new(message).at(mark).below(VERSION));
         }
-        None => troubles.push(Trouble::new(format!("missing key `{VERSION}`; expected `{VERSION}: {FORMAT}`")).at(root.mark)),
+        None => troubles.push(
+            Trouble::new(format!(
+                "missing key `{VERSION}`; expected `{VERSION}: {FORMAT}`"
+            ))
+            .at(root.mark),
+        ),
     }
     let one = match root.get(LIST) {
         Some(list) => {
-            for (key, mark, _) in entries.iter().filter(|(key, ..)| key != VERSION && key != LIST) {
-                troubles.push(Trouble::unknown_key(key, &[VERSION, LIST]).at(*mark).below(key));
+            for (key, mark, _) in entries
+                .iter()
+                .filter(|(key, ..)| key != VERSION && key != LIST)
+            {
+                troubles.push(
+                    Trouble::unknown_key(key, &[VERSION, LIST])
+                        .at(*mark)
+                        .below(key),
+                );
             }
             if !matches!(list.value, YamlValue::List(_)) {
-                troubles.push(Trouble::new("expected a list of effects").at(list.mark).below(LIST));
+                troubles.push(
+                    Trouble::new("expected a list of effects")
+                        .at(list.mark)
+                        .below(LIST),
+                );
             }
-            rest.extend(list.items().iter().enumerate().map(|(k, node)| (format!("{LIST}[{k}]"), node.clone())));
+            rest.extend(
+                list.items()
+                    .iter()
+                    .enumerate()
+                    .map(|(k, node)| (format!("{LIST}[{k}]"), node.clone())),
+            );
             None
         }
         None => {
-            let own = entries.iter().filter(|(key, ..)| key != VERSION).cloned().collect();
+            let own = entries
+                .iter()
+                .filter(|(key, ..)| key != VERSION)
+                .cloned()
+                .collect();
             Some((String::new(), Node::new(YamlValue::Map(own), root.mark)))
         }
     };
-    one.into_iter().chain(rest).filter_map(|(path, node)| declared(path, node, troubles)).collect()
+    one.into_iter()
+        .chain(rest)
+        .filter_map(|(path, node)| declared(path, node, troubles))
+        .collect()
 }
 
 /// One effect, where nothing is wrong with it.
-fn declared(path: String, node: Node, troubles: &mut Vec<Trouble>) -> Option<(String, Node, &'static DeclaredCause)> {
+fn declared(
+    path: String,
+    node: Node,
+    troubles: &mut Vec<Trouble>,
+) -> Option<(String, Node, &'static DeclaredCause)> {
     let declaration: EffectDeclaration = match typed(&node) {
         Ok(declaration) => declaration,
         Err(found) => {
@@ -96,7 +147,10 @@ fn declared(path: String, node: Node, troubles: &mut Vec<Trouble>) -> Option<(St
         Err(found) => {
             troubles.extend(found.into_iter().map(|fault| {
                 let mark = node.nearest_mark(&fault.path);
-                Trouble::new(fault.message).at(mark).below(&fault.path).below(&path)
+                Trouble::new(fault.message)
+                    .at(mark)
+                    .below(&fault.path)
+                    .below(&path)
             }));
             None
         }

@@ -33,10 +33,18 @@ pub struct ParameterSet<'a> {
 impl ParameterSet<'_> {
     /// Every pattern with the setting that it stands in.
     fn patterns(&self) -> impl Iterator<Item = (&'static str, &str)> {
-        let free = self.free.unwrap_or_default().iter().map(|pattern| ("free", pattern.as_str()));
+        let free = self
+            .free
+            .unwrap_or_default()
+            .iter()
+            .map(|pattern| ("free", pattern.as_str()));
         let hold = self.hold.iter().map(|pattern| ("hold", pattern.as_str()));
         let prior = self.prior.keys().map(|pattern| ("prior", pattern.as_str()));
-        free.chain(hold).chain(prior).chain(self.bounds.keys().map(|pattern| ("bounds", pattern.as_str())))
+        free.chain(hold).chain(prior).chain(
+            self.bounds
+                .keys()
+                .map(|pattern| ("bounds", pattern.as_str())),
+        )
     }
 
     /// What is wrong with the settings whatever the robot.
@@ -50,7 +58,8 @@ impl ParameterSet<'_> {
                 let message = "where the robot stands in the tracker's frame is found by alignment: only `free` and `hold` apply";
                 faults.push(Fault::new(format!("{setting}.{pattern}"), message));
             } else if !names.iter().any(|name| matches(effect, name)) {
-                let near = nearest(effect, names.iter().copied()).map(|near| format!("did you mean `{near}`? "));
+                let near = nearest(effect, names.iter().copied())
+                    .map(|near| format!("did you mean `{near}`? "));
                 faults.push(Fault::new(
                     setting,
                     format!(
@@ -63,17 +72,25 @@ impl ParameterSet<'_> {
             }
         }
         if self.free.is_some_and(<[String]>::is_empty) {
-            faults.push(Fault::new("free", "name at least one parameter, or leave it out: then all are free that are not held"));
+            faults.push(Fault::new(
+                "free",
+                "name at least one parameter, or leave it out: then all are free that are not held",
+            ));
         }
         for (pattern, prior) in self.prior {
             if !(prior.sigma > 0.0 && prior.sigma.is_finite() && prior.mean.is_finite()) {
-                faults.push(Fault::new(format!("prior.{pattern}"), "expected a sigma above zero, e.g. {sigma: 0.1, mean: 0}"));
+                faults.push(Fault::new(
+                    format!("prior.{pattern}"),
+                    "expected a sigma above zero, e.g. {sigma: 0.1, mean: 0}",
+                ));
             }
         }
         for (pattern, [low, high]) in self.bounds {
             if !(low < high && low.is_finite() && high.is_finite()) {
-                faults
-                    .push(Fault::new(format!("bounds.{pattern}"), "expected two numbers, the lower one first, e.g. [-0.5, 0.5]"));
+                faults.push(Fault::new(
+                    format!("bounds.{pattern}"),
+                    "expected two numbers, the lower one first, e.g. [-0.5, 0.5]",
+                ));
             }
         }
         faults
@@ -81,26 +98,44 @@ impl ParameterSet<'_> {
 
     /// Sorts the parameters that this stage may estimate (`open`, positions in the stack) into (candidates, held), and tells the
     /// model what is known beforehand. Patterns that match none of them are warned of.
-    pub fn apply(&self, model: &mut Model, open: &[usize], context: &Context) -> (Vec<usize>, Vec<usize>) {
+    pub fn apply(
+        &self,
+        model: &mut Model,
+        open: &[usize],
+        context: &Context,
+    ) -> (Vec<usize>, Vec<usize>) {
         let specs = model.stack.specs();
         let names: Vec<&str> = open.iter().map(|k| specs[*k].name.as_str()).collect();
-        for (setting, pattern) in self.patterns().filter(|(_, pattern)| !names.iter().any(|name| matches(pattern, name))) {
-            let near = nearest(pattern, names.iter().copied()).map(|near| format!("; did you mean `{near}`?"));
-            context
-                .services
-                .warn(format!("{setting}: `{pattern}` matches no parameter of this model{}", near.unwrap_or_default()));
+        for (setting, pattern) in self
+            .patterns()
+            .filter(|(_, pattern)| !names.iter().any(|name| matches(pattern, name)))
+        {
+            let near = nearest(pattern, names.iter().copied())
+                .map(|near| format!("; did you mean `{near}`?"));
+            context.services.warn(format!(
+                "{setting}: `{pattern}` matches no parameter of this model{}",
+                near.unwrap_or_default()
+            ));
         }
-        let any = |patterns: &[String], name: &str| patterns.iter().any(|pattern| matches(pattern, name));
-        let wanted = |name: &str| self.free.is_none_or(|free| any(free, name)) && !any(self.hold, name);
-        let (candidates, held): (Vec<usize>, Vec<usize>) = open.iter().partition(|k| wanted(&specs[**k].name));
+        let any =
+            |patterns: &[String], name: &str| patterns.iter().any(|pattern| matches(pattern, name));
+        let wanted =
+            |name: &str| self.free.is_none_or(|free| any(free, name)) && !any(self.hold, name);
+        let (candidates, held): (Vec<usize>, Vec<usize>) =
+            open.iter().partition(|k| wanted(&specs[**k].name));
         let base: Vec<usize> = model.stack.parameters_of(names::BASE_FRAME).collect();
         let mut known = BTreeMap::new();
         for &k in candidates.iter().filter(|k| !base.contains(k)) {
             let (name, unit) = (&specs[k].name, specs[k].unit);
             let about = Known {
-                prior: longest(self.prior, name)
-                    .map(|prior| Prior { mean: unit.to_si(prior.mean), sigma: unit.to_si(prior.sigma) }),
-                bounds: longest(self.bounds, name).map(|[low, high]| Bounds { low: unit.to_si(*low), high: unit.to_si(*high) }),
+                prior: longest(self.prior, name).map(|prior| Prior {
+                    mean: unit.to_si(prior.mean),
+                    sigma: unit.to_si(prior.sigma),
+                }),
+                bounds: longest(self.bounds, name).map(|[low, high]| Bounds {
+                    low: unit.to_si(*low),
+                    high: unit.to_si(*high),
+                }),
             };
             if about != Known::default() {
                 known.insert(k, about);
@@ -113,17 +148,24 @@ impl ParameterSet<'_> {
 
 /// The entry of the longest pattern that matches.
 fn longest<'a, T>(patterns: &'a BTreeMap<String, T>, name: &str) -> Option<&'a T> {
-    let matching = patterns.iter().filter(|(pattern, _)| matches(pattern, name));
-    matching.max_by_key(|(pattern, _)| pattern.len()).map(|(_, value)| value)
+    let matching = patterns
+        .iter()
+        .filter(|(pattern, _)| matches(pattern, name));
+    matching
+        .max_by_key(|(pattern, _)| pattern.len())
+        .map(|(_, value)| value)
 }
 
 /// Whether a pattern with `*` for anything matches the whole name.
 pub(crate) fn matches(pattern: &str, name: &str) -> bool {
     match pattern.split_once('*') {
         None => pattern == name,
-        Some((head, tail)) => name
-            .strip_prefix(head)
-            .is_some_and(|rest| rest.char_indices().map(|(at, _)| &rest[at..]).chain([""]).any(|end| matches(tail, end))),
+        Some((head, tail)) => name.strip_prefix(head).is_some_and(|rest| {
+            rest.char_indices()
+                .map(|(at, _)| &rest[at..])
+                .chain([""])
+                .any(|end| matches(tail, end))
+        }),
     }
 }
 

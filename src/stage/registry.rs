@@ -18,9 +18,14 @@ pub trait ErasedStage: Send + Sync {
     /// The settings with defaults filled in; part of the stage's key.
     fn settings(&self) -> serde_json::Value;
     /// As [`Stage::look`], with the tables of each input port where all are known.
-    fn look(&self, inputs: Option<Vec<Vec<(String, InputTable)>>>, context: &Context) -> Result<Option<Vec<Output>>>;
+    fn look(
+        &self,
+        inputs: Option<Vec<Vec<(String, InputTable)>>>,
+        context: &Context,
+    ) -> Result<Option<Vec<Output>>>;
     /// Takes the tables of each input port with the ids of the stages that wrote them.
-    fn run(&self, inputs: Vec<Vec<(String, InputTable)>>, context: &Context) -> Result<Vec<Output>>;
+    fn run(&self, inputs: Vec<Vec<(String, InputTable)>>, context: &Context)
+    -> Result<Vec<Output>>;
 }
 
 impl<T: Stage> ErasedStage for T {
@@ -39,11 +44,21 @@ impl<T: Stage> ErasedStage for T {
     fn settings(&self) -> serde_json::Value {
         serde_json::to_value(self).expect("settings are plain data")
     }
-    fn look(&self, inputs: Option<Vec<Vec<(String, InputTable)>>>, context: &Context) -> Result<Option<Vec<Output>>> {
+    fn look(
+        &self,
+        inputs: Option<Vec<Vec<(String, InputTable)>>>,
+        context: &Context,
+    ) -> Result<Option<Vec<Output>>> {
         let reads = inputs.map(T::Reads::take).transpose()?;
-        Stage::look(self, reads, context)?.map(Writes::give).transpose()
+        Stage::look(self, reads, context)?
+            .map(Writes::give)
+            .transpose()
     }
-    fn run(&self, inputs: Vec<Vec<(String, InputTable)>>, context: &Context) -> Result<Vec<Output>> {
+    fn run(
+        &self,
+        inputs: Vec<Vec<(String, InputTable)>>,
+        context: &Context,
+    ) -> Result<Vec<Output>> {
         Stage::run(self, T::Reads::take(inputs)?, context)?.give()
     }
 }

@@ -27,11 +27,22 @@ impl Repeatability {
     /// What is wrong with the figure, if anything.
     pub fn fault(&self) -> Option<Fault> {
         let wrong = matches!(self, Self::Arcsec(sigma) if !(*sigma > 0.0 && sigma.is_finite()));
-        wrong.then(|| Fault::new("repeatability", "expected `measured`, `ignored`, or a figure above zero, e.g. {arcsec: 3}"))
+        wrong.then(|| {
+            Fault::new(
+                "repeatability",
+                "expected `measured`, `ignored`, or a figure above zero, e.g. {arcsec: 3}",
+            )
+        })
     }
 
     /// Gives every row the covariance that the joints make of it; the standard deviation of a joint (rad), where one is known.
-    pub fn apply(&self, model: &Model, data: &mut Measurements, rows: &[usize], context: &Context) -> Option<f64> {
+    pub fn apply(
+        &self,
+        model: &Model,
+        data: &mut Measurements,
+        rows: &[usize],
+        context: &Context,
+    ) -> Option<f64> {
         let sigma = match self {
             Self::Ignored => None,
             Self::Arcsec(sigma) => Some(sigma * ARCSEC),
@@ -55,8 +66,18 @@ const UNLIKELY: f64 = 0.01;
 
 /// Notes for the person on what repeats say against the fit.
 pub fn note(context: &Context, repeated: &Repeated) {
-    let Repeated { poses, noise, freedom, revisited, lack_of_fit } = repeated;
-    let what = if *revisited { "noise and repeatability" } else { "noise (the arm stood still: no word on repeatability)" };
+    let Repeated {
+        poses,
+        noise,
+        freedom,
+        revisited,
+        lack_of_fit,
+    } = repeated;
+    let what = if *revisited {
+        "noise and repeatability"
+    } else {
+        "noise (the arm stood still: no word on repeatability)"
+    };
     let floor = noise * 1e3;
     let mut line = format!(
         "measured more than once: {}, {floor:.3} mm per axis of {what}, {} of freedom",
@@ -65,9 +86,13 @@ pub fn note(context: &Context, repeated: &Repeated) {
     );
     if let Some((ratio, chance)) = lack_of_fit {
         line += &if *chance < UNLIKELY {
-            format!("; the residual between poses is {ratio:.1} times that in mean square: this model lacks something")
+            format!(
+                "; the residual between poses is {ratio:.1} times that in mean square: this model lacks something"
+            )
         } else {
-            format!("; the residual between poses is no larger (F {ratio:.2}, p {chance:.2}): no lack of fit shows")
+            format!(
+                "; the residual between poses is no larger (F {ratio:.2}, p {chance:.2}): no lack of fit shows"
+            )
         };
     }
     context.services.note(line);

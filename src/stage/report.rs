@@ -6,9 +6,10 @@ use crate::report::{AcceptanceLimits, PageLanguage, ReportOptions, Tables, pages
 use crate::robot::RobotModel;
 use crate::stage::{Context, Labelled, Stage, curves, reads, writes};
 use crate::table::{
-    Acceptance, Cells, Corrections, Curves, Document, DocumentRow, FindingNumbers, Findings, Fit, Forms, Frame, Intake,
-    JointConventions, Observability, Parameters, Prediction, Recording, Rejected, Rivals, Robot, Split, Standing, Statistics,
-    Step, Suspects, Table, Training, Unseen, Verdict, VerdictSentences, standing,
+    Acceptance, Cells, Corrections, Curves, Document, DocumentRow, FindingNumbers, Findings, Fit,
+    Forms, Frame, Intake, JointConventions, Observability, Parameters, Prediction, Recording,
+    Rejected, Rivals, Robot, Split, Standing, Statistics, Step, Suspects, Table, Training, Unseen,
+    Verdict, VerdictSentences, standing,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -81,46 +82,82 @@ writes! {
 
 impl Stage for Report {
     const NAME: &'static str = "report";
-    const SUMMARY: &'static str = "writes one self-contained HTML file: errors before and after, parameters, rejected rows";
+    const SUMMARY: &'static str =
+        "writes one self-contained HTML file: errors before and after, parameters, rejected rows";
     const IMPLEMENTATION: u32 = 21;
     type Reads = ReportReads;
     type Writes = ReportWrites;
 
     fn sets_named(&self) -> Vec<(String, String)> {
-        self.set.iter().map(|set| ("set".into(), set.clone())).collect()
+        self.set
+            .iter()
+            .map(|set| ("set".into(), set.clone()))
+            .collect()
     }
 
     fn run(&self, reads: ReportReads, context: &Context) -> Result<ReportWrites> {
         let curves = self.curves(&reads)?;
         let hashes = hashes(&reads)?;
         // A diagnosis beside an outside simulation speaks of that, not of this robot's model.
-        let diagnosed = reads.findings.last().filter(|_| reads.recording.simulated.is_none()).map(|findings| &findings.stage);
-        let model = |stage: &String| reads.models.iter().find(|model| model.stage == *stage).map(|model| model.table.clone());
+        let diagnosed = reads
+            .findings
+            .last()
+            .filter(|_| reads.recording.simulated.is_none())
+            .map(|findings| &findings.stage);
+        let model = |stage: &String| {
+            reads
+                .models
+                .iter()
+                .find(|model| model.stage == *stage)
+                .map(|model| model.table.clone())
+        };
         let step = |step: &Labelled<Prediction>| Step {
-            id: step.table.0.first().map_or_else(|| step.stage.clone(), |row| row.step.clone()),
+            id: step
+                .table
+                .0
+                .first()
+                .map_or_else(|| step.stage.clone(), |row| row.step.clone()),
             own: model(&step.stage).is_some(),
             unseen: Unseen::of(&step.table),
         };
         let steps: Vec<Step> = reads.prediction.iter().map(step).collect();
         let wrong = reads.verdict.last().zip(reads.findings.last());
-        let wrong = wrong.and_then(|(verdict, findings)| verdict.table.wrong_setup(&findings.table));
+        let wrong =
+            wrong.and_then(|(verdict, findings)| verdict.table.wrong_setup(&findings.table));
         let stands = standing(&steps, diagnosed.map(String::as_str));
         let stands = stands.filter(|_| reads.recording.simulated.is_none() && wrong.is_none());
-        let withdrawn = stands.as_ref().map(|stands| stands.withdrawn.clone()).unwrap_or_default();
-        stands.iter().flat_map(Standing::warnings).for_each(|warning| context.services.warn(warning));
+        let withdrawn = stands
+            .as_ref()
+            .map(|stands| stands.withdrawn.clone())
+            .unwrap_or_default();
+        stands
+            .iter()
+            .flat_map(Standing::warnings)
+            .for_each(|warning| context.services.warn(warning));
         let counting = counting(&reads)?;
-        let mut standing = stands.as_ref().map(|stands| [stands.step.clone(), stands.model.clone()]);
+        let mut standing = stands
+            .as_ref()
+            .map(|stands| [stands.step.clone(), stands.model.clone()]);
         let (mut statistics, mut prediction) = (reads.statistics, reads.prediction);
-        if let Some(carried) = carried(standing.as_ref().map(|[step, _]| step), &prediction, &reads.recording) {
+        if let Some(carried) = carried(
+            standing.as_ref().map(|[step, _]| step),
+            &prediction,
+            &reads.recording,
+        ) {
             prediction.retain(|step| step.table.is_of(&reads.recording));
-            statistics.0.retain(|row| prediction.iter().any(|step| step.stage == row.step));
+            statistics
+                .0
+                .retain(|row| prediction.iter().any(|step| step.stage == row.step));
             standing = Some([carried.clone(), carried]);
         }
         let tables = Tables {
             counting,
             statistics,
             prediction: unlabelled(prediction),
-            parameters: standing.as_ref().and_then(|[_, stage]| model(stage)).unwrap_or(reads.parameters),
+            parameters: standing
+                .as_ref()
+                .and_then(|[_, stage]| model(stage))
+                .unwrap_or(reads.parameters),
             robot: reads.robot,
             recording: reads.recording,
             split: reads.split,
@@ -142,52 +179,113 @@ impl Stage for Report {
             standing: standing.map(|[step, _]| step),
             withdrawn,
         };
-        let Accepted { mean_mm, p95_mm, max_mm } = self.limits;
-        let limits = AcceptanceLimits { mean_mm, p95_mm, max_mm };
+        let Accepted {
+            mean_mm,
+            p95_mm,
+            max_mm,
+        } = self.limits;
+        let limits = AcceptanceLimits {
+            mean_mm,
+            p95_mm,
+            max_mm,
+        };
         let (title, set) = (self.title.as_deref(), self.set.as_deref());
-        let options = ReportOptions { title, set, limits, language: self.language, identity: &self.identity, hashes };
+        let options = ReportOptions {
+            title,
+            set,
+            limits,
+            language: self.language,
+            identity: &self.identity,
+            hashes,
+        };
         let pages = pages(&tables, &options).map_err(|error| placed(error, context.id))?;
-        let document =
-            |name: &str, media_type: &str, content| DocumentRow { name: name.into(), media_type: media_type.into(), content };
+        let document = |name: &str, media_type: &str, content| DocumentRow {
+            name: name.into(),
+            media_type: media_type.into(),
+            content,
+        };
         let html = document("report.html", "text/html", pages.html);
         let json = document("report.json", "application/json", pages.json);
-        Ok(ReportWrites { document: Document(vec![html, json]), acceptance: pages.acceptance, curves: tables.curves })
+        Ok(ReportWrites {
+            document: Document(vec![html, json]),
+            acceptance: pages.acceptance,
+            curves: tables.curves,
+        })
     }
 
     fn check(&self) -> Vec<Fault> {
-        let limits = [("mean_mm", self.limits.mean_mm), ("p95_mm", self.limits.p95_mm), ("max_mm", self.limits.max_mm)];
-        let wrong = limits.into_iter().filter(|(_, limit)| limit.is_some_and(|limit| !(limit.is_finite() && limit > 0.0)));
-        wrong.map(|(name, _)| Fault::new(format!("limits.{name}"), "expected a length above 0, mm")).collect()
+        let limits = [
+            ("mean_mm", self.limits.mean_mm),
+            ("p95_mm", self.limits.p95_mm),
+            ("max_mm", self.limits.max_mm),
+        ];
+        let wrong = limits
+            .into_iter()
+            .filter(|(_, limit)| limit.is_some_and(|limit| !(limit.is_finite() && limit > 0.0)));
+        wrong
+            .map(|(name, _)| Fault::new(format!("limits.{name}"), "expected a length above 0, mm"))
+            .collect()
     }
 }
 
 /// The last step that predicts the recording of the report, where the step that stands predicts another one: the report is of what was
 /// carried there.
-fn carried(standing: Option<&String>, prediction: &[Labelled<Prediction>], recording: &Recording) -> Option<String> {
-    let stands = prediction.iter().find(|step| Some(&step.stage) == standing)?;
+fn carried(
+    standing: Option<&String>,
+    prediction: &[Labelled<Prediction>],
+    recording: &Recording,
+) -> Option<String> {
+    let stands = prediction
+        .iter()
+        .find(|step| Some(&step.stage) == standing)?;
     let here = || prediction.iter().rfind(|step| step.table.is_of(recording));
-    if stands.table.is_of(recording) { None } else { here().map(|step| step.stage.clone()) }
+    if stands.table.is_of(recording) {
+        None
+    } else {
+        here().map(|step| step.stage.clone())
+    }
 }
 
 impl Report {
     /// Curves of the last diagnosis' findings; none without a diagnosis.
     fn curves(&self, reads: &ReportReads) -> Result<Curves> {
-        let Some(findings) = reads.findings.last().filter(|findings| !findings.table.0.is_empty()) else {
+        let Some(findings) = reads
+            .findings
+            .last()
+            .filter(|findings| !findings.table.0.is_empty())
+        else {
             return Ok(Curves::default());
         };
-        let parameters = reads.models.iter().find(|model| model.stage == findings.stage);
-        let prediction = reads.prediction.iter().find(|prediction| prediction.stage == findings.stage);
-        let (Some(parameters), Some(prediction)) = (parameters, prediction) else { return Ok(Curves::default()) };
+        let parameters = reads
+            .models
+            .iter()
+            .find(|model| model.stage == findings.stage);
+        let prediction = reads
+            .prediction
+            .iter()
+            .find(|prediction| prediction.stage == findings.stage);
+        let (Some(parameters), Some(prediction)) = (parameters, prediction) else {
+            return Ok(Curves::default());
+        };
         let robot = RobotModel::new(reads.robot.to_description()?);
         let model = parameters.table.model(robot, &[], Load::GravityTorque)?;
         let data = reads.recording.measurements();
-        curves::curves(&findings.table, &parameters.table, &model, &reads.recording, &data, &prediction.table)
+        curves::curves(
+            &findings.table,
+            &parameters.table,
+            &model,
+            &reads.recording,
+            &data,
+            &prediction.table,
+        )
     }
 }
 
 /// What the controller counts otherwise than the robot file, where it does.
 fn counting(reads: &ReportReads) -> Result<Option<String>> {
-    let Some(convention) = reads.convention.last() else { return Ok(None) };
+    let Some(convention) = reads.convention.last() else {
+        return Ok(None);
+    };
     let robot = RobotModel::new(reads.robot.to_description()?);
     Ok(convention.table.to_convention()?.difference(&robot))
 }
@@ -200,7 +298,10 @@ fn hashes(reads: &ReportReads) -> Result<Vec<(String, String)>> {
     add("recording".into(), reads.recording.to_frame()?);
     add("split".into(), reads.split.to_frame()?);
     for model in &reads.models {
-        add(format!("parameters of {}", model.stage), model.table.to_frame()?);
+        add(
+            format!("parameters of {}", model.stage),
+            model.table.to_frame()?,
+        );
     }
     Ok(out)
 }
@@ -212,9 +313,12 @@ fn unlabelled<T>(tables: Vec<Labelled<T>>) -> Vec<T> {
 /// Faults of the settings with the stage they belong to.
 fn placed(error: Error, stage: &str) -> Error {
     match error {
-        Error::Spec(faults) => {
-            Error::Spec(faults.into_iter().map(|f| Fault::new(format!("{stage}.{}", f.place), f.message)).collect())
-        }
+        Error::Spec(faults) => Error::Spec(
+            faults
+                .into_iter()
+                .map(|f| Fault::new(format!("{stage}.{}", f.place), f.message))
+                .collect(),
+        ),
         other => other,
     }
 }

@@ -4,8 +4,9 @@ use crate::error::Result;
 use crate::report::{TorqueTables, torque_page};
 use crate::stage::{Context, Labelled, Stage, reads, writes};
 use crate::table::{
-    BodyConsistencies, Contacts, Document, DocumentRow, FrictionCurves, Inertials, JointTorques, Robot, Table, TorqueCourse,
-    TorqueFindings, TorqueNumbers, TorqueRivals, TorqueVerdict, VerdictSentences,
+    BodyConsistencies, Contacts, Document, DocumentRow, FrictionCurves, Inertials, JointTorques,
+    Robot, Table, TorqueCourse, TorqueFindings, TorqueNumbers, TorqueRivals, TorqueVerdict,
+    VerdictSentences,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -44,13 +45,16 @@ writes! {
 
 impl Stage for ReportTorques {
     const NAME: &'static str = "report_torques";
-    const SUMMARY: &'static str = "writes one self-contained HTML file: torques before and after, friction, what was found";
+    const SUMMARY: &'static str =
+        "writes one self-contained HTML file: torques before and after, friction, what was found";
     const IMPLEMENTATION: u32 = 4;
     type Reads = ReportTorquesReads;
     type Writes = ReportTorquesWrites;
 
     fn run(&self, reads: ReportTorquesReads, _context: &Context) -> Result<ReportTorquesWrites> {
-        let hash = |name: &str, frame: crate::table::Frame| (name.to_string(), frame.table_hash().to_string());
+        let hash = |name: &str, frame: crate::table::Frame| {
+            (name.to_string(), frame.table_hash().to_string())
+        };
         let hashes = vec![
             hash("robot", reads.robot.to_frame()?),
             hash("findings", reads.findings.to_frame()?),
@@ -60,7 +64,13 @@ impl Stage for ReportTorques {
             robot: reads.robot,
             verdict: reads.verdict,
             // Other diagnoses of the pipeline have theirs: each is asked for by its step.
-            sentences: VerdictSentences(reads.sentences.into_iter().flat_map(|of| of.table.0).collect()),
+            sentences: VerdictSentences(
+                reads
+                    .sentences
+                    .into_iter()
+                    .flat_map(|of| of.table.0)
+                    .collect(),
+            ),
             findings: reads.findings,
             numbers: reads.numbers,
             rivals: reads.rivals,
@@ -73,7 +83,13 @@ impl Stage for ReportTorques {
             hashes,
         };
         let content = torque_page(&tables, self.title.as_deref())?;
-        let html = DocumentRow { name: "torques.html".into(), media_type: "text/html".into(), content };
-        Ok(ReportTorquesWrites { document: Document(vec![html]) })
+        let html = DocumentRow {
+            name: "torques.html".into(),
+            media_type: "text/html".into(),
+            content,
+        };
+        Ok(ReportTorquesWrites {
+            document: Document(vec![html]),
+        })
     }
 }

@@ -49,21 +49,29 @@ writes! {
 
 impl Stage for ReadRobot {
     const NAME: &'static str = "robot";
-    const SUMMARY: &'static str = "reads a robot file (screws, DH, modified DH, URDF, or a practice robot.json)";
+    const SUMMARY: &'static str =
+        "reads a robot file (screws, DH, modified DH, URDF, or a practice robot.json)";
     const IMPLEMENTATION: u32 = 2;
     type Reads = RobotReads;
     type Writes = RobotWrites;
 
     fn check(&self) -> Vec<Fault> {
         match (self.format, &self.urdf) {
-            (RobotFormat::Case, Some(_)) => vec![Fault::new("urdf", "the format `case` takes no URDF")],
+            (RobotFormat::Case, Some(_)) => {
+                vec![Fault::new("urdf", "the format `case` takes no URDF")]
+            }
             _ => Vec::new(),
         }
     }
 
     fn files(&self) -> Vec<(String, RawFile)> {
-        let urdf = self.urdf.iter().map(|file| ("urdf".to_string(), file.clone()));
-        std::iter::once(("file".to_string(), self.file.clone())).chain(urdf).collect()
+        let urdf = self
+            .urdf
+            .iter()
+            .map(|file| ("urdf".to_string(), file.clone()));
+        std::iter::once(("file".to_string(), self.file.clone()))
+            .chain(urdf)
+            .collect()
     }
 
     fn look(&self, reads: Option<RobotReads>, context: &Context) -> Result<Option<RobotWrites>> {
@@ -72,18 +80,31 @@ impl Stage for ReadRobot {
 
     fn run(&self, _reads: RobotReads, context: &Context) -> Result<RobotWrites> {
         let (label, text) = robot_text(&self.file, context)?;
-        let file = RobotFileText { label: &label, text: &text };
+        let file = RobotFileText {
+            label: &label,
+            text: &text,
+        };
         let imported = match self.format {
             RobotFormat::Case => read_case(file)?,
             RobotFormat::Calib => {
-                let urdf = self.urdf.as_ref().map(|file| robot_text(file, context)).transpose()?;
-                read_calib(file, urdf.as_ref().map(|(label, text)| RobotFileText { label, text }))?
+                let urdf = self
+                    .urdf
+                    .as_ref()
+                    .map(|file| robot_text(file, context))
+                    .transpose()?;
+                read_calib(
+                    file,
+                    urdf.as_ref()
+                        .map(|(label, text)| RobotFileText { label, text }),
+                )?
             }
         };
         for note in imported.notes {
             context.services.warn(note);
         }
-        Ok(RobotWrites { robot: Robot::from_description(&imported.robot) })
+        Ok(RobotWrites {
+            robot: Robot::from_description(&imported.robot),
+        })
     }
 }
 

@@ -1,6 +1,8 @@
 //! What identifications do about rows that no smooth model can follow, and what they tell the person about them.
 
-use crate::estimate::{FitOptions, Fitted, Model, Screening, Suspect, SuspectKind, fit, fit_screened};
+use crate::estimate::{
+    FitOptions, Fitted, Model, Screening, Suspect, SuspectKind, fit, fit_screened,
+};
 use crate::robot::Measurements;
 use crate::stage::Context;
 use crate::table::{Recording, Split, slip};
@@ -17,7 +19,14 @@ pub fn fit_rows(
     if !screen {
         let kept = options.rows.to_vec();
         let (model, fitted) = fit(start, data, options);
-        return (model, fitted, Screening { kept, ..Screening::default() });
+        return (
+            model,
+            fitted,
+            Screening {
+                kept,
+                ..Screening::default()
+            },
+        );
     }
     fit_screened(start, data, options, &numbered(split))
 }
@@ -46,7 +55,10 @@ pub fn note(context: &Context, screening: &Screening, recording: &Recording) {
         ));
     }
     let id = |row: usize| recording.point_id[row].as_str();
-    let (events, aside): (Vec<&Suspect>, Vec<&Suspect>) = screening.suspects.iter().partition(|suspect| suspect.used());
+    let (events, aside): (Vec<&Suspect>, Vec<&Suspect>) = screening
+        .suspects
+        .iter()
+        .partition(|suspect| suspect.used());
     if !aside.is_empty() {
         let mut by_kind: BTreeMap<u8, Vec<String>> = BTreeMap::new();
         for case in cases(&aside) {
@@ -54,18 +66,36 @@ pub fn note(context: &Context, screening: &Screening, recording: &Recording) {
             let who = if case.len() == 1 {
                 id(first.row).to_string()
             } else {
-                format!("{} to {} ({} rows)", id(first.row), id(last.row), case.len())
+                format!(
+                    "{} to {} ({} rows)",
+                    id(first.row),
+                    id(last.row),
+                    case.len()
+                )
             };
             let partner = first.partner.map_or("another row", id);
             let many = case.len() > 1;
             let (order, text) = match first.kind {
-                SuspectKind::Exchanged if first.partner > Some(first.row) => (0, format!("{who} and {partner} look exchanged")),
+                SuspectKind::Exchanged if first.partner > Some(first.row) => {
+                    (0, format!("{who} and {partner} look exchanged"))
+                }
                 SuspectKind::Exchanged => continue,
-                SuspectKind::ShiftedBlock(offset) => (1, format!("{who}: points and joints are {offset:+} rows apart")),
-                SuspectKind::Mislabelled => (2, format!("{who} lies where the joints of {partner} put it")),
-                SuspectKind::UnitSlip(factor) => (3, format!("{who} {} {}", if many { "are" } else { "is" }, slip(factor))),
+                SuspectKind::ShiftedBlock(offset) => (
+                    1,
+                    format!("{who}: points and joints are {offset:+} rows apart"),
+                ),
+                SuspectKind::Mislabelled => (
+                    2,
+                    format!("{who} lies where the joints of {partner} put it"),
+                ),
+                SuspectKind::UnitSlip(factor) => (
+                    3,
+                    format!("{who} {} {}", if many { "are" } else { "is" }, slip(factor)),
+                ),
                 SuspectKind::Zero => (4, format!("{who} {} zero", if many { "are" } else { "is" })),
-                SuspectKind::Outlier | SuspectKind::Event => (5, format!("{who} is {:.3} mm off", first.size * 1e3)),
+                SuspectKind::Outlier | SuspectKind::Event => {
+                    (5, format!("{who} is {:.3} mm off", first.size * 1e3))
+                }
             };
             by_kind.entry(order).or_default().push(text);
         }
@@ -77,7 +107,11 @@ pub fn note(context: &Context, screening: &Screening, recording: &Recording) {
         });
         let texts: Vec<String> = texts.collect();
         let rows = if aside.len() == 1 { "row" } else { "rows" };
-        context.services.warn(format!("{} {rows} set aside: {}", aside.len(), texts.join("; ")));
+        context.services.warn(format!(
+            "{} {rows} set aside: {}",
+            aside.len(),
+            texts.join("; ")
+        ));
     }
     for run in events.chunk_by(|a, b| a.row + 1 == b.row) {
         context.services.warn(format!(
@@ -98,7 +132,10 @@ pub fn note(context: &Context, screening: &Screening, recording: &Recording) {
 /// Suspects that are one thing to a person: consecutive rows with the same slip, zero or shift; all others one by one.
 fn cases<'a>(suspects: &'a [&'a Suspect]) -> impl Iterator<Item = &'a [&'a Suspect]> {
     suspects.chunk_by(|a, b| {
-        let together = matches!(a.kind, SuspectKind::ShiftedBlock(_) | SuspectKind::UnitSlip(_) | SuspectKind::Zero);
+        let together = matches!(
+            a.kind,
+            SuspectKind::ShiftedBlock(_) | SuspectKind::UnitSlip(_) | SuspectKind::Zero
+        );
         together && a.kind == b.kind && a.row + 1 == b.row
     })
 }

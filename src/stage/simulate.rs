@@ -98,49 +98,107 @@ impl Stage for Simulate {
         let mut faults = Vec::new();
         let mut fault = |place: &str, message: &str| faults.push(Fault::new(place, message));
         for (index, fixture) in self.fixtures.iter().enumerate() {
-            fixture.faults().iter().for_each(|(at, message)| fault(&format!("fixtures[{index}].{at}"), message));
-            if self.fixtures[..index].iter().any(|other| other.name == fixture.name) {
-                fault(&format!("fixtures[{index}].name"), "another one has this name");
+            fixture
+                .faults()
+                .iter()
+                .for_each(|(at, message)| fault(&format!("fixtures[{index}].{at}"), message));
+            if self.fixtures[..index]
+                .iter()
+                .any(|other| other.name == fixture.name)
+            {
+                fault(
+                    &format!("fixtures[{index}].name"),
+                    "another one has this name",
+                );
             }
         }
         let measured = !self.blocks.is_empty() || self.motion.is_some();
         if !self.fixtures.is_empty() && measured {
-            fault("fixtures", "nothing but joints is recorded at fixtures; leave out `blocks` and `motion`");
+            fault(
+                "fixtures",
+                "nothing but joints is recorded at fixtures; leave out `blocks` and `motion`",
+            );
         }
         if self.fixtures.is_empty() && self.blocks.iter().all(|block| block.count() == 0) {
-            fault("blocks", "expected at least one block with points, e.g. [{usage: fit, points: 50}]");
+            fault(
+                "blocks",
+                "expected at least one block with points, e.g. [{usage: fit, points: 50}]",
+            );
         }
         for (place, pose) in given(&self.blocks) {
-            pose.faults().iter().for_each(|(at, message)| fault(&format!("{place}.{at}"), message));
+            pose.faults()
+                .iter()
+                .for_each(|(at, message)| fault(&format!("{place}.{at}"), message));
         }
-        for (index, _) in self.blocks.iter().enumerate().filter(|(_, block)| self.motion.is_some() && !block.given.is_empty()) {
-            fault(&format!("blocks[{index}].given"), "given poses need an arm at rest; leave out `given` or `motion`");
+        for (index, _) in self
+            .blocks
+            .iter()
+            .enumerate()
+            .filter(|(_, block)| self.motion.is_some() && !block.given.is_empty())
+        {
+            fault(
+                &format!("blocks[{index}].given"),
+                "given poses need an arm at rest; leave out `given` or `motion`",
+            );
         }
         for (index, block) in self.blocks.iter().enumerate() {
             if !(block.payload_kg.is_finite() && block.payload_kg >= 0.0) {
-                fault(&format!("blocks[{index}].payload_kg"), "expected a mass, 0 or more");
+                fault(
+                    &format!("blocks[{index}].payload_kg"),
+                    "expected a mass, 0 or more",
+                );
             }
         }
         for (index, range) in self.poses.range_deg.iter().enumerate() {
             if !(range[0].is_finite() && range[1].is_finite() && range[0] <= range[1]) {
-                fault(&format!("poses.range_deg[{index}]"), "expected [lower, upper], lower first");
+                fault(
+                    &format!("poses.range_deg[{index}]"),
+                    "expected [lower, upper], lower first",
+                );
             }
         }
-        if !(self.tracker.coverage > 0.0 && self.tracker.noise_um >= 0.0 && self.tracker.noise_um_per_m >= 0.0) {
-            fault("tracker", "expected noise_um and noise_um_per_m of 0 or more, and a coverage above 0, e.g. 2");
+        if !(self.tracker.coverage > 0.0
+            && self.tracker.noise_um >= 0.0
+            && self.tracker.noise_um_per_m >= 0.0)
+        {
+            fault(
+                "tracker",
+                "expected noise_um and noise_um_per_m of 0 or more, and a coverage above 0, e.g. 2",
+            );
         }
-        let Climate { pace_s: pace, begin_s, warm_up_h, swing_h, .. } = self.climate;
+        let Climate {
+            pace_s: pace,
+            begin_s,
+            warm_up_h,
+            swing_h,
+            ..
+        } = self.climate;
         if !(begin_s >= 0.0 && begin_s.is_finite()) {
             fault("climate.begin_s", "expected a time of 0 or more, s");
         }
-        if !(pace[0] > 0.0 && pace[0] <= pace[1] && pace[1].is_finite() && warm_up_h > 0.0 && swing_h > 0.0) {
-            fault("climate", "expected pace_s as [shortest, longest] above 0, and warm_up_h and swing_h above 0");
+        if !(pace[0] > 0.0
+            && pace[0] <= pace[1]
+            && pace[1].is_finite()
+            && warm_up_h > 0.0
+            && swing_h > 0.0)
+        {
+            fault(
+                "climate",
+                "expected pace_s as [shortest, longest] above 0, and warm_up_h and swing_h above 0",
+            );
         }
         if let Some(way) = &self.motion {
-            let positive = [way.rate_hz, way.speed_deg_s].iter().all(|value| *value > 0.0 && value.is_finite());
-            let more = [way.dwell_s, way.wander_s].iter().all(|value| *value >= 0.0 && value.is_finite());
+            let positive = [way.rate_hz, way.speed_deg_s]
+                .iter()
+                .all(|value| *value > 0.0 && value.is_finite());
+            let more = [way.dwell_s, way.wander_s]
+                .iter()
+                .all(|value| *value >= 0.0 && value.is_finite());
             if !(positive && more) {
-                fault("motion", "expected rate_hz and speed_deg_s above 0, dwell_s and wander_s of 0 or more");
+                fault(
+                    "motion",
+                    "expected rate_hz and speed_deg_s above 0, dwell_s and wander_s of 0 or more",
+                );
             }
         }
         faults
@@ -151,7 +209,8 @@ impl Stage for Simulate {
         let place = format!("{}.with", context.id);
         let faults = self.against(&robot);
         if !faults.is_empty() {
-            let named = |fault: Fault| Fault::new(format!("{place}.{}", fault.place), fault.message);
+            let named =
+                |fault: Fault| Fault::new(format!("{place}.{}", fault.place), fault.message);
             return Err(Error::Spec(faults.into_iter().map(named).collect()));
         }
         let effects = self.acting();
@@ -172,16 +231,30 @@ impl Stage for Simulate {
             seed: self.seed.unwrap_or(context.seed),
         };
         if !self.fixtures.is_empty() {
-            let touches = experiment.touch(&self.fixtures).map_err(|message| Error::spec(place, message))?;
-            let (rows, things) = (counted(touches.len(), "row"), counted(self.fixtures.len(), "fixture"));
-            context.services.note(format!("{rows} of joints at {things} of a twin"));
+            let touches = experiment
+                .touch(&self.fixtures)
+                .map_err(|message| Error::spec(place, message))?;
+            let (rows, things) = (
+                counted(touches.len(), "row"),
+                counted(self.fixtures.len(), "fixture"),
+            );
+            context
+                .services
+                .note(format!("{rows} of joints at {things} of a twin"));
             let mut truth = truth(&robot, &self.truth, &self.tracker, effects);
-            truth.0.extend(self.fixtures.iter().flat_map(fixtures::truth));
+            truth
+                .0
+                .extend(self.fixtures.iter().flat_map(fixtures::truth));
             truth.0.sort_by(|a, b| a.name.cmp(&b.name));
-            return Ok(SimulateWrites { recording: fixtures::recording(&robot, &self.fixtures, &touches), truth });
+            return Ok(SimulateWrites {
+                recording: fixtures::recording(&robot, &self.fixtures, &touches),
+                truth,
+            });
         }
         let points: usize = self.blocks.iter().map(Block::count).sum();
-        context.services.begin("measuring the twin", Some(points as u64), "points");
+        context
+            .services
+            .begin("measuring the twin", Some(points as u64), "points");
         let mut done = 0;
         let shots = match &self.motion {
             Some(way) => experiment.follow(way, || tick(&mut done)),
@@ -212,32 +285,63 @@ impl Simulate {
     /// Settings that this robot cannot have.
     fn against(&self, robot: &RobotDescription) -> Vec<Fault> {
         let joints = robot.joints.len();
-        let of_truth = self.truth.faults(robot).into_iter().map(|(at, what)| Fault::new(format!("truth.{at}"), what));
+        let of_truth = self
+            .truth
+            .faults(robot)
+            .into_iter()
+            .map(|(at, what)| Fault::new(format!("truth.{at}"), what));
         let of_poses = given(&self.blocks).flat_map(|(place, pose)| {
-            pose.against(robot).into_iter().map(move |(at, what)| Fault::new(format!("{place}.{at}"), what))
+            pose.against(robot)
+                .into_iter()
+                .map(move |(at, what)| Fault::new(format!("{place}.{at}"), what))
         });
         let mut faults: Vec<Fault> = of_truth.chain(of_poses).collect();
         for (index, effect) in self.effects.iter().enumerate() {
-            faults.extend(effect.fault(joints).map(|what| Fault::new(format!("effects[{index}]"), what)));
+            faults.extend(
+                effect
+                    .fault(joints)
+                    .map(|what| Fault::new(format!("effects[{index}]"), what)),
+            );
             if self.motion.is_none() && effect.moves_only() {
                 let what = "shows on a moving arm only; say `motion`, e.g. motion: {rate_hz: 100}";
                 faults.push(Fault::new(format!("effects[{index}]"), what));
             }
         }
-        for (name, list) in [("motors.sign", &self.motors.sign), ("repeatability_arcsec", &self.repeatability_arcsec)] {
+        for (name, list) in [
+            ("motors.sign", &self.motors.sign),
+            ("repeatability_arcsec", &self.repeatability_arcsec),
+        ] {
             if !list.is_empty() && list.len() != joints {
                 faults.push(Fault::new(
                     name,
-                    format!("has {}, the robot {}", counted(list.len(), "number"), counted(joints, "joint")),
+                    format!(
+                        "has {}, the robot {}",
+                        counted(list.len(), "number"),
+                        counted(joints, "joint")
+                    ),
                 ));
             }
         }
-        for (joint, factor) in self.truth.compliance_rad_a.iter().enumerate().filter(|(_, factor)| **factor != 0.0) {
+        for (joint, factor) in self
+            .truth
+            .compliance_rad_a
+            .iter()
+            .enumerate()
+            .filter(|(_, factor)| **factor != 0.0)
+        {
             let at = format!("truth.compliance_rad_a[{joint}]");
-            let known = robot.joints.get(joint).is_some_and(|j| j.reduction_ratio.is_some() && j.motor_constant.is_some());
+            let known = robot
+                .joints
+                .get(joint)
+                .is_some_and(|j| j.reduction_ratio.is_some() && j.motor_constant.is_some());
             if !known {
-                faults.push(Fault::new(at, "needs reduction_ratio and motor_constant of this joint in the robot file"));
-            } else if factor.signum() == self.motors.sign.get(joint).copied().unwrap_or(1.0).signum() {
+                faults.push(Fault::new(
+                    at,
+                    "needs reduction_ratio and motor_constant of this joint in the robot file",
+                ));
+            } else if factor.signum()
+                == self.motors.sign.get(joint).copied().unwrap_or(1.0).signum()
+            {
                 let why = "has the sign of motors.sign: the gear would wind up against its load; the signs must differ";
                 faults.push(Fault::new(at, why));
             }
@@ -247,9 +351,22 @@ impl Simulate {
 
     /// What the tracker states of its noise; nothing where it has none, since no fit can weigh by zero.
     fn noise(&self) -> (Instrument, SigmaSource) {
-        let Tracker { noise_um, noise_um_per_m, coverage, .. } = self.tracker;
-        let stated = Instrument { constant_um: noise_um, per_metre_um: noise_um_per_m, coverage };
-        if stated.fault().is_none() { (stated, SigmaSource::Instrument) } else { (START, SigmaSource::Inferred) }
+        let Tracker {
+            noise_um,
+            noise_um_per_m,
+            coverage,
+            ..
+        } = self.tracker;
+        let stated = Instrument {
+            constant_um: noise_um,
+            per_metre_um: noise_um_per_m,
+            coverage,
+        };
+        if stated.fault().is_none() {
+            (stated, SigmaSource::Instrument)
+        } else {
+            (START, SigmaSource::Inferred)
+        }
     }
 
     fn recording(&self, robot: &RobotDescription, shots: &[Shot]) -> Recording {
@@ -264,39 +381,96 @@ impl Simulate {
         let (figures, source) = self.noise();
         Recording {
             joints: robot.joints.len(),
-            prismatic: robot.joints.iter().map(|joint| joint.kind == JointKind::Prismatic).collect(),
+            prismatic: robot
+                .joints
+                .iter()
+                .map(|joint| joint.kind == JointKind::Prismatic)
+                .collect(),
             sequence: (0..shots.len() as i64).collect(),
             point_id: ids,
-            usage: shots.iter().map(|shot| Some(self.blocks[shot.block].usage.clone())).collect(),
-            q: shots.iter().flat_map(|shot| shot.q.iter().copied()).collect(),
+            usage: shots
+                .iter()
+                .map(|shot| Some(self.blocks[shot.block].usage.clone()))
+                .collect(),
+            q: shots
+                .iter()
+                .flat_map(|shot| shot.q.iter().copied())
+                .collect(),
             position: shots.iter().map(|shot| shot.position).collect(),
-            position_sigma: Some(shots.iter().map(|shot| [figures.sigma(&shot.position.into()); 3]).collect()),
+            position_sigma: Some(
+                shots
+                    .iter()
+                    .map(|shot| [figures.sigma(&shot.position.into()); 3])
+                    .collect(),
+            ),
             sigma_source: Some(vec![source; shots.len()]),
             time: Some(shots.iter().map(|shot| shot.time_s).collect()),
             payload: Some(shots.iter().map(|shot| shot.payload_kg).collect()),
             temperature: Some(shots.iter().map(|shot| shot.temperature_c).collect()),
-            current: self.motion.is_none().then(|| shots.iter().flat_map(|shot| shot.current.iter().copied()).collect()),
+            current: self.motion.is_none().then(|| {
+                shots
+                    .iter()
+                    .flat_map(|shot| shot.current.iter().copied())
+                    .collect()
+            }),
             velocity: self
                 .motion
                 .as_ref()
                 .is_some_and(|way| way.log_velocity)
-                .then(|| shots.iter().flat_map(|shot| shot.velocity.iter().copied()).collect()),
-            direction: Some(shots.iter().flat_map(|shot| shot.direction.iter().copied()).collect()),
+                .then(|| {
+                    shots
+                        .iter()
+                        .flat_map(|shot| shot.velocity.iter().copied())
+                        .collect()
+                }),
+            direction: Some(
+                shots
+                    .iter()
+                    .flat_map(|shot| shot.direction.iter().copied())
+                    .collect(),
+            ),
             ..Recording::default()
         }
     }
 }
 
 /// The true numbers in canonical names, the names that identified parameters have; effects named twice are numbered.
-fn truth(robot: &RobotDescription, truth: &TrueRobot, tracker: &Tracker, effects: &[Physical]) -> Truth {
-    let values = truth.values(robot).into_iter().chain(tracker.values()).chain(effects.iter().flat_map(Physical::truth));
+fn truth(
+    robot: &RobotDescription,
+    truth: &TrueRobot,
+    tracker: &Tracker,
+    effects: &[Physical],
+) -> Truth {
+    let values = truth
+        .values(robot)
+        .into_iter()
+        .chain(tracker.values())
+        .chain(effects.iter().flat_map(Physical::truth));
     let mut seen: BTreeMap<String, usize> = BTreeMap::new();
-    let rows = values.map(|TrueValue { name, effect, place, unit, value }| {
-        let count = seen.entry(name.clone()).or_default();
-        *count += 1;
-        let name = if *count == 1 { name } else { format!("{name}#{count}") };
-        TruthRow { name, effect: effect.into(), place, unit: unit.into(), value }
-    });
+    let rows = values.map(
+        |TrueValue {
+             name,
+             effect,
+             place,
+             unit,
+             value,
+         }| {
+            let count = seen.entry(name.clone()).or_default();
+            *count += 1;
+            let name = if *count == 1 {
+                name
+            } else {
+                format!("{name}#{count}")
+            };
+            TruthRow {
+                name,
+                effect: effect.into(),
+                place,
+                unit: unit.into(),
+                value,
+            }
+        },
+    );
     let mut rows: Vec<TruthRow> = rows.collect();
     rows.sort_by(|a, b| a.name.cmp(&b.name));
     Truth(rows)

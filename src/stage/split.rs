@@ -128,7 +128,8 @@ writes! {
 
 impl Stage for SplitBy {
     const NAME: &'static str = "split";
-    const SUMMARY: &'static str = "deals rows out to named sets: every n-th, by name, blocks, random, by usage, by order";
+    const SUMMARY: &'static str =
+        "deals rows out to named sets: every n-th, by name, blocks, random, by usage, by order";
     const IMPLEMENTATION: u32 = 4;
     type Reads = SplitReads;
     type Writes = SplitWrites;
@@ -141,33 +142,55 @@ impl Stage for SplitBy {
             }
         }
         match self {
-            Self::Every { n, offset, set, rest, .. } => {
+            Self::Every {
+                n,
+                offset,
+                set,
+                rest,
+                ..
+            } => {
                 if *n < 2 {
                     faults.push(Fault::new("n", "allowed: 2 and above"));
                 }
                 if offset.is_some_and(|offset| offset >= *n) {
-                    faults.push(Fault::new("offset", format!("allowed: 0 to {}", n.saturating_sub(1))));
+                    faults.push(Fault::new(
+                        "offset",
+                        format!("allowed: 0 to {}", n.saturating_sub(1)),
+                    ));
                 }
                 two(set, rest, &mut faults);
             }
-            Self::Named { names, set, rest, .. } => {
+            Self::Named {
+                names, set, rest, ..
+            } => {
                 if names.is_empty() {
                     faults.push(Fault::new("names", "name at least one, e.g. [front/*]"));
                 }
                 two(set, rest, &mut faults);
             }
-            Self::Blocks { count, length, sets } => {
+            Self::Blocks {
+                count,
+                length,
+                sets,
+            } => {
                 if count.is_some() == length.is_some() {
                     faults.push(Fault::new("", "say `count` or `length`, one of them"));
                 }
                 if *count == Some(0) || *length == Some(0) {
-                    faults.push(Fault::new(if count.is_some() { "count" } else { "length" }, "allowed: 1 and above"));
+                    faults.push(Fault::new(
+                        if count.is_some() { "count" } else { "length" },
+                        "allowed: 1 and above",
+                    ));
                 }
                 if sets.is_empty() {
                     faults.push(Fault::new("sets", "name at least one set"));
                 }
             }
-            Self::Random { fraction, set, rest } => {
+            Self::Random {
+                fraction,
+                set,
+                rest,
+            } => {
                 if !(*fraction > 0.0 && *fraction < 1.0) {
                     faults.push(Fault::new("fraction", "allowed: above 0 and below 1"));
                 }
@@ -175,7 +198,10 @@ impl Stage for SplitBy {
             }
             Self::Usage { sets, .. } => {
                 if sets.as_ref().is_some_and(BTreeMap::is_empty) {
-                    faults.push(Fault::new("sets", "map at least one label, or leave it out"));
+                    faults.push(Fault::new(
+                        "sets",
+                        "map at least one label, or leave it out",
+                    ));
                 }
             }
             Self::Order { sets } => {
@@ -198,7 +224,11 @@ impl Stage for SplitBy {
 
     fn sets_dealt(&self) -> Option<Vec<String>> {
         if let Self::Usage { sets, blank } = self {
-            let sets = sets.as_ref()?.values().chain(blank).collect::<BTreeSet<_>>();
+            let sets = sets
+                .as_ref()?
+                .values()
+                .chain(blank)
+                .collect::<BTreeSet<_>>();
             return Some(sets.into_iter().cloned().collect());
         }
         Some(self.names().into_iter().map(Into::into).collect())
@@ -212,8 +242,12 @@ impl Stage for SplitBy {
         let recording = &reads.recording;
         let mut sets = self.deal(recording, context.seed)?;
         let copies = copied_rows(recording);
-        copies.iter().for_each(|(row, copy)| sets[*copy] = sets[*row].clone());
-        copied::said(&copies, recording).into_iter().for_each(|line| context.services.warn(line));
+        copies
+            .iter()
+            .for_each(|(row, copy)| sets[*copy] = sets[*row].clone());
+        copied::said(&copies, recording)
+            .into_iter()
+            .for_each(|line| context.services.warn(line));
         let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
         for set in &sets {
             *counts.entry(set).or_default() += 1;
@@ -223,15 +257,25 @@ impl Stage for SplitBy {
                 return Err(self.empty(name, recording.rows()));
             }
         }
-        let listed: Vec<String> = counts.iter().map(|(set, rows)| format!("{set} {rows}")).collect();
-        context.services.note(format!("rows: {}", listed.join(", ")));
-        let rows = sets.into_iter().zip(&recording.sequence).zip(&recording.point_id);
+        let listed: Vec<String> = counts
+            .iter()
+            .map(|(set, rows)| format!("{set} {rows}"))
+            .collect();
+        context
+            .services
+            .note(format!("rows: {}", listed.join(", ")));
+        let rows = sets
+            .into_iter()
+            .zip(&recording.sequence)
+            .zip(&recording.point_id);
         let row = |((set, sequence), point_id): ((String, &i64), &String)| SplitRow {
             sequence: *sequence,
             point_id: point_id.clone(),
             set,
         };
-        Ok(SplitWrites { split: Split(rows.map(row).collect()) })
+        Ok(SplitWrites {
+            split: Split(rows.map(row).collect()),
+        })
     }
 }
 
@@ -245,9 +289,9 @@ impl SplitBy {
     /// Sets that must not stay empty.
     fn names(&self) -> BTreeSet<&str> {
         match self {
-            Self::Every { set, rest, .. } | Self::Random { set, rest, .. } | Self::Named { set, rest, .. } => {
-                [set.as_str(), rest].into()
-            }
+            Self::Every { set, rest, .. }
+            | Self::Random { set, rest, .. }
+            | Self::Named { set, rest, .. } => [set.as_str(), rest].into(),
             Self::Blocks { sets, .. } => sets.iter().map(String::as_str).collect(),
             Self::Usage { .. } => BTreeSet::new(),
             Self::Order { sets } => sets.iter().map(|stretch| stretch.set.as_str()).collect(),
@@ -262,52 +306,108 @@ impl SplitBy {
             Self::Named { .. } => ("names", "say other `names`"),
             Self::Random { set, .. } if name == set => ("fraction", "say a larger `fraction`"),
             Self::Random { .. } => ("fraction", "say a smaller `fraction`"),
-            Self::Blocks { count: Some(_), .. } => ("count", "say a larger `count`, or fewer `sets`"),
+            Self::Blocks { count: Some(_), .. } => {
+                ("count", "say a larger `count`, or fewer `sets`")
+            }
             Self::Blocks { .. } => ("length", "say a smaller `length`, or fewer `sets`"),
             Self::Order { .. } | Self::Usage { .. } => ("sets", "give it rows, or leave it out"),
         };
-        Error::data(format!("with.{setting}"), format!("set `{name}` gets none of the {}; {advice}", counted(rows, "row")))
+        Error::data(
+            format!("with.{setting}"),
+            format!(
+                "set `{name}` gets none of the {}; {advice}",
+                counted(rows, "row")
+            ),
+        )
     }
 
     /// The set of each row.
     fn deal(&self, recording: &Recording, seed: u64) -> Result<Vec<String>> {
         let rows = recording.rows();
         match self {
-            Self::Every { n, offset, set, rest, within } => {
+            Self::Every {
+                n,
+                offset,
+                set,
+                rest,
+                within,
+            } => {
                 let offset = offset.unwrap_or(n - 1);
-                let names = within.map(|column| column.of(recording, "within")).transpose()?;
+                let names = within
+                    .map(|column| column.of(recording, "within"))
+                    .transpose()?;
                 let mut counts: BTreeMap<&str, u64> = BTreeMap::new();
                 let dealt = stops(recording).into_iter().flat_map(|stop| {
-                    let count = counts.entry(names.as_ref().map_or("", |names| names[stop.start])).or_default();
+                    let count = counts
+                        .entry(names.as_ref().map_or("", |names| names[stop.start]))
+                        .or_default();
                     *count += 1;
-                    std::iter::repeat_n(if (*count - 1) % n == offset { set } else { rest }, stop.len())
+                    std::iter::repeat_n(
+                        if (*count - 1) % n == offset {
+                            set
+                        } else {
+                            rest
+                        },
+                        stop.len(),
+                    )
                 });
                 Ok(dealt.cloned().collect())
             }
-            Self::Named { column, names: wanted, set, rest } => {
+            Self::Named {
+                column,
+                names: wanted,
+                set,
+                rest,
+            } => {
                 let names = column.of(recording, "column")?;
-                if let Some(k) = wanted.iter().position(|pattern| !names.iter().any(|name| matches(pattern, name))) {
-                    let there: BTreeSet<&str> = names.iter().copied().filter(|name| !name.is_empty()).collect();
+                if let Some(k) = wanted
+                    .iter()
+                    .position(|pattern| !names.iter().any(|name| matches(pattern, name)))
+                {
+                    let there: BTreeSet<&str> = names
+                        .iter()
+                        .copied()
+                        .filter(|name| !name.is_empty())
+                        .collect();
                     let there = there.into_iter().collect::<Vec<_>>().join(", ");
-                    return Err(Error::data(format!("with.names[{k}]"), format!("no row has such a name; there are: {there}")));
+                    return Err(Error::data(
+                        format!("with.names[{k}]"),
+                        format!("no row has such a name; there are: {there}"),
+                    ));
                 }
                 let is_wanted = |name: &&str| wanted.iter().any(|pattern| matches(pattern, name));
-                Ok(names.iter().map(|name| if is_wanted(name) { set } else { rest }.clone()).collect())
+                Ok(names
+                    .iter()
+                    .map(|name| if is_wanted(name) { set } else { rest }.clone())
+                    .collect())
             }
-            Self::Blocks { count, length, sets } => {
+            Self::Blocks {
+                count,
+                length,
+                sets,
+            } => {
                 let mut dealt = Vec::with_capacity(rows);
                 for pose in poses(recording) {
                     // A pose belongs to the block in which it begins.
                     let block = match (count, length) {
-                        (Some(count), _) => (pose.start as u128 * u128::from(*count) / rows.max(1) as u128) as usize,
+                        (Some(count), _) => {
+                            (pose.start as u128 * u128::from(*count) / rows.max(1) as u128) as usize
+                        }
                         (None, length) => pose.start / length.unwrap_or(1).max(1) as usize,
                     };
-                    let set = sets.get(block % sets.len().max(1)).cloned().unwrap_or_default();
+                    let set = sets
+                        .get(block % sets.len().max(1))
+                        .cloned()
+                        .unwrap_or_default();
                     dealt.resize(pose.end, set);
                 }
                 Ok(dealt)
             }
-            Self::Random { fraction, set, rest } => {
+            Self::Random {
+                fraction,
+                set,
+                rest,
+            } => {
                 let mut poses = poses(recording);
                 poses.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
                 let wanted = (fraction * rows as f64).round() as usize;
@@ -318,7 +418,11 @@ impl SplitBy {
                         continue;
                     }
                     drawn += pose.len();
-                    dealt.iter_mut().take(pose.end).skip(pose.start).for_each(|dealt| dealt.clone_from(set));
+                    dealt
+                        .iter_mut()
+                        .take(pose.end)
+                        .skip(pose.start)
+                        .for_each(|dealt| dealt.clone_from(set));
                 }
                 Ok(dealt)
             }
@@ -328,9 +432,22 @@ impl SplitBy {
     }
 }
 
-fn by_usage(recording: &Recording, sets: Option<&BTreeMap<String, String>>, blank: Option<&str>) -> Result<Vec<String>> {
-    let labels: BTreeSet<&str> = recording.usage.iter().flatten().map(String::as_str).collect();
-    let found = if labels.is_empty() { "none".to_string() } else { labels.iter().copied().collect::<Vec<_>>().join(", ") };
+fn by_usage(
+    recording: &Recording,
+    sets: Option<&BTreeMap<String, String>>,
+    blank: Option<&str>,
+) -> Result<Vec<String>> {
+    let labels: BTreeSet<&str> = recording
+        .usage
+        .iter()
+        .flatten()
+        .map(String::as_str)
+        .collect();
+    let found = if labels.is_empty() {
+        "none".to_string()
+    } else {
+        labels.iter().copied().collect::<Vec<_>>().join(", ")
+    };
     let set = |(usage, row): (&Option<String>, usize)| {
         let point = || recording.point_id.get(row).map_or("", String::as_str);
         match (usage, sets) {
@@ -362,7 +479,11 @@ fn by_order(rows: usize, sets: &[Stretch]) -> Result<Vec<String>> {
         if wanted > left as u64 {
             return Err(Error::data(
                 format!("with.sets[{k}].rows"),
-                format!("set `{}` takes {}, but only {left} of {rows} remain", stretch.set, counted(wanted, "row")),
+                format!(
+                    "set `{}` takes {}, but only {left} of {rows} remain",
+                    stretch.set,
+                    counted(wanted, "row")
+                ),
             ));
         }
         dealt.resize(dealt.len() + wanted as usize, stretch.set.clone());

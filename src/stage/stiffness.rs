@@ -34,7 +34,8 @@ crate::stage::reads! {
 
 impl Stage for Stiffness {
     const NAME: &'static str = "stiffness";
-    const SUMMARY: &'static str = "identifies joint compliance from loaded poses; everything identified before is kept";
+    const SUMMARY: &'static str =
+        "identifies joint compliance from loaded poses; everything identified before is kept";
     const IMPLEMENTATION: u32 = 17;
     type Reads = StiffnessReads;
     type Writes = Identified;
@@ -51,14 +52,31 @@ impl Stage for Stiffness {
         let robot = RobotModel::new(reads.robot.to_description()?);
         let mut data = reads.recording.measurements();
         let rows = reads.split.rows(&reads.recording, &self.on)?;
-        let mut model = reads.parameters.model(robot, &[names::JOINT_COMPLIANCE], self.load.into())?;
-        let compliance = model.stack.effects().find(|(effect, _)| effect.name() == names::JOINT_COMPLIANCE);
-        if let Some(reason) = compliance.and_then(|(effect, _)| effect.missing(&model.robot, &data)) {
-            return Err(Error::data("with.load", format!("no joint load is known: {reason}")));
+        let mut model =
+            reads
+                .parameters
+                .model(robot, &[names::JOINT_COMPLIANCE], self.load.into())?;
+        let compliance = model
+            .stack
+            .effects()
+            .find(|(effect, _)| effect.name() == names::JOINT_COMPLIANCE);
+        if let Some(reason) = compliance.and_then(|(effect, _)| effect.missing(&model.robot, &data))
+        {
+            return Err(Error::data(
+                "with.load",
+                format!("no joint load is known: {reason}"),
+            ));
         }
-        let wanted: Vec<String> = self.joints.iter().map(|joint| format!("{}.j{joint}", names::JOINT_COMPLIANCE)).collect();
+        let wanted: Vec<String> = self
+            .joints
+            .iter()
+            .map(|joint| format!("{}.j{joint}", names::JOINT_COMPLIANCE))
+            .collect();
         let specs = model.stack.specs();
-        if let Some(unknown) = wanted.iter().find(|name| !specs.iter().any(|spec| spec.name == **name)) {
+        if let Some(unknown) = wanted
+            .iter()
+            .find(|name| !specs.iter().any(|spec| spec.name == **name))
+        {
             return Err(Error::spec(
                 "with.joints",
                 format!("this robot has no `{unknown}`: allowed are its revolute joints, from 1"),
@@ -69,9 +87,16 @@ impl Stage for Stiffness {
         let open: Vec<usize> = own.iter().copied().filter(chosen).collect();
         let (candidates, _) = self.parameter_set().apply(&mut model, &open, context);
         let repeatability = self.repeatability.apply(&model, &mut data, &rows, context);
-        let options = FitOptions { rows: &rows, candidates: &candidates };
-        let (model, fitted, screening) = fit_rows(&model, &data, &options, &reads.split, self.screen);
-        let held: Vec<usize> = own.into_iter().filter(|k| !candidates.contains(k)).collect();
+        let options = FitOptions {
+            rows: &rows,
+            candidates: &candidates,
+        };
+        let (model, fitted, screening) =
+            fit_rows(&model, &data, &options, &reads.split, self.screen);
+        let held: Vec<usize> = own
+            .into_iter()
+            .filter(|k| !candidates.contains(k))
+            .collect();
         let seen_before: Vec<bool> = reads.prediction.0.iter().map(|row| !row.held_out).collect();
         let fitting = Fitting {
             data: &data,
@@ -88,7 +113,9 @@ impl Stage for Stiffness {
             repeatability,
             folds: self.folds,
             measured: &data,
-            doubtful: (0..data.rows()).filter(|row| !seen_before[*row] && rows.binary_search(row).is_err()).collect(),
+            doubtful: (0..data.rows())
+                .filter(|row| !seen_before[*row] && rows.binary_search(row).is_err())
+                .collect(),
             placed: &std::collections::BTreeMap::new(),
         };
         Ok(Identified::of(context, &model, &fitted, &fitting))

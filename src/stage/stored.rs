@@ -51,6 +51,13 @@ impl<T: Table> PortValue for Chunks<T> {
     const KIND: &'static str = T::KIND;
     const CHUNKED: bool = true;
     fn take(inputs: Vec<(String, InputTable)>) -> Result<Self> {
-        Ok(Self(inputs.into_iter().next().expect("the plan wired this port").1, PhantomData))
+        Ok(Self(
+            inputs
+                .into_iter()
+                .next()
+                .expect("the plan wired this port")
+                .1,
+            PhantomData,
+        ))
     }
 }

@@ -25,21 +25,38 @@ impl<'a> RecordedTorques<'a> {
     pub fn of(motion: &'a Chunks<ArmMotion>, robot: &RobotDescription) -> Result<Self> {
         let mut seen = None;
         motion.each(|chunk| {
-            seen.get_or_insert((chunk.joints, chunk.torque.is_some(), chunk.current.is_some()));
+            seen.get_or_insert((
+                chunk.joints,
+                chunk.torque.is_some(),
+                chunk.current.is_some(),
+            ));
             Ok(())
         })?;
         let (joints, torque, current) = seen.unwrap_or_default();
         let factor = match (torque, current) {
             (true, _) => None,
             (false, true) => Some(torque_per_ampere(robot)?),
-            (false, false) => return Err(Error::data("table motion", "has neither torques nor currents")),
+            (false, false) => {
+                return Err(Error::data(
+                    "table motion",
+                    "has neither torques nor currents",
+                ));
+            }
         };
-        Ok(Self { motion, joints, factor, held_out: None })
+        Ok(Self {
+            motion,
+            joints,
+            factor,
+            held_out: None,
+        })
     }
 
     /// The same with rows that judge in the end.
     pub fn holding_out(self, held_out: Box<HeldOut<'a>>) -> Self {
-        Self { held_out: Some(held_out), ..self }
+        Self {
+            held_out: Some(held_out),
+            ..self
+        }
     }
 
     /// Whether torques are motor currents times a constant.
@@ -55,7 +72,9 @@ impl<'a> RecordedTorques<'a> {
         };
         let torque = match (&self.factor, motion.current.take()) {
             (Some(factor), Some(mut current)) => {
-                current.chunks_exact_mut(factor.len()).for_each(|row| row.iter_mut().zip(factor).for_each(|(i, k)| *i *= k));
+                current
+                    .chunks_exact_mut(factor.len())
+                    .for_each(|row| row.iter_mut().zip(factor).for_each(|(i, k)| *i *= k));
                 current
             }
             _ => motion.torque.take().unwrap_or_default(),
@@ -67,7 +86,11 @@ impl<'a> RecordedTorques<'a> {
             velocity: motion.velocity,
             torque,
             temperature: motion.temperature,
-            trajectory: motion.trajectory.iter().map(|number| u32::try_from(*number).unwrap_or(u32::MAX)).collect(),
+            trajectory: motion
+                .trajectory
+                .iter()
+                .map(|number| u32::try_from(*number).unwrap_or(u32::MAX))
+                .collect(),
             held_out,
             from_current: self.is_current(),
         }

@@ -12,7 +12,9 @@ use crate::robot::{Measurements, RobotModel};
 use crate::stage::identified::{Fitting, Identified};
 use crate::stage::screened::fit_rows;
 use crate::stage::{Context, Labelled, Stage};
-use crate::table::{CovarianceTable, ParameterRow, Parameters, Prediction, Recording, Robot, Split};
+use crate::table::{
+    CovarianceTable, ParameterRow, Parameters, Prediction, Recording, Robot, Split,
+};
 use cells::VisitedCells;
 use comparison::{ComparedRows, Comparison};
 use source::{CarriedFrom, stripped};
@@ -80,15 +82,35 @@ impl Stage for Transfer {
         };
         let (candidates, held) = self.parameter_set().apply(&mut model, &open, context);
         let repeatability = self.repeatability.apply(&model, &mut data, &rows, context);
-        let options = FitOptions { rows: &rows, candidates: &candidates };
-        let (model, fitted, screening) = fit_rows(&model, &data, &options, &reads.split, self.screen);
-        let mut carried = CarriedModel { earlier, model, fitted, screening, held };
+        let options = FitOptions {
+            rows: &rows,
+            candidates: &candidates,
+        };
+        let (model, fitted, screening) =
+            fit_rows(&model, &data, &options, &reads.split, self.screen);
+        let mut carried = CarriedModel {
+            earlier,
+            model,
+            fitted,
+            screening,
+            held,
+        };
         let mut covariance = reads.covariance.as_ref();
-        if let Some(geometry) = self.better_alone(&carried, source.as_ref(), &reads, (&data, &rows), context)? {
+        if let Some(geometry) =
+            self.better_alone(&carried, source.as_ref(), &reads, (&data, &rows), context)?
+        {
             (carried, covariance) = (geometry, None);
         }
-        let CarriedModel { earlier, model, fitted, screening, held } = &carried;
-        let source_data = source.as_ref().map(|source| source.recording.measurements());
+        let CarriedModel {
+            earlier,
+            model,
+            fitted,
+            screening,
+            held,
+        } = &carried;
+        let source_data = source
+            .as_ref()
+            .map(|source| source.recording.measurements());
         let fitting = Fitting {
             data: &data,
             recording: &reads.recording,
@@ -108,7 +130,12 @@ impl Stage for Transfer {
             placed: &std::collections::BTreeMap::new(),
         };
         let identified = Identified::of(context, model, fitted, &fitting);
-        let doubtful = identified.prediction.0.iter().filter(|row| row.remark.is_some()).count();
+        let doubtful = identified
+            .prediction
+            .0
+            .iter()
+            .filter(|row| row.remark.is_some())
+            .count();
         if doubtful > 0 {
             let rows = counted(data.rows(), "row");
             context.services.note(format!(
@@ -130,11 +157,19 @@ struct CarriedModel {
 
 impl Transfer {
     /// A model with its base where these rows have it best.
-    fn placed(&self, earlier: &Parameters, reads: &TransferReads, data: &Measurements, rows: &[usize]) -> Result<Model> {
+    fn placed(
+        &self,
+        earlier: &Parameters,
+        reads: &TransferReads,
+        data: &Measurements,
+        rows: &[usize],
+    ) -> Result<Model> {
         let robot = RobotModel::new(reads.robot.to_description()?);
         let there = earlier.model(robot.clone(), &[], self.load.into())?;
         let predicted = there.predict(data);
-        let points = rows.iter().filter_map(|row| Some((predicted[*row], data.point(*row)?)));
+        let points = rows
+            .iter()
+            .filter_map(|row| Some((predicted[*row], data.point(*row)?)));
         let (carried, measured): (Vec<_>, Vec<_>) = points.unzip();
         let base = align_points(&carried, &measured) * there.base();
         earlier.model_standing(base, robot, &[], self.load.into())
@@ -158,16 +193,29 @@ impl Transfer {
         };
         let start = self.placed(&geometry, reads, data, rows)?;
         let candidates: Vec<usize> = start.stack.parameters_of(names::BASE_FRAME).collect();
-        let options = FitOptions { rows, candidates: &candidates };
-        let (model, fitted, screening) = fit_rows(&start, data, &options, &reads.split, self.screen);
+        let options = FitOptions {
+            rows,
+            candidates: &candidates,
+        };
+        let (model, fitted, screening) =
+            fit_rows(&start, data, &options, &reads.split, self.screen);
         let sides = sides(data, rows, [&carried.screening, &screening]);
-        let visited = source.map(|source| VisitedCells::of(&source.recording.measurements(), &source.rows));
+        let visited =
+            source.map(|source| VisitedCells::of(&source.recording.measurements(), &source.rows));
         let both = [&carried.model.predict(data)[..], &model.predict(data)];
         let comparison = Comparison::of(data, &sides, both, visited.as_ref());
         let words = comparison.words();
         if comparison.is_worse() {
-            context.services.warn(format!("{words}: what was identified besides it does not hold here and is not used"));
-            return Ok(Some(CarriedModel { earlier: geometry, model, fitted, screening, held: Vec::new() }));
+            context.services.warn(format!(
+                "{words}: what was identified besides it does not hold here and is not used"
+            ));
+            return Ok(Some(CarriedModel {
+                earlier: geometry,
+                model,
+                fitted,
+                screening,
+                held: Vec::new(),
+            }));
         }
         match (comparison.is_worse_where_judged(), comparison.is_worse_outside()) {
             (true, _) => context.services.warn(format!(
@@ -190,9 +238,24 @@ fn is_geometry(row: &ParameterRow) -> bool {
 /// Whole points by which one of two carried models is chosen, those that place their base, and by which both are judged, all others, or
 /// where there are none the same; without those that neither can follow.
 fn sides(data: &Measurements, asked: &[usize], screenings: [&Screening; 2]) -> ComparedRows {
-    let aside =
-        |row: usize| screenings.iter().all(|one| one.suspects.iter().any(|suspect| suspect.row == row && !suspect.used()));
-    let whole: Vec<usize> = (0..data.rows()).filter(|row| data.has_point(*row) && !aside(*row)).collect();
-    let (choose, others): (Vec<usize>, Vec<usize>) = whole.into_iter().partition(|row| asked.contains(row));
-    ComparedRows { judge: if others.is_empty() { choose.clone() } else { others }, choose }
+    let aside = |row: usize| {
+        screenings.iter().all(|one| {
+            one.suspects
+                .iter()
+                .any(|suspect| suspect.row == row && !suspect.used())
+        })
+    };
+    let whole: Vec<usize> = (0..data.rows())
+        .filter(|row| data.has_point(*row) && !aside(*row))
+        .collect();
+    let (choose, others): (Vec<usize>, Vec<usize>) =
+        whole.into_iter().partition(|row| asked.contains(row));
+    ComparedRows {
+        judge: if others.is_empty() {
+            choose.clone()
+        } else {
+            others
+        },
+        choose,
+    }
 }

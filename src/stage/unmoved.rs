@@ -16,7 +16,9 @@ fn standing(data: &Measurements, rows: &[usize]) -> Vec<(usize, f64)> {
     let stands = |joint: usize| {
         let mut positions = rows.iter().map(|row| data.q(*row)[joint]);
         let first = positions.next()?;
-        let (least, most) = positions.fold((first, first), |(least, most), q| (least.min(q), most.max(q)));
+        let (least, most) = positions.fold((first, first), |(least, most), q| {
+            (least.min(q), most.max(q))
+        });
         (most - least < STILL).then_some((joint, first))
     };
     (0..data.joints).filter_map(stands).collect()
@@ -50,18 +52,34 @@ fn drift(data: &Measurements, rows: &[usize]) -> Option<[f64; 2]> {
     let points: Vec<(f64, Vector3<f64>)> = rows
         .iter()
         .enumerate()
-        .filter_map(|(place, row)| Some((data.time.as_ref().map_or(place as f64, |time| time[*row]), data.point(*row)?)))
+        .filter_map(|(place, row)| {
+            Some((
+                data.time.as_ref().map_or(place as f64, |time| time[*row]),
+                data.point(*row)?,
+            ))
+        })
         .collect();
     let count = points.len() as f64;
     let time = points.iter().map(|(time, _)| time).sum::<f64>() / count;
     let middle = points.iter().map(|(_, point)| point).sum::<Vector3<f64>>() / count;
     let square: f64 = points.iter().map(|(at, _)| (at - time).powi(2)).sum();
-    let (least, most) = points.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), (at, _)| (a.min(*at), b.max(*at)));
+    let (least, most) = points
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), (at, _)| {
+            (a.min(*at), b.max(*at))
+        });
     if points.len() < FEWEST || square.is_nan() || square == 0.0 {
         return None;
     }
-    let slope = points.iter().map(|(at, point)| (point - middle) * (at - time)).sum::<Vector3<f64>>() / square;
-    let left: f64 = points.iter().map(|(at, point)| (point - middle - slope * (at - time)).norm_squared()).sum();
+    let slope = points
+        .iter()
+        .map(|(at, point)| (point - middle) * (at - time))
+        .sum::<Vector3<f64>>()
+        / square;
+    let left: f64 = points
+        .iter()
+        .map(|(at, point)| (point - middle - slope * (at - time)).norm_squared())
+        .sum();
     let sigma = (left / (3.0 * (count - 2.0)) / square).sqrt();
     Some([slope.norm() * (most - least), sigma * (most - least)])
 }
@@ -80,8 +98,10 @@ pub(super) fn told(robot: &RobotModel, data: &Measurements, rows: &[usize]) -> O
         };
         format!("joint {} (at {position})", joint + 1)
     };
-    let (all, verb) =
-        (standing.iter().map(at).collect::<Vec<_>>().join(", "), if standing.len() == 1 { "moves" } else { "move" });
+    let (all, verb) = (
+        standing.iter().map(at).collect::<Vec<_>>().join(", "),
+        if standing.len() == 1 { "moves" } else { "move" },
+    );
     Some(format!(
         "never {verb} in the {} to fit: {all}. What only its motion shows is not determined, and the model holds at this position alone: \
          measure poses with it elsewhere",

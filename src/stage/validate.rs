@@ -55,14 +55,16 @@ writes! {
 
 impl Stage for Validate {
     const NAME: &'static str = "validate";
-    const SUMMARY: &'static str = "states the position error after every step, held-out and training rows apart";
+    const SUMMARY: &'static str =
+        "states the position error after every step, held-out and training rows apart";
     const IMPLEMENTATION: u32 = 5;
     type Reads = ValidateReads;
     type Writes = ValidateWrites;
 
     fn sets_named(&self) -> Vec<(String, String)> {
         let sets = self.reference.iter().enumerate();
-        sets.map(|(k, reference)| (format!("reference[{k}].set"), reference.set.clone())).collect()
+        sets.map(|(k, reference)| (format!("reference[{k}].set"), reference.set.clone()))
+            .collect()
     }
 
     fn run(&self, reads: ValidateReads, context: &Context) -> Result<ValidateWrites> {
@@ -75,43 +77,71 @@ impl Stage for Validate {
         let mut statistics = Statistics::default();
         let mut suspicion = None;
         for (order, step) in (0..).zip(&reads.prediction) {
-            let fit = reads.observability.iter().find(|fit| fit.stage == step.stage);
-            let value =
-                |quantity: &str| fit.and_then(|fit| fit.table.0.iter().find(|row| row.quantity == quantity)).map(|row| row.value);
+            let fit = reads
+                .observability
+                .iter()
+                .find(|fit| fit.stage == step.stage);
+            let value = |quantity: &str| {
+                fit.and_then(|fit| fit.table.0.iter().find(|row| row.quantity == quantity))
+                    .map(|row| row.value)
+            };
             // A step on top of another carries that one's covariance, which scales with that one's residuals.
             let unmodelled = value("unmodelled_mm").filter(|_| value("earlier").is_none());
-            let fitted = step.table.0.iter().filter(|row| row.fold_error_mm.is_some()).count();
+            let fitted = step
+                .table
+                .0
+                .iter()
+                .filter(|row| row.fold_error_mm.is_some())
+                .count();
             // Without a k-th part of the rows, three values each.
             let inflation = value("folds").zip(value("free")).map(|(folds, free)| {
                 let values = 3.0 * fitted as f64 * (1.0 - 1.0 / folds);
                 (1.0 + free / (values - free - 1.0).max(1.0)).sqrt()
             });
             for ((name, set, held_out), rows) in groups(step)? {
-                let whole = rows.iter().filter(|row| held_out && row.measured.is_none() && !row.suspect);
-                let suspected = computed::suspicion(whole.map(|row| [row.error_mm, row.noise_mm]), 0);
-                suspicion = suspicion.or(suspected.map(|line| format!("{name} on {set}, held out: {line}")));
+                let whole = rows
+                    .iter()
+                    .filter(|row| held_out && row.measured.is_none() && !row.suspect);
+                let suspected =
+                    computed::suspicion(whole.map(|row| [row.error_mm, row.noise_mm]), 0);
+                suspicion = suspicion
+                    .or(suspected.map(|line| format!("{name} on {set}, held out: {line}")));
                 let row = describe(order, name, &set, held_out, &rows);
-                let row = StatisticsRow { expected_rms_mm: expected(held_out, &rows, unmodelled), ..row };
+                let row = StatisticsRow {
+                    expected_rms_mm: expected(held_out, &rows, unmodelled),
+                    ..row
+                };
                 statistics.0.push(cross_validated(row, &rows, inflation));
             }
         }
         for row in statistics.0.iter().filter(|row| row.held_out) {
             if let Some(without) = row.mean_without_mm {
-                let (suspects, them) = (counted(row.suspects, "suspect"), if row.suspects == 1 { "it" } else { "them" });
+                let (suspects, them) = (
+                    counted(row.suspects, "suspect"),
+                    if row.suspects == 1 { "it" } else { "them" },
+                );
                 context.services.note(format!(
                     "{} on {}: the held-out mean of {:.3} mm includes {suspects}; without {them} {without:.3} mm",
                     row.step, row.set, row.mean_mm
                 ));
             }
             if let Some(line) = row.doubts() {
-                context.services.note(format!("{} on {}: {line}", row.step, row.set));
+                context
+                    .services
+                    .note(format!("{} on {}: {line}", row.step, row.set));
             }
         }
         for reference in &self.reference {
-            let mut beside =
-                statistics.0.iter_mut().filter(|row| row.step == reference.step && row.set == reference.set).peekable();
+            let mut beside = statistics
+                .0
+                .iter_mut()
+                .filter(|row| row.step == reference.step && row.set == reference.set)
+                .peekable();
             if beside.peek().is_none() {
-                let message = format!("reference: no statistics of step `{}` on set `{}`", reference.step, reference.set);
+                let message = format!(
+                    "reference: no statistics of step `{}` on set `{}`",
+                    reference.step, reference.set
+                );
                 return Err(Error::spec(context.id, message));
             }
             for row in beside {
@@ -121,9 +151,13 @@ impl Stage for Validate {
                 row.reference_max_mm = reference.max_mm;
             }
         }
-        suspicion.into_iter().for_each(|line| context.services.warn(line));
+        suspicion
+            .into_iter()
+            .for_each(|line| context.services.warn(line));
         if !statistics.0.iter().any(|row| row.held_out) {
-            context.services.warn("no held-out rows: only the training error can be stated, and it flatters".into());
+            context.services.warn(
+                "no held-out rows: only the training error can be stated, and it flatters".into(),
+            );
         }
         Ok(ValidateWrites { statistics })
     }
@@ -141,33 +175,59 @@ fn groups(step: &Labelled<Prediction>) -> Result<RowsByStepAndSet<'_>> {
             Some(measured) => Cow::Owned(format!("{} ({measured})", row.set)),
             None => Cow::Borrowed(row.set.as_str()),
         };
-        groups.entry((&row.step, set, row.held_out)).or_default().push(row);
+        groups
+            .entry((&row.step, set, row.held_out))
+            .or_default()
+            .push(row);
     }
     let mut names = groups.keys().map(|key| key.0);
     if let Some(first) = names.next()
         && let Some(other) = names.find(|name| *name != first)
     {
-        return Err(Error::Bug(format!("stage {}: one prediction table with two steps, {first} and {other}", step.stage)));
+        return Err(Error::Bug(format!(
+            "stage {}: one prediction table with two steps, {first} and {other}",
+            step.stage
+        )));
     }
     Ok(groups)
 }
 
 /// The statistics of a group of at least one row.
-fn describe(order: i64, step: &str, set: &str, held_out: bool, rows: &[&PredictionRow]) -> StatisticsRow {
+fn describe(
+    order: i64,
+    step: &str,
+    set: &str,
+    held_out: bool,
+    rows: &[&PredictionRow],
+) -> StatisticsRow {
     let mut error: Vec<f64> = rows.iter().map(|row| row.error_mm).collect();
     error.sort_by(f64::total_cmp);
     let count = error.len() as f64;
     let mean = error.iter().sum::<f64>() / count;
     let spread: f64 = error.iter().map(|e| (e - mean).powi(2)).sum();
-    let rms = |value: fn(&PredictionRow) -> f64| (rows.iter().map(|row| value(row).powi(2)).sum::<f64>() / count).sqrt();
-    let mut without: Vec<f64> = rows.iter().filter(|row| !row.suspect).map(|row| row.error_mm).collect();
+    let rms = |value: fn(&PredictionRow) -> f64| {
+        (rows.iter().map(|row| value(row).powi(2)).sum::<f64>() / count).sqrt()
+    };
+    let mut without: Vec<f64> = rows
+        .iter()
+        .filter(|row| !row.suspect)
+        .map(|row| row.error_mm)
+        .collect();
     without.sort_by(f64::total_cmp);
     let suspects = rows.len() - without.len();
-    let remarked: Vec<&PredictionRow> = rows.iter().copied().filter(|row| row.remark.is_some()).collect();
+    let remarked: Vec<&PredictionRow> = rows
+        .iter()
+        .copied()
+        .filter(|row| row.remark.is_some())
+        .collect();
     let at = |share: f64| quantile(&error, share).unwrap_or(f64::NAN);
     let some = suspects > 0 && !without.is_empty();
-    let basis = rows.iter().filter_map(|row| NoiseBasis::parse(row.noise_basis.as_deref()?)).max();
-    let average = |power: i32| without.iter().map(|e| e.powi(power)).sum::<f64>() / without.len() as f64;
+    let basis = rows
+        .iter()
+        .filter_map(|row| NoiseBasis::parse(row.noise_basis.as_deref()?))
+        .max();
+    let average =
+        |power: i32| without.iter().map(|e| e.powi(power)).sum::<f64>() / without.len() as f64;
     StatisticsRow {
         order,
         step: step.into(),
@@ -175,7 +235,11 @@ fn describe(order: i64, step: &str, set: &str, held_out: bool, rows: &[&Predicti
         held_out,
         points: rows.len() as i64,
         mean_mm: mean,
-        std_mm: if rows.len() > 1 { (spread / (count - 1.0)).sqrt() } else { 0.0 },
+        std_mm: if rows.len() > 1 {
+            (spread / (count - 1.0)).sqrt()
+        } else {
+            0.0
+        },
         rms_mm: rms(|row| row.error_mm),
         median_mm: at(0.5),
         p95_mm: at(0.95),
@@ -193,7 +257,10 @@ fn describe(order: i64, step: &str, set: &str, held_out: bool, rows: &[&Predicti
         remarked: Some(remarked.len() as i64),
         mean_remarked_mm: (!remarked.is_empty())
             .then(|| remarked.iter().map(|row| row.error_mm).sum::<f64>() / remarked.len() as f64),
-        max_remarked_mm: remarked.iter().map(|row| row.error_mm).max_by(f64::total_cmp),
+        max_remarked_mm: remarked
+            .iter()
+            .map(|row| row.error_mm)
+            .max_by(f64::total_cmp),
         remarked_points: (!remarked.is_empty()).then(|| doubtful::named(&remarked)),
         fold_mean_mm: None,
         fold_rms_mm: None,
@@ -210,7 +277,11 @@ fn describe(order: i64, step: &str, set: &str, held_out: bool, rows: &[&Predicti
 }
 
 /// The row with what cross-validation says of its points; `inflation` of the noise is to be expected.
-fn cross_validated(row: StatisticsRow, points: &[&PredictionRow], inflation: Option<f64>) -> StatisticsRow {
+fn cross_validated(
+    row: StatisticsRow,
+    points: &[&PredictionRow],
+    inflation: Option<f64>,
+) -> StatisticsRow {
     let figures = |error: fn(&PredictionRow) -> Option<f64>| {
         let errors: Vec<f64> = points.iter().filter_map(|point| error(point)).collect();
         let count = errors.len() as f64;
@@ -218,7 +289,10 @@ fn cross_validated(row: StatisticsRow, points: &[&PredictionRow], inflation: Opt
         let rms = (errors.iter().map(|error| error * error).sum::<f64>() / count).sqrt();
         (!errors.is_empty()).then(|| (mean, rms, errors.iter().copied().fold(0.0, f64::max)))
     };
-    let (fold, block) = (figures(|point| point.fold_error_mm), figures(|point| point.block_error_mm));
+    let (fold, block) = (
+        figures(|point| point.fold_error_mm),
+        figures(|point| point.block_error_mm),
+    );
     StatisticsRow {
         fold_mean_mm: fold.map(|figures| figures.0),
         fold_rms_mm: fold.map(|figures| figures.1),
@@ -226,7 +300,9 @@ fn cross_validated(row: StatisticsRow, points: &[&PredictionRow], inflation: Opt
         block_mean_mm: block.map(|figures| figures.0),
         block_rms_mm: block.map(|figures| figures.1),
         block_max_mm: block.map(|figures| figures.2),
-        fold_expected_mm: fold.and(inflation).map(|inflation| row.noise_rms_mm * inflation),
+        fold_expected_mm: fold
+            .and(inflation)
+            .map(|inflation| row.noise_rms_mm * inflation),
         ..row
     }
 }
@@ -244,7 +320,12 @@ fn expected(held_out: bool, rows: &[&PredictionRow], unmodelled: Option<f64>) ->
         }
         let noise = row.noise_mm.powi(2);
         let leverage = row.sigma_mm?.powi(2) / (noise + beyond);
-        sum += noise * if held_out { 1.0 + leverage } else { (1.0 - leverage).max(0.0) };
+        sum += noise
+            * if held_out {
+                1.0 + leverage
+            } else {
+                (1.0 - leverage).max(0.0)
+            };
     }
     Some((sum / rows.len() as f64).sqrt())
 }

@@ -16,9 +16,16 @@ pub(super) struct WeightlessLinks {
 }
 
 /// What is said of links without masses at some rows; none where all masses are known, or weight turns no joint.
-pub(super) fn weightless_links(robot: &RobotModel, data: &Measurements, rows: &[usize]) -> Option<WeightlessLinks> {
+pub(super) fn weightless_links(
+    robot: &RobotModel,
+    data: &Measurements,
+    rows: &[usize],
+) -> Option<WeightlessLinks> {
     let joints = &robot.description().joints;
-    let bare = joints.iter().filter(|joint| joint.mass.is_none() || joint.centre.is_none()).count();
+    let bare = joints
+        .iter()
+        .filter(|joint| joint.mass.is_none() || joint.centre.is_none())
+        .count();
     let gravity = Vector3::from(robot.description().gravity);
     let turned = |joint: usize| {
         let along = gravity.dot(robot.axis(joint)).abs() / gravity.norm().max(f64::MIN_POSITIVE);
@@ -30,15 +37,26 @@ pub(super) fn weightless_links(robot: &RobotModel, data: &Measurements, rows: &[
         return None;
     }
     let (given, windup) = match joints.len() - bare {
-        0 => ("no link masses".to_string(), "shows at best as an angle, without a stiffness"),
-        some => (format!("mass and centre of {some} of {} links alone", joints.len()), "cannot be computed"),
+        0 => (
+            "no link masses".to_string(),
+            "shows at best as an angle, without a stiffness",
+        ),
+        some => (
+            format!("mass and centre of {some} of {} links alone", joints.len()),
+            "cannot be computed",
+        ),
     };
     let loaded = rows.iter().filter(|row| data.payload[**row] > 0.0).count();
     let load = match loaded {
         0 => String::new(),
-        _ => format!(" ({} of {} carry a payload)", counted(loaded, "row"), rows.len()),
+        _ => format!(
+            " ({} of {} carry a payload)",
+            counted(loaded, "row"),
+            rows.len()
+        ),
     };
-    let missing = format!("the robot file gives {given}, yet gravity loads joints in these poses{load}");
+    let missing =
+        format!("the robot file gives {given}, yet gravity loads joints in these poses{load}");
     let warning = format!(
         "{missing}: wind-up under the arm's own weight {windup}, bending and counterbalances cannot be computed, and what they do may be \
          attributed to another cause (gear, hose). Fill in `links` of the robot file"

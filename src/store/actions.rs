@@ -85,13 +85,19 @@ pub struct Published {
 
 impl Store {
     fn record_path(&self, id: &ActionId) -> PathBuf {
-        self.root().join("actions").join(&id.as_str()[..2]).join(format!("{id}.json"))
+        self.root()
+            .join("actions")
+            .join(&id.as_str()[..2])
+            .join(format!("{id}.json"))
     }
 
     /// The file of a published table.
     pub fn object_path(&self, table: &TableRef) -> PathBuf {
         let name = table.file_hash.as_str();
-        self.root().join("objects").join(name.get(..2).unwrap_or("00")).join(format!("{name}.parquet"))
+        self.root()
+            .join("objects")
+            .join(name.get(..2).unwrap_or("00"))
+            .join(format!("{name}.parquet"))
     }
 
     /// The file of a published table, which of a store in a bucket is fetched first; fails where the bucket does not hold it whole.
@@ -114,7 +120,12 @@ impl Store {
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Lookup::Absent),
             Err(e) => return Err(refused(&path, "read", &e)),
         };
-        let damaged = |why: String| Ok(Lookup::Damaged(format!("{}: {why}; the stage runs again", path.display())));
+        let damaged = |why: String| {
+            Ok(Lookup::Damaged(format!(
+                "{}: {why}; the stage runs again",
+                path.display()
+            )))
+        };
         if let Err(why) = unseal(&bytes) {
             return damaged(why.into());
         }
@@ -132,8 +143,16 @@ impl Store {
                 // Read to its end: a stage that is cached must not stand on a table that rotted.
                 Ok(length) if length == table.bytes && same_bytes(&path, table) => (),
                 _ if self.obtain(table, &path)? => (),
-                Ok(length) if length == table.bytes => return damaged(format!("table {port} is not what was published")),
-                Ok(length) => return damaged(format!("table {port} has {} instead of {}", counted(length, "byte"), table.bytes)),
+                Ok(length) if length == table.bytes => {
+                    return damaged(format!("table {port} is not what was published"));
+                }
+                Ok(length) => {
+                    return damaged(format!(
+                        "table {port} has {} instead of {}",
+                        counted(length, "byte"),
+                        table.bytes
+                    ));
+                }
                 Err(e) => return damaged(format!("table {port}: {e}")),
             }
         }
@@ -142,7 +161,12 @@ impl Store {
 
     /// Commits what a stage made: objects first, then the record. If a whole record is there already, that one stands. All can be
     /// seen at once and is durable after the next `sync`.
-    pub fn publish(&self, key: &StageKey, products: Vec<(String, PendingTable)>, account: Account) -> Result<Published> {
+    pub fn publish(
+        &self,
+        key: &StageKey,
+        products: Vec<(String, PendingTable)>,
+        account: Account,
+    ) -> Result<Published> {
         let mut tables = BTreeMap::new();
         for (port, product) in products {
             let file = match product {
@@ -151,28 +175,46 @@ impl Store {
             };
             let table = self.put_object(file)?;
             if tables.insert(port.clone(), table).is_some() {
-                return Err(Error::Bug(format!("stage {}: port {port} twice", key.stage)));
+                return Err(Error::Bug(format!(
+                    "stage {}: port {port} twice",
+                    key.stage
+                )));
             }
         }
-        let record = ActionRecord { record_format: RECORD_FORMAT, id: key.id(), key: key.clone(), tables, account };
+        let record = ActionRecord {
+            record_format: RECORD_FORMAT,
+            id: key.id(),
+            key: key.clone(),
+            tables,
+            account,
+        };
         let path = self.record_path(&record.id);
         let aside = self.workspace()?.fresh();
         let file = write(&aside, &seal(&record)?)?;
         if self.commit(&aside, &path)? {
             let _ = fs::remove_file(&aside);
             self.owe(&path, file)?;
-            return Ok(Published { record, conflict: None });
+            return Ok(Published {
+                record,
+                conflict: None,
+            });
         }
         match self.action(key)? {
             Lookup::Done(standing) => {
                 let _ = fs::remove_file(&aside);
-                Ok(Published { conflict: conflict(&standing, &record), record: *standing })
+                Ok(Published {
+                    conflict: conflict(&standing, &record),
+                    record: *standing,
+                })
             }
             Lookup::Absent | Lookup::Damaged(_) => {
                 self.give(&aside, &path)?;
                 place(&aside, &path)?;
                 self.owe(&path, file)?;
-                Ok(Published { record, conflict: None })
+                Ok(Published {
+                    record,
+                    conflict: None,
+                })
             }
         }
     }
@@ -206,7 +248,8 @@ impl Store {
         if !same_bytes(&path, &table) {
             make_read_only(file.path())?;
             place(file.path(), &path)?;
-            file.written().map_or(Ok(()), |written| self.owe(&path, written))?;
+            file.written()
+                .map_or(Ok(()), |written| self.owe(&path, written))?;
         } else if let Ok(standing) = fs::File::open(&path) {
             // Whoever put it there may not have made it durable yet.
             self.owe(&path, standing)?;
@@ -217,14 +260,21 @@ impl Store {
 
 fn conflict(standing: &ActionRecord, fresh: &ActionRecord) -> Option<String> {
     let ports = |record: &ActionRecord| -> BTreeMap<String, TableHash> {
-        record.tables.iter().map(|(port, table)| (port.clone(), table.table_hash.clone())).collect()
+        record
+            .tables
+            .iter()
+            .map(|(port, table)| (port.clone(), table.table_hash.clone()))
+            .collect()
     };
     let (old, new) = (ports(standing), ports(fresh));
     if old == new {
         return None;
     }
-    let differing: Vec<&str> =
-        new.iter().filter(|(port, hash)| old.get(*port) != Some(hash)).map(|(port, _)| port.as_str()).collect();
+    let differing: Vec<&str> = new
+        .iter()
+        .filter(|(port, hash)| old.get(*port) != Some(hash))
+        .map(|(port, _)| port.as_str())
+        .collect();
     Some(format!(
         "stage {} is not deterministic: the same key gave other content before in {}; the earlier tables stand (action {})",
         fresh.key.stage,

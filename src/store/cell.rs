@@ -1,6 +1,8 @@
 //! Rust types that are one cell of a column.
 
-use arrow::array::{Array, ArrayRef, BooleanArray, Float64Array, Int64Array, StringArray, StringBuilder};
+use arrow::array::{
+    Array, ArrayRef, BooleanArray, Float64Array, Int64Array, StringArray, StringBuilder,
+};
 use arrow::datatypes::DataType;
 use std::sync::Arc;
 
@@ -29,7 +31,8 @@ macro_rules! cell {
             }
             fn from_array(array: &ArrayRef) -> Option<Vec<Self>> {
                 let array = array.as_any().downcast_ref::<$array>()?;
-                (array.null_count() == 0).then(|| (0..array.len()).map(|i| $get(array, i)).collect())
+                (array.null_count() == 0)
+                    .then(|| (0..array.len()).map(|i| $get(array, i)).collect())
             }
         }
         impl Cell for Option<$rust> {
@@ -44,15 +47,32 @@ macro_rules! cell {
             }
             fn from_array(array: &ArrayRef) -> Option<Vec<Self>> {
                 let array = array.as_any().downcast_ref::<$array>()?;
-                Some((0..array.len()).map(|i| (!array.is_null(i)).then(|| $get(array, i))).collect())
+                Some(
+                    (0..array.len())
+                        .map(|i| (!array.is_null(i)).then(|| $get(array, i)))
+                        .collect(),
+                )
             }
         }
     };
 }
-cell!(f64, Float64Array, DataType::Float64, |a: &Float64Array, i| a.value(i));
-cell!(i64, Int64Array, DataType::Int64, |a: &Int64Array, i| a.value(i));
-cell!(bool, BooleanArray, DataType::Boolean, |a: &BooleanArray, i| a.value(i));
-cell!(String, StringArray, DataType::Utf8, |a: &StringArray, i| a.value(i).to_string());
+cell!(
+    f64,
+    Float64Array,
+    DataType::Float64,
+    |a: &Float64Array, i| a.value(i)
+);
+cell!(i64, Int64Array, DataType::Int64, |a: &Int64Array, i| a
+    .value(i));
+cell!(
+    bool,
+    BooleanArray,
+    DataType::Boolean,
+    |a: &BooleanArray, i| a.value(i)
+);
+cell!(String, StringArray, DataType::Utf8, |a: &StringArray, i| a
+    .value(i)
+    .to_string());
 
 /// A column of texts that grows cell by cell, without a text of its own for each.
 #[derive(Default)]

@@ -1,6 +1,8 @@
 //! The check behind [`super::frame::FrameBuilder::finish`]: columns against a schema, once.
 
-use arrow::array::{Array, ArrayRef, AsArray, DynComparator, Float64Array, RecordBatch, make_comparator};
+use arrow::array::{
+    Array, ArrayRef, AsArray, DynComparator, Float64Array, RecordBatch, make_comparator,
+};
 use arrow::compute::{SortColumn, SortOptions, lexsort_to_indices, take_record_batch};
 use arrow::datatypes::{Field, Float64Type, Int64Type, Schema};
 use std::cmp::Ordering;
@@ -11,7 +13,10 @@ use super::schema::{ColumnType, FieldSchema, TableSchema};
 use crate::error::{Error, Fault, Result, counted};
 
 /// Rows ascend by the key; nulls do not occur in it.
-const ASCENDING: SortOptions = SortOptions { descending: false, nulls_first: true };
+const ASCENDING: SortOptions = SortOptions {
+    descending: false,
+    nulls_first: true,
+};
 
 /// Columns by name -> the batch in the order of the schema and of the key.
 pub(super) fn parse(schema: &TableSchema, columns: Vec<(String, ArrayRef)>) -> Result<RecordBatch> {
@@ -26,30 +31,53 @@ pub(super) fn parse(schema: &TableSchema, columns: Vec<(String, ArrayRef)>) -> R
         return Err(bug(format!("column {name} is not in the schema")));
     }
     let layout = layout(schema, &given).map_err(bug)?;
-    let metadata = [("calib.schema".to_string(), schema.id()), ("calib.primary_key".to_string(), schema.primary_key.join(","))];
+    let metadata = [
+        ("calib.schema".to_string(), schema.id()),
+        (
+            "calib.primary_key".to_string(),
+            schema.primary_key.join(","),
+        ),
+    ];
     let mut fields: Vec<Field> = Vec::new();
     let mut arrays = Vec::new();
     for (field, joint) in &layout {
         let name = field.column(*joint);
-        let array = given.remove(&name).ok_or_else(|| bug(format!("column {name} is missing")))?;
+        let array = given
+            .remove(&name)
+            .ok_or_else(|| bug(format!("column {name} is missing")))?;
         if array.data_type() != &field.column_type.arrow() {
-            return Err(bug(format!("column {name} is {}, expected {}", array.data_type(), field.column_type.arrow())));
+            return Err(bug(format!(
+                "column {name} is {}, expected {}",
+                array.data_type(),
+                field.column_type.arrow()
+            )));
         }
         fields.push(field.arrow(*joint));
         arrays.push(array);
     }
-    let arrow_schema = Arc::new(Schema::new_with_metadata(fields, metadata.into_iter().collect()));
+    let arrow_schema = Arc::new(Schema::new_with_metadata(
+        fields,
+        metadata.into_iter().collect(),
+    ));
     if arrays.windows(2).any(|pair| pair[0].len() != pair[1].len()) {
         return Err(bug("columns of unequal length".into()));
     }
-    let batch =
-        match arrays.iter().zip(arrow_schema.fields()).find(|(array, field)| !field.is_nullable() && array.null_count() > 0) {
-            Some((array, field)) => {
-                let row = (0..array.len()).find(|&row| array.is_null(row)).unwrap_or_default();
-                return Err(bug(format!("column {}, row {row}: null where a value is needed", field.name())));
-            }
-            None => RecordBatch::try_new(arrow_schema, arrays).map_err(|e| bug(e.to_string()))?,
-        };
+    let batch = match arrays
+        .iter()
+        .zip(arrow_schema.fields())
+        .find(|(array, field)| !field.is_nullable() && array.null_count() > 0)
+    {
+        Some((array, field)) => {
+            let row = (0..array.len())
+                .find(|&row| array.is_null(row))
+                .unwrap_or_default();
+            return Err(bug(format!(
+                "column {}, row {row}: null where a value is needed",
+                field.name()
+            )));
+        }
+        None => RecordBatch::try_new(arrow_schema, arrays).map_err(|e| bug(e.to_string()))?,
+    };
     check_values(schema, &layout, &batch)?;
     in_key_order(schema, batch)
 }
@@ -59,8 +87,17 @@ fn layout<'a>(
     schema: &'a TableSchema,
     given: &BTreeMap<String, ArrayRef>,
 ) -> std::result::Result<Vec<(&'a FieldSchema, Option<usize>)>, String> {
-    let joints = given.keys().filter_map(|name| schema.field_of(name)?.1).max().unwrap_or(0);
-    if joints == 0 && schema.fields.iter().any(|field| field.per_joint && !field.optional) {
+    let joints = given
+        .keys()
+        .filter_map(|name| schema.field_of(name)?.1)
+        .max()
+        .unwrap_or(0);
+    if joints == 0
+        && schema
+            .fields
+            .iter()
+            .any(|field| field.per_joint && !field.optional)
+    {
         return Err("no column of any joint".into());
     }
     let mut layout = Vec::new();
@@ -80,19 +117,32 @@ fn layout<'a>(
             }
             Some(group) if !settled.contains(&group.as_str()) => {
                 settled.push(group);
-                let members: Vec<&FieldSchema> =
-                    schema.fields.iter().filter(|other| other.either.as_ref() == Some(group)).collect();
-                let given_any = |member: &&FieldSchema| (1..=joints).any(|joint| given.contains_key(&member.column(Some(joint))));
+                let members: Vec<&FieldSchema> = schema
+                    .fields
+                    .iter()
+                    .filter(|other| other.either.as_ref() == Some(group))
+                    .collect();
+                let given_any = |member: &&FieldSchema| {
+                    (1..=joints).any(|joint| given.contains_key(&member.column(Some(joint))))
+                };
                 if members.iter().all(|member| member.optional) && !members.iter().any(given_any) {
                     continue;
                 }
                 for joint in 1..=joints {
-                    let mut there = members.iter().filter(|member| given.contains_key(&member.column(Some(joint))));
+                    let mut there = members
+                        .iter()
+                        .filter(|member| given.contains_key(&member.column(Some(joint))));
                     match (there.next(), there.next()) {
                         (Some(member), None) => layout.push((member, Some(joint))),
                         _ => {
-                            let names: Vec<String> = members.iter().map(|member| member.column(Some(joint))).collect();
-                            return Err(format!("joint {joint} needs exactly one of the columns {}", names.join(", ")));
+                            let names: Vec<String> = members
+                                .iter()
+                                .map(|member| member.column(Some(joint)))
+                                .collect();
+                            return Err(format!(
+                                "joint {joint} needs exactly one of the columns {}",
+                                names.join(", ")
+                            ));
                         }
                     }
                 }
@@ -103,13 +153,25 @@ fn layout<'a>(
     Ok(layout)
 }
 
-fn check_values(schema: &TableSchema, layout: &[(&FieldSchema, Option<usize>)], batch: &RecordBatch) -> Result<()> {
+fn check_values(
+    schema: &TableSchema,
+    layout: &[(&FieldSchema, Option<usize>)],
+    batch: &RecordBatch,
+) -> Result<()> {
     let mut faults = Vec::new();
     for ((field, joint), array) in layout.iter().zip(batch.columns()) {
-        let place =
-            |row: usize| format!("table {}, column {}, {}", schema.name, field.column(*joint), key_of(schema, batch, row));
+        let place = |row: usize| {
+            format!(
+                "table {}, column {}, {}",
+                schema.name,
+                field.column(*joint),
+                key_of(schema, batch, row)
+            )
+        };
         let range = &field.constraints;
-        let outside = |value: f64| range.min.is_some_and(|min| value < min) || range.max.is_some_and(|max| value > max);
+        let outside = |value: f64| {
+            range.min.is_some_and(|min| value < min) || range.max.is_some_and(|max| value > max)
+        };
         let mut bad: Vec<(usize, String)> = Vec::new();
         match field.column_type {
             // As nearly every column is; numbers of null cells are not seen by what is below.
@@ -131,13 +193,21 @@ fn check_values(schema: &TableSchema, layout: &[(&FieldSchema, Option<usize>)], 
             ColumnType::Int64 if range.min.is_some() || range.max.is_some() => {
                 let values = array.as_primitive::<Int64Type>().iter().enumerate();
                 bad.extend(values.filter_map(|(row, value)| {
-                    value.filter(|value| outside(*value as f64)).map(|value| (row, value.to_string()))
+                    value
+                        .filter(|value| outside(*value as f64))
+                        .map(|value| (row, value.to_string()))
                 }));
             }
             ColumnType::Utf8 if !range.values.is_empty() => {
                 for (row, value) in array.as_string::<i32>().iter().enumerate() {
-                    if let Some(value) = value.filter(|value| !range.values.iter().any(|allowed| allowed == value)) {
-                        return Err(Error::Bug(format!("{}: `{value}`; allowed: {}", place(row), range.values.join(", "))));
+                    if let Some(value) =
+                        value.filter(|value| !range.values.iter().any(|allowed| allowed == value))
+                    {
+                        return Err(Error::Bug(format!(
+                            "{}: `{value}`; allowed: {}",
+                            place(row),
+                            range.values.join(", ")
+                        )));
                     }
                 }
             }
@@ -149,20 +219,33 @@ fn check_values(schema: &TableSchema, layout: &[(&FieldSchema, Option<usize>)], 
                 .as_deref()
                 .filter(|unit| *unit != "1" && *unit != "row")
                 .map_or(String::new(), |unit| format!(" {unit}"));
-            let more = if bad.len() > 1 { format!(" (and {})", counted(bad.len() - 1, "more row")) } else { String::new() };
+            let more = if bad.len() > 1 {
+                format!(" (and {})", counted(bad.len() - 1, "more row"))
+            } else {
+                String::new()
+            };
             faults.push(Fault::new(
                 place(*row),
-                format!("{value}{unit} is out of range; allowed: {}{unit}{more}", span(range.min, range.max)),
+                format!(
+                    "{value}{unit} is out of range; allowed: {}{unit}{more}",
+                    span(range.min, range.max)
+                ),
             ));
         }
     }
-    if faults.is_empty() { Ok(()) } else { Err(Error::Data(faults)) }
+    if faults.is_empty() {
+        Ok(())
+    } else {
+        Err(Error::Data(faults))
+    }
 }
 
 /// Whether all numbers are finite and in range, those in the place of null cells too.
 fn are_inside(column: &Float64Array, min: Option<f64>, max: Option<f64>) -> bool {
     let (min, max) = (min.unwrap_or(f64::MIN), max.unwrap_or(f64::MAX));
-    column.values().iter().fold(true, |inside, value| inside & (min <= *value) & (*value <= max))
+    column.values().iter().fold(true, |inside, value| {
+        inside & (min <= *value) & (*value <= max)
+    })
 }
 
 fn span(min: Option<f64>, max: Option<f64>) -> String {
@@ -180,12 +263,19 @@ pub(super) fn key_of(schema: &TableSchema, batch: &RecordBatch, row: usize) -> S
         let array = batch.column_by_name(name)?;
         let value = match array.data_type() {
             arrow::datatypes::DataType::Utf8 => array.as_string::<i32>().value(row).to_string(),
-            arrow::datatypes::DataType::Int64 => array.as_primitive::<Int64Type>().value(row).to_string(),
+            arrow::datatypes::DataType::Int64 => {
+                array.as_primitive::<Int64Type>().value(row).to_string()
+            }
             _ => return None,
         };
         Some(format!("{name} {value}"))
     };
-    schema.primary_key.iter().filter_map(part).collect::<Vec<_>>().join(", ")
+    schema
+        .primary_key
+        .iter()
+        .filter_map(part)
+        .collect::<Vec<_>>()
+        .join(", ")
 }
 
 /// Compares rows of two batches of one table by key.
@@ -195,12 +285,27 @@ pub(super) fn compare_keys(
     right: &RecordBatch,
 ) -> Result<impl Fn(usize, usize) -> Ordering> {
     let compare = |name: &String| -> Result<DynComparator> {
-        let column =
-            |batch: &RecordBatch| batch.column_by_name(name).cloned().ok_or_else(|| Error::Bug(format!("no key column {name}")));
-        make_comparator(&column(left)?, &column(right)?, ASCENDING).map_err(|e| Error::Bug(e.to_string()))
+        let column = |batch: &RecordBatch| {
+            batch
+                .column_by_name(name)
+                .cloned()
+                .ok_or_else(|| Error::Bug(format!("no key column {name}")))
+        };
+        make_comparator(&column(left)?, &column(right)?, ASCENDING)
+            .map_err(|e| Error::Bug(e.to_string()))
     };
-    let comparators = schema.sort.iter().map(compare).collect::<Result<Vec<_>>>()?;
-    Ok(move |l, r| comparators.iter().map(|compare| compare(l, r)).find(|order| order.is_ne()).unwrap_or(Ordering::Equal))
+    let comparators = schema
+        .sort
+        .iter()
+        .map(compare)
+        .collect::<Result<Vec<_>>>()?;
+    Ok(move |l, r| {
+        comparators
+            .iter()
+            .map(|compare| compare(l, r))
+            .find(|order| order.is_ne())
+            .unwrap_or(Ordering::Equal)
+    })
 }
 
 fn in_key_order(schema: &TableSchema, batch: RecordBatch) -> Result<RecordBatch> {
@@ -215,16 +320,24 @@ fn in_key_order(schema: &TableSchema, batch: RecordBatch) -> Result<RecordBatch>
         .sort
         .iter()
         .filter_map(|name| batch.column_by_name(name))
-        .map(|values| SortColumn { values: values.clone(), options: Some(ASCENDING) })
+        .map(|values| SortColumn {
+            values: values.clone(),
+            options: Some(ASCENDING),
+        })
         .collect();
     let bug = |e: arrow::error::ArrowError| Error::Bug(e.to_string());
-    let sorted = take_record_batch(&batch, &lexsort_to_indices(&columns, None).map_err(bug)?).map_err(bug)?;
+    let sorted = take_record_batch(&batch, &lexsort_to_indices(&columns, None).map_err(bug)?)
+        .map_err(bug)?;
     let twice = {
         let compare = compare_keys(schema, &sorted, &sorted)?;
         (1..sorted.num_rows()).find(|&row| compare(row - 1, row).is_eq())
     };
     match twice {
-        Some(row) => Err(Error::Bug(format!("table {}: key {} twice", schema.name, key_of(schema, &sorted, row)))),
+        Some(row) => Err(Error::Bug(format!(
+            "table {}: key {} twice",
+            schema.name,
+            key_of(schema, &sorted, row)
+        ))),
         None => Ok(sorted),
     }
 }

@@ -39,13 +39,21 @@ impl Frame {
 
 /// The identity of columns as a file of this kind and major version has them; none where one is of a type that no table has.
 pub(super) fn hash_of_columns(kind: &str, major: u32, batch: &RecordBatch) -> Option<TableHash> {
-    let known = [DataType::Float64, DataType::Int64, DataType::Boolean, DataType::Utf8];
+    let known = [
+        DataType::Float64,
+        DataType::Int64,
+        DataType::Boolean,
+        DataType::Utf8,
+    ];
     let fields = batch.schema_ref().fields();
-    fields.iter().all(|field| known.contains(field.data_type())).then(|| {
-        let mut hasher = ContentHasher::new(kind, major);
-        hasher.push(batch);
-        hasher.finish()
-    })
+    fields
+        .iter()
+        .all(|field| known.contains(field.data_type()))
+        .then(|| {
+            let mut hasher = ContentHasher::new(kind, major);
+            hasher.push(batch);
+            hasher.finish()
+        })
 }
 
 /// Hashes a table chunk by chunk; every chunk has the same columns.
@@ -58,7 +66,12 @@ pub(super) struct ContentHasher {
 
 impl ContentHasher {
     pub(super) fn new(kind: &str, major: u32) -> Self {
-        Self { kind: kind.into(), major, rows: 0, columns: Vec::new() }
+        Self {
+            kind: kind.into(),
+            major,
+            rows: 0,
+            columns: Vec::new(),
+        }
     }
 
     pub(super) fn push(&mut self, chunk: &RecordBatch) {
@@ -67,9 +80,18 @@ impl ContentHasher {
                 let unit = field.metadata().get("unit").map_or("", String::as_str);
                 format!("{}\0{}\0{unit}", field.name(), field.data_type())
             };
-            self.columns = chunk.schema_ref().fields().iter().map(|field| (header(field), blake3::Hasher::new())).collect();
+            self.columns = chunk
+                .schema_ref()
+                .fields()
+                .iter()
+                .map(|field| (header(field), blake3::Hasher::new()))
+                .collect();
         }
-        assert_eq!(self.columns.len(), chunk.num_columns(), "chunks of one table have the same columns");
+        assert_eq!(
+            self.columns.len(),
+            chunk.num_columns(),
+            "chunks of one table have the same columns"
+        );
         self.rows += chunk.num_rows() as u64;
         for ((_, hasher), array) in self.columns.iter_mut().zip(chunk.columns()) {
             hash_cells(hasher, array);
@@ -100,9 +122,13 @@ const BLOCK: usize = 1 << 16;
 /// Feeds the cells of a column, presence first.
 fn hash_cells(hasher: &mut blake3::Hasher, array: &ArrayRef) {
     match array.data_type() {
-        DataType::Float64 => numbers(hasher, array.as_primitive::<Float64Type>(), |value| value.to_bits().to_le_bytes()),
+        DataType::Float64 => numbers(hasher, array.as_primitive::<Float64Type>(), |value| {
+            value.to_bits().to_le_bytes()
+        }),
         DataType::Int64 => numbers(hasher, array.as_primitive::<Int64Type>(), i64::to_le_bytes),
-        DataType::Boolean => feed(hasher, array.as_boolean().iter(), |block, value| block.push(u8::from(value))),
+        DataType::Boolean => feed(hasher, array.as_boolean().iter(), |block, value| {
+            block.push(u8::from(value))
+        }),
         DataType::Utf8 => feed(hasher, array.as_string::<i32>().iter(), |block, value| {
             block.extend_from_slice(&(value.len() as u64).to_le_bytes());
             block.extend_from_slice(value.as_bytes());
@@ -111,18 +137,31 @@ fn hash_cells(hasher: &mut blake3::Hasher, array: &ArrayRef) {
     }
 }
 
-fn numbers<T: ArrowPrimitiveType>(hasher: &mut blake3::Hasher, array: &PrimitiveArray<T>, bytes: fn(T::Native) -> [u8; 8]) {
+fn numbers<T: ArrowPrimitiveType>(
+    hasher: &mut blake3::Hasher,
+    array: &PrimitiveArray<T>,
+    bytes: fn(T::Native) -> [u8; 8],
+) {
     if array.null_count() > 0 {
-        return feed(hasher, array.iter(), |block, value| block.extend_from_slice(&bytes(value)));
+        return feed(hasher, array.iter(), |block, value| {
+            block.extend_from_slice(&bytes(value))
+        });
     }
     let mut block = vec![[1; 9]; (BLOCK / 9).min(array.len())];
     for values in array.values().chunks(block.len().max(1)) {
-        block.iter_mut().zip(values).for_each(|(cell, value)| cell[1..].copy_from_slice(&bytes(*value)));
+        block
+            .iter_mut()
+            .zip(values)
+            .for_each(|(cell, value)| cell[1..].copy_from_slice(&bytes(*value)));
         hasher.update(block[..values.len()].as_flattened());
     }
 }
 
-fn feed<T>(hasher: &mut blake3::Hasher, cells: impl Iterator<Item = Option<T>>, encode: impl Fn(&mut Vec<u8>, T)) {
+fn feed<T>(
+    hasher: &mut blake3::Hasher,
+    cells: impl Iterator<Item = Option<T>>,
+    encode: impl Fn(&mut Vec<u8>, T),
+) {
     let mut block = Vec::with_capacity(BLOCK + 64);
     for cell in cells {
         block.push(u8::from(cell.is_some()));

@@ -21,7 +21,10 @@ pub(super) fn refused(path: &Path, doing: &str, error: &io::Error) -> Error {
         }
         _ => "check the disk and run again: finished stages are kept",
     };
-    Error::store(path.display().to_string(), format!("cannot {doing}: {error}; {remedy}"))
+    Error::store(
+        path.display().to_string(),
+        format!("cannot {doing}: {error}; {remedy}"),
+    )
 }
 
 /// Makes a folder and those above it.
@@ -31,7 +34,9 @@ pub(super) fn make_dir(path: &Path) -> Result<()> {
 
 /// Makes the entries of a folder durable.
 pub(super) fn sync_dir(path: &Path) -> Result<()> {
-    File::open(path).and_then(|dir| dir.sync_all()).map_err(|e| refused(path, "sync the folder", &e))
+    File::open(path)
+        .and_then(|dir| dir.sync_all())
+        .map_err(|e| refused(path, "sync the folder", &e))
 }
 
 /// Writes a new file; the handle is for making it durable.
@@ -46,7 +51,9 @@ pub(super) fn write(path: &Path, bytes: &[u8]) -> Result<File> {
 
 /// Writes a new file and makes its bytes (not yet its name) durable.
 pub(super) fn write_synced(path: &Path, bytes: &[u8]) -> Result<()> {
-    write(path, bytes)?.sync_all().map_err(|e| refused(path, "write", &e))
+    write(path, bytes)?
+        .sync_all()
+        .map_err(|e| refused(path, "write", &e))
 }
 
 /// Moves `from` to `to`, over what may be there, atomically.
@@ -99,7 +106,11 @@ pub(super) fn make_read_only(path: &Path) -> Result<()> {
 /// A name from outside as one component of a path: no separators, no leading dot.
 pub(super) fn component(name: &str) -> Result<&str> {
     let allowed = |c: char| c.is_alphanumeric() || matches!(c, '_' | '-' | '.' | ' ');
-    if name.is_empty() || name.len() > 120 || name.starts_with(['.', ' ']) || !name.chars().all(allowed) {
+    if name.is_empty()
+        || name.len() > 120
+        || name.starts_with(['.', ' '])
+        || !name.chars().all(allowed)
+    {
         let shown = name.chars().take(40).collect::<String>();
         let message = "cannot be part of a file name; allowed: letters, digits, `_`, `-`, `.` and blanks, up to 120 bytes, not starting with a dot or blank";
         return Err(Error::spec(format!("name {shown:?}"), message));

@@ -60,14 +60,19 @@ impl Store {
     pub(super) fn sync_then(&self, place: impl FnOnce() -> Result<Option<PathBuf>>) -> Result<()> {
         let _alone = lock(&self.durability.paying);
         let files = std::mem::take(&mut lock(&self.durability.owed).files);
-        let synced = together(&files, |(path, file)| file.sync_all().map_err(|e| refused(path, "make durable", &e)));
+        let synced = together(&files, |(path, file)| {
+            file.sync_all()
+                .map_err(|e| refused(path, "make durable", &e))
+        });
         let result = synced.and_then(|()| {
             let placed = place()?;
             let mut owed = lock(&self.durability.owed);
             let mut folders = std::mem::take(&mut owed.folders);
             drop(owed);
             folders.extend(placed.and_then(|path| path.parent().map(Path::to_path_buf)));
-            together(&folders.into_iter().collect::<Vec<_>>(), |folder| sync_dir(folder))
+            together(&folders.into_iter().collect::<Vec<_>>(), |folder| {
+                sync_dir(folder)
+            })
         });
         let mut owed = lock(&self.durability.owed);
         if let Err(Error::Store(fault)) = &result {
@@ -105,7 +110,10 @@ pub(super) fn together<T: Sync>(items: &[T], one: impl Fn(&T) -> Result<()> + Sy
         }
         work();
     });
-    failure.into_inner().unwrap_or_else(PoisonError::into_inner).map_or(Ok(()), |(_, error)| Err(error))
+    failure
+        .into_inner()
+        .unwrap_or_else(PoisonError::into_inner)
+        .map_or(Ok(()), |(_, error)| Err(error))
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -124,13 +132,22 @@ mod tests {
             std::fs::create_dir_all(path.parent().unwrap()).unwrap();
             store.owe(path, File::create(path).unwrap()).unwrap();
         };
-        let paths: Vec<PathBuf> = (0..50).map(|n| store.root().join(format!("{}/{n}", n % 7))).collect();
+        let paths: Vec<PathBuf> = (0..50)
+            .map(|n| store.root().join(format!("{}/{n}", n % 7)))
+            .collect();
         paths.iter().for_each(|path| write(path));
         store.sync().unwrap();
         paths.iter().for_each(|path| write(path));
         std::fs::remove_dir_all(store.root().join("3")).unwrap();
         let error = store.sync().unwrap_err();
-        assert!(error.exit_code() == 75 && error.to_string().contains("store/3"), "{error}");
-        assert_eq!(store.sync().unwrap_err().to_string(), error.to_string(), "also when asked again");
+        assert!(
+            error.exit_code() == 75 && error.to_string().contains("store/3"),
+            "{error}"
+        );
+        assert_eq!(
+            store.sync().unwrap_err().to_string(),
+            error.to_string(),
+            "also when asked again"
+        );
     }
 }

@@ -69,7 +69,11 @@ impl StageKey {
     /// The hash of the key.
     pub fn id(&self) -> ActionId {
         let value = serde_json::to_value(self).expect("a key is plain data");
-        ActionId(blake3::hash(canonical(&value).as_bytes()).to_hex().to_string())
+        ActionId(
+            blake3::hash(canonical(&value).as_bytes())
+                .to_hex()
+                .to_string(),
+        )
     }
 }
 
@@ -118,10 +122,22 @@ pub fn canonical(value: &Value) -> String {
     match value {
         Value::Object(map) => {
             let ordered: BTreeMap<&String, &Value> = map.iter().collect();
-            let member = |(key, value): (&String, &Value)| format!("{}:{}", Value::String(key.clone()), canonical(value));
-            format!("{{{}}}", ordered.into_iter().map(member).collect::<Vec<_>>().join(","))
+            let member = |(key, value): (&String, &Value)| {
+                format!("{}:{}", Value::String(key.clone()), canonical(value))
+            };
+            format!(
+                "{{{}}}",
+                ordered
+                    .into_iter()
+                    .map(member)
+                    .collect::<Vec<_>>()
+                    .join(",")
+            )
         }
-        Value::Array(items) => format!("[{}]", items.iter().map(canonical).collect::<Vec<_>>().join(",")),
+        Value::Array(items) => format!(
+            "[{}]",
+            items.iter().map(canonical).collect::<Vec<_>>().join(",")
+        ),
         plain => plain.to_string(),
     }
 }

@@ -84,7 +84,12 @@ impl Store {
         {
             return Err(occupied);
         }
-        Ok(Self { root, remote: None, workspace: Mutex::new(None), durability: Durability::default() })
+        Ok(Self {
+            root,
+            remote: None,
+            workspace: Mutex::new(None),
+            durability: Durability::default(),
+        })
     }
 
     /// Its folder; of a bucket, that of what was fetched.
@@ -99,7 +104,10 @@ impl Store {
 
     /// The folder for unfinished files; the first call makes the store.
     fn workspace(&self) -> Result<Arc<Workspace>> {
-        let mut slot = self.workspace.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut slot = self
+            .workspace
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
         if let Some(workspace) = &*slot {
             return Ok(workspace.clone());
         }
@@ -119,7 +127,10 @@ impl Store {
 }
 
 fn format_text() -> Result<Vec<u8>> {
-    serde_json::to_vec(&StoreMarker { calib_store: STORE_FORMAT }).map_err(|e| Error::Bug(e.to_string()))
+    serde_json::to_vec(&StoreMarker {
+        calib_store: STORE_FORMAT,
+    })
+    .map_err(|e| Error::Bug(e.to_string()))
 }
 
 /// Whether there is a format file; fails where it is not that of a store of this calib.
@@ -144,7 +155,9 @@ fn check_format(path: &Path, bytes: &[u8]) -> Result<()> {
         )),
         Err(e) => Err(Error::store(
             place,
-            format!("not the format file of a calib store ({e}); restore it: {{\"calib_store\": {STORE_FORMAT}}}"),
+            format!(
+                "not the format file of a calib store ({e}); restore it: {{\"calib_store\": {STORE_FORMAT}}}"
+            ),
         )),
     }
 }
@@ -162,7 +175,9 @@ fn check_vacant(root: &Path) -> Result<()> {
             let found = entry.file_name().to_string_lossy().into_owned();
             Err(Error::spec(
                 root.display().to_string(),
-                format!("not a calib store (no format.json, but `{found}`); --store takes a store, or a new or empty folder"),
+                format!(
+                    "not a calib store (no format.json, but `{found}`); --store takes a store, or a new or empty folder"
+                ),
             ))
         }
     }

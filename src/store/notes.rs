@@ -64,7 +64,9 @@ impl Store {
     pub fn drop_note(&self, place: &[&str], name: &str) -> Result<()> {
         let path = self.place_of_note(place, name)?;
         match fs::remove_file(&path) {
-            Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(refused(&path, "remove", &error)),
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                Err(refused(&path, "remove", &error))
+            }
             _ => Ok(()),
         }
     }
@@ -86,5 +88,9 @@ fn read(bytes: &[u8]) -> Option<Value> {
     let mut value: Value = serde_json::from_slice(bytes).ok()?;
     let members = value.as_object_mut()?;
     members.remove("sealed");
-    if members.len() == 1 && members.contains_key(LIST) { members.remove(LIST) } else { Some(value) }
+    if members.len() == 1 && members.contains_key(LIST) {
+        members.remove(LIST)
+    } else {
+        Some(value)
+    }
 }

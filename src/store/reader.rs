@@ -30,7 +30,10 @@ fn open_published(path: &Path, table: &TableRef) -> Result<File> {
     let open = || File::open(path).map_err(|e| unopened(path, &e));
     let found = FileHash::of_reader(open()?).map_err(|e| refused(path, "read", &e))?;
     if found != table.file_hash {
-        return Err(set_aside(path, "its bytes are not those that were published"));
+        return Err(set_aside(
+            path,
+            "its bytes are not those that were published",
+        ));
     }
     open()
 }
@@ -80,7 +83,10 @@ pub(super) fn load(path: &Path, table: &TableRef) -> Result<Frame> {
     let unreadable = |why| Error::store(&place, format!("not a readable Parquet file: {why}"));
     let decoded = Decoded::of(file).map_err(unreadable)?;
     if decoded.rows() != table.rows {
-        return Err(set_aside(path, "it has another number of rows than was published"));
+        return Err(set_aside(
+            path,
+            "it has another number of rows than was published",
+        ));
     }
     if decoded.table_hash(kind, version).as_ref() != Some(&table.table_hash) {
         return Err(set_aside(path, "its content is not what was published"));
@@ -92,7 +98,10 @@ pub(super) fn load(path: &Path, table: &TableRef) -> Result<Frame> {
 fn unopened(path: &Path, error: &io::Error) -> Error {
     let place = path.display().to_string();
     match error.kind() {
-        io::ErrorKind::NotFound => Error::store(place, "the table is gone; `calib run` of its pipeline writes it anew"),
+        io::ErrorKind::NotFound => Error::store(
+            place,
+            "the table is gone; `calib run` of its pipeline writes it anew",
+        ),
         io::ErrorKind::IsADirectory => Error::store(
             place,
             "a folder stands in the table's place; remove it, and `calib run` of its pipeline writes the table anew",
@@ -103,20 +112,34 @@ fn unopened(path: &Path, error: &io::Error) -> Error {
 
 /// The kind of a schema id `name/version` that this calib can read.
 fn known_schema<'a>(place: &str, id: &'a str) -> Result<(&'a str, Version)> {
-    let parts = id.split_once('/').and_then(|(kind, version)| Some((kind, Version::parse(version)?)));
+    let parts = id
+        .split_once('/')
+        .and_then(|(kind, version)| Some((kind, Version::parse(version)?)));
     let Some((kind, version)) = parts else {
-        return Err(Error::store(place, format!("schema `{id}` is not of the form name/1.0.0")));
+        return Err(Error::store(
+            place,
+            format!("schema `{id}` is not of the form name/1.0.0"),
+        ));
     };
-    let known = schema::all().find(|schema| schema.name == kind).map(|schema| schema.version);
+    let known = schema::all()
+        .find(|schema| schema.name == kind)
+        .map(|schema| schema.version);
     match known {
-        Some(known) if known.major == version.major && version.minor <= known.minor => Ok((kind, version)),
+        Some(known) if known.major == version.major && version.minor <= known.minor => {
+            Ok((kind, version))
+        }
         Some(known) => Err(Error::store(
             place,
-            format!("the table is {id}, this calib reads {kind}/{known}: use the calib that wrote it, or a newer one"),
+            format!(
+                "the table is {id}, this calib reads {kind}/{known}: use the calib that wrote it, or a newer one"
+            ),
         )),
-        None => {
-            Err(Error::store(place, format!("this calib knows no table `{kind}`: use the calib that wrote it, or a newer one")))
-        }
+        None => Err(Error::store(
+            place,
+            format!(
+                "this calib knows no table `{kind}`: use the calib that wrote it, or a newer one"
+            ),
+        )),
     }
 }
 
@@ -133,19 +156,36 @@ pub(crate) fn table_of_bytes(label: &str, bytes: Vec<u8>, kind: &str) -> Result<
     loose(label, bytes::Bytes::from(bytes), Some(kind))
 }
 
-fn loose<R: ChunkReader + 'static>(place: &str, source: R, kind: Option<&str>) -> Result<Loose<Frame>> {
-    let decoded = Decoded::of(source).map_err(|why| Error::data(place, format!("not a readable Parquet file: {why}")))?;
+fn loose<R: ChunkReader + 'static>(
+    place: &str,
+    source: R,
+    kind: Option<&str>,
+) -> Result<Loose<Frame>> {
+    let decoded = Decoded::of(source)
+        .map_err(|why| Error::data(place, format!("not a readable Parquet file: {why}")))?;
     let id = decoded.said(SCHEMA).map(String::from);
     let (kind, version) = match (kind, &id) {
         (Some(kind), Some(id)) if id.split_once('/').is_none_or(|(named, _)| named != kind) => {
-            return Err(Error::data(place, format!("says that it is a table `{id}`; expected a table `{kind}` of calib")));
+            return Err(Error::data(
+                place,
+                format!("says that it is a table `{id}`; expected a table `{kind}` of calib"),
+            ));
         }
         (_, Some(id)) => known_schema(place, id).map_err(|error| of_the_data(place, error))?,
         (Some(kind), None) => (kind, schema::of(kind)?.version),
-        (None, None) => return Err(Error::spec(place, "does not say which table it is; say so with --as KIND")),
+        (None, None) => {
+            return Err(Error::spec(
+                place,
+                "does not say which table it is; say so with --as KIND",
+            ));
+        }
     };
     let carried = decoded.said(CONTENT_HASH);
-    if carried.is_some_and(|carried| decoded.table_hash(kind, version).is_none_or(|found| found.as_str() != carried)) {
+    if carried.is_some_and(|carried| {
+        decoded
+            .table_hash(kind, version)
+            .is_none_or(|found| found.as_str() != carried)
+    }) {
         let message = format!(
             "its content is not what calib wrote: the hash that it carries (`{CONTENT_HASH}`) does not match its numbers. Take the file again \
              from the store that it comes from, where `calib run` writes it anew"
@@ -153,7 +193,9 @@ fn loose<R: ChunkReader + 'static>(place: &str, source: R, kind: Option<&str>) -
         return Err(Error::data(place, message));
     }
     let vouched = carried.is_some();
-    let table = decoded.frame(kind, version).map_err(|error| of_the_data(place, error))?;
+    let table = decoded
+        .frame(kind, version)
+        .map_err(|error| of_the_data(place, error))?;
     Ok(Loose { table, vouched })
 }
 
@@ -162,9 +204,12 @@ fn of_the_data(place: &str, error: Error) -> Error {
     match error {
         Error::Bug(message) => Error::data(place, message),
         Error::Store(fault) => Error::Data(vec![fault]),
-        Error::Data(faults) => {
-            Error::Data(faults.into_iter().map(|fault| Fault::new(format!("{place}: {}", fault.place), fault.message)).collect())
-        }
+        Error::Data(faults) => Error::Data(
+            faults
+                .into_iter()
+                .map(|fault| Fault::new(format!("{place}: {}", fault.place), fault.message))
+                .collect(),
+        ),
         other => other,
     }
 }
@@ -173,9 +218,17 @@ fn of_the_data(place: &str, error: Error) -> Error {
 fn set_aside(path: &Path, why: &str) -> Error {
     let place = path.display().to_string();
     match fs::rename(path, path.with_extension("damaged")) {
-        Ok(()) => {
-            Error::store(place, format!("damaged: {why}; it was set aside, and `calib run` of its pipeline writes it anew"))
-        }
-        Err(e) => Error::store(place, format!("damaged: {why}; remove it, and `calib run` of its pipeline writes it anew ({e})")),
+        Ok(()) => Error::store(
+            place,
+            format!(
+                "damaged: {why}; it was set aside, and `calib run` of its pipeline writes it anew"
+            ),
+        ),
+        Err(e) => Error::store(
+            place,
+            format!(
+                "damaged: {why}; remove it, and `calib run` of its pipeline writes it anew ({e})"
+            ),
+        ),
     }
 }

@@ -56,7 +56,10 @@ impl Store {
             super::check_format(Path::new(&format!("{}/format.json", bucket.name())), &bytes)?;
             place(&aside, &format)?;
         }
-        store.remote = Some(Remote { bucket, begun: AtomicBool::new(begun) });
+        store.remote = Some(Remote {
+            bucket,
+            begun: AtomicBool::new(begun),
+        });
         store.refresh_runs()?;
         store.refresh_tags()?;
         Ok(store)
@@ -64,7 +67,11 @@ impl Store {
 
     /// Opens `s3://BUCKET/PREFIX` with a folder below `cache` before it. `settings` are the environment's `AWS_...`.
     #[cfg(feature = "s3")]
-    pub fn open_s3(url: &str, settings: &std::collections::BTreeMap<String, String>, cache: &Path) -> Result<Self> {
+    pub fn open_s3(
+        url: &str,
+        settings: &std::collections::BTreeMap<String, String>,
+        cache: &Path,
+    ) -> Result<Self> {
         let bucket = super::s3::S3::open(url, settings)?;
         let root = cache.join(bucket.folder());
         Self::open_before(root, Arc::new(bucket))
@@ -72,15 +79,21 @@ impl Store {
 
     /// Says how to come by a calib that opens `s3://BUCKET/PREFIX`.
     #[cfg(not(feature = "s3"))]
-    pub fn open_s3(url: &str, _settings: &std::collections::BTreeMap<String, String>, _cache: &Path) -> Result<Self> {
-        let message =
-            "this calib was built without object storage: build it with `cargo install --path . --features s3`, or name a folder";
+    pub fn open_s3(
+        url: &str,
+        _settings: &std::collections::BTreeMap<String, String>,
+        _cache: &Path,
+    ) -> Result<Self> {
+        let message = "this calib was built without object storage: build it with `cargo install --path . --features s3`, or name a folder";
         Err(Error::spec(url, message))
     }
 
     /// The store as a person names it.
     pub fn name(&self) -> String {
-        self.remote.as_ref().map_or_else(|| self.root().display().to_string(), |remote| remote.bucket.name().to_string())
+        self.remote.as_ref().map_or_else(
+            || self.root().display().to_string(),
+            |remote| remote.bucket.name().to_string(),
+        )
     }
 
     pub(super) fn in_bucket(&self) -> bool {
@@ -89,15 +102,21 @@ impl Store {
 
     /// The remote and the key of a file of this store.
     fn keyed(&self, path: &Path) -> Result<Option<(&Remote, String)>> {
-        let Some(remote) = &self.remote else { return Ok(None) };
-        let inside = path.strip_prefix(self.root()).map_err(|_| Error::Bug(format!("{} is not of the store", path.display())))?;
+        let Some(remote) = &self.remote else {
+            return Ok(None);
+        };
+        let inside = path
+            .strip_prefix(self.root())
+            .map_err(|_| Error::Bug(format!("{} is not of the store", path.display())))?;
         let parts: Vec<_> = inside.iter().map(|part| part.to_string_lossy()).collect();
         Ok(Some((remote, parts.join("/"))))
     }
 
     /// The same where something is going to be written: the bucket becomes a store.
     fn written(&self, path: &Path) -> Result<Option<(&Remote, String)>> {
-        let Some((remote, key)) = self.keyed(path)? else { return Ok(None) };
+        let Some((remote, key)) = self.keyed(path)? else {
+            return Ok(None);
+        };
         if !remote.begun.load(Ordering::Acquire) {
             let aside = self.workspace()?.fresh();
             write(&aside, &super::format_text()?)?;
@@ -115,21 +134,29 @@ impl Store {
 
     /// Sends the file `from` as what is going to be at `path`; nothing for a store that is only a folder.
     pub(super) fn give(&self, from: &Path, path: &Path) -> Result<()> {
-        self.written(path)?.map_or(Ok(()), |(remote, key)| remote.bucket.send(from, &key))
+        self.written(path)?
+            .map_or(Ok(()), |(remote, key)| remote.bucket.send(from, &key))
     }
 
     /// Sends the first manifest of a run, whose id nobody else may have.
     pub(super) fn give_run(&self, from: &Path, path: &Path) -> Result<()> {
-        let Some((remote, key)) = self.written(path)? else { return Ok(()) };
+        let Some((remote, key)) = self.written(path)? else {
+            return Ok(());
+        };
         match remote.bucket.create(from, &key)? {
             true => Ok(()),
-            false => Err(Error::store(format!("{}/{key}", remote.bucket.name()), "another run has this id: run again")),
+            false => Err(Error::store(
+                format!("{}/{key}", remote.bucket.name()),
+                "another run has this id: run again",
+            )),
         }
     }
 
     /// Puts a record that is aside in its place if none stands, which the bucket decides where there is one; false where one stands.
     pub(super) fn commit(&self, aside: &Path, path: &Path) -> Result<bool> {
-        let Some((remote, key)) = self.written(path)? else { return put_if_absent(aside, path) };
+        let Some((remote, key)) = self.written(path)? else {
+            return put_if_absent(aside, path);
+        };
         for _ in 0..TRIES {
             if remote.bucket.create(aside, &key)? {
                 place(aside, path)?;
@@ -148,12 +175,15 @@ impl Store {
 
     /// Takes a file of the bucket away.
     pub(super) fn withdraw(&self, path: &Path) -> Result<()> {
-        self.keyed(path)?.map_or(Ok(()), |(remote, key)| remote.bucket.remove(&key))
+        self.keyed(path)?
+            .map_or(Ok(()), |(remote, key)| remote.bucket.remove(&key))
     }
 
     /// Makes a file what it is in the bucket; false where it is not there. A file of a store that is only a folder stays as it is.
     pub(super) fn refresh(&self, path: &Path) -> Result<bool> {
-        let Some((remote, key)) = self.keyed(path)? else { return Ok(true) };
+        let Some((remote, key)) = self.keyed(path)? else {
+            return Ok(true);
+        };
         let aside = self.workspace()?.fresh();
         let there = remote.bucket.fetch(&key, &aside)?;
         if there {
@@ -164,7 +194,9 @@ impl Store {
 
     /// Fetches the file of a table; false where the bucket does not hold it whole, or where there is no bucket.
     pub(super) fn obtain(&self, table: &TableRef, path: &Path) -> Result<bool> {
-        let Some((remote, key)) = self.keyed(path)? else { return Ok(false) };
+        let Some((remote, key)) = self.keyed(path)? else {
+            return Ok(false);
+        };
         let aside = self.workspace()?.fresh();
         let whole = remote.bucket.fetch(&key, &aside)? && same_bytes(&aside, table);
         if whole {
@@ -185,22 +217,32 @@ impl Store {
 
     /// Fetches all files below a folder of the bucket that are not here; nothing for a store that is only a folder.
     pub(super) fn refresh_all(&self, folder: &str) -> Result<()> {
-        let Some(remote) = &self.remote else { return Ok(()) };
-        let paths = remote.bucket.list(folder, ALL)?.into_iter().filter_map(|(key, _)| below(self.root(), &key));
+        let Some(remote) = &self.remote else {
+            return Ok(());
+        };
+        let paths = remote
+            .bucket
+            .list(folder, ALL)?
+            .into_iter()
+            .filter_map(|(key, _)| below(self.root(), &key));
         let missing: Vec<PathBuf> = paths.filter(|path| !path.exists()).collect();
         together(&missing, |path| self.refresh(path).map(drop))
     }
 
     /// Makes the runs of the folder those of the bucket. Events only grow; a manifest that is rewritten has another length.
     fn refresh_runs(&self) -> Result<()> {
-        let Some(remote) = &self.remote else { return Ok(()) };
+        let Some(remote) = &self.remote else {
+            return Ok(());
+        };
         // Before the bucket is listed: a run that begins in this moment is in the bucket first.
         let here = self.run_folders()?;
         let runs = self.root().join("runs");
         let mut there = BTreeSet::new();
         let mut stale = Vec::new();
         for (key, bytes) in remote.bucket.list("runs/", ALL)? {
-            let Some(path) = below(self.root(), &key) else { continue };
+            let Some(path) = below(self.root(), &key) else {
+                continue;
+            };
             there.extend(key.split('/').nth(1).map(String::from));
             let found = fs::metadata(&path).map(|metadata| metadata.len());
             let fresh = match found {
@@ -213,7 +255,10 @@ impl Store {
             }
         }
         together(&stale, |path| self.refresh(path).map(drop))?;
-        for run in here.iter().filter(|run| !there.contains(*run) && runs.join(run).join("manifest.json").exists()) {
+        for run in here
+            .iter()
+            .filter(|run| !there.contains(*run) && runs.join(run).join("manifest.json").exists())
+        {
             let gone = runs.join(run);
             fs::remove_dir_all(&gone).map_err(|e| refused(&gone, "remove", &e))?;
         }
@@ -221,10 +266,15 @@ impl Store {
     }
 
     fn refresh_tags(&self) -> Result<()> {
-        let Some(remote) = &self.remote else { return Ok(()) };
+        let Some(remote) = &self.remote else {
+            return Ok(());
+        };
         let here = super::verify::files(&self.root().join("tags"))?;
         let listed = remote.bucket.list("tags/", ALL)?;
-        let there: Vec<PathBuf> = listed.iter().filter_map(|(key, _)| below(self.root(), key)).collect();
+        let there: Vec<PathBuf> = listed
+            .iter()
+            .filter_map(|(key, _)| below(self.root(), key))
+            .collect();
         together(&there, |path| self.refresh(path).map(drop))?;
         for gone in here.iter().filter(|path| !there.contains(path)) {
             fs::remove_file(gone).map_err(|e| refused(gone, "remove", &e))?;
@@ -234,15 +284,28 @@ impl Store {
 
     /// Everything in the bucket in a new folder; none for a store that is only a folder.
     pub(super) fn copy(&self) -> Result<Option<PathBuf>> {
-        let Some(remote) = &self.remote else { return Ok(None) };
+        let Some(remote) = &self.remote else {
+            return Ok(None);
+        };
         let folder = self.workspace()?.fresh();
         let listed = remote.bucket.list("", ALL)?;
         if listed.is_empty() {
-            return Err(Error::spec(remote.bucket.name(), "no store here; name one with --store"));
+            return Err(Error::spec(
+                remote.bucket.name(),
+                "no store here; name one with --store",
+            ));
         }
-        let foreign =
-            |key: &str| Error::spec(format!("{}/{key}", remote.bucket.name()), "is nothing that calib wrote: move it away");
-        let files = listed.iter().map(|(key, _)| below(&folder, key).map(|path| (key, path)).ok_or_else(|| foreign(key)));
+        let foreign = |key: &str| {
+            Error::spec(
+                format!("{}/{key}", remote.bucket.name()),
+                "is nothing that calib wrote: move it away",
+            )
+        };
+        let files = listed.iter().map(|(key, _)| {
+            below(&folder, key)
+                .map(|path| (key, path))
+                .ok_or_else(|| foreign(key))
+        });
         together(&files.collect::<Result<Vec<_>>>()?, |(key, path)| {
             make_dir(path.parent().unwrap_or(&folder))?;
             remote.bucket.fetch(key, path).map(drop)
@@ -253,5 +316,7 @@ impl Store {
 
 /// The path of a key below a folder; none where a part of it cannot be a file name.
 fn below(folder: &Path, key: &str) -> Option<PathBuf> {
-    key.split('/').try_fold(folder.to_path_buf(), |path, part| Some(path.join(component(part).ok()?)))
+    key.split('/').try_fold(folder.to_path_buf(), |path, part| {
+        Some(path.join(component(part).ok()?))
+    })
 }

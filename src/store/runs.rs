@@ -59,20 +59,32 @@ impl Run {
         self.chain.update(&line);
         let hash = &self.chain.finalize().to_hex()[..EVENT_DIGITS];
         line.extend_from_slice(format!(",\"chain\":\"{hash}\"}}\n").as_bytes());
-        self.events.write_all(&line).map_err(|e| refused(&self.dir.join("events.jsonl"), "write", &e))
+        self.events
+            .write_all(&line)
+            .map_err(|e| refused(&self.dir.join("events.jsonl"), "write", &e))
     }
 }
 
 /// What is wrong with the events of a run, if anything; the last line of a run that was killed may be torn.
 pub(crate) fn events_fault(text: &[u8], ended: bool) -> Option<String> {
     let mut chain = blake3::Hasher::new();
-    let mut lines = text.split_inclusive(|&byte| byte == b'\n').enumerate().peekable();
+    let mut lines = text
+        .split_inclusive(|&byte| byte == b'\n')
+        .enumerate()
+        .peekable();
     while let Some((number, line)) = lines.next() {
         let tail = EVENT_DIGITS + "\"}\n".len();
-        let known = line.len().checked_sub(tail + ",\"chain\":\"".len()).map(|at| line.split_at(at));
+        let known = line
+            .len()
+            .checked_sub(tail + ",\"chain\":\"".len())
+            .map(|at| line.split_at(at));
         let whole = known.is_some_and(|(body, end)| {
             chain.update(body);
-            end == format!(",\"chain\":\"{}\"}}\n", &chain.finalize().to_hex()[..EVENT_DIGITS]).as_bytes()
+            end == format!(
+                ",\"chain\":\"{}\"}}\n",
+                &chain.finalize().to_hex()[..EVENT_DIGITS]
+            )
+            .as_bytes()
         });
         let torn = !ended && lines.peek().is_none() && !line.contains(&b'}');
         if !whole && !torn {
@@ -92,14 +104,17 @@ impl Store {
     pub fn reserve_run(&self, fresh: &str) -> Result<String> {
         self.workspace()?;
         make_dir(&self.root().join("runs"))?;
-        let reserved = fs::read_dir(self.run_dir(fresh)?).is_ok_and(|mut entries| entries.next().is_none());
+        let reserved =
+            fs::read_dir(self.run_dir(fresh)?).is_ok_and(|mut entries| entries.next().is_none());
         if reserved {
             return Ok(fresh.into());
         }
         let mut id = fresh.to_string();
         loop {
             if let Some(last) = self.run_folders()?.pop().filter(|last| *last >= id) {
-                let next = ulid::Ulid::from_string(&last).ok().and_then(|last| last.increment().ok());
+                let next = ulid::Ulid::from_string(&last)
+                    .ok()
+                    .and_then(|last| last.increment().ok());
                 id = next.map_or(id, |next| next.to_string());
             }
             let dir = self.run_dir(&id)?;
@@ -107,8 +122,12 @@ impl Store {
                 Ok(()) => return Ok(id),
                 // Another run took it in this moment.
                 Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => {
-                    let next = ulid::Ulid::from_string(&id).ok().and_then(|id| id.increment().ok());
-                    id = next.ok_or_else(|| refused(&dir, "make the folder", &e))?.to_string();
+                    let next = ulid::Ulid::from_string(&id)
+                        .ok()
+                        .and_then(|id| id.increment().ok());
+                    id = next
+                        .ok_or_else(|| refused(&dir, "make the folder", &e))?
+                        .to_string();
                 }
                 Err(e) => return Err(refused(&dir, "make the folder", &e)),
             }
@@ -131,9 +150,18 @@ impl Store {
             self.give_run(&aside, &dir.join("manifest.json"))?;
             place(&aside, &dir.join("manifest.json"))?;
             self.owe(&dir.join("manifest.json"), file)?;
-            let events = File::options().append(true).create(true).open(&path).map_err(|e| refused(&path, "write", &e))?;
+            let events = File::options()
+                .append(true)
+                .create(true)
+                .open(&path)
+                .map_err(|e| refused(&path, "write", &e))?;
             self.owe_folder(&self.root().join("runs"));
-            Ok(Run { id: id.into(), dir: dir.clone(), events, chain: blake3::Hasher::new() })
+            Ok(Run {
+                id: id.into(),
+                dir: dir.clone(),
+                events,
+                chain: blake3::Hasher::new(),
+            })
         };
         begin().inspect_err(|_| drop(fs::remove_dir_all(&dir)))
     }
@@ -171,7 +199,10 @@ impl Store {
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
             Err(e) => return Err(refused(&dir, "read", &e)),
         };
-        let mut names: Vec<String> = entries.flatten().filter_map(|entry| entry.file_name().into_string().ok()).collect();
+        let mut names: Vec<String> = entries
+            .flatten()
+            .filter_map(|entry| entry.file_name().into_string().ok())
+            .collect();
         names.sort();
         Ok(names)
     }
@@ -202,13 +233,21 @@ impl Store {
 
     /// Whether anything of a run's manifest was written: a power cut may leave a run without, which then never ended.
     pub fn has_manifest(&self, id: &str) -> bool {
-        self.run_dir(id).is_ok_and(|dir| fs::metadata(dir.join("manifest.json")).is_ok_and(|file| file.len() > 0))
+        self.run_dir(id).is_ok_and(|dir| {
+            fs::metadata(dir.join("manifest.json")).is_ok_and(|file| file.len() > 0)
+        })
     }
 
     /// The events of a run, oldest first, as far as they were written; none where they cannot be read.
     pub fn events(&self, id: &str) -> Vec<Value> {
-        let text = self.run_dir(id).ok().and_then(|dir| fs::read(dir.join("events.jsonl")).ok()).unwrap_or_default();
-        text.split(|byte| *byte == b'\n').filter_map(|line| serde_json::from_slice(line).ok()).collect()
+        let text = self
+            .run_dir(id)
+            .ok()
+            .and_then(|dir| fs::read(dir.join("events.jsonl")).ok())
+            .unwrap_or_default();
+        text.split(|byte| *byte == b'\n')
+            .filter_map(|line| serde_json::from_slice(line).ok())
+            .collect()
     }
 
     /// The manifest of a run, as far as it was written.
@@ -220,7 +259,12 @@ impl Store {
     pub fn sealed_manifest(&self, id: &str) -> Result<Sealed> {
         let path = self.run_dir(id)?.join("manifest.json");
         let bytes = fs::read(&path).map_err(|e| refused(&path, "read", &e))?;
-        let damaged = |why: String| Error::store(path.display().to_string(), format!("not a whole manifest: {why}"));
+        let damaged = |why: String| {
+            Error::store(
+                path.display().to_string(),
+                format!("not a whole manifest: {why}"),
+            )
+        };
         let sealed = unseal(&bytes).map_err(|why| damaged(why.into()))?;
         let manifest = serde_json::from_slice(&bytes).map_err(|e| damaged(e.to_string()))?;
         Ok(Sealed { manifest, sealed })

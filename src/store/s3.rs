@@ -44,20 +44,39 @@ impl S3 {
     /// Nothing is asked yet.
     pub fn open(url: &str, settings: &BTreeMap<String, String>) -> Result<Self> {
         let shape = || Error::spec(url, "expected s3://BUCKET/PREFIX");
-        let rest = url.strip_prefix("s3://").ok_or_else(shape)?.trim_end_matches('/');
+        let rest = url
+            .strip_prefix("s3://")
+            .ok_or_else(shape)?
+            .trim_end_matches('/');
         let (bucket, prefix) = rest.split_once('/').unwrap_or((rest, ""));
         let prefix = Key::parse(prefix).map_err(|_| shape())?;
         if bucket.is_empty() {
             return Err(shape());
         }
         let given = |name: &str| settings.get(name).filter(|value| !value.is_empty());
-        let endpoint = given("AWS_ENDPOINT_URL_S3").or_else(|| given("AWS_ENDPOINT_URL")).cloned().unwrap_or_default();
+        let endpoint = given("AWS_ENDPOINT_URL_S3")
+            .or_else(|| given("AWS_ENDPOINT_URL"))
+            .cloned()
+            .unwrap_or_default();
         if endpoint.starts_with("http:") && given("AWS_ALLOW_HTTP").is_none() {
-            return Err(Error::spec("AWS_ENDPOINT_URL", "is not encrypted: set AWS_ALLOW_HTTP=true where that is meant so"));
+            return Err(Error::spec(
+                "AWS_ENDPOINT_URL",
+                "is not encrypted: set AWS_ALLOW_HTTP=true where that is meant so",
+            ));
         }
-        let known = ["AWS_ACCESS_KEY_ID", "AWS_WEB_IDENTITY_TOKEN_FILE", "AWS_SKIP_SIGNATURE"];
-        let contained = ["AWS_CONTAINER_CREDENTIALS_RELATIVE_URI", "AWS_CONTAINER_CREDENTIALS_FULL_URI"];
-        let keyless = known.iter().chain(&contained).all(|name| given(name).is_none());
+        let known = [
+            "AWS_ACCESS_KEY_ID",
+            "AWS_WEB_IDENTITY_TOKEN_FILE",
+            "AWS_SKIP_SIGNATURE",
+        ];
+        let contained = [
+            "AWS_CONTAINER_CREDENTIALS_RELATIVE_URI",
+            "AWS_CONTAINER_CREDENTIALS_FULL_URI",
+        ];
+        let keyless = known
+            .iter()
+            .chain(&contained)
+            .all(|name| given(name).is_none());
         // The process may have chosen one already, and that one serves as well.
         let _ = rustls::crypto::ring::default_provider().install_default();
         let mut builder = AmazonS3Builder::new();
@@ -66,18 +85,41 @@ impl S3 {
                 builder = builder.with_config(key, value);
             }
         }
-        let retry = RetryConfig { max_retries: RETRIES, retry_timeout: PATIENCE, ..RetryConfig::default() };
+        let retry = RetryConfig {
+            max_retries: RETRIES,
+            retry_timeout: PATIENCE,
+            ..RetryConfig::default()
+        };
         // A table may take longer than the 30 s that a request is given otherwise; what stalls is told by its reading.
         let builder = builder
             .with_config(AmazonS3ConfigKey::Client(ClientConfigKey::Timeout), "600s")
-            .with_config(AmazonS3ConfigKey::Client(ClientConfigKey::ReadTimeout), "30s")
+            .with_config(
+                AmazonS3ConfigKey::Client(ClientConfigKey::ReadTimeout),
+                "30s",
+            )
             .with_bucket_name(bucket)
             .with_retry(retry);
-        let client =
-            builder.build().map_err(|e| Error::spec(url, format!("cannot be opened: {e}; look at the AWS_... variables")))?;
-        let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build();
-        let runtime = runtime.map_err(|e| Error::store(url, format!("no thread for the network: {e}")))?;
-        Ok(Self { name: format!("s3://{rest}"), bucket: bucket.into(), prefix, endpoint, keyless, client, runtime })
+        let client = builder.build().map_err(|e| {
+            Error::spec(
+                url,
+                format!("cannot be opened: {e}; look at the AWS_... variables"),
+            )
+        })?;
+        let runtime = tokio::runtime::Builder::new_multi_thread()
+            .worker_threads(1)
+            .enable_all()
+            .build();
+        let runtime =
+            runtime.map_err(|e| Error::store(url, format!("no thread for the network: {e}")))?;
+        Ok(Self {
+            name: format!("s3://{rest}"),
+            bucket: bucket.into(),
+            prefix,
+            endpoint,
+            keyless,
+            client,
+            runtime,
+        })
     }
 
     /// A folder name for what is fetched from here; other endpoints have other buckets of the same name.
@@ -87,18 +129,31 @@ impl S3 {
     }
 
     fn key(&self, key: &str) -> Result<Key> {
-        let key = if self.prefix.as_ref().is_empty() { key.into() } else { format!("{}/{key}", self.prefix) };
+        let key = if self.prefix.as_ref().is_empty() {
+            key.into()
+        } else {
+            format!("{}/{key}", self.prefix)
+        };
         Key::parse(&key).map_err(|e| Error::spec(format!("{}/{key}", self.name), e.to_string()))
     }
 
     /// What went wrong, and what the reader can do about it.
     fn refused(&self, doing: &str, key: &str, error: object_store::Error) -> Error {
-        let text = error.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
+        let text = error
+            .to_string()
+            .split_whitespace()
+            .collect::<Vec<_>>()
+            .join(" ");
         let mut said: String = text.chars().take(SHOWN).collect();
         // The first cause (no route, a certificate) is the last of a chain, and a text need not name it.
-        let causes = std::iter::successors(std::error::Error::source(&error), |error| error.source());
+        let causes =
+            std::iter::successors(std::error::Error::source(&error), |error| error.source());
         said.extend(
-            causes.last().map(ToString::to_string).filter(|cause| !text.contains(cause)).map(|cause| format!(": {cause}")),
+            causes
+                .last()
+                .map(ToString::to_string)
+                .filter(|cause| !text.contains(cause))
+                .map(|cause| format!(": {cause}")),
         );
         let place = format!("{}/{key}", self.name);
         if text.contains("NoSuchBucket") {
@@ -119,7 +174,9 @@ impl S3 {
             PermissionDenied { .. } | Unauthenticated { .. } => {
                 "look at AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, which must be allowed to list, get, put and delete there"
             }
-            _ => "check the network, AWS_ENDPOINT_URL and AWS_REGION, and run again: finished stages are kept",
+            _ => {
+                "check the network, AWS_ENDPOINT_URL and AWS_REGION, and run again: finished stages are kept"
+            }
         };
         Error::store(place, format!("cannot {doing}: {said}; {remedy}"))
     }
@@ -127,7 +184,8 @@ impl S3 {
 
 /// A key that is not there; a bucket that is not there is another matter.
 fn absent(error: &object_store::Error) -> bool {
-    matches!(error, object_store::Error::NotFound { .. }) && !error.to_string().contains("NoSuchBucket")
+    matches!(error, object_store::Error::NotFound { .. })
+        && !error.to_string().contains("NoSuchBucket")
 }
 
 impl Bucket for S3 {
@@ -147,7 +205,8 @@ impl Bucket for S3 {
             let mut parts = found.into_stream();
             while let Some(part) = parts.next().await {
                 let part = part.map_err(|error| self.refused("get it", key, error))?;
-                file.write_all(&part).map_err(|e| refused(to, "write", &e))?;
+                file.write_all(&part)
+                    .map_err(|e| refused(to, "write", &e))?;
             }
             Ok(true)
         })
@@ -165,7 +224,12 @@ impl Bucket for S3 {
         self.runtime.block_on(async {
             let failed = |error| self.refused("put it", key, error);
             if first.len() < PART {
-                return self.client.put(&at, PutPayload::from(first)).await.map(drop).map_err(failed);
+                return self
+                    .client
+                    .put(&at, PutPayload::from(first))
+                    .await
+                    .map(drop)
+                    .map_err(failed);
             }
             let upload = self.client.put_multipart(&at).await.map_err(failed)?;
             let mut upload = WriteMultipart::new_with_chunk_size(upload, PART);
@@ -182,7 +246,9 @@ impl Bucket for S3 {
     fn create(&self, from: &Path, key: &str) -> Result<bool> {
         let at = self.key(key)?;
         let bytes = std::fs::read(from).map_err(|e| refused(from, "read", &e))?;
-        let put = self.client.put_opts(&at, PutPayload::from(bytes), PutMode::Create.into());
+        let put = self
+            .client
+            .put_opts(&at, PutPayload::from(bytes), PutMode::Create.into());
         match self.runtime.block_on(put) {
             Ok(_) => Ok(true),
             Err(object_store::Error::AlreadyExists { .. }) => Ok(false),
@@ -203,11 +269,22 @@ impl Bucket for S3 {
         let below = (!below.as_ref().is_empty()).then_some(&below);
         let strip = |location: &Key| {
             let parts = location.prefix_match(&self.prefix)?;
-            Some(parts.map(|part| part.as_ref().to_string()).collect::<Vec<_>>().join("/"))
+            Some(
+                parts
+                    .map(|part| part.as_ref().to_string())
+                    .collect::<Vec<_>>()
+                    .join("/"),
+            )
         };
         let found = self.client.list(below).take(most).try_collect::<Vec<_>>();
-        let found = self.runtime.block_on(found).map_err(|error| self.refused("list it", folder, error))?;
-        let mut keys: Vec<(String, u64)> = found.iter().filter_map(|file| Some((strip(&file.location)?, file.size))).collect();
+        let found = self
+            .runtime
+            .block_on(found)
+            .map_err(|error| self.refused("list it", folder, error))?;
+        let mut keys: Vec<(String, u64)> = found
+            .iter()
+            .filter_map(|file| Some((strip(&file.location)?, file.size)))
+            .collect();
         keys.sort();
         Ok(keys)
     }

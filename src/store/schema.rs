@@ -18,7 +18,11 @@ const SCHEMAS: &[&str] = include!(concat!(env!("OUT_DIR"), "/schemas.rs"));
 
 static PARSED: LazyLock<BTreeMap<String, TableSchema>> = LazyLock::new(|| {
     let parse = |text: &&str| TableSchema::parse(text).expect("embedded schemas are valid");
-    SCHEMAS.iter().map(parse).map(|schema| (schema.name.clone(), schema)).collect()
+    SCHEMAS
+        .iter()
+        .map(parse)
+        .map(|schema| (schema.name.clone(), schema))
+        .collect()
 });
 
 /// All schemas, by kind.
@@ -28,7 +32,9 @@ pub fn all() -> impl Iterator<Item = &'static TableSchema> {
 
 /// The schema of a table kind.
 pub fn of(kind: &str) -> Result<&'static TableSchema> {
-    PARSED.get(kind).ok_or_else(|| Error::Bug(format!("no schema for table kind {kind}")))
+    PARSED
+        .get(kind)
+        .ok_or_else(|| Error::Bug(format!("no schema for table kind {kind}")))
 }
 
 /// What a table of one kind holds.
@@ -145,7 +151,11 @@ impl Version {
     /// The version of a text like `1.0.0`.
     pub fn parse(text: &str) -> Option<Self> {
         let mut parts = text.split('.').map(|part| part.parse::<u32>().ok());
-        let version = Self { major: parts.next()??, minor: parts.next()??, patch: parts.next()?? };
+        let version = Self {
+            major: parts.next()??,
+            minor: parts.next()??,
+            patch: parts.next()??,
+        };
         parts.next().is_none().then_some(version)
     }
 }
@@ -157,9 +167,13 @@ impl fmt::Display for Version {
 }
 
 impl<'de> Deserialize<'de> for Version {
-    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
+    fn deserialize<D: serde::Deserializer<'de>>(
+        deserializer: D,
+    ) -> std::result::Result<Self, D::Error> {
         let text = String::deserialize(deserializer)?;
-        Self::parse(&text).ok_or_else(|| serde::de::Error::custom(format!("`{text}` is not a version like 1.0.0")))
+        Self::parse(&text).ok_or_else(|| {
+            serde::de::Error::custom(format!("`{text}` is not a version like 1.0.0"))
+        })
     }
 }
 
@@ -178,7 +192,8 @@ impl ColumnType {
 impl TableSchema {
     /// Reads a schema file; the error names the fault of the file.
     pub fn parse(text: &str) -> Result<Self> {
-        let schema: Self = serde_json::from_str(text).map_err(|e| Error::Bug(format!("table schema: {e}")))?;
+        let schema: Self =
+            serde_json::from_str(text).map_err(|e| Error::Bug(format!("table schema: {e}")))?;
         match schema.fault() {
             Some(fault) => Err(Error::Bug(format!("table schema {}: {fault}", schema.name))),
             None => Ok(schema),
@@ -192,10 +207,12 @@ impl TableSchema {
 
     /// The field that a column belongs to, with the joint (from 1) of a per-joint column.
     pub fn field_of(&self, column: &str) -> Option<(&FieldSchema, Option<usize>)> {
-        self.fields.iter().find_map(|field| match field.joint_of(column) {
-            Some(joint) => Some((field, Some(joint))),
-            None => (!field.per_joint && field.name == column).then_some((field, None)),
-        })
+        self.fields
+            .iter()
+            .find_map(|field| match field.joint_of(column) {
+                Some(joint) => Some((field, Some(joint))),
+                None => (!field.per_joint && field.name == column).then_some((field, None)),
+            })
     }
 
     fn fault(&self) -> Option<String> {
@@ -208,10 +225,18 @@ impl TableSchema {
         for key in &self.primary_key {
             match self.fields.iter().find(|field| &field.name == key) {
                 Some(field) if !field.nullable && !field.optional && !field.per_joint => (),
-                _ => return Some(format!("key column `{key}` must be there and neither nullable, optional nor per_joint")),
+                _ => {
+                    return Some(format!(
+                        "key column `{key}` must be there and neither nullable, optional nor per_joint"
+                    ));
+                }
             }
         }
-        let fault_of = |field: &FieldSchema| field.fault().map(|fault| format!("field {}: {fault}", field.name));
+        let fault_of = |field: &FieldSchema| {
+            field
+                .fault()
+                .map(|fault| format!("field {}: {fault}", field.name))
+        };
         self.fields.iter().find_map(fault_of)
     }
 }
@@ -236,15 +261,30 @@ impl FieldSchema {
     /// The Arrow field of a column, with unit, description and semantic as metadata.
     pub fn arrow(&self, joint: Option<usize>) -> Field {
         let number = joint.map_or(String::new(), |joint| joint.to_string());
-        let mut metadata = vec![("description".to_string(), self.description.replace("{j}", &number))];
-        metadata.extend(self.unit.iter().map(|unit| ("unit".to_string(), unit.clone())));
-        metadata.extend(self.semantic.iter().map(|semantic| ("semantic".to_string(), semantic.clone())));
-        Field::new(self.column(joint), self.column_type.arrow(), self.nullable).with_metadata(metadata.into_iter().collect())
+        let mut metadata = vec![(
+            "description".to_string(),
+            self.description.replace("{j}", &number),
+        )];
+        metadata.extend(
+            self.unit
+                .iter()
+                .map(|unit| ("unit".to_string(), unit.clone())),
+        );
+        metadata.extend(
+            self.semantic
+                .iter()
+                .map(|semantic| ("semantic".to_string(), semantic.clone())),
+        );
+        Field::new(self.column(joint), self.column_type.arrow(), self.nullable)
+            .with_metadata(metadata.into_iter().collect())
     }
 
     fn fault(&self) -> Option<String> {
         let Constraints { min, max, values } = &self.constraints;
-        let unit_known = self.unit.as_deref().is_none_or(|unit| unit == "row" || Unit::parse(unit).is_some());
+        let unit_known = self
+            .unit
+            .as_deref()
+            .is_none_or(|unit| unit == "row" || Unit::parse(unit).is_some());
         let numeric = matches!(self.column_type, ColumnType::Int64 | ColumnType::Float64);
         if self.per_joint != self.name.contains("{j}") {
             return Some("`per_joint` needs `{j}` in the name".into());
@@ -253,12 +293,17 @@ impl FieldSchema {
             return Some("`either` needs `per_joint`".into());
         }
         if !unit_known {
-            return Some(format!("unit `{}` is unknown", self.unit.as_deref().unwrap_or_default()));
+            return Some(format!(
+                "unit `{}` is unknown",
+                self.unit.as_deref().unwrap_or_default()
+            ));
         }
         if (self.column_type == ColumnType::Float64) != self.unit.is_some() {
             return Some("float64 columns, and only they, have a `unit`".into());
         }
-        if (min.is_some() || max.is_some()) && !numeric || !values.is_empty() && self.column_type != ColumnType::Utf8 {
+        if (min.is_some() || max.is_some()) && !numeric
+            || !values.is_empty() && self.column_type != ColumnType::Utf8
+        {
             return Some("`min` and `max` are for numbers, `enum` for text".into());
         }
         None
@@ -299,11 +344,23 @@ mod tests {
             for field in &schema.fields {
                 match field.unit.as_deref() {
                     None | Some("1" | "row") => {
-                        assert!(!endings.iter().any(|(_, end)| field.name.ends_with(end)), "{}", field.name)
+                        assert!(
+                            !endings.iter().any(|(_, end)| field.name.ends_with(end)),
+                            "{}",
+                            field.name
+                        )
                     }
                     Some(unit) => {
-                        let (_, end) = endings.iter().find(|(symbol, _)| *symbol == unit).expect(unit);
-                        assert!(field.name.ends_with(end), "{}.{} in {unit}", schema.name, field.name);
+                        let (_, end) = endings
+                            .iter()
+                            .find(|(symbol, _)| *symbol == unit)
+                            .expect(unit);
+                        assert!(
+                            field.name.ends_with(end),
+                            "{}.{} in {unit}",
+                            schema.name,
+                            field.name
+                        );
                     }
                 }
             }
@@ -313,11 +370,23 @@ mod tests {
     #[test]
     fn a_column_of_a_joint_is_told_from_its_neighbours() {
         let recording = of("recording").unwrap();
-        let joint = |column| recording.field_of(column).map(|(field, joint)| (field.name.as_str(), joint));
+        let joint = |column| {
+            recording
+                .field_of(column)
+                .map(|(field, joint)| (field.name.as_str(), joint))
+        };
         assert_eq!(joint("q12_rad"), Some(("q{j}_rad", Some(12))));
         assert_eq!(joint("dir3"), Some(("dir{j}", Some(3))));
         assert_eq!(joint("x_mm"), Some(("x_mm", None)));
-        assert_eq!((joint("q0_rad"), joint("q01_rad"), joint("q{j}_rad"), joint("q_rad")), (None, None, None, None));
+        assert_eq!(
+            (
+                joint("q0_rad"),
+                joint("q01_rad"),
+                joint("q{j}_rad"),
+                joint("q_rad")
+            ),
+            (None, None, None, None)
+        );
     }
 
     #[test]
@@ -329,12 +398,30 @@ mod tests {
         };
         for (field, says) in [
             (r#"{"name":"x","type":"float64","description":""}"#, "unit"),
-            (r#"{"name":"x","type":"float64","unit":"furlong","description":""}"#, "furlong"),
-            (r#"{"name":"x","type":"float64","unit":"mm","per_joint":true,"description":""}"#, "{j}"),
-            (r#"{"name":"x","type":"utf8","constraints":{"min":1},"description":""}"#, "min"),
-            (r#"{"name":"x","type":"utf8","descripton":""}"#, "descripton"),
+            (
+                r#"{"name":"x","type":"float64","unit":"furlong","description":""}"#,
+                "furlong",
+            ),
+            (
+                r#"{"name":"x","type":"float64","unit":"mm","per_joint":true,"description":""}"#,
+                "{j}",
+            ),
+            (
+                r#"{"name":"x","type":"utf8","constraints":{"min":1},"description":""}"#,
+                "min",
+            ),
+            (
+                r#"{"name":"x","type":"utf8","descripton":""}"#,
+                "descripton",
+            ),
         ] {
-            assert!(TableSchema::parse(&with(field)).unwrap_err().to_string().contains(says), "{field}");
+            assert!(
+                TableSchema::parse(&with(field))
+                    .unwrap_err()
+                    .to_string()
+                    .contains(says),
+                "{field}"
+            );
         }
     }
 }

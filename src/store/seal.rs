@@ -24,7 +24,9 @@ pub(super) fn seal(value: &impl Serialize) -> Result<Vec<u8>> {
 /// The hash that a sealed text carries, if it is the text's own; else what is wrong.
 pub(super) fn unseal(text: &[u8]) -> std::result::Result<String, &'static str> {
     let tail = OPEN.len() + DIGITS + CLOSE.len();
-    let Some(split) = text.len().checked_sub(tail) else { return Err("it is torn") };
+    let Some(split) = text.len().checked_sub(tail) else {
+        return Err("it is torn");
+    };
     let (body, end) = text.split_at(split);
     let carried = end
         .strip_prefix(OPEN.as_bytes())

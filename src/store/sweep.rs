@@ -35,7 +35,12 @@ pub struct Sweep {
 impl Store {
     /// Takes away the records of actions that are neither in `keep` nor named by a fleet, the objects that neither a record nor a fleet names then,
     /// and what was set aside as damaged; of all these only what was last changed before `before`. Refuses while a run is in flight.
-    pub fn sweep(&self, keep: &BTreeSet<String>, before: SystemTime, dry_run: bool) -> Result<Sweep> {
+    pub fn sweep(
+        &self,
+        keep: &BTreeSet<String>,
+        before: SystemTime,
+        dry_run: bool,
+    ) -> Result<Sweep> {
         if self.in_bucket() {
             return Err(Error::spec(
                 self.name(),
@@ -48,13 +53,18 @@ impl Store {
         }
         let mut sweep = Sweep::default();
         let mut named: BTreeSet<String> = BTreeSet::new();
-        for path in files(&self.root().join("fleets"))?.iter().filter(|path| path.extension().is_some_and(|end| end == "json")) {
+        for path in files(&self.root().join("fleets"))?
+            .iter()
+            .filter(|path| path.extension().is_some_and(|end| end == "json"))
+        {
             hashes_in(path, &mut named)?;
         }
         let mut gone: BTreeSet<PathBuf> = BTreeSet::new();
         for path in files(&self.root().join("actions"))? {
             let asked = |stem: &str| keep.contains(stem) || named.contains(stem);
-            let kept = path.file_stem().is_some_and(|stem| asked(&stem.to_string_lossy()));
+            let kept = path
+                .file_stem()
+                .is_some_and(|stem| asked(&stem.to_string_lossy()));
             if kept || !old(&path, before, &mut sweep) {
                 sweep.kept_actions += 1;
                 continue;
@@ -63,12 +73,20 @@ impl Store {
             sweep.bytes += remove(&path, dry_run)?;
             gone.insert(path);
         }
-        for path in files(&self.root().join("actions"))?.iter().filter(|path| !gone.contains(*path)) {
+        for path in files(&self.root().join("actions"))?
+            .iter()
+            .filter(|path| !gone.contains(*path))
+        {
             hashes_in(path, &mut named)?;
         }
         for path in files(&self.root().join("objects"))? {
-            let damaged = path.extension().is_some_and(|extension| extension == "damaged");
-            let needed = !damaged && path.file_stem().is_some_and(|stem| named.contains(&*stem.to_string_lossy()));
+            let damaged = path
+                .extension()
+                .is_some_and(|extension| extension == "damaged");
+            let needed = !damaged
+                && path
+                    .file_stem()
+                    .is_some_and(|stem| named.contains(&*stem.to_string_lossy()));
             if needed || !old(&path, before, &mut sweep) {
                 sweep.kept_objects += 1;
                 continue;
@@ -83,20 +101,26 @@ impl Store {
 /// What looks like a hash in a record, also in one that cannot be read as one any more.
 fn hashes_in(path: &Path, hashes: &mut BTreeSet<String>) -> Result<()> {
     let text = fs::read(path).map_err(|e| refused(path, "read", &e))?;
-    let words = text.split(|byte| !byte.is_ascii_hexdigit()).filter(|word| word.len() == 64);
+    let words = text
+        .split(|byte| !byte.is_ascii_hexdigit())
+        .filter(|word| word.len() == 64);
     hashes.extend(words.map(|word| String::from_utf8_lossy(word).into_owned()));
     Ok(())
 }
 
 /// True where a file was last changed before `before`; a time that lies in the future counts as young.
 fn old(path: &Path, before: SystemTime, sweep: &mut Sweep) -> bool {
-    let old = fs::metadata(path).and_then(|metadata| metadata.modified()).is_ok_and(|time| time < before);
+    let old = fs::metadata(path)
+        .and_then(|metadata| metadata.modified())
+        .is_ok_and(|time| time < before);
     sweep.young += u64::from(!old);
     old
 }
 
 fn remove(path: &Path, dry_run: bool) -> Result<u64> {
-    let bytes = fs::metadata(path).map(|metadata| metadata.len()).unwrap_or(0);
+    let bytes = fs::metadata(path)
+        .map(|metadata| metadata.len())
+        .unwrap_or(0);
     if !dry_run {
         fs::remove_file(path).map_err(|e| refused(path, "remove", &e))?;
     }
@@ -107,9 +131,14 @@ impl Store {
     /// Runs that the records of fleets name.
     pub fn runs_of_fleets(&self) -> Result<BTreeSet<String>> {
         let mut runs = BTreeSet::new();
-        for path in files(&self.root().join("fleets"))?.iter().filter(|path| path.extension().is_some_and(|end| end == "json")) {
+        for path in files(&self.root().join("fleets"))?
+            .iter()
+            .filter(|path| path.extension().is_some_and(|end| end == "json"))
+        {
             let text = fs::read(path).map_err(|e| refused(path, "read", &e))?;
-            let words = text.split(|byte| !byte.is_ascii_alphanumeric()).filter(|word| word.len() == RUN_ID);
+            let words = text
+                .split(|byte| !byte.is_ascii_alphanumeric())
+                .filter(|word| word.len() == RUN_ID);
             runs.extend(words.map(|word| String::from_utf8_lossy(word).into_owned()));
         }
         Ok(runs)

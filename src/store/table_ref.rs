@@ -23,5 +23,7 @@ pub struct TableRef {
 
 /// Whether a file is the one that was published, byte for byte.
 pub(super) fn same_bytes(path: &Path, table: &TableRef) -> bool {
-    File::open(path).and_then(FileHash::of_reader).is_ok_and(|found| found == table.file_hash)
+    File::open(path)
+        .and_then(FileHash::of_reader)
+        .is_ok_and(|found| found == table.file_hash)
 }

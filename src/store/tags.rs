@@ -19,7 +19,10 @@ impl Store {
     fn tag_path(&self, name: &str) -> Result<PathBuf> {
         let name = component(name)?;
         if name.starts_with("HEAD") || name.ends_with(".json") {
-            return Err(Error::spec(format!("tag {name}"), "a tag must not begin with HEAD or end in .json"));
+            return Err(Error::spec(
+                format!("tag {name}"),
+                "a tag must not begin with HEAD or end in .json",
+            ));
         }
         Ok(self.root().join("tags").join(format!("{name}.json")))
     }
@@ -34,10 +37,18 @@ impl Store {
         };
         let mut tags = BTreeMap::new();
         for path in entries.flatten().map(|entry| entry.path()) {
-            let Some(name) = path.file_name().and_then(|name| name.to_str()?.strip_suffix(".json")) else { continue };
+            let Some(name) = path
+                .file_name()
+                .and_then(|name| name.to_str()?.strip_suffix(".json"))
+            else {
+                continue;
+            };
             let bytes = fs::read(&path).map_err(|e| refused(&path, "read", &e))?;
             let damaged = |why: &str| {
-                Error::store(path.display().to_string(), format!("damaged: {why}; set it again with calib tag RUN {name}"))
+                Error::store(
+                    path.display().to_string(),
+                    format!("damaged: {why}; set it again with calib tag RUN {name}"),
+                )
             };
             unseal(&bytes).map_err(damaged)?;
             let tag: Tag = serde_json::from_slice(&bytes).map_err(|e| damaged(&e.to_string()))?;

@@ -36,7 +36,10 @@ pub struct Verification {
     pub faults: Vec<Fault>,
 }
 
-fn texts<S: serde::Serializer>(faults: &[Fault], serializer: S) -> std::result::Result<S::Ok, S::Error> {
+fn texts<S: serde::Serializer>(
+    faults: &[Fault],
+    serializer: S,
+) -> std::result::Result<S::Ok, S::Error> {
     serializer.collect_seq(faults.iter().map(Fault::to_string))
 }
 
@@ -49,7 +52,10 @@ impl Store {
         let mut found = Verification::default();
         let format = self.root().join("format.json");
         if fs::read(&format).map_err(|e| refused(&format, "read", &e))? != super::format_text()? {
-            found.faults.push(fault(&format, "is not what was written; restore it: {\"calib_store\":1}"));
+            found.faults.push(fault(
+                &format,
+                "is not what was written; restore it: {\"calib_store\":1}",
+            ));
         }
         let objects = self.check_objects(&mut found)?;
         let mut known: BTreeSet<String> = objects.keys().cloned().collect();
@@ -60,13 +66,17 @@ impl Store {
                 found.tags = tags.len() as u64;
                 let runs = self.runs()?;
                 for (tag, run) in tags.into_iter().filter(|(_, run)| !runs.contains(run)) {
-                    found.faults.push(Fault::new(format!("tag {tag}"), format!("names the run {run}, which is not there")));
+                    found.faults.push(Fault::new(
+                        format!("tag {tag}"),
+                        format!("names the run {run}, which is not there"),
+                    ));
                 }
             }
             Err(Error::Store(tag)) => found.faults.push(tag),
             Err(other) => return Err(other),
         }
-        let advice = "is no table that a run wrote: it was edited or is damaged; calib run writes it anew";
+        let advice =
+            "is no table that a run wrote: it was edited or is damaged; calib run writes it anew";
         for path in files(&self.root().join("tables"))? {
             found.copies += 1;
             if !known.contains(hash(&path)?.0.as_str()) {
@@ -74,10 +84,17 @@ impl Store {
             }
         }
         self.check_documents(&mut found)?;
-        for path in files(&self.root().join("fleets"))?.iter().filter(|path| path.extension().is_some_and(|end| end == "json")) {
+        for path in files(&self.root().join("fleets"))?
+            .iter()
+            .filter(|path| path.extension().is_some_and(|end| end == "json"))
+        {
             found.notes += 1;
             let text = fs::read(path).map_err(|e| refused(path, "read", &e))?;
-            found.faults.extend(unseal(&text).err().map(|why| fault(path, &format!("{why}; calib fleet run writes it anew"))));
+            found.faults.extend(
+                unseal(&text)
+                    .err()
+                    .map(|why| fault(path, &format!("{why}; calib fleet run writes it anew"))),
+            );
         }
         Ok(found)
     }
@@ -85,16 +102,31 @@ impl Store {
     /// Objects by name, with whether they are whole.
     fn check_objects(&self, found: &mut Verification) -> Result<BTreeMap<String, bool>> {
         let paths = files(&self.root().join("objects"))?;
-        let hashes: Vec<(PathBuf, Result<(FileHash, u64)>)> = paths.par_iter().map(|path| (path.clone(), hash(path))).collect();
+        let hashes: Vec<(PathBuf, Result<(FileHash, u64)>)> = paths
+            .par_iter()
+            .map(|path| (path.clone(), hash(path)))
+            .collect();
         let mut objects = BTreeMap::new();
         for (path, hashed) in hashes {
-            let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+            let name = path
+                .file_stem()
+                .map(|stem| stem.to_string_lossy().into_owned())
+                .unwrap_or_default();
             let (hash, bytes) = hashed?;
             found.objects += 1;
             found.bytes += bytes;
-            let whole = hash.as_str() == name && path.extension().is_some_and(|extension| extension == "parquet");
-            if path.extension().is_some_and(|extension| extension == "damaged") {
-                found.faults.push(fault(&path, "was set aside as damaged; calib gc takes it away"));
+            let whole = hash.as_str() == name
+                && path
+                    .extension()
+                    .is_some_and(|extension| extension == "parquet");
+            if path
+                .extension()
+                .is_some_and(|extension| extension == "damaged")
+            {
+                found.faults.push(fault(
+                    &path,
+                    "was set aside as damaged; calib gc takes it away",
+                ));
             } else if !whole {
                 found.faults.push(fault(
                     &path,
@@ -106,21 +138,31 @@ impl Store {
         Ok(objects)
     }
 
-    fn check_actions(&self, objects: &BTreeMap<String, bool>, found: &mut Verification) -> Result<()> {
+    fn check_actions(
+        &self,
+        objects: &BTreeMap<String, bool>,
+        found: &mut Verification,
+    ) -> Result<()> {
         for path in files(&self.root().join("actions"))? {
             found.actions += 1;
             let record = match read_record(&path)? {
                 Ok(record) => record,
                 Err(why) => {
-                    found.faults.push(fault(&path, &format!("{why}; calib run makes it anew where it is needed")));
+                    found.faults.push(fault(
+                        &path,
+                        &format!("{why}; calib run makes it anew where it is needed"),
+                    ));
                     continue;
                 }
             };
             for (port, table) in &record.tables {
                 if !objects.contains_key(table.file_hash.as_str()) {
-                    found
-                        .faults
-                        .push(fault(&path, &format!("its table {port} is missing from the objects; calib run makes it anew")));
+                    found.faults.push(fault(
+                        &path,
+                        &format!(
+                            "its table {port} is missing from the objects; calib run makes it anew"
+                        ),
+                    ));
                 }
             }
         }
@@ -143,17 +185,26 @@ impl Store {
                 Err(other) => return Err(other),
             };
             if manifest["run_id"] != run.as_str() {
-                found.faults.push(fault(&path.join("manifest.json"), "is the manifest of another run"));
+                found.faults.push(fault(
+                    &path.join("manifest.json"),
+                    "is the manifest of another run",
+                ));
             }
             let events = path.join("events.jsonl");
             match fs::read(&events) {
                 Ok(text) => {
                     let ended = manifest["status"] != "running";
-                    found.faults.extend(events_fault(&text, ended).map(|why| fault(&events, &why)));
+                    found
+                        .faults
+                        .extend(events_fault(&text, ended).map(|why| fault(&events, &why)));
                 }
                 // A run may be killed between its manifest and its first event.
-                Err(e) if e.kind() == std::io::ErrorKind::NotFound && manifest["status"] == "running" => {}
-                Err(e) => found.faults.push(fault(&events, &format!("cannot be read: {e}"))),
+                Err(e)
+                    if e.kind() == std::io::ErrorKind::NotFound
+                        && manifest["status"] == "running" => {}
+                Err(e) => found
+                    .faults
+                    .push(fault(&events, &format!("cannot be read: {e}"))),
             }
             for output in manifest["stages"]
                 .as_array()
@@ -167,13 +218,18 @@ impl Store {
             seals.insert(run, Some(sealed));
         }
         for (run, previous) in links.iter().filter(|(_, previous)| !previous.is_null()) {
-            let (before, sealed) = (previous["run"].as_str().unwrap_or_default(), previous["sealed"].as_str());
+            let (before, sealed) = (
+                previous["run"].as_str().unwrap_or_default(),
+                previous["sealed"].as_str(),
+            );
             let why = match seals.get(before) {
                 None => format!("the preceding run {before} is missing"),
                 // A broken seal is a fault of its own already.
                 Some(None) => continue,
                 Some(Some(found)) if Some(found.as_str()) == sealed => continue,
-                Some(Some(_)) => format!("the manifest of the preceding run {before} has changed since this run began"),
+                Some(Some(_)) => format!(
+                    "the manifest of the preceding run {before} has changed since this run began"
+                ),
             };
             found.faults.push(Fault::new(format!("run {run}"), why));
         }
@@ -188,22 +244,35 @@ impl Store {
         for path in files(&seals)? {
             found.notes += 1;
             let text = fs::read(&path).map_err(|e| refused(&path, "read", &e))?;
-            let whole = unseal(&text).ok().and_then(|_| serde_json::from_slice::<serde_json::Value>(&text).ok());
-            let named = path.strip_prefix(&seals).ok().map(|name| documents.join(name.with_extension("")));
+            let whole = unseal(&text)
+                .ok()
+                .and_then(|_| serde_json::from_slice::<serde_json::Value>(&text).ok());
+            let named = path
+                .strip_prefix(&seals)
+                .ok()
+                .map(|name| documents.join(name.with_extension("")));
             let (Some(note), Some(document)) = (whole, named) else {
-                found.faults.push(fault(&path, "is damaged; calib run writes it anew"));
+                found
+                    .faults
+                    .push(fault(&path, "is damaged; calib run writes it anew"));
                 continue;
             };
             found.copies += 1;
             match hash(&document) {
                 Ok((hash, _)) if note["blake3"] == hash.as_str() => {}
                 Ok(_) => found.faults.push(fault(&document, advice)),
-                Err(_) => found.faults.push(fault(&document, "is gone; calib run writes it anew")),
+                Err(_) => found
+                    .faults
+                    .push(fault(&document, "is gone; calib run writes it anew")),
             }
             sealed.insert(document);
         }
-        let unsealed = files(&documents)?.into_iter().filter(|path| !sealed.contains(path));
-        found.faults.extend(unsealed.map(|path| fault(&path, "is no document that calib wrote")));
+        let unsealed = files(&documents)?
+            .into_iter()
+            .filter(|path| !sealed.contains(path));
+        found
+            .faults
+            .extend(unsealed.map(|path| fault(&path, "is no document that calib wrote")));
         Ok(())
     }
 
@@ -211,7 +280,10 @@ impl Store {
     fn verify_copy(&self, copy: &Path) -> Result<Verification> {
         let mut found = match Store::open(copy) {
             Ok(store) => store.verify()?,
-            Err(Error::Store(fault)) => Verification { faults: vec![fault], ..Verification::default() },
+            Err(Error::Store(fault)) => Verification {
+                faults: vec![fault],
+                ..Verification::default()
+            },
             Err(other) => return Err(other),
         };
         let (prefix, name) = (copy.display().to_string(), self.name());
@@ -221,7 +293,10 @@ impl Store {
             {
                 let _ = fs::remove_file(self.root().join(key));
             }
-            (fault.place, fault.message) = (fault.place.replace(&prefix, &name), fault.message.replace(&prefix, &name));
+            (fault.place, fault.message) = (
+                fault.place.replace(&prefix, &name),
+                fault.message.replace(&prefix, &name),
+            );
         }
         fs::remove_dir_all(copy).map_err(|e| refused(copy, "remove", &e))?;
         Ok(found)
@@ -247,7 +322,9 @@ fn read_record(path: &Path) -> Result<std::result::Result<ActionRecord, String>>
         Ok(record) => record,
         Err(e) => return Ok(Err(format!("not an action record ({e})"))),
     };
-    let named = path.file_stem().is_some_and(|stem| stem == record.id.as_str());
+    let named = path
+        .file_stem()
+        .is_some_and(|stem| stem == record.id.as_str());
     if !named || record.key.id() != record.id {
         return Ok(Err("the record is not of the key that its name says".into()));
     }

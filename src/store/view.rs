@@ -11,9 +11,19 @@ use crate::error::Result;
 
 impl Store {
     /// Shows a table as `tables/<pipeline>/<stage>.<port>.parquet`: another name of the object, or a copy where links cannot be.
-    pub fn expose(&self, pipeline: &str, stage: &str, port: &str, table: &TableRef) -> Result<PathBuf> {
+    pub fn expose(
+        &self,
+        pipeline: &str,
+        stage: &str,
+        port: &str,
+        table: &TableRef,
+    ) -> Result<PathBuf> {
         let name = format!("{}.{}.parquet", component(stage)?, component(port)?);
-        let path = self.root().join("tables").join(component(pipeline)?).join(name);
+        let path = self
+            .root()
+            .join("tables")
+            .join(component(pipeline)?)
+            .join(name);
         let object = self.object_path(table);
         let aside = self.workspace()?.fresh();
         if fs::hard_link(&object, &aside).is_err() {
@@ -27,13 +37,22 @@ impl Store {
     /// Whether a table of a stage was ever shown.
     pub fn shown(&self, pipeline: &str, stage: &str) -> bool {
         let opening = format!("{stage}.");
-        let entries = fs::read_dir(self.root().join("tables").join(pipeline)).into_iter().flatten().flatten();
-        entries.into_iter().any(|entry| entry.file_name().to_string_lossy().starts_with(&opening))
+        let entries = fs::read_dir(self.root().join("tables").join(pipeline))
+            .into_iter()
+            .flatten()
+            .flatten();
+        entries
+            .into_iter()
+            .any(|entry| entry.file_name().to_string_lossy().starts_with(&opening))
     }
 
     /// Writes a document (a report) as `documents/<pipeline>/<name>`, and its hash as `seals/<pipeline>/<name>.json`.
     pub fn expose_document(&self, pipeline: &str, name: &str, content: &[u8]) -> Result<PathBuf> {
-        let path = self.root().join("documents").join(component(pipeline)?).join(component(name)?);
+        let path = self
+            .root()
+            .join("documents")
+            .join(component(pipeline)?)
+            .join(component(name)?);
         let aside = self.workspace()?.fresh();
         let file = write(&aside, content)?;
         place(&aside, &path)?;

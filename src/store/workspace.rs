@@ -26,19 +26,26 @@ impl Workspace {
         loop {
             let dir = tmp.join(fresh_name());
             let lock_path = dir.with_extension("lock");
-            let lock = File::create_new(&lock_path).map_err(|e| refused(&lock_path, "write", &e))?;
+            let lock =
+                File::create_new(&lock_path).map_err(|e| refused(&lock_path, "write", &e))?;
             // A sweeper may have come between creating and locking; then the name is gone or held: take another.
             if lock.try_lock().is_err() || !lock_path.exists() {
                 continue;
             }
             make_dir(&dir)?;
-            return Ok(Self { dir, lock_path, _lock: lock, next: AtomicU64::new(0) });
+            return Ok(Self {
+                dir,
+                lock_path,
+                _lock: lock,
+                next: AtomicU64::new(0),
+            });
         }
     }
 
     /// A path that nobody else uses.
     pub(super) fn fresh(&self) -> PathBuf {
-        self.dir.join(self.next.fetch_add(1, Ordering::Relaxed).to_string())
+        self.dir
+            .join(self.next.fetch_add(1, Ordering::Relaxed).to_string())
     }
 }
 
@@ -57,19 +64,32 @@ impl Drop for Workspace {
 
 /// True while a living process has a folder below `tmp`.
 pub(super) fn in_use(tmp: &Path) -> bool {
-    let entries = fs::read_dir(tmp).into_iter().flatten().flatten().map(|entry| entry.path());
-    let mut locks = entries.filter(|path| path.extension().is_some_and(|extension| extension == "lock"));
-    locks.any(|path| File::open(path).is_ok_and(|lock| matches!(lock.try_lock(), Err(TryLockError::WouldBlock))))
+    let entries = fs::read_dir(tmp)
+        .into_iter()
+        .flatten()
+        .flatten()
+        .map(|entry| entry.path());
+    let mut locks = entries.filter(|path| {
+        path.extension()
+            .is_some_and(|extension| extension == "lock")
+    });
+    locks.any(|path| {
+        File::open(path).is_ok_and(|lock| matches!(lock.try_lock(), Err(TryLockError::WouldBlock)))
+    })
 }
 
 /// Removes the folders whose owner is dead, that is, whose lock can be had. What cannot be removed stays: it harms nobody.
 fn sweep(tmp: &Path) {
-    let Ok(entries) = fs::read_dir(tmp) else { return };
+    let Ok(entries) = fs::read_dir(tmp) else {
+        return;
+    };
     for path in entries.flatten().map(|entry| entry.path()) {
         if path.extension().is_none_or(|extension| extension != "lock") {
             continue;
         }
-        let Ok(lock) = File::open(&path) else { continue };
+        let Ok(lock) = File::open(&path) else {
+            continue;
+        };
         match lock.try_lock() {
             Ok(()) => {
                 let _ = fs::remove_dir_all(path.with_extension(""));

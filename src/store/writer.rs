@@ -82,13 +82,23 @@ struct Open {
 
 impl TableWriter {
     pub(super) fn new(schema: &'static TableSchema, workspace: Arc<Workspace>) -> Self {
-        Self { schema, path: workspace.fresh(), workspace, rows: 0, state: None }
+        Self {
+            schema,
+            path: workspace.fresh(),
+            workspace,
+            rows: 0,
+            state: None,
+        }
     }
 
     /// Appends a chunk; a table without rows still needs one empty chunk. May fail for a chunk before.
     pub fn push(&mut self, chunk: &Frame) -> Result<()> {
         if chunk.kind() != self.schema.name {
-            return Err(Error::Bug(format!("a chunk of table {} for a table of {}", chunk.kind(), self.schema.name)));
+            return Err(Error::Bug(format!(
+                "a chunk of table {} for a table of {}",
+                chunk.kind(),
+                self.schema.name
+            )));
         }
         self.rows += chunk.rows() as u64;
         match self.state.take() {
@@ -97,7 +107,10 @@ impl TableWriter {
                 self.state = Some(WriterState::Aside(aside));
             }
             Some(WriterState::Here(open)) => self.state = Some(self.begun(open, chunk)?),
-            None => self.state = Some(self.begun(Box::new(Open::new(self.schema, chunk, &self.path)?), chunk)?),
+            None => {
+                self.state =
+                    Some(self.begun(Box::new(Open::new(self.schema, chunk, &self.path)?), chunk)?)
+            }
         }
         Ok(())
     }
@@ -122,22 +135,44 @@ impl TableWriter {
         let open = match self.state {
             Some(WriterState::Here(open)) => *open,
             Some(WriterState::Aside(aside)) => aside.end()?,
-            None => return Err(Error::Bug(format!("table {}: finished without a chunk", self.schema.name))),
+            None => {
+                return Err(Error::Bug(format!(
+                    "table {}: finished without a chunk",
+                    self.schema.name
+                )));
+            }
         };
         let (table, written) = open.finish()?;
-        Ok(FinishedFile { table, path: self.path, written: Some(written), _workspace: self.workspace })
+        Ok(FinishedFile {
+            table,
+            path: self.path,
+            written: Some(written),
+            _workspace: self.workspace,
+        })
     }
 }
 
 impl EncodingThread {
     fn new(mut open: Open) -> Self {
         let (chunks, taken) = sync_channel::<RecordBatch>(1);
-        let encode = move || taken.into_iter().try_for_each(|chunk| open.push(&chunk)).map(|()| open);
-        Self { chunks: Some(chunks), thread: Some(std::thread::spawn(encode)) }
+        let encode = move || {
+            taken
+                .into_iter()
+                .try_for_each(|chunk| open.push(&chunk))
+                .map(|()| open)
+        };
+        Self {
+            chunks: Some(chunks),
+            thread: Some(std::thread::spawn(encode)),
+        }
     }
 
     fn push(&mut self, chunk: &RecordBatch) -> Result<()> {
-        match self.chunks.as_ref().map(|chunks| chunks.send(chunk.clone())) {
+        match self
+            .chunks
+            .as_ref()
+            .map(|chunks| chunks.send(chunk.clone()))
+        {
             Some(Ok(())) => Ok(()),
             // It ended before its time.
             _ => self.join().map(drop),
@@ -146,8 +181,13 @@ impl EncodingThread {
 
     fn join(&mut self) -> Result<Open> {
         self.chunks = None;
-        let thread = self.thread.take().ok_or_else(|| Error::Bug("a table that failed before".into()))?;
-        thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+        let thread = self
+            .thread
+            .take()
+            .ok_or_else(|| Error::Bug("a table that failed before".into()))?;
+        thread
+            .join()
+            .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
     }
 
     fn end(mut self) -> Result<Open> {
@@ -186,26 +226,56 @@ impl Drop for FinishedFile {
 impl Open {
     fn new(schema: &'static TableSchema, chunk: &Frame, path: &Path) -> Result<Self> {
         let file = File::create_new(path).map_err(|e| refused(path, "write", &e))?;
-        let (arrow_schema, content) = (chunk.arrow_schema(), ContentHasher::new(&schema.name, schema.version.major));
+        let (arrow_schema, content) = (
+            chunk.arrow_schema(),
+            ContentHasher::new(&schema.name, schema.version.major),
+        );
         let path = path.to_path_buf();
-        Ok(Self { schema, path, file: Some(file), writer: None, arrow_schema, content, waiting: Vec::new(), last: None, rows: 0 })
+        Ok(Self {
+            schema,
+            path,
+            file: Some(file),
+            writer: None,
+            arrow_schema,
+            content,
+            waiting: Vec::new(),
+            last: None,
+            rows: 0,
+        })
     }
 
     fn writer(&mut self, first: Option<&RecordBatch>) -> Result<&mut ArrowWriter<HashingFile>> {
         if let Some(file) = self.file.take() {
-            let capacity = if self.rows < SMALL_ROWS { 1 << 14 } else { 1 << 18 };
-            let sink = HashingFile { file: BufWriter::with_capacity(capacity, file), hasher: blake3::Hasher::new(), bytes: 0 };
-            let properties = properties(self.schema, &self.arrow_schema, first.filter(|_| self.rows >= SMALL_ROWS))?;
+            let capacity = if self.rows < SMALL_ROWS {
+                1 << 14
+            } else {
+                1 << 18
+            };
+            let sink = HashingFile {
+                file: BufWriter::with_capacity(capacity, file),
+                hasher: blake3::Hasher::new(),
+                bytes: 0,
+            };
+            let properties = properties(
+                self.schema,
+                &self.arrow_schema,
+                first.filter(|_| self.rows >= SMALL_ROWS),
+            )?;
             let writer = ArrowWriter::try_new(sink, self.arrow_schema.clone(), Some(properties));
             self.writer = Some(writer.map_err(|e| parquet_refused(&self.path, e))?);
         }
-        self.writer.as_mut().ok_or_else(|| Error::Bug(format!("table {}: no file to write to", self.schema.name)))
+        self.writer
+            .as_mut()
+            .ok_or_else(|| Error::Bug(format!("table {}: no file to write to", self.schema.name)))
     }
 
     fn push(&mut self, batch: &RecordBatch) -> Result<()> {
         let schema = self.schema;
         if batch.schema_ref() != &self.arrow_schema {
-            return Err(Error::Bug(format!("table {}: chunks with different columns", schema.name)));
+            return Err(Error::Bug(format!(
+                "table {}: chunks with different columns",
+                schema.name
+            )));
         }
         self.content.push(batch);
         if batch.num_rows() == 0 {
@@ -214,14 +284,24 @@ impl Open {
         if let Some(last) = &self.last
             && !check::compare_keys(schema, last, batch)?(0, 0).is_lt()
         {
-            let (before, after) = (check::key_of(schema, last, 0), check::key_of(schema, batch, 0));
-            return Err(Error::Bug(format!("table {}: key {after} after {before}; keys ascend across chunks", schema.name)));
+            let (before, after) = (
+                check::key_of(schema, last, 0),
+                check::key_of(schema, batch, 0),
+            );
+            return Err(Error::Bug(format!(
+                "table {}: key {after} after {before}; keys ascend across chunks",
+                schema.name
+            )));
         }
         self.last = Some(batch.slice(batch.num_rows() - 1, 1));
         self.rows += batch.num_rows() as u64;
         self.waiting.push(batch.clone());
         let waiting: usize = self.waiting.iter().map(RecordBatch::num_rows).sum();
-        if waiting >= GROUP_ROWS { self.write_groups() } else { Ok(()) }
+        if waiting >= GROUP_ROWS {
+            self.write_groups()
+        } else {
+            Ok(())
+        }
     }
 
     /// Writes whole row groups from what is waiting, so that their borders do not depend on the chunks.
@@ -232,7 +312,11 @@ impl Open {
             self.write(&all.slice(start, GROUP_ROWS))?;
         }
         let rest = all.slice(whole, all.num_rows() - whole);
-        self.waiting = if rest.num_rows() > 0 { vec![rest] } else { Vec::new() };
+        self.waiting = if rest.num_rows() > 0 {
+            vec![rest]
+        } else {
+            Vec::new()
+        };
         Ok(())
     }
 
@@ -245,7 +329,9 @@ impl Open {
     }
 
     fn write(&mut self, batch: &RecordBatch) -> Result<()> {
-        self.writer(Some(batch))?.write(batch).map_err(|e| parquet_refused(&self.path, e))
+        self.writer(Some(batch))?
+            .write(batch)
+            .map_err(|e| parquet_refused(&self.path, e))
     }
 
     fn finish(mut self) -> Result<(TableRef, File)> {
@@ -255,27 +341,59 @@ impl Open {
         }
         self.writer(None)?;
         let (schema, path) = (self.schema, &self.path);
-        let Some(mut writer) = self.writer else { return Err(Error::Bug(format!("table {}: no writer", schema.name))) };
+        let Some(mut writer) = self.writer else {
+            return Err(Error::Bug(format!("table {}: no writer", schema.name)));
+        };
         let table_hash = self.content.finish();
-        writer.append_key_value_metadata(KeyValue::new(CONTENT_HASH.into(), table_hash.to_string()));
+        writer
+            .append_key_value_metadata(KeyValue::new(CONTENT_HASH.into(), table_hash.to_string()));
         // Not `into_inner`, which hides what the disk said of the last bytes.
         writer.finish().map_err(|e| parquet_refused(path, e))?;
-        let (file, file_hash, bytes) = writer.inner_mut().close().map_err(|e| refused(path, "write", &e))?;
-        Ok((TableRef { schema: schema.id(), table_hash, file_hash, rows: self.rows, bytes }, file))
+        let (file, file_hash, bytes) = writer
+            .inner_mut()
+            .close()
+            .map_err(|e| refused(path, "write", &e))?;
+        Ok((
+            TableRef {
+                schema: schema.id(),
+                table_hash,
+                file_hash,
+                rows: self.rows,
+                bytes,
+            },
+            file,
+        ))
     }
 }
 
 /// Everything that shapes the bytes, so that equal tables make equal files. Schema, key and units are plain key-values besides,
 /// for readers that do not see Arrow's field metadata. Of a large table the first row group is known.
-fn properties(schema: &TableSchema, arrow_schema: &SchemaRef, large: Option<&RecordBatch>) -> Result<WriterProperties> {
+fn properties(
+    schema: &TableSchema,
+    arrow_schema: &SchemaRef,
+    large: Option<&RecordBatch>,
+) -> Result<WriterProperties> {
     let index = |name: &String| {
-        arrow_schema.index_of(name).map(|i| SortingColumn { column_idx: i as i32, descending: false, nulls_first: false })
+        arrow_schema.index_of(name).map(|i| SortingColumn {
+            column_idx: i as i32,
+            descending: false,
+            nulls_first: false,
+        })
     };
-    let sorting = schema.sort.iter().map(index).collect::<Result<Vec<_>, _>>().map_err(|e| Error::Bug(e.to_string()))?;
+    let sorting = schema
+        .sort
+        .iter()
+        .map(index)
+        .collect::<Result<Vec<_>, _>>()
+        .map_err(|e| Error::Bug(e.to_string()))?;
     let unit = |field: &Arc<arrow::datatypes::Field>| {
-        field.metadata().get("unit").map(|unit| (field.name().clone(), unit.clone().into()))
+        field
+            .metadata()
+            .get("unit")
+            .map(|unit| (field.name().clone(), unit.clone().into()))
     };
-    let units: serde_json::Map<String, serde_json::Value> = arrow_schema.fields().iter().filter_map(unit).collect();
+    let units: serde_json::Map<String, serde_json::Value> =
+        arrow_schema.fields().iter().filter_map(unit).collect();
     let key_values = [
         (SCHEMA, schema.id()),
         ("calib.description", schema.description.clone()),
@@ -283,17 +401,28 @@ fn properties(schema: &TableSchema, arrow_schema: &SchemaRef, large: Option<&Rec
         (UNITS, super::key::canonical(&units.into())),
     ];
     let zstd = Compression::ZSTD(ZstdLevel::try_new(3).map_err(|e| Error::Bug(e.to_string()))?);
-    let compression = if large.is_some() { zstd } else { Compression::SNAPPY };
+    let compression = if large.is_some() {
+        zstd
+    } else {
+        Compression::SNAPPY
+    };
     let mut properties = WriterProperties::builder()
         .set_compression(compression)
         .set_max_row_group_row_count(Some(GROUP_ROWS))
         .set_sorting_columns(Some(sorting))
-        .set_key_value_metadata(Some(key_values.map(|(key, value)| KeyValue::new(key.into(), value)).into()))
+        .set_key_value_metadata(Some(
+            key_values
+                .map(|(key, value)| KeyValue::new(key.into(), value))
+                .into(),
+        ))
         .set_dictionary_enabled(false);
     // Names of sets, steps and files repeat. Of a large table measured numbers and names of points do not: a dictionary of such names is a
     // second column, and of such numbers zstd, most of the work of writing them, saves a tenth.
     for (index, field) in arrow_schema.fields().iter().enumerate() {
-        let (path, repeats) = (ColumnPath::from(field.name().as_str()), large.is_none_or(|batch| repeats(batch.column(index))));
+        let (path, repeats) = (
+            ColumnPath::from(field.name().as_str()),
+            large.is_none_or(|batch| repeats(batch.column(index))),
+        );
         match field.data_type() {
             DataType::Utf8 => properties = properties.set_column_dictionary_enabled(path, repeats),
             DataType::Float64 if !repeats => {
@@ -309,10 +438,17 @@ fn properties(schema: &TableSchema, arrow_schema: &SchemaRef, large: Option<&Rec
 fn repeats(column: &ArrayRef) -> bool {
     let first = column.slice(0, column.len().min(SMALL_ROWS as usize));
     let different = match first.data_type() {
-        DataType::Utf8 => first.as_string::<i32>().iter().collect::<HashSet<_>>().len(),
-        DataType::Float64 => {
-            first.as_primitive::<Float64Type>().iter().map(|cell| cell.map(f64::to_bits)).collect::<HashSet<_>>().len()
-        }
+        DataType::Utf8 => first
+            .as_string::<i32>()
+            .iter()
+            .collect::<HashSet<_>>()
+            .len(),
+        DataType::Float64 => first
+            .as_primitive::<Float64Type>()
+            .iter()
+            .map(|cell| cell.map(f64::to_bits))
+            .collect::<HashSet<_>>()
+            .len(),
         _ => 0,
     };
     2 * different < first.len()
@@ -350,6 +486,10 @@ impl Write for HashingFile {
 impl HashingFile {
     fn close(&mut self) -> io::Result<(File, FileHash, u64)> {
         self.file.flush()?;
-        Ok((self.file.get_ref().try_clone()?, FileHash::of_hasher(&self.hasher), self.bytes))
+        Ok((
+            self.file.get_ref().try_clone()?,
+            FileHash::of_hasher(&self.hasher),
+            self.bytes,
+        ))
     }
 }

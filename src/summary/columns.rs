@@ -7,7 +7,11 @@ use serde_json::{Value, json};
 
 /// Tables with their columns, as JSON.
 pub fn columns_json(store: &Store, tables: &[&QueryTable]) -> Result<Value> {
-    tables.iter().map(|table| object(store, table)).collect::<Result<Vec<Value>>>().map(Value::from)
+    tables
+        .iter()
+        .map(|table| object(store, table))
+        .collect::<Result<Vec<Value>>>()
+        .map(Value::from)
 }
 
 /// Tables with their columns, as text.
@@ -19,8 +23,15 @@ pub fn columns(store: &Store, tables: &[&QueryTable]) -> Result<String> {
             None => groups.push((&table.kind, vec![table])),
         }
     }
-    let texts = groups.iter().map(|(kind, group)| text(store, kind, group)).collect::<Result<Vec<String>>>()?;
-    Ok(if texts.is_empty() { "the run has no tables\n".into() } else { texts.join("\n") })
+    let texts = groups
+        .iter()
+        .map(|(kind, group)| text(store, kind, group))
+        .collect::<Result<Vec<String>>>()?;
+    Ok(if texts.is_empty() {
+        "the run has no tables\n".into()
+    } else {
+        texts.join("\n")
+    })
 }
 
 fn object(store: &Store, table: &QueryTable) -> Result<Value> {
@@ -31,23 +42,44 @@ fn object(store: &Store, table: &QueryTable) -> Result<Value> {
 }
 
 fn text(store: &Store, kind: &str, tables: &[&QueryTable]) -> Result<String> {
-    let description = tables.iter().find_map(|table| table.schema()).map_or("", |schema| &schema.description);
+    let description = tables
+        .iter()
+        .find_map(|table| table.schema())
+        .map_or("", |schema| &schema.description);
     let mut text = format!("{kind}: {description}\n");
-    let width = tables.iter().map(|table| table.name.len()).max().unwrap_or(0);
+    let width = tables
+        .iter()
+        .map(|table| table.name.len())
+        .max()
+        .unwrap_or(0);
     let mut columns: Vec<QueryColumn> = Vec::new();
     for table in tables {
-        let short = table.short.as_ref().map_or_else(String::new, |short| format!(", also `{short}`"));
-        text.push_str(&format!("  {:width$}  {}{short}\n", table.name, counted(table.table.rows, "row")));
+        let short = table
+            .short
+            .as_ref()
+            .map_or_else(String::new, |short| format!(", also `{short}`"));
+        text.push_str(&format!(
+            "  {:width$}  {}{short}\n",
+            table.name,
+            counted(table.table.rows, "row")
+        ));
         for column in table.columns(store)? {
             if columns.iter().all(|known| known.name != column.name) {
                 columns.push(column);
             }
         }
     }
-    let width = columns.iter().map(|column| column.name.len()).max().unwrap_or(0);
+    let width = columns
+        .iter()
+        .map(|column| column.name.len())
+        .max()
+        .unwrap_or(0);
     for column in columns {
         let unit = column.unit.as_deref().unwrap_or("");
-        text.push_str(&format!("    {:width$}  {:7}  {unit:5}  {}\n", column.name, column.column_type, column.description));
+        text.push_str(&format!(
+            "    {:width$}  {:7}  {unit:5}  {}\n",
+            column.name, column.column_type, column.description
+        ));
     }
     Ok(text)
 }

@@ -21,7 +21,8 @@ impl Diagnosed {
     /// What the stage of a run wrote. Fails where a table has left the store.
     pub fn read(run: &str, stage: &StageReport, store: &Store) -> Result<Self> {
         if stage.uses == DiagnoseTorques::NAME {
-            return TorqueSummary::read(run, stage, store).map(|told| Self::Torques(Box::new(told)));
+            return TorqueSummary::read(run, stage, store)
+                .map(|told| Self::Torques(Box::new(told)));
         }
         DiagnosisSummary::read(run, stage, store).map(|told| Self::Positions(Box::new(told)))
     }
@@ -38,7 +39,10 @@ impl Diagnosed {
     pub fn effect_file(&self, finding: Option<i64>) -> Result<String> {
         match self {
             Self::Positions(told) => told.effect_file(finding),
-            Self::Torques(_) => Err(Error::spec("--export-effect", "findings on torques have no formula of their own")),
+            Self::Torques(_) => Err(Error::spec(
+                "--export-effect",
+                "findings on torques have no formula of their own",
+            )),
         }
     }
 
@@ -54,9 +58,10 @@ impl Diagnosed {
     pub fn page(&self, store: &str) -> Result<String> {
         match self {
             Self::Positions(told) => told.page(store),
-            Self::Torques(_) => {
-                Err(Error::spec("--html", "of torques the page is the pipeline's report: put `- uses: report` last"))
-            }
+            Self::Torques(_) => Err(Error::spec(
+                "--html",
+                "of torques the page is the pipeline's report: put `- uses: report` last",
+            )),
         }
     }
 
@@ -83,7 +88,9 @@ impl Diagnosed {
             Self::Positions(told) => told.head(),
             Self::Torques(told) => told.head(),
         };
-        let next = self.next_step(store).map_or_else(String::new, |step| step.text(width));
+        let next = self
+            .next_step(store)
+            .map_or_else(String::new, |step| step.text(width));
         head + &screen::found(self.found(), width) + &labelled("verdict", &self.verdict()) + &next
     }
 

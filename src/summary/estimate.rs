@@ -14,7 +14,11 @@ const PERCENT: f64 = 1e-3;
 
 /// A length, given in mm.
 pub(super) fn length(mm: f64) -> String {
-    if mm >= MILLIMETRES { format!("{mm:.2} mm") } else { format!("{} um", figure(1e3 * mm, 0)) }
+    if mm >= MILLIMETRES {
+        format!("{mm:.2} mm")
+    } else {
+        format!("{} um", figure(1e3 * mm, 0))
+    }
 }
 
 /// An angle, given in rad.
@@ -25,15 +29,25 @@ pub(super) fn angle(rad: f64) -> String {
 /// A number with its standard deviation, as many digits as that tells: `14.8 +- 0.4 arcsec`, `(4.17 +- 0.02)e-7 rad/Nm`.
 pub(super) fn estimate(value: f64, sigma: Option<f64>, unit: &str) -> String {
     if unit == "1" {
-        let (scale, unit) = if value.abs() >= PERCENT { (1e2, "%") } else { (1e6, "ppm") };
+        let (scale, unit) = if value.abs() >= PERCENT {
+            (1e2, "%")
+        } else {
+            (1e6, "ppm")
+        };
         return estimate(scale * value, sigma.map(|sigma| scale * sigma), unit);
     }
     let size = value.abs();
-    let power = if size == 0.0 || (PLAIN[0]..PLAIN[1]).contains(&size) { 0 } else { size.log10().floor() as i32 };
+    let power = if size == 0.0 || (PLAIN[0]..PLAIN[1]).contains(&size) {
+        0
+    } else {
+        size.log10().floor() as i32
+    };
     let scale = 10f64.powi(power);
     let value = value / scale;
     // One that shows in no digit is as good as none.
-    let sigma = sigma.map(|sigma| sigma / scale).filter(|sigma| *sigma > 0.0 && decimals(*sigma, 1) <= decimals(value, MOST));
+    let sigma = sigma
+        .map(|sigma| sigma / scale)
+        .filter(|sigma| *sigma > 0.0 && decimals(*sigma, 1) <= decimals(value, MOST));
     let decimals = sigma.map_or_else(|| decimals(value, MOST), |sigma| decimals(sigma, 1));
     let number = match sigma {
         Some(sigma) => format!("{value:.decimals$} +- {sigma:.decimals$}"),
@@ -92,7 +106,10 @@ mod tests {
 
     #[test]
     fn a_length_reads_in_the_unit_in_which_it_is_short() {
-        assert_eq!([3.546, 0.31, 0.047, 0.0063].map(length), ["3.55 mm", "0.31 mm", "47 um", "6.3 um"]);
+        assert_eq!(
+            [3.546, 0.31, 0.047, 0.0063].map(length),
+            ["3.55 mm", "0.31 mm", "47 um", "6.3 um"]
+        );
         assert_eq!(angle(1e-4), "21 arcsec");
     }
 }

@@ -9,7 +9,9 @@ pub fn explanation(explanation: &Explanation) -> String {
     let stage = &explanation.stage;
     let mut text = format!("{} in run {}: {}", stage.id, explanation.run, word(stage));
     match (stage.status, &stage.reason) {
-        (StageStatus::Cached, _) => text.push_str(", all that it depends on was the same as in an earlier run\n"),
+        (StageStatus::Cached, _) => {
+            text.push_str(", all that it depends on was the same as in an earlier run\n")
+        }
         (_, Some(reason)) => text.push_str(&format!(", because: {reason}\n")),
         (_, None) => text.push('\n'),
     }
@@ -21,7 +23,10 @@ pub fn explanation(explanation: &Explanation) -> String {
     }
     text.push_str(&format!("since run {before}:\n"));
     for change in &explanation.changes {
-        let writer = explanation.writers.iter().find(|(port, _)| change.what == "input" && *port == change.name);
+        let writer = explanation
+            .writers
+            .iter()
+            .find(|(port, _)| change.what == "input" && *port == change.name);
         let writer = writer.map_or_else(String::new, |(_, from)| format!(", written by {from}"));
         let value = |value: &str| {
             let cut: String = value.chars().take(60).collect();

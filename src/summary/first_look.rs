@@ -17,7 +17,14 @@ const NAMED: usize = 12;
 pub fn first_look(manifest: &Manifest, store: &Store) -> Result<String> {
     let mut out = String::new();
     for recording in tables::<Recording>(manifest, store)? {
-        out.push_str(&labelled("rows", &format!("{} used, of {}", recording.rows(), counted(distinct(&recording), "point"))));
+        out.push_str(&labelled(
+            "rows",
+            &format!(
+                "{} used, of {}",
+                recording.rows(),
+                counted(distinct(&recording), "point")
+            ),
+        ));
         if let Some(robot) = tables::<Robot>(manifest, store)?.first() {
             out.push_str(&ranges(&recording, robot)?);
         }
@@ -31,7 +38,10 @@ pub fn first_look(manifest: &Manifest, store: &Store) -> Result<String> {
     if let Some(parameters) = tables::<Parameters>(manifest, store)?.last() {
         out.push_str(&observable(parameters));
     }
-    let warnings = manifest.stages.iter().flat_map(|stage| stage.warnings.iter().map(|line| (stage.id.as_str(), line)));
+    let warnings = manifest
+        .stages
+        .iter()
+        .flat_map(|stage| stage.warnings.iter().map(|line| (stage.id.as_str(), line)));
     let mut said = Vec::new();
     for (id, line) in warnings {
         if !said.contains(&line) {
@@ -43,12 +53,22 @@ pub fn first_look(manifest: &Manifest, store: &Store) -> Result<String> {
 }
 
 fn tables<T: Table>(manifest: &Manifest, store: &Store) -> Result<Vec<T>> {
-    let outputs = manifest.stages.iter().flat_map(|stage| &stage.outputs).filter(|output| output.kind == T::KIND);
-    outputs.map(|output| T::from_frame(&store.load(&output.table)?)).collect()
+    let outputs = manifest
+        .stages
+        .iter()
+        .flat_map(|stage| &stage.outputs)
+        .filter(|output| output.kind == T::KIND);
+    outputs
+        .map(|output| T::from_frame(&store.load(&output.table)?))
+        .collect()
 }
 
 fn distinct(recording: &Recording) -> usize {
-    recording.point_id.iter().collect::<std::collections::BTreeSet<_>>().len()
+    recording
+        .point_id
+        .iter()
+        .collect::<std::collections::BTreeSet<_>>()
+        .len()
 }
 
 /// Smallest and largest position of each joint, in the robot file's counting, and joints beyond its limits.
@@ -59,12 +79,35 @@ fn ranges(recording: &Recording, robot: &Robot) -> Result<String> {
         let values = (0..recording.rows()).map(|row| recording.q(row)[k]);
         let (lower, upper) = values.fold((f64::MAX, f64::MIN), |(a, b), q| (a.min(q), b.max(q)));
         let prismatic = recording.prismatic.get(k).copied().unwrap_or(false);
-        let shown =
-            |value: f64| if prismatic { format!("{:.1} mm", 1e3 * value) } else { format!("{:.1} deg", value.to_degrees()) };
-        let limits = joint.limits.filter(|[a, b]| lower < a - 1e-6 || upper > b + 1e-6);
-        let beyond = limits.map(|[a, b]| format!("; beyond the robot file's limits, {} to {}", shown(a), shown(b)));
-        let still = if upper - lower < 1e-6 { "; it does not move, so that nothing of it can be seen" } else { "" };
-        let text = format!("{} {} to {}{}{still}", joint.name, shown(lower), shown(upper), beyond.unwrap_or_default());
+        let shown = |value: f64| {
+            if prismatic {
+                format!("{:.1} mm", 1e3 * value)
+            } else {
+                format!("{:.1} deg", value.to_degrees())
+            }
+        };
+        let limits = joint
+            .limits
+            .filter(|[a, b]| lower < a - 1e-6 || upper > b + 1e-6);
+        let beyond = limits.map(|[a, b]| {
+            format!(
+                "; beyond the robot file's limits, {} to {}",
+                shown(a),
+                shown(b)
+            )
+        });
+        let still = if upper - lower < 1e-6 {
+            "; it does not move, so that nothing of it can be seen"
+        } else {
+            ""
+        };
+        let text = format!(
+            "{} {} to {}{}{still}",
+            joint.name,
+            shown(lower),
+            shown(upper),
+            beyond.unwrap_or_default()
+        );
         out.push_str(&labelled(if k == 0 { "ranges" } else { "" }, &text));
     }
     Ok(out)
@@ -79,11 +122,26 @@ fn not_used(rejected: &Rejected) -> String {
     let one = |(reason, rows): (&str, Vec<usize>)| {
         let name = |k: &usize| {
             let row = &rejected.0[*k];
-            row.point_id.clone().unwrap_or_else(|| format!("line {}", row.line)) + &format!(" ({}: {})", row.file, row.detail)
+            row.point_id
+                .clone()
+                .unwrap_or_else(|| format!("line {}", row.line))
+                + &format!(" ({}: {})", row.file, row.detail)
         };
         let shown: Vec<String> = rows.iter().take(SHOWN).map(name).collect();
-        let more = if rows.len() > SHOWN { format!("; and {} more", rows.len() - SHOWN) } else { String::new() };
-        labelled("rejected", &format!("{}, {}: {}{more}", counted(rows.len(), "row"), reason.replace('_', " "), shown.join("; ")))
+        let more = if rows.len() > SHOWN {
+            format!("; and {} more", rows.len() - SHOWN)
+        } else {
+            String::new()
+        };
+        labelled(
+            "rejected",
+            &format!(
+                "{}, {}: {}{more}",
+                counted(rows.len(), "row"),
+                reason.replace('_', " "),
+                shown.join("; ")
+            ),
+        )
     };
     reasons.into_iter().map(one).collect()
 }
@@ -100,21 +158,46 @@ fn errors(prediction: &Prediction) -> String {
     let one = |(step, errors): (&str, Vec<f64>)| {
         let mean = errors.iter().sum::<f64>() / errors.len() as f64;
         let most = errors.iter().copied().fold(0.0, f64::max);
-        labelled("error", &format!("mean {mean:.3} mm, max {most:.3} mm after `{step}`, {}", counted(errors.len(), "point")))
+        labelled(
+            "error",
+            &format!(
+                "mean {mean:.3} mm, max {most:.3} mm after `{step}`, {}",
+                counted(errors.len(), "point")
+            ),
+        )
     };
     steps.into_iter().map(one).collect()
 }
 
 /// How many parameters are estimated, and the others by their reason.
 fn observable(parameters: &Parameters) -> String {
-    let of =
-        |status: &str| parameters.0.iter().filter(|row| row.status == status).map(|row| row.name.as_str()).collect::<Vec<_>>();
+    let of = |status: &str| {
+        parameters
+            .0
+            .iter()
+            .filter(|row| row.status == status)
+            .map(|row| row.name.as_str())
+            .collect::<Vec<_>>()
+    };
     let named = |names: &[&str]| {
-        let more = if names.len() > NAMED { format!(" and {} more", names.len() - NAMED) } else { String::new() };
+        let more = if names.len() > NAMED {
+            format!(" and {} more", names.len() - NAMED)
+        } else {
+            String::new()
+        };
         format!("{}{more}", names[..names.len().min(NAMED)].join(", "))
     };
-    let mut out = labelled("seen", &format!("{} can be estimated", counted(of("free").len() + of("bound").len(), "parameter")));
-    for (status, why) in [("unseen", "these data do not see"), ("redundant", "other parameters do the same as")] {
+    let mut out = labelled(
+        "seen",
+        &format!(
+            "{} can be estimated",
+            counted(of("free").len() + of("bound").len(), "parameter")
+        ),
+    );
+    for (status, why) in [
+        ("unseen", "these data do not see"),
+        ("redundant", "other parameters do the same as"),
+    ] {
         let names = of(status);
         if !names.is_empty() {
             out.push_str(&labelled("", &format!("{why}: {}", named(&names))));

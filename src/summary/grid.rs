@@ -26,7 +26,11 @@ struct Drawn {
 /// The first rows, and how many are left out.
 pub fn grid(answer: &QueryResult, rows: usize, width: Option<usize>) -> String {
     let shown = rows.min(answer.rows());
-    let columns = answer.names().zip(answer.columns(shown)).map(|(name, values)| drawn(name, &values)).collect();
+    let columns = answer
+        .names()
+        .zip(answer.columns(shown))
+        .map(|(name, values)| drawn(name, &values))
+        .collect();
     let mut text = draw(columns, shown, width);
     if answer.rows() > shown {
         text.push_str(&format!(
@@ -43,7 +47,9 @@ fn draw(mut columns: Vec<Drawn>, rows: usize, width: Option<usize>) -> String {
     let left_out = width.map_or_else(Vec::new, |width| fit(&mut columns, width));
     let mut text = line(columns.iter().map(|column| (column, column.name.as_str())));
     for row in 0..rows {
-        text.push_str(&line(columns.iter().map(|column| (column, column.cells.get(row).map_or("", String::as_str)))));
+        text.push_str(&line(columns.iter().map(|column| {
+            (column, column.cells.get(row).map_or("", String::as_str))
+        })));
     }
     if !left_out.is_empty() {
         text.push_str(&format!("too narrow for: {}\n", left_out.join(", ")));
@@ -55,7 +61,11 @@ fn line<'a>(cells: impl Iterator<Item = (&'a Drawn, &'a str)>) -> String {
     let cells = cells.map(|(column, cell)| {
         let cell = cut(cell, column.width);
         let blank = " ".repeat(column.width.saturating_sub(cell.width()));
-        if column.right { blank + &cell } else { cell + &blank }
+        if column.right {
+            blank + &cell
+        } else {
+            cell + &blank
+        }
     });
     let line = cells.collect::<Vec<_>>().join("  ");
     format!("{}\n", line.trim_end())
@@ -69,8 +79,12 @@ fn fit(columns: &mut Vec<Drawn>, width: usize) -> Vec<String> {
     };
     while excess(columns) > 0 {
         let too_much = excess(columns);
-        let long = columns.iter_mut().filter(|column| !column.right && column.width > SHORTEST);
-        let Some(widest) = long.max_by_key(|column| column.width) else { break };
+        let long = columns
+            .iter_mut()
+            .filter(|column| !column.right && column.width > SHORTEST);
+        let Some(widest) = long.max_by_key(|column| column.width) else {
+            break;
+        };
         widest.width = widest.width.saturating_sub(too_much).max(SHORTEST);
     }
     let mut left_out = Vec::new();
@@ -82,7 +96,12 @@ fn fit(columns: &mut Vec<Drawn>, width: usize) -> Vec<String> {
 }
 
 fn drawn(name: &str, values: &[QueryValue]) -> Drawn {
-    let right = values.iter().all(|value| matches!(value, QueryValue::Null | QueryValue::Integer(_) | QueryValue::Number(_)));
+    let right = values.iter().all(|value| {
+        matches!(
+            value,
+            QueryValue::Null | QueryValue::Integer(_) | QueryValue::Number(_)
+        )
+    });
     let decimals = decimals(values, if name.ends_with("_mm") { LENGTH } else { 0 });
     let mut cells: Vec<String> = values
         .iter()
@@ -97,15 +116,36 @@ fn drawn(name: &str, values: &[QueryValue]) -> Drawn {
     if right && decimals.is_some() {
         shorten(&mut cells);
     }
-    let width = cells.iter().map(|cell| cell.width()).chain([name.width()]).max().unwrap_or(0);
-    Drawn { name: name.into(), right, cells, width }
+    let width = cells
+        .iter()
+        .map(|cell| cell.width())
+        .chain([name.width()])
+        .max()
+        .unwrap_or(0);
+    Drawn {
+        name: name.into(),
+        right,
+        cells,
+        width,
+    }
 }
 
 /// Decimals that suit all numbers of a column, at least so many; nothing where they are of too different sizes.
 fn decimals(values: &[QueryValue], least: i32) -> Option<usize> {
-    let sizes = values.iter().filter_map(|value| if let QueryValue::Number(number) = value { Some(number.abs()) } else { None });
-    let sizes: Vec<f64> = sizes.filter(|size| size.is_finite() && *size > 0.0).collect();
-    let (Some(largest), Some(smallest)) = (sizes.iter().copied().reduce(f64::max), sizes.iter().copied().reduce(f64::min)) else {
+    let sizes = values.iter().filter_map(|value| {
+        if let QueryValue::Number(number) = value {
+            Some(number.abs())
+        } else {
+            None
+        }
+    });
+    let sizes: Vec<f64> = sizes
+        .filter(|size| size.is_finite() && *size > 0.0)
+        .collect();
+    let (Some(largest), Some(smallest)) = (
+        sizes.iter().copied().reduce(f64::max),
+        sizes.iter().copied().reduce(f64::min),
+    ) else {
         return Some(0);
     };
     let decimals = (DIGITS - 1 - power(largest)).max(least);
@@ -115,7 +155,10 @@ fn decimals(values: &[QueryValue], least: i32) -> Option<usize> {
 
 /// 2 of 345.0, -3 of 0.0012.
 fn power(size: f64) -> i32 {
-    format!("{size:e}").split_once('e').and_then(|(_, power)| power.parse().ok()).unwrap_or(0)
+    format!("{size:e}")
+        .split_once('e')
+        .and_then(|(_, power)| power.parse().ok())
+        .unwrap_or(0)
 }
 
 fn written(number: f64, decimals: Option<usize>) -> String {
@@ -133,7 +176,12 @@ fn written(number: f64, decimals: Option<usize>) -> String {
 /// Takes away zeros that end every number of a column.
 fn shorten(cells: &mut [String]) {
     let number = |cell: &&mut String| cell.contains('.');
-    while cells.iter().any(|cell| cell.contains('.')) && cells.iter_mut().filter(number).all(|cell| cell.ends_with(['0', '.'])) {
+    while cells.iter().any(|cell| cell.contains('.'))
+        && cells
+            .iter_mut()
+            .filter(number)
+            .all(|cell| cell.ends_with(['0', '.']))
+    {
         cells.iter_mut().filter(number).for_each(|cell| {
             cell.pop();
         });
@@ -145,7 +193,14 @@ mod tests {
     use super::*;
 
     fn numbers(values: &[f64]) -> Vec<String> {
-        drawn("n", &values.iter().map(|value| QueryValue::Number(*value)).collect::<Vec<_>>()).cells
+        drawn(
+            "n",
+            &values
+                .iter()
+                .map(|value| QueryValue::Number(*value))
+                .collect::<Vec<_>>(),
+        )
+        .cells
     }
 
     #[test]
@@ -160,13 +215,22 @@ mod tests {
 
     #[test]
     fn a_length_far_away_keeps_its_micrometres() {
-        assert_eq!(drawn("x_mm", &[QueryValue::Number(4744.84123)]).cells, ["4744.8412"]);
-        assert_eq!(drawn("x_mm", &[QueryValue::Number(0.0286965)]).cells, ["0.0286965"]);
+        assert_eq!(
+            drawn("x_mm", &[QueryValue::Number(4744.84123)]).cells,
+            ["4744.8412"]
+        );
+        assert_eq!(
+            drawn("x_mm", &[QueryValue::Number(0.0286965)]).cells,
+            ["0.0286965"]
+        );
     }
 
     #[test]
     fn numbers_of_different_sizes_are_written_each_by_itself() {
-        assert_eq!(numbers(&[1594.0, 2.5e-7, 0.0]), ["1594.00", "2.50000e-7", "0"]);
+        assert_eq!(
+            numbers(&[1594.0, 2.5e-7, 0.0]),
+            ["1594.00", "2.50000e-7", "0"]
+        );
         assert_eq!(numbers(&[1e300]), ["1.00000e300"]);
     }
 
@@ -177,7 +241,10 @@ mod tests {
             vec![
                 drawn("point", &[text("P1"), text("a point with a long name")]),
                 drawn("x_mm", &[QueryValue::Number(1954.25), QueryValue::Null]),
-                drawn("kept", &[QueryValue::Boolean(true), QueryValue::Boolean(false)]),
+                drawn(
+                    "kept",
+                    &[QueryValue::Boolean(true), QueryValue::Boolean(false)],
+                ),
             ]
         };
         assert_eq!(
@@ -185,14 +252,27 @@ mod tests {
             "point                        x_mm  kept\nP1                        1954.25  true\na point with a long name           false\n"
         );
         let narrow = draw(columns(), 2, Some(30));
-        assert!(narrow.lines().all(|line| line.width() <= 30) && narrow.contains("a point with …"), "{narrow}");
+        assert!(
+            narrow.lines().all(|line| line.width() <= 30) && narrow.contains("a point with …"),
+            "{narrow}"
+        );
         let narrower = draw(columns(), 2, Some(24));
         assert!(narrower.ends_with("too narrow for: kept\n"), "{narrower}");
     }
 
     #[test]
     fn a_text_keeps_its_zeros() {
-        assert_eq!(drawn("version", &[QueryValue::Text("1.0".into()), QueryValue::Text("2.0".into())]).cells, ["1.0", "2.0"]);
+        assert_eq!(
+            drawn(
+                "version",
+                &[
+                    QueryValue::Text("1.0".into()),
+                    QueryValue::Text("2.0".into())
+                ]
+            )
+            .cells,
+            ["1.0", "2.0"]
+        );
     }
 
     #[test]

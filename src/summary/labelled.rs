@@ -14,8 +14,18 @@ pub fn labelled(label: &str, text: &str) -> String {
 
 /// The same lines, none wider than `width` but for words that are longer and commands, which are there to be copied.
 pub fn folded(text: &str, width: usize) -> String {
-    let fold = |line: &str| if line.trim_start().starts_with("calib ") { format!("{line}\n") } else { broken(line, width) };
-    if width < NARROWEST { text.into() } else { text.lines().map(fold).collect() }
+    let fold = |line: &str| {
+        if line.trim_start().starts_with("calib ") {
+            format!("{line}\n")
+        } else {
+            broken(line, width)
+        }
+    };
+    if width < NARROWEST {
+        text.into()
+    } else {
+        text.lines().map(fold).collect()
+    }
 }
 
 fn broken(line: &str, width: usize) -> String {
@@ -43,9 +53,20 @@ mod tests {
     fn a_long_text_is_broken_at_spaces_under_its_label() {
         assert_eq!(labelled("verdict", "explained"), "verdict   explained\n");
         let text = folded(&labelled("next", &"poses ".repeat(30)), 60);
-        assert!(text.lines().count() > 2 && text.lines().all(|line| line.len() <= 60), "{text}");
-        assert!(text.lines().skip(1).all(|line| line.starts_with("          poses")), "{text}");
-        for whole in [labelled("report", &"x".repeat(120)), labelled("", &format!("calib poses {}", "a ".repeat(60)))] {
+        assert!(
+            text.lines().count() > 2 && text.lines().all(|line| line.len() <= 60),
+            "{text}"
+        );
+        assert!(
+            text.lines()
+                .skip(1)
+                .all(|line| line.starts_with("          poses")),
+            "{text}"
+        );
+        for whole in [
+            labelled("report", &"x".repeat(120)),
+            labelled("", &format!("calib poses {}", "a ".repeat(60))),
+        ] {
             assert_eq!(folded(&whole, 60), whole);
         }
     }

@@ -38,12 +38,23 @@ impl LimitsSummary {
     /// The judgements of all reports of the record of a run.
     pub fn of(manifest: &Manifest, store: &Store) -> Result<Self> {
         let mut all = Vec::new();
-        for stage in manifest.stages.iter().filter(|stage| stage.uses == Report::NAME && !stage.outputs.is_empty()) {
-            let Some(own) = stage.outputs.iter().find(|output| output.kind == Acceptance::KIND) else {
+        for stage in manifest
+            .stages
+            .iter()
+            .filter(|stage| stage.uses == Report::NAME && !stage.outputs.is_empty())
+        {
+            let Some(own) = stage
+                .outputs
+                .iter()
+                .find(|output| output.kind == Acceptance::KIND)
+            else {
                 let message = "its report was made by an earlier calib, which kept limits elsewhere; run the pipeline again";
                 return Err(Error::data(&manifest.run_id, message));
             };
-            all.extend(judged(&stage.id, Acceptance::from_frame(&store.load(&own.table)?)?));
+            all.extend(judged(
+                &stage.id,
+                Acceptance::from_frame(&store.load(&own.table)?)?,
+            ));
         }
         Ok(Self(all))
     }
@@ -55,12 +66,19 @@ impl LimitsSummary {
 
     /// What is not accepted, a sentence a report.
     pub fn exceeded(&self) -> Vec<String> {
-        self.0.iter().filter(|judged| !judged.kept).map(Judged::words).collect()
+        self.0
+            .iter()
+            .filter(|judged| !judged.kept)
+            .map(Judged::words)
+            .collect()
     }
 
     /// A line for each report with limits.
     pub fn text(&self) -> String {
-        self.0.iter().map(|judged| labelled("limits", &judged.words())).collect()
+        self.0
+            .iter()
+            .map(|judged| labelled("limits", &judged.words()))
+            .collect()
     }
 
     /// The same for other programs.
@@ -74,22 +92,52 @@ fn judged(stage: &str, Acceptance(rows): Acceptance) -> Option<Judged> {
     let first = rows.first()?;
     let (kept, sentence) = (first.accepted, first.sentence.clone());
     let figure = |row: AcceptanceRow| {
-        let AcceptanceRow { figure, limit_mm, kept, .. } = row;
-        Some(Figure { figure, found_mm: row.found_mm?, limit_mm, kept })
+        let AcceptanceRow {
+            figure,
+            limit_mm,
+            kept,
+            ..
+        } = row;
+        Some(Figure {
+            figure,
+            found_mm: row.found_mm?,
+            limit_mm,
+            kept,
+        })
     };
-    Some(Judged { stage: stage.into(), kept, sentence, figures: rows.into_iter().filter_map(figure).collect() })
+    Some(Judged {
+        stage: stage.into(),
+        kept,
+        sentence,
+        figures: rows.into_iter().filter_map(figure).collect(),
+    })
 }
 
 impl Judged {
     /// The judgement, then the figures that are beyond, or all where none is.
     fn words(&self) -> String {
-        let told = self.figures.iter().filter(|figure| figure.kept == self.kept);
-        let told = told.map(|one| format!("{} {:.4} mm, at most {} mm allowed", one.figure, one.found_mm, one.limit_mm));
+        let told = self
+            .figures
+            .iter()
+            .filter(|figure| figure.kept == self.kept);
+        let told = told.map(|one| {
+            format!(
+                "{} {:.4} mm, at most {} mm allowed",
+                one.figure, one.found_mm, one.limit_mm
+            )
+        });
         let told: Vec<String> = told.collect();
         let mut letters = self.sentence.trim_end_matches('.').chars();
-        let first = letters.next().map(|letter| letter.to_lowercase().to_string()).unwrap_or_default();
+        let first = letters
+            .next()
+            .map(|letter| letter.to_lowercase().to_string())
+            .unwrap_or_default();
         let sentence = format!("{first}{}", letters.as_str());
-        if told.is_empty() { sentence } else { format!("{sentence}: {}", told.join("; ")) }
+        if told.is_empty() {
+            sentence
+        } else {
+            format!("{sentence}: {}", told.join("; "))
+        }
     }
 }
 
@@ -110,9 +158,21 @@ mod tests {
             sentence: "Not accepted: beyond the limits.".into(),
         };
         let words = |rows| judged("report", Acceptance(rows)).map(|judged| judged.words());
-        let found = vec![row("mean", Some(0.0421), 0.03, false), row("largest", Some(0.1), 0.5, true)];
-        assert_eq!(words(found).as_deref(), Some("not accepted: beyond the limits: mean 0.0421 mm, at most 0.03 mm allowed"));
-        assert_eq!(words(vec![row("mean", None, 0.03, false)]).as_deref(), Some("not accepted: beyond the limits"));
-        assert!(words(Vec::new()).is_none(), "a wrong set-up is judged unasked");
+        let found = vec![
+            row("mean", Some(0.0421), 0.03, false),
+            row("largest", Some(0.1), 0.5, true),
+        ];
+        assert_eq!(
+            words(found).as_deref(),
+            Some("not accepted: beyond the limits: mean 0.0421 mm, at most 0.03 mm allowed")
+        );
+        assert_eq!(
+            words(vec![row("mean", None, 0.03, false)]).as_deref(),
+            Some("not accepted: beyond the limits")
+        );
+        assert!(
+            words(Vec::new()).is_none(),
+            "a wrong set-up is judged unasked"
+        );
     }
 }

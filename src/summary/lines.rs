@@ -8,7 +8,9 @@ use std::fmt::Display;
 /// A header, then the rows; null is an empty cell.
 pub fn csv(answer: &QueryResult) -> Result<String> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record(answer.names().map(|name| inert(Cow::Borrowed(name)))).map_err(bug)?;
+    writer
+        .write_record(answer.names().map(|name| inert(Cow::Borrowed(name))))
+        .map_err(bug)?;
     for row in 0..answer.rows() {
         let cells = answer.row(row).map(|value| match value {
             QueryValue::Null => String::new(),
@@ -26,13 +28,20 @@ pub fn csv(answer: &QueryResult) -> Result<String> {
 /// A text that a spreadsheet would run as a formula gets a quote in front, as spreadsheets mark a text.
 fn inert(text: Cow<str>) -> String {
     let runs = text.starts_with(['=', '+', '-', '@', '\t', '\r']) && text.parse::<f64>().is_err();
-    if runs { format!("'{text}") } else { text.into_owned() }
+    if runs {
+        format!("'{text}")
+    } else {
+        text.into_owned()
+    }
 }
 
 /// One array of objects, a row a line, columns in their order; what is no number is null.
 pub fn json(answer: &QueryResult) -> Result<String> {
     let quoted = |text: &str| serde_json::to_string(text).map_err(bug);
-    let names = answer.names().map(quoted).collect::<Result<Vec<String>>>()?;
+    let names = answer
+        .names()
+        .map(quoted)
+        .collect::<Result<Vec<String>>>()?;
     let mut rows = Vec::with_capacity(answer.rows());
     for row in 0..answer.rows() {
         let mut cells = Vec::with_capacity(names.len());
@@ -48,7 +57,11 @@ pub fn json(answer: &QueryResult) -> Result<String> {
         }
         rows.push(format!("  {{{}}}", cells.join(", ")));
     }
-    Ok(if rows.is_empty() { "[]\n".into() } else { format!("[\n{}\n]\n", rows.join(",\n")) })
+    Ok(if rows.is_empty() {
+        "[]\n".into()
+    } else {
+        format!("[\n{}\n]\n", rows.join(",\n"))
+    })
 }
 
 fn bug(error: impl Display) -> Error {

@@ -53,12 +53,18 @@ use crate::table::{Robot, Table};
 
 /// All tables of a kind that a run wrote. Fails where one has left the store.
 fn tables<T: Table>(outcome: &CompletedRun, store: &Store) -> Result<Vec<T>> {
-    outcome.manifest.tables(T::KIND).map(|output| T::from_frame(&store.load(&output.table)?)).collect()
+    outcome
+        .manifest
+        .tables(T::KIND)
+        .map(|output| T::from_frame(&store.load(&output.table)?))
+        .collect()
 }
 
 /// The name of the robot that a stage read; none where it read none. Fails where its table has left the store.
 fn robot_of(stage: &StageReport, store: &Store) -> Result<Option<String>> {
-    let Some(own) = stage.inputs.iter().find(|input| input.port == Robot::KIND) else { return Ok(None) };
+    let Some(own) = stage.inputs.iter().find(|input| input.port == Robot::KIND) else {
+        return Ok(None);
+    };
     let robot = Robot::from_frame(&store.load(&own.table)?)?;
     Ok(robot.0.into_iter().next().map(|base| base.name))
 }

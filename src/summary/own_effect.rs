@@ -6,7 +6,8 @@ use serde::Serialize;
 
 /// The file's text; `told` says where it is from.
 pub(super) fn declared_in_yaml(declaration: &str, told: &str) -> Result<String> {
-    let unreadable = |error: serde_json::Error| Error::data("table forms", format!("`{declaration}`: {error}"));
+    let unreadable =
+        |error: serde_json::Error| Error::data("table forms", format!("`{declaration}`: {error}"));
     let declared: EffectDeclaration = serde_json::from_str(declaration).map_err(unreadable)?;
     let mut lines = vec![
         format!("# {told}."),
@@ -15,7 +16,12 @@ pub(super) fn declared_in_yaml(declaration: &str, told: &str) -> Result<String> 
         format!("name: {}", json(&declared.name)),
         format!("place: {}", json(&declared.place)),
     ];
-    lines.extend(declared.motion.iter().map(|motion| format!("motion: {}", json(motion))));
+    lines.extend(
+        declared
+            .motion
+            .iter()
+            .map(|motion| format!("motion: {}", json(motion))),
+    );
     match &declared.law.0[..] {
         [one] => lines.push(format!("law: {}", json(one))),
         several => {
@@ -25,15 +31,35 @@ pub(super) fn declared_in_yaml(declaration: &str, told: &str) -> Result<String> 
     }
     if !declared.shape.is_empty() {
         lines.push("shape:".into());
-        lines.extend(declared.shape.iter().map(|(name, range)| format!("  {name}: {}", bounds(range))));
+        lines.extend(
+            declared
+                .shape
+                .iter()
+                .map(|(name, range)| format!("  {name}: {}", bounds(range))),
+        );
     }
-    lines.extend(declared.unit.iter().map(|unit| format!("unit: {}", json(unit))));
-    lines.extend(declared.sentence.iter().map(|sentence| format!("sentence: {}", json(sentence))));
+    lines.extend(
+        declared
+            .unit
+            .iter()
+            .map(|unit| format!("unit: {}", json(unit))),
+    );
+    lines.extend(
+        declared
+            .sentence
+            .iter()
+            .map(|sentence| format!("sentence: {}", json(sentence))),
+    );
     Ok(lines.join("\n") + "\n")
 }
 
 fn bounds(range: &ShapeRange) -> String {
-    format!("{{from: {}, to: {}, start: {}}}", range.from, range.to, json(&range.start))
+    format!(
+        "{{from: {}, to: {}, start: {}}}",
+        range.from,
+        range.to,
+        json(&range.start)
+    )
 }
 
 /// JSON's texts and lists are YAML's.

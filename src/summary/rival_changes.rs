@@ -69,8 +69,11 @@ type Listed = (CauseAtPlace, Option<f64>);
 impl Said {
     /// None where a table was not written or has left the store.
     fn read(stage: &StageReport, store: &Store) -> Result<Option<Self>> {
-        let (findings, rivals): (Option<Findings>, Option<Rivals>) = (table(stage, store)?, table(stage, store)?);
-        let (Some(findings), Some(rivals)) = (findings, rivals) else { return Ok(None) };
+        let (findings, rivals): (Option<Findings>, Option<Rivals>) =
+            (table(stage, store)?, table(stage, store)?);
+        let (Some(findings), Some(rivals)) = (findings, rivals) else {
+            return Ok(None);
+        };
         let finding = |row: &FindingRow| {
             let own = rivals.0.iter().filter(|rival| rival.rank == row.rank);
             let own = own.map(|rival| (cause(&rival.effect, &rival.place), rival.probability));
@@ -85,13 +88,20 @@ impl Said {
 
     /// Findings with the rivals that are not excluded, and their probabilities.
     fn open(&self) -> impl Iterator<Item = (&CauseAtPlace, &CauseAtPlace, Option<f64>)> {
-        let pairs = self.0.iter().flat_map(|(finding, own)| own.iter().map(move |(rival, value)| (finding, rival, *value)));
+        let pairs = self.0.iter().flat_map(|(finding, own)| {
+            own.iter()
+                .map(move |(rival, value)| (finding, rival, *value))
+        });
         pairs.filter(|(_, _, value)| is_open(*value))
     }
 
     /// A rival of a finding, if it is listed.
     fn rival(&self, finding: &CauseAtPlace, rival: &CauseAtPlace) -> Option<&Listed> {
-        let own = self.0.iter().filter(|(cause, _)| cause == finding).flat_map(|(_, own)| own);
+        let own = self
+            .0
+            .iter()
+            .filter(|(cause, _)| cause == finding)
+            .flat_map(|(_, own)| own);
         own.into_iter().find(|(cause, _)| cause == rival)
     }
 }
@@ -102,12 +112,17 @@ fn is_open(probability: Option<f64>) -> bool {
 }
 
 fn cause(effect: &str, place: &str) -> CauseAtPlace {
-    CauseAtPlace { effect: effect.into(), place: place.into() }
+    CauseAtPlace {
+        effect: effect.into(),
+        place: place.into(),
+    }
 }
 
 /// A table of a stage; none where it was not written or has left the store.
 fn table<T: Table>(stage: &StageReport, store: &Store) -> Result<Option<T>> {
-    let Some(own) = stage.outputs.iter().find(|output| output.kind == T::KIND) else { return Ok(None) };
+    let Some(own) = stage.outputs.iter().find(|output| output.kind == T::KIND) else {
+        return Ok(None);
+    };
     if !store.object(&own.table)?.exists() {
         return Ok(None);
     }
@@ -117,12 +132,23 @@ fn table<T: Table>(stage: &StageReport, store: &Store) -> Result<Option<T>> {
 fn compare(stage: &str, a: &Said, b: &Said) -> Vec<RivalChange> {
     let change = |finding: &CauseAtPlace, rival: &CauseAtPlace, outcome, before, now| {
         let (stage, finding, rival) = (stage.to_string(), finding.clone(), rival.clone());
-        RivalChange { stage, finding, rival, outcome, before, now }
+        RivalChange {
+            stage,
+            finding,
+            rival,
+            outcome,
+            before,
+            now,
+        }
     };
     let mut out: Vec<RivalChange> = Vec::new();
     for (finding, rival, before) in a.open() {
         let (stays, comes) = (b.finds(finding), b.finds(rival));
-        let listed = if stays { b.rival(finding, rival) } else { b.rival(rival, finding) };
+        let listed = if stays {
+            b.rival(finding, rival)
+        } else {
+            b.rival(rival, finding)
+        };
         let outcome = match (stays, comes) {
             (true, true) => RivalOutcome::Both,
             (false, false) => RivalOutcome::Neither,
@@ -130,24 +156,58 @@ fn compare(stage: &str, a: &Said, b: &Said) -> Vec<RivalChange> {
             (true, false) => RivalOutcome::Confirmed,
             (false, true) => RivalOutcome::Reversed,
         };
-        out.push(change(finding, rival, outcome, before, listed.and_then(|(_, value)| *value)));
+        out.push(change(
+            finding,
+            rival,
+            outcome,
+            before,
+            listed.and_then(|(_, value)| *value),
+        ));
     }
     for (finding, rival, now) in b.open() {
-        let known = |one: &RivalChange| [(&one.finding, &one.rival), (&one.rival, &one.finding)].contains(&(finding, rival));
+        let known = |one: &RivalChange| {
+            [(&one.finding, &one.rival), (&one.rival, &one.finding)].contains(&(finding, rival))
+        };
         if !out.iter().any(known) {
-            out.push(change(finding, rival, RivalOutcome::New, a.rival(finding, rival).and_then(|(_, value)| *value), now));
+            out.push(change(
+                finding,
+                rival,
+                RivalOutcome::New,
+                a.rival(finding, rival).and_then(|(_, value)| *value),
+                now,
+            ));
         }
     }
     out
 }
 
 /// What the diagnoses of two compared runs say about rivals, stage by stage.
-pub fn rival_changes(store: &Store, diff: &RunDiff, of: [&RunAddress; 2]) -> Result<Vec<RivalChange>> {
-    let (a, b) = (Manifest::of(store, &diff.a.run)?, Manifest::of(store, &diff.b.run)?);
-    let asked = |id: &String| of.iter().all(|place| place.port.is_none() && place.stage.as_ref().is_none_or(|stage| stage == id));
+pub fn rival_changes(
+    store: &Store,
+    diff: &RunDiff,
+    of: [&RunAddress; 2],
+) -> Result<Vec<RivalChange>> {
+    let (a, b) = (
+        Manifest::of(store, &diff.a.run)?,
+        Manifest::of(store, &diff.b.run)?,
+    );
+    let asked = |id: &String| {
+        of.iter().all(|place| {
+            place.port.is_none() && place.stage.as_ref().is_none_or(|stage| stage == id)
+        })
+    };
     let mut out = Vec::new();
-    for now in b.stages.iter().filter(|stage| stage.uses == Diagnose::NAME && asked(&stage.id)) {
-        let Some(before) = a.stage(&now.id).filter(|stage| stage.uses == Diagnose::NAME) else { continue };
+    for now in b
+        .stages
+        .iter()
+        .filter(|stage| stage.uses == Diagnose::NAME && asked(&stage.id))
+    {
+        let Some(before) = a
+            .stage(&now.id)
+            .filter(|stage| stage.uses == Diagnose::NAME)
+        else {
+            continue;
+        };
         if let (Some(before), Some(said)) = (Said::read(before, store)?, Said::read(now, store)?) {
             out.extend(compare(&now.id, &before, &said));
         }
@@ -157,21 +217,42 @@ pub fn rival_changes(store: &Store, diff: &RunDiff, of: [&RunAddress; 2]) -> Res
 
 /// A line each.
 pub fn rival_words(changes: &[RivalChange]) -> String {
-    let number = |value: Option<f64>| value.map_or_else(|| "not listed".into(), |value| format!("{value:.2}"));
+    let number = |value: Option<f64>| {
+        value.map_or_else(|| "not listed".into(), |value| format!("{value:.2}"))
+    };
     let line = |change: &RivalChange| {
-        let RivalChange { stage, finding, rival, outcome, before, now } = change;
+        let RivalChange {
+            stage,
+            finding,
+            rival,
+            outcome,
+            before,
+            now,
+        } = change;
         let (was, is) = (number(*before), number(*now));
         match outcome {
-            RivalOutcome::Confirmed => format!("{stage}: decided: {finding}, not {rival} (its probability {was} -> {is})\n"),
+            RivalOutcome::Confirmed => format!(
+                "{stage}: decided: {finding}, not {rival} (its probability {was} -> {is})\n"
+            ),
             RivalOutcome::Reversed => {
-                format!("{stage}: decided: {rival}, not {finding} as in A (the rival's probability was {was} there)\n")
+                format!(
+                    "{stage}: decided: {rival}, not {finding} as in A (the rival's probability was {was} there)\n"
+                )
             }
             RivalOutcome::Open => {
-                format!("{stage}: still open: {finding} or {rival} (probability of the less probable one {was} -> {is})\n")
+                format!(
+                    "{stage}: still open: {finding} or {rival} (probability of the less probable one {was} -> {is})\n"
+                )
             }
-            RivalOutcome::Both => format!("{stage}: {finding} and {rival} are both findings in B\n"),
-            RivalOutcome::Neither => format!("{stage}: neither {finding} nor its rival {rival} is a finding in B\n"),
-            RivalOutcome::New => format!("{stage}: new rival: {finding} or {rival} (probability {was} -> {is})\n"),
+            RivalOutcome::Both => {
+                format!("{stage}: {finding} and {rival} are both findings in B\n")
+            }
+            RivalOutcome::Neither => {
+                format!("{stage}: neither {finding} nor its rival {rival} is a finding in B\n")
+            }
+            RivalOutcome::New => {
+                format!("{stage}: new rival: {finding} or {rival} (probability {was} -> {is})\n")
+            }
         }
     };
     changes.iter().map(line).collect()
@@ -182,22 +263,47 @@ mod tests {
     use super::*;
 
     fn said(findings: &[(&str, &[(&str, f64)])]) -> Said {
-        let named = |text: &str| text.split_once('@').map(|(effect, place)| cause(effect, place)).expect("EFFECT@PLACE");
-        let rivals = |own: &[(&str, f64)]| own.iter().map(|(name, value)| (named(name), Some(*value))).collect();
-        Said(findings.iter().map(|(name, own)| (named(name), rivals(own))).collect())
+        let named = |text: &str| {
+            text.split_once('@')
+                .map(|(effect, place)| cause(effect, place))
+                .expect("EFFECT@PLACE")
+        };
+        let rivals = |own: &[(&str, f64)]| {
+            own.iter()
+                .map(|(name, value)| (named(name), Some(*value)))
+                .collect()
+        };
+        Said(
+            findings
+                .iter()
+                .map(|(name, own)| (named(name), rivals(own)))
+                .collect(),
+        )
     }
 
     #[test]
     fn every_rival_that_was_open_is_confirmed_reversed_or_still_open() {
         let before = said(&[
-            ("joint_compliance@joint 2", &[("joint_hardening@joint 2", 0.31), ("link_mass@link 2", 0.02)]),
+            (
+                "joint_compliance@joint 2",
+                &[
+                    ("joint_hardening@joint 2", 0.31),
+                    ("link_mass@link 2", 0.02),
+                ],
+            ),
             ("backlash@joint 3", &[("joint_log_lag@joint 3", 0.2)]),
             ("gear_cyclic@joint 1", &[("cable_drag@joint 1", 0.4)]),
             ("link_mass@link 4", &[("link_mass@link 5", 0.3)]),
             ("tool_shift@tool", &[("base_shift@base", 0.1)]),
         ]);
         let now = said(&[
-            ("joint_compliance@joint 2", &[("joint_hardening@joint 2", 0.01), ("link_mass@link 2", 0.06)]),
+            (
+                "joint_compliance@joint 2",
+                &[
+                    ("joint_hardening@joint 2", 0.01),
+                    ("link_mass@link 2", 0.06),
+                ],
+            ),
             ("joint_log_lag@joint 3", &[]),
             ("gear_cyclic@joint 1", &[("cable_drag@joint 1", 0.07)]),
             ("link_mass@link 4", &[]),

@@ -6,17 +6,42 @@ use crate::store::TableRef;
 
 /// A whole run.
 pub fn run(manifest: &Manifest) -> String {
-    let mut text = format!("run {}, {}, {}\n", manifest.run_id, manifest.what(), status(manifest));
-    text.push_str(&manifest.error.as_ref().map_or_else(String::new, |error| format!("error: {error}\n")));
-    let seconds = manifest.wall_seconds.map_or_else(String::new, |seconds| format!(", {seconds:.1} s"));
-    let memory = manifest.peak_memory_bytes.map_or_else(String::new, |bytes| format!(", {:.0} MB at most", bytes as f64 / 1e6));
+    let mut text = format!(
+        "run {}, {}, {}\n",
+        manifest.run_id,
+        manifest.what(),
+        status(manifest)
+    );
+    text.push_str(
+        &manifest
+            .error
+            .as_ref()
+            .map_or_else(String::new, |error| format!("error: {error}\n")),
+    );
+    let seconds = manifest
+        .wall_seconds
+        .map_or_else(String::new, |seconds| format!(", {seconds:.1} s"));
+    let memory = manifest
+        .peak_memory_bytes
+        .map_or_else(String::new, |bytes| {
+            format!(", {:.0} MB at most", bytes as f64 / 1e6)
+        });
     text.push_str(&format!("started {}{seconds}{memory}\n", manifest.started));
-    text.push_str(&format!("pipeline {}, {}, seed {}\n", manifest.pipeline.name, manifest.pipeline.file, manifest.seed));
+    text.push_str(&format!(
+        "pipeline {}, {}, seed {}\n",
+        manifest.pipeline.name, manifest.pipeline.file, manifest.seed
+    ));
     for set in &manifest.overrides {
-        text.push_str(&format!("set on the command line: {} = {}\n", set.target, set.value));
+        text.push_str(&format!(
+            "set on the command line: {} = {}\n",
+            set.target, set.value
+        ));
     }
     let (tool, host) = (&manifest.tool, &manifest.host);
-    let user = manifest.user.as_ref().map_or_else(String::new, |user| format!("{user} on "));
+    let user = manifest
+        .user
+        .as_ref()
+        .map_or_else(String::new, |user| format!("{user} on "));
     text.push_str(&format!(
         "{} {} on {user}{}, {} {}, {}\n",
         tool.name,
@@ -29,14 +54,37 @@ pub fn run(manifest: &Manifest) -> String {
     if let Some(previous) = &manifest.previous {
         text.push_str(&format!("after run {}\n", previous.run));
     }
-    let width = manifest.stages.iter().map(|stage| stage.id.len()).max().unwrap_or(0);
+    let width = manifest
+        .stages
+        .iter()
+        .map(|stage| stage.id.len())
+        .max()
+        .unwrap_or(0);
     text.push('\n');
     for stage in &manifest.stages {
-        let rows: Vec<String> = stage.outputs.iter().map(|output| format!("{} {}", output.port, output.table.rows)).collect();
-        let seconds = stage.wall_seconds.map_or_else(String::new, |seconds| format!("{seconds:.2} s"));
-        text.push_str(&format!("{:width$}  {:8}  {seconds:>9}  {}\n", stage.id, word(stage), rows.join(", ")));
-        text.push_str(&stage.reason.as_ref().map_or_else(String::new, |reason| format!("{:width$}  because: {reason}\n", "")));
-        text.extend(stage.warnings.iter().map(|warning| format!("{:width$}  warning: {warning}\n", "")));
+        let rows: Vec<String> = stage
+            .outputs
+            .iter()
+            .map(|output| format!("{} {}", output.port, output.table.rows))
+            .collect();
+        let seconds = stage
+            .wall_seconds
+            .map_or_else(String::new, |seconds| format!("{seconds:.2} s"));
+        text.push_str(&format!(
+            "{:width$}  {:8}  {seconds:>9}  {}\n",
+            stage.id,
+            word(stage),
+            rows.join(", ")
+        ));
+        text.push_str(&stage.reason.as_ref().map_or_else(String::new, |reason| {
+            format!("{:width$}  because: {reason}\n", "")
+        }));
+        text.extend(
+            stage
+                .warnings
+                .iter()
+                .map(|warning| format!("{:width$}  warning: {warning}\n", "")),
+        );
     }
     text
 }
@@ -51,24 +99,66 @@ pub(super) fn word(stage: &StageReport) -> String {
 
 /// One stage with its inputs and tables.
 pub fn stage(stage: &StageReport) -> String {
-    let mut text =
-        format!("stage {} (uses {}, implementation {}): {}\n", stage.id, stage.uses, stage.implementation, word(stage));
-    text.push_str(&stage.reason.as_ref().map_or_else(String::new, |reason| format!("because: {reason}\n")));
-    text.push_str(&stage.action.as_ref().map_or_else(String::new, |action| format!("action {action}\n")));
+    let mut text = format!(
+        "stage {} (uses {}, implementation {}): {}\n",
+        stage.id,
+        stage.uses,
+        stage.implementation,
+        word(stage)
+    );
+    text.push_str(
+        &stage
+            .reason
+            .as_ref()
+            .map_or_else(String::new, |reason| format!("because: {reason}\n")),
+    );
+    text.push_str(
+        &stage
+            .action
+            .as_ref()
+            .map_or_else(String::new, |action| format!("action {action}\n")),
+    );
     for file in &stage.files {
-        text.push_str(&format!("file    {} = {}, {} bytes, {:.12}\n", file.place, file.path, file.bytes, file.blake3.as_str()));
+        text.push_str(&format!(
+            "file    {} = {}, {} bytes, {:.12}\n",
+            file.place,
+            file.path,
+            file.bytes,
+            file.blake3.as_str()
+        ));
     }
     let mut table = |verb: &str, what: String, table: &TableRef| {
-        text.push_str(&format!("{verb:7} {what}, {}, {:.12}\n", counted(table.rows, "row"), table.table_hash.as_str()));
+        text.push_str(&format!(
+            "{verb:7} {what}, {}, {:.12}\n",
+            counted(table.rows, "row"),
+            table.table_hash.as_str()
+        ));
     };
-    stage.inputs.iter().for_each(|input| table("reads", format!("{} <- {}", input.port, input.from), &input.table));
-    stage.outputs.iter().for_each(|output| table("writes", format!("{} ({})", output.port, output.table.schema), &output.table));
+    stage.inputs.iter().for_each(|input| {
+        table(
+            "reads",
+            format!("{} <- {}", input.port, input.from),
+            &input.table,
+        )
+    });
+    stage.outputs.iter().for_each(|output| {
+        table(
+            "writes",
+            format!("{} ({})", output.port, output.table.schema),
+            &output.table,
+        )
+    });
     if let Some(key) = &stage.key {
         let settings = serde_json::to_string_pretty(&key.settings).unwrap_or_default();
         text.push_str(&format!("seed    {}\nsettings {settings}\n", key.seed));
     }
     text.extend(stage.notes.iter().map(|note| format!("note    {note}\n")));
-    text.extend(stage.warnings.iter().map(|warning| format!("warning {warning}\n")));
+    text.extend(
+        stage
+            .warnings
+            .iter()
+            .map(|warning| format!("warning {warning}\n")),
+    );
     text
 }
 

@@ -21,13 +21,22 @@ pub(super) fn width(terminal: Option<usize>) -> usize {
 pub(super) fn measured(robot: Option<&str>, rows: &str, noise: Option<&str>) -> String {
     let all: Vec<&str> = [Some(rows), noise].into_iter().flatten().collect();
     let rows = all.join("; ");
-    labelled("robot", &robot.map_or_else(|| rows.clone(), |robot| format!("{}: {rows}", cut(robot, WIDTH / 3))))
+    labelled(
+        "robot",
+        &robot.map_or_else(
+            || rows.clone(),
+            |robot| format!("{}: {rows}", cut(robot, WIDTH / 3)),
+        ),
+    )
 }
 
 /// Mean and largest error of a step (mm), with the decimals that suit the smaller of all means.
 pub(super) fn errors(label: &str, [mean, largest]: [f64; 2], least: f64, of: &str) -> String {
     let decimals = if least < SMALL { 4 } else { 3 };
-    labelled(label, &format!("{mean:>7.decimals$} mm mean {largest:>8.decimals$} mm largest  {of}"))
+    labelled(
+        label,
+        &format!("{mean:>7.decimals$} mm mean {largest:>8.decimals$} mm largest  {of}"),
+    )
 }
 
 /// What the noise is and rests on.
@@ -41,19 +50,38 @@ pub(super) fn noise(size: &str, basis: Option<&str>) -> String {
 
 /// What the errors after a diagnosis are of.
 pub(super) fn with_findings(count: usize) -> &'static str {
-    if count == 0 { "nothing found" } else { "with the findings" }
+    if count == 0 {
+        "nothing found"
+    } else {
+        "with the findings"
+    }
 }
 
 /// What the data cannot show, by the names alone that begin its sentences.
 pub(super) fn not_seen(sentences: &[&str], width: usize) -> String {
-    let name = |line: &&str| line.split_once(": ").map_or(*line, |(what, _)| what).replace('_', " ");
-    names("not seen", &sentences.iter().map(name).collect::<Vec<_>>(), width)
+    let name = |line: &&str| {
+        line.split_once(": ")
+            .map_or(*line, |(what, _)| what)
+            .replace('_', " ")
+    };
+    names(
+        "not seen",
+        &sentences.iter().map(name).collect::<Vec<_>>(),
+        width,
+    )
 }
 
 /// How many findings did not stand; nothing where all did.
 pub(super) fn withdrawn(count: usize) -> String {
     let was = if count == 1 { "was" } else { "were" };
-    if count == 0 { String::new() } else { labelled("withdrawn", &format!("{} {was} not confirmed", counted(count, "finding"))) }
+    if count == 0 {
+        String::new()
+    } else {
+        labelled(
+            "withdrawn",
+            &format!("{} {was} not confirmed", counted(count, "finding")),
+        )
+    }
 }
 
 /// One thing to do next.
@@ -67,7 +95,10 @@ pub struct NextStep {
 impl NextStep {
     /// To correct one's targets by the model of a run.
     pub fn correct(run: &str, store: &str) -> Self {
-        Self { what: "correct your targets".into(), command: Some(format!("calib compensate {run} targets.csv{store}")) }
+        Self {
+            what: "correct your targets".into(),
+            command: Some(format!("calib compensate {run} targets.csv{store}")),
+        }
     }
 
     /// Its lines.
@@ -91,14 +122,24 @@ pub(super) fn sentence(label: &str, text: &str, width: usize) -> String {
 pub(super) fn found(mut findings: Vec<ShortFinding>, width: usize) -> String {
     let size = |finding: &ShortFinding| finding.size.as_ref().map_or(0.0, |(size, _)| *size);
     findings.sort_by(|a, b| size(b).total_cmp(&size(a)));
-    let told = if findings.len() > FOUND + 1 { FOUND } else { findings.len() };
+    let told = if findings.len() > FOUND + 1 {
+        FOUND
+    } else {
+        findings.len()
+    };
     let smaller = findings.len() - told;
-    let sizes: Vec<&str> = findings[..told].iter().map(|one| one.size.as_ref().map_or("", |(_, size)| size.as_str())).collect();
+    let sizes: Vec<&str> = findings[..told]
+        .iter()
+        .map(|one| one.size.as_ref().map_or("", |(_, size)| size.as_str()))
+        .collect();
     let right = sizes.iter().map(|size| size.width()).max().unwrap_or(0);
     let room = width.saturating_sub(LABEL);
     let half = room / 2 + 1;
-    let mut cells: Vec<String> =
-        sizes.iter().zip(&findings).map(|(size, one)| cut(&format!("{size:>right$}  {}", one.what), room)).collect();
+    let mut cells: Vec<String> = sizes
+        .iter()
+        .zip(&findings)
+        .map(|(size, one)| cut(&format!("{size:>right$}  {}", one.what), room))
+        .collect();
     if smaller > 0 {
         cells.push(format!("{:right$}  and {smaller} smaller", ""));
     }
@@ -119,13 +160,26 @@ pub(super) fn ranked(rank: i64, finding: &ShortFinding, at: &str, width: usize) 
     let room = width.saturating_sub(LABEL);
     let told = |at: &str| {
         let size = finding.size.as_ref().map(|(_, size)| format!("{size}{at}"));
-        let figures: Vec<&str> = finding.number.iter().chain(&size).map(String::as_str).collect();
-        if figures.is_empty() { finding.what.clone() } else { format!("{}: {}", finding.what, figures.join(", ")) }
+        let figures: Vec<&str> = finding
+            .number
+            .iter()
+            .chain(&size)
+            .map(String::as_str)
+            .collect();
+        if figures.is_empty() {
+            finding.what.clone()
+        } else {
+            format!("{}: {}", finding.what, figures.join(", "))
+        }
     };
-    let told = Some(told(at)).filter(|text| text.width() <= room).unwrap_or_else(|| cut(&told(""), room));
+    let told = Some(told(at))
+        .filter(|text| text.width() <= room)
+        .unwrap_or_else(|| cut(&told(""), room));
     let label = format!("{rank:>3}.");
     match &finding.instead {
-        Some(instead) if told.width() + instead.width() + 2 <= room => labelled(&label, &format!("{told}; {instead}")),
+        Some(instead) if told.width() + instead.width() + 2 <= room => {
+            labelled(&label, &format!("{told}; {instead}"))
+        }
         Some(instead) => labelled(&label, &told) + &labelled("", &cut(instead, room)),
         None => labelled(&label, &told),
     }
@@ -136,11 +190,19 @@ pub(super) fn names(label: &str, all: &[String], width: usize) -> String {
     let room = width.saturating_sub(LABEL);
     let shown = |count: usize| {
         let rest = all.len() - count;
-        let more = if rest > 0 { format!(" and {rest} more") } else { String::new() };
+        let more = if rest > 0 {
+            format!(" and {rest} more")
+        } else {
+            String::new()
+        };
         all[..count].join(", ") + &more
     };
-    let fits = (1..=all.len()).rev().map(shown).find(|text| text.width() <= room);
-    fits.or_else(|| all.first().cloned()).map_or_else(String::new, |text| labelled(label, &cut(&text, room)))
+    let fits = (1..=all.len())
+        .rev()
+        .map(shown)
+        .find(|text| text.width() <= room);
+    fits.or_else(|| all.first().cloned())
+        .map_or_else(String::new, |text| labelled(label, &cut(&text, room)))
 }
 
 /// A text of this width at most, `…` for what is cut off.
@@ -164,11 +226,18 @@ mod tests {
 
     fn finding(mm: f64, what: &str) -> ShortFinding {
         let size = Some((mm, format!("{mm:.2} mm")));
-        ShortFinding { size, what: what.into(), number: Some("14.8 +- 0.4 arcsec".into()), instead: None }
+        ShortFinding {
+            size,
+            what: what.into(),
+            number: Some("14.8 +- 0.4 arcsec".into()),
+            instead: None,
+        }
     }
 
     fn several(count: usize) -> Vec<ShortFinding> {
-        (1..=count).map(|k| finding(k as f64, &format!("joint {k} yields under load"))).collect()
+        (1..=count)
+            .map(|k| finding(k as f64, &format!("joint {k} yields under load")))
+            .collect()
     }
 
     #[test]
@@ -181,7 +250,10 @@ mod tests {
         );
         assert_eq!(found(several(6), 100).lines().count(), 3);
         let narrow = found(several(17), 80);
-        assert!(narrow.lines().count() == 6 && narrow.lines().all(|line| line.width() <= 80), "{narrow}");
+        assert!(
+            narrow.lines().count() == 6 && narrow.lines().all(|line| line.width() <= 80),
+            "{narrow}"
+        );
         assert_eq!(found(Vec::new(), 100), "");
     }
 
@@ -192,10 +264,14 @@ mod tests {
             ..finding(0.1, &"x".repeat(70))
         };
         for width in [60, 80, 100] {
-            let text = ranked(3, &long, " at the tool", width) + &found(vec![finding(0.1, &"x".repeat(120))], width);
+            let text = ranked(3, &long, " at the tool", width)
+                + &found(vec![finding(0.1, &"x".repeat(120))], width);
             let text = text + &names("not seen", &vec!["temperature".to_string(); 20], width);
             assert!(text.lines().all(|line| line.width() <= width), "{text}");
-            assert!(text.contains("or: joint 4") && text.contains(" more\n"), "{text}");
+            assert!(
+                text.contains("or: joint 4") && text.contains(" more\n"),
+                "{text}"
+            );
         }
     }
 }

@@ -8,7 +8,10 @@ use crate::table::{Searches, SearchesRow};
 use serde_json::json;
 
 fn rows(outcome: &CompletedRun, store: &Store) -> Result<Vec<SearchesRow>> {
-    Ok(tables::<Searches>(outcome, store)?.into_iter().flat_map(|table| table.0).collect())
+    Ok(tables::<Searches>(outcome, store)?
+        .into_iter()
+        .flat_map(|table| table.0)
+        .collect())
 }
 
 /// One line per function and optimiser; nothing where nothing was searched.
@@ -33,9 +36,14 @@ pub fn searches(outcome: &CompletedRun, store: &Store) -> Result<String> {
         if published { "  published time" } else { "" }
     );
     for row in &rows {
-        let share = |count: i64| format!("{:.1}%", 100.0 * count as f64 / row.searches.max(1) as f64);
-        let count = |value: Option<f64>| value.map_or_else(|| "-".to_string(), |value| format!("{value:.0}"));
-        let error = |value: Option<f64>| value.map_or_else(|| "-".to_string(), |value| format!("{value:.2e}"));
+        let share =
+            |count: i64| format!("{:.1}%", 100.0 * count as f64 / row.searches.max(1) as f64);
+        let count = |value: Option<f64>| {
+            value.map_or_else(|| "-".to_string(), |value| format!("{value:.0}"))
+        };
+        let error = |value: Option<f64>| {
+            value.map_or_else(|| "-".to_string(), |value| format!("{value:.2e}"))
+        };
         let time = match (&row.reference, row.reference_s) {
             (Some(label), Some(seconds)) => format!("  {label}: {seconds:.3} s"),
             _ => String::new(),

@@ -99,36 +99,91 @@ const PHRASES: &[(&str, &str, Told)] = &[
     ("base_shift", "base or tracker moves", No),
     ("tracker_drift", "tracker drifts", No),
     ("tracker_scale", "tracker scale differs", Largest),
-    ("tracker_circle", "tracker azimuth errs periodically", Amplitude),
-    ("tracker_elevation", "tracker errs with elevation", Amplitude),
+    (
+        "tracker_circle",
+        "tracker azimuth errs periodically",
+        Amplitude,
+    ),
+    (
+        "tracker_elevation",
+        "tracker errs with elevation",
+        Amplitude,
+    ),
     ("tracker_offset", "tracker ranges are offset", Largest),
-    ("tracker_refraction", "tracker ranges change with the air", Largest),
+    (
+        "tracker_refraction",
+        "tracker ranges change with the air",
+        Largest,
+    ),
     ("joint_log_lag", "joint log lags or leads", Largest),
     ("coupling_ratio", "{} cross-coupling", Largest),
     ("coulomb_friction", "{} Coulomb friction", Called("coulomb")),
     ("viscous_friction", "{} viscous friction", Called("viscous")),
-    ("stribeck_friction", "{} Stribeck friction", Called("stribeck")),
-    ("asymmetric_friction", "{} friction differs by side", Called("asymmetry")),
-    ("presliding_friction", "{} presliding friction", Called("kept")),
-    ("load_friction", "{} friction grows with load", Called("share")),
-    ("warmup_friction", "{} friction falls with warmth", Called("coulomb_cold")),
-    ("wrist_coupling", "{} friction by another joint", Called("coulomb")),
-    ("backlash_spikes", "{} knocks at reversals", Called("height")),
+    (
+        "stribeck_friction",
+        "{} Stribeck friction",
+        Called("stribeck"),
+    ),
+    (
+        "asymmetric_friction",
+        "{} friction differs by side",
+        Called("asymmetry"),
+    ),
+    (
+        "presliding_friction",
+        "{} presliding friction",
+        Called("kept"),
+    ),
+    (
+        "load_friction",
+        "{} friction grows with load",
+        Called("share"),
+    ),
+    (
+        "warmup_friction",
+        "{} friction falls with warmth",
+        Called("coulomb_cold"),
+    ),
+    (
+        "wrist_coupling",
+        "{} friction by another joint",
+        Called("coulomb"),
+    ),
+    (
+        "backlash_spikes",
+        "{} knocks at reversals",
+        Called("height"),
+    ),
     ("torque_ripple", "{} torque ripple", Called("amplitude")),
     ("joint_elasticity", "{} oscillates", Called("resonance")),
-    ("torque_constant", "{} torque constant differs", Called("relative")),
+    (
+        "torque_constant",
+        "{} torque constant differs",
+        Called("relative"),
+    ),
     ("rotor_inertia", "{} rotor inertia", Called("inertia")),
     ("current_offset", "{} torque offset", Called("offset")),
-    ("current_latency", "torques lag behind positions", Called("latency")),
+    (
+        "current_latency",
+        "torques lag behind positions",
+        Called("latency"),
+    ),
     ("spring_balance", "balancing spring at {}", No),
-    ("cable_stiffness", "cable or hose at {}", Called("stiffness")),
+    (
+        "cable_stiffness",
+        "cable or hose at {}",
+        Called("stiffness"),
+    ),
     ("link_com", "centre of mass of {} differs", Largest),
     ("link_inertia", "inertia of {} differs", Largest),
     ("gravity_direction", "base is tilted", Called("tilt")),
 ];
 
 fn phrase(effect: &str) -> Option<(&'static str, Told)> {
-    PHRASES.iter().find(|(name, ..)| *name == effect).map(|(_, words, told)| (*words, *told))
+    PHRASES
+        .iter()
+        .find(|(name, ..)| *name == effect)
+        .map(|(_, words, told)| (*words, *told))
 }
 
 /// What a cause does at a place, whatever its size; one that a user declares by its name.
@@ -145,35 +200,69 @@ impl ShortFinding {
     pub fn of(found: FoundCause, rows: bool) -> Self {
         let forms = serde_json::from_str::<Value>(found.forms).unwrap_or_default();
         // A cause of the list which fits best, but not well enough to bear its name.
-        let nearest = (found.effect == names::UNKNOWN).then(|| nearest(&found, &forms)).flatten();
+        let nearest = (found.effect == names::UNKNOWN)
+            .then(|| nearest(&found, &forms))
+            .flatten();
         let effect = nearest.unwrap_or(found.effect);
-        let told = phrase(effect).map_or(if effect == names::UNKNOWN { No } else { Largest }, |(_, told)| told);
+        let told = phrase(effect).map_or(
+            if effect == names::UNKNOWN {
+                No
+            } else {
+                Largest
+            },
+            |(_, told)| told,
+        );
         let number = told.number(&found.numbers);
         let of_rows = number.is_none() && found.size.is_none();
-        let mut what = if of_rows { found.statement.trim_end_matches('.').to_string() } else { words(effect, found.place) };
+        let mut what = if of_rows {
+            found.statement.trim_end_matches('.').to_string()
+        } else {
+            words(effect, found.place)
+        };
         if let Some(at) = changed_at(&forms).filter(|_| !of_rows) {
-            what += &if rows { format!(" at row {:.0}", at.floor() + 2.0) } else { format!(" at {} s", figure(at, 0)) };
+            what += &if rows {
+                format!(" at row {:.0}", at.floor() + 2.0)
+            } else {
+                format!(" at {} s", figure(at, 0))
+            };
         }
         if nearest.is_some() {
             what += ", roughly";
         }
         let instead = instead(&found, nearest);
-        Self { size: found.size, what, number, instead }
+        Self {
+            size: found.size,
+            what,
+            number,
+            instead,
+        }
     }
 }
 
 /// The cause by whose form something unknown is modelled, where that is its closest rival.
 fn nearest<'a>(found: &FoundCause<'a>, forms: &Value) -> Option<&'a str> {
     let own = |rival: &&NamedRival| rival.place == found.place && rival.effect != names::UNKNOWN;
-    let modelled = |effect: &str| forms.as_array().is_some_and(|all| all.iter().any(|form| form.get(effect).is_some()));
-    found.rivals.iter().filter(own).find(|rival| modelled(rival.effect)).map(|rival| rival.effect)
+    let modelled = |effect: &str| {
+        forms
+            .as_array()
+            .is_some_and(|all| all.iter().any(|form| form.get(effect).is_some()))
+    };
+    found
+        .rivals
+        .iter()
+        .filter(own)
+        .find(|rival| modelled(rival.effect))
+        .map(|rival| rival.effect)
 }
 
 /// When a form steps, on the clock of the recording.
 fn changed_at(forms: &Value) -> Option<f64> {
     match forms {
         Value::Object(all) => {
-            let own = all.get("after").and_then(|after| after.get("at")).and_then(Value::as_f64);
+            let own = all
+                .get("after")
+                .and_then(|after| after.get("at"))
+                .and_then(Value::as_f64);
             own.or_else(|| all.values().find_map(changed_at))
         }
         Value::Array(all) => all.iter().find_map(changed_at),
@@ -183,7 +272,10 @@ fn changed_at(forms: &Value) -> Option<f64> {
 
 /// What else it might be, where its name is not certain.
 fn instead(found: &FoundCause, nearest: Option<&str>) -> Option<String> {
-    let certain = nearest.is_some() || found.probability.is_none_or(|probability| probability > CERTAIN);
+    let certain = nearest.is_some()
+        || found
+            .probability
+            .is_none_or(|probability| probability > CERTAIN);
     let mut rivals: Vec<(f64, String)> = found
         .rivals
         .iter()
@@ -199,27 +291,49 @@ fn instead(found: &FoundCause, nearest: Option<&str>) -> Option<String> {
         return None;
     }
     if others > NAMED {
-        return Some(format!("not determined: {others} other causes fit as well (--details)"));
+        return Some(format!(
+            "not determined: {others} other causes fit as well (--details)"
+        ));
     }
-    let said: Vec<String> = rivals.iter().map(|(share, words)| format!("{words} ({:.0} %)", 100.0 * share)).collect();
+    let said: Vec<String> = rivals
+        .iter()
+        .map(|(share, words)| format!("{words} ({:.0} %)", 100.0 * share))
+        .collect();
     Some(format!("or: {}", said.join(", ")))
 }
 
 impl Told {
     fn number(self, all: &[FindingNumber]) -> Option<String> {
         let written = |one: &FindingNumber| {
-            let per = if one.name.ends_with("per_kelvin") { "/K" } else { "" };
+            let per = if one.name.ends_with("per_kelvin") {
+                "/K"
+            } else {
+                ""
+            };
             estimate(one.value, one.sigma, one.unit) + per
         };
-        let largest = || all.iter().max_by(|a, b| a.value.abs().total_cmp(&b.value.abs()));
+        let largest = || {
+            all.iter()
+                .max_by(|a, b| a.value.abs().total_cmp(&b.value.abs()))
+        };
         match self {
             No => None,
             Largest => largest().map(written),
             Size => largest().map(|one| estimate(one.value.abs(), one.sigma, one.unit)),
-            Twice => largest().map(|one| estimate(2.0 * one.value.abs(), one.sigma.map(|sigma| 2.0 * sigma), one.unit)),
+            Twice => largest().map(|one| {
+                estimate(
+                    2.0 * one.value.abs(),
+                    one.sigma.map(|sigma| 2.0 * sigma),
+                    one.unit,
+                )
+            }),
             Called(name) => {
-                let called = all.iter().find(|one| one.name.rsplit(['.', '_']).next() == Some(name) || one.name == name);
-                let more = |one: &&FindingNumber| ["mass", "relative", "offset"].contains(&name) && one.value > 0.0;
+                let called = all.iter().find(|one| {
+                    one.name.rsplit(['.', '_']).next() == Some(name) || one.name == name
+                });
+                let more = |one: &&FindingNumber| {
+                    ["mass", "relative", "offset"].contains(&name) && one.value > 0.0
+                };
                 called.map(|one| format!("{}{}", if more(&one) { "+" } else { "" }, written(one)))
             }
             Amplitude => amplitude(all),
@@ -231,14 +345,27 @@ impl Told {
 fn amplitude(all: &[FindingNumber]) -> Option<String> {
     let pairs = all.iter().filter_map(|sine| {
         let start = sine.name.strip_suffix("sin")?;
-        let cosine = all.iter().find(|one| one.name.strip_suffix("cos") == Some(start))?;
+        let cosine = all
+            .iter()
+            .find(|one| one.name.strip_suffix("cos") == Some(start))?;
         let size = sine.value.hypot(cosine.value);
-        let sigma = sine.sigma.zip(cosine.sigma).map(|(a, b)| (sine.value * a).hypot(cosine.value * b) / size);
+        let sigma = sine
+            .sigma
+            .zip(cosine.sigma)
+            .map(|(a, b)| (sine.value * a).hypot(cosine.value * b) / size);
         Some((size, sigma, sine))
     });
     let (size, sigma, sine) = pairs.max_by(|a, b| a.0.total_cmp(&b.0))?;
-    let digits = |text: &str| text.chars().take_while(char::is_ascii_digit).collect::<String>();
-    let order = sine.name.split_once("order").map(|(_, rest)| digits(rest)).filter(|order| !order.is_empty());
+    let digits = |text: &str| {
+        text.chars()
+            .take_while(char::is_ascii_digit)
+            .collect::<String>()
+    };
+    let order = sine
+        .name
+        .split_once("order")
+        .map(|(_, rest)| digits(rest))
+        .filter(|order| !order.is_empty());
     let order = order.map_or_else(String::new, |order| format!(", {order} per turn"));
     Some(estimate(size, sigma.filter(|sigma| sigma.is_finite()), sine.unit) + &order)
 }
@@ -249,7 +376,12 @@ mod tests {
     use crate::effect::CAUSES;
 
     fn number<'a>(name: &'a str, value: f64, unit: &'a str, sigma: f64) -> FindingNumber<'a> {
-        FindingNumber { name, value, unit, sigma: Some(sigma) }
+        FindingNumber {
+            name,
+            value,
+            unit,
+            sigma: Some(sigma),
+        }
     }
 
     fn found<'a>(effect: &'a str, numbers: Vec<FindingNumber<'a>>) -> FoundCause<'a> {
@@ -268,13 +400,25 @@ mod tests {
 
     fn said(found: FoundCause) -> [String; 3] {
         let short = ShortFinding::of(found, false);
-        [short.what, short.number.unwrap_or_default(), short.instead.unwrap_or_default()]
+        [
+            short.what,
+            short.number.unwrap_or_default(),
+            short.instead.unwrap_or_default(),
+        ]
     }
 
     #[test]
     fn a_finding_is_what_it_does_with_its_number_and_standard_deviation() {
-        let compliance = || found("joint_compliance", vec![number("j3", 4.17e-7, "rad/Nm", 2e-9)]);
-        assert_eq!(said(compliance()), ["joint 3 yields under load", "(4.17 +- 0.02)e-7 rad/Nm", ""]);
+        let compliance = || {
+            found(
+                "joint_compliance",
+                vec![number("j3", 4.17e-7, "rad/Nm", 2e-9)],
+            )
+        };
+        assert_eq!(
+            said(compliance()),
+            ["joint 3 yields under load", "(4.17 +- 0.02)e-7 rad/Nm", ""]
+        );
         let wave = vec![
             number("j3.order2.cos", 3.0, "arcsec", 0.3),
             number("j3.order2.sin", 4.0, "arcsec", 0.3),
@@ -282,45 +426,119 @@ mod tests {
             number("j3.order5.sin", 0.0, "arcsec", 0.3),
         ];
         let wave = said(found("gear_cyclic", wave));
-        assert_eq!(wave, ["joint 3 errs with its angle", "5.0 +- 0.3 arcsec, 2 per turn", ""]);
-        let forms = r#"[{"zero_shift": {"law": {"of": "time", "basis": {"after": {"at": 447.2}}}}}]"#;
-        let step = FoundCause { forms, ..found("zero_shift", vec![number("j3.step", -14.8, "arcsec", 0.4)]) };
-        assert_eq!(said(step), ["zero of joint 3 steps at 447 s", "14.8 +- 0.4 arcsec", ""]);
-        let mass = said(found("payload_error", vec![number("tool.mass", 0.031, "1", 0.004)]));
+        assert_eq!(
+            wave,
+            [
+                "joint 3 errs with its angle",
+                "5.0 +- 0.3 arcsec, 2 per turn",
+                ""
+            ]
+        );
+        let forms =
+            r#"[{"zero_shift": {"law": {"of": "time", "basis": {"after": {"at": 447.2}}}}}]"#;
+        let step = FoundCause {
+            forms,
+            ..found("zero_shift", vec![number("j3.step", -14.8, "arcsec", 0.4)])
+        };
+        assert_eq!(
+            said(step),
+            ["zero of joint 3 steps at 447 s", "14.8 +- 0.4 arcsec", ""]
+        );
+        let mass = said(found(
+            "payload_error",
+            vec![number("tool.mass", 0.031, "1", 0.004)],
+        ));
         assert_eq!(mass, ["payload differs", "+3.1 +- 0.4 %", ""]);
-        let own = said(found("worn_tooth", vec![number("j3.depth", 12.0, "arcsec", 1.0)]));
+        let own = said(found(
+            "worn_tooth",
+            vec![number("j3.depth", 12.0, "arcsec", 1.0)],
+        ));
         assert_eq!(own, ["worn tooth at joint 3", "12.0 +- 1.0 arcsec", ""]);
     }
 
     #[test]
     fn rivals_are_named_only_where_the_name_is_not_certain() {
-        let backlash = || NamedRival { effect: "backlash", place: "joint 3", probability: 0.3 };
-        let doubtful = |probability, rivals, none| {
-            said(FoundCause { probability: Some(probability), rivals, none, ..found("gear_cyclic", Vec::new()) })[2].clone()
+        let backlash = || NamedRival {
+            effect: "backlash",
+            place: "joint 3",
+            probability: 0.3,
         };
-        assert_eq!(doubtful(0.5, vec![backlash()], 0.2), "or: joint 3 has backlash (30 %), another cause (20 %)");
+        let doubtful = |probability, rivals, none| {
+            said(FoundCause {
+                probability: Some(probability),
+                rivals,
+                none,
+                ..found("gear_cyclic", Vec::new())
+            })[2]
+                .clone()
+        };
+        assert_eq!(
+            doubtful(0.5, vec![backlash()], 0.2),
+            "or: joint 3 has backlash (30 %), another cause (20 %)"
+        );
         assert_eq!(doubtful(0.89, Vec::new(), 0.11), "");
         assert_eq!(doubtful(0.95, vec![backlash()], 0.1), "");
-        let twelve = (0..12).map(|_| NamedRival { probability: 0.07, ..backlash() }).collect();
-        assert_eq!(doubtful(0.07, twelve, 0.07), "not determined: 12 other causes fit as well (--details)");
+        let twelve = (0..12)
+            .map(|_| NamedRival {
+                probability: 0.07,
+                ..backlash()
+            })
+            .collect();
+        assert_eq!(
+            doubtful(0.07, twelve, 0.07),
+            "not determined: 12 other causes fit as well (--details)"
+        );
     }
 
     #[test]
     fn what_is_in_no_list_is_called_as_the_nearest_that_models_it_roughly() {
-        let rivals = || vec![NamedRival { effect: "joint_compliance", place: "joint 3", probability: 0.02 }];
+        let rivals = || {
+            vec![NamedRival {
+                effect: "joint_compliance",
+                place: "joint 3",
+                probability: 0.02,
+            }]
+        };
         let numbers = || vec![number("j3", 4.17e-7, "rad/Nm", 2e-9)];
-        let near = FoundCause { forms: r#"[{"joint_compliance": {}}]"#, rivals: rivals(), ..found("unknown", numbers()) };
-        assert_eq!(said(near), ["joint 3 yields under load, roughly", "(4.17 +- 0.02)e-7 rad/Nm", ""]);
-        let far = FoundCause { forms: r#"[{"unknown": {}}]"#, rivals: rivals(), ..found("unknown", numbers()) };
+        let near = FoundCause {
+            forms: r#"[{"joint_compliance": {}}]"#,
+            rivals: rivals(),
+            ..found("unknown", numbers())
+        };
+        assert_eq!(
+            said(near),
+            [
+                "joint 3 yields under load, roughly",
+                "(4.17 +- 0.02)e-7 rad/Nm",
+                ""
+            ]
+        );
+        let far = FoundCause {
+            forms: r#"[{"unknown": {}}]"#,
+            rivals: rivals(),
+            ..found("unknown", numbers())
+        };
         assert_eq!(said(far), ["unknown cause at joint 3", "", ""]);
     }
 
     #[test]
     fn every_cause_that_is_found_has_its_phrase() {
-        let base = ["anchor", "base_frame", "tool_offset", "joint_offset", "link_geometry", "reduction_ratio"];
+        let base = [
+            "anchor",
+            "base_frame",
+            "tool_offset",
+            "joint_offset",
+            "link_geometry",
+            "reduction_ratio",
+        ];
         let of_rows = ["outlier", "mislabelled_point", "unknown"];
-        let without = CAUSES.iter().map(|cause| cause.name()).filter(|name| phrase(name).is_none());
-        let missing: Vec<&str> = without.filter(|name| !base.contains(name) && !of_rows.contains(name)).collect();
+        let without = CAUSES
+            .iter()
+            .map(|cause| cause.name())
+            .filter(|name| phrase(name).is_none());
+        let missing: Vec<&str> = without
+            .filter(|name| !base.contains(name) && !of_rows.contains(name))
+            .collect();
         assert!(missing.is_empty(), "{missing:?}");
         for (_, words, _) in PHRASES {
             assert!(words.replace("{}", "joint 3").len() <= 35, "{words}");

@@ -9,24 +9,42 @@ use serde_json::json;
 
 /// The rows of all tables `statistics` of a run.
 pub(super) fn rows(outcome: &CompletedRun, store: &Store) -> Result<Vec<StatisticsRow>> {
-    Ok(tables::<Statistics>(outcome, store)?.into_iter().flat_map(|table| table.0).collect())
+    Ok(tables::<Statistics>(outcome, store)?
+        .into_iter()
+        .flat_map(|table| table.0)
+        .collect())
 }
 
 /// Three tables: points that no model has seen, those that the models were fitted to, and these again
 /// cross-validated. `expected` is the rms of a complete
 /// model under the instrument's noise.
-pub fn statistics(outcome: &CompletedRun, standing: Option<&Standing>, store: &Store) -> Result<String> {
+pub fn statistics(
+    outcome: &CompletedRun,
+    standing: Option<&Standing>,
+    store: &Store,
+) -> Result<String> {
     let mut rows = rows(outcome, store)?;
-    let withdrawn: Vec<&str> = standing.iter().flat_map(|stands| &stands.withdrawn).map(|gone| gone.step.as_str()).collect();
-    for row in rows.iter_mut().filter(|row| withdrawn.contains(&row.step.as_str())) {
+    let withdrawn: Vec<&str> = standing
+        .iter()
+        .flat_map(|stands| &stands.withdrawn)
+        .map(|gone| gone.step.as_str())
+        .collect();
+    for row in rows
+        .iter_mut()
+        .filter(|row| withdrawn.contains(&row.step.as_str()))
+    {
         row.step.push_str(" (withdrawn)");
     }
     let mut text = String::new();
     for (held_out, title) in [
-        (false, "training points (the models were fitted to these: flattered)"),
+        (
+            false,
+            "training points (the models were fitted to these: flattered)",
+        ),
         (true, "held-out points (no model has seen these)"),
     ] {
-        let rows: Vec<&StatisticsRow> = rows.iter().filter(|row| row.held_out == held_out).collect();
+        let rows: Vec<&StatisticsRow> =
+            rows.iter().filter(|row| row.held_out == held_out).collect();
         if !rows.is_empty() {
             text.push_str(&block(title, &rows));
         }
@@ -41,14 +59,24 @@ pub fn statistics(outcome: &CompletedRun, standing: Option<&Standing>, store: &S
 
 /// Training points under fits without them; nothing where no step made folds.
 fn folds(rows: &[StatisticsRow]) -> String {
-    let rows: Vec<&StatisticsRow> = rows.iter().filter(|row| row.fold_rms_mm.is_some()).collect();
+    let rows: Vec<&StatisticsRow> = rows
+        .iter()
+        .filter(|row| row.fold_rms_mm.is_some())
+        .collect();
     if rows.is_empty() {
         return String::new();
     }
     let width = |name: fn(&StatisticsRow) -> &str, least: usize| {
-        rows.iter().map(|row| name(row).chars().count()).max().unwrap_or(0).max(least)
+        rows.iter()
+            .map(|row| name(row).chars().count())
+            .max()
+            .unwrap_or(0)
+            .max(least)
     };
-    let (step, set) = (width(|row| &row.step, "step".len()), width(|row| &row.set, "set".len()));
+    let (step, set) = (
+        width(|row| &row.step, "step".len()),
+        width(|row| &row.set, "set".len()),
+    );
     let brought = rows.iter().filter(|row| row.is_brought()).count();
     let blocks = match brought {
         0 => "contiguous folds",
@@ -80,11 +108,16 @@ fn folds(rows: &[StatisticsRow]) -> String {
 
 /// Our figures beside those that the pipeline names; nothing where it names none.
 fn references(rows: &[StatisticsRow]) -> String {
-    let rows: Vec<(&str, &StatisticsRow)> = rows.iter().filter_map(|row| Some((row.reference.as_deref()?, row))).collect();
+    let rows: Vec<(&str, &StatisticsRow)> = rows
+        .iter()
+        .filter_map(|row| Some((row.reference.as_deref()?, row)))
+        .collect();
     if rows.is_empty() {
         return String::new();
     }
-    let width = |names: &mut dyn Iterator<Item = &str>| names.map(|name| name.chars().count()).max().unwrap_or(0);
+    let width = |names: &mut dyn Iterator<Item = &str>| {
+        names.map(|name| name.chars().count()).max().unwrap_or(0)
+    };
     let label = width(&mut rows.iter().map(|row| row.0)).max("reference".len());
     let step = width(&mut rows.iter().map(|row| row.1.step.as_str())).max("step".len());
     let set = width(&mut rows.iter().map(|row| row.1.set.as_str())).max("set".len());
@@ -111,9 +144,16 @@ fn references(rows: &[StatisticsRow]) -> String {
 
 fn block(title: &str, rows: &[&StatisticsRow]) -> String {
     let width = |name: fn(&StatisticsRow) -> &str, least: usize| {
-        rows.iter().map(|row| name(row).chars().count()).max().unwrap_or(0).max(least)
+        rows.iter()
+            .map(|row| name(row).chars().count())
+            .max()
+            .unwrap_or(0)
+            .max(least)
     };
-    let (step, set) = (width(|row| &row.step, "step".len()), width(|row| &row.set, "set".len()));
+    let (step, set) = (
+        width(|row| &row.step, "step".len()),
+        width(|row| &row.set, "set".len()),
+    );
     let mut text = format!(
         "{title}, error in mm\n  {:step$}  {:set$}  {:>6}  {:>8}  {:>8}  {:>8}  {:>8}  {:>8}  {:>8}\n",
         "step", "set", "points", "mean", "std", "p95", "max", "rms", "expected"
@@ -129,7 +169,8 @@ fn block(title: &str, rows: &[&StatisticsRow]) -> String {
             row.p95_mm,
             row.max_mm,
             row.rms_mm,
-            row.expected_rms_mm.map_or_else(String::new, |expected| format!("{expected:.4}"))
+            row.expected_rms_mm
+                .map_or_else(String::new, |expected| format!("{expected:.4}"))
         ));
     }
     text + "\n"
@@ -142,14 +183,27 @@ pub fn statistics_json(outcome: &CompletedRun, store: &Store) -> Result<serde_js
 
 /// How many rows of the raw files were rejected.
 pub fn rejected_rows(manifest: &Manifest) -> u64 {
-    manifest.tables(crate::table::Rejected::KIND).map(|output| output.table.rows).sum()
+    manifest
+        .tables(crate::table::Rejected::KIND)
+        .map(|output| output.table.rows)
+        .sum()
 }
 
 /// Nothing where nothing was rejected.
 pub fn rejected(manifest: &Manifest) -> String {
     let line = |output: &crate::pipeline::OutputRecord| {
         let path = output.path.as_deref().unwrap_or_default();
-        labelled("rejected", &format!("{}, each with its reason in {path}", counted(output.table.rows, "row")))
+        labelled(
+            "rejected",
+            &format!(
+                "{}, each with its reason in {path}",
+                counted(output.table.rows, "row")
+            ),
+        )
     };
-    manifest.tables(crate::table::Rejected::KIND).filter(|output| output.table.rows > 0).map(line).collect()
+    manifest
+        .tables(crate::table::Rejected::KIND)
+        .filter(|output| output.table.rows > 0)
+        .map(line)
+        .collect()
 }

@@ -9,8 +9,9 @@ use crate::error::{Error, Result};
 use crate::pipeline::StageReport;
 use crate::store::Store;
 use crate::table::{
-    ContactRow, Contacts, JointTorqueRow, JointTorques, Table, TorqueFindingRow, TorqueFindings, TorqueNumberRow, TorqueNumbers,
-    TorqueRivalRow, TorqueRivals, TorqueVerdict, TorqueVerdictRow, VerdictSentences, VerdictTopic,
+    ContactRow, Contacts, JointTorqueRow, JointTorques, Table, TorqueFindingRow, TorqueFindings,
+    TorqueNumberRow, TorqueNumbers, TorqueRivalRow, TorqueRivals, TorqueVerdict, TorqueVerdictRow,
+    VerdictSentences, VerdictTopic,
 };
 use serde_json::{Value, json};
 
@@ -33,11 +34,20 @@ impl TorqueSummary {
     pub fn read(run: &str, stage: &StageReport, store: &Store) -> Result<Self> {
         fn table<T: Table>(stage: &StageReport, store: &Store) -> Result<T> {
             let own = stage.outputs.iter().find(|output| output.kind == T::KIND);
-            let own = own.ok_or_else(|| Error::Bug(format!("a diagnosis of torques without its table {}", T::KIND)))?;
+            let own = own.ok_or_else(|| {
+                Error::Bug(format!(
+                    "a diagnosis of torques without its table {}",
+                    T::KIND
+                ))
+            })?;
             T::from_frame(&store.load(&own.table)?)
         }
         let verdict: TorqueVerdict = table(stage, store)?;
-        let verdict = verdict.0.into_iter().next().ok_or_else(|| Error::Bug("a diagnosis without a verdict".into()))?;
+        let verdict = verdict
+            .0
+            .into_iter()
+            .next()
+            .ok_or_else(|| Error::Bug("a diagnosis without a verdict".into()))?;
         Ok(Self {
             verdict,
             sentences: table(stage, store)?,
@@ -58,14 +68,24 @@ impl TorqueSummary {
 
     /// The verdict in at most twelve words.
     pub fn verdict(&self) -> String {
-        let worst = self.joints.iter().max_by(|a, b| a.leftover_over_noise.total_cmp(&b.leftover_over_noise));
+        let worst = self
+            .joints
+            .iter()
+            .max_by(|a, b| a.leftover_over_noise.total_cmp(&b.leftover_over_noise));
         let is = |kind: VerdictKind| self.verdict.verdict == kind.name();
         match worst {
-            _ if is(VerdictKind::WrongSetup) => "wrong set-up: correct it first; nothing was identified".into(),
-            _ if is(VerdictKind::NothingMissing) => "nothing missing: the rigid arm explains the torques".into(),
+            _ if is(VerdictKind::WrongSetup) => {
+                "wrong set-up: correct it first; nothing was identified".into()
+            }
+            _ if is(VerdictKind::NothingMissing) => {
+                "nothing missing: the rigid arm explains the torques".into()
+            }
             _ if is(VerdictKind::Explained) => "explained: noise alone remains".into(),
             Some(row) if is(VerdictKind::Unexplained) => {
-                format!("unexplained: {:.1} times the noise remains at joint {}", row.leftover_over_noise, row.joint)
+                format!(
+                    "unexplained: {:.1} times the noise remains at joint {}",
+                    row.leftover_over_noise, row.joint
+                )
             }
             _ => self.verdict.verdict.replace('_', " "),
         }
@@ -73,22 +93,42 @@ impl TorqueSummary {
 
     /// The findings in a few words each, as the table has them.
     pub(super) fn found(&self) -> Vec<ShortFinding> {
-        self.findings.iter().map(|finding| ShortFinding::of(self.cause(finding), false)).collect()
+        self.findings
+            .iter()
+            .map(|finding| ShortFinding::of(self.cause(finding), false))
+            .collect()
     }
 
     fn cause<'a>(&'a self, finding: &'a TorqueFindingRow) -> FoundCause<'a> {
-        let numbers = self.numbers.iter().filter(|number| number.rank == finding.rank);
-        let rival =
-            |rival: &'a TorqueRivalRow| NamedRival { effect: &rival.effect, place: &rival.place, probability: rival.probability };
+        let numbers = self
+            .numbers
+            .iter()
+            .filter(|number| number.rank == finding.rank);
+        let rival = |rival: &'a TorqueRivalRow| NamedRival {
+            effect: &rival.effect,
+            place: &rival.place,
+            probability: rival.probability,
+        };
         let size = Some(finding.effect_rms_nm).filter(|nm| *nm > 0.0);
         FoundCause {
             effect: &finding.effect,
             place: &finding.place,
             statement: &finding.statement,
             forms: "",
-            numbers: numbers.map(|n| FindingNumber { name: &n.name, value: n.value, unit: &n.unit, sigma: n.sigma }).collect(),
+            numbers: numbers
+                .map(|n| FindingNumber {
+                    name: &n.name,
+                    value: n.value,
+                    unit: &n.unit,
+                    sigma: n.sigma,
+                })
+                .collect(),
             probability: Some(finding.probability),
-            rivals: self.rivals_of(finding.rank).into_iter().map(rival).collect(),
+            rivals: self
+                .rivals_of(finding.rank)
+                .into_iter()
+                .map(rival)
+                .collect(),
             none: finding.none_probability,
             size: size.map(|nm| (nm, format!("{} Nm", figure(nm, 1)))),
         }
@@ -97,18 +137,39 @@ impl TorqueSummary {
     /// What was measured, and the errors before and after.
     pub(super) fn head(&self) -> String {
         let v = &self.verdict;
-        let rows = format!("{} rows at {:.0} Hz, low-pass {:.1} Hz", v.rows, v.rate_hz, v.cutoff_hz);
+        let rows = format!(
+            "{} rows at {:.0} Hz, low-pass {:.1} Hz",
+            v.rows, v.rate_hz, v.cutoff_hz
+        );
         let rows = screen::measured(self.robot.as_deref(), &rows, None);
-        let of = if v.held_out { "held out" } else { "fitted rows: flattered" };
+        let of = if v.held_out {
+            "held out"
+        } else {
+            "fitted rows: flattered"
+        };
         let line = |label: &str, share: f64, what: &str| {
-            labelled(label, &format!("{:>7.2} % of the torques' rms, mean over joints  {what}", 100.0 * share))
+            labelled(
+                label,
+                &format!(
+                    "{:>7.2} % of the torques' rms, mean over joints  {what}",
+                    100.0 * share
+                ),
+            )
         };
         rows + &line("before", v.before_nrmse, &format!("rigid arm, {of}"))
-            + &line("after", v.after_nrmse, screen::with_findings(self.findings.len()))
+            + &line(
+                "after",
+                v.after_nrmse,
+                screen::with_findings(self.findings.len()),
+            )
     }
 
     fn rivals_of(&self, rank: i64) -> Vec<&TorqueRivalRow> {
-        let mut own: Vec<&TorqueRivalRow> = self.rivals.iter().filter(|rival| rival.rank == rank).collect();
+        let mut own: Vec<&TorqueRivalRow> = self
+            .rivals
+            .iter()
+            .filter(|rival| rival.rank == rank)
+            .collect();
         own.sort_by(|a, b| b.probability.total_cmp(&a.probability));
         own
     }
@@ -147,10 +208,20 @@ impl TorqueSummary {
             json!({ "validate_nrmse": nrmse, "joints": each.collect::<Vec<_>>() })
         };
         let before = errors(v.before_nrmse, |row| {
-            [Some(row.before_rms_nm), Some(row.before_nrmse), row.before_moving_rms_nm, row.before_rest_rms_nm]
+            [
+                Some(row.before_rms_nm),
+                Some(row.before_nrmse),
+                row.before_moving_rms_nm,
+                row.before_rest_rms_nm,
+            ]
         });
         let after = errors(v.after_nrmse, |row| {
-            [Some(row.after_rms_nm), Some(row.after_nrmse), row.after_moving_rms_nm, row.after_rest_rms_nm]
+            [
+                Some(row.after_rms_nm),
+                Some(row.after_nrmse),
+                row.after_moving_rms_nm,
+                row.after_rest_rms_nm,
+            ]
         });
         let noise = self
             .joints
@@ -184,7 +255,11 @@ impl TorqueSummary {
 
     fn errors(&self) -> String {
         let v = &self.verdict;
-        let rows = if v.held_out { "held-out rows" } else { "fitted rows (none are held out: flattered)" };
+        let rows = if v.held_out {
+            "held-out rows"
+        } else {
+            "fitted rows (none are held out: flattered)"
+        };
         format!(
             "{:.3} -> {:.3} of the torques' own rms, mean over joints; {rows}, {} at {:.1} Hz, low-pass {:.1} Hz",
             v.before_nrmse, v.after_nrmse, v.rows, v.rate_hz, v.cutoff_hz
@@ -194,7 +269,10 @@ impl TorqueSummary {
     /// Torques to be fed forward by the model of a run.
     pub(super) fn next_step(run: &str, store: &str) -> NextStep {
         let command = format!("calib compensate {run} motion.csv --torque{store}");
-        NextStep { what: "feed torques forward".into(), command: Some(command) }
+        NextStep {
+            what: "feed torques forward".into(),
+            command: Some(command),
+        }
     }
 
     /// What `calib diagnose` prints unless all is asked for.
@@ -204,17 +282,31 @@ impl TorqueSummary {
             text.push_str(&screen::ranked(row.rank, finding, " rms", width));
         }
         text.push_str(&screen::withdrawn(self.said(VerdictTopic::Withdrawn).len()));
-        text.push_str(&screen::not_seen(&self.said(VerdictTopic::NotObservable), width));
+        text.push_str(&screen::not_seen(
+            &self.said(VerdictTopic::NotObservable),
+            width,
+        ));
         text.push_str(&Self::next_step(&self.run, store).text(width));
-        text + &labelled("more", "--details prints numbers, joints, noise and all that was decided")
+        text + &labelled(
+            "more",
+            "--details prints numbers, joints, noise and all that was decided",
+        )
     }
 
     /// All of the diagnosis, as `calib diagnose --details` prints it.
     pub fn text(&self) -> String {
         let v = &self.verdict;
-        let mut text = format!("{}: {}\n\nerror: {}\n", v.verdict.replace('_', " "), v.statement, self.errors());
-        text.push_str("joint   rms before   after   moving   resting   noise  (Nm)  autocorrelation\n");
-        let nm = |value: Option<f64>| value.map_or_else(|| "-".into(), |value| format!("{value:.3}"));
+        let mut text = format!(
+            "{}: {}\n\nerror: {}\n",
+            v.verdict.replace('_', " "),
+            v.statement,
+            self.errors()
+        );
+        text.push_str(
+            "joint   rms before   after   moving   resting   noise  (Nm)  autocorrelation\n",
+        );
+        let nm =
+            |value: Option<f64>| value.map_or_else(|| "-".into(), |value| format!("{value:.3}"));
         for row in &self.joints {
             text.push_str(&format!(
                 "{:>5}   {:>10} {:>7}  {:>7}   {:>7} {:>7}        {:.1}\n",
@@ -232,28 +324,60 @@ impl TorqueSummary {
             text.push_str(&format!("{}. {}\n", finding.rank, finding.statement));
             text.push_str(&format!(
                 "   probability: {} {:.2}, at {} {:.2}, none of the names {:.2}\n",
-                finding.effect, finding.probability, finding.place, finding.place_probability, finding.none_probability
+                finding.effect,
+                finding.probability,
+                finding.place,
+                finding.place_probability,
+                finding.none_probability
             ));
-            for number in self.numbers.iter().filter(|number| number.rank == finding.rank) {
-                let sigma = number.sigma.map_or_else(String::new, |sigma| format!(" +- {sigma:.3}"));
-                text.push_str(&format!("   {} {:.4}{sigma} {}\n", number.name, number.value, number.unit));
+            for number in self
+                .numbers
+                .iter()
+                .filter(|number| number.rank == finding.rank)
+            {
+                let sigma = number
+                    .sigma
+                    .map_or_else(String::new, |sigma| format!(" +- {sigma:.3}"));
+                text.push_str(&format!(
+                    "   {} {:.4}{sigma} {}\n",
+                    number.name, number.value, number.unit
+                ));
             }
             let rivals: Vec<String> = self
                 .rivals_of(finding.rank)
                 .iter()
-                .map(|rival| format!("{} at {} {:.2}", rival.effect, rival.place, rival.probability))
+                .map(|rival| {
+                    format!(
+                        "{} at {} {:.2}",
+                        rival.effect, rival.place, rival.probability
+                    )
+                })
                 .collect();
             if !rivals.is_empty() {
-                text.push_str(&format!("   these data cannot separate it from: {}\n", rivals.join(", ")));
+                text.push_str(&format!(
+                    "   these data cannot separate it from: {}\n",
+                    rivals.join(", ")
+                ));
             }
         }
-        for (label, topic) in [("withdrawn", VerdictTopic::Withdrawn), ("not observable", VerdictTopic::NotObservable)] {
-            self.said(topic).into_iter().for_each(|line| text.push_str(&format!("{label}: {line}\n")));
+        for (label, topic) in [
+            ("withdrawn", VerdictTopic::Withdrawn),
+            ("not observable", VerdictTopic::NotObservable),
+        ] {
+            self.said(topic)
+                .into_iter()
+                .for_each(|line| text.push_str(&format!("{label}: {line}\n")));
         }
         for row in &self.joints {
-            text.extend(row.signature.iter().map(|left| format!("what is left at joint {}: {left}\n", row.joint)));
+            text.extend(
+                row.signature
+                    .iter()
+                    .map(|left| format!("what is left at joint {}: {left}\n", row.joint)),
+            );
         }
-        self.said(VerdictTopic::Remark).into_iter().for_each(|line| text.push_str(&format!("{line}\n")));
+        self.said(VerdictTopic::Remark)
+            .into_iter()
+            .for_each(|line| text.push_str(&format!("{line}\n")));
         text
     }
 }

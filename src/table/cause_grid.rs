@@ -59,9 +59,16 @@ impl CauseGrid {
     pub fn of(cells: &Cells, findings: &Findings) -> Self {
         let mut found: BTreeMap<(String, String), CauseGridCell> = BTreeMap::new();
         for finding in &findings.0 {
-            let Some(follows) = &finding.follows else { continue };
-            let cell = found.entry((row_of(&finding.place), follows.clone())).or_default();
-            cell.mm = [cell.mm, finding.effect_rms_mm].into_iter().flatten().reduce(f64::max);
+            let Some(follows) = &finding.follows else {
+                continue;
+            };
+            let cell = found
+                .entry((row_of(&finding.place), follows.clone()))
+                .or_default();
+            cell.mm = [cell.mm, finding.effect_rms_mm]
+                .into_iter()
+                .flatten()
+                .reduce(f64::max);
             cell.is_named |= finding.effect != names::UNKNOWN;
             if !cell.effects.contains(&finding.effect) {
                 cell.effects.push(finding.effect.clone());
@@ -69,33 +76,56 @@ impl CauseGrid {
         }
         let mut left: BTreeMap<(String, String), CauseGridCell> = BTreeMap::new();
         for row in cells.0.iter().filter(|row| row.moment == "after") {
-            let cell = left.entry((row_of(&row.place), row.follows.clone())).or_default();
-            if row.delta_bic > 0.0 && cell.mm.is_none_or(|mm| row.explains_mm.is_some_and(|other| other > mm)) {
+            let cell = left
+                .entry((row_of(&row.place), row.follows.clone()))
+                .or_default();
+            if row.delta_bic > 0.0
+                && cell
+                    .mm
+                    .is_none_or(|mm| row.explains_mm.is_some_and(|other| other > mm))
+            {
                 let is_named = row.effect != names::UNKNOWN;
-                *cell = CauseGridCell { mm: row.explains_mm, effects: vec![row.effect.clone()], is_named };
+                *cell = CauseGridCell {
+                    mm: row.explains_mm,
+                    effects: vec![row.effect.clone()],
+                    is_named,
+                };
             }
         }
         let asked: BTreeSet<&(String, String)> = left.keys().chain(found.keys()).collect();
         let asked_of = |column: &str| asked.iter().any(|(_, follows)| follows == column);
         let something = |column: &str| {
-            let is_there =
-                |((_, follows), cell): (&(String, String), &CauseGridCell)| follows == column && !cell.effects.is_empty();
+            let is_there = |((_, follows), cell): (&(String, String), &CauseGridCell)| {
+                follows == column && !cell.effects.is_empty()
+            };
             found.iter().any(is_there) || left.iter().any(is_there)
         };
-        let (mut columns, mut others): (Vec<_>, Vec<_>) =
-            COLUMNS.into_iter().filter(|column| asked_of(column)).partition(|column| something(column));
+        let (mut columns, mut others): (Vec<_>, Vec<_>) = COLUMNS
+            .into_iter()
+            .filter(|column| asked_of(column))
+            .partition(|column| something(column));
         if columns.is_empty() {
             std::mem::swap(&mut columns, &mut others);
         }
-        let is_one = |place: Place| !matches!(place, Place::Links(first, last) if first != last) && along(place).is_some();
-        let shown = |place: &str| found.keys().any(|(at, _)| at == place) || place.parse().is_ok_and(is_one);
-        let mut places: Vec<&str> = asked.iter().map(|(place, _)| place.as_str()).filter(|place| shown(place)).collect();
+        let is_one = |place: Place| {
+            !matches!(place, Place::Links(first, last) if first != last) && along(place).is_some()
+        };
+        let shown = |place: &str| {
+            found.keys().any(|(at, _)| at == place) || place.parse().is_ok_and(is_one)
+        };
+        let mut places: Vec<&str> = asked
+            .iter()
+            .map(|(place, _)| place.as_str())
+            .filter(|place| shown(place))
+            .collect();
         places.dedup();
         places.sort_by_key(|place| place.parse().ok().and_then(along).unwrap_or(usize::MAX));
         let rows = places.into_iter().map(|place| {
             let of = |all: &BTreeMap<(String, String), CauseGridCell>, column: &str| {
                 let key = (place.to_string(), column.to_string());
-                asked.contains(&key).then(|| all.get(&key).cloned().unwrap_or_default())
+                asked
+                    .contains(&key)
+                    .then(|| all.get(&key).cloned().unwrap_or_default())
             };
             CauseGridRow {
                 place: place.into(),
@@ -103,7 +133,11 @@ impl CauseGrid {
                 left: columns.iter().map(|column| of(&left, column)).collect(),
             }
         });
-        Self { rows: rows.collect(), columns, others }
+        Self {
+            rows: rows.collect(),
+            columns,
+            others,
+        }
     }
 }
 
@@ -115,7 +149,13 @@ impl CauseGrid {
             Some(mm) => format!("{:.0} um", 1e3 * mm),
             None => String::new(),
         };
-        let has = |column: &usize| self.rows.iter().any(|row| row.found[*column].as_ref().is_some_and(|cell| cell.mm.is_some()));
+        let has = |column: &usize| {
+            self.rows.iter().any(|row| {
+                row.found[*column]
+                    .as_ref()
+                    .is_some_and(|cell| cell.mm.is_some())
+            })
+        };
         let columns: Vec<usize> = (0..self.columns.len()).filter(has).collect();
         if columns.is_empty() {
             return String::new();
@@ -124,10 +164,24 @@ impl CauseGrid {
             let cells: String = cells.iter().map(|cell| format!("{cell:>12}")).collect();
             format!("{head:10}{cells}").trim_end().to_string() + "\n"
         };
-        let names: Vec<String> = columns.iter().map(|column| self.columns[*column].to_string()).collect();
-        let rows = self.rows.iter().map(|row| (row, columns.iter().map(|column| size(&row.found[*column])).collect::<Vec<_>>()));
+        let names: Vec<String> = columns
+            .iter()
+            .map(|column| self.columns[*column].to_string())
+            .collect();
+        let rows = self.rows.iter().map(|row| {
+            (
+                row,
+                columns
+                    .iter()
+                    .map(|column| size(&row.found[*column]))
+                    .collect::<Vec<_>>(),
+            )
+        });
         let rows = rows.filter(|(_, cells)| cells.iter().any(|cell| !cell.is_empty()));
-        line("found", &names) + &rows.map(|(row, cells)| line(&row.place, &cells)).collect::<String>()
+        line("found", &names)
+            + &rows
+                .map(|(row, cells)| line(&row.place, &cells))
+                .collect::<String>()
     }
 }
 

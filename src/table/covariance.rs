@@ -9,14 +9,22 @@ impl CovarianceTable {
     /// The covariance of a fit. Parameters that it kept are taken over from `earlier`: what was estimated on top is held to be independent.
     pub fn of(model: &Model, fitted: &Fitted, earlier: Option<&Self>) -> Self {
         let specs = model.stack.specs();
-        let own = fitted.covariance.iter().flat_map(|covariance| covariance.pairs());
-        let mut rows: Vec<CovarianceRow> =
-            own.map(|(a, b, value, correlation)| row(&specs[a], &specs[b], value, correlation)).collect();
+        let own = fitted
+            .covariance
+            .iter()
+            .flat_map(|covariance| covariance.pairs());
+        let mut rows: Vec<CovarianceRow> = own
+            .map(|(a, b, value, correlation)| row(&specs[a], &specs[b], value, correlation))
+            .collect();
         let new: BTreeSet<String> = rows.iter().map(|row| row.parameter.clone()).collect();
         let known: BTreeSet<&str> = specs.iter().map(|spec| spec.name.as_str()).collect();
         let kept = |name: &String| known.contains(name.as_str()) && !new.contains(name);
         let before = earlier.iter().flat_map(|table| &table.0);
-        rows.extend(before.filter(|row| kept(&row.parameter) && kept(&row.other)).cloned());
+        rows.extend(
+            before
+                .filter(|row| kept(&row.parameter) && kept(&row.other))
+                .cloned(),
+        );
         rows.sort_by(|a, b| (&a.parameter, &a.other).cmp(&(&b.parameter, &b.other)));
         Self(rows)
     }
@@ -24,11 +32,21 @@ impl CovarianceTable {
     /// The covariance of the parameters of `model`, SI; `None` where the table is empty, or says nothing of one of its own.
     pub fn of_model(&self, model: &Model) -> Option<Covariance> {
         let specs = model.stack.specs();
-        let position: BTreeMap<&str, usize> = specs.iter().enumerate().map(|(k, spec)| (spec.name.as_str(), k)).collect();
+        let position: BTreeMap<&str, usize> = specs
+            .iter()
+            .enumerate()
+            .map(|(k, spec)| (spec.name.as_str(), k))
+            .collect();
         let mut values = BTreeMap::new();
         for row in &self.0 {
-            let (a, b) = (*position.get(row.parameter.as_str())?, *position.get(row.other.as_str())?);
-            values.insert((a.min(b), a.max(b)), row.covariance * specs[a].unit.to_si(1.0) * specs[b].unit.to_si(1.0));
+            let (a, b) = (
+                *position.get(row.parameter.as_str())?,
+                *position.get(row.other.as_str())?,
+            );
+            values.insert(
+                (a.min(b), a.max(b)),
+                row.covariance * specs[a].unit.to_si(1.0) * specs[b].unit.to_si(1.0),
+            );
         }
         Covariance::of_pairs(&values)
     }

@@ -9,7 +9,10 @@ impl FindingRow {
     /// The joint (from 1) whose range bounds it, that range as people read it, and the range's unit.
     pub fn valid_range(&self) -> Option<(i64, [f64; 2], &'static str)> {
         let joint = self.valid_joint?;
-        match (self.valid_from_rad.zip(self.valid_to_rad), self.valid_from_mm.zip(self.valid_to_mm)) {
+        match (
+            self.valid_from_rad.zip(self.valid_to_rad),
+            self.valid_from_mm.zip(self.valid_to_mm),
+        ) {
             (Some((from, to)), _) => Some((joint, [from.to_degrees(), to.to_degrees()], "deg")),
             (None, Some((from, to))) => Some((joint, [from, to], "mm")),
             (None, None) => None,
@@ -20,7 +23,8 @@ impl FindingRow {
 impl RivalRow {
     /// Whether it is more than the nearest name of a finding that has none: one that the data exclude.
     pub fn is_inseparable(&self) -> bool {
-        self.probability.is_none_or(|probability| probability >= EXCLUDED)
+        self.probability
+            .is_none_or(|probability| probability >= EXCLUDED)
     }
 }
 
@@ -48,15 +52,17 @@ macro_rules! beside_findings {
         impl $numbers {
             /// A row for each number of each finding.
             pub fn of(diagnosis: &$diagnosis) -> Self {
-                let rows = $crate::table::findings::ranked(&diagnosis.findings).flat_map(|(rank, finding)| {
-                    finding.parameters.iter().map(move |number| $number_row {
-                        rank,
-                        name: number.name.clone(),
-                        value: number.value,
-                        unit: number.unit.into(),
-                        sigma: number.sigma.filter(|sigma| sigma.is_finite()),
-                    })
-                });
+                let rows = $crate::table::findings::ranked(&diagnosis.findings).flat_map(
+                    |(rank, finding)| {
+                        finding.parameters.iter().map(move |number| $number_row {
+                            rank,
+                            name: number.name.clone(),
+                            value: number.value,
+                            unit: number.unit.into(),
+                            sigma: number.sigma.filter(|sigma| sigma.is_finite()),
+                        })
+                    },
+                );
                 let mut rows: Vec<$number_row> = rows.collect();
                 rows.sort_by(|a, b| (a.rank, &a.name).cmp(&(b.rank, &b.name)));
                 Self(rows)
@@ -66,23 +72,29 @@ macro_rules! beside_findings {
         impl $rivals {
             /// A row for each rival of each finding.
             pub fn of(diagnosis: &$diagnosis) -> Self {
-                let rows = $crate::table::findings::ranked(&diagnosis.findings).flat_map(|(rank, finding)| {
-                    finding.rivals.iter().map(move |rival| $rival_row {
-                        rank,
-                        effect: rival.effect.into(),
-                        place: rival.place.to_string(),
-                        delta_bic: rival.delta_bic,
-                        probability: rival.probability.into(),
-                    })
-                });
+                let rows = $crate::table::findings::ranked(&diagnosis.findings).flat_map(
+                    |(rank, finding)| {
+                        finding.rivals.iter().map(move |rival| $rival_row {
+                            rank,
+                            effect: rival.effect.into(),
+                            place: rival.place.to_string(),
+                            delta_bic: rival.delta_bic,
+                            probability: rival.probability.into(),
+                        })
+                    },
+                );
                 let mut rows: Vec<$rival_row> = rows.collect();
-                rows.sort_by(|a, b| (a.rank, &a.effect, &a.place).cmp(&(b.rank, &b.effect, &b.place)));
+                rows.sort_by(|a, b| {
+                    (a.rank, &a.effect, &a.place).cmp(&(b.rank, &b.effect, &b.place))
+                });
                 // Several names of one finding may have one rival.
                 rows.dedup_by(|next, kept| {
-                    let same = (next.rank, &next.effect, &next.place) == (kept.rank, &kept.effect, &kept.place);
+                    let same = (next.rank, &next.effect, &next.place)
+                        == (kept.rank, &kept.effect, &kept.place);
                     if same {
                         kept.delta_bic = kept.delta_bic.min(next.delta_bic);
-                        kept.probability = $crate::table::findings::sum(kept.probability, next.probability);
+                        kept.probability =
+                            $crate::table::findings::sum(kept.probability, next.probability);
                     }
                     same
                 });
@@ -100,21 +112,43 @@ impl Findings {
     pub fn of(diagnosis: &Diagnosis) -> Self {
         let lengths = diagnosis.dimension == Dimension::Length;
         let turns = |joint: usize| diagnosis.model.robot.is_revolute(joint);
-        let in_rad = |finding: &Finding| finding.valid.filter(|(joint, _)| turns(*joint)).map(|(_, range)| range);
-        let in_mm =
-            |finding: &Finding| finding.valid.filter(|(joint, _)| !turns(*joint)).map(|(_, range)| range.map(|q| 1e3 * q));
+        let in_rad = |finding: &Finding| {
+            finding
+                .valid
+                .filter(|(joint, _)| turns(*joint))
+                .map(|(_, range)| range)
+        };
+        let in_mm = |finding: &Finding| {
+            finding
+                .valid
+                .filter(|(joint, _)| !turns(*joint))
+                .map(|(_, range)| range.map(|q| 1e3 * q))
+        };
         let rows = ranked(&diagnosis.findings).map(|(rank, finding)| FindingRow {
             rank,
             effect: finding.effect.into(),
             place: finding.place.to_string(),
-            follows: finding.forms.first().map(|form| form.follows(finding.place).into()),
+            follows: finding
+                .forms
+                .first()
+                .map(|form| form.follows(finding.place).into()),
             statement: finding.statement.clone(),
             f_statistic: finding.evidence.map(|e| e.f_statistic),
             p_value: finding.evidence.map(|e| e.p_value),
             delta_bic: finding.evidence.map(|e| e.delta_bic),
-            heldout_gain_mm: finding.evidence.and_then(|e| e.heldout_gain).filter(|_| lengths).map(|gain| gain * 1e3),
-            effect_rms_mm: finding.evidence.filter(|_| lengths).map(|e| e.effect_rms * 1e3),
-            heldout_gain_rad: finding.evidence.and_then(|e| e.heldout_gain).filter(|_| !lengths),
+            heldout_gain_mm: finding
+                .evidence
+                .and_then(|e| e.heldout_gain)
+                .filter(|_| lengths)
+                .map(|gain| gain * 1e3),
+            effect_rms_mm: finding
+                .evidence
+                .filter(|_| lengths)
+                .map(|e| e.effect_rms * 1e3),
+            heldout_gain_rad: finding
+                .evidence
+                .and_then(|e| e.heldout_gain)
+                .filter(|_| !lengths),
             effect_rms_rad: finding.evidence.filter(|_| !lengths).map(|e| e.effect_rms),
             probability: Some(finding.probabilities.name),
             place_probability: Some(finding.probabilities.place),

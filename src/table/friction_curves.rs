@@ -16,7 +16,11 @@ impl FrictionCurves {
             })
         });
         let mut rows: Vec<FrictionCurveRow> = rows.collect();
-        rows.sort_by(|a, b| a.joint.cmp(&b.joint).then(a.velocity_rad_s.total_cmp(&b.velocity_rad_s)));
+        rows.sort_by(|a, b| {
+            a.joint
+                .cmp(&b.joint)
+                .then(a.velocity_rad_s.total_cmp(&b.velocity_rad_s))
+        });
         rows.dedup_by(|a, b| (a.joint, a.velocity_rad_s) == (b.joint, b.velocity_rad_s));
         Self(rows)
     }

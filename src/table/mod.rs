@@ -30,7 +30,10 @@ pub fn from_parquet<T: Table>(label: &str, bytes: Vec<u8>) -> Result<Loose<T>> {
 }
 
 fn typed<T: Table>(loose: Loose<Frame>) -> Result<Loose<T>> {
-    Ok(Loose { table: T::from_frame(&loose.table)?, vouched: loose.vouched })
+    Ok(Loose {
+        table: T::from_frame(&loose.table)?,
+        vouched: loose.vouched,
+    })
 }
 
 /// Declares a table as a list of rows. It is handed the columns of `schemas/<kind>.json` by a macro of the kind's name (schemas/build.rs).
@@ -112,7 +115,9 @@ pub use forms::formula_in_words;
 pub use motion::ArmMotion;
 pub use observability::{FitContext, UNFOLDED};
 pub use parameters::Corrected;
-pub use recording::{Recording, SOURCE as SIGMA_SOURCE, columns as recording_columns, frame as recording_frame};
+pub use recording::{
+    Recording, SOURCE as SIGMA_SOURCE, columns as recording_columns, frame as recording_frame,
+};
 pub use standing::{Contradicted, Standing, Step, Unseen, Withdrawn, standing};
 pub(crate) use suspects::slip;
 pub use torque_course::TorqueCourse;

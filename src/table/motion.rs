@@ -43,15 +43,30 @@ struct PerJoint {
     sliding: (&'static str, Unit),
 }
 
-const Q: PerJoint = PerJoint { turning: ("q{j}_rad", Unit::Radian), sliding: ("q{j}_mm", Unit::Millimetre) };
-const VELOCITY: PerJoint =
-    PerJoint { turning: ("dq{j}_rad_s", Unit::RadianPerSecond), sliding: ("dq{j}_mm_s", Unit::MillimetrePerSecond) };
-const CURRENT: PerJoint = PerJoint { turning: ("i{j}_a", Unit::Ampere), sliding: ("i{j}_a", Unit::Ampere) };
-const TORQUE: PerJoint = PerJoint { turning: ("tau{j}_nm", Unit::NewtonMetre), sliding: ("tau{j}_nm", Unit::NewtonMetre) };
+const Q: PerJoint = PerJoint {
+    turning: ("q{j}_rad", Unit::Radian),
+    sliding: ("q{j}_mm", Unit::Millimetre),
+};
+const VELOCITY: PerJoint = PerJoint {
+    turning: ("dq{j}_rad_s", Unit::RadianPerSecond),
+    sliding: ("dq{j}_mm_s", Unit::MillimetrePerSecond),
+};
+const CURRENT: PerJoint = PerJoint {
+    turning: ("i{j}_a", Unit::Ampere),
+    sliding: ("i{j}_a", Unit::Ampere),
+};
+const TORQUE: PerJoint = PerJoint {
+    turning: ("tau{j}_nm", Unit::NewtonMetre),
+    sliding: ("tau{j}_nm", Unit::NewtonMetre),
+};
 
 impl PerJoint {
     fn column(self, joint: usize, prismatic: bool) -> (String, Unit) {
-        let (name, unit) = if prismatic { self.sliding } else { self.turning };
+        let (name, unit) = if prismatic {
+            self.sliding
+        } else {
+            self.turning
+        };
         (name.replace("{j}", &(joint + 1).to_string()), unit)
     }
 
@@ -59,21 +74,36 @@ impl PerJoint {
         for (joint, slides) in prismatic.iter().enumerate() {
             let (name, unit) = self.column(joint, *slides);
             let values = all.iter().skip(joint).step_by(prismatic.len());
-            frame.push(name, Cell::to_array(values.map(|value| unit.from_si(*value)).collect::<Vec<f64>>()));
+            frame.push(
+                name,
+                Cell::to_array(
+                    values
+                        .map(|value| unit.from_si(*value))
+                        .collect::<Vec<f64>>(),
+                ),
+            );
         }
     }
 
     /// Row-major, SI; none where the table has no such columns.
     fn read(self, frame: &Frame, prismatic: &[bool]) -> Result<Option<Vec<f64>>> {
-        let named: Vec<(String, Unit)> =
-            prismatic.iter().enumerate().map(|(joint, slides)| self.column(joint, *slides)).collect();
-        if named.first().is_none_or(|(name, _)| frame.column(name).is_none()) {
+        let named: Vec<(String, Unit)> = prismatic
+            .iter()
+            .enumerate()
+            .map(|(joint, slides)| self.column(joint, *slides))
+            .collect();
+        if named
+            .first()
+            .is_none_or(|(name, _)| frame.column(name).is_none())
+        {
             return Ok(None);
         }
         let mut columns = Vec::with_capacity(named.len());
         for (name, unit) in &named {
             let mut values = frame.read::<f64>(name)?;
-            values.iter_mut().for_each(|value| *value = unit.to_si(*value));
+            values
+                .iter_mut()
+                .for_each(|value| *value = unit.to_si(*value));
             columns.push(values);
         }
         Ok(Some(interleaved(&columns)))
@@ -94,16 +124,29 @@ impl Table for ArmMotion {
         let mut frame = FrameBuilder::new(Self::KIND);
         frame.push("sequence", Cell::to_array(self.sequence.clone()));
         frame.push("trajectory", Cell::to_array(self.trajectory.clone()));
-        let name = |usage: &Option<u16>| usage.and_then(|usage| self.usages.get(usize::from(usage)).cloned());
-        frame.push("usage", Cell::to_array(self.usage.iter().map(name).collect::<Vec<Option<String>>>()));
+        let name = |usage: &Option<u16>| {
+            usage.and_then(|usage| self.usages.get(usize::from(usage)).cloned())
+        };
+        frame.push(
+            "usage",
+            Cell::to_array(self.usage.iter().map(name).collect::<Vec<Option<String>>>()),
+        );
         frame.push("time_s", Cell::to_array(self.time.clone()));
         Q.push(&mut frame, &self.prismatic, &self.q);
-        for (quantity, all) in [(VELOCITY, &self.velocity), (CURRENT, &self.current), (TORQUE, &self.torque)] {
-            all.iter().for_each(|all| quantity.push(&mut frame, &self.prismatic, all));
+        for (quantity, all) in [
+            (VELOCITY, &self.velocity),
+            (CURRENT, &self.current),
+            (TORQUE, &self.torque),
+        ] {
+            all.iter()
+                .for_each(|all| quantity.push(&mut frame, &self.prismatic, all));
         }
         if let Some(all) = &self.temperature {
             let stored = all.iter().map(|value| (!value.is_nan()).then_some(*value));
-            frame.push("temp_c", Cell::to_array(stored.collect::<Vec<Option<f64>>>()));
+            frame.push(
+                "temp_c",
+                Cell::to_array(stored.collect::<Vec<Option<f64>>>()),
+            );
         }
         frame.finish()
     }
@@ -123,11 +166,19 @@ impl Table for ArmMotion {
                 (usages.len() - 1) as u16
             }))
         };
-        let usage = frame.read::<Option<String>>("usage")?.into_iter().map(&mut number).collect();
+        let usage = frame
+            .read::<Option<String>>("usage")?
+            .into_iter()
+            .map(&mut number)
+            .collect();
         let temperature = match frame.column("temp_c") {
             Some(_) => {
                 let all = frame.read::<Option<f64>>("temp_c")?;
-                Some(all.into_iter().map(|value| value.unwrap_or(f64::NAN)).collect())
+                Some(
+                    all.into_iter()
+                        .map(|value| value.unwrap_or(f64::NAN))
+                        .collect(),
+                )
             }
             None => None,
         };

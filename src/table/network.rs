@@ -24,11 +24,21 @@ impl Network {
         match &correction.body {
             Body::Networks(dress, networks) => {
                 table.dress(dress, prismatic);
-                table.put(0, activation_name(networks.shape.activation), [0, 0, 0], 1.0);
+                table.put(
+                    0,
+                    activation_name(networks.shape.activation),
+                    [0, 0, 0],
+                    1.0,
+                );
                 if let Some(motion) = &networks.joints {
                     table.arm(&motion.arm);
                     for (joint, scale) in motion.scales.iter().enumerate() {
-                        table.put(0, "joint_scale", [0, joint + 1, 0], scale * source_unit(joint, prismatic));
+                        table.put(
+                            0,
+                            "joint_scale",
+                            [0, joint + 1, 0],
+                            scale * source_unit(joint, prismatic),
+                        );
                     }
                 }
                 for (m, parameters) in networks.members.iter().enumerate() {
@@ -56,7 +66,14 @@ impl Network {
     fn put(&mut self, member: usize, part: &str, place: [usize; 3], value: f64) {
         let number = |n: usize| i64::try_from(n).expect("a small number");
         let [layer, to, from] = place.map(number);
-        self.0.push(NetworkRow { member: number(member), part: part.into(), layer, to, from, value });
+        self.0.push(NetworkRow {
+            member: number(member),
+            part: part.into(),
+            layer,
+            to,
+            from,
+            value,
+        });
     }
 
     /// Values in a row of an array, `from` 1, 2, ...
@@ -73,13 +90,25 @@ impl Network {
             self.put(0, "valid_upper", [0, source + 1, 0], valid.upper * unit);
             self.put(0, "valid_margin", [0, source + 1, 0], valid.margin * unit);
         }
-        let Some(jointly) = &region.jointly else { return };
+        let Some(jointly) = &region.jointly else {
+            return;
+        };
         self.put(0, "joint_limit", [0, 0, 0], jointly.limit);
         self.put(0, "joint_margin", [0, 0, 0], jointly.margin);
         for (i, (mean, factor)) in jointly.mean.iter().zip(&jointly.factor).enumerate() {
-            self.put(0, "joint_mean", [0, i + 1, 0], mean * source_unit(i, prismatic));
+            self.put(
+                0,
+                "joint_mean",
+                [0, i + 1, 0],
+                mean * source_unit(i, prismatic),
+            );
             for (j, value) in factor.iter().enumerate() {
-                self.put(0, "joint_factor", [0, i + 1, j + 1], value / source_unit(j, prismatic));
+                self.put(
+                    0,
+                    "joint_factor",
+                    [0, i + 1, j + 1],
+                    value / source_unit(j, prismatic),
+                );
             }
         }
     }
@@ -87,7 +116,12 @@ impl Network {
     fn dress(&mut self, dress: &NetworkScaling, prismatic: &[bool]) {
         for (i, (feature, scaling)) in dress.features.iter().zip(&dress.inputs).enumerate() {
             let unit = feature_unit(*feature, prismatic);
-            self.put(0, map_name(feature.map), [0, i + 1, feature.source + 1], 1.0);
+            self.put(
+                0,
+                map_name(feature.map),
+                [0, i + 1, feature.source + 1],
+                1.0,
+            );
             self.put(0, "input_mean", [0, i + 1, 0], scaling.mean * unit);
             self.put(0, "input_scale", [0, i + 1, 0], scaling.scale * unit);
         }
@@ -120,7 +154,12 @@ impl Network {
                 self.put(0, part, [layer, t + 1, joint + 1], 1.0);
             }
             for (m, member) in linear.members.iter().enumerate() {
-                self.put(m + 1, "coefficient", [0, t + 1, 0], member[t] * coefficient_unit(term));
+                self.put(
+                    m + 1,
+                    "coefficient",
+                    [0, t + 1, 0],
+                    member[t] * coefficient_unit(term),
+                );
             }
         }
     }
@@ -129,7 +168,12 @@ impl Network {
         for (j, hinge) in arm.hinges.iter().enumerate() {
             self.row("axis", 0, j + 1, &hinge.axis);
             self.row("point", 0, j + 1, &hinge.point.map(|value| value * MILLI));
-            self.put(0, "slides", [0, j + 1, 0], if hinge.slides { 1.0 } else { 0.0 });
+            self.put(
+                0,
+                "slides",
+                [0, j + 1, 0],
+                if hinge.slides { 1.0 } else { 0.0 },
+            );
         }
         self.row("tool", 0, 0, &arm.tool.map(|value| value * MILLI));
         self.row("down", 0, 0, &arm.down);
@@ -139,12 +183,18 @@ impl Network {
 /// Where parameter `index` of a network stands in the table: part, and layer, to, from.
 fn place(shape: LayerSizes, index: usize) -> (&'static str, [usize; 3]) {
     if shape.hidden_weights().contains(&index) {
-        ("weight", [1, index / shape.inputs + 1, index % shape.inputs + 1])
+        (
+            "weight",
+            [1, index / shape.inputs + 1, index % shape.inputs + 1],
+        )
     } else if shape.hidden_biases().contains(&index) {
         ("bias", [1, index - shape.hidden_biases().start + 1, 0])
     } else if shape.output_weights().contains(&index) {
         let index = index - shape.output_weights().start;
-        ("weight", [2, index / shape.hidden + 1, index % shape.hidden + 1])
+        (
+            "weight",
+            [2, index / shape.hidden + 1, index % shape.hidden + 1],
+        )
     } else {
         ("bias", [2, index - shape.output_biases().start + 1, 0])
     }
@@ -152,16 +202,28 @@ fn place(shape: LayerSizes, index: usize) -> (&'static str, [usize; 3]) {
 
 /// Stored per SI: a length is stored in mm, everything else as it is.
 fn source_unit(source: usize, prismatic: &[bool]) -> f64 {
-    if prismatic.get(source).copied().unwrap_or(false) { MILLI } else { 1.0 }
+    if prismatic.get(source).copied().unwrap_or(false) {
+        MILLI
+    } else {
+        1.0
+    }
 }
 
 fn feature_unit(feature: Feature, prismatic: &[bool]) -> f64 {
-    if feature.map == Map::Value { source_unit(feature.source, prismatic) } else { 1.0 }
+    if feature.map == Map::Value {
+        source_unit(feature.source, prismatic)
+    } else {
+        1.0
+    }
 }
 
 /// Shifts are stored in mm, turns in rad; per m of torque or travel where a wave is one.
 fn coefficient_unit(term: &BasisTerm) -> f64 {
-    if matches!(term.way, OutputMotion::Along(_) | OutputMotion::Shift(..)) { MILLI } else { 1.0 }
+    if matches!(term.way, OutputMotion::Along(_) | OutputMotion::Shift(..)) {
+        MILLI
+    } else {
+        1.0
+    }
 }
 
 fn map_name(map: Map) -> &'static str {

@@ -24,7 +24,13 @@ pub struct FitContext {
 impl Observability {
     /// What a fit could see.
     pub fn of(step: &str, fitted: &Fitted, beside: &FitContext) -> Self {
-        let FitContext { geometry, repeatability, folds, unfolded, earlier } = *beside;
+        let FitContext {
+            geometry,
+            repeatability,
+            folds,
+            unfolded,
+            earlier,
+        } = *beside;
         let mut rows = Vec::new();
         let mut push = |quantity: &str, index: usize, value: f64, meaning: &str| {
             // A null space exactly zero has no logarithm, no ratio: such figures are left out, not stored as infinite.
@@ -38,19 +44,49 @@ impl Observability {
                 });
             }
         };
-        push("free", 0, fitted.singular.len() as f64, "parameters estimated");
-        push("candidates", 0, fitted.singular_all.len() as f64, "parameters asked for");
+        push(
+            "free",
+            0,
+            fitted.singular.len() as f64,
+            "parameters estimated",
+        );
+        push(
+            "candidates",
+            0,
+            fitted.singular_all.len() as f64,
+            "parameters asked for",
+        );
         if earlier > 0 {
-            push("earlier", 0, earlier as f64, "parameters of the model that an earlier step estimated");
+            push(
+                "earlier",
+                0,
+                earlier as f64,
+                "parameters of the model that an earlier step estimated",
+            );
         }
         if let Some((rank, expected)) = geometry {
-            push("rank", 0, rank as f64, "geometric parameters that the data see");
-            push("rank_expected", 0, expected as f64, "4 per revolute joint + 2 per prismatic joint + 3 of the measured point");
+            push(
+                "rank",
+                0,
+                rank as f64,
+                "geometric parameters that the data see",
+            );
+            push(
+                "rank_expected",
+                0,
+                expected as f64,
+                "4 per revolute joint + 2 per prismatic joint + 3 of the measured point",
+            );
         }
         let rank = fitted.singular.len();
         if rank > 0 && rank < fitted.singular_all.len() {
             let gap = fitted.singular_all[rank - 1] / fitted.singular_all[rank];
-            push("gap", 0, gap, "ratio of the last free singular value to the next one");
+            push(
+                "gap",
+                0,
+                gap,
+                "ratio of the last free singular value to the next one",
+            );
         }
         push(
             "unmodelled_mm",
@@ -67,10 +103,17 @@ impl Observability {
             );
         }
         if let Some(sigma) = repeatability {
-            push("joint_repeatability_rad", 0, sigma, "standard deviation of every revolute joint that rows are weighted by");
+            push(
+                "joint_repeatability_rad",
+                0,
+                sigma,
+                "standard deviation of every revolute joint that rows are weighted by",
+            );
         }
         if let Some(repeated) = &fitted.repeated {
-            of_repeats(repeated, &mut |quantity, value, meaning| push(quantity, 0, value, meaning));
+            of_repeats(repeated, &mut |quantity, value, meaning| {
+                push(quantity, 0, value, meaning)
+            });
         }
         if fitted.clusters > 0 {
             push(
@@ -81,7 +124,12 @@ impl Observability {
             );
         }
         if let Some(folds) = folds {
-            push("folds", 0, folds as f64, "parts of the poses without each of which the fit was repeated");
+            push(
+                "folds",
+                0,
+                folds as f64,
+                "parts of the poses without each of which the fit was repeated",
+            );
         }
         if let Some(poses) = unfolded {
             push(
@@ -91,12 +139,22 @@ impl Observability {
                 "poses: not enough, or too many, for the folds that were asked for, so that nothing was cross-validated",
             );
         }
-        push("downweighted", 0, fitted.downweighted.len() as f64, "fitted rows with reduced weight (Huber)");
+        push(
+            "downweighted",
+            0,
+            fitted.downweighted.len() as f64,
+            "fitted rows with reduced weight (Huber)",
+        );
         for (name, value, meaning) in &fitted.indices {
             push(name, 0, *value, meaning);
         }
         for (k, value) in fitted.singular.iter().enumerate() {
-            push("singular_value", k + 1, *value, "of the whitened Jacobian, columns scaled to unit prior sigma");
+            push(
+                "singular_value",
+                k + 1,
+                *value,
+                "of the whitened Jacobian, columns scaled to unit prior sigma",
+            );
         }
         rows.sort_by(|a, b| (&a.quantity, a.index).cmp(&(&b.quantity, b.index)));
         Self(rows)
@@ -105,16 +163,32 @@ impl Observability {
 
 /// What poses say that were measured more than once: quantity, value, meaning.
 fn of_repeats(repeated: &Repeated, push: &mut dyn FnMut(&str, f64, &str)) {
-    push("repeated_poses", repeated.poses as f64, "fitted poses measured more than once");
+    push(
+        "repeated_poses",
+        repeated.poses as f64,
+        "fitted poses measured more than once",
+    );
     let floor = if repeated.revisited {
         "standard deviation per axis of rows about their pose's mean: no model can do better"
     } else {
         "standard deviation per axis of rows about their pose's mean, the arm at rest: without the joints' repeatability"
     };
     push("repeat_noise_mm", repeated.noise * 1e3, floor);
-    push("repeat_freedom", repeated.freedom as f64, "degrees of freedom of repeat_noise_mm");
+    push(
+        "repeat_freedom",
+        repeated.freedom as f64,
+        "degrees of freedom of repeat_noise_mm",
+    );
     if let Some((ratio, chance)) = repeated.lack_of_fit {
-        push("lack_of_fit_F", ratio, "mean square of the residual between poses over that within: 1 for a complete model");
-        push("lack_of_fit_p", chance, "chance of a larger F under a complete model");
+        push(
+            "lack_of_fit_F",
+            ratio,
+            "mean square of the residual between poses over that within: 1 for a complete model",
+        );
+        push(
+            "lack_of_fit_p",
+            chance,
+            "chance of a larger F under a complete model",
+        );
     }
 }

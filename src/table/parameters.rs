@@ -1,7 +1,10 @@
 //! The identified model: every parameter by name, with its status.
 
 use super::{ParameterRow, Parameters};
-use crate::effect::{AnchorShift, Effect, EffectContext, EffectStack, Form, Load, ToolOffset, arm_effect, identified, names};
+use crate::effect::{
+    AnchorShift, Effect, EffectContext, EffectStack, Form, Load, ToolOffset, arm_effect,
+    identified, names,
+};
 use crate::error::{Error, Result};
 use crate::estimate::{CONFLICT, Fitted, Model, ParameterStatus, PriorCheck};
 use crate::robot::{Anchor, MeasurementSetup, RobotModel, Shape, Target};
@@ -43,23 +46,47 @@ fn read_form(text: &str) -> Result<Form> {
 
 impl Parameters {
     /// The whole model after a fit. Rows of parameters that the fit kept are taken over from `earlier`.
-    pub fn of(step: &str, model: &Model, fitted: &Fitted, held: &[usize], earlier: Option<&Parameters>) -> Self {
+    pub fn of(
+        step: &str,
+        model: &Model,
+        fitted: &Fitted,
+        held: &[usize],
+        earlier: Option<&Parameters>,
+    ) -> Self {
         let specs = model.stack.specs();
         let mut rows = Vec::with_capacity(specs.len());
         for (effect, range) in model.stack.effects() {
-            let form = effect.form().map(|form| serde_json::to_string(form).expect("numbers and names serialise"));
+            let form = effect
+                .form()
+                .map(|form| serde_json::to_string(form).expect("numbers and names serialise"));
             for k in range.clone() {
                 let spec = &specs[k];
-                let before = earlier.and_then(|table| table.0.iter().find(|row| row.name == spec.name));
+                let before =
+                    earlier.and_then(|table| table.0.iter().find(|row| row.name == spec.name));
                 if let (ParameterStatus::Kept, Some(before)) = (&fitted.statuses[k], before) {
-                    let status = if before.status == "free" { "earlier".to_string() } else { before.status.clone() };
-                    rows.push(ParameterRow { status, ..before.clone() });
+                    let status = if before.status == "free" {
+                        "earlier".to_string()
+                    } else {
+                        before.status.clone()
+                    };
+                    rows.push(ParameterRow {
+                        status,
+                        ..before.clone()
+                    });
                     continue;
                 }
                 let (nominal, value) = model.standing(k);
                 let names = |with: &[(usize, f64)]| {
-                    let list: Vec<&str> = with.iter().take(4).map(|(j, _)| specs[*j].name.as_str()).collect();
-                    if list.is_empty() { "several others".to_string() } else { list.join(", ") }
+                    let list: Vec<&str> = with
+                        .iter()
+                        .take(4)
+                        .map(|(j, _)| specs[*j].name.as_str())
+                        .collect();
+                    if list.is_empty() {
+                        "several others".to_string()
+                    } else {
+                        list.join(", ")
+                    }
                 };
                 let (status, sigma, remark) = match &fitted.statuses[k] {
                     ParameterStatus::Free(sigma) => {
@@ -118,7 +145,10 @@ impl Parameters {
     pub fn with_advice(mut self, advice: &BTreeMap<String, String>) -> Self {
         for row in &mut self.0 {
             if let Some(sentence) = advice.get(&row.name) {
-                row.remark = Some(row.remark.take().map_or_else(|| sentence.clone(), |remark| format!("{remark}; {sentence}")));
+                row.remark = Some(row.remark.take().map_or_else(
+                    || sentence.clone(),
+                    |remark| format!("{remark}; {sentence}"),
+                ));
             }
         }
         self
@@ -139,20 +169,39 @@ impl Parameters {
     /// What these correct: of an outside simulation they say nothing of the robot file's model.
     pub fn corrected(&self) -> Corrected {
         // Tables before version 1.2 say it in their remarks alone, and must not correct commands.
-        let said = |row: &ParameterRow| row.remark.as_deref().is_some_and(|remark| remark.starts_with(Corrected::REMARK));
-        let outside = self.0.iter().any(|row| row.corrects.as_deref() == Some(Corrected::OUTSIDE) || said(row));
-        if outside { Corrected::OutsideSimulation } else { Corrected::RobotFile }
+        let said = |row: &ParameterRow| {
+            row.remark
+                .as_deref()
+                .is_some_and(|remark| remark.starts_with(Corrected::REMARK))
+        };
+        let outside = self
+            .0
+            .iter()
+            .any(|row| row.corrects.as_deref() == Some(Corrected::OUTSIDE) || said(row));
+        if outside {
+            Corrected::OutsideSimulation
+        } else {
+            Corrected::RobotFile
+        }
     }
 
     /// The effects of the whole arm in this model, in the registry's order.
     pub fn effects(&self) -> Vec<&'static str> {
-        let has = |name: &&str| self.0.iter().any(|row| row.effect == *name && row.form.is_none());
+        let has = |name: &&str| {
+            self.0
+                .iter()
+                .any(|row| row.effect == *name && row.form.is_none())
+        };
         identified().map(|cause| cause.name()).filter(has).collect()
     }
 
     /// Effects at a place, in the order of their parameters. Fails where a form cannot be read.
     fn forms(&self) -> Result<Vec<Form>> {
-        let texts: BTreeSet<&str> = self.0.iter().filter_map(|row| row.form.as_deref()).collect();
+        let texts: BTreeSet<&str> = self
+            .0
+            .iter()
+            .filter_map(|row| row.form.as_deref())
+            .collect();
         texts.into_iter().map(read_form).collect()
     }
 
@@ -175,17 +224,33 @@ impl Parameters {
     }
 
     /// [`Parameters::model`] of a robot whose base stands elsewhere.
-    pub fn model_standing(&self, base: Pose, robot: RobotModel, more: &[&str], load: Load) -> Result<Model> {
+    pub fn model_standing(
+        &self,
+        base: Pose,
+        robot: RobotModel,
+        more: &[&str],
+        load: Load,
+    ) -> Result<Model> {
         self.must_be_of(robot.description())?;
         // Factors per ampere and per newton metre are different parameters of one name: the table's unit decides.
-        let compliance = self.0.iter().find(|row| row.effect == names::JOINT_COMPLIANCE && row.form.is_none());
-        let load = compliance.and_then(|row| Load::of_compliance(Unit::parse(&row.unit)?)).unwrap_or(load);
+        let compliance = self
+            .0
+            .iter()
+            .find(|row| row.effect == names::JOINT_COMPLIANCE && row.form.is_none());
+        let load = compliance
+            .and_then(|row| Load::of_compliance(Unit::parse(&row.unit)?))
+            .unwrap_or(load);
         let robot = self.with_setup(robot);
         let setting = EffectContext { base, load };
         let names = identified().map(|cause| cause.name());
-        let chosen: Vec<&str> = names.filter(|name| self.effects().contains(name) || more.contains(name)).collect();
+        let chosen: Vec<&str> = names
+            .filter(|name| self.effects().contains(name) || more.contains(name))
+            .collect();
         let whole = chosen.iter().filter_map(|name| arm_effect(name, &setting));
-        let placed = self.forms()?.into_iter().map(|form| Box::new(form) as Box<dyn Effect>);
+        let placed = self
+            .forms()?
+            .into_iter()
+            .map(|form| Box::new(form) as Box<dyn Effect>);
         let effects = whole.chain(placed).collect();
         let mut model = Model::nominal(robot.clone(), EffectStack::new(&robot, base, effects));
         let targets = !robot.setup().targets.is_empty();
@@ -195,11 +260,18 @@ impl Parameters {
             effect => targets && effect == names::TOOL_OFFSET,
         };
         for row in self.0.iter().filter(|row| !stands(row)) {
-            let position = model.stack.specs().iter().position(|spec| spec.name == row.name);
+            let position = model
+                .stack
+                .specs()
+                .iter()
+                .position(|spec| spec.name == row.name);
             let (Some(k), Some(unit)) = (position, Unit::parse(&row.unit)) else {
                 return Err(Error::data(
                     "table parameters",
-                    format!("`{}` in {} is no parameter of this robot", row.name, row.unit),
+                    format!(
+                        "`{}` in {} is no parameter of this robot",
+                        row.name, row.unit
+                    ),
                 ));
             };
             model.x[k] = unit.to_si(row.value);
@@ -210,8 +282,14 @@ impl Parameters {
     /// The robot with the targets and anchors that the parameters place.
     fn with_setup(&self, robot: RobotModel) -> RobotModel {
         let home = *robot.home();
-        let anchors = self.placed(names::ANCHOR).into_iter().map(|(name, stand)| self.anchor(name, &stand));
-        let mut setup = MeasurementSetup { targets: Vec::new(), anchors: anchors.collect() };
+        let anchors = self
+            .placed(names::ANCHOR)
+            .into_iter()
+            .map(|(name, stand)| self.anchor(name, &stand));
+        let mut setup = MeasurementSetup {
+            targets: Vec::new(),
+            anchors: anchors.collect(),
+        };
         let turned = |name: &str| {
             let rx = format!("{}rx", ToolOffset::prefix(name));
             self.0.iter().any(|row| row.name == rx)
@@ -219,7 +297,10 @@ impl Parameters {
         let targets = self.placed(names::TOOL_OFFSET);
         if targets.keys().any(|name| !name.is_empty()) || turned("") {
             let target = |(name, stand): (String, Pose)| Target {
-                mounting: Pose::new(stand.rotation * home.rotation, stand.translation + home.translation),
+                mounting: Pose::new(
+                    stand.rotation * home.rotation,
+                    stand.translation + home.translation,
+                ),
                 oriented: turned(&name),
                 name,
             };
@@ -232,7 +313,10 @@ impl Parameters {
     fn anchor(&self, name: String, stand: &Pose) -> Anchor {
         let of = |ending: &str| {
             let full = format!("{}{ending}", AnchorShift::prefix(&name));
-            self.0.iter().find(|row| row.name == full).map(|row| Unit::Millimetre.to_si(row.value))
+            self.0
+                .iter()
+                .find(|row| row.name == full)
+                .map(|row| Unit::Millimetre.to_si(row.value))
         };
         let (place, shape) = match (of("offset"), of("radius")) {
             (Some(offset), _) => {
@@ -252,22 +336,37 @@ impl Parameters {
         for row in self.0.iter().filter(|row| row.effect == effect) {
             let own = row.name.strip_prefix(effect).unwrap_or_default();
             let (name, axis) = own.rsplit_once('.').unwrap_or_default();
-            let axis = ["x", "y", "z", "rx", "ry", "rz"].iter().position(|known| *known == axis);
+            let axis = ["x", "y", "z", "rx", "ry", "rz"]
+                .iter()
+                .position(|known| *known == axis);
             if let (Some(axis), Some(unit)) = (axis, Unit::parse(&row.unit)) {
-                parts.entry(name.trim_start_matches('.').into()).or_default()[axis] = unit.to_si(row.value);
+                parts
+                    .entry(name.trim_start_matches('.').into())
+                    .or_default()[axis] = unit.to_si(row.value);
             }
         }
-        let pose = |[x, y, z, rx, ry, rz]: [f64; 6]| Pose::from_rotation_vector(Vector3::new(rx, ry, rz), Vector3::new(x, y, z));
-        parts.into_iter().map(|(name, part)| (name, pose(part))).collect()
+        let pose = |[x, y, z, rx, ry, rz]: [f64; 6]| {
+            Pose::from_rotation_vector(Vector3::new(rx, ry, rz), Vector3::new(x, y, z))
+        };
+        parts
+            .into_iter()
+            .map(|(name, part)| (name, pose(part)))
+            .collect()
     }
 
     /// The same of a robot whose base stands elsewhere in the tracker's frame.
     pub fn standing_at(mut self, base: &Pose) -> Self {
         let (translation, rotation) = (base.translation, base.rotation_vector());
         for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
-            for (ending, value, unit) in [("", translation[axis], Unit::Millimetre), ("r", rotation[axis], Unit::Radian)] {
+            for (ending, value, unit) in [
+                ("", translation[axis], Unit::Millimetre),
+                ("r", rotation[axis], Unit::Radian),
+            ] {
                 let name = format!("{}.{ending}{name}", names::BASE_FRAME);
-                self.0.iter_mut().filter(|row| row.name == name).for_each(|row| row.value = unit.from_si(value));
+                self.0
+                    .iter_mut()
+                    .filter(|row| row.name == name)
+                    .for_each(|row| row.value = unit.from_si(value));
             }
         }
         self
@@ -277,7 +376,10 @@ impl Parameters {
     pub fn base_pose(&self) -> Pose {
         let value = |axis: &str, unit: Unit| {
             let name = format!("{}.{axis}", names::BASE_FRAME);
-            self.0.iter().find(|row| row.name == name).map_or(0.0, |row| unit.to_si(row.value))
+            self.0
+                .iter()
+                .find(|row| row.name == name)
+                .map_or(0.0, |row| unit.to_si(row.value))
         };
         let translation = ["x", "y", "z"].map(|axis| value(axis, Unit::Millimetre));
         let rotation = ["rx", "ry", "rz"].map(|axis| value(axis, Unit::Radian));
@@ -289,15 +391,16 @@ impl Parameters {
 fn against_prior(check: &PriorCheck, unit: Unit) -> Option<String> {
     match check.without {
         Some((without, sigma)) if check.conflict > CONFLICT => {
-            let [mean, own, without, sigma] =
-                [check.prior.mean, check.prior.sigma, without, sigma].map(|value| unit.from_si(value));
+            let [mean, own, without, sigma] = [check.prior.mean, check.prior.sigma, without, sigma]
+                .map(|value| unit.from_si(value));
             let apart = check.conflict;
             Some(format!(
                 "prior {mean:.4e} +- {own:.1e} and data {without:.4e} +- {sigma:.1e} contradict each other ({apart:.1} sigma)"
             ))
         }
         Some((_, sigma)) if sigma < SILENT * check.prior.sigma => {
-            let [mean, own] = [check.prior.mean, check.prior.sigma].map(|value| unit.from_si(value));
+            let [mean, own] =
+                [check.prior.mean, check.prior.sigma].map(|value| unit.from_si(value));
             Some(format!("prior {mean} +- {own}"))
         }
         _ => Some("known from its prior alone: the data add nothing".into()),
@@ -333,10 +436,19 @@ mod tests {
             assert_eq!(bare.corrected(), Corrected::RobotFile);
             assert_eq!(bare.clone().correcting(Corrected::RobotFile), bare);
             let outside = bare.correcting(Corrected::OutsideSimulation);
-            assert_eq!(outside.with_advice(&advice).corrected(), Corrected::OutsideSimulation);
+            assert_eq!(
+                outside.with_advice(&advice).corrected(),
+                Corrected::OutsideSimulation
+            );
         }
         let mentioned = format!("not so: {}", Corrected::REMARK);
-        assert_eq!(Parameters(vec![row(Some(&mentioned))]).corrected(), Corrected::RobotFile);
-        assert_eq!(Parameters(vec![row(Some(Corrected::REMARK))]).corrected(), Corrected::OutsideSimulation);
+        assert_eq!(
+            Parameters(vec![row(Some(&mentioned))]).corrected(),
+            Corrected::RobotFile
+        );
+        assert_eq!(
+            Parameters(vec![row(Some(Corrected::REMARK))]).corrected(),
+            Corrected::OutsideSimulation
+        );
     }
 }

@@ -33,7 +33,9 @@ impl Prediction {
             let whole = measured_point.is_some();
             let residual = match measured_point {
                 Some(measured) => measured * 1e3 - point,
-                None => error.as_ref().map_or_else(Vector3::zeros, |error| error.point * 1e3),
+                None => error
+                    .as_ref()
+                    .map_or_else(Vector3::zeros, |error| error.point * 1e3),
             };
             PredictionRow {
                 sequence: recording.sequence[row],
@@ -68,9 +70,20 @@ impl Prediction {
 
     /// Whether these are the points of a recording: its rows, names and measured points.
     pub fn is_of(&self, recording: &Recording) -> bool {
-        let measured = |row: &PredictionRow| [row.x_mm + row.dx_mm, row.y_mm + row.dy_mm, row.z_mm + row.dz_mm];
+        let measured = |row: &PredictionRow| {
+            [
+                row.x_mm + row.dx_mm,
+                row.y_mm + row.dy_mm,
+                row.z_mm + row.dz_mm,
+            ]
+        };
         let is = |at: usize, row: &PredictionRow| {
-            let near = |point: [f64; 3]| measured(row).into_iter().zip(point).all(|(own, m)| (own - m * 1e3).abs() < ROUNDING_MM);
+            let near = |point: [f64; 3]| {
+                measured(row)
+                    .into_iter()
+                    .zip(point)
+                    .all(|(own, m)| (own - m * 1e3).abs() < ROUNDING_MM)
+            };
             row.sequence == recording.sequence[at]
                 && row.point_id == recording.point_id[at]
                 && (row.measured.is_some() || recording.point(at).is_some_and(near))
@@ -80,7 +93,9 @@ impl Prediction {
 
     /// Whole points that the step was fitted to.
     fn fitted_points(&self) -> impl Iterator<Item = &PredictionRow> {
-        self.0.iter().filter(|row| !row.held_out && !row.suspect && row.measured.is_none())
+        self.0
+            .iter()
+            .filter(|row| !row.held_out && !row.suspect && row.measured.is_none())
     }
 
     /// Standard deviation per axis (mm) of what the model leaves beyond the noise, by the residuals of the points that its step was
@@ -88,29 +103,44 @@ impl Prediction {
     pub fn unexplained_mm(&self) -> f64 {
         let (mut excess, mut noise, mut count) = (0.0, 0.0, 0usize);
         for row in self.fitted_points() {
-            excess += row.error_mm.powi(2) + row.sigma_mm.unwrap_or(0.0).powi(2) - row.noise_mm.powi(2);
+            excess +=
+                row.error_mm.powi(2) + row.sigma_mm.unwrap_or(0.0).powi(2) - row.noise_mm.powi(2);
             noise += row.noise_mm.powi(2);
             count += 1;
         }
         // The standard error of a sum of squares of three axes a row.
         let chance = 2.0 * noise * (2.0 / (3 * count.max(1)) as f64).sqrt();
-        if excess > chance { (excess / (3 * count) as f64).sqrt() } else { 0.0 }
+        if excess > chance {
+            (excess / (3 * count) as f64).sqrt()
+        } else {
+            0.0
+        }
     }
 
     /// Mean squared one-sigma length of the noise of the points that the step was fitted to, mm2; zero of none.
     pub fn mean_square_noise_mm2(&self) -> f64 {
-        let (sum, count) = self.fitted_points().fold((0.0, 0usize), |(sum, count), row| (sum + row.noise_mm.powi(2), count + 1));
+        let (sum, count) = self
+            .fitted_points()
+            .fold((0.0, 0usize), |(sum, count), row| {
+                (sum + row.noise_mm.powi(2), count + 1)
+            });
         sum / count.max(1) as f64
     }
 
     /// The same with errors larger by a factor, by row: of rows that had a part in what they were brought to.
     pub fn with_places(mut self, inflation: &BTreeMap<usize, f64>) -> Self {
-        inflation.iter().filter(|(_, by)| by.is_finite()).for_each(|(row, by)| self.0[*row].error_mm *= by);
+        inflation
+            .iter()
+            .filter(|(_, by)| by.is_finite())
+            .for_each(|(row, by)| self.0[*row].error_mm *= by);
         self
     }
 
     /// The same with the errors of `rows` under fits without them.
-    pub fn with_folds<'a>(mut self, rows: impl Iterator<Item = (&'a usize, (&'a f64, &'a f64))>) -> Self {
+    pub fn with_folds<'a>(
+        mut self,
+        rows: impl Iterator<Item = (&'a usize, (&'a f64, &'a f64))>,
+    ) -> Self {
         for (row, (fold, block)) in rows {
             self.0[*row].fold_error_mm = Some(fold * 1e3);
             self.0[*row].block_error_mm = Some(block * 1e3);
@@ -120,8 +150,13 @@ impl Prediction {
 
     /// The same with the weights of `rows` in a fit to them; 0 of those that were set aside.
     pub fn with_weights(mut self, rows: &[usize], fitted: &Fitted) -> Self {
-        rows.iter().for_each(|row| self.0[*row].weight = Some(fitted.downweighted.get(row).copied().unwrap_or(1.0)));
-        self.0.iter_mut().filter(|row| row.suspect).for_each(|row| row.weight = Some(0.0));
+        rows.iter().for_each(|row| {
+            self.0[*row].weight = Some(fitted.downweighted.get(row).copied().unwrap_or(1.0))
+        });
+        self.0
+            .iter_mut()
+            .filter(|row| row.suspect)
+            .for_each(|row| row.weight = Some(0.0));
         self
     }
 
@@ -147,5 +182,9 @@ impl Prediction {
 
 /// What a row measured, in words.
 fn measured(data: &Measurements, row: usize) -> String {
-    KINDS.iter().flat_map(|kind| kind.words(data, row)).collect::<Vec<_>>().join(" ")
+    KINDS
+        .iter()
+        .flat_map(|kind| kind.words(data, row))
+        .collect::<Vec<_>>()
+        .join(" ")
 }

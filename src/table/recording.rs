@@ -2,7 +2,9 @@
 
 use crate::error::Result;
 use crate::observation::{DeclaredColumn, KINDS};
-use crate::robot::{CIRCUMSTANCES, Measurements, Memories, Named, NoiseBasis, Sequence, SigmaSource, law_columns};
+use crate::robot::{
+    CIRCUMSTANCES, Measurements, Memories, Named, NoiseBasis, Sequence, SigmaSource, law_columns,
+};
 use crate::store::frame::{Cell, Column, Frame, FrameBuilder};
 use crate::table::Table;
 use crate::table::point::{is_whole, points};
@@ -11,7 +13,9 @@ use std::collections::BTreeMap;
 
 /// All columns, in the order in which people see them: circumstances, and what kinds of measurement own.
 pub fn columns() -> impl Iterator<Item = &'static DeclaredColumn> {
-    CIRCUMSTANCES.iter().chain(KINDS.iter().flat_map(|kind| kind.about().columns))
+    CIRCUMSTANCES
+        .iter()
+        .chain(KINDS.iter().flat_map(|kind| kind.about().columns))
 }
 
 /// Measured points in the order of recording; key `sequence`. Per-joint quantities are row-major (`row * joints + joint`).
@@ -74,7 +78,11 @@ impl Recording {
     /// What the numerics need; a point without a standard deviation has the weight that one starts from.
     pub fn measurements(&self) -> Measurements {
         let measured = |value: &f64| if value.is_finite() { *value } else { 0.0 };
-        let (points, is_inferred) = points(&self.position, self.position_sigma.as_deref(), self.sigma_source.as_deref());
+        let (points, is_inferred) = points(
+            &self.position,
+            self.position_sigma.as_deref(),
+            self.sigma_source.as_deref(),
+        );
         let payload = match &self.payload {
             Some(all) => all.iter().map(measured).collect(),
             None => vec![0.0; self.rows()],
@@ -88,11 +96,17 @@ impl Recording {
             time: self.time.clone(),
             temperature: self.temperature.clone(),
             circumstances: law_columns()
-                .filter_map(|column| Some((column.setting, self.readings.get(column.setting)?.clone())))
+                .filter_map(|column| {
+                    Some((column.setting, self.readings.get(column.setting)?.clone()))
+                })
                 .collect(),
             direction: self.direction.clone(),
             velocity: self.velocity.clone(),
-            noise_basis: if is_inferred { NoiseBasis::Inferred } else { NoiseBasis::Instrument },
+            noise_basis: if is_inferred {
+                NoiseBasis::Inferred
+            } else {
+                NoiseBasis::Instrument
+            },
             spread: None,
             reading_spread: BTreeMap::new(),
             target: self.target.as_ref().map(|names| named(names)),
@@ -100,21 +114,32 @@ impl Recording {
                 .iter()
                 .filter_map(|kind| {
                     let names = |setting: &str| self.names.get(setting).map(|names| named(names));
-                    kind.readings(|setting| self.readings.get(setting).map(Vec::as_slice), names)
+                    kind.readings(
+                        |setting| self.readings.get(setting).map(Vec::as_slice),
+                        names,
+                    )
                 })
                 .collect(),
             sequence: None,
             long_after: false,
             memories: Memories::default(),
         };
-        data.sequence = data.time.as_ref().and_then(|time| Sequence::by_time(time, |a, b| data.near_pose(a, b)));
+        data.sequence = data
+            .time
+            .as_ref()
+            .and_then(|time| Sequence::by_time(time, |a, b| data.near_pose(a, b)));
         data
     }
 
     /// The name of what a row's target was brought to, where that is what was measured.
     pub fn brought(&self, row: usize) -> Option<&str> {
-        let settings = KINDS.iter().filter(|kind| kind.is_brought()).flat_map(|kind| kind.telling());
-        settings.filter_map(|column| self.names.get(column.setting)?.get(row)?.as_deref()).next()
+        let settings = KINDS
+            .iter()
+            .filter(|kind| kind.is_brought())
+            .flat_map(|kind| kind.telling());
+        settings
+            .filter_map(|column| self.names.get(column.setting)?.get(row)?.as_deref())
+            .next()
     }
 
     /// The point of a row (m) where all three of its axes were measured.
@@ -131,18 +156,39 @@ impl Table for Recording {
     const KIND: &'static str = "recording";
 
     fn to_frame(&self) -> Result<Frame> {
-        let named = |all: &Vec<SigmaSource>| all.iter().map(|source| Some(source.name().to_string())).collect::<Vec<_>>();
+        let named = |all: &Vec<SigmaSource>| {
+            all.iter()
+                .map(|source| Some(source.name().to_string()))
+                .collect::<Vec<_>>()
+        };
         let source = self.sigma_source.as_ref().map(named);
-        let texts = [("usage", Some(&self.usage)), ("target", self.target.as_ref()), (SOURCE, source.as_ref())];
-        let texts = texts.into_iter().filter_map(|(name, texts)| Some((name, texts?)));
+        let texts = [
+            ("usage", Some(&self.usage)),
+            ("target", self.target.as_ref()),
+            (SOURCE, source.as_ref()),
+        ];
+        let texts = texts
+            .into_iter()
+            .filter_map(|(name, texts)| Some((name, texts?)));
         let texts = texts.chain(self.names.iter().map(|(name, names)| (*name, names)));
         let numbers = columns().filter_map(|column| Some((column, self.numbers(column)?)));
         let numbers = numbers.flat_map(|(column, (values, first, step))| {
             let stored = column.columns(&self.prismatic).into_iter().enumerate();
-            stored.map(move |(k, (name, unit))| (name, unit, values.iter().copied().skip(first + k).step_by(step)))
+            stored.map(move |(k, (name, unit))| {
+                (
+                    name,
+                    unit,
+                    values.iter().copied().skip(first + k).step_by(step),
+                )
+            })
         });
         let texts = texts.map(|(name, texts)| (name, Cell::to_array(texts.clone())));
-        frame(self.sequence.clone(), Cell::to_array(self.point_id.clone()), texts, numbers)
+        frame(
+            self.sequence.clone(),
+            Cell::to_array(self.point_id.clone()),
+            texts,
+            numbers,
+        )
     }
 
     fn from_frame(frame: &Frame) -> Result<Self> {
@@ -159,9 +205,15 @@ impl Table for Recording {
                 let read = |(name, unit): &(String, Unit)| -> Result<Vec<f64>> {
                     // Null -> NaN.
                     let values = frame.read::<Option<f64>>(name)?;
-                    Ok(values.into_iter().map(|value| value.map_or(f64::NAN, |value| unit.to_si(value))).collect())
+                    Ok(values
+                        .into_iter()
+                        .map(|value| value.map_or(f64::NAN, |value| unit.to_si(value)))
+                        .collect())
                 };
-                numbers.insert(column.setting, interleave(&stored.iter().map(read).collect::<Result<Vec<_>>>()?));
+                numbers.insert(
+                    column.setting,
+                    interleave(&stored.iter().map(read).collect::<Result<Vec<_>>>()?),
+                );
             }
         }
         let mut texts: BTreeMap<&'static str, Vec<Option<String>>> = BTreeMap::new();
@@ -171,14 +223,30 @@ impl Table for Recording {
             }
         }
         let known = |name: Option<String>| {
-            SigmaSource::ALL.into_iter().find(|source| name.as_deref() == Some(source.name())).unwrap_or(SigmaSource::Recorded)
+            SigmaSource::ALL
+                .into_iter()
+                .find(|source| name.as_deref() == Some(source.name()))
+                .unwrap_or(SigmaSource::Recorded)
         };
-        let source =
-            if has(SOURCE) { Some(frame.read::<Option<String>>(SOURCE)?.into_iter().map(known).collect()) } else { None };
+        let source = if has(SOURCE) {
+            Some(
+                frame
+                    .read::<Option<String>>(SOURCE)?
+                    .into_iter()
+                    .map(known)
+                    .collect(),
+            )
+        } else {
+            None
+        };
         let mut take = |setting: &str| numbers.remove(setting);
         let mut points = |[x, y, z]: [&str; 3]| -> Option<Vec<[f64; 3]>> {
             let axes = [take(x)?, take(y)?, take(z)?];
-            Some((0..frame.rows()).map(|row| [axes[0][row], axes[1][row], axes[2][row]]).collect())
+            Some(
+                (0..frame.rows())
+                    .map(|row| [axes[0][row], axes[1][row], axes[2][row]])
+                    .collect(),
+            )
         };
         Ok(Self {
             joints: prismatic.len(),
@@ -213,9 +281,16 @@ const SIMULATED: [&str; 3] = ["sim_x", "sim_y", "sim_z"];
 impl Recording {
     /// The numbers of a column, SI: where they are, the first of them, and how far the next row's is.
     fn numbers(&self, column: &DeclaredColumn) -> Option<(&[f64], usize, usize)> {
-        let points = [(POINT, Some(&self.position)), (SIGMA, self.position_sigma.as_ref()), (SIMULATED, self.simulated.as_ref())];
+        let points = [
+            (POINT, Some(&self.position)),
+            (SIGMA, self.position_sigma.as_ref()),
+            (SIMULATED, self.simulated.as_ref()),
+        ];
         for (settings, points) in points {
-            if let Some(axis) = settings.iter().position(|setting| *setting == column.setting) {
+            if let Some(axis) = settings
+                .iter()
+                .position(|setting| *setting == column.setting)
+            {
                 return Some((points?.as_flattened(), axis, 3));
             }
         }
@@ -244,12 +319,16 @@ pub fn frame<N: Iterator<Item = f64>>(
     frame.push("sequence", Cell::to_array(sequence));
     frame.push("point_id", point_id);
     texts.for_each(|(name, texts)| frame.push(name, texts));
-    numbers.for_each(|(name, unit, values)| frame.push_numbers(name, values.map(|value| unit.from_si(value))));
+    numbers.for_each(|(name, unit, values)| {
+        frame.push_numbers(name, values.map(|value| unit.from_si(value)))
+    });
     frame.finish()
 }
 
 /// Columns of equal length -> row-major.
 fn interleave(columns: &[Vec<f64>]) -> Vec<f64> {
     let rows = columns.first().map_or(0, Vec::len);
-    (0..rows).flat_map(|row| columns.iter().map(move |column| column[row])).collect()
+    (0..rows)
+        .flat_map(|row| columns.iter().map(move |column| column[row]))
+        .collect()
 }

@@ -2,7 +2,8 @@
 
 use super::{Robot, RobotRow};
 use crate::description::{
-    Coupling, DeclaredInertias, InertiaMoments, JointDescription, JointKind, MassTolerance, RobotDescription,
+    Coupling, DeclaredInertias, InertiaMoments, JointDescription, JointKind, MassTolerance,
+    RobotDescription,
 };
 use crate::error::{Error, Result};
 use crate::robot::Bound;
@@ -22,7 +23,8 @@ impl Robot {
     pub fn from_description(robot: &RobotDescription) -> Self {
         let gravity = Vector3::from(robot.gravity);
         let mut base = empty(0, &robot.name, "base");
-        [base.axis_x, base.axis_y, base.axis_z] = some((gravity.norm() > 0.0).then(|| gravity.normalize().into()));
+        [base.axis_x, base.axis_y, base.axis_z] =
+            some((gravity.norm() > 0.0).then(|| gravity.normalize().into()));
         base.gravity_m_s2 = Some(gravity.norm());
         if let Some(tolerance) = &robot.inertias.tolerance {
             base.tolerance_mass = Some(tolerance.mass);
@@ -33,31 +35,46 @@ impl Robot {
         let mut tool = empty(robot.joints.len() + 1, "tool", "tool");
         [tool.point_x_mm, tool.point_y_mm, tool.point_z_mm] = millimetres(Some(robot.tool));
         tool.mass_kg = Some(robot.payload_mass);
-        [tool.centre_x_mm, tool.centre_y_mm, tool.centre_z_mm] = millimetres(Some(robot.payload_centre));
+        [tool.centre_x_mm, tool.centre_y_mm, tool.centre_z_mm] =
+            millimetres(Some(robot.payload_centre));
         let rotation = Matrix3::from_fn(|i, j| robot.tool_rotation[i][j]);
-        let orientation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
+        let orientation =
+            UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
         set_inertia(&mut tool, robot.inertias.payload);
         tool.orientation_w = Some(orientation.w);
-        [tool.orientation_x, tool.orientation_y, tool.orientation_z] = some(Some([orientation.i, orientation.j, orientation.k]));
+        [tool.orientation_x, tool.orientation_y, tool.orientation_z] =
+            some(Some([orientation.i, orientation.j, orientation.k]));
 
         let joints = robot.joints.iter().enumerate().map(|(i, joint)| {
             let mut row = joint_row(i, joint, &robot.couplings);
             set_inertia(&mut row, robot.inertias.links.get(i).copied().flatten());
             row
         });
-        Self(std::iter::once(base).chain(joints).chain(std::iter::once(tool)).collect())
+        Self(
+            std::iter::once(base)
+                .chain(joints)
+                .chain(std::iter::once(tool))
+                .collect(),
+        )
     }
 
     /// The description that the rows hold; fails when a body or one of its numbers is missing.
     pub fn to_description(&self) -> Result<RobotDescription> {
         let (Some((base, rest)), true) = (self.0.split_first(), self.0.len() > 2) else {
-            return Err(Error::data("table robot", "expected a base, at least one joint and a tool"));
+            return Err(Error::data(
+                "table robot",
+                "expected a base, at least one joint and a tool",
+            ));
         };
         let Some((tool, joints)) = rest.split_last() else {
             return Err(Error::data("table robot", "has no tool"));
         };
         let size = need(base.gravity_m_s2, base, "gravity_m_s2")?;
-        let down = if size == 0.0 { [0.0; 3] } else { all([base.axis_x, base.axis_y, base.axis_z], base, "axis")? };
+        let down = if size == 0.0 {
+            [0.0; 3]
+        } else {
+            all([base.axis_x, base.axis_y, base.axis_z], base, "axis")?
+        };
         let q = Quaternion::new(
             need(tool.orientation_w, tool, "orientation_w")?,
             need(tool.orientation_x, tool, "orientation_x")?,
@@ -72,11 +89,19 @@ impl Robot {
         Ok(RobotDescription {
             name: base.name.clone(),
             joints: joints.iter().map(joint).collect::<Result<_>>()?,
-            tool: metres([tool.point_x_mm, tool.point_y_mm, tool.point_z_mm], tool, "point")?,
+            tool: metres(
+                [tool.point_x_mm, tool.point_y_mm, tool.point_z_mm],
+                tool,
+                "point",
+            )?,
             tool_rotation: [0, 1, 2].map(|i| [0, 1, 2].map(|j| rotation[(i, j)])),
             couplings,
             payload_mass: need(tool.mass_kg, tool, "mass_kg")?,
-            payload_centre: metres([tool.centre_x_mm, tool.centre_y_mm, tool.centre_z_mm], tool, "centre")?,
+            payload_centre: metres(
+                [tool.centre_x_mm, tool.centre_y_mm, tool.centre_z_mm],
+                tool,
+                "centre",
+            )?,
             gravity: down.map(|x| x * size),
             inertias: inertias(base, joints, tool),
         })
@@ -84,7 +109,15 @@ impl Robot {
 }
 
 fn joint_row(index: usize, joint: &JointDescription, couplings: &[Coupling]) -> RobotRow {
-    let mut row = empty(index + 1, &joint.name, if joint.kind == JointKind::Revolute { "revolute" } else { "prismatic" });
+    let mut row = empty(
+        index + 1,
+        &joint.name,
+        if joint.kind == JointKind::Revolute {
+            "revolute"
+        } else {
+            "prismatic"
+        },
+    );
     [row.axis_x, row.axis_y, row.axis_z] = some(Some(joint.axis));
     [row.point_x_mm, row.point_y_mm, row.point_z_mm] = millimetres(Some(joint.point));
     let [lower, upper] = joint.limits.map_or([None; 2], |limits| limits.map(Some));
@@ -101,7 +134,12 @@ fn joint_row(index: usize, joint: &JointDescription, couplings: &[Coupling]) -> 
     row.coulomb_nm = joint.coulomb;
     [row.centre_x_mm, row.centre_y_mm, row.centre_z_mm] = millimetres(joint.centre);
     let mine = couplings.iter().filter(|c| c.moved == index);
-    let cells: Vec<_> = mine.map(|c| CouplingCell { by: c.by + 1, ratio: c.ratio }).collect();
+    let cells: Vec<_> = mine
+        .map(|c| CouplingCell {
+            by: c.by + 1,
+            ratio: c.ratio,
+        })
+        .collect();
     if !cells.is_empty() {
         row.couplings = Some(serde_json::to_string(&cells).expect("numbers and names serialise"));
     }
@@ -112,24 +150,48 @@ fn joint(row: &RobotRow) -> Result<JointDescription> {
     let metre = |x: Option<f64>| x.map(|x| Unit::Millimetre.to_si(x));
     let (kind, limits) = match row.kind.as_str() {
         "revolute" => (JointKind::Revolute, (row.lower_rad, row.upper_rad)),
-        "prismatic" => (JointKind::Prismatic, (metre(row.lower_mm), metre(row.upper_mm))),
-        other => return Err(fault(row, &format!("kind is `{other}`; expected revolute or prismatic"))),
+        "prismatic" => (
+            JointKind::Prismatic,
+            (metre(row.lower_mm), metre(row.upper_mm)),
+        ),
+        other => {
+            return Err(fault(
+                row,
+                &format!("kind is `{other}`; expected revolute or prismatic"),
+            ));
+        }
     };
     let centre = [row.centre_x_mm, row.centre_y_mm, row.centre_z_mm];
-    let factors: Vec<f64> = [row.reduction_ratio, row.motor_constant_nm_a].into_iter().flatten().collect();
-    sized(Bound::Factor, &factors, row, "reduction_ratio, motor_constant_nm_a")?;
+    let factors: Vec<f64> = [row.reduction_ratio, row.motor_constant_nm_a]
+        .into_iter()
+        .flatten()
+        .collect();
+    sized(
+        Bound::Factor,
+        &factors,
+        row,
+        "reduction_ratio, motor_constant_nm_a",
+    )?;
     sized(Bound::Mass, row.mass_kg.as_slice(), row, "mass_kg")?;
     Ok(JointDescription {
         name: row.name.clone(),
         kind,
         axis: all([row.axis_x, row.axis_y, row.axis_z], row, "axis")?,
-        point: metres([row.point_x_mm, row.point_y_mm, row.point_z_mm], row, "point")?,
+        point: metres(
+            [row.point_x_mm, row.point_y_mm, row.point_z_mm],
+            row,
+            "point",
+        )?,
         limits: limits.0.zip(limits.1).map(|(lower, upper)| [lower, upper]),
         reduction_ratio: row.reduction_ratio,
         motor_constant: row.motor_constant_nm_a,
         mass: row.mass_kg,
         coulomb: row.coulomb_nm,
-        centre: if centre == [None; 3] { None } else { Some(metres(centre, row, "centre")?) },
+        centre: if centre == [None; 3] {
+            None
+        } else {
+            Some(metres(centre, row, "centre")?)
+        },
     })
 }
 
@@ -158,23 +220,43 @@ fn inertias(base: &RobotRow, joints: &[RobotRow], tool: &RobotRow) -> DeclaredIn
     let links: Vec<_> = joints.iter().map(moments).collect();
     let tolerance = || {
         let centre = Unit::Millimetre.to_si(base.tolerance_centre_mm?);
-        Some(MassTolerance { mass: base.tolerance_mass?, centre, inertia: base.tolerance_inertia? })
+        Some(MassTolerance {
+            mass: base.tolerance_mass?,
+            centre,
+            inertia: base.tolerance_inertia?,
+        })
     };
     DeclaredInertias {
-        links: if links.iter().any(Option::is_some) { links } else { Vec::new() },
+        links: if links.iter().any(Option::is_some) {
+            links
+        } else {
+            Vec::new()
+        },
         payload: moments(tool),
         tolerance: tolerance(),
     }
 }
 
 fn couplings_of(moved: usize, row: &RobotRow, joints: usize) -> Result<Vec<Coupling>> {
-    let Some(text) = &row.couplings else { return Ok(Vec::new()) };
-    let cells: Vec<CouplingCell> = serde_json::from_str(text).map_err(|e| fault(row, &format!("couplings: {e}")))?;
+    let Some(text) = &row.couplings else {
+        return Ok(Vec::new());
+    };
+    let cells: Vec<CouplingCell> =
+        serde_json::from_str(text).map_err(|e| fault(row, &format!("couplings: {e}")))?;
     (cells.into_iter())
-        .map(|cell| match cell.by.checked_sub(1).filter(|by| *by < joints) {
-            Some(by) => Ok(Coupling { moved, by, ratio: cell.ratio }),
-            None => Err(fault(row, &format!("couplings: there is no joint {}", cell.by))),
-        })
+        .map(
+            |cell| match cell.by.checked_sub(1).filter(|by| *by < joints) {
+                Some(by) => Ok(Coupling {
+                    moved,
+                    by,
+                    ratio: cell.ratio,
+                }),
+                None => Err(fault(
+                    row,
+                    &format!("couplings: there is no joint {}", cell.by),
+                )),
+            },
+        )
         .collect()
 }
 
@@ -252,5 +334,8 @@ fn need(value: Option<f64>, row: &RobotRow, what: &str) -> Result<f64> {
 }
 
 fn fault(row: &RobotRow, message: &str) -> Error {
-    Error::data(format!("table robot, body {} (`{}`)", row.body, row.name), message)
+    Error::data(
+        format!("table robot, body {} (`{}`)", row.body, row.name),
+        message,
+    )
 }

@@ -20,7 +20,12 @@ struct RobotIdentity {
 impl RobotIdentity {
     fn of(robot: &RobotDescription) -> Self {
         let mut text = String::new();
-        let numbers = |vector: &[f64]| vector.iter().map(|x| format!(" {}", (x * PARTS).round() as i128)).collect::<String>();
+        let numbers = |vector: &[f64]| {
+            vector
+                .iter()
+                .map(|x| format!(" {}", (x * PARTS).round() as i128))
+                .collect::<String>()
+        };
         for joint in &robot.joints {
             // What a sliding joint's point is changes nothing.
             let (kind, point) = match joint.kind {
@@ -30,10 +35,20 @@ impl RobotIdentity {
             writeln!(text, "{kind}{}{point}", numbers(&joint.axis)).expect("text grows");
         }
         for coupling in &robot.couplings {
-            writeln!(text, "coupled {} {}{}", coupling.moved, coupling.by, numbers(&[coupling.ratio])).expect("text grows");
+            writeln!(
+                text,
+                "coupled {} {}{}",
+                coupling.moved,
+                coupling.by,
+                numbers(&[coupling.ratio])
+            )
+            .expect("text grows");
         }
         let kinematics = blake3::hash(text.as_bytes()).to_hex()[..DIGITS].to_string();
-        Self { name: robot.name.clone(), kinematics }
+        Self {
+            name: robot.name.clone(),
+            kinematics,
+        }
     }
 
     /// Fails where a table of the kind `kind` with this identity is used for another robot.
@@ -73,14 +88,21 @@ macro_rules! of_one_robot {
 
             /// Whether the table says of which robot it is.
             pub fn says_its_robot(&self) -> bool {
-                self.0.iter().all(|row| row.robot.is_some() && row.kinematics.is_some())
+                self.0
+                    .iter()
+                    .all(|row| row.robot.is_some() && row.kinematics.is_some())
             }
 
             /// Fails where the table says that it is the model of another robot.
             pub fn must_be_of(&self, robot: &RobotDescription) -> Result<()> {
                 let other = RobotIdentity::of(robot);
-                let mut stated = self.0.iter().filter_map(|row| row.robot.clone().zip(row.kinematics.clone()));
-                stated.try_for_each(|(name, kinematics)| RobotIdentity { name, kinematics }.must_be(&other, $kind))
+                let mut stated = self
+                    .0
+                    .iter()
+                    .filter_map(|row| row.robot.clone().zip(row.kinematics.clone()));
+                stated.try_for_each(|(name, kinematics)| {
+                    RobotIdentity { name, kinematics }.must_be(&other, $kind)
+                })
             }
         }
     };

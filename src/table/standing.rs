@@ -77,7 +77,13 @@ pub struct Contradicted(pub Withdrawn);
 
 impl fmt::Display for Withdrawn {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { step, rms_mm, than, than_rms_mm, points } = self;
+        let Self {
+            step,
+            rms_mm,
+            than,
+            than_rms_mm,
+            points,
+        } = self;
         write!(
             f,
             "`{step}` is withdrawn and `{than}` used instead: {rms_mm:.3} mm rms after `{step}`, {than_rms_mm:.3} mm after `{than}` at the same {points} points, predicted by fits without them"
@@ -87,7 +93,13 @@ impl fmt::Display for Withdrawn {
 
 impl fmt::Display for Contradicted {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Withdrawn { step, rms_mm, than, than_rms_mm, points } = &self.0;
+        let Withdrawn {
+            step,
+            rms_mm,
+            than,
+            than_rms_mm,
+            points,
+        } = &self.0;
         write!(
             f,
             "the {points} held-out points contradict the choice of `{step}`: {rms_mm:.3} mm rms after `{step}`, {than_rms_mm:.3} mm after `{than}`. Held-out points judge a step and never choose one: something differs there that the fitted points do not show"
@@ -98,7 +110,10 @@ impl fmt::Display for Contradicted {
 impl Standing {
     /// What a person must know of the choice, a sentence each.
     pub fn warnings(&self) -> impl Iterator<Item = String> + '_ {
-        self.withdrawn.iter().map(ToString::to_string).chain(self.contradicted.iter().map(ToString::to_string))
+        self.withdrawn
+            .iter()
+            .map(ToString::to_string)
+            .chain(self.contradicted.iter().map(ToString::to_string))
     }
 }
 
@@ -106,7 +121,11 @@ impl Unseen {
     /// Errors of a step at rows that its fits have not seen.
     pub fn of(prediction: &Prediction) -> Self {
         let mut out = Self::default();
-        for row in prediction.0.iter().filter(|row| !row.suspect && row.measured.is_none()) {
+        for row in prediction
+            .0
+            .iter()
+            .filter(|row| !row.suspect && row.measured.is_none())
+        {
             out.add(row.sequence, row.error_mm, row.held_out, row.fold_error_mm);
         }
         out
@@ -114,9 +133,18 @@ impl Unseen {
 
     /// The same from a table `prediction` of which nothing else is read.
     pub fn of_frame(frame: &Frame) -> Result<Self> {
-        let (sequence, error) = (frame.read::<i64>("sequence")?, frame.read::<f64>("error_mm")?);
-        let (held_out, suspect) = (frame.read::<bool>("held_out")?, frame.read::<bool>("suspect")?);
-        let (measured, fold) = (frame.read::<Option<String>>("measured")?, frame.read::<Option<f64>>("fold_error_mm")?);
+        let (sequence, error) = (
+            frame.read::<i64>("sequence")?,
+            frame.read::<f64>("error_mm")?,
+        );
+        let (held_out, suspect) = (
+            frame.read::<bool>("held_out")?,
+            frame.read::<bool>("suspect")?,
+        );
+        let (measured, fold) = (
+            frame.read::<Option<String>>("measured")?,
+            frame.read::<Option<f64>>("fold_error_mm")?,
+        );
         let mut out = Self::default();
         for row in (0..sequence.len()).filter(|row| !suspect[*row] && measured[*row].is_none()) {
             out.add(sequence[row], error[row], held_out[row], fold[row]);
@@ -147,21 +175,31 @@ struct StepComparison {
 
 /// The comparison of two steps, where the first is worse by more than does not matter.
 fn worse(one: &ErrorsByRow, other: &ErrorsByRow) -> Option<StepComparison> {
-    let pairs: Vec<(f64, f64)> =
-        one.iter().filter_map(|(row, own)| Some((own * own, other.get(row).map(|error| error * error)?))).collect();
+    let pairs: Vec<(f64, f64)> = one
+        .iter()
+        .filter_map(|(row, own)| Some((own * own, other.get(row).map(|error| error * error)?)))
+        .collect();
     if pairs.len() < FEWEST {
         return None;
     }
     let count = pairs.len() as f64;
     let mean = |of: fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / count;
     let (own, theirs) = (mean(|pair| pair.0), mean(|pair| pair.1));
-    let off: Vec<f64> = pairs.iter().map(|(own_square, square)| own_square - square - (own - theirs)).collect();
+    let off: Vec<f64> = pairs
+        .iter()
+        .map(|(own_square, square)| own_square - square - (own - theirs))
+        .collect();
     let variance = off.iter().map(|value| value * value).sum::<f64>() / (count - 1.0);
     // Points along a path are not as many opinions as there are points.
     let independent = count / autocorrelation_time(&off, 1);
     let clearly = (own - theirs) / (variance / independent).sqrt();
     let is_worse = own.sqrt() > theirs.sqrt() * (1.0 + WORSE) && clearly > CLEARLY;
-    is_worse.then(|| StepComparison { rms: [own.sqrt(), theirs.sqrt()], points: pairs.len(), clearly, independent })
+    is_worse.then(|| StepComparison {
+        rms: [own.sqrt(), theirs.sqrt()],
+        points: pairs.len(),
+        clearly,
+        independent,
+    })
 }
 
 impl StepComparison {
@@ -181,17 +219,40 @@ pub fn standing(steps: &[Step], diagnosed: Option<&str>) -> Option<Standing> {
     };
     let never = never_fitted(steps);
     let judged = |step: &Step| -> ErrorsByRow {
-        let others = step.unseen.held_out.iter().filter(|(row, _)| !never.contains(row));
-        step.unseen.folds.iter().chain(others).map(|(row, error)| (*row, *error)).collect()
+        let others = step
+            .unseen
+            .held_out
+            .iter()
+            .filter(|(row, _)| !never.contains(row));
+        step.unseen
+            .folds
+            .iter()
+            .chain(others)
+            .map(|(row, error)| (*row, *error))
+            .collect()
     };
     let compared = |a: &Step, b: &Step, found: Option<StepComparison>| {
-        let StepComparison { rms: [rms_mm, than_rms_mm], points, .. } = found?;
-        Some(Withdrawn { step: a.id.clone(), rms_mm, than: b.id.clone(), than_rms_mm, points })
+        let StepComparison {
+            rms: [rms_mm, than_rms_mm],
+            points,
+            ..
+        } = found?;
+        Some(Withdrawn {
+            step: a.id.clone(),
+            rms_mm,
+            than: b.id.clone(),
+            than_rms_mm,
+            points,
+        })
     };
     let mut stands = 0;
     let mut withdrawn: Vec<Withdrawn> = Vec::new();
     for (at, step) in steps.iter().enumerate().take(end).skip(1) {
-        match compared(step, &steps[stands], worse(&judged(step), &judged(&steps[stands]))) {
+        match compared(
+            step,
+            &steps[stands],
+            worse(&judged(step), &judged(&steps[stands])),
+        ) {
             Some(gone) => withdrawn.push(gone),
             None => {
                 stands = at;
@@ -200,21 +261,46 @@ pub fn standing(steps: &[Step], diagnosed: Option<&str>) -> Option<Standing> {
             }
         }
     }
-    let model = steps[..end].get(..=stands)?.iter().rfind(|step| step.own).unwrap_or(&steps[stands]);
+    let model = steps[..end]
+        .get(..=stands)?
+        .iter()
+        .rfind(|step| step.own)
+        .unwrap_or(&steps[stands]);
     let chosen = &steps[stands];
     let guard = |step: &Step| -> ErrorsByRow {
-        step.unseen.held_out.iter().filter(|(row, _)| never.contains(row)).map(|(row, error)| (*row, *error)).collect()
+        step.unseen
+            .held_out
+            .iter()
+            .filter(|(row, _)| never.contains(row))
+            .map(|(row, error)| (*row, *error))
+            .collect()
     };
-    let against = |step: &Step| worse(&guard(chosen), &guard(step)).filter(|found| found.contradicts(stands));
-    let better = steps[..stands].iter().filter_map(|step| compared(chosen, step, against(step)));
-    let contradicted = better.min_by(|a, b| a.than_rms_mm.total_cmp(&b.than_rms_mm)).map(Contradicted);
-    Some(Standing { step: chosen.id.clone(), model: model.id.clone(), withdrawn, contradicted })
+    let against =
+        |step: &Step| worse(&guard(chosen), &guard(step)).filter(|found| found.contradicts(stands));
+    let better = steps[..stands]
+        .iter()
+        .filter_map(|step| compared(chosen, step, against(step)));
+    let contradicted = better
+        .min_by(|a, b| a.than_rms_mm.total_cmp(&b.than_rms_mm))
+        .map(Contradicted);
+    Some(Standing {
+        step: chosen.id.clone(),
+        model: model.id.clone(),
+        withdrawn,
+        contradicted,
+    })
 }
 
 /// Rows that no step was fitted to.
 fn never_fitted(steps: &[Step]) -> BTreeSet<i64> {
-    let rows: BTreeSet<i64> = steps.iter().flat_map(|step| step.unseen.held_out.keys().copied()).collect();
-    let fitted: BTreeSet<i64> = steps.iter().flat_map(|step| step.unseen.fitted.iter().copied()).collect();
+    let rows: BTreeSet<i64> = steps
+        .iter()
+        .flat_map(|step| step.unseen.held_out.keys().copied())
+        .collect();
+    let fitted: BTreeSet<i64> = steps
+        .iter()
+        .flat_map(|step| step.unseen.fitted.iter().copied())
+        .collect();
     rows.difference(&fitted).copied().collect()
 }
 
@@ -225,7 +311,8 @@ mod tests {
     /// Steps with a model of their own or without, each with one error at all points but for a little scatter; the first so many points
     /// are folds of a fit to them, all others are held out.
     fn steps(all: &[(&str, bool, f64, f64)], folds: i64) -> Vec<Step> {
-        let scattered = |mean: f64, row: i64| (row, mean * (1.0 + 0.1 * f64::from((row % 3) as i32)));
+        let scattered =
+            |mean: f64, row: i64| (row, mean * (1.0 + 0.1 * f64::from((row % 3) as i32)));
         let step = |(id, own, fold, held_out): &(&str, bool, f64, f64)| Step {
             id: (*id).into(),
             own: *own,
@@ -250,20 +337,40 @@ mod tests {
         ];
         let all = steps(&all.map(|(id, own, error)| (id, own, error, error)), 40);
         let of = |diagnosed| standing(&all, diagnosed).map(|s| (s.step, s.model));
-        assert_eq!(of(Some("diagnose")), Some(("on_top".into(), "diagnose".into())));
+        assert_eq!(
+            of(Some("diagnose")),
+            Some(("on_top".into(), "diagnose".into()))
+        );
         assert_eq!(of(Some("joint")), Some(("more".into(), "joint".into())));
-        assert_eq!(of(Some("nominal")), Some(("network".into(), "nominal".into())));
+        assert_eq!(
+            of(Some("nominal")),
+            Some(("network".into(), "nominal".into()))
+        );
         assert_eq!(of(None), Some(("more".into(), "joint".into())));
         assert_eq!(standing(&[], None), None);
     }
 
     #[test]
     fn a_step_that_is_worse_at_points_that_it_did_not_see_is_withdrawn() {
-        let worse = steps(&[("geometry", true, 0.232, 0.2), ("diagnose", true, 0.498, 0.2)], 40);
+        let worse = steps(
+            &[
+                ("geometry", true, 0.232, 0.2),
+                ("diagnose", true, 0.498, 0.2),
+            ],
+            40,
+        );
         let found = standing(&worse, Some("diagnose")).expect("a step");
-        assert_eq!((found.step.as_str(), found.model.as_str()), ("geometry", "geometry"));
-        let [gone] = found.withdrawn.as_slice() else { panic!("{:?}", found.withdrawn) };
-        assert_eq!((gone.step.as_str(), gone.than.as_str(), gone.points), ("diagnose", "geometry", 40));
+        assert_eq!(
+            (found.step.as_str(), found.model.as_str()),
+            ("geometry", "geometry")
+        );
+        let [gone] = found.withdrawn.as_slice() else {
+            panic!("{:?}", found.withdrawn)
+        };
+        assert_eq!(
+            (gone.step.as_str(), gone.than.as_str(), gone.points),
+            ("diagnose", "geometry", 40)
+        );
         // The mean square of errors m (1, 1.1, 1.2) in turn, 14, 13 and 13 of them, is 1.21125 m2.
         assert!(
             (gone.rms_mm - 0.498 * 1.21125f64.sqrt()).abs() < 1e-9
@@ -271,25 +378,71 @@ mod tests {
         );
         assert_eq!(found.contradicted, None);
         // What was learned on it and is no worse stands all the same.
-        let mended = steps(&[("geometry", true, 0.232, 0.2), ("diagnose", true, 0.498, 0.2), ("network", false, 0.2, 0.2)], 40);
+        let mended = steps(
+            &[
+                ("geometry", true, 0.232, 0.2),
+                ("diagnose", true, 0.498, 0.2),
+                ("network", false, 0.2, 0.2),
+            ],
+            40,
+        );
         let found = standing(&mended, Some("diagnose")).expect("a step");
-        assert_eq!((found.step, found.model, found.withdrawn), ("network".into(), "diagnose".into(), Vec::new()));
+        assert_eq!(
+            (found.step, found.model, found.withdrawn),
+            ("network".into(), "diagnose".into(), Vec::new())
+        );
         // Fewer points than five say nothing.
-        let few = steps(&[("geometry", true, 0.232, 0.2), ("diagnose", true, 0.498, 0.2)], 4);
-        assert_eq!(standing(&few, Some("diagnose")).map(|s| s.step), Some("diagnose".into()));
+        let few = steps(
+            &[
+                ("geometry", true, 0.232, 0.2),
+                ("diagnose", true, 0.498, 0.2),
+            ],
+            4,
+        );
+        assert_eq!(
+            standing(&few, Some("diagnose")).map(|s| s.step),
+            Some("diagnose".into())
+        );
         // A share that does not matter is none.
-        let close = steps(&[("geometry", true, 0.232, 0.2), ("diagnose", true, 0.236, 0.2)], 40);
-        assert_eq!(standing(&close, Some("diagnose")).map(|s| s.step), Some("diagnose".into()));
+        let close = steps(
+            &[
+                ("geometry", true, 0.232, 0.2),
+                ("diagnose", true, 0.236, 0.2),
+            ],
+            40,
+        );
+        assert_eq!(
+            standing(&close, Some("diagnose")).map(|s| s.step),
+            Some("diagnose".into())
+        );
     }
 
     #[test]
     fn points_that_no_step_was_fitted_to_choose_nothing_and_are_heard() {
-        let all = |held_out: f64| steps(&[("geometry", true, 0.232, 0.25), ("diagnose", true, 0.1, held_out)], 40);
-        let [agreed, against] = [0.12, 0.9].map(|held_out| standing(&all(held_out), Some("diagnose")).expect("a step"));
-        assert_eq!((&agreed.step, &against.step), (&"diagnose".to_string(), &"diagnose".to_string()));
-        assert_eq!((agreed.contradicted, &against.withdrawn), (None, &Vec::new()));
+        let all = |held_out: f64| {
+            steps(
+                &[
+                    ("geometry", true, 0.232, 0.25),
+                    ("diagnose", true, 0.1, held_out),
+                ],
+                40,
+            )
+        };
+        let [agreed, against] =
+            [0.12, 0.9].map(|held_out| standing(&all(held_out), Some("diagnose")).expect("a step"));
+        assert_eq!(
+            (&agreed.step, &against.step),
+            (&"diagnose".to_string(), &"diagnose".to_string())
+        );
+        assert_eq!(
+            (agreed.contradicted, &against.withdrawn),
+            (None, &Vec::new())
+        );
         let Contradicted(found) = against.contradicted.expect("a contradiction");
-        assert_eq!((found.step.as_str(), found.than.as_str(), found.points), ("diagnose", "geometry", 40));
+        assert_eq!(
+            (found.step.as_str(), found.than.as_str(), found.points),
+            ("diagnose", "geometry", 40)
+        );
     }
 
     #[test]
@@ -297,34 +450,54 @@ mod tests {
         // Three steps as good as each other at 25 points: noise of 18 um and 4 um of what each fit made of it, a step its own.
         let mut state = 7_u64;
         let mut even = move || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
             (state >> 11) as f64 / (1u64 << 53) as f64
         };
         let mut normal = move || (0..12).map(|_| even()).sum::<f64>() - 6.0;
         let runs = 4000;
         let mut contradicted = 0;
         for _ in 0..runs {
-            let mut all = steps(&[("nominal", true, 0.3, 0.0), ("geometry", true, 0.2, 0.0), ("diagnose", true, 0.1, 0.0)], 55);
+            let mut all = steps(
+                &[
+                    ("nominal", true, 0.3, 0.0),
+                    ("geometry", true, 0.2, 0.0),
+                    ("diagnose", true, 0.1, 0.0),
+                ],
+                55,
+            );
             for row in 55..80 {
                 let noise = [0.018, 0.018, 0.018].map(|sigma| sigma * normal());
                 for step in &mut all {
-                    let square: f64 = noise.iter().map(|noise| (noise + 0.004 * normal()).powi(2)).sum();
+                    let square: f64 = noise
+                        .iter()
+                        .map(|noise| (noise + 0.004 * normal()).powi(2))
+                        .sum();
                     step.unseen.held_out.insert(row, square.sqrt());
                 }
             }
-            contradicted += usize::from(standing(&all, Some("diagnose")).is_some_and(|found| found.contradicted.is_some()));
+            contradicted += usize::from(
+                standing(&all, Some("diagnose")).is_some_and(|found| found.contradicted.is_some()),
+            );
         }
         assert!(contradicted <= 8, "{contradicted} of {runs}");
     }
 
     #[test]
     fn rows_that_a_later_step_was_fitted_to_judge_by_its_folds_and_by_the_earlier_step_as_it_is() {
-        let all = steps(&[("geometry", true, 0.1, 0.2), ("stiffness", true, 0.5, 0.2)], 40);
+        let all = steps(
+            &[("geometry", true, 0.1, 0.2), ("stiffness", true, 0.5, 0.2)],
+            40,
+        );
         let [mut geometry, stiffness] = <[Step; 2]>::try_from(all).ok().expect("two steps");
         // The first step was fitted to none of the rows.
         geometry.unseen.held_out.append(&mut geometry.unseen.folds);
         geometry.unseen.fitted.clear();
         let found = standing(&[geometry, stiffness], None).expect("a step");
-        assert_eq!((found.step.as_str(), found.withdrawn[0].points), ("geometry", 40));
+        assert_eq!(
+            (found.step.as_str(), found.withdrawn[0].points),
+            ("geometry", 40)
+        );
     }
 }

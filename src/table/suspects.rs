@@ -40,7 +40,9 @@ fn remark(suspect: &Suspect, partner: Option<&str>) -> String {
     let partner = partner.unwrap_or("another row");
     let far = format!("{:.3} mm from where its joints put it", suspect.size * 1e3);
     match suspect.kind {
-        SuspectKind::Exchanged => format!("{far}; with the points of {partner} and this row swapped, both fit"),
+        SuspectKind::Exchanged => {
+            format!("{far}; with the points of {partner} and this row swapped, both fit")
+        }
         SuspectKind::Mislabelled => format!("{far}, and where the joints of {partner} put it"),
         SuspectKind::ShiftedBlock(offset) => {
             format!(
@@ -49,9 +51,13 @@ fn remark(suspect: &Suspect, partner: Option<&str>) -> String {
         }
         SuspectKind::UnitSlip(factor) => format!("the point is {}: another unit?", slip(factor)),
         SuspectKind::Zero => "the point is the tracker's origin: a lost beam?".into(),
-        SuspectKind::Outlier => format!("{far}, and no mistake of the recording explains where it is"),
+        SuspectKind::Outlier => {
+            format!("{far}, and no mistake of the recording explains where it is")
+        }
         SuspectKind::Event => {
-            format!("{far}, like its neighbours: something happened that the model does not know, so the row is kept")
+            format!(
+                "{far}, like its neighbours: something happened that the model does not know, so the row is kept"
+            )
         }
     }
 }
@@ -59,5 +65,9 @@ fn remark(suspect: &Suspect, partner: Option<&str>) -> String {
 /// E.g. `25.4 times too far`.
 pub(crate) fn slip(factor: f64) -> String {
     let digits = |factor: f64| format!("{factor:.1}").trim_end_matches(".0").to_string();
-    if factor > 1.0 { format!("{} times too far", digits(factor)) } else { format!("{} times too near", digits(1.0 / factor)) }
+    if factor > 1.0 {
+        format!("{} times too far", digits(factor))
+    } else {
+        format!("{} times too near", digits(1.0 / factor))
+    }
 }

@@ -35,7 +35,9 @@ impl TorqueCourse {
     /// the recording are missing.
     pub fn of(diagnosis: &TorqueDiagnosis, joints: usize, sequence: &[i64]) -> Self {
         let courses = &diagnosis.courses;
-        let rows: Vec<usize> = (0..sequence.len()).filter(|row| *row == 0 || sequence[row - 1] != sequence[*row]).collect();
+        let rows: Vec<usize> = (0..sequence.len())
+            .filter(|row| *row == 0 || sequence[row - 1] != sequence[*row])
+            .collect();
         Self {
             joints,
             sequence: kept(sequence, 1, &rows),
@@ -51,7 +53,11 @@ impl TorqueCourse {
     }
 
     /// A joint's part of a row-major list, by row.
-    pub fn of_joint<'a, T: Copy>(&self, all: &'a [T], joint: usize) -> impl Iterator<Item = T> + use<'a, T> {
+    pub fn of_joint<'a, T: Copy>(
+        &self,
+        all: &'a [T],
+        joint: usize,
+    ) -> impl Iterator<Item = T> + use<'a, T> {
         all.iter().skip(joint).step_by(self.joints.max(1)).copied()
     }
 }
@@ -66,7 +72,10 @@ impl Table for TorqueCourse {
         frame.push("held_out", Cell::to_array(self.held_out.clone()));
         frame.push("in_event", Cell::to_array(self.in_event.clone()));
         for joint in 0..self.joints {
-            frame.push(format!("rest{}", joint + 1), Cell::to_array(self.of_joint(&self.rest, joint).collect()));
+            frame.push(
+                format!("rest{}", joint + 1),
+                Cell::to_array(self.of_joint(&self.rest, joint).collect()),
+            );
         }
         for (name, all) in [
             ("dq{j}_rad_s", &self.velocity),
@@ -83,12 +92,18 @@ impl Table for TorqueCourse {
     }
 
     fn from_frame(frame: &Frame) -> Result<Self> {
-        let joints = (1..).take_while(|joint| frame.column(&format!("rest{joint}")).is_some()).count();
+        let joints = (1..)
+            .take_while(|joint| frame.column(&format!("rest{joint}")).is_some())
+            .count();
         let all = |name: &str| -> Result<Vec<f64>> {
             let read = |joint: usize| frame.read::<f64>(&name.replace("{j}", &joint.to_string()));
-            Ok(interleaved(&(1..=joints).map(read).collect::<Result<Vec<_>>>()?))
+            Ok(interleaved(
+                &(1..=joints).map(read).collect::<Result<Vec<_>>>()?,
+            ))
         };
-        let rest = (1..=joints).map(|joint| frame.read::<bool>(&format!("rest{joint}"))).collect::<Result<Vec<_>>>()?;
+        let rest = (1..=joints)
+            .map(|joint| frame.read::<bool>(&format!("rest{joint}")))
+            .collect::<Result<Vec<_>>>()?;
         Ok(Self {
             joints,
             sequence: frame.read("sequence")?,
@@ -106,11 +121,16 @@ impl Table for TorqueCourse {
 
 /// Some rows of row-major values.
 fn kept<T: Copy>(values: &[T], width: usize, rows: &[usize]) -> Vec<T> {
-    rows.iter().flat_map(|row| &values[row * width..(row + 1) * width]).copied().collect()
+    rows.iter()
+        .flat_map(|row| &values[row * width..(row + 1) * width])
+        .copied()
+        .collect()
 }
 
 /// Columns of equal length -> row-major.
 pub(super) fn interleaved<T: Copy>(columns: &[Vec<T>]) -> Vec<T> {
     let rows = columns.first().map_or(0, Vec::len);
-    (0..rows).flat_map(|row| columns.iter().map(move |column| column[row])).collect()
+    (0..rows)
+        .flat_map(|row| columns.iter().map(move |column| column[row]))
+        .collect()
 }

@@ -1,7 +1,9 @@
 //! What a diagnosis of torques found, its numbers, and what would explain the data as well: three tables linked by the finding's rank.
 
 use super::findings::{beside_findings, ranked};
-use super::{TorqueFindingRow, TorqueFindings, TorqueNumberRow, TorqueNumbers, TorqueRivalRow, TorqueRivals};
+use super::{
+    TorqueFindingRow, TorqueFindings, TorqueNumberRow, TorqueNumbers, TorqueRivalRow, TorqueRivals,
+};
 use crate::dynamics::TorqueDiagnosis;
 
 beside_findings! { TorqueDiagnosis => TorqueNumbers of TorqueNumberRow, TorqueRivals of TorqueRivalRow }

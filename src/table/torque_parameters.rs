@@ -1,7 +1,9 @@
 //! The identified model of torques: one table from which it is made again, and its covariance.
 
 use super::{TorqueCovariance, TorqueCovarianceRow, TorqueParameterRow, TorqueParameters};
-use crate::dynamics::{COULOMB, INERTIAL_NAMES, INERTIAL_NUMBERS, JointRange, TorqueModel, TorqueTerm};
+use crate::dynamics::{
+    COULOMB, INERTIAL_NAMES, INERTIAL_NUMBERS, JointRange, TorqueModel, TorqueTerm,
+};
 use crate::effect::Place;
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -30,14 +32,28 @@ const RANGE: [(&str, &str); 8] = [
     ("sign_width", "rad/s"),
 ];
 /// Numbers of the recording as a whole: width of a sign, latency, cut-off, by how much friction turns before the velocity.
-const WHOLE: [(&str, &str); 4] = [("sign_width", "rad/s"), ("latency", "s"), ("cutoff", "Hz"), ("friction_lead", "s")];
+const WHOLE: [(&str, &str); 4] = [
+    ("sign_width", "rad/s"),
+    ("latency", "s"),
+    ("cutoff", "Hz"),
+    ("friction_lead", "s"),
+];
 
 /// Where it was recorded, C.
 const TEMPERATURE: [&str; 2] = ["temperature_least", "temperature_greatest"];
 
 fn ends(range: &JointRange) -> [f64; 8] {
     let [least, greatest] = range.position;
-    [least, greatest, range.speed, range.acceleration, range.load, range.misfit, range.usual, range.sign_width]
+    [
+        least,
+        greatest,
+        range.speed,
+        range.acceleration,
+        range.load,
+        range.misfit,
+        range.usual,
+        range.sign_width,
+    ]
 }
 
 fn fault(message: String) -> Error {
@@ -50,7 +66,10 @@ impl TorqueParameters {
         let names = model.names()?;
         let width = names.len();
         let mut numbers = names.iter().enumerate().map(|(number, (name, unit))| {
-            let sigma = model.covariance.get(number * (width + 1)).map(|variance| variance.max(0.0).sqrt());
+            let sigma = model
+                .covariance
+                .get(number * (width + 1))
+                .map(|variance| variance.max(0.0).sqrt());
             (name.clone(), (*unit).to_string(), sigma)
         });
         let mut rows = Vec::with_capacity(width);
@@ -72,7 +91,10 @@ impl TorqueParameters {
             });
         }
         for term in &model.terms {
-            let form = serde_json::to_string(&TermForm { with: term.with, shape: term.shape.clone() });
+            let form = serde_json::to_string(&TermForm {
+                with: term.with,
+                shape: term.shape.clone(),
+            });
             let form = form.map_err(|error| Error::Bug(error.to_string()))?;
             for (value, (name, unit, sigma)) in term.coefficients.iter().zip(numbers.by_ref()) {
                 let quantity = name.rsplit('.').next().unwrap_or_default().to_string();
@@ -96,7 +118,9 @@ impl TorqueParameters {
             }
         }
         for term in &model.terms {
-            for (value, (name, unit, sigma)) in term.shape_numbers()?.into_iter().zip(numbers.by_ref()) {
+            for (value, (name, unit, sigma)) in
+                term.shape_numbers()?.into_iter().zip(numbers.by_ref())
+            {
                 let quantity = name.rsplit('.').next().unwrap_or_default().to_string();
                 let (effect, place) = (term.effect.clone(), term.place.to_string());
                 let (rms_nm, form, robot, kinematics) = (None, None, None, None);
@@ -118,7 +142,9 @@ impl TorqueParameters {
         rows.extend(seen(model));
         // The last number of the covariance is the width of a sign.
         if let Some((name, _, sigma)) = numbers.next() {
-            rows.iter_mut().filter(|row| row.name == name).for_each(|row| row.sigma = sigma);
+            rows.iter_mut()
+                .filter(|row| row.name == name)
+                .for_each(|row| row.sigma = sigma);
         }
         rows.sort_by(|a, b| a.name.cmp(&b.name));
         Ok(Self(rows))
@@ -129,7 +155,9 @@ impl TorqueParameters {
     pub fn dry_friction(&self, joints: usize) -> Vec<Option<f64>> {
         let at = |joint: usize| {
             let place = Place::Joint(joint).to_string();
-            let here = |row: &&TorqueParameterRow| row.effect == COULOMB && row.place == place && row.form.is_some();
+            let here = |row: &&TorqueParameterRow| {
+                row.effect == COULOMB && row.place == place && row.form.is_some()
+            };
             let own = self.0.iter().find(here)?;
             (own.value > SURE * own.sigma.unwrap_or(0.0)).then_some(own.value)
         };
@@ -138,9 +166,16 @@ impl TorqueParameters {
 
     /// The model, without its covariance. Fails where rows that every model has are missing or not understood.
     pub fn to_model(&self) -> Result<TorqueModel> {
-        let joints = (1..).take_while(|joint| self.value(&format!("{SEEN}.j{joint}.{}", RANGE[0].0)).is_ok()).count();
+        let joints = (1..)
+            .take_while(|joint| {
+                self.value(&format!("{SEEN}.j{joint}.{}", RANGE[0].0))
+                    .is_ok()
+            })
+            .count();
         if joints == 0 {
-            return Err(fault("has no row recording.j1.position_least: it is no model of torques".into()));
+            return Err(fault(
+                "has no row recording.j1.position_least: it is no model of torques".into(),
+            ));
         }
         let mut model = TorqueModel {
             inertials: vec![0.0; INERTIAL_NUMBERS * joints],
@@ -152,86 +187,155 @@ impl TorqueParameters {
             cutoff: self.value(&format!("{SEEN}.{}", WHOLE[2].0))?,
             // Tables of before it was written say nothing of it.
             friction_lead: self.value(&format!("{SEEN}.{}", WHOLE[3].0)).unwrap_or(0.0),
-            range: (1..=joints).map(|joint| self.range(joint)).collect::<Result<_>>()?,
+            range: (1..=joints)
+                .map(|joint| self.range(joint))
+                .collect::<Result<_>>()?,
             temperature: self.temperature(),
         };
         for row in self.0.iter().filter(|row| row.effect == LINKS) {
             let link = match row.place.parse() {
                 Ok(Place::Links(link, _)) if link < joints => link,
-                _ => return Err(fault(format!("{}: `{}` is no link of {joints}", row.name, row.place))),
+                _ => {
+                    return Err(fault(format!(
+                        "{}: `{}` is no link of {joints}",
+                        row.name, row.place
+                    )));
+                }
             };
             let number = INERTIAL_NAMES.iter().position(|name| *name == row.quantity);
-            let number = number.ok_or_else(|| fault(format!("{}: `{}` is no inertial number", row.name, row.quantity)))?;
+            let number = number.ok_or_else(|| {
+                fault(format!(
+                    "{}: `{}` is no inertial number",
+                    row.name, row.quantity
+                ))
+            })?;
             model.inertials[INERTIAL_NUMBERS * link + number] = row.value;
             model.identified[INERTIAL_NUMBERS * link + number] = true;
         }
         let mut terms: BTreeMap<&str, Vec<&TorqueParameterRow>> = BTreeMap::new();
         // Shape numbers are in the form of each coefficient.
-        for row in self.0.iter().filter(|row| row.effect != LINKS && row.effect != SEEN && row.form.is_some()) {
-            let prefix = row.name.strip_suffix(row.quantity.as_str()).unwrap_or(&row.name);
+        for row in self
+            .0
+            .iter()
+            .filter(|row| row.effect != LINKS && row.effect != SEEN && row.form.is_some())
+        {
+            let prefix = row
+                .name
+                .strip_suffix(row.quantity.as_str())
+                .unwrap_or(&row.name);
             terms.entry(prefix).or_default().push(row);
         }
-        model.terms = terms.values().map(|rows| term(rows)).collect::<Result<_>>()?;
+        model.terms = terms
+            .values()
+            .map(|rows| term(rows))
+            .collect::<Result<_>>()?;
         Ok(model)
     }
 
     fn value(&self, name: &str) -> Result<f64> {
         let row = self.0.iter().find(|row| row.name == name);
-        row.map(|row| row.value).ok_or_else(|| fault(format!("has no row {name}")))
+        row.map(|row| row.value)
+            .ok_or_else(|| fault(format!("has no row {name}")))
     }
 
     fn range(&self, joint: usize) -> Result<JointRange> {
         let of = |quantity: &str| self.value(&format!("{SEEN}.j{joint}.{quantity}"));
-        let [least, greatest, speed, acceleration] = [RANGE[0].0, RANGE[1].0, RANGE[2].0, RANGE[3].0].map(of);
+        let [least, greatest, speed, acceleration] =
+            [RANGE[0].0, RANGE[1].0, RANGE[2].0, RANGE[3].0].map(of);
         // Tables of before these were written say nothing of them.
-        let [load, misfit, usual] = [(RANGE[4].0, f64::INFINITY), (RANGE[5].0, 0.0), (RANGE[6].0, 0.0)]
-            .map(|(quantity, unknown)| of(quantity).unwrap_or(unknown));
-        let sign_width = of(RANGE[7].0).or_else(|_| self.value(&format!("{SEEN}.{}", WHOLE[0].0)))?;
+        let [load, misfit, usual] = [
+            (RANGE[4].0, f64::INFINITY),
+            (RANGE[5].0, 0.0),
+            (RANGE[6].0, 0.0),
+        ]
+        .map(|(quantity, unknown)| of(quantity).unwrap_or(unknown));
+        let sign_width =
+            of(RANGE[7].0).or_else(|_| self.value(&format!("{SEEN}.{}", WHOLE[0].0)))?;
         let position = [least?, greatest?];
-        Ok(JointRange { position, speed: speed?, acceleration: acceleration?, load, misfit, usual, sign_width })
+        Ok(JointRange {
+            position,
+            speed: speed?,
+            acceleration: acceleration?,
+            load,
+            misfit,
+            usual,
+            sign_width,
+        })
     }
 
     fn temperature(&self) -> Option<[f64; 2]> {
-        let [least, greatest] = TEMPERATURE.map(|quantity| self.value(&format!("{SEEN}.{quantity}")).ok());
+        let [least, greatest] =
+            TEMPERATURE.map(|quantity| self.value(&format!("{SEEN}.{quantity}")).ok());
         Some([least?, greatest?])
     }
 }
 
 /// How and in which motion a model was seen.
 fn seen(model: &TorqueModel) -> Vec<TorqueParameterRow> {
-    let row = |name: String, place: Place, (quantity, unit): (&str, &str), value: f64| TorqueParameterRow {
-        name,
-        effect: SEEN.into(),
-        place: place.to_string(),
-        quantity: quantity.into(),
-        value,
-        unit: unit.into(),
-        sigma: None,
-        rms_nm: None,
-        form: None,
-        robot: None,
-        kinematics: None,
+    let row = |name: String, place: Place, (quantity, unit): (&str, &str), value: f64| {
+        TorqueParameterRow {
+            name,
+            effect: SEEN.into(),
+            place: place.to_string(),
+            quantity: quantity.into(),
+            value,
+            unit: unit.into(),
+            sigma: None,
+            rms_nm: None,
+            form: None,
+            robot: None,
+            kinematics: None,
+        }
     };
-    let whole = WHOLE.iter().zip([model.sign_width, model.latency, model.cutoff, model.friction_lead]);
-    let whole = whole.map(|(named, value)| row(format!("{SEEN}.{}", named.0), Place::Recording, *named, value));
+    let whole = WHOLE.iter().zip([
+        model.sign_width,
+        model.latency,
+        model.cutoff,
+        model.friction_lead,
+    ]);
+    let whole = whole.map(|(named, value)| {
+        row(
+            format!("{SEEN}.{}", named.0),
+            Place::Recording,
+            *named,
+            value,
+        )
+    });
     let ranges = model.range.iter().enumerate().flat_map(|(joint, range)| {
         let of = move |(named, value): (&(&'static str, &'static str), f64)| {
-            row(format!("{SEEN}.j{}.{}", joint + 1, named.0), Place::Joint(joint), *named, value)
+            row(
+                format!("{SEEN}.j{}.{}", joint + 1, named.0),
+                Place::Joint(joint),
+                *named,
+                value,
+            )
         };
         RANGE.iter().zip(ends(range)).map(of).collect::<Vec<_>>()
     });
-    let temperature = TEMPERATURE.iter().zip(model.temperature.into_iter().flatten());
-    let temperature =
-        temperature.map(|(quantity, value)| row(format!("{SEEN}.{quantity}"), Place::Recording, (quantity, "C"), value));
+    let temperature = TEMPERATURE
+        .iter()
+        .zip(model.temperature.into_iter().flatten());
+    let temperature = temperature.map(|(quantity, value)| {
+        row(
+            format!("{SEEN}.{quantity}"),
+            Place::Recording,
+            (quantity, "C"),
+            value,
+        )
+    });
     whole.chain(ranges).chain(temperature).collect()
 }
 
 /// A cause from its rows.
 fn term(rows: &[&TorqueParameterRow]) -> Result<TorqueTerm> {
     let first = rows[0];
-    let place = first.place.parse().map_err(|()| fault(format!("{}: `{}` is no place", first.name, first.place)))?;
+    let place = first
+        .place
+        .parse()
+        .map_err(|()| fault(format!("{}: `{}` is no place", first.name, first.place)))?;
     let form = first.form.as_deref().unwrap_or_default();
-    let form: TermForm = serde_json::from_str(form).map_err(|error| fault(format!("{}: form `{form}`: {error}", first.name)))?;
+    let form: TermForm = serde_json::from_str(form)
+        .map_err(|error| fault(format!("{}: form `{form}`: {error}", first.name)))?;
     let mut term = TorqueTerm {
         effect: first.effect.clone(),
         place,
@@ -243,7 +347,9 @@ fn term(rows: &[&TorqueParameterRow]) -> Result<TorqueTerm> {
     let names = term.names()?;
     for (value, (quantity, _)) in term.coefficients.iter_mut().zip(&names) {
         let row = rows.iter().find(|row| row.quantity == *quantity);
-        *value = row.ok_or_else(|| fault(format!("{}: has no {quantity}", first.name)))?.value;
+        *value = row
+            .ok_or_else(|| fault(format!("{}: has no {quantity}", first.name)))?
+            .value;
     }
     Ok(term)
 }
@@ -257,7 +363,9 @@ impl TorqueCovariance {
         for a in 0..width {
             for b in a..width {
                 let covariance = model.covariance[a * width + b];
-                let scale = (model.covariance[a * (width + 1)] * model.covariance[b * (width + 1)]).max(0.0).sqrt();
+                let scale = (model.covariance[a * (width + 1)] * model.covariance[b * (width + 1)])
+                    .max(0.0)
+                    .sqrt();
                 let correlation = if a == b {
                     1.0
                 } else if scale > 0.0 {
@@ -265,8 +373,18 @@ impl TorqueCovariance {
                 } else {
                     0.0
                 };
-                let [first, second] = if names[a].0 <= names[b].0 { [a, b] } else { [b, a] }.map(|place| names[place].0.clone());
-                rows.push(TorqueCovarianceRow { parameter: first, other: second, covariance, correlation });
+                let [first, second] = if names[a].0 <= names[b].0 {
+                    [a, b]
+                } else {
+                    [b, a]
+                }
+                .map(|place| names[place].0.clone());
+                rows.push(TorqueCovarianceRow {
+                    parameter: first,
+                    other: second,
+                    covariance,
+                    correlation,
+                });
             }
         }
         rows.sort_by(|a, b| (&a.parameter, &a.other).cmp(&(&b.parameter, &b.other)));
@@ -277,10 +395,17 @@ impl TorqueCovariance {
     pub fn of_model(&self, model: &TorqueModel) -> Result<Vec<f64>> {
         let names = model.names()?;
         let width = names.len();
-        let places: BTreeMap<&str, usize> = names.iter().enumerate().map(|(place, (name, _))| (name.as_str(), place)).collect();
+        let places: BTreeMap<&str, usize> = names
+            .iter()
+            .enumerate()
+            .map(|(place, (name, _))| (name.as_str(), place))
+            .collect();
         let mut all = vec![f64::NAN; width * width];
         for row in &self.0 {
-            if let (Some(a), Some(b)) = (places.get(row.parameter.as_str()), places.get(row.other.as_str())) {
+            if let (Some(a), Some(b)) = (
+                places.get(row.parameter.as_str()),
+                places.get(row.other.as_str()),
+            ) {
                 (all[a * width + b], all[b * width + a]) = (row.covariance, row.covariance);
             }
         }
@@ -288,7 +413,10 @@ impl TorqueCovariance {
             None => Ok(all),
             Some(entry) => {
                 let [one, other] = [entry / width, entry % width].map(|place| &names[place].0);
-                Err(Error::data("table torque_covariance", format!("has no covariance of {one} and {other}")))
+                Err(Error::data(
+                    "table torque_covariance",
+                    format!("has no covariance of {one} and {other}"),
+                ))
             }
         }
     }
@@ -313,7 +441,11 @@ mod tests {
             robot: None,
             kinematics: None,
         };
-        let all = TorqueParameters(vec![row(1, 6.0, Some(0.1)), row(2, 0.2, Some(0.1)), row(4, 2.0, None)]);
+        let all = TorqueParameters(vec![
+            row(1, 6.0, Some(0.1)),
+            row(2, 0.2, Some(0.1)),
+            row(4, 2.0, None),
+        ]);
         assert_eq!(all.dry_friction(4), [Some(6.0), None, None, Some(2.0)]);
     }
 }

@@ -26,9 +26,20 @@ impl VerdictRow {
 impl Verdict {
     /// What is wrong with the set-up, where a diagnosis says so: `findings` are its own.
     pub fn wrong_setup(&self, findings: &Findings) -> Option<String> {
-        let wrong = self.0.iter().any(|row| row.verdict == VerdictKind::WrongSetup.name());
-        let first = findings.0.first().map(|finding| finding.statement.as_str()).unwrap_or_default();
-        wrong.then(|| format!("the set-up is wrong: {first}").trim_end_matches('.').to_string())
+        let wrong = self
+            .0
+            .iter()
+            .any(|row| row.verdict == VerdictKind::WrongSetup.name());
+        let first = findings
+            .0
+            .first()
+            .map(|finding| finding.statement.as_str())
+            .unwrap_or_default();
+        wrong.then(|| {
+            format!("the set-up is wrong: {first}")
+                .trim_end_matches('.')
+                .to_string()
+        })
     }
 
     /// The verdict of the stage `step`.
@@ -36,7 +47,9 @@ impl Verdict {
         let lengths = diagnosis.dimension == Dimension::Length;
         let in_mm = |size: f64| lengths.then_some(size * 1e3);
         let in_rad = |size: f64| (!lengths).then_some(size);
-        let mm = |errors: Option<ErrorLengths>, of: fn(ErrorLengths) -> f64| errors.and_then(|errors| in_mm(of(errors)));
+        let mm = |errors: Option<ErrorLengths>, of: fn(ErrorLengths) -> f64| {
+            errors.and_then(|errors| in_mm(of(errors)))
+        };
         let rms_rad = |errors: Option<ErrorLengths>| errors.and_then(|errors| in_rad(errors.rms));
         Self(vec![VerdictRow {
             step: step.into(),

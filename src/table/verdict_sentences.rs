@@ -38,26 +38,49 @@ impl VerdictSentences {
             number,
             sentence: sentence.clone(),
         };
-        let rows = topics.iter().flat_map(|(topic, all)| (1..).zip(*all).map(|(number, said)| row(*topic, number, said)));
+        let rows = topics.iter().flat_map(|(topic, all)| {
+            (1..)
+                .zip(*all)
+                .map(|(number, said)| row(*topic, number, said))
+        });
         Self(rows.collect())
     }
 
     /// What a diagnosis of positions says, of the stage `step`.
     pub fn of_positions(step: &str, diagnosis: &Diagnosis) -> Self {
-        let next = (VerdictTopic::NextMeasurement, diagnosis.next_measurements.as_slice());
-        Self::of(step, &[(VerdictTopic::NotObservable, &diagnosis.not_observable), next])
+        let next = (
+            VerdictTopic::NextMeasurement,
+            diagnosis.next_measurements.as_slice(),
+        );
+        Self::of(
+            step,
+            &[
+                (VerdictTopic::NotObservable, &diagnosis.not_observable),
+                next,
+            ],
+        )
     }
 
     /// The same of a diagnosis of torques.
     pub fn of_torques(step: &str, diagnosis: &TorqueDiagnosis) -> Self {
         let withdrawn = (VerdictTopic::Withdrawn, diagnosis.withdrawn.as_slice());
         let remarks = (VerdictTopic::Remark, diagnosis.remarks.as_slice());
-        Self::of(step, &[(VerdictTopic::NotObservable, &diagnosis.not_observable), withdrawn, remarks])
+        Self::of(
+            step,
+            &[
+                (VerdictTopic::NotObservable, &diagnosis.not_observable),
+                withdrawn,
+                remarks,
+            ],
+        )
     }
 
     /// What the stage `step` says of a topic, in its order.
     pub fn about(&self, step: &str, topic: VerdictTopic) -> Vec<&str> {
-        let own = self.0.iter().filter(|row| row.step == step && row.about == topic.name());
+        let own = self
+            .0
+            .iter()
+            .filter(|row| row.step == step && row.about == topic.name());
         own.map(|row| row.sentence.as_str()).collect()
     }
 }

@@ -60,13 +60,21 @@ const JOINT_NAMES: [&str; 4] = ["q", "a", "j", "joint"];
 
 impl TargetColumns {
     /// Reads the header; fails where it names no whole target, or a unit is missing.
-    pub fn read(place: &str, header: &[String], robot: &RobotDescription, units: Units) -> Result<Self> {
+    pub fn read(
+        place: &str,
+        header: &[String],
+        robot: &RobotDescription,
+        units: Units,
+    ) -> Result<Self> {
         let mut faults = Vec::new();
         let mut roles = Vec::new();
         for (index, name) in header.iter().enumerate() {
             match role(name, robot, units) {
                 Ok(Some(role)) if roles.iter().any(|(_, known)| same(known, &role)) => {
-                    faults.push(Fault::new(place, format!("column `{name}` repeats what another column gives")));
+                    faults.push(Fault::new(
+                        place,
+                        format!("column `{name}` repeats what another column gives"),
+                    ));
                 }
                 Ok(Some(role)) => roles.push((index, role)),
                 Ok(None) => {}
@@ -86,16 +94,37 @@ impl TargetColumns {
         let quaternion = count(|role| matches!(role, ColumnRole::Quaternion(_)));
         let turns = count(|role| matches!(role, ColumnRole::Turn(..)));
         if !joints.is_empty() && joints.len() < n {
-            let missing: Vec<String> = (0..n).filter(|j| joint(*j).is_none()).map(|j| format!("q{}", j + 1)).collect();
-            faults.push(Fault::new(place, format!("has no column for {} of the robot's {n} joints", missing.join(", "))));
+            let missing: Vec<String> = (0..n)
+                .filter(|j| joint(*j).is_none())
+                .map(|j| format!("q{}", j + 1))
+                .collect();
+            faults.push(Fault::new(
+                place,
+                format!(
+                    "has no column for {} of the robot's {n} joints",
+                    missing.join(", ")
+                ),
+            ));
         }
-        for (found, whole, what) in [(point, 3, "x, y, z"), (quaternion, 4, "qw, qx, qy, qz"), (turns, 3, "a, b, c")] {
+        for (found, whole, what) in [
+            (point, 3, "x, y, z"),
+            (quaternion, 4, "qw, qx, qy, qz"),
+            (turns, 3, "a, b, c"),
+        ] {
             if found != 0 && found != whole {
-                faults.push(Fault::new(place, format!("has only {found} of the columns {what}")));
+                faults.push(Fault::new(
+                    place,
+                    format!("has only {found} of the columns {what}"),
+                ));
             }
         }
         if faults.is_empty() && joints.is_empty() && point == 0 {
-            let names = header.iter().take(12).map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+            let names = header
+                .iter()
+                .take(12)
+                .map(|name| format!("`{name}`"))
+                .collect::<Vec<_>>()
+                .join(", ");
             faults.push(Fault::new(
                 place,
                 format!("no targets found in the columns {names}; expected q1_deg..q{n}_deg (joints), or x_mm, y_mm, z_mm with qw, qx, qy, qz or a_deg, b_deg, c_deg, in a header line"),
@@ -104,7 +133,14 @@ impl TargetColumns {
         if !faults.is_empty() {
             return Err(Error::Spec(faults));
         }
-        Ok(Self { count: header.len(), roles, joints, point: point == 3, quaternion: quaternion == 4, turns: turns == 3 })
+        Ok(Self {
+            count: header.len(),
+            roles,
+            joints,
+            point: point == 3,
+            quaternion: quaternion == 4,
+            turns: turns == 3,
+        })
     }
 }
 
@@ -119,24 +155,47 @@ fn same(a: &ColumnRole, b: &ColumnRole) -> bool {
 
 fn role(name: &str, robot: &RobotDescription, units: Units) -> Result<Option<ColumnRole>, String> {
     let lower = name.trim().to_lowercase();
-    let named = |text: &str| robot.joints.iter().position(|joint| joint.name.to_lowercase() == text);
+    let named = |text: &str| {
+        robot
+            .joints
+            .iter()
+            .position(|joint| joint.name.to_lowercase() == text)
+    };
     // Of a joint called `joint_1_s` the `s` is no unit.
-    let whole = Header { stem: &lower, unit: None, ending: None };
-    let Header { stem, unit, ending } = if named(&lower).is_some() { whole } else { Header::of(&lower) };
+    let whole = Header {
+        stem: &lower,
+        unit: None,
+        ending: None,
+    };
+    let Header { stem, unit, ending } = if named(&lower).is_some() {
+        whole
+    } else {
+        Header::of(&lower)
+    };
     let of = |quantity: Quantity, otherwise: Option<Unit>, option: &str| match unit.or(otherwise) {
         Some(unit) if unit.quantity() == quantity => Ok(Some(unit)),
         // A letter behind the name is a word then: the point C of `x_c`.
         Some(_) if ending.is_some_and(|ending| ending.len() == 1) => Ok(None),
-        Some(unit) => Err(format!("column `{name}`: {unit} is no unit of it; allowed: {}", Unit::symbols(quantity).join(", "))),
+        Some(unit) => Err(format!(
+            "column `{name}`: {unit} is no unit of it; allowed: {}",
+            Unit::symbols(quantity).join(", ")
+        )),
         None => Err(format!(
             "column `{name}` has no unit; call it e.g. `{stem}_{}`, or give {option}",
             option.rsplit(' ').next().unwrap_or_default()
         )),
     };
     let numbered = |prefix: &str| {
-        stem.strip_prefix(prefix).and_then(|number| number.parse::<usize>().ok()).filter(|n| (1..=robot.joints.len()).contains(n))
+        stem.strip_prefix(prefix)
+            .and_then(|number| number.parse::<usize>().ok())
+            .filter(|n| (1..=robot.joints.len()).contains(n))
     };
-    let joint = named(stem).or_else(|| JOINT_NAMES.iter().find_map(|prefix| numbered(prefix)).map(|n| n - 1));
+    let joint = named(stem).or_else(|| {
+        JOINT_NAMES
+            .iter()
+            .find_map(|prefix| numbered(prefix))
+            .map(|n| n - 1)
+    });
     if let Some(joint) = joint {
         let unit = match robot.joints[joint].kind {
             JointKind::Revolute => of(Quantity::Angle, units.angle, "--angle deg")?,
@@ -145,13 +204,20 @@ fn role(name: &str, robot: &RobotDescription, units: Units) -> Result<Option<Col
         return Ok(unit.map(|unit| ColumnRole::Joint(joint, unit)));
     }
     if let Some(axis) = ["x", "y", "z"].iter().position(|axis| *axis == stem) {
-        return Ok(of(Quantity::Length, units.length, "--length mm")?.map(|unit| ColumnRole::Axis(axis, unit)));
+        return Ok(of(Quantity::Length, units.length, "--length mm")?
+            .map(|unit| ColumnRole::Axis(axis, unit)));
     }
-    if let (Some(part), None) = (["qw", "qx", "qy", "qz"].iter().position(|part| *part == stem), unit) {
+    if let (Some(part), None) = (
+        ["qw", "qx", "qy", "qz"]
+            .iter()
+            .position(|part| *part == stem),
+        unit,
+    ) {
         return Ok(Some(ColumnRole::Quaternion(part)));
     }
     if let Some(turn) = ["a", "b", "c"].iter().position(|turn| *turn == stem) {
-        return Ok(of(Quantity::Angle, units.angle, "--angle deg")?.map(|unit| ColumnRole::Turn(turn, unit)));
+        return Ok(of(Quantity::Angle, units.angle, "--angle deg")?
+            .map(|unit| ColumnRole::Turn(turn, unit)));
     }
     Ok(match (stem, unit) {
         ("payload", Some(Unit::Kilogram)) => Some(ColumnRole::Payload),

@@ -41,14 +41,19 @@ mod tests {
     fn a_number_is_written_to_half_a_unit_of_its_last_decimal() {
         let mut seed = 1u64;
         for _ in 0..20_000 {
-            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            seed = seed
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
             let value = (seed >> 11) as f64 / (1u64 << 53) as f64 * 400.0 - 200.0;
             for decimals in [0, 4, 7, 9] {
                 let mut text = String::new();
                 push(&mut text, value, decimals, '.');
                 let whole: f64 = text.parse().expect("a number");
                 // Half a unit of the last place and a rounding of the product.
-                assert!((whole - value).abs() <= 0.500_1 * 10f64.powi(-(decimals as i32)), "{value} {text}");
+                assert!(
+                    (whole - value).abs() <= 0.500_1 * 10f64.powi(-(decimals as i32)),
+                    "{value} {text}"
+                );
                 assert_eq!(text.len(), format!("{whole:.decimals$}").len());
             }
         }
@@ -58,7 +63,17 @@ mod tests {
             text
         };
         assert_eq!(write(-12.5, 3, ','), "-12,500");
-        assert_eq!((write(-1e-9, 4, '.'), write(0.05, 1, '.'), write(3.0, 0, '.')), ("0.0000".into(), "0.0".into(), "3".into()));
-        assert_eq!((write(1e30, 2, ',').len(), write(f64::NAN, 2, '.')), (34, "NaN".into()));
+        assert_eq!(
+            (
+                write(-1e-9, 4, '.'),
+                write(0.05, 1, '.'),
+                write(3.0, 0, '.')
+            ),
+            ("0.0000".into(), "0.0".into(), "3".into())
+        );
+        assert_eq!(
+            (write(1e30, 2, ',').len(), write(f64::NAN, 2, '.')),
+            (34, "NaN".into())
+        );
     }
 }

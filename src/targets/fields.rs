@@ -12,6 +12,9 @@ pub(super) fn fields(line: &str, delimiter: char) -> Result<Vec<TextField<'_>>, 
     let (places, open) = raw::fields(line, Delimiter::Byte(delimiter as u8));
     match open {
         Some(at) => Err(format!("column {}: `\"` is not closed on its line", at + 1)),
-        None => Ok(places.into_iter().map(|place| (place.clone(), unquoted_text(&line[place]))).collect()),
+        None => Ok(places
+            .into_iter()
+            .map(|place| (place.clone(), unquoted_text(&line[place])))
+            .collect()),
     }
 }

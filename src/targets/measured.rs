@@ -21,14 +21,24 @@ pub struct MeasuredTarget {
 
 /// Reads a whole table. Fails with the faults of its header, or of its rows with their lines.
 pub fn measured(text: &str, layout: &Layout) -> Result<Vec<MeasuredTarget>> {
-    let mut lines = (1..).zip(text.trim_start_matches('\u{feff}').lines()).filter(|(_, line)| !line.trim().is_empty());
+    let mut lines = (1..)
+        .zip(text.trim_start_matches('\u{feff}').lines())
+        .filter(|(_, line)| !line.trim().is_empty());
     let Some((number, header)) = lines.next() else {
-        return Err(Error::data(layout.place, "is empty; expected a header line and targets with their measured points"));
+        return Err(Error::data(
+            layout.place,
+            "is empty; expected a header line and targets with their measured points",
+        ));
     };
     let delimiter = delimiter(header);
-    let broken = |number: usize, message: String| Fault::new(format!("{}:{number}", layout.place), message);
-    let names = fields(header, delimiter).map_err(|message| Error::Data(vec![broken(number, message)]))?;
-    let names: Vec<String> = names.into_iter().map(|field| field.1.into_owned()).collect();
+    let broken =
+        |number: usize, message: String| Fault::new(format!("{}:{number}", layout.place), message);
+    let names =
+        fields(header, delimiter).map_err(|message| Error::Data(vec![broken(number, message)]))?;
+    let names: Vec<String> = names
+        .into_iter()
+        .map(|field| field.1.into_owned())
+        .collect();
     let columns = TargetColumns::read(layout.place, &names, layout.robot, layout.units)?;
     if columns.joints.is_empty() || !columns.point {
         let message = "has no columns of joints (the targets before correction), or no x_mm, y_mm, z_mm (the measured points)";
@@ -42,24 +52,43 @@ pub fn measured(text: &str, layout: &Layout) -> Result<Vec<MeasuredTarget>> {
             Err(message) => faults.push(broken(number, message)),
         }
     }
-    if faults.is_empty() { Ok(rows) } else { Err(Error::Data(faults)) }
+    if faults.is_empty() {
+        Ok(rows)
+    } else {
+        Err(Error::Data(faults))
+    }
 }
 
-fn row(line: &str, delimiter: char, columns: &TargetColumns, layout: &Layout) -> Result<MeasuredTarget, String> {
+fn row(
+    line: &str,
+    delimiter: char,
+    columns: &TargetColumns,
+    layout: &Layout,
+) -> Result<MeasuredTarget, String> {
     let cells = fields(line, delimiter)?;
     if cells.len() != columns.count {
-        return Err(format!("has {} fields, the header {}", cells.len(), columns.count));
+        return Err(format!(
+            "has {} fields, the header {}",
+            cells.len(),
+            columns.count
+        ));
     }
     let (mut row, mut point) = (TargetRow::default(), Vector3::zeros());
     for (index, role) in &columns.roles {
         let text = &cells[*index].1;
-        let value = parse(text, delimiter).map_err(|()| format!("field {} is `{text}`, no number", index + 1))?;
+        let value = parse(text, delimiter)
+            .map_err(|()| format!("field {} is `{text}`, no number", index + 1))?;
         match (role, value) {
             (ColumnRole::Axis(axis, unit), Some(value)) => point[*axis] = unit.to_si(value),
             (role, Some(value)) => row.take(*role, value, layout.robot.joints.len()),
-            (ColumnRole::Axis(..) | ColumnRole::Joint(..), None) => return Err(format!("field {} is empty", index + 1)),
+            (ColumnRole::Axis(..) | ColumnRole::Joint(..), None) => {
+                return Err(format!("field {} is empty", index + 1));
+            }
             _ => {}
         }
     }
-    Ok(MeasuredTarget { target: row.target(columns, layout)?, point })
+    Ok(MeasuredTarget {
+        target: row.target(columns, layout)?,
+        point,
+    })
 }

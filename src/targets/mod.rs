@@ -46,7 +46,11 @@ const APPENDED: [&str; 3] = ["uncorrected_mm", "residual_mm", "iterations"];
 impl Layout<'_> {
     /// Why a table is refused by its columns: it was corrected already.
     fn refused(&self, names: &[String]) -> Result<()> {
-        if !self.force && APPENDED.iter().all(|own| names.iter().any(|name| name == own)) {
+        if !self.force
+            && APPENDED
+                .iter()
+                .all(|own| names.iter().any(|name| name == own))
+        {
             let message = "was compensated by calib already (columns uncorrected_mm, residual_mm, iterations): a second correction would move the robot twice as far. Take the table of before, or insist with --force";
             return Err(Error::data(self.place, message));
         }
@@ -67,7 +71,10 @@ impl Unreached {
     fn push(&mut self, place: impl FnOnce() -> String, remark: &str) {
         self.count += 1;
         if self.faults.len() < MOST {
-            self.faults.push(Fault::new(place(), format!("{remark}: no joints are written")));
+            self.faults.push(Fault::new(
+                place(),
+                format!("{remark}: no joints are written"),
+            ));
         }
     }
 }

@@ -20,36 +20,73 @@ use std::sync::Arc;
 const BATCH: usize = 1 << 13;
 
 /// Reads targets from a Parquet file and writes them corrected as another.
-pub fn stream(input: File, output: impl Write + Send, layout: &Layout, corrector: &mut Corrector) -> Result<Unreached> {
-    let fault = |message: String| Error::data(layout.place, format!("not a readable Parquet file: {message}"));
+pub fn stream(
+    input: File,
+    output: impl Write + Send,
+    layout: &Layout,
+    corrector: &mut Corrector,
+) -> Result<Unreached> {
+    let fault = |message: String| {
+        Error::data(
+            layout.place,
+            format!("not a readable Parquet file: {message}"),
+        )
+    };
     let reader = raw::parquet(input, BATCH).map_err(fault)?;
     let schema = reader.schema.clone();
-    let names: Vec<String> = schema.fields().iter().map(|field| field.name().clone()).collect();
+    let names: Vec<String> = schema
+        .fields()
+        .iter()
+        .map(|field| field.name().clone())
+        .collect();
     layout.refused(&names)?;
     let columns = TargetColumns::read(layout.place, &names, layout.robot, layout.units)?;
-    let out_schema = Arc::new(described(&schema, &columns, layout, corrector.has_uncertainty()));
-    let mut writer = ArrowWriter::try_new(output, out_schema.clone(), None).map_err(|error| Error::Bug(error.to_string()))?;
+    let out_schema = Arc::new(described(
+        &schema,
+        &columns,
+        layout,
+        corrector.has_uncertainty(),
+    ));
+    let mut writer = ArrowWriter::try_new(output, out_schema.clone(), None)
+        .map_err(|error| Error::Bug(error.to_string()))?;
     let (mut unreached, mut turned) = (Unreached::default(), FarTurned::default());
     let mut rows = 0;
     for batch in reader {
         let batch = batch.map_err(fault)?;
         let targets = targets(&batch, &columns, layout, rows)?;
         for (k, target) in targets.iter().enumerate() {
-            turned.count(|| format!("{}: row {}", layout.place, rows + k + 1), target, layout.robot);
+            turned.count(
+                || format!("{}: row {}", layout.place, rows + k + 1),
+                target,
+                layout.robot,
+            );
         }
         if let Some(fault) = turned.fault(&columns) {
             return Err(Error::Data(vec![fault]));
         }
         let answers = corrector.batch(targets);
-        for (k, answer) in answers.iter().enumerate().filter(|(_, answer)| answer.q.is_none()) {
-            unreached.push(|| format!("{}: row {}", layout.place, rows + k + 1), &answer.remark());
+        for (k, answer) in answers
+            .iter()
+            .enumerate()
+            .filter(|(_, answer)| answer.q.is_none())
+        {
+            unreached.push(
+                || format!("{}: row {}", layout.place, rows + k + 1),
+                &answer.remark(),
+            );
         }
         let columns = answered(&batch, &columns, layout, &answers);
-        let batch = RecordBatch::try_new(out_schema.clone(), columns).map_err(|error| Error::Bug(error.to_string()))?;
-        writer.write(&batch).map_err(|error| Error::store("output", error.to_string()))?;
+        let batch = RecordBatch::try_new(out_schema.clone(), columns)
+            .map_err(|error| Error::Bug(error.to_string()))?;
+        writer
+            .write(&batch)
+            .map_err(|error| Error::store("output", error.to_string()))?;
         rows += batch.num_rows();
     }
-    writer.close().map(|_| unreached).map_err(|error| Error::store("output", error.to_string()))
+    writer
+        .close()
+        .map(|_| unreached)
+        .map_err(|error| Error::store("output", error.to_string()))
 }
 
 fn described(schema: &Schema, columns: &TargetColumns, layout: &Layout, sigma: bool) -> Schema {
@@ -58,17 +95,25 @@ fn described(schema: &Schema, columns: &TargetColumns, layout: &Layout, sigma: b
     for (index, field) in schema.fields().iter().enumerate() {
         fields.push(if joint(index) {
             // Null where a target is not reached.
-            Arc::new(Field::new(field.name(), DataType::Float64, true).with_metadata(field.metadata().clone()))
+            Arc::new(
+                Field::new(field.name(), DataType::Float64, true)
+                    .with_metadata(field.metadata().clone()),
+            )
         } else {
             field.clone()
         });
     }
     if columns.joints.is_empty() {
         for (j, joint) in layout.robot.joints.iter().enumerate() {
-            fields.push(Arc::new(Field::new(format!("q{}_{}", j + 1, stored(joint.kind).symbol()), DataType::Float64, true)));
+            fields.push(Arc::new(Field::new(
+                format!("q{}_{}", j + 1, stored(joint.kind).symbol()),
+                DataType::Float64,
+                true,
+            )));
         }
     }
-    let mut append = |name: &str, kind: DataType| fields.push(Arc::new(Field::new(name, kind, false)));
+    let mut append =
+        |name: &str, kind: DataType| fields.push(Arc::new(Field::new(name, kind, false)));
     if !layout.plain {
         append("uncorrected_mm", DataType::Float64);
         append("residual_mm", DataType::Float64);
@@ -83,16 +128,32 @@ fn described(schema: &Schema, columns: &TargetColumns, layout: &Layout, sigma: b
 }
 
 fn stored(kind: JointKind) -> Unit {
-    if kind == JointKind::Revolute { Unit::Radian } else { Unit::Millimetre }
+    if kind == JointKind::Revolute {
+        Unit::Radian
+    } else {
+        Unit::Millimetre
+    }
 }
 
-fn targets(batch: &RecordBatch, columns: &TargetColumns, layout: &Layout, before: usize) -> Result<Vec<CommandTarget>> {
+fn targets(
+    batch: &RecordBatch,
+    columns: &TargetColumns,
+    layout: &Layout,
+    before: usize,
+) -> Result<Vec<CommandTarget>> {
     let mut numbers = Vec::new();
     for (index, role) in &columns.roles {
         let column = batch.column(*index);
         let name = batch.schema().field(*index).name().clone();
-        let cast = cast(column, &DataType::Float64)
-            .map_err(|_| Error::data(layout.place, format!("column `{name}` holds {}, expected numbers", column.data_type())))?;
+        let cast = cast(column, &DataType::Float64).map_err(|_| {
+            Error::data(
+                layout.place,
+                format!(
+                    "column `{name}` holds {}, expected numbers",
+                    column.data_type()
+                ),
+            )
+        })?;
         numbers.push((*role, name, cast));
     }
     (0..batch.num_rows())
@@ -102,7 +163,10 @@ fn targets(batch: &RecordBatch, columns: &TargetColumns, layout: &Layout, before
                 let values = column.as_primitive::<Float64Type>();
                 let needed = matches!(
                     role,
-                    ColumnRole::Joint(..) | ColumnRole::Axis(..) | ColumnRole::Quaternion(_) | ColumnRole::Turn(..)
+                    ColumnRole::Joint(..)
+                        | ColumnRole::Axis(..)
+                        | ColumnRole::Quaternion(_)
+                        | ColumnRole::Turn(..)
                 );
                 if !values.is_null(row) && values.value(row).is_finite() {
                     if let Some(message) = role.fault(values.value(row)) {
@@ -111,24 +175,43 @@ fn targets(batch: &RecordBatch, columns: &TargetColumns, layout: &Layout, before
                     }
                     taken.take(*role, values.value(row), layout.robot.joints.len());
                 } else if needed {
-                    return Err(Error::data(layout.place, format!("row {}: column `{name}` is empty", before + row + 1)));
+                    return Err(Error::data(
+                        layout.place,
+                        format!("row {}: column `{name}` is empty", before + row + 1),
+                    ));
                 }
             }
-            let faulty = |message: String| Error::data(layout.place, format!("row {}: {message}", before + row + 1));
+            let faulty = |message: String| {
+                Error::data(layout.place, format!("row {}: {message}", before + row + 1))
+            };
             taken.target(columns, layout).map_err(faulty)
         })
         .collect()
 }
 
-fn answered(batch: &RecordBatch, columns: &TargetColumns, layout: &Layout, answers: &[CorrectedCommand]) -> Vec<ArrayRef> {
-    let numbers =
-        |of: &dyn Fn(&CorrectedCommand) -> f64| -> ArrayRef { Arc::new(answers.iter().map(of).collect::<Float64Array>()) };
+fn answered(
+    batch: &RecordBatch,
+    columns: &TargetColumns,
+    layout: &Layout,
+    answers: &[CorrectedCommand],
+) -> Vec<ArrayRef> {
+    let numbers = |of: &dyn Fn(&CorrectedCommand) -> f64| -> ArrayRef {
+        Arc::new(answers.iter().map(of).collect::<Float64Array>())
+    };
     let joint_numbers = |joint: usize, unit: Unit| -> ArrayRef {
-        Arc::new(answers.iter().map(|answer| Some(unit.from_si(answer.q.as_ref()?[joint]))).collect::<Float64Array>())
+        Arc::new(
+            answers
+                .iter()
+                .map(|answer| Some(unit.from_si(answer.q.as_ref()?[joint])))
+                .collect::<Float64Array>(),
+        )
     };
     let mut out: Vec<ArrayRef> = Vec::new();
     for (index, column) in batch.columns().iter().enumerate() {
-        let joint = columns.joints.iter().position(|(column, _)| *column == index);
+        let joint = columns
+            .joints
+            .iter()
+            .position(|(column, _)| *column == index);
         out.push(match joint {
             Some(joint) => joint_numbers(joint, columns.joints[joint].1),
             None => column.clone(),
@@ -142,12 +225,26 @@ fn answered(batch: &RecordBatch, columns: &TargetColumns, layout: &Layout, answe
     if !layout.plain {
         out.push(numbers(&|answer| answer.uncorrected * 1e3));
         out.push(numbers(&|answer| answer.residual * 1e3));
-        out.push(Arc::new(answers.iter().map(|answer| answer.iterations as i64).collect::<Int64Array>()));
+        out.push(Arc::new(
+            answers
+                .iter()
+                .map(|answer| answer.iterations as i64)
+                .collect::<Int64Array>(),
+        ));
         if answers.iter().any(|answer| answer.uncertainty.is_some()) {
-            out.push(numbers(&|answer| answer.uncertainty.map_or(0.0, |known| known.sigma) * 1e3));
-            out.push(numbers(&|answer| answer.uncertainty.map_or(0.0, |known| known.u95) * 1e3));
+            out.push(numbers(&|answer| {
+                answer.uncertainty.map_or(0.0, |known| known.sigma) * 1e3
+            }));
+            out.push(numbers(&|answer| {
+                answer.uncertainty.map_or(0.0, |known| known.u95) * 1e3
+            }));
         }
-        out.push(Arc::new(answers.iter().map(|answer| Some(answer.remark())).collect::<StringArray>()));
+        out.push(Arc::new(
+            answers
+                .iter()
+                .map(|answer| Some(answer.remark()))
+                .collect::<StringArray>(),
+        ));
     }
     out
 }

@@ -21,8 +21,9 @@ pub(super) struct TargetRow {
 
 impl TargetRow {
     pub fn take(&mut self, role: ColumnRole, value: f64, joints: usize) {
-        let put =
-            |slot: &mut Option<Vec<f64>>, joint: usize, value: f64| slot.get_or_insert_with(|| vec![0.0; joints])[joint] = value;
+        let put = |slot: &mut Option<Vec<f64>>, joint: usize, value: f64| {
+            slot.get_or_insert_with(|| vec![0.0; joints])[joint] = value
+        };
         match role {
             ColumnRole::Joint(joint, unit) => put(&mut self.target.q, joint, unit.to_si(value)),
             ColumnRole::Axis(axis, unit) => self.point[axis] = unit.to_si(value),
@@ -36,12 +37,31 @@ impl TargetRow {
         }
     }
 
-    pub fn target(mut self, columns: &TargetColumns, layout: &Layout) -> Result<CommandTarget, String> {
+    pub fn target(
+        mut self,
+        columns: &TargetColumns,
+        layout: &Layout,
+    ) -> Result<CommandTarget, String> {
         let joints = self.target.q.iter().flatten().zip(&columns.joints);
-        let joints =
-            joints.map(|(q, (_, unit))| (if unit.quantity() == Quantity::Length { Bound::Length } else { Bound::Angle }, *q));
-        let others = self.point.iter().map(|x| (Bound::Length, *x)).chain(self.turns.iter().map(|turn| (Bound::Angle, *turn)));
-        if let Some(message) = joints.chain(others).find_map(|(bound, value)| bound.fault(value)) {
+        let joints = joints.map(|(q, (_, unit))| {
+            (
+                if unit.quantity() == Quantity::Length {
+                    Bound::Length
+                } else {
+                    Bound::Angle
+                },
+                *q,
+            )
+        });
+        let others = self
+            .point
+            .iter()
+            .map(|x| (Bound::Length, *x))
+            .chain(self.turns.iter().map(|turn| (Bound::Angle, *turn)));
+        if let Some(message) = joints
+            .chain(others)
+            .find_map(|(bound, value)| bound.fault(value))
+        {
             return Err(message);
         }
         if let (Some(load), None) = (layout.load, self.target.payload) {
@@ -64,9 +84,13 @@ impl TargetRow {
         let [w, x, y, z] = self.quaternion;
         let length = Vector3::new(x, y, z).norm().hypot(w);
         if (length - 1.0).abs() > 1e-3 {
-            return Err(format!("columns qw, qx, qy, qz: the quaternion has length {length:.4}, expected 1"));
+            return Err(format!(
+                "columns qw, qx, qy, qz: the quaternion has length {length:.4}, expected 1"
+            ));
         }
-        Ok(UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)).to_rotation_matrix().into_inner())
+        Ok(UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z))
+            .to_rotation_matrix()
+            .into_inner())
     }
 }
 
@@ -81,11 +105,18 @@ pub(super) struct FarTurned {
 
 impl FarTurned {
     /// Counts a row; what the robot's own limits allow is not far.
-    pub fn count(&mut self, place: impl FnOnce() -> String, target: &CommandTarget, robot: &RobotDescription) {
+    pub fn count(
+        &mut self,
+        place: impl FnOnce() -> String,
+        target: &CommandTarget,
+        robot: &RobotDescription,
+    ) {
         self.rows += 1;
         let mut joints = target.q.iter().flatten().zip(&robot.joints).enumerate();
         let far = joints.find(|(_, (q, joint))| {
-            let allowed = joint.limits.is_some_and(|[lower, upper]| (lower..=upper).contains(*q));
+            let allowed = joint
+                .limits
+                .is_some_and(|[lower, upper]| (lower..=upper).contains(*q));
             joint.kind == JointKind::Revolute && q.abs() > ONE_AND_A_HALF_TURNS && !allowed
         });
         if let Some((joint, (q, _))) = far {
@@ -98,9 +129,13 @@ impl FarTurned {
     pub fn fault(&self, columns: &TargetColumns) -> Option<Fault> {
         let (place, joint, q) = self.first.as_ref().filter(|_| 2 * self.far > self.rows)?;
         let (_, unit) = columns.joints.get(*joint)?;
-        let [shown, most] = [*q, ONE_AND_A_HALF_TURNS].map(|angle| (unit.from_si(angle) * 100.0).round() / 100.0);
-        let degrees =
-            if *unit == Unit::Degree { "" } else { "; if these are degrees, let the names of their columns end in _deg" };
+        let [shown, most] =
+            [*q, ONE_AND_A_HALF_TURNS].map(|angle| (unit.from_si(angle) * 100.0).round() / 100.0);
+        let degrees = if *unit == Unit::Degree {
+            ""
+        } else {
+            "; if these are degrees, let the names of their columns end in _deg"
+        };
         let message = format!(
             "in {} of {} a joint is beyond one and a half turns, here joint {} at {shown} {unit}; allowed: up to {most} {unit}{degrees}",
             self.far,

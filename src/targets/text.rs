@@ -28,12 +28,20 @@ const LONGEST: u64 = 16 << 20;
 const DECIMALS: usize = 7;
 
 /// Reads targets from `input` to its end and writes them corrected.
-pub fn stream(input: &mut dyn BufRead, output: &mut dyn Write, layout: &Layout, corrector: &mut Corrector) -> Result<Unreached> {
+pub fn stream(
+    input: &mut dyn BufRead,
+    output: &mut dyn Write,
+    layout: &Layout,
+    corrector: &mut Corrector,
+) -> Result<Unreached> {
     let (mut unreached, mut turned) = (Unreached::default(), FarTurned::default());
     let (mut number, mut head) = (0, String::new());
     let header = loop {
         let Some(line) = next(input, layout.place)? else {
-            return Err(Error::data(layout.place, "is empty; expected a header line and targets"));
+            return Err(Error::data(
+                layout.place,
+                "is empty; expected a header line and targets",
+            ));
         };
         number += 1;
         if !line.trim().is_empty() {
@@ -43,17 +51,36 @@ pub fn stream(input: &mut dyn BufRead, output: &mut dyn Write, layout: &Layout, 
     };
     let delimiter = delimiter(&header);
     let (body, ending) = split_ending(&header);
-    let cells = fields(body.trim_start_matches('\u{feff}'), delimiter)
-        .map_err(|message| Error::Data(vec![Fault::new(format!("{}:{number}", layout.place), message)]))?;
-    let names: Vec<String> = cells.into_iter().map(|field| field.1.into_owned()).collect();
+    let cells = fields(body.trim_start_matches('\u{feff}'), delimiter).map_err(|message| {
+        Error::Data(vec![Fault::new(
+            format!("{}:{number}", layout.place),
+            message,
+        )])
+    })?;
+    let names: Vec<String> = cells
+        .into_iter()
+        .map(|field| field.1.into_owned())
+        .collect();
     layout.refused(&names)?;
     let columns = TargetColumns::read(layout.place, &names, layout.robot, layout.units)?;
-    let mut joints: Vec<(usize, usize, Unit)> =
-        columns.joints.iter().enumerate().map(|(joint, (index, unit))| (*index, joint, *unit)).collect();
+    let mut joints: Vec<(usize, usize, Unit)> = columns
+        .joints
+        .iter()
+        .enumerate()
+        .map(|(joint, (index, unit))| (*index, joint, *unit))
+        .collect();
     joints.sort_unstable_by_key(|(index, ..)| *index);
-    let table = TextTable { layout, columns: &columns, joints, delimiter };
+    let table = TextTable {
+        layout,
+        columns: &columns,
+        joints,
+        delimiter,
+    };
     // Written with the first rows: a fault among them leaves nothing half done.
-    head.push_str(&format!("{body}{}{ending}", table.appended_names(corrector.has_uncertainty())));
+    head.push_str(&format!(
+        "{body}{}{ending}",
+        table.appended_names(corrector.has_uncertainty())
+    ));
     let mut block = Block::default();
     loop {
         let first = number + 1;
@@ -63,24 +90,46 @@ pub fn stream(input: &mut dyn BufRead, output: &mut dyn Write, layout: &Layout, 
         if lines.is_empty() {
             put(output, &head)?;
             return match output.flush() {
-                Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(refused(&error)),
+                Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+                    Err(refused(&error))
+                }
                 _ => Ok(unreached),
             };
         }
-        let parsed: Vec<Result<Option<(CommandTarget, Spans)>, String>> =
-            lines.par_iter().map(|line| if line.trim().is_empty() { Ok(None) } else { table.target(line).map(Some) }).collect();
+        let parsed: Vec<Result<Option<(CommandTarget, Spans)>, String>> = lines
+            .par_iter()
+            .map(|line| {
+                if line.trim().is_empty() {
+                    Ok(None)
+                } else {
+                    table.target(line).map(Some)
+                }
+            })
+            .collect();
         let faults: Vec<Fault> = (parsed.iter().enumerate())
-            .filter_map(|(k, row)| Some(Fault::new(format!("{}:{}", layout.place, first + k), row.as_ref().err()?)))
+            .filter_map(|(k, row)| {
+                Some(Fault::new(
+                    format!("{}:{}", layout.place, first + k),
+                    row.as_ref().err()?,
+                ))
+            })
             .take(FAULTS)
             .collect();
         if !faults.is_empty() {
             return Err(Error::Data(faults));
         }
-        let (mut targets, mut spans) = (Vec::with_capacity(lines.len()), Vec::with_capacity(lines.len()));
+        let (mut targets, mut spans) = (
+            Vec::with_capacity(lines.len()),
+            Vec::with_capacity(lines.len()),
+        );
         for (k, row) in parsed.into_iter().filter_map(Result::ok).enumerate() {
             let (target, span) = row.unzip();
             if let Some(target) = &target {
-                turned.count(|| format!("{}:{}", layout.place, first + k), target, layout.robot);
+                turned.count(
+                    || format!("{}:{}", layout.place, first + k),
+                    target,
+                    layout.robot,
+                );
             }
             targets.extend(target);
             spans.push(span);
@@ -94,12 +143,22 @@ pub fn stream(input: &mut dyn BufRead, output: &mut dyn Write, layout: &Layout, 
             .zip(spans)
             .map(|(line, spans)| (line, spans.and_then(|spans| Some((spans, answers.next()?)))))
             .collect();
-        for (k, answer) in rows.iter().enumerate().filter_map(|(k, (_, answered))| Some((k, &answered.as_ref()?.1))) {
+        for (k, answer) in rows
+            .iter()
+            .enumerate()
+            .filter_map(|(k, (_, answered))| Some((k, &answered.as_ref()?.1)))
+        {
             if answer.q.is_none() {
-                unreached.push(|| format!("{}:{}", layout.place, first + k), &answer.remark());
+                unreached.push(
+                    || format!("{}:{}", layout.place, first + k),
+                    &answer.remark(),
+                );
             }
         }
-        let written: Vec<String> = rows.par_chunks(CHUNK).map(|rows| table.lines(rows)).collect();
+        let written: Vec<String> = rows
+            .par_chunks(CHUNK)
+            .map(|rows| table.lines(rows))
+            .collect();
         for text in std::iter::once(&std::mem::take(&mut head)).chain(&written) {
             if !put(output, text)? {
                 return Ok(unreached);
@@ -132,9 +191,13 @@ impl Block {
     }
 
     fn lines(&self) -> Result<Vec<&str>> {
-        let text = std::str::from_utf8(&self.bytes).map_err(|_| Error::data(&*self.place, "is no text in UTF-8"))?;
+        let text = std::str::from_utf8(&self.bytes)
+            .map_err(|_| Error::data(&*self.place, "is no text in UTF-8"))?;
         let starts = std::iter::once(0).chain(self.ends.iter().copied());
-        Ok(starts.zip(&self.ends).map(|(start, end)| &text[start..*end]).collect())
+        Ok(starts
+            .zip(&self.ends)
+            .map(|(start, end)| &text[start..*end])
+            .collect())
     }
 }
 
@@ -156,7 +219,13 @@ fn read_line(input: &mut dyn BufRead, bytes: &mut Vec<u8>, place: &str) -> Resul
     let read = input.take(LONGEST).read_until(b'\n', bytes);
     let read = read.map_err(|error| Error::store(place, format!("cannot be read: {error}")))?;
     if read as u64 == LONGEST {
-        return Err(Error::data(place, format!("has a line of more than {} MB; expected a table of targets", LONGEST >> 20)));
+        return Err(Error::data(
+            place,
+            format!(
+                "has a line of more than {} MB; expected a table of targets",
+                LONGEST >> 20
+            ),
+        ));
     }
     Ok(read)
 }
@@ -166,7 +235,9 @@ fn next(input: &mut dyn BufRead, place: &str) -> Result<Option<String>> {
     if read_line(input, &mut bytes, place)? == 0 {
         return Ok(None);
     }
-    String::from_utf8(bytes).map(Some).map_err(|_| Error::data(place, "is no text in UTF-8"))
+    String::from_utf8(bytes)
+        .map(Some)
+        .map_err(|_| Error::data(place, "is no text in UTF-8"))
 }
 
 /// A line and its line ending.
@@ -178,7 +249,11 @@ fn split_ending(line: &str) -> (&str, &str) {
 /// What separates most in the header.
 pub(super) fn delimiter(header: &str) -> char {
     let count = |c: char| header.matches(c).count();
-    [';', '\t', ','].into_iter().filter(|c| count(*c) > 0).max_by_key(|c| count(*c)).unwrap_or(',')
+    [';', '\t', ',']
+        .into_iter()
+        .filter(|c| count(*c) > 0)
+        .max_by_key(|c| count(*c))
+        .unwrap_or(',')
 }
 
 /// Where a line's joints stand, in the order of the line, and whether its numbers have a comma.
@@ -211,40 +286,73 @@ impl TextTable<'_> {
         }
         if !self.layout.plain {
             names.extend(["uncorrected_mm", "residual_mm", "iterations"].map(String::from));
-            names.extend(["sigma_mm", "u95_mm"].into_iter().filter(|_| sigma).map(String::from));
+            names.extend(
+                ["sigma_mm", "u95_mm"]
+                    .into_iter()
+                    .filter(|_| sigma)
+                    .map(String::from),
+            );
             names.push("remark".into());
         }
-        names.iter().map(|name| format!("{}{name}", self.delimiter)).collect()
+        names
+            .iter()
+            .map(|name| format!("{}{name}", self.delimiter))
+            .collect()
     }
 
     fn target(&self, line: &str) -> Result<(CommandTarget, Spans), String> {
         let (body, _) = split_ending(line);
         let cells = fields(body, self.delimiter)?;
         if cells.len() != self.columns.count {
-            return Err(format!("has {} fields, the header {}", cells.len(), self.columns.count));
+            return Err(format!(
+                "has {} fields, the header {}",
+                cells.len(),
+                self.columns.count
+            ));
         }
         let number = |index: usize| -> Result<Option<f64>, String> {
             let (range, text) = &cells[index];
-            parse(text, self.delimiter)
-                .map_err(|()| format!("column {}: field {} is `{text}`, no number", range.start + 1, index + 1))
+            parse(text, self.delimiter).map_err(|()| {
+                format!(
+                    "column {}: field {} is `{text}`, no number",
+                    range.start + 1,
+                    index + 1
+                )
+            })
         };
         let mut row = TargetRow::default();
         for (index, role) in &self.columns.roles {
             if let Some(value) = number(*index)? {
                 if let Some(message) = role.fault(value) {
-                    return Err(format!("column {}: field {}: {message}", cells[*index].0.start + 1, index + 1));
+                    return Err(format!(
+                        "column {}: field {}: {message}",
+                        cells[*index].0.start + 1,
+                        index + 1
+                    ));
                 }
                 row.take(*role, value, self.layout.robot.joints.len());
             } else if matches!(
                 role,
-                ColumnRole::Joint(..) | ColumnRole::Axis(..) | ColumnRole::Quaternion(_) | ColumnRole::Turn(..)
+                ColumnRole::Joint(..)
+                    | ColumnRole::Axis(..)
+                    | ColumnRole::Quaternion(_)
+                    | ColumnRole::Turn(..)
             ) {
                 return Err(format!("column {} is empty", cells[*index].0.start + 1));
             }
         }
-        let comma = self.delimiter != ',' && body.contains(',') && cells.iter().any(|(_, text)| is_comma_number(text));
-        let joints = self.joints.iter().map(|(index, ..)| cells[*index].0.clone()).collect();
-        Ok((row.target(self.columns, self.layout)?, Spans { joints, comma }))
+        let comma = self.delimiter != ','
+            && body.contains(',')
+            && cells.iter().any(|(_, text)| is_comma_number(text));
+        let joints = self
+            .joints
+            .iter()
+            .map(|(index, ..)| cells[*index].0.clone())
+            .collect();
+        Ok((
+            row.target(self.columns, self.layout)?,
+            Spans { joints, comma },
+        ))
     }
 
     /// Lines with their targets' results; lines without one as they are.
@@ -280,7 +388,10 @@ impl TextTable<'_> {
         if self.columns.joints.is_empty() {
             for (j, joint) in self.layout.robot.joints.iter().enumerate() {
                 let unit = own_unit(joint.kind);
-                append(answer.q.as_ref().map(|q| unit.from_si(q[j])), decimals(unit));
+                append(
+                    answer.q.as_ref().map(|q| unit.from_si(q[j])),
+                    decimals(unit),
+                );
             }
         }
         if !self.layout.plain {
@@ -292,7 +403,11 @@ impl TextTable<'_> {
                 append(Some(known.u95 * 1e3), 4);
             }
             let remark = answer.remark();
-            let quote = if remark.contains(self.delimiter) { "\"" } else { "" };
+            let quote = if remark.contains(self.delimiter) {
+                "\""
+            } else {
+                ""
+            };
             out.push(self.delimiter);
             out.extend([quote, &remark, quote]);
         }
@@ -301,7 +416,11 @@ impl TextTable<'_> {
 }
 
 fn own_unit(kind: JointKind) -> Unit {
-    if kind == JointKind::Revolute { Unit::Degree } else { Unit::Millimetre }
+    if kind == JointKind::Revolute {
+        Unit::Degree
+    } else {
+        Unit::Millimetre
+    }
 }
 
 fn decimals(unit: Unit) -> usize {
@@ -322,8 +441,14 @@ pub(super) fn parse(text: &str, delimiter: char) -> Result<Option<f64>, ()> {
     }
     let value = match text.parse::<f64>() {
         Ok(value) => value,
-        Err(_) if delimiter != ',' && is_comma_number(text) => text.replacen(',', ".", 1).parse().map_err(|_| ())?,
+        Err(_) if delimiter != ',' && is_comma_number(text) => {
+            text.replacen(',', ".", 1).parse().map_err(|_| ())?
+        }
         Err(_) => return Err(()),
     };
-    if value.is_finite() { Ok(Some(value)) } else { Err(()) }
+    if value.is_finite() {
+        Ok(Some(value))
+    } else {
+        Err(())
+    }
 }

@@ -40,23 +40,41 @@ impl<'a> Trajectory<'a> {
     /// written anew.
     pub fn read(place: &str, text: &'a str, robot: &RobotDescription, force: bool) -> Result<Self> {
         let text = text.trim_start_matches('\u{feff}');
-        let mut lines = (1..).zip(text.lines()).filter(|(_, line)| !line.trim().is_empty());
+        let mut lines = (1..)
+            .zip(text.lines())
+            .filter(|(_, line)| !line.trim().is_empty());
         let empty = || Error::data(place, "is empty; expected a header line and a motion");
         let (number, header) = lines.next().ok_or_else(empty)?;
         let delimiter = delimiter(header);
         let at = |line: usize, message: String| Fault::new(format!("{place}:{line}"), message);
-        let names = fields(header, delimiter).map_err(|message| Error::Data(vec![at(number, message)]))?;
+        let names =
+            fields(header, delimiter).map_err(|message| Error::Data(vec![at(number, message)]))?;
         let everything = names.len();
         let kept = kept(place, &names, robot.joints.len(), force)?;
-        let header = kept.checked_sub(1).map_or(header, |last| &header[..names[last].0.end]);
-        let names: Vec<String> = names.into_iter().take(kept).map(|field| field.1.into_owned()).collect();
+        let header = kept
+            .checked_sub(1)
+            .map_or(header, |last| &header[..names[last].0.end]);
+        let names: Vec<String> = names
+            .into_iter()
+            .take(kept)
+            .map(|field| field.1.into_owned())
+            .collect();
         let columns = columns(place, &names, robot)?;
-        let mut trajectory =
-            Self { motion: empty_motion(robot.joints.len(), &columns), header, lines: lines.collect(), delimiter, point: '.' };
+        let mut trajectory = Self {
+            motion: empty_motion(robot.joints.len(), &columns),
+            header,
+            lines: lines.collect(),
+            delimiter,
+            point: '.',
+        };
         for (_, line) in &mut trajectory.lines {
             // What cannot be split is told where the line is read.
-            let end = fields(line, delimiter).ok().and_then(|cells| cells.get(kept.checked_sub(1)?).map(|cell| cell.0.end));
-            *line = end.filter(|_| kept < everything).map_or(*line, |end| &line[..end]);
+            let end = fields(line, delimiter)
+                .ok()
+                .and_then(|cells| cells.get(kept.checked_sub(1)?).map(|cell| cell.0.end));
+            *line = end
+                .filter(|_| kept < everything)
+                .map_or(*line, |end| &line[..end]);
         }
         trajectory.fill(place, &columns)?;
         trajectory.check_clock(place)?;
@@ -67,10 +85,16 @@ impl<'a> Trajectory<'a> {
     fn fill(&mut self, place: &str, columns: &[MotionColumn]) -> Result<()> {
         let (n, rows) = (self.motion.joints, self.lines.len());
         let mut faults = Vec::new();
-        for list in [&mut self.motion.velocity, &mut self.motion.acceleration].into_iter().flatten() {
+        for list in [&mut self.motion.velocity, &mut self.motion.acceleration]
+            .into_iter()
+            .flatten()
+        {
             list.resize(n * rows, 0.0);
         }
-        self.motion.temperature.iter_mut().for_each(|list| list.resize(rows, 0.0));
+        self.motion
+            .temperature
+            .iter_mut()
+            .for_each(|list| list.resize(rows, 0.0));
         self.motion.time.resize(rows, 0.0);
         self.motion.position.resize(n * rows, 0.0);
         for row in 0..rows {
@@ -83,7 +107,11 @@ impl<'a> Trajectory<'a> {
             let cells = match fields(line, self.delimiter) {
                 Ok(cells) if cells.len() == columns.len() => cells,
                 Ok(cells) => {
-                    fault(format!("has {} cells, the header {}", cells.len(), columns.len()));
+                    fault(format!(
+                        "has {} cells, the header {}",
+                        cells.len(),
+                        columns.len()
+                    ));
                     continue;
                 }
                 Err(message) => {
@@ -102,7 +130,11 @@ impl<'a> Trajectory<'a> {
                 put(&mut self.motion, row, *column, value);
             }
         }
-        if faults.is_empty() { Ok(()) } else { Err(Error::Data(faults)) }
+        if faults.is_empty() {
+            Ok(())
+        } else {
+            Err(Error::Data(faults))
+        }
     }
 
     /// Times must grow in even steps: derivatives are by differences of rows.
@@ -110,15 +142,31 @@ impl<'a> Trajectory<'a> {
         let time = &self.motion.time;
         let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let usual = crate::statistics::nearest(&mut steps, 0.5).unwrap_or(0.0);
-        let wrong = |row: usize, message: String| Err(Error::data(format!("{place}:{}", self.lines[row + 1].0), message));
-        if let Some((row, pair)) = time.windows(2).enumerate().find(|(_, pair)| pair[1] <= pair[0]) {
-            return wrong(row, format!("the time does not increase: {} s after {} s", pair[1], pair[0]));
+        let wrong = |row: usize, message: String| {
+            Err(Error::data(
+                format!("{place}:{}", self.lines[row + 1].0),
+                message,
+            ))
+        };
+        if let Some((row, pair)) = time
+            .windows(2)
+            .enumerate()
+            .find(|(_, pair)| pair[1] <= pair[0])
+        {
+            return wrong(
+                row,
+                format!(
+                    "the time does not increase: {} s after {} s",
+                    pair[1], pair[0]
+                ),
+            );
         }
         let uneven = |pair: &[f64]| (pair[1] - pair[0] - usual).abs() > UNEVEN * usual;
         if let Some((row, pair)) = time.windows(2).enumerate().find(|(_, pair)| uneven(pair)) {
             let step = pair[1] - pair[0];
-            let message =
-                format!("the clock is uneven: a step of {step:.6} s, usual are {usual:.6} s; give the motion in even steps");
+            let message = format!(
+                "the clock is uneven: a step of {step:.6} s, usual are {usual:.6} s; give the motion in even steps"
+            );
             return wrong(row, message);
         }
         Ok(())
@@ -126,7 +174,12 @@ impl<'a> Trajectory<'a> {
 
     /// The lines with torques (Nm), currents (A) where `per_ampere` says what an ampere is, uncertainties (Nm) where they are known, and
     /// the remarks of each row; a row that is refused has no torques.
-    pub fn written(&self, needed: &NeededTorques, per_ampere: Option<&[f64]>, rows: &[JudgedRow]) -> String {
+    pub fn written(
+        &self,
+        needed: &NeededTorques,
+        per_ampere: Option<&[f64]>,
+        rows: &[JudgedRow],
+    ) -> String {
         let n = self.motion.joints;
         let (between, point) = (self.delimiter, self.point);
         let mut text = self.header.trim_end().to_string();
@@ -145,11 +198,20 @@ impl<'a> Trajectory<'a> {
                 }
             };
             let allowed = |value: f64| (!judged.is_refused()).then_some(value);
-            needed.torque[own.clone()].iter().for_each(|torque| number(allowed(*torque)));
+            needed.torque[own.clone()]
+                .iter()
+                .for_each(|torque| number(allowed(*torque)));
             if let Some(factors) = per_ampere {
-                needed.torque[own.clone()].iter().zip(factors).for_each(|(torque, factor)| number(allowed(torque / factor)));
+                needed.torque[own.clone()]
+                    .iter()
+                    .zip(factors)
+                    .for_each(|(torque, factor)| number(allowed(torque / factor)));
             }
-            needed.u95.iter().flat_map(|all| &all[own.clone()]).for_each(|u95| number(Some(*u95)));
+            needed
+                .u95
+                .iter()
+                .flat_map(|all| &all[own.clone()])
+                .for_each(|u95| number(Some(*u95)));
             let remark = judged.to_string();
             let quote = if remark.contains(between) { "\"" } else { "" };
             text.push(between);
@@ -166,7 +228,9 @@ impl<'a> Trajectory<'a> {
 
 /// Names of the columns that are appended.
 fn appended(joints: usize, currents: bool, u95: bool) -> impl Iterator<Item = String> {
-    let each = move |wanted: bool, name: fn(usize) -> String| (1..=joints).filter(move |_| wanted).map(name);
+    let each = move |wanted: bool, name: fn(usize) -> String| {
+        (1..=joints).filter(move |_| wanted).map(name)
+    };
     each(true, |joint| format!("tau{joint}_nm"))
         .chain(each(currents, |joint| format!("i{joint}_a")))
         .chain(each(u95, |joint| format!("u95_{joint}_nm")))
@@ -176,12 +240,17 @@ fn appended(joints: usize, currents: bool, u95: bool) -> impl Iterator<Item = St
 /// How many columns are the person's own: all, or those before the ones that calib appended. Fails where there are such, unless `force`.
 fn kept(place: &str, names: &[TextField], joints: usize, force: bool) -> Result<usize> {
     let is = |at: usize, name: &str| names.get(at).is_some_and(|field| field.1 == name);
-    let Some(first) = (0..names.len()).find(|at| is(*at, "tau1_nm")) else { return Ok(names.len()) };
+    let Some(first) = (0..names.len()).find(|at| is(*at, "tau1_nm")) else {
+        return Ok(names.len());
+    };
     let ours = |currents: bool, u95: bool| {
         let all: Vec<String> = appended(joints, currents, u95).collect();
-        first + all.len() == names.len() && all.iter().enumerate().all(|(k, name)| is(first + k, name))
+        first + all.len() == names.len()
+            && all.iter().enumerate().all(|(k, name)| is(first + k, name))
     };
-    let written = [(true, true), (true, false), (false, true), (false, false)].into_iter().any(|(i, u)| ours(i, u));
+    let written = [(true, true), (true, false), (false, true), (false, false)]
+        .into_iter()
+        .any(|(i, u)| ours(i, u));
     if !written {
         return Ok(names.len());
     }
@@ -211,7 +280,12 @@ fn put(motion: &mut PlannedMotion, row: usize, column: MotionColumn, value: f64)
     let n = motion.joints;
     let (list, joint, unit) = match column {
         MotionColumn::Time(unit) => return motion.time[row] = unit * value,
-        MotionColumn::Temperature => return motion.temperature.iter_mut().for_each(|all| all[row] = value),
+        MotionColumn::Temperature => {
+            return motion
+                .temperature
+                .iter_mut()
+                .for_each(|all| all[row] = value);
+        }
         MotionColumn::Position(joint, unit) => (Some(&mut motion.position), joint, unit),
         MotionColumn::Velocity(joint, unit) => (motion.velocity.as_mut(), joint, unit),
         MotionColumn::Acceleration(joint, unit) => (motion.acceleration.as_mut(), joint, unit),
@@ -252,28 +326,48 @@ fn columns(place: &str, names: &[String], robot: &RobotDescription) -> Result<Ve
             )),
         }
     }
-    let count = |is: &dyn Fn(&MotionColumn) -> bool| columns.iter().filter(|column| is(column)).count();
+    let count =
+        |is: &dyn Fn(&MotionColumn) -> bool| columns.iter().filter(|column| is(column)).count();
     if faults.is_empty() && count(&|column| matches!(column, MotionColumn::Time(_))) == 0 {
         faults.push(Fault::new(place, "has no column time_s"));
     }
     for (what, needed, is) in [
-        ("q", true, (|column| matches!(column, MotionColumn::Position(..))) as fn(&MotionColumn) -> bool),
-        ("dq", false, |column| matches!(column, MotionColumn::Velocity(..))),
-        ("ddq", false, |column| matches!(column, MotionColumn::Acceleration(..))),
+        (
+            "q",
+            true,
+            (|column| matches!(column, MotionColumn::Position(..))) as fn(&MotionColumn) -> bool,
+        ),
+        ("dq", false, |column| {
+            matches!(column, MotionColumn::Velocity(..))
+        }),
+        ("ddq", false, |column| {
+            matches!(column, MotionColumn::Acceleration(..))
+        }),
     ] {
         let found = count(&is);
         if faults.is_empty() && found != n && (needed || found > 0) {
-            faults.push(Fault::new(place, format!("has columns {what} of {found} of the robot's {n} joints: give all of them")));
+            faults.push(Fault::new(
+                place,
+                format!(
+                    "has columns {what} of {found} of the robot's {n} joints: give all of them"
+                ),
+            ));
         }
     }
-    if faults.is_empty() { Ok(columns) } else { Err(Error::Spec(faults)) }
+    if faults.is_empty() {
+        Ok(columns)
+    } else {
+        Err(Error::Spec(faults))
+    }
 }
 
 fn same(a: &MotionColumn, b: &MotionColumn) -> bool {
     use MotionColumn::{Acceleration, Position, Temperature, Time, Velocity};
     match (a, b) {
         (Time(_), Time(_)) | (Temperature, Temperature) => true,
-        (Position(a, _), Position(b, _)) | (Velocity(a, _), Velocity(b, _)) | (Acceleration(a, _), Acceleration(b, _)) => a == b,
+        (Position(a, _), Position(b, _))
+        | (Velocity(a, _), Velocity(b, _))
+        | (Acceleration(a, _), Acceleration(b, _)) => a == b,
         _ => false,
     }
 }
@@ -287,10 +381,21 @@ fn column(name: &str, robot: &RobotDescription) -> Option<MotionColumn> {
         return Some(MotionColumn::Temperature);
     }
     for (what, ending, unit) in PER_JOINT {
-        let Some(stem) = lower.strip_suffix(ending) else { continue };
-        let number = stem.strip_prefix(what).and_then(|number| number.parse::<usize>().ok());
-        let numbered = number.filter(|number| (1..=robot.joints.len()).contains(number)).map(|number| number - 1);
-        let named = || robot.joints.iter().position(|joint| what == "q" && joint.name.to_lowercase() == stem);
+        let Some(stem) = lower.strip_suffix(ending) else {
+            continue;
+        };
+        let number = stem
+            .strip_prefix(what)
+            .and_then(|number| number.parse::<usize>().ok());
+        let numbered = number
+            .filter(|number| (1..=robot.joints.len()).contains(number))
+            .map(|number| number - 1);
+        let named = || {
+            robot
+                .joints
+                .iter()
+                .position(|joint| what == "q" && joint.name.to_lowercase() == stem)
+        };
         if let Some(joint) = numbered.or_else(named) {
             return Some(match what {
                 "q" => MotionColumn::Position(joint, unit),

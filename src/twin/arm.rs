@@ -60,15 +60,24 @@ impl Arm {
     pub fn new(robot: &RobotDescription, truth: &TrueRobot) -> Arm {
         let last = robot.joints.len().saturating_sub(1);
         let links = robot.joints.iter().enumerate().map(|(index, joint)| {
-            let end = robot.joints.get(index + 1).map_or(robot.tool, |next| next.point);
+            let end = robot
+                .joints
+                .get(index + 1)
+                .map_or(robot.tool, |next| next.point);
             let error = truth.link_error(index);
             Link {
                 revolute: joint.kind == JointKind::Revolute,
                 axis: joint.axis,
                 span: matrix::add(matrix::minus(end, joint.point), error.shift),
-                tilt: if index == last { matrix::IDENTITY } else { matrix::turn_by(error.tilt) },
+                tilt: if index == last {
+                    matrix::IDENTITY
+                } else {
+                    matrix::turn_by(error.tilt)
+                },
                 mass: joint.mass.unwrap_or(0.0),
-                centre: joint.centre.map_or([0.0; 3], |centre| matrix::minus(centre, joint.point)),
+                centre: joint
+                    .centre
+                    .map_or([0.0; 3], |centre| matrix::minus(centre, joint.point)),
                 gear: joint.reduction_ratio.unwrap_or(1.0),
                 motor_constant: joint.motor_constant.unwrap_or(1.0),
             }
@@ -102,6 +111,10 @@ impl Arm {
             at = matrix::times(&at, &motion.link_end[index]);
             at = matrix::times(&at, &link.tilt);
         }
-        Posture { tool: matrix::place(&at, motion.tool), frames, axes }
+        Posture {
+            tool: matrix::place(&at, motion.tool),
+            frames,
+            axes,
+        }
     }
 }

@@ -30,7 +30,17 @@ pub fn settle(arm: &Arm, row: &Row, effects: &[Physical]) -> Equilibrium {
         let mut next = Motion::none(arm.links.len());
         for (index, effect) in effects.iter().enumerate() {
             let memory = remembered(row, index);
-            effect.act(&State { arm, row, posture: &held.0, loads: &held.1, torque: &held.2, memory }, &mut next);
+            effect.act(
+                &State {
+                    arm,
+                    row,
+                    posture: &held.0,
+                    loads: &held.1,
+                    torque: &held.2,
+                    memory,
+                },
+                &mut next,
+            );
         }
         let change = next.distance(&held.3);
         motion = next;
@@ -39,13 +49,25 @@ pub fn settle(arm: &Arm, row: &Row, effects: &[Physical]) -> Equilibrium {
         }
     }
     let (posture, _, torque, motion) = hold(arm, row, motion);
-    Equilibrium { posture, motion, torque }
+    Equilibrium {
+        posture,
+        motion,
+        torque,
+    }
 }
 
 /// What the tracker reads of the measured point, m in its frame, without its noise; `base` is the base frame as it sees it at first.
 pub fn sighted(rest: &Equilibrium, base: &Matrix, row: &Row, effects: &[Physical]) -> Vector {
-    let there = matrix::place(&matrix::times(&rest.motion.tracker, base), rest.posture.tool);
-    effects.iter().enumerate().fold(there, |point, (index, effect)| effect.sight(row, remembered(row, index), point))
+    let there = matrix::place(
+        &matrix::times(&rest.motion.tracker, base),
+        rest.posture.tool,
+    );
+    effects
+        .iter()
+        .enumerate()
+        .fold(there, |point, (index, effect)| {
+            effect.sight(row, remembered(row, index), point)
+        })
 }
 
 fn remembered(row: &Row, effect: usize) -> f64 {
@@ -53,10 +75,19 @@ fn remembered(row: &Row, effect: usize) -> f64 {
 }
 
 fn hold(arm: &Arm, row: &Row, motion: Motion) -> (Posture, Loads, Vec<f64>, Motion) {
-    let angle: Vec<f64> = row.drive.iter().zip(&motion.joint).map(|(drive, extra)| drive + extra).collect();
+    let angle: Vec<f64> = row
+        .drive
+        .iter()
+        .zip(&motion.joint)
+        .map(|(drive, extra)| drive + extra)
+        .collect();
     let posture = arm.posture(&angle, &motion);
     let loads = Loads::new(arm, &posture, row.payload_kg);
     let gravity = loads.torques(arm, &posture);
-    let torque = gravity.iter().zip(&motion.load).map(|(gravity, load)| gravity + load).collect();
+    let torque = gravity
+        .iter()
+        .zip(&motion.load)
+        .map(|(gravity, load)| gravity + load)
+        .collect();
     (posture, loads, torque, motion)
 }

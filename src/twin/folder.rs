@@ -51,28 +51,63 @@ pub struct Log {
 impl Log {
     /// controller.csv.
     pub fn controller(&self, decimals: Decimals) -> String {
-        let numbered = |name: &dyn Fn(usize) -> String| (1..=self.joints).map(name).collect::<Vec<_>>();
+        let numbered =
+            |name: &dyn Fn(usize) -> String| (1..=self.joints).map(name).collect::<Vec<_>>();
         let mut titles = vec!["point_id".to_string()];
         titles.extend(self.time_s.is_some().then(|| "time_s".into()));
         titles.extend(["use".into(), "payload_kg".into()]);
         titles.extend(numbered(&|joint| format!("q{joint}_deg")));
-        titles.extend(self.current.iter().flat_map(|_| numbered(&|joint| format!("i{joint}_a"))));
-        titles.extend(self.direction.iter().flat_map(|_| numbered(&|joint| format!("dir{joint}"))));
-        titles.extend(self.velocity.iter().flat_map(|_| numbered(&|joint| format!("dq{joint}_deg_s"))));
+        titles.extend(
+            self.current
+                .iter()
+                .flat_map(|_| numbered(&|joint| format!("i{joint}_a"))),
+        );
+        titles.extend(
+            self.direction
+                .iter()
+                .flat_map(|_| numbered(&|joint| format!("dir{joint}"))),
+        );
+        titles.extend(
+            self.velocity
+                .iter()
+                .flat_map(|_| numbered(&|joint| format!("dq{joint}_deg_s"))),
+        );
         titles.extend(self.temperature_c.is_some().then(|| "temp_c".into()));
         let mut text = titles.join(",") + "\n";
         for (row, id) in self.id.iter().enumerate() {
             let joints = row * self.joints..(row + 1) * self.joints;
             let mut cells = vec![word(id)];
-            cells.extend(self.time_s.iter().map(|time| fixed(time[row], decimals.time)));
+            cells.extend(
+                self.time_s
+                    .iter()
+                    .map(|time| fixed(time[row], decimals.time)),
+            );
             cells.push(word(&self.usage[row]));
             cells.push(fixed(self.payload_kg[row], 1));
-            cells.extend(self.q[joints.clone()].iter().map(|angle| fixed(angle.to_degrees(), decimals.angle)));
-            cells.extend(self.current.iter().flat_map(|all| &all[joints.clone()]).map(|current| fixed(*current, 4)));
-            cells.extend(self.direction.iter().flat_map(|all| &all[joints.clone()]).map(|side| fixed(*side, 0)));
+            cells.extend(
+                self.q[joints.clone()]
+                    .iter()
+                    .map(|angle| fixed(angle.to_degrees(), decimals.angle)),
+            );
+            cells.extend(
+                self.current
+                    .iter()
+                    .flat_map(|all| &all[joints.clone()])
+                    .map(|current| fixed(*current, 4)),
+            );
+            cells.extend(
+                self.direction
+                    .iter()
+                    .flat_map(|all| &all[joints.clone()])
+                    .map(|side| fixed(*side, 0)),
+            );
             let rates = self.velocity.iter().flat_map(|all| &all[joints.clone()]);
             cells.extend(rates.map(|rate| fixed(rate.to_degrees(), decimals.angle)));
-            cells.extend(self.temperature_c.iter().map(|celsius| fixed(celsius[row], 2)));
+            cells.extend(
+                self.temperature_c
+                    .iter()
+                    .map(|celsius| fixed(celsius[row], 2)),
+            );
             let _ = writeln!(text, "{}", cells.join(","));
         }
         text
@@ -84,7 +119,9 @@ impl Log {
         let mut text = format!("point_id,{title}x_mm,y_mm,z_mm\n");
         let later = if self.at_once { 0.0 } else { TRACKER_LATER_S };
         for (row, (id, position)) in self.id.iter().zip(&self.position).enumerate() {
-            let time = self.time_s.as_ref().map_or_else(String::new, |time| fixed(time[row] + later, decimals.time) + ",");
+            let time = self.time_s.as_ref().map_or_else(String::new, |time| {
+                fixed(time[row] + later, decimals.time) + ","
+            });
             let [x, y, z] = position.map(|coordinate| fixed(1e3 * coordinate, decimals.length));
             let _ = writeln!(text, "{},{time}{x},{y},{z}", word(id));
         }
@@ -94,7 +131,11 @@ impl Log {
 
 /// A text of somebody else's as a cell: quoted where it holds a separator, and no formula for a spreadsheet.
 fn word(text: &str) -> String {
-    let guard = if text.starts_with(['=', '+', '-', '@', '\t', '\r']) { "'" } else { "" };
+    let guard = if text.starts_with(['=', '+', '-', '@', '\t', '\r']) {
+        "'"
+    } else {
+        ""
+    };
     if guard.is_empty() && !text.contains([',', '"', '\n', '\r']) {
         return text.to_string();
     }
@@ -113,12 +154,21 @@ fn fixed(value: f64, decimals: usize) -> String {
 /// robot.json: mm, kg, Nm/A, joints from 0. Fails with what of the robot this layout cannot state.
 pub fn robot(robot: &RobotDescription) -> Result<String, String> {
     let joints = &robot.joints;
-    if let Some(number) = joints.iter().position(|joint| joint.kind == JointKind::Prismatic) {
-        return Err(format!("joint {} is prismatic, which robot.json cannot state", number + 1));
+    if let Some(number) = joints
+        .iter()
+        .position(|joint| joint.kind == JointKind::Prismatic)
+    {
+        return Err(format!(
+            "joint {} is prismatic, which robot.json cannot state",
+            number + 1
+        ));
     }
     if let Some(pair) = robot.couplings.iter().find(|pair| pair.ratio != 0.0) {
         let (moved, by) = (pair.moved + 1, pair.by + 1);
-        return Err(format!("the coupling {by}->{moved} has a nominal ratio of {}, which robot.json cannot state", pair.ratio));
+        return Err(format!(
+            "the coupling {by}->{moved} has a nominal ratio of {}, which robot.json cannot state",
+            pair.ratio
+        ));
     }
     let mm = |v: Vector| json!(v.map(|x| (1e9 * x).round() / 1e6));
     let mut out = json!({
@@ -136,9 +186,30 @@ pub fn robot(robot: &RobotDescription) -> Result<String, String> {
             out[key] = json!(values);
         }
     };
-    state("mass", joints.iter().map(|joint| joint.mass.map(|mass| json!(mass))).collect());
-    state("com", joints.iter().map(|joint| joint.centre.map(mm)).collect());
-    state("ratio", joints.iter().map(|joint| joint.reduction_ratio.map(|ratio| json!(ratio))).collect());
-    state("kt", joints.iter().map(|joint| joint.motor_constant.map(|constant| json!(constant))).collect());
+    state(
+        "mass",
+        joints
+            .iter()
+            .map(|joint| joint.mass.map(|mass| json!(mass)))
+            .collect(),
+    );
+    state(
+        "com",
+        joints.iter().map(|joint| joint.centre.map(mm)).collect(),
+    );
+    state(
+        "ratio",
+        joints
+            .iter()
+            .map(|joint| joint.reduction_ratio.map(|ratio| json!(ratio)))
+            .collect(),
+    );
+    state(
+        "kt",
+        joints
+            .iter()
+            .map(|joint| joint.motor_constant.map(|constant| json!(constant)))
+            .collect(),
+    );
     Ok(format!("{out:#}\n"))
 }

@@ -25,11 +25,26 @@ const SHORT: f64 = 5.0;
 impl GivenPose {
     /// The joints, rad or m, and where the arm stops before, if it does.
     pub(super) fn postures(&self, robot: &RobotDescription) -> (Vec<f64>, Option<Vec<f64>>) {
-        let si = |(value, kind): (f64, JointKind)| if kind == JointKind::Revolute { value.to_radians() } else { 1e-3 * value };
+        let si = |(value, kind): (f64, JointKind)| {
+            if kind == JointKind::Revolute {
+                value.to_radians()
+            } else {
+                1e-3 * value
+            }
+        };
         let kinds = || robot.joints.iter().map(|joint| joint.kind);
-        let q = self.joints_deg.iter().copied().zip(kinds()).map(si).collect();
+        let q = self
+            .joints_deg
+            .iter()
+            .copied()
+            .zip(kinds())
+            .map(si)
+            .collect();
         let sides = self.joints_deg.iter().zip(&self.direction);
-        let short = sides.map(|(value, side)| value - side * SHORT).zip(kinds()).map(si);
+        let short = sides
+            .map(|(value, side)| value - side * SHORT)
+            .zip(kinds())
+            .map(si);
         (q, (!self.direction.is_empty()).then(|| short.collect()))
     }
 
@@ -37,12 +52,25 @@ impl GivenPose {
     pub fn faults(&self) -> Vec<(&'static str, String)> {
         let mut out = Vec::new();
         if self.joints_deg.is_empty() || !self.joints_deg.iter().all(|value| value.is_finite()) {
-            out.push(("joints_deg", "expected a number for every joint, deg (mm for a prismatic joint)".to_string()));
+            out.push((
+                "joints_deg",
+                "expected a number for every joint, deg (mm for a prismatic joint)".to_string(),
+            ));
         }
-        if !self.direction.iter().all(|side| [-1.0, 0.0, 1.0].contains(side)) {
-            out.push(("direction", "allowed: 1, -1 or 0 for every joint, or nothing".to_string()));
+        if !self
+            .direction
+            .iter()
+            .all(|side| [-1.0, 0.0, 1.0].contains(side))
+        {
+            out.push((
+                "direction",
+                "allowed: 1, -1 or 0 for every joint, or nothing".to_string(),
+            ));
         }
-        if self.payload_kg.is_some_and(|mass| !(mass.is_finite() && mass >= 0.0)) {
+        if self
+            .payload_kg
+            .is_some_and(|mass| !(mass.is_finite() && mass >= 0.0))
+        {
             out.push(("payload_kg", "expected a mass, 0 or more".to_string()));
         }
         out
@@ -52,22 +80,33 @@ impl GivenPose {
     pub fn against(&self, robot: &RobotDescription) -> Vec<(&'static str, String)> {
         let joints = robot.joints.len();
         let mut out = Vec::new();
-        for (name, count) in [("joints_deg", self.joints_deg.len()), ("direction", self.direction.len())] {
+        for (name, count) in [
+            ("joints_deg", self.joints_deg.len()),
+            ("direction", self.direction.len()),
+        ] {
             if count != joints && (name == "joints_deg" || count > 0) {
-                out.push((name, format!("has {count} numbers, the robot {joints} joints")));
+                out.push((
+                    name,
+                    format!("has {count} numbers, the robot {joints} joints"),
+                ));
             }
         }
         let (q, _) = self.postures(robot);
         for (index, (at, joint)) in q.iter().zip(&robot.joints).enumerate() {
             // A limit that was rounded to the decimals of a pose is no breach of it.
-            let beyond = joint.limits.filter(|[low, high]| *at < low - 1e-6 || *at > high + 1e-6);
+            let beyond = joint
+                .limits
+                .filter(|[low, high]| *at < low - 1e-6 || *at > high + 1e-6);
             if let Some(limits) = beyond {
                 let (unit, [low, high]) = match joint.kind {
                     JointKind::Revolute => ("deg", limits.map(f64::to_degrees)),
                     JointKind::Prismatic => ("mm", limits.map(|metres| 1e3 * metres)),
                 };
-                let message =
-                    format!("joint {} is at {} {unit}; allowed: {low:.3} to {high:.3}", index + 1, self.joints_deg[index]);
+                let message = format!(
+                    "joint {} is at {} {unit}; allowed: {low:.3} to {high:.3}",
+                    index + 1,
+                    self.joints_deg[index]
+                );
                 out.push(("joints_deg", message));
             }
         }

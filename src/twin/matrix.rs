@@ -6,7 +6,12 @@ pub type Matrix = [[f64; 4]; 4];
 pub type Vector = [f64; 3];
 
 /// No motion.
-pub const IDENTITY: Matrix = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
+pub const IDENTITY: Matrix = [
+    [1.0, 0.0, 0.0, 0.0],
+    [0.0, 1.0, 0.0, 0.0],
+    [0.0, 0.0, 1.0, 0.0],
+    [0.0, 0.0, 0.0, 1.0],
+];
 
 /// The motion `a` followed by `b` in a's frame.
 pub fn times(a: &Matrix, b: &Matrix) -> Matrix {
@@ -38,7 +43,11 @@ pub fn turn(axis: Vector, angle: f64) -> Matrix {
 /// Rotation by a rotation vector (rad).
 pub fn turn_by(v: Vector) -> Matrix {
     let angle = norm(v);
-    if angle == 0.0 { IDENTITY } else { turn(scale(v, 1.0 / angle), angle) }
+    if angle == 0.0 {
+        IDENTITY
+    } else {
+        turn(scale(v, 1.0 / angle), angle)
+    }
 }
 
 /// Roll, pitch, yaw (rad) about the fixed x, y and z axis, in this order.
@@ -103,7 +112,11 @@ pub fn dot(a: Vector, b: Vector) -> f64 {
 
 /// a x b.
 pub fn cross(a: Vector, b: Vector) -> Vector {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
 }
 
 /// Length.

@@ -18,7 +18,9 @@ pub struct Moment {
 impl Moment {
     /// Travel of a joint (from 1) piece by piece, rad or m.
     pub fn travels(&self, joint: usize) -> impl Iterator<Item = f64> {
-        self.pieces.iter().filter_map(move |piece| piece.get(joint.wrapping_sub(1)).copied())
+        self.pieces
+            .iter()
+            .filter_map(move |piece| piece.get(joint.wrapping_sub(1)).copied())
     }
 }
 
@@ -31,9 +33,18 @@ pub fn past(points: &[Point]) -> Vec<Moment> {
     let mut out = Vec::with_capacity(points.len());
     let mut stood: Option<&[f64]> = None;
     for point in points {
-        let back = stood.filter(|stood| *stood != point.before.as_slice()).map(|stood| piece(stood, &point.before));
-        let pieces = back.into_iter().chain([piece(&point.before, &point.q)]).collect();
-        out.push(Moment { pieces, time_s: point.time_s, temperature_c: point.temperature_c });
+        let back = stood
+            .filter(|stood| *stood != point.before.as_slice())
+            .map(|stood| piece(stood, &point.before));
+        let pieces = back
+            .into_iter()
+            .chain([piece(&point.before, &point.q)])
+            .collect();
+        out.push(Moment {
+            pieces,
+            time_s: point.time_s,
+            temperature_c: point.temperature_c,
+        });
         stood = Some(&point.q);
     }
     out
@@ -45,7 +56,11 @@ pub fn along(course: impl Iterator<Item = (Vec<f64>, f64, f64)>) -> Vec<Moment> 
     let reach = |(q, time_s, temperature_c): (Vec<f64>, f64, f64)| {
         let pieces = stood.iter().map(|stood| piece(stood, &q)).collect();
         stood = Some(q);
-        Moment { pieces, time_s, temperature_c }
+        Moment {
+            pieces,
+            time_s,
+            temperature_c,
+        }
     };
     course.map(reach).collect()
 }
@@ -61,7 +76,8 @@ pub(super) fn behind(past: &[Moment], lag_s: f64, start_c: f64) -> Vec<f64> {
         } else if dt > 0.0 {
             // Behind a ramp it ends up by slope times lag.
             let trail = rise / dt * lag_s;
-            lagging = moment.temperature_c - trail + (lagging - logged + trail) * (-dt / lag_s).exp();
+            lagging =
+                moment.temperature_c - trail + (lagging - logged + trail) * (-dt / lag_s).exp();
         }
         (then, logged) = (moment.time_s, moment.temperature_c);
         lagging
@@ -73,7 +89,11 @@ pub(super) fn behind(past: &[Moment], lag_s: f64, start_c: f64) -> Vec<f64> {
 pub(super) fn recent_travel(past: &[Moment], joint: usize, cooling_s: f64) -> Vec<f64> {
     let (mut then, mut warm) = (0.0, 0.0);
     let live = |moment: &Moment| {
-        let kept = if cooling_s > 0.0 { (-(moment.time_s - then) / cooling_s).exp() } else { 0.0 };
+        let kept = if cooling_s > 0.0 {
+            (-(moment.time_s - then) / cooling_s).exp()
+        } else {
+            0.0
+        };
         warm = warm * kept + moment.travels(joint).map(f64::abs).sum::<f64>();
         then = moment.time_s;
         warm

@@ -6,7 +6,10 @@ use super::truth::ARCSEC;
 /// A share of a rigid step: a shift (um) after a rotation vector (arcsec).
 pub fn step(shift_um: Vector, turn_arcsec: Vector, share: f64) -> Matrix {
     let moved = matrix::shift(matrix::scale(shift_um, 1e-6 * share));
-    matrix::times(&moved, &matrix::turn_by(matrix::scale(turn_arcsec, ARCSEC * share)))
+    matrix::times(
+        &moved,
+        &matrix::turn_by(matrix::scale(turn_arcsec, ARCSEC * share)),
+    )
 }
 
 /// What effects do to the arm.
@@ -45,12 +48,35 @@ impl Motion {
     /// The largest difference of any number, rad, m or Nm; the motors' torque does not move the arm.
     pub fn distance(&self, other: &Motion) -> f64 {
         let apart = |a: &Matrix, b: &Matrix| {
-            a.as_flattened().iter().zip(b.as_flattened()).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max)
+            a.as_flattened()
+                .iter()
+                .zip(b.as_flattened())
+                .map(|(x, y)| (x - y).abs())
+                .fold(0.0, f64::max)
         };
-        let joints = self.joint.iter().zip(&other.joint).map(|(a, b)| (a - b).abs());
-        let links = self.link_end.iter().zip(&other.link_end).map(|(a, b)| apart(a, b));
-        let loads = self.load.iter().zip(&other.load).map(|(a, b)| (a - b).abs());
-        let frames = [apart(&self.base, &other.base), apart(&self.tracker, &other.tracker)];
-        joints.chain(links).chain(loads).chain(frames).fold(matrix::norm(matrix::minus(self.tool, other.tool)), f64::max)
+        let joints = self
+            .joint
+            .iter()
+            .zip(&other.joint)
+            .map(|(a, b)| (a - b).abs());
+        let links = self
+            .link_end
+            .iter()
+            .zip(&other.link_end)
+            .map(|(a, b)| apart(a, b));
+        let loads = self
+            .load
+            .iter()
+            .zip(&other.load)
+            .map(|(a, b)| (a - b).abs());
+        let frames = [
+            apart(&self.base, &other.base),
+            apart(&self.tracker, &other.tracker),
+        ];
+        joints
+            .chain(links)
+            .chain(loads)
+            .chain(frames)
+            .fold(matrix::norm(matrix::minus(self.tool, other.tool)), f64::max)
     }
 }

@@ -29,7 +29,12 @@ pub struct Poses {
 
 impl Default for Poses {
     fn default() -> Self {
-        Self { range_deg: Vec::new(), floor_mm: 200.0, clearance_mm: 600.0, candidates: 10 }
+        Self {
+            range_deg: Vec::new(),
+            floor_mm: 200.0,
+            clearance_mm: 600.0,
+            candidates: 10,
+        }
     }
 }
 
@@ -60,7 +65,10 @@ impl Block {
 /// Given poses of all blocks, with their places.
 pub fn given(blocks: &[Block]) -> impl Iterator<Item = (String, &GivenPose)> {
     blocks.iter().enumerate().flat_map(|(block, all)| {
-        all.given.iter().enumerate().map(move |(pose, given)| (format!("blocks[{block}].given[{pose}]"), given))
+        all.given
+            .iter()
+            .enumerate()
+            .map(move |(pose, given)| (format!("blocks[{block}].given[{pose}]"), given))
     })
 }
 
@@ -107,7 +115,15 @@ fn usual_swing(hours: &f64) -> bool {
 impl Default for Climate {
     fn default() -> Self {
         let (pace_s, begin_s) = ([15.0, 25.0], 0.0);
-        Self { pace_s, begin_s, start_c: 20.0, rise_k: 0.0, warm_up_h: 1.5, swing_k: 0.0, swing_h: SWING_H }
+        Self {
+            pace_s,
+            begin_s,
+            start_c: 20.0,
+            rise_k: 0.0,
+            warm_up_h: 1.5,
+            swing_k: 0.0,
+            swing_h: SWING_H,
+        }
     }
 }
 
@@ -115,13 +131,26 @@ impl Climate {
     /// Temperature of the arm at a time, C.
     pub fn temperature(&self, time_s: f64) -> f64 {
         let warm = self.start_c + self.rise_k * (1.0 - (-time_s / (3600.0 * self.warm_up_h)).exp());
-        if self.swing_k == 0.0 { warm } else { warm + self.swing_k * (TAU * time_s / (3600.0 * self.swing_h)).sin() }
+        if self.swing_k == 0.0 {
+            warm
+        } else {
+            warm + self.swing_k * (TAU * time_s / (3600.0 * self.swing_h)).sin()
+        }
     }
 }
 
 /// The side to which each joint moved last: +1, -1, or 0 where it stood still.
 pub fn direction(now: &[f64], before: &[f64]) -> Vec<f64> {
-    now.iter().zip(before).map(|(now, then)| if now == then { 0.0 } else { (now - then).signum() }).collect()
+    now.iter()
+        .zip(before)
+        .map(|(now, then)| {
+            if now == then {
+                0.0
+            } else {
+                (now - then).signum()
+            }
+        })
+        .collect()
 }
 
 /// A planned point.
@@ -156,14 +185,27 @@ pub fn plan(
     seed: u64,
 ) -> Result<Vec<Point>, String> {
     // Nothing is drawn where all poses are given: then the robot needs no limits.
-    let ranges = if blocks.iter().all(|block| block.points == 0) { Vec::new() } else { ranges(robot, poses)? };
+    let ranges = if blocks.iter().all(|block| block.points == 0) {
+        Vec::new()
+    } else {
+        ranges(robot, poses)?
+    };
     let mut draw = Noise::new(seed, Purpose::Poses);
     let mut clock = Noise::new(seed, Purpose::Clock);
-    let (mut out, mut time, mut before): (Vec<Point>, f64, _) = (Vec::new(), climate.begin_s, vec![0.0; robot.joints.len()]);
+    let (mut out, mut time, mut before): (Vec<Point>, f64, _) =
+        (Vec::new(), climate.begin_s, vec![0.0; robot.joints.len()]);
     let mut tick = |q: Vec<f64>, block: usize, payload_kg: f64| {
         time += clock.uniform(climate.pace_s[0], climate.pace_s[1]);
         let before = std::mem::replace(&mut before, q.clone());
-        Point { block, q, before, direction: Vec::new(), time_s: time, temperature_c: climate.temperature(time), payload_kg }
+        Point {
+            block,
+            q,
+            before,
+            direction: Vec::new(),
+            time_s: time,
+            temperature_c: climate.temperature(time),
+            payload_kg,
+        }
     };
     for (number, block) in blocks.iter().enumerate() {
         let mut taken: Vec<Vector> = Vec::with_capacity(block.count());
@@ -171,13 +213,19 @@ pub fn plan(
             let (q, short) = pose.postures(robot);
             taken.push(arm.posture(&q, &Motion::none(arm.links.len())).tool);
             let straight = tick(q, number, pose.payload_kg.unwrap_or(block.payload_kg));
-            out.push(Point { before: short.unwrap_or_else(|| straight.before.clone()), ..straight });
+            out.push(Point {
+                before: short.unwrap_or_else(|| straight.before.clone()),
+                ..straight
+            });
         }
         for _ in 0..block.points {
             let mut best: Option<(f64, Vec<f64>, Vector)> = None;
             for _ in 0..poses.candidates.max(1) {
                 let (q, tool) = allowed(arm, poses, &ranges, &mut draw)?;
-                let room = taken.iter().map(|other| matrix::norm(matrix::minus(tool, *other))).fold(f64::INFINITY, f64::min);
+                let room = taken
+                    .iter()
+                    .map(|other| matrix::norm(matrix::minus(tool, *other)))
+                    .fold(f64::INFINITY, f64::min);
                 if best.as_ref().is_none_or(|(most, _, _)| room > *most) {
                     best = Some((room, q, tool));
                 }
@@ -187,37 +235,64 @@ pub fn plan(
             out.push(tick(q, number, block.payload_kg));
         }
     }
-    out.iter_mut().for_each(|point| point.direction = direction(&point.q, &point.before));
+    out.iter_mut()
+        .for_each(|point| point.direction = direction(&point.q, &point.before));
     Ok(out)
 }
 
 /// The range of every joint, rad or m; fails where the robot has no limits and the poses no ranges.
 pub(super) fn ranges(robot: &RobotDescription, poses: &Poses) -> Result<Vec<[f64; 2]>, String> {
     if poses.range_deg.is_empty() {
-        let limits =
-            robot.joints.iter().enumerate().map(|(index, joint)| {
-                joint.limits.ok_or_else(|| format!("joint {} has no limits; give poses.range_deg", index + 1))
-            });
+        let limits = robot.joints.iter().enumerate().map(|(index, joint)| {
+            joint
+                .limits
+                .ok_or_else(|| format!("joint {} has no limits; give poses.range_deg", index + 1))
+        });
         return limits.collect();
     }
     if poses.range_deg.len() != robot.joints.len() {
-        return Err(format!("poses.range_deg has {} ranges, the robot {} joints", poses.range_deg.len(), robot.joints.len()));
+        return Err(format!(
+            "poses.range_deg has {} ranges, the robot {} joints",
+            poses.range_deg.len(),
+            robot.joints.len()
+        ));
     }
     let si = |revolute: bool, x: f64| if revolute { x.to_radians() } else { 1e-3 * x };
-    let joints = robot.joints.iter().map(|joint| joint.kind == calib_foundation::description::JointKind::Revolute);
-    Ok(poses.range_deg.iter().zip(joints).map(|(range, revolute)| range.map(|x| si(revolute, x))).collect())
+    let joints = robot
+        .joints
+        .iter()
+        .map(|joint| joint.kind == calib_foundation::description::JointKind::Revolute);
+    Ok(poses
+        .range_deg
+        .iter()
+        .zip(joints)
+        .map(|(range, revolute)| range.map(|x| si(revolute, x)))
+        .collect())
 }
 
 /// A random pose within `ranges` (rad or m) and its tool point; fails with what to widen where none is allowed.
-pub fn allowed(arm: &Arm, poses: &Poses, ranges: &[[f64; 2]], draw: &mut Noise) -> Result<(Vec<f64>, Vector), String> {
+pub fn allowed(
+    arm: &Arm,
+    poses: &Poses,
+    ranges: &[[f64; 2]],
+    draw: &mut Noise,
+) -> Result<(Vec<f64>, Vector), String> {
     let floor = 1e-3 * poses.floor_mm;
     let rest = Motion::none(arm.links.len());
     for _ in 0..TRIES {
-        let q: Vec<f64> = ranges.iter().map(|range| draw.uniform(range[0], range[1])).collect();
+        let q: Vec<f64> = ranges
+            .iter()
+            .map(|range| draw.uniform(range[0], range[1]))
+            .collect();
         let posture = arm.posture(&q, &rest);
         let far = posture.tool[0].hypot(posture.tool[1]) >= 1e-3 * poses.clearance_mm;
         // Joints up to the second stand on the base, which may reach to the floor.
-        let high = posture.frames.iter().skip(2).all(|frame| frame[2][3] >= floor) && posture.tool[2] >= floor;
+        let high = posture
+            .frames
+            .iter()
+            .skip(2)
+            .all(|frame| frame[2][3] >= floor)
+            && posture.tool[2] >= floor;
         if far && high {
             return Ok((q, posture.tool));
         }

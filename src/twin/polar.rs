@@ -17,12 +17,23 @@ impl Polar {
     /// The range and the angles of a point as the instrument sees it, m.
     pub fn of(point: Vector) -> Polar {
         let level = point[0].hypot(point[1]);
-        Polar { range: matrix::norm(point), azimuth: point[1].atan2(point[0]), elevation: point[2].atan2(level) }
+        Polar {
+            range: matrix::norm(point),
+            azimuth: point[1].atan2(point[0]),
+            elevation: point[2].atan2(level),
+        }
     }
 
     /// The point, m.
     pub fn point(self) -> Vector {
-        let (level, height) = (self.range * self.elevation.cos(), self.range * self.elevation.sin());
-        [level * self.azimuth.cos(), level * self.azimuth.sin(), height]
+        let (level, height) = (
+            self.range * self.elevation.cos(),
+            self.range * self.elevation.sin(),
+        );
+        [
+            level * self.azimuth.cos(),
+            level * self.azimuth.sin(),
+            height,
+        ]
     }
 }

@@ -81,7 +81,14 @@ impl Experiment<'_> {
     /// All points in order; `tick` hears of each. Fails with what is wrong where no pose is allowed.
     pub fn record(&self, tick: impl FnMut()) -> Result<Vec<Shot>, String> {
         let arm = Arm::new(self.robot, self.truth);
-        let points = plan::plan(self.robot, &arm, self.poses, self.blocks, self.climate, self.seed)?;
+        let points = plan::plan(
+            self.robot,
+            &arm,
+            self.poses,
+            self.blocks,
+            self.climate,
+            self.seed,
+        )?;
         Ok(self.measure(points, tick))
     }
 
@@ -89,7 +96,14 @@ impl Experiment<'_> {
     pub fn follow(&self, way: &Way, mut tick: impl FnMut()) -> Result<Vec<Shot>, String> {
         let mut arm = Arm::new(self.robot, self.truth);
         let rows: usize = self.blocks.iter().map(|block| block.points).sum();
-        let path = Path::draw(way, self.robot, &arm, self.poses, rows as f64 / way.rate_hz, self.seed)?;
+        let path = Path::draw(
+            way,
+            self.robot,
+            &arm,
+            self.poses,
+            rows as f64 / way.rate_hz,
+            self.seed,
+        )?;
         let effects = self.all_effects(&arm);
         for effect in &effects {
             effect.shape(&mut arm);
@@ -97,37 +111,75 @@ impl Experiment<'_> {
         let later: f64 = effects.iter().map(Physical::later).sum();
         let times = (0..rows).map(|row| row as f64 / way.rate_hz);
         let begin_s = self.climate.begin_s;
-        let clock = |since_s: f64| (begin_s + since_s, self.climate.temperature(begin_s + since_s));
-        let course = times.map(|since_s| (path.at(since_s + later).0, clock(since_s).0, clock(since_s).1));
+        let clock = |since_s: f64| {
+            (
+                begin_s + since_s,
+                self.climate.temperature(begin_s + since_s),
+            )
+        };
+        let course = times.map(|since_s| {
+            (
+                path.at(since_s + later).0,
+                clock(since_s).0,
+                clock(since_s).1,
+            )
+        });
         let mut memories = effect::recall(&effects, &memory::along(course));
         let base = self.tracker.base();
         let mut beam = Beam::new(self.seed);
         let mut play = Noise::new(self.seed, Purpose::Repeatability);
-        let lasts = if way.wander_s > 0.0 { (-1.0 / (way.rate_hz * way.wander_s)).exp() } else { 0.0 };
-        let mut astray: Vec<f64> = self.repeatability_arcsec.iter().map(|_| play.normal()).collect();
+        let lasts = if way.wander_s > 0.0 {
+            (-1.0 / (way.rate_hz * way.wander_s)).exp()
+        } else {
+            0.0
+        };
+        let mut astray: Vec<f64> = self
+            .repeatability_arcsec
+            .iter()
+            .map(|_| play.normal())
+            .collect();
         let mut direction = vec![0.0; arm.links.len()];
-        let blocks =
-            self.blocks.iter().enumerate().flat_map(|(number, block)| std::iter::repeat_n((number, block), block.points));
+        let blocks = self
+            .blocks
+            .iter()
+            .enumerate()
+            .flat_map(|(number, block)| std::iter::repeat_n((number, block), block.points));
         let mut shots = Vec::with_capacity(rows);
         for (row, (block, load)) in blocks.enumerate() {
             let since_s = row as f64 / way.rate_hz;
             let (mut q, logged) = path.at(since_s);
             let (command, velocity) = path.at(since_s + later);
             let mut drive = self.truth.drive(self.robot, &command);
-            for (((position, astray), sigma), link) in
-                drive.iter_mut().zip(&mut astray).zip(self.repeatability_arcsec).zip(&arm.links)
+            for (((position, astray), sigma), link) in drive
+                .iter_mut()
+                .zip(&mut astray)
+                .zip(self.repeatability_arcsec)
+                .zip(&arm.links)
             {
                 *astray = lasts * *astray + (1.0 - lasts * lasts).sqrt() * play.normal();
                 *position += sigma * if link.revolute { ARCSEC } else { 1e-6 } * *astray;
             }
-            for (side, speed) in direction.iter_mut().zip(&velocity).filter(|(_, speed)| **speed != 0.0) {
+            for (side, speed) in direction
+                .iter_mut()
+                .zip(&velocity)
+                .filter(|(_, speed)| **speed != 0.0)
+            {
                 *side = speed.signum();
             }
             let (time_s, temperature_c) = clock(since_s);
             let payload_kg = load.payload_kg;
             let memory = std::mem::take(&mut memories[row]);
             let direction = direction.clone();
-            let row = Row { command, drive, direction, time_s, temperature_c, payload_kg, velocity, memory };
+            let row = Row {
+                command,
+                drive,
+                direction,
+                time_s,
+                temperature_c,
+                payload_kg,
+                velocity,
+                memory,
+            };
             let rest = settle(&arm, &row, &effects);
             let seen = sighted(&rest, &base, &row, &effects);
             let before = q.clone();
@@ -166,13 +218,33 @@ impl Experiment<'_> {
         let mut shots = Vec::with_capacity(points.len());
         for (point, memory) in points.into_iter().zip(memories) {
             let mut drive = self.truth.drive(self.robot, &point.q);
-            for ((position, sigma), link) in drive.iter_mut().zip(self.repeatability_arcsec).zip(&arm.links) {
+            for ((position, sigma), link) in drive
+                .iter_mut()
+                .zip(self.repeatability_arcsec)
+                .zip(&arm.links)
+            {
                 *position += sigma * if link.revolute { ARCSEC } else { 1e-6 } * play.normal();
             }
-            let Point { block, before, time_s, temperature_c, payload_kg, .. } = point;
+            let Point {
+                block,
+                before,
+                time_s,
+                temperature_c,
+                payload_kg,
+                ..
+            } = point;
             let direction = point.direction;
             let velocity = Vec::new();
-            let row = Row { command: point.q, drive, direction, time_s, temperature_c, payload_kg, velocity, memory };
+            let row = Row {
+                command: point.q,
+                drive,
+                direction,
+                time_s,
+                temperature_c,
+                payload_kg,
+                velocity,
+                memory,
+            };
             let rest = settle(&arm, &row, &effects);
             let seen = sighted(&rest, &base, &row, &effects);
             let mut q = row.command;
@@ -199,15 +271,25 @@ impl Experiment<'_> {
     /// The chosen effects and the true robot's linear wind-up.
     pub(super) fn all_effects(&self, arm: &Arm) -> Vec<Physical> {
         let wind_up = arm.links.iter().enumerate().map(|(joint, link)| {
-            let rad_per_nm = self.truth.compliance(joint, link.gear * link.motor_constant);
-            Physical::JointCompliance(JointCompliance { joint: joint + 1, rad_per_nm })
+            let rad_per_nm = self
+                .truth
+                .compliance(joint, link.gear * link.motor_constant);
+            Physical::JointCompliance(JointCompliance {
+                joint: joint + 1,
+                rad_per_nm,
+            })
         });
         wind_up.chain(self.effects.iter().cloned()).collect()
     }
 
     /// Holding currents: the motor carries what gravity and springs do to the joint, plus what friction adds.
     fn currents(&self, arm: &Arm, torque: &[f64], motion: &Motion, meter: &mut Noise) -> Vec<f64> {
-        let joints = arm.links.iter().zip(torque).zip(&motion.motor_torque).enumerate();
+        let joints = arm
+            .links
+            .iter()
+            .zip(torque)
+            .zip(&motion.motor_torque)
+            .enumerate();
         joints
             .map(|(joint, ((link, gravity), extra))| {
                 let sign = self.motors.sign.get(joint).copied().unwrap_or(1.0);

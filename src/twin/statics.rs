@@ -13,14 +13,22 @@ pub struct Loads {
 impl Loads {
     /// The links and the declared payload (kg) of an arm in `posture`.
     pub fn new(arm: &Arm, posture: &Posture, payload: f64) -> Loads {
-        let mut bodies: Vec<(usize, f64, Vector)> = (arm.links.iter().zip(&posture.frames).enumerate())
-            .map(|(index, (link, frame))| (index, link.mass, matrix::place(frame, link.centre)))
-            .collect();
+        let mut bodies: Vec<(usize, f64, Vector)> =
+            (arm.links.iter().zip(&posture.frames).enumerate())
+                .map(|(index, (link, frame))| (index, link.mass, matrix::place(frame, link.centre)))
+                .collect();
         if let Some(hand) = posture.frames.last() {
             // Beyond the last link: it bends that link too.
-            bodies.push((arm.links.len(), payload * arm.payload_share, matrix::place(hand, arm.payload_centre)));
+            bodies.push((
+                arm.links.len(),
+                payload * arm.payload_share,
+                matrix::place(hand, arm.payload_centre),
+            ));
         }
-        Loads { bodies, gravity: arm.gravity }
+        Loads {
+            bodies,
+            gravity: arm.gravity,
+        }
     }
 
     /// Force (N) and moment about `point` (Nm) of the weight of everything from link `from` (from 0) on, base frame.
@@ -36,7 +44,12 @@ impl Loads {
 
     /// What gravity does to each joint along its axis, Nm (N for a prismatic joint).
     pub fn torques(&self, arm: &Arm, posture: &Posture) -> Vec<f64> {
-        let joints = arm.links.iter().zip(&posture.frames).zip(&posture.axes).enumerate();
+        let joints = arm
+            .links
+            .iter()
+            .zip(&posture.frames)
+            .zip(&posture.axes)
+            .enumerate();
         joints
             .map(|(index, ((link, frame), axis))| {
                 let (force, moment) = self.wrench(index, matrix::origin(frame));

@@ -44,7 +44,9 @@ fn fit() -> String {
 }
 
 /// Kinds of things.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum FixtureKind {
     /// The ball lies in it.
@@ -83,9 +85,17 @@ impl Fixture {
     /// What is wrong with it: the place below it, and the message.
     pub fn faults(&self) -> Vec<(&'static str, &'static str)> {
         let mut faults = Vec::new();
-        let plain = |part: &str| !part.is_empty() && part.chars().all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_');
+        let plain = |part: &str| {
+            !part.is_empty()
+                && part
+                    .chars()
+                    .all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_')
+        };
         if !self.name.split('/').all(plain) {
-            faults.push(("name", "expected letters, digits, - and _, in parts with / between, e.g. front/0"));
+            faults.push((
+                "name",
+                "expected letters, digits, - and _, in parts with / between, e.g. front/0",
+            ));
         }
         if self.points == 0 {
             faults.push(("points", "expected 1 or more"));
@@ -95,10 +105,16 @@ impl Fixture {
         }
         let normal = self.normal.is_some_and(|normal| matrix::norm(normal) > 0.0);
         if (self.kind == FixtureKind::Plane) != normal {
-            faults.push(("normal", "a plane has one, e.g. [0, 0, 1], and nothing else has"));
+            faults.push((
+                "normal",
+                "a plane has one, e.g. [0, 0, 1], and nothing else has",
+            ));
         }
         if (self.kind != FixtureKind::Socket) != self.radius_mm.is_some_and(|radius| radius > 0.0) {
-            faults.push(("radius_mm", "planes and spheres have one above 0, sockets none"));
+            faults.push((
+                "radius_mm",
+                "planes and spheres have one above 0, sockets none",
+            ));
         }
         faults
     }
@@ -111,14 +127,23 @@ impl Fixture {
             FixtureKind::Socket => centre.map(|coordinate| coordinate + sigma * noise.normal()),
             FixtureKind::Sphere => {
                 let along = draw.vector(1.0, 1.0);
-                matrix::add(centre, matrix::scale(along, radius + sigma * noise.normal()))
+                matrix::add(
+                    centre,
+                    matrix::scale(along, radius + sigma * noise.normal()),
+                )
             }
             FixtureKind::Plane => {
                 let normal = self.normal.unwrap_or([0.0, 0.0, 1.0]);
                 let normal = matrix::scale(normal, 1.0 / matrix::norm(normal));
                 let flat = matrix::cross(normal, draw.vector(1.0, 1.0));
-                let out = matrix::scale(flat, radius * draw.uniform(0.0, 1.0).sqrt() / matrix::norm(flat).max(1e-9));
-                matrix::add(matrix::add(centre, out), matrix::scale(normal, sigma * noise.normal()))
+                let out = matrix::scale(
+                    flat,
+                    radius * draw.uniform(0.0, 1.0).sqrt() / matrix::norm(flat).max(1e-9),
+                );
+                matrix::add(
+                    matrix::add(centre, out),
+                    matrix::scale(normal, sigma * noise.normal()),
+                )
             }
         }
     }
@@ -134,7 +159,9 @@ impl Experiment<'_> {
         let mut draw = Noise::new(self.seed, Purpose::Poses);
         let mut noise = Noise::new(self.seed, Purpose::Tracker);
         let mut clock = Noise::new(self.seed, Purpose::Clock);
-        let Climate { pace_s, begin_s, .. } = *self.climate;
+        let Climate {
+            pace_s, begin_s, ..
+        } = *self.climate;
         let (mut time_s, mut touches) = (begin_s, Vec::new());
         for (number, fixture) in fixtures.iter().enumerate() {
             for _ in 0..fixture.points {
@@ -142,7 +169,14 @@ impl Experiment<'_> {
                 let temperature_c = self.climate.temperature(time_s);
                 let there = fixture.point(&mut draw, &mut noise);
                 let before = touches.last().map(|touch: &Touch| touch.q.clone());
-                let q = self.reach(&arm, &effects, &ranges, (there, before.as_deref()), [time_s, temperature_c], &mut draw);
+                let q = self.reach(
+                    &arm,
+                    &effects,
+                    &ranges,
+                    (there, before.as_deref()),
+                    [time_s, temperature_c],
+                    &mut draw,
+                );
                 let q = q.ok_or_else(|| {
                     let [x, y, z] = fixture.centre_mm;
                     format!(
@@ -150,7 +184,12 @@ impl Experiment<'_> {
                         fixture.name
                     )
                 })?;
-                touches.push(Touch { fixture: number, q, time_s, temperature_c });
+                touches.push(Touch {
+                    fixture: number,
+                    q,
+                    time_s,
+                    temperature_c,
+                });
             }
         }
         Ok(touches)
@@ -172,7 +211,11 @@ impl Experiment<'_> {
                 command: q.to_vec(),
                 drive: self.truth.drive(self.robot, q),
                 direction: match before {
-                    Some(before) => q.iter().zip(before).map(|(q, before)| (q - before).signum()).collect(),
+                    Some(before) => q
+                        .iter()
+                        .zip(before)
+                        .map(|(q, before)| (q - before).signum())
+                        .collect(),
                     None => vec![0.0; joints],
                 },
                 time_s,
@@ -183,7 +226,11 @@ impl Experiment<'_> {
             };
             settle(arm, &row, effects).posture.tool
         };
-        let anywhere = Poses { floor_mm: f64::NEG_INFINITY, clearance_mm: 0.0, ..self.poses.clone() };
+        let anywhere = Poses {
+            floor_mm: f64::NEG_INFINITY,
+            clearance_mm: 0.0,
+            ..self.poses.clone()
+        };
         for _ in 0..TRIES {
             let (mut q, _) = plan::allowed(arm, &anywhere, ranges, draw).ok()?;
             for _ in 0..STEPS {
@@ -201,10 +248,14 @@ impl Experiment<'_> {
                     matrix::scale(matrix::minus(ball(&beside), tool), 1.0 / STEP)
                 };
                 let columns: Vec<Vector> = (0..joints).map(moved).collect();
-                let Some(step) = least_step(&columns, left) else { break };
+                let Some(step) = least_step(&columns, left) else {
+                    break;
+                };
                 let largest = step.iter().fold(0.0f64, |most, turn| most.max(turn.abs()));
                 let share = (FAR / largest.max(1e-12)).min(1.0);
-                q.iter_mut().zip(&step).for_each(|(q, turn)| *q += share * turn);
+                q.iter_mut()
+                    .zip(&step)
+                    .for_each(|(q, turn)| *q += share * turn);
                 if !near(&q, ranges) {
                     break;
                 }
@@ -216,29 +267,50 @@ impl Experiment<'_> {
     /// Joints up to the second stand on the base, which may reach to the floor; the ball may lie below it.
     fn is_above_floor(&self, arm: &Arm, q: &[f64]) -> bool {
         let posture = arm.posture(q, &super::motion::Motion::none(arm.links.len()));
-        posture.frames.iter().skip(2).all(|frame| frame[2][3] >= 1e-3 * self.poses.floor_mm)
+        posture
+            .frames
+            .iter()
+            .skip(2)
+            .all(|frame| frame[2][3] >= 1e-3 * self.poses.floor_mm)
     }
 }
 
 fn within(q: &[f64], ranges: &[[f64; 2]]) -> bool {
-    q.iter().zip(ranges).all(|(q, [lower, upper])| q >= lower && q <= upper)
+    q.iter()
+        .zip(ranges)
+        .all(|(q, [lower, upper])| q >= lower && q <= upper)
 }
 
 /// Not hopelessly out of the ranges: Newton's steps may come back.
 fn near(q: &[f64], ranges: &[[f64; 2]]) -> bool {
-    q.iter().zip(ranges).all(|(q, [lower, upper])| *q >= lower - FAR && *q <= upper + FAR)
+    q.iter()
+        .zip(ranges)
+        .all(|(q, [lower, upper])| *q >= lower - FAR && *q <= upper + FAR)
 }
 
 /// The shortest step whose columns sum up to `left`; none near a singular posture.
 fn least_step(columns: &[Vector], left: Vector) -> Option<Vec<f64>> {
-    let line = |i: usize| -> Vector { std::array::from_fn(|j| columns.iter().map(|column| column[i] * column[j]).sum()) };
+    let line = |i: usize| -> Vector {
+        std::array::from_fn(|j| columns.iter().map(|column| column[i] * column[j]).sum())
+    };
     let [a, b, c] = [line(0), line(1), line(2)];
     let volume = matrix::dot(a, matrix::cross(b, c));
     if volume < 1e-9 {
         return None;
     }
     // Cramer's rule on the symmetric square.
-    let [first, second, third] = [matrix::cross(b, c), matrix::cross(c, a), matrix::cross(a, b)];
-    let pull: Vector = std::array::from_fn(|i| (first[i] * left[0] + second[i] * left[1] + third[i] * left[2]) / volume);
-    Some(columns.iter().map(|column| matrix::dot(*column, pull)).collect())
+    let [first, second, third] = [
+        matrix::cross(b, c),
+        matrix::cross(c, a),
+        matrix::cross(a, b),
+    ];
+    let pull: Vector = std::array::from_fn(|i| {
+        (first[i] * left[0] + second[i] * left[1] + third[i] * left[2]) / volume
+    });
+    Some(
+        columns
+            .iter()
+            .map(|column| matrix::dot(*column, pull))
+            .collect(),
+    )
 }

@@ -27,8 +27,13 @@ pub enum Scatter {
 }
 
 /// All of them.
-pub const SCATTERS: [Scatter; 5] =
-    [Scatter::Gaussian, Scatter::Student, Scatter::Uneven, Scatter::Wandering, Scatter::Directional];
+pub const SCATTERS: [Scatter; 5] = [
+    Scatter::Gaussian,
+    Scatter::Student,
+    Scatter::Uneven,
+    Scatter::Wandering,
+    Scatter::Directional,
+];
 
 impl Scatter {
     /// As it is written.
@@ -58,7 +63,10 @@ pub struct Beam {
 impl Beam {
     /// A tracker with this seed of its noise.
     pub fn new(seed: u64) -> Self {
-        Self { noise: Noise::new(seed, Purpose::Tracker), astray: None }
+        Self {
+            noise: Noise::new(seed, Purpose::Tracker),
+            astray: None,
+        }
     }
 }
 
@@ -97,16 +105,24 @@ impl Tracker {
     /// The base frame as the tracker sees it.
     pub fn base(&self) -> Matrix {
         let turned = matrix::roll_pitch_yaw(self.roll_pitch_yaw_deg.map(f64::to_radians));
-        matrix::inverse(&matrix::times(&matrix::shift(matrix::scale(self.position_mm, 1e-3)), &turned))
+        matrix::inverse(&matrix::times(
+            &matrix::shift(matrix::scale(self.position_mm, 1e-3)),
+            &turned,
+        ))
     }
 
     /// The true pose of the tracker under names of its own; a fit's base frame is a correction of an alignment.
     pub fn values(&self) -> Vec<TrueValue> {
-        let value = |number: String, unit, value| true_value("tracker", "pose", "tracker".into(), &number, unit, value);
+        let value = |number: String, unit, value| {
+            true_value("tracker", "pose", "tracker".into(), &number, unit, value)
+        };
         let axes = ["x", "y", "z"].into_iter().enumerate();
         axes.flat_map(|(index, axis)| {
             let turned = self.roll_pitch_yaw_deg[index].to_radians();
-            [value(axis.into(), "mm", self.position_mm[index]), value(format!("r{axis}"), "rad", turned)]
+            [
+                value(axis.into(), "mm", self.position_mm[index]),
+                value(format!("r{axis}"), "rad", turned),
+            ]
         })
         .collect()
     }
@@ -123,7 +139,10 @@ impl Tracker {
         match self.scatter {
             Scatter::Gaussian => point.map(|coordinate| coordinate + sigma * noise.normal()),
             Scatter::Student => point.map(|coordinate| {
-                let spread = (0..3).map(|_| noise.normal().powi(2)).sum::<f64>().max(1e-12);
+                let spread = (0..3)
+                    .map(|_| noise.normal().powi(2))
+                    .sum::<f64>()
+                    .max(1e-12);
                 // t with 3 degrees of freedom has variance 3: normal / sqrt(chi2 / 3), over sqrt 3.
                 coordinate + sigma * noise.normal() / spread.sqrt()
             }),
@@ -135,7 +154,9 @@ impl Tracker {
             Scatter::Wandering => {
                 let fresh = [(); 3].map(|()| noise.normal());
                 let part = (1.0 - WANDERING * WANDERING).sqrt();
-                let now = astray.map_or(fresh, |last| std::array::from_fn(|k| WANDERING * last[k] + part * fresh[k]));
+                let now = astray.map_or(fresh, |last| {
+                    std::array::from_fn(|k| WANDERING * last[k] + part * fresh[k])
+                });
                 *astray = Some(now);
                 std::array::from_fn(|k| point[k] + sigma * now[k])
             }
@@ -145,7 +166,9 @@ impl Tracker {
                 let drawn = [(); 3].map(|()| noise.normal());
                 let beam = matrix::scale(point, 1.0 / matrix::norm(point));
                 let part: f64 = (0..3).map(|k| drawn[k] * beam[k]).sum();
-                std::array::from_fn(|k| point[k] + along * (ACROSS * (drawn[k] - part * beam[k]) + part * beam[k]))
+                std::array::from_fn(|k| {
+                    point[k] + along * (ACROSS * (drawn[k] - part * beam[k]) + part * beam[k])
+                })
             }
         }
     }

@@ -25,7 +25,13 @@ pub(crate) fn true_value(
     value: f64,
 ) -> TrueValue {
     let dot = if number.is_empty() { "" } else { "." };
-    TrueValue { name: format!("{effect}.{tag}{dot}{number}"), effect, place, unit, value }
+    TrueValue {
+        name: format!("{effect}.{tag}{dot}{number}"),
+        effect,
+        place,
+        unit,
+        value,
+    }
 }
 
 /// Numbers of the effect `effect` at `place`: name, unit and value of each.
@@ -35,6 +41,8 @@ pub(crate) fn true_values<N: AsRef<str>>(
     place: &str,
     numbers: impl IntoIterator<Item = (N, &'static str, f64)>,
 ) -> Vec<TrueValue> {
-    let value = |(number, unit, value): (N, _, _)| true_value(effect, tag, place.into(), number.as_ref(), unit, value);
+    let value = |(number, unit, value): (N, _, _)| {
+        true_value(effect, tag, place.into(), number.as_ref(), unit, value)
+    };
     numbers.into_iter().map(value).collect()
 }

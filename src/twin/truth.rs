@@ -87,10 +87,13 @@ impl TrueRobot {
     /// Joint positions (rad or m) without load for reported positions `q`.
     pub fn drive(&self, robot: &RobotDescription, q: &[f64]) -> Vec<f64> {
         let ratio = |joint: usize| self.ratio.get(joint).copied().unwrap_or(1.0);
-        let mut out: Vec<f64> = (0..q.len()).map(|joint| self.offset(robot, joint) + ratio(joint) * q[joint]).collect();
+        let mut out: Vec<f64> = (0..q.len())
+            .map(|joint| self.offset(robot, joint) + ratio(joint) * q[joint])
+            .collect();
         for nominal in &robot.couplings {
             // The controller takes the nominal coupling out with the gear it believes in; the true gears put it back.
-            out[nominal.moved] += nominal.ratio * q[nominal.by] * (ratio(nominal.by) - ratio(nominal.moved));
+            out[nominal.moved] +=
+                nominal.ratio * q[nominal.by] * (ratio(nominal.by) - ratio(nominal.moved));
         }
         for wrong in &self.couplings {
             out[wrong.moved - 1] += wrong.error * q[wrong.by - 1] * ratio(wrong.by - 1);
@@ -101,12 +104,20 @@ impl TrueRobot {
     /// Error of a joint's zero position, rad or m.
     pub fn offset(&self, robot: &RobotDescription, joint: usize) -> f64 {
         let revolute = robot.joints[joint].kind == JointKind::Revolute;
-        self.offset_deg.get(joint).copied().unwrap_or(0.0) * if revolute { std::f64::consts::PI / 180.0 } else { 1e-3 }
+        self.offset_deg.get(joint).copied().unwrap_or(0.0)
+            * if revolute {
+                std::f64::consts::PI / 180.0
+            } else {
+                1e-3
+            }
     }
 
     /// Linear wind-up of a joint per torque, rad/Nm; `per_ampere` is the joint's torque per ampere of its motor.
     pub fn compliance(&self, joint: usize, per_ampere: f64) -> f64 {
-        let by_current = self.compliance_rad_a.get(joint).map_or(0.0, |c| c.abs() / per_ampere.abs());
+        let by_current = self
+            .compliance_rad_a
+            .get(joint)
+            .map_or(0.0, |c| c.abs() / per_ampere.abs());
         by_current + self.compliance_rad_nm.get(joint).copied().unwrap_or(0.0)
     }
 
@@ -115,35 +126,75 @@ impl TrueRobot {
         let mut out = Vec::new();
         for (joint, described) in robot.joints.iter().enumerate() {
             let (tag, place) = (format!("j{}", joint + 1), format!("joint {}", joint + 1));
-            let mut push =
-                |effect, number: &str, unit, value| out.push(true_value(effect, &tag, place.clone(), number, unit, value));
+            let mut push = |effect, number: &str, unit, value| {
+                out.push(true_value(effect, &tag, place.clone(), number, unit, value))
+            };
             let offset = self.offset(robot, joint);
             match described.kind {
                 JointKind::Revolute => push("joint_offset", "", "rad", offset),
                 JointKind::Prismatic => push("joint_offset", "", "mm", 1e3 * offset),
             }
-            push("reduction_ratio", "", "1", self.ratio.get(joint).map_or(0.0, |ratio| ratio - 1.0));
+            push(
+                "reduction_ratio",
+                "",
+                "1",
+                self.ratio.get(joint).map_or(0.0, |ratio| ratio - 1.0),
+            );
             if let Some(factor) = self.compliance_rad_a.get(joint) {
                 push("joint_compliance", "", "rad/A", *factor);
             }
-            let per_ampere = described.reduction_ratio.unwrap_or(1.0) * described.motor_constant.unwrap_or(1.0);
-            push("joint_compliance", "torque", "rad/Nm", self.compliance(joint, per_ampere));
+            let per_ampere =
+                described.reduction_ratio.unwrap_or(1.0) * described.motor_constant.unwrap_or(1.0);
+            push(
+                "joint_compliance",
+                "torque",
+                "rad/Nm",
+                self.compliance(joint, per_ampere),
+            );
             let (error, link) = (self.link_error(joint), format!("l{}", joint + 1));
             for (axis, letter) in ["x", "y", "z"].into_iter().enumerate() {
                 if joint + 1 == robot.joints.len() {
-                    out.push(true_value("tool_offset", letter, "tool".into(), "", "mm", 1e3 * error.shift[axis]));
+                    out.push(true_value(
+                        "tool_offset",
+                        letter,
+                        "tool".into(),
+                        "",
+                        "mm",
+                        1e3 * error.shift[axis],
+                    ));
                     continue;
                 }
                 let place = format!("link {}", joint + 1);
-                out.push(true_value("link_geometry", &link, place.clone(), letter, "mm", 1e3 * error.shift[axis]));
-                out.push(true_value("link_geometry", &link, place, &format!("r{letter}"), "rad", error.tilt[axis]));
+                out.push(true_value(
+                    "link_geometry",
+                    &link,
+                    place.clone(),
+                    letter,
+                    "mm",
+                    1e3 * error.shift[axis],
+                ));
+                out.push(true_value(
+                    "link_geometry",
+                    &link,
+                    place,
+                    &format!("r{letter}"),
+                    "rad",
+                    error.tilt[axis],
+                ));
             }
         }
         for wrong in &self.couplings {
             let tag = format!("j{}_j{}", wrong.by, wrong.moved);
             let place = format!("joint {}->{}", wrong.by, wrong.moved);
             let ratio = self.ratio.get(wrong.by - 1).copied().unwrap_or(1.0);
-            out.push(true_value("coupling_ratio", &tag, place, "", "1", wrong.error * ratio));
+            out.push(true_value(
+                "coupling_ratio",
+                &tag,
+                place,
+                "",
+                "1",
+                wrong.error * ratio,
+            ));
         }
         out
     }
@@ -161,18 +212,31 @@ impl TrueRobot {
             if !list.is_empty() && list.len() != joints {
                 out.push((
                     name.into(),
-                    format!("has {} numbers, the robot {joints} joints; give one a joint or none", list.len()),
+                    format!(
+                        "has {} numbers, the robot {joints} joints; give one a joint or none",
+                        list.len()
+                    ),
                 ));
             }
         }
         for (index, error) in self.links.iter().enumerate() {
             if !(1..=joints).contains(&error.link) {
-                out.push((format!("links[{index}].link"), format!("is {}; allowed: 1 to {joints}", error.link)));
+                out.push((
+                    format!("links[{index}].link"),
+                    format!("is {}; allowed: 1 to {joints}", error.link),
+                ));
             }
         }
         for (index, error) in self.couplings.iter().enumerate() {
-            if ![error.moved, error.by].iter().all(|joint| (1..=joints).contains(joint)) || error.moved == error.by {
-                out.push((format!("couplings[{index}]"), format!("needs two different joints out of 1 to {joints}")));
+            if ![error.moved, error.by]
+                .iter()
+                .all(|joint| (1..=joints).contains(joint))
+                || error.moved == error.by
+            {
+                out.push((
+                    format!("couplings[{index}]"),
+                    format!("needs two different joints out of 1 to {joints}"),
+                ));
             }
         }
         out

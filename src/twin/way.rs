@@ -28,7 +28,14 @@ pub struct Way {
 
 impl Default for Way {
     fn default() -> Self {
-        Self { rate_hz: 100.0, speed_deg_s: 40.0, shape: Shape::Waves, dwell_s: 0.0, wander_s: 0.0, log_velocity: true }
+        Self {
+            rate_hz: 100.0,
+            speed_deg_s: 40.0,
+            shape: Shape::Waves,
+            dwell_s: 0.0,
+            wander_s: 0.0,
+            log_velocity: true,
+        }
     }
 }
 
@@ -70,27 +77,53 @@ const SHORTEST_S: f64 = 0.3;
 
 impl Path {
     /// A way of so many seconds; fails where no pose is allowed.
-    pub fn draw(way: &Way, robot: &RobotDescription, arm: &Arm, poses: &Poses, seconds: f64, seed: u64) -> Result<Self, String> {
+    pub fn draw(
+        way: &Way,
+        robot: &RobotDescription,
+        arm: &Arm,
+        poses: &Poses,
+        seconds: f64,
+        seed: u64,
+    ) -> Result<Self, String> {
         let ranges = plan::ranges(robot, poses)?;
         let mut draw = Noise::new(seed, Purpose::Poses);
         let speeds: Vec<f64> = robot
             .joints
             .iter()
-            .map(|joint| if joint.kind == JointKind::Revolute { way.speed_deg_s.to_radians() } else { 1e-3 * way.speed_deg_s })
+            .map(|joint| {
+                if joint.kind == JointKind::Revolute {
+                    way.speed_deg_s.to_radians()
+                } else {
+                    1e-3 * way.speed_deg_s
+                }
+            })
             .collect();
         if way.shape == Shape::Waves {
             let joints = ranges.iter().zip(&speeds);
-            return Ok(Self::Waves(joints.map(|(range, speed)| waves(*range, *speed, &mut draw)).collect()));
+            return Ok(Self::Waves(
+                joints
+                    .map(|(range, speed)| waves(*range, *speed, &mut draw))
+                    .collect(),
+            ));
         }
         let mut moves: Vec<Move> = Vec::new();
         let (mut at, _) = plan::allowed(arm, poses, &ranges, &mut draw)?;
         let mut time = -MARGIN_S;
         while time < seconds + MARGIN_S {
             let (to, _) = plan::allowed(arm, poses, &ranges, &mut draw)?;
-            let longest = at.iter().zip(&to).zip(&speeds).map(|((a, b), speed)| PEAK * (b - a).abs() / speed);
+            let longest = at
+                .iter()
+                .zip(&to)
+                .zip(&speeds)
+                .map(|((a, b), speed)| PEAK * (b - a).abs() / speed);
             let duration_s = longest.fold(SHORTEST_S, f64::max);
             let from = std::mem::replace(&mut at, to.clone());
-            moves.push(Move { start_s: time, duration_s, from, to });
+            moves.push(Move {
+                start_s: time,
+                duration_s,
+                from,
+                to,
+            });
             time += duration_s + way.dwell_s;
         }
         Ok(Self::Moves(moves))
@@ -100,18 +133,30 @@ impl Path {
     pub fn at(&self, time: f64) -> (Vec<f64>, Vec<f64>) {
         match self {
             Self::Waves(joints) => {
-                let sum = |of: &dyn Fn(&[f64; 3]) -> f64, waves: &[[f64; 3]; 3]| waves.iter().map(of).sum::<f64>();
+                let sum = |of: &dyn Fn(&[f64; 3]) -> f64, waves: &[[f64; 3]; 3]| {
+                    waves.iter().map(of).sum::<f64>()
+                };
                 let place = |[size, pace, phase]: &[f64; 3]| size * (pace * time + phase).sin();
-                let speed = |[size, pace, phase]: &[f64; 3]| size * pace * (pace * time + phase).cos();
-                joints.iter().map(|(middle, waves)| (middle + sum(&place, waves), sum(&speed, waves))).unzip()
+                let speed =
+                    |[size, pace, phase]: &[f64; 3]| size * pace * (pace * time + phase).cos();
+                joints
+                    .iter()
+                    .map(|(middle, waves)| (middle + sum(&place, waves), sum(&speed, waves)))
+                    .unzip()
             }
             Self::Moves(moves) => {
                 let next = moves.partition_point(|one| one.start_s <= time).max(1) - 1;
-                let Some(one) = moves.get(next) else { return (Vec::new(), Vec::new()) };
+                let Some(one) = moves.get(next) else {
+                    return (Vec::new(), Vec::new());
+                };
                 let u = ((time - one.start_s) / one.duration_s).clamp(0.0, 1.0);
                 let share = u * u * u * (10.0 - u * (15.0 - 6.0 * u));
                 let rate = 30.0 * u * u * (1.0 - u) * (1.0 - u) / one.duration_s;
-                one.from.iter().zip(&one.to).map(|(from, to)| (from + share * (to - from), rate * (to - from))).unzip()
+                one.from
+                    .iter()
+                    .zip(&one.to)
+                    .map(|(from, to)| (from + share * (to - from), rate * (to - from)))
+                    .unzip()
             }
         }
     }
@@ -122,8 +167,15 @@ fn waves([low, high]: [f64; 2], speed: f64, draw: &mut Noise) -> (f64, [[f64; 3]
     let sizes = SHARES.map(|share| half * share * draw.uniform(0.7, 1.0));
     let paces = FREQUENCIES.map(|times| times * draw.uniform(0.9, 1.1));
     // Never faster than allowed, even where all waves meet.
-    let fastest: f64 = sizes.iter().zip(&paces).map(|(size, pace)| size * pace).sum();
+    let fastest: f64 = sizes
+        .iter()
+        .zip(&paces)
+        .map(|(size, pace)| size * pace)
+        .sum();
     let first = speed * draw.uniform(0.6, 1.0) / fastest.max(1e-12);
     let wave = |k: usize, draw: &mut Noise| [sizes[k], first * paces[k], draw.uniform(0.0, TAU)];
-    (0.5 * (low + high), [wave(0, draw), wave(1, draw), wave(2, draw)])
+    (
+        0.5 * (low + high),
+        [wave(0, draw), wave(1, draw), wave(2, draw)],
+    )
 }

@@ -4,8 +4,12 @@
 pub fn read(files: &[String]) {
     let (mut rows, mut bytes, mut record) = (0u64, 0usize, csv::ByteRecord::new());
     for file in files {
-        let mut reader = csv::Reader::from_path(file).unwrap_or_else(|error| panic!("{file}: {error}"));
-        while reader.read_byte_record(&mut record).unwrap_or_else(|error| panic!("{file}: {error}")) {
+        let mut reader =
+            csv::Reader::from_path(file).unwrap_or_else(|error| panic!("{file}: {error}"));
+        while reader
+            .read_byte_record(&mut record)
+            .unwrap_or_else(|error| panic!("{file}: {error}"))
+        {
             rows += 1;
             bytes += record.as_slice().len();
         }

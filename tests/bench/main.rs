@@ -7,7 +7,11 @@
 //! - `cargo bench -- bare FILE ...` reads delimited files by the csv crate and nothing else (`tests/reference/ingest_speed.py`);
 //! - `cargo bench -- swarm` prints how often and how fast each swarm optimiser finds a known minimum.
 
-#![expect(clippy::disallowed_methods, clippy::print_stdout, reason = "benches read the clock and print figures")]
+#![expect(
+    clippy::disallowed_methods,
+    clippy::print_stdout,
+    reason = "benches read the clock and print figures"
+)]
 
 use std::hint::black_box;
 
@@ -26,12 +30,18 @@ use nalgebra::Vector3;
 use problem::Case;
 
 fn main() {
-    let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
+    let arguments: Vec<String> = std::env::args()
+        .skip(1)
+        .filter(|argument| argument != "--bench")
+        .collect();
     match arguments.split_first() {
         Some((verb, files)) if verb == "solve" => files.iter().for_each(|file| solve::solve(file)),
         Some((verb, rows)) if verb == "curve" => solve::curve(rows),
         Some((verb, count)) if verb == "fleet" => {
-            let robots = count.first().and_then(|text| text.parse().ok()).unwrap_or(1_000);
+            let robots = count
+                .first()
+                .and_then(|text| text.parse().ok())
+                .unwrap_or(1_000);
             fleet::fleet(robots).unwrap_or_else(|error| panic!("{error}"));
         }
         Some((verb, files)) if verb == "train" => files.iter().for_each(|file| train::train(file)),
@@ -44,7 +54,9 @@ fn main() {
 fn criterion() {
     let mut criterion = Criterion::default().configure_from_args();
     let case = Case::simulated(160);
-    criterion.bench_function("fit of 160 points, 48 parameters", |bencher| bencher.iter(|| black_box(case.fit().1.stop)));
+    criterion.bench_function("fit of 160 points, 48 parameters", |bencher| {
+        bencher.iter(|| black_box(case.fit().1.stop))
+    });
 
     let (model, _) = case.fit();
     let mut scratch = model.stack.scratch(&model.robot);
@@ -52,7 +64,14 @@ fn criterion() {
         bencher.iter(|| {
             let mut sum = Vector3::zeros();
             for row in 0..160 {
-                model.stack.derivatives(&model.robot, &case.data, row, &model.x, &mut scratch, |_, derivative| sum += derivative);
+                model.stack.derivatives(
+                    &model.robot,
+                    &case.data,
+                    row,
+                    &model.x,
+                    &mut scratch,
+                    |_, derivative| sum += derivative,
+                );
             }
             sum
         });

@@ -6,19 +6,42 @@ use calib::stage::{BenchmarkProblem, Optimise};
 use std::time::Instant;
 
 /// The paper's times to the target, s; none for its own method.
-const PUBLISHED: [(Algorithm, f64); 4] =
-    [(Algorithm::Bas, 0.087843), (Algorithm::Pso, 0.215134), (Algorithm::Ga, 0.262317), (Algorithm::Abc, 0.132563)];
+const PUBLISHED: [(Algorithm, f64); 4] = [
+    (Algorithm::Bas, 0.087843),
+    (Algorithm::Pso, 0.215134),
+    (Algorithm::Ga, 0.262317),
+    (Algorithm::Abc, 0.132563),
+];
 
 /// Prints the tables, each search on one core.
 pub fn table() {
     let stage = Optimise::default();
     compare(&stage, &stage.problems[0], stage.seeds, &PUBLISHED);
-    for function in [Landscape::Rastrigin, Landscape::Rosenbrock, Landscape::Ackley, Landscape::Michalewicz] {
-        compare(&stage, &BenchmarkProblem { function, dimensions: 10, tolerance: 1e-2 }, 30, &[]);
+    for function in [
+        Landscape::Rastrigin,
+        Landscape::Rosenbrock,
+        Landscape::Ackley,
+        Landscape::Michalewicz,
+    ] {
+        compare(
+            &stage,
+            &BenchmarkProblem {
+                function,
+                dimensions: 10,
+                tolerance: 1e-2,
+            },
+            30,
+            &[],
+        );
     }
 }
 
-fn compare(stage: &Optimise, problem: &BenchmarkProblem, seeds: usize, published: &[(Algorithm, f64)]) {
+fn compare(
+    stage: &Optimise,
+    problem: &BenchmarkProblem,
+    seeds: usize,
+    published: &[(Algorithm, f64)],
+) {
     println!(
         "{}-D {}, absolute error {:e}, {seeds} seeds, at most {} evaluations, one core",
         problem.dimensions,
@@ -28,9 +51,20 @@ fn compare(stage: &Optimise, problem: &BenchmarkProblem, seeds: usize, published
     );
     println!(
         "{:<6} {:>7} {:>9} {:>9} {:>9} {:>9} {:>10} {:>9} {:>8}",
-        "method", "found", "evals p50", "evals p90", "ms p50", "ms p90", "error p50", "paper ms", "ratio"
+        "method",
+        "found",
+        "evals p50",
+        "evals p90",
+        "ms p50",
+        "ms p90",
+        "error p50",
+        "paper ms",
+        "ratio"
     );
-    let minimum = problem.function.minimum(problem.dimensions).unwrap_or(f64::NEG_INFINITY);
+    let minimum = problem
+        .function
+        .minimum(problem.dimensions)
+        .unwrap_or(f64::NEG_INFINITY);
     for method in Algorithm::ALL {
         let (mut times, mut evaluations, mut errors) = (Vec::new(), Vec::new(), Vec::new());
         for seed in 0..seeds as u64 {
@@ -45,10 +79,16 @@ fn compare(stage: &Optimise, problem: &BenchmarkProblem, seeds: usize, published
         }
         let found = 100.0 * times.len() as f64 / seeds as f64;
         let shown = |values: &[f64], share: f64, digits: usize| {
-            quantile(values, share).map_or_else(|| "-".to_string(), |value| format!("{value:.digits$}"))
+            quantile(values, share)
+                .map_or_else(|| "-".to_string(), |value| format!("{value:.digits$}"))
         };
-        let paper = published.iter().find(|row| row.0 == method).map(|row| row.1 * 1e3);
-        let ratio = paper.zip(quantile(&times, 0.5)).map(|(paper, ours)| format!("{:.0} x", paper / ours));
+        let paper = published
+            .iter()
+            .find(|row| row.0 == method)
+            .map(|row| row.1 * 1e3);
+        let ratio = paper
+            .zip(quantile(&times, 0.5))
+            .map(|(paper, ours)| format!("{:.0} x", paper / ours));
         println!(
             "{:<6} {found:>6.1}% {:>9} {:>9} {:>9} {:>9} {:>10.1e} {:>9} {:>8}",
             method.name(),

@@ -11,8 +11,14 @@ use std::io::Cursor;
 use std::path::Path;
 use write::{FRAMES, JOINTS, Message, POINT, db3, frames, joint_state, mcap, point};
 
-const ARM: [&str; 6] =
-    ["shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint"];
+const ARM: [&str; 6] = [
+    "shoulder_pan_joint",
+    "shoulder_lift_joint",
+    "elbow_joint",
+    "wrist_1_joint",
+    "wrist_2_joint",
+    "wrist_3_joint",
+];
 const SECOND: i64 = 1_000_000_000;
 /// In November 2023.
 const START: i64 = 1_700_000_000 * SECOND + 123_456_789;
@@ -20,14 +26,22 @@ const START: i64 = 1_700_000_000 * SECOND + 123_456_789;
 /// Every kind of bag with these messages.
 fn every(messages: &[Message]) -> Vec<Vec<u8>> {
     let packed = [None, Some(Compression::Lz4), Some(Compression::Zstd)];
-    packed.into_iter().map(|compression| mcap(compression, messages)).chain([db3(messages)]).collect()
+    packed
+        .into_iter()
+        .map(|compression| mcap(compression, messages))
+        .chain([db3(messages)])
+        .collect()
 }
 
 type Rows = (Vec<String>, Vec<Vec<String>>, Option<String>);
 
 /// Names, rows and what is lost.
 fn rows_of(bag: Box<dyn InputSource>, topic: Option<&str>) -> Result<Rows> {
-    let (mut reader, mut record, mut rows) = (BagRows::open(bag, "run.bag", topic)?, Record::default(), Vec::new());
+    let (mut reader, mut record, mut rows) = (
+        BagRows::open(bag, "run.bag", topic)?,
+        Record::default(),
+        Vec::new(),
+    );
     reader.next(&mut record)?;
     let names = record.cells();
     while reader.next(&mut record)? {
@@ -49,17 +63,31 @@ fn wave(k: usize, joint: usize) -> f64 {
 fn states(is_big: bool, count: usize) -> Vec<Message> {
     let state = |k: usize| {
         let order: Vec<usize> = (0..6).map(|j| (j + k) % 6).collect();
-        let names: Vec<&str> = std::iter::once("finger_1").chain(order.iter().map(|j| ARM[*j])).collect();
-        let of = |factor: f64| std::iter::once(9.0).chain(order.iter().map(|j| factor * wave(k, *j))).collect::<Vec<f64>>();
+        let names: Vec<&str> = std::iter::once("finger_1")
+            .chain(order.iter().map(|j| ARM[*j]))
+            .collect();
+        let of = |factor: f64| {
+            std::iter::once(9.0)
+                .chain(order.iter().map(|j| factor * wave(k, *j)))
+                .collect::<Vec<f64>>()
+        };
         let ns = START + 8_000_000 * k as i64;
-        ("/joint_states", JOINTS, ns + 1000, joint_state(is_big, ns, &names, [&of(1.0), &of(2.0), &of(3.0)]))
+        (
+            "/joint_states",
+            JOINTS,
+            ns + 1000,
+            joint_state(is_big, ns, &names, [&of(1.0), &of(2.0), &of(3.0)]),
+        )
     };
     (0..count).map(state).collect()
 }
 
 #[test]
 fn joints_come_by_their_names_from_every_kind_of_bag_and_both_orders_of_bytes() {
-    for bag in every(&states(false, 300)).into_iter().chain(every(&states(true, 300))) {
+    for bag in every(&states(false, 300))
+        .into_iter()
+        .chain(every(&states(true, 300)))
+    {
         let (names, rows, loss) = rows(&bag, None);
         assert_eq!((rows.len(), loss), (300, None));
         let column = |name: &str| names.iter().position(|other| other == name).unwrap();
@@ -67,12 +95,19 @@ fn joints_come_by_their_names_from_every_kind_of_bag_and_both_orders_of_bytes() 
             for (j, joint) in ARM.iter().enumerate() {
                 for (what, factor) in [("position", 1.0), ("velocity", 2.0), ("effort", 3.0)] {
                     let read: f64 = row[column(&format!("{joint}.{what}"))].parse().unwrap();
-                    assert_eq!(read.to_bits(), (factor * wave(k, j)).to_bits(), "{joint} {what}");
+                    assert_eq!(
+                        read.to_bits(),
+                        (factor * wave(k, j)).to_bits(),
+                        "{joint} {what}"
+                    );
                 }
             }
             assert_eq!(row[column("finger_1.position")], "9.0");
         }
-        assert_eq!([&rows[0][column("stamp")], &rows[0][column("received")]], ["1700000000.123456789", "1700000000.123457789"]);
+        assert_eq!(
+            [&rows[0][column("stamp")], &rows[0][column("received")]],
+            ["1700000000.123456789", "1700000000.123457789"]
+        );
     }
 }
 
@@ -83,26 +118,47 @@ fn transforms_are_read_by_their_frames() {
         .map(|k| {
             let ns = START + k as i64 * SECOND;
             let other = ("map", "base", pose(77));
-            let all = if k % 3 == 0 { vec![other] } else { vec![other, ("base", "tool0", pose(k))] };
+            let all = if k % 3 == 0 {
+                vec![other]
+            } else {
+                vec![other, ("base", "tool0", pose(k))]
+            };
             ("/tf", FRAMES, ns, frames(ns, &all))
         })
         .collect();
     for bag in every(&messages) {
         let (names, found, _) = rows(&bag, Some("/tf base->tool0"));
-        let x = names.iter().position(|name| name == "translation.x").unwrap();
+        let x = names
+            .iter()
+            .position(|name| name == "translation.x")
+            .unwrap();
         let read: Vec<&str> = found.iter().map(|row| row[x].as_str()).collect();
         assert_eq!(read, ["1.0", "2.0", "4.0", "5.0", "7.0", "8.0"]);
-        let answer = rows_of(Box::new(Cursor::new(bag)), None).unwrap_err().to_string();
-        assert!(answer.contains("`topic: NAME`; allowed: `/tf base->tool0`, `/tf map->base`"), "{answer}");
+        let answer = rows_of(Box::new(Cursor::new(bag)), None)
+            .unwrap_err()
+            .to_string();
+        assert!(
+            answer.contains("`topic: NAME`; allowed: `/tf base->tool0`, `/tf map->base`"),
+            "{answer}"
+        );
     }
 }
 
 #[test]
 fn a_topic_that_is_not_there_or_not_read_is_named_with_those_that_are() {
     let mut messages = states(false, 3);
-    messages.push(("/plan", "trajectory_msgs/msg/JointTrajectory", START, vec![0, 1, 0, 0]));
+    messages.push((
+        "/plan",
+        "trajectory_msgs/msg/JointTrajectory",
+        START,
+        vec![0, 1, 0, 0],
+    ));
     for bag in every(&messages) {
-        let refused = |topic: &str| rows_of(Box::new(Cursor::new(bag.clone())), Some(topic)).unwrap_err().to_string();
+        let refused = |topic: &str| {
+            rows_of(Box::new(Cursor::new(bag.clone())), Some(topic))
+                .unwrap_err()
+                .to_string()
+        };
         let answer = refused("/joint_state");
         assert!(
             answer.contains("no messages of a topic `/joint_state`; allowed: `/joint_states`; of other types: `/plan`"),
@@ -110,12 +166,19 @@ fn a_topic_that_is_not_there_or_not_read_is_named_with_those_that_are() {
         );
         let answer = refused("/plan");
         assert!(
-            answer.contains("holds trajectory_msgs/msg/JointTrajectory, which is not read; allowed: sensor_msgs"),
+            answer.contains(
+                "holds trajectory_msgs/msg/JointTrajectory, which is not read; allowed: sensor_msgs"
+            ),
             "{answer}"
         );
     }
-    let answer = rows_of(Box::new(Cursor::new(db3(&messages[3..]))), None).unwrap_err().to_string();
-    assert!(answer.contains("has no topic that is read; none of its topics is read"), "{answer}");
+    let answer = rows_of(Box::new(Cursor::new(db3(&messages[3..]))), None)
+        .unwrap_err()
+        .to_string();
+    assert!(
+        answer.contains("has no topic that is read; none of its topics is read"),
+        "{answer}"
+    );
 }
 
 #[test]
@@ -130,8 +193,16 @@ fn a_bag_that_is_cut_gives_its_beginning_and_says_that_the_rest_is_lost() {
                 assert!(k < 5, "nothing is read of {k} parts of 21");
                 continue;
             };
-            assert!(found.len() >= before && found[..] == all[..found.len()], "{k}");
-            assert!(found.len() * 21 + 21 * 40 >= all.len() * (k - 1), "{k}: {} of {}", found.len(), all.len());
+            assert!(
+                found.len() >= before && found[..] == all[..found.len()],
+                "{k}"
+            );
+            assert!(
+                found.len() * 21 + 21 * 40 >= all.len() * (k - 1),
+                "{k}: {} of {}",
+                found.len(),
+                all.len()
+            );
             let loss = loss.expect("a loss");
             assert!(loss.contains("lost") && loss.contains("cut"), "{loss}");
             before = found.len();
@@ -146,11 +217,16 @@ fn damaged_bytes_never_break_the_reading() {
         for _ in 0..150 {
             let mut bytes = bag.clone();
             for _ in 0..3 {
-                draw = draw.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+                draw = draw
+                    .wrapping_mul(6364136223846793005)
+                    .wrapping_add(1442695040888963407);
                 let at = (draw >> 33) as usize % bytes.len();
                 bytes[at] = (draw >> 20) as u8;
             }
-            let Ok(mut reader) = BagRows::open(Box::new(Cursor::new(bytes)), "run.bag", None) else { continue };
+            let Ok(mut reader) = BagRows::open(Box::new(Cursor::new(bytes)), "run.bag", None)
+            else {
+                continue;
+            };
             let mut record = Record::default();
             while reader.next(&mut record).unwrap() {}
             assert!(reader.lines() <= 400, "{}", reader.lines());
@@ -164,14 +240,17 @@ fn a_message_that_cannot_be_read_is_a_loss_of_its_bag() {
     let bag = db3(&states(false, 40));
     // Its length, then the types of number, topic, time. Pages that were split hold old copies of rows, too.
     let head = [0x06, 0x00, 0x09, 0x06];
-    let found = (0..bag.len() - 4).filter(|at| bag[*at..at + 4] == head).filter_map(|at| {
-        let mut damaged = bag.clone();
-        damaged[at + 2] = 0x0a;
-        let (_, rows, loss) = rows(&damaged, Some("/joint_states"));
-        (rows.len() < 40).then_some((rows.len(), loss))
-    });
+    let found = (0..bag.len() - 4)
+        .filter(|at| bag[*at..at + 4] == head)
+        .filter_map(|at| {
+            let mut damaged = bag.clone();
+            damaged[at + 2] = 0x0a;
+            let (_, rows, loss) = rows(&damaged, Some("/joint_states"));
+            (rows.len() < 40).then_some((rows.len(), loss))
+        });
     let found: Vec<_> = found.collect();
-    let lost = || Some("it is damaged: 1 of its messages cannot be read, which are lost".to_string());
+    let lost =
+        || Some("it is damaged: 1 of its messages cannot be read, which are lost".to_string());
     assert_eq!(found, vec![(39, lost()); 40], "each of the rows");
 }
 
@@ -181,17 +260,36 @@ fn a_folder_of_parts_is_one_recording_in_the_order_of_their_numbers() {
     for kind in ["mcap", "db3"] {
         let folder = tempfile::tempdir().unwrap();
         for (part, messages) in all.chunks(10).enumerate() {
-            let bag = if kind == "mcap" { mcap(Some(Compression::Zstd), messages) } else { db3(messages) };
+            let bag = if kind == "mcap" {
+                mcap(Some(Compression::Zstd), messages)
+            } else {
+                db3(messages)
+            };
             // One recorder was stopped by force.
             let end = if part == 4 { bag.len() / 2 } else { bag.len() };
-            std::fs::write(folder.path().join(format!("run_{part}.{kind}")), &bag[..end]).unwrap();
+            std::fs::write(
+                folder.path().join(format!("run_{part}.{kind}")),
+                &bag[..end],
+            )
+            .unwrap();
         }
-        std::fs::write(folder.path().join("metadata.yaml"), "rosbag2_bagfile_information: {}\n").unwrap();
+        std::fs::write(
+            folder.path().join("metadata.yaml"),
+            "rosbag2_bagfile_information: {}\n",
+        )
+        .unwrap();
         let (names, found, loss) = rows_of(source(folder.path()).unwrap(), None).unwrap();
-        let x = names.iter().position(|name| name == "elbow_joint.position").unwrap();
+        let x = names
+            .iter()
+            .position(|name| name == "elbow_joint.position")
+            .unwrap();
         let read: Vec<f64> = found.iter().map(|row| row[x].parse().unwrap()).collect();
         let expected: Vec<f64> = (0..120).map(|k| wave(k, 2)).collect();
-        assert!(found.len() >= 110 && read[..40] == expected[..40] && read.ends_with(&expected[50..]), "{}", found.len());
+        assert!(
+            found.len() >= 110 && read[..40] == expected[..40] && read.ends_with(&expected[50..]),
+            "{}",
+            found.len()
+        );
         assert!(loss.is_some_and(|loss| loss.starts_with("part 5: it ")));
     }
 }
@@ -199,16 +297,27 @@ fn a_folder_of_parts_is_one_recording_in_the_order_of_their_numbers() {
 /// A run of a pipeline in a folder: the rows that were used, those that were not, and the counts.
 fn run(here: &Path, pipeline: &str) -> (Recording, Rejected, Intake, String) {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    std::fs::copy(root.join("pipelines/ur10/robot.yaml"), here.join("robot.yaml")).unwrap();
-    let head =
-        "calib: 1\nname: p\nseed: 1\nstages:\n  - uses: robot\n    with: {file: robot.yaml}\n  - uses: ingest\n    with:\n";
+    std::fs::copy(
+        root.join("pipelines/ur10/robot.yaml"),
+        here.join("robot.yaml"),
+    )
+    .unwrap();
+    let head = "calib: 1\nname: p\nseed: 1\nstages:\n  - uses: robot\n    with: {file: robot.yaml}\n  - uses: ingest\n    with:\n";
     std::fs::write(here.join("p.yaml"), format!("{head}{pipeline}")).unwrap();
     let output = calib(here, &["run", "p.yaml", "--store", "s"], "");
     let answer = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{answer}");
-    let at = |name: &str| here.join("s/tables/p").join(format!("ingest.{name}.parquet"));
+    let at = |name: &str| {
+        here.join("s/tables/p")
+            .join(format!("ingest.{name}.parquet"))
+    };
     let recording = from_file(&at("recording")).unwrap().table;
-    (recording, from_file(&at("rejected")).unwrap().table, from_file(&at("intake")).unwrap().table, answer)
+    (
+        recording,
+        from_file(&at("rejected")).unwrap().table,
+        from_file(&at("intake")).unwrap().table,
+        answer,
+    )
 }
 
 const POSES: &str = "      files:
@@ -232,27 +341,54 @@ const POSES: &str = "      files:
 #[test]
 fn each_message_that_is_not_used_has_its_reason() {
     let joints = |k: i64, q: f64| joint_state(false, START + k * SECOND, &ARM, [&[q; 6], &[], &[]]);
-    let mut messages: Vec<Message> = (0..20).map(|k| ("/joint_states", JOINTS, START, joints(k, 0.01 * k as f64))).collect();
+    let mut messages: Vec<Message> = (0..20)
+        .map(|k| ("/joint_states", JOINTS, START, joints(k, 0.01 * k as f64)))
+        .collect();
     let more = [
         // Another publisher, a gripper.
-        joint_state(false, START + SECOND, &["finger_1", "finger_2"], [&[0.0, 0.0], &[], &[]]),
+        joint_state(
+            false,
+            START + SECOND,
+            &["finger_1", "finger_2"],
+            [&[0.0, 0.0], &[], &[]],
+        ),
         joints(19, 0.2),
         joints(30, f64::NAN),
         joint_state(false, START + 31 * SECOND, &ARM, [&[], &[0.0; 6], &[]]),
         joint_state(false, START + 32 * SECOND, &ARM, [&[0.0; 5], &[], &[]]),
-        joint_state(false, START + 33 * SECOND, &["elbow_joint", "elbow_joint"], [&[0.0; 2], &[], &[]]),
+        joint_state(
+            false,
+            START + 33 * SECOND,
+            &["elbow_joint", "elbow_joint"],
+            [&[0.0; 2], &[], &[]],
+        ),
         joints(34, 0.0)[..60].to_vec(),
         vec![],
         // A publisher that does not know the time.
         joint_state(false, 0, &ARM, [&[0.3; 6], &[], &[]]),
     ];
     messages.extend(more.map(|data| ("/joint_states", JOINTS, START, data)));
-    messages.extend((0..20).map(|k| ("/reflector", POINT, START, point(true, START + k * SECOND, [1.0, 0.01 * k as f64, 0.5]))));
+    messages.extend((0..20).map(|k| {
+        (
+            "/reflector",
+            POINT,
+            START,
+            point(true, START + k * SECOND, [1.0, 0.01 * k as f64, 0.5]),
+        )
+    }));
     let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("run.mcap"), mcap(Some(Compression::Lz4), &messages)).unwrap();
+    std::fs::write(
+        folder.path().join("run.mcap"),
+        mcap(Some(Compression::Lz4), &messages),
+    )
+    .unwrap();
     let (recording, rejected, intake, _) = run(folder.path(), POSES);
     assert_eq!(recording.rows(), 20);
-    let reasons: Vec<(&str, i64)> = rejected.0.iter().map(|row| (row.reason.as_str(), row.line)).collect();
+    let reasons: Vec<(&str, i64)> = rejected
+        .0
+        .iter()
+        .map(|row| (row.reason.as_str(), row.line))
+        .collect();
     let expected = [
         ("foreign", 21),
         ("doubled_stamp", 22),
@@ -266,8 +402,14 @@ fn each_message_that_is_not_used_has_its_reason() {
     ];
     assert_eq!(reasons, expected);
     let of = |k: usize| rejected.0[k].detail.as_str();
-    assert_eq!(of(0), "the message has no `shoulder_pan_joint.position`; its joints: finger_1, finger_2");
-    assert_eq!(of(1), "message 20 has the same stamp, 1700000019.123456789 s");
+    assert_eq!(
+        of(0),
+        "the message has no `shoulder_pan_joint.position`; its joints: finger_1, finger_2"
+    );
+    assert_eq!(
+        of(1),
+        "message 20 has the same stamp, 1700000019.123456789 s"
+    );
     assert_eq!(of(4), "`position` has 5 numbers for 6 names");
     for row in &intake.0 {
         assert_eq!(row.accepted + row.rejected, row.read, "{}", row.file);
@@ -279,16 +421,31 @@ fn each_message_that_is_not_used_has_its_reason() {
 fn a_folder_of_parts_is_run_as_one_file_and_a_part_that_changed_is_read_again() {
     let messages: Vec<Message> = (0..40i64)
         .flat_map(|k| {
-            let (ns, q) = (START + k * SECOND, std::array::from_fn::<f64, 6, _>(|j| wave(k as usize, j)));
+            let (ns, q) = (
+                START + k * SECOND,
+                std::array::from_fn::<f64, 6, _>(|j| wave(k as usize, j)),
+            );
             let state = joint_state(false, ns, &ARM, [&q, &[], &[]]);
-            [("/joint_states", JOINTS, ns, state), ("/reflector", POINT, ns, point(false, ns, [1.0, 0.01 * k as f64, 0.5]))]
+            [
+                ("/joint_states", JOINTS, ns, state),
+                (
+                    "/reflector",
+                    POINT,
+                    ns,
+                    point(false, ns, [1.0, 0.01 * k as f64, 0.5]),
+                ),
+            ]
         })
         .collect();
     let folder = tempfile::tempdir().unwrap();
     let parts = folder.path().join("run");
     std::fs::create_dir(&parts).unwrap();
     for (part, messages) in messages.chunks(8).enumerate() {
-        std::fs::write(parts.join(format!("run_{part}.mcap")), mcap(Some(Compression::Zstd), messages)).unwrap();
+        std::fs::write(
+            parts.join(format!("run_{part}.mcap")),
+            mcap(Some(Compression::Zstd), messages),
+        )
+        .unwrap();
     }
     let pipeline = POSES.replace("run.mcap", "run");
     let (recording, _, intake, _) = run(folder.path(), &pipeline);
@@ -298,12 +455,18 @@ fn a_folder_of_parts_is_run_as_one_file_and_a_part_that_changed_is_read_again() 
     let last = parts.join("run_9.mcap");
     std::fs::write(&last, &std::fs::read(&last).unwrap()[..300]).unwrap();
     let (recording, .., answer) = run(folder.path(), &pipeline);
-    assert!(recording.rows() < 40 && answer.contains("part 10: it is cut or damaged before byte"), "{answer}");
+    assert!(
+        recording.rows() < 40 && answer.contains("part 10: it is cut or damaged before byte"),
+        "{answer}"
+    );
     // Two kinds of parts are no recording, nor is a folder of anything else.
     std::fs::write(parts.join("run_3.db3"), db3(&messages[..8])).unwrap();
     let output = calib(folder.path(), &["check", "p.yaml"], "");
     let answer = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.code() == Some(2) && answer.contains("all .mcap or all .db3"), "{answer}");
+    assert!(
+        output.status.code() == Some(2) && answer.contains("all .mcap or all .db3"),
+        "{answer}"
+    );
 }
 
 #[test]
@@ -311,38 +474,77 @@ fn two_robots_in_one_topic_are_told_by_their_joints() {
     let of = |arm: &str, k: i64, q: f64| {
         let names: Vec<String> = ARM.iter().map(|joint| format!("{arm}{joint}")).collect();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
-        ("/joint_states", JOINTS, START + k, joint_state(k % 2 == 0, START + k * SECOND / 10, &names, [&[q; 6], &[], &[]]))
+        (
+            "/joint_states",
+            JOINTS,
+            START + k,
+            joint_state(
+                k % 2 == 0,
+                START + k * SECOND / 10,
+                &names,
+                [&[q; 6], &[], &[]],
+            ),
+        )
     };
-    let mut messages: Vec<Message> = (0..30).flat_map(|k| [of("left_", k, 0.3), of("", k, 0.01 * k as f64)]).collect();
-    messages.extend(
-        (0..30).map(|k| ("/reflector", POINT, START, point(false, START + k * SECOND / 10, [1.0, 0.01 * k as f64, 0.5]))),
-    );
+    let mut messages: Vec<Message> = (0..30)
+        .flat_map(|k| [of("left_", k, 0.3), of("", k, 0.01 * k as f64)])
+        .collect();
+    messages.extend((0..30).map(|k| {
+        (
+            "/reflector",
+            POINT,
+            START,
+            point(false, START + k * SECOND / 10, [1.0, 0.01 * k as f64, 0.5]),
+        )
+    }));
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("run.mcap"), mcap(None, &messages)).unwrap();
     let (recording, rejected, intake, _) = run(folder.path(), POSES);
-    assert_eq!((recording.rows(), rejected.0.len(), intake.0[0].read), (30, 30, 60));
-    assert!(rejected.0.iter().all(|row| row.reason == "foreign" && row.detail.contains("its joints: left_shoulder_pan_joint")));
+    assert_eq!(
+        (recording.rows(), rejected.0.len(), intake.0[0].read),
+        (30, 30, 60)
+    );
+    assert!(
+        rejected.0.iter().all(|row| row.reason == "foreign"
+            && row.detail.contains("its joints: left_shoulder_pan_joint"))
+    );
 }
 
 #[test]
 fn init_reads_a_bag_and_its_pipeline_runs() {
     let mut messages: Vec<Message> = Vec::new();
     for k in 0..60i64 {
-        let (ns, q) = (START + k * SECOND / 2, std::array::from_fn::<f64, 6, _>(|j| wave(k as usize, j)));
-        messages.push(("/joint_states", JOINTS, ns, joint_state(false, ns, &ARM, [&q, &[], &[]])));
+        let (ns, q) = (
+            START + k * SECOND / 2,
+            std::array::from_fn::<f64, 6, _>(|j| wave(k as usize, j)),
+        );
+        messages.push((
+            "/joint_states",
+            JOINTS,
+            ns,
+            joint_state(false, ns, &ARM, [&q, &[], &[]]),
+        ));
         let seen = [0.8 + 0.01 * k as f64, 0.2 * (k as f64).sin(), 0.5];
         messages.push(("/reflector", POINT, ns, point(false, ns + 1_000_000, seen)));
     }
     messages.push(("/image", "sensor_msgs/msg/Image", START, vec![0, 1, 0, 0]));
     let folder = tempfile::tempdir().unwrap();
-    for (name, bag) in [("run.mcap", mcap(Some(Compression::Zstd), &messages)), ("run.db3", db3(&messages))] {
+    for (name, bag) in [
+        ("run.mcap", mcap(Some(Compression::Zstd), &messages)),
+        ("run.db3", db3(&messages)),
+    ] {
         let here = folder.path().join(name.replace('.', "_"));
         std::fs::create_dir(&here).unwrap();
         std::fs::write(here.join(name), bag).unwrap();
         let output = calib(&here, &["init", "--robot", "ur10", "--data", name], "");
         let answer = String::from_utf8_lossy(&output.stdout);
         assert!(output.status.success(), "{answer}");
-        assert!(answer.contains("topic `/image`: sensor_msgs/msg/Image, 1 message; this type is not read"), "{answer}");
+        assert!(
+            answer.contains(
+                "topic `/image`: sensor_msgs/msg/Image, 1 message; this type is not read"
+            ),
+            "{answer}"
+        );
         assert!(
             answer.contains("topic `/reflector`: geometry_msgs/msg/PointStamped, 60 messages, 2.0000 Hz, longest gap 0.5000 s"),
             "{answer}"
@@ -356,11 +558,27 @@ fn init_reads_a_bag_and_its_pipeline_runs() {
         ] {
             assert!(pipeline.contains(line), "{line} in\n{pipeline}");
         }
-        let output = calib(&here, &["run", "pipeline.yaml", "--until", "ingest", "--store", "s"], "");
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        let recordings = glob::glob(here.join("s/tables/*/ingest.recording.parquet").to_str().unwrap()).unwrap();
+        let output = calib(
+            &here,
+            &["run", "pipeline.yaml", "--until", "ingest", "--store", "s"],
+            "",
+        );
+        assert!(
+            output.status.success(),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+        let recordings = glob::glob(
+            here.join("s/tables/*/ingest.recording.parquet")
+                .to_str()
+                .unwrap(),
+        )
+        .unwrap();
         let recordings: Vec<_> = recordings.flatten().collect();
-        assert_eq!(from_file::<Recording>(&recordings[0]).unwrap().table.rows(), 60);
+        assert_eq!(
+            from_file::<Recording>(&recordings[0]).unwrap().table.rows(),
+            60
+        );
     }
 }
 
@@ -369,12 +587,18 @@ fn a_doubled_stamp_is_one_of_the_same_joints() {
     // Two publishers with one clock: the hand's states are no doubles of the arm's.
     let hand = |k: i64| joint_state(false, START + k * SECOND, &["finger_1"], [&[0.0], &[], &[]]);
     let arm = |k: i64| joint_state(false, START + k * SECOND, &ARM, [&[0.1; 6], &[], &[]]);
-    let messages: Vec<Message> =
-        (0..4).flat_map(|k| [hand(k), arm(k)]).map(|data| ("/joint_states", JOINTS, START, data)).collect();
+    let messages: Vec<Message> = (0..4)
+        .flat_map(|k| [hand(k), arm(k)])
+        .map(|data| ("/joint_states", JOINTS, START, data))
+        .collect();
     let mut reader = BagRows::open(Box::new(Cursor::new(db3(&messages))), "run.bag", None).unwrap();
     let mut record = Record::default();
     reader.next(&mut record).unwrap();
-    let elbow = record.cells().iter().position(|name| name == "elbow_joint.position").unwrap();
+    let elbow = record
+        .cells()
+        .iter()
+        .position(|name| name == "elbow_joint.position")
+        .unwrap();
     reader.only(&[(elbow, true)]);
     let mut faults = Vec::new();
     while reader.next(&mut record).unwrap() {

@@ -7,8 +7,8 @@ use calib::twin::conceal::design::{Content, Design};
 use calib::twin::conceal::family::{BEYOND, Collection};
 use calib::twin::conceal::robots::Kind;
 use calib::twin::effect::{
-    Circle, GearLoad, Heat, JointWarming, Physical, Presliding, TrackerCircle, TrackerElevation, TrackerOffset,
-    TrackerRefraction, recall,
+    Circle, GearLoad, Heat, JointWarming, Physical, Presliding, TrackerCircle, TrackerElevation,
+    TrackerOffset, TrackerRefraction, recall,
 };
 use calib::twin::equilibrium::{Equilibrium, settle, sighted};
 use calib::twin::matrix::IDENTITY;
@@ -22,7 +22,16 @@ const ARCSEC: f64 = PI / 648_000.0;
 
 fn row(q: &[f64], memory: Vec<f64>) -> Row {
     let (command, drive, direction) = (q.to_vec(), q.to_vec(), vec![1.0; q.len()]);
-    Row { command, drive, direction, time_s: 0.0, temperature_c: 20.0, payload_kg: 0.0, velocity: Vec::new(), memory }
+    Row {
+        command,
+        drive,
+        direction,
+        time_s: 0.0,
+        temperature_c: 20.0,
+        payload_kg: 0.0,
+        velocity: Vec::new(),
+        memory,
+    }
 }
 
 /// Moves of one joint, deg, 100 s apart, at a temperature that rises by 1 K from one to the next.
@@ -36,33 +45,65 @@ fn moves(travels_deg: &[f64]) -> Vec<Moment> {
 }
 
 fn remembered(effect: Physical, past: &[Moment]) -> Vec<f64> {
-    recall(&[effect], past).into_iter().map(|memory| memory[0]).collect()
+    recall(&[effect], past)
+        .into_iter()
+        .map(|memory| memory[0])
+        .collect()
 }
 
 fn assert_near(found: &[f64], expected: &[f64], within: f64) {
     assert_eq!(found.len(), expected.len());
-    let apart = found.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let apart = found
+        .iter()
+        .zip(expected)
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, f64::max);
     assert!(apart <= within, "{found:?} is {apart} from {expected:?}");
 }
 
 /// Two travels up leave 1 - exp(-2); half a travel back brings -1 + (1 + that) exp(-1/2); a joint that stays keeps what it had.
 #[test]
 fn lost_motion_of_dahl_fades_in_over_its_travel() {
-    let friction = Presliding { joint: 1, amplitude_arcsec: 30.0, dahl_deg: 1.0, slip_deg: Vec::new() };
-    let z = remembered(Physical::Presliding(friction.clone()), &moves(&[2.0, -0.5, 0.0]));
-    assert_near(&z, &[0.864_664_716_763, 0.130_976_320_801, 0.130_976_320_801], 1e-12);
+    let friction = Presliding {
+        joint: 1,
+        amplitude_arcsec: 30.0,
+        dahl_deg: 1.0,
+        slip_deg: Vec::new(),
+    };
+    let z = remembered(
+        Physical::Presliding(friction.clone()),
+        &moves(&[2.0, -0.5, 0.0]),
+    );
+    assert_near(
+        &z,
+        &[0.864_664_716_763, 0.130_976_320_801, 0.130_976_320_801],
+        1e-12,
+    );
 
     let robot = Kind::Five5r.description([0.0; 3]);
     let rest = |memory| {
-        settle(&Arm::new(&robot, &TrueRobot::default()), &row(&[0.0; 5], vec![memory]), &[Physical::Presliding(friction.clone())])
+        settle(
+            &Arm::new(&robot, &TrueRobot::default()),
+            &row(&[0.0; 5], vec![memory]),
+            &[Physical::Presliding(friction.clone())],
+        )
     };
-    assert_near(&rest(0.5).motion.joint, &[-15.0 * ARCSEC, 0.0, 0.0, 0.0, 0.0], 1e-15);
+    assert_near(
+        &rest(0.5).motion.joint,
+        &[-15.0 * ARCSEC, 0.0, 0.0, 0.0, 0.0],
+        1e-15,
+    );
 }
 
 /// Elements that slip at 1 and 3 deg: after 2 deg up one slides and one is stretched by 2/3; 1.5 deg back leave -1/2 and 1/6.
 #[test]
 fn maxwells_elements_slip_one_after_another() {
-    let friction = Presliding { joint: 1, amplitude_arcsec: 30.0, dahl_deg: 0.0, slip_deg: vec![1.0, 3.0] };
+    let friction = Presliding {
+        joint: 1,
+        amplitude_arcsec: 30.0,
+        dahl_deg: 0.0,
+        slip_deg: vec![1.0, 3.0],
+    };
     let z = remembered(Physical::Presliding(friction), &moves(&[2.0, -1.5]));
     assert_near(&z, &[5.0 / 6.0, -1.0 / 6.0], 1e-12);
 }
@@ -92,13 +133,26 @@ fn a_joint_warms_by_its_own_work_and_cools_off() {
 /// Behind a ramp of 0.01 K/s a body with 100 s ends up 1 K behind: after 1000 s it is 10 - 1 + exp(-10) K warmer.
 #[test]
 fn metal_trails_a_ramp_by_slope_times_its_time() {
-    let warm = remembered(Physical::JointWarming(warming(Heat::Temperature, 100.0)), &moves(&[0.0; 10]));
+    let warm = remembered(
+        Physical::JointWarming(warming(Heat::Temperature, 100.0)),
+        &moves(&[0.0; 10]),
+    );
     assert!((warm[9] - 9.000_045_399_930).abs() < 1e-11, "{warm:?}");
-    let at_once = remembered(Physical::JointWarming(warming(Heat::Temperature, 0.0)), &moves(&[0.0; 3]));
+    let at_once = remembered(
+        Physical::JointWarming(warming(Heat::Temperature, 0.0)),
+        &moves(&[0.0; 3]),
+    );
     assert_near(&at_once, &[1.0, 2.0, 3.0], 1e-12);
     // Saturating at 2 K, the first kelvin is 2 tanh(1/2).
-    let joint = JointWarming { full: 2.0, ..warming(Heat::Temperature, 0.0) };
-    assert_near(&remembered(Physical::JointWarming(joint), &moves(&[0.0])), &[2.0 * 0.5f64.tanh()], 1e-12);
+    let joint = JointWarming {
+        full: 2.0,
+        ..warming(Heat::Temperature, 0.0)
+    };
+    assert_near(
+        &remembered(Physical::JointWarming(joint), &moves(&[0.0])),
+        &[2.0 * 0.5f64.tanh()],
+        1e-12,
+    );
 }
 
 /// A repeat is reached as before: back to where the arm came from, and again.
@@ -113,8 +167,15 @@ fn a_repeated_row_went_away_and_came_back() {
         temperature_c: 20.0,
         payload_kg: 0.0,
     };
-    let ways = past(&[point(0.3, 0.0, 10.0), point(0.3, 0.0, 20.0), point(0.5, 0.3, 30.0)]);
-    let travels: Vec<Vec<f64>> = ways.iter().map(|moment| moment.travels(1).collect()).collect();
+    let ways = past(&[
+        point(0.3, 0.0, 10.0),
+        point(0.3, 0.0, 20.0),
+        point(0.5, 0.3, 30.0),
+    ]);
+    let travels: Vec<Vec<f64>> = ways
+        .iter()
+        .map(|moment| moment.travels(1).collect())
+        .collect();
     assert_eq!(travels, [vec![0.3], vec![-0.3, 0.3], vec![0.2]]);
 }
 
@@ -125,33 +186,97 @@ fn read(effect: Physical, memory: f64, point: [f64; 3]) -> [f64; 3] {
 /// At azimuth 90 deg and 3 m from the standing axis 10 arcsec are 3 m times 10 arcsec against x; at 45 deg of elevation a tangent is 1.
 #[test]
 fn an_instrument_errs_in_range_azimuth_and_elevation_about_its_own_origin() {
-    let circle = |circle, phase_deg| Physical::TrackerCircle(TrackerCircle { circle, amplitude_arcsec: 10.0, phase_deg });
+    let circle = |circle, phase_deg| {
+        Physical::TrackerCircle(TrackerCircle {
+            circle,
+            amplitude_arcsec: 10.0,
+            phase_deg,
+        })
+    };
     let turned = [-30.0 * ARCSEC, 3.0, 4.0];
-    assert_near(&read(circle(Circle::Eccentric, 0.0), 0.0, [0.0, 3.0, 4.0]), &turned, 1e-8);
-    assert_near(&read(circle(Circle::OffCentre, 0.0), 0.0, [0.0, 3.0, 4.0]), &turned, 1e-8);
+    assert_near(
+        &read(circle(Circle::Eccentric, 0.0), 0.0, [0.0, 3.0, 4.0]),
+        &turned,
+        1e-8,
+    );
+    assert_near(
+        &read(circle(Circle::OffCentre, 0.0), 0.0, [0.0, 3.0, 4.0]),
+        &turned,
+        1e-8,
+    );
     // Along x only the cosine shows: sin(0 + 90 deg).
-    assert_near(&read(circle(Circle::OffCentre, 90.0), 0.0, [3.0, 0.0, 4.0]), &[3.0, 30.0 * ARCSEC, 4.0], 1e-8);
-    assert_near(&read(circle(Circle::Elliptic, 0.0), 0.0, [0.0, 3.0, 4.0]), &[0.0, 3.0, 4.0], 1e-12);
+    assert_near(
+        &read(circle(Circle::OffCentre, 90.0), 0.0, [3.0, 0.0, 4.0]),
+        &[3.0, 30.0 * ARCSEC, 4.0],
+        1e-8,
+    );
+    assert_near(
+        &read(circle(Circle::Elliptic, 0.0), 0.0, [0.0, 3.0, 4.0]),
+        &[0.0, 3.0, 4.0],
+        1e-12,
+    );
 
-    let head = TrackerElevation { index_arcsec: 4.0, sag_arcsec: 6.0, ..TrackerElevation::default() };
-    assert_near(&read(Physical::TrackerElevation(head), 0.0, [3.0, 0.0, 0.0]), &[3.0, 0.0, 30.0 * ARCSEC], 1e-8);
-    let transit = TrackerElevation { transit_arcsec: 10.0, ..TrackerElevation::default() };
-    assert_near(&read(Physical::TrackerElevation(transit), 0.0, [3.0, 0.0, 3.0]), &[3.0, 30.0 * ARCSEC, 3.0], 1e-8);
+    let head = TrackerElevation {
+        index_arcsec: 4.0,
+        sag_arcsec: 6.0,
+        ..TrackerElevation::default()
+    };
+    assert_near(
+        &read(Physical::TrackerElevation(head), 0.0, [3.0, 0.0, 0.0]),
+        &[3.0, 0.0, 30.0 * ARCSEC],
+        1e-8,
+    );
+    let transit = TrackerElevation {
+        transit_arcsec: 10.0,
+        ..TrackerElevation::default()
+    };
+    assert_near(
+        &read(Physical::TrackerElevation(transit), 0.0, [3.0, 0.0, 3.0]),
+        &[3.0, 30.0 * ARCSEC, 3.0],
+        1e-8,
+    );
 
-    let ranges = TrackerOffset { constant_um: 75.0, um_per_m2: 1.0, ..TrackerOffset::default() };
-    assert_near(&read(Physical::TrackerOffset(ranges), 0.0, [3.0, 0.0, 4.0]), &[3.000_06, 0.0, 4.000_08], 1e-12);
-    let quarter = TrackerOffset { cyclic_um: 100.0, wave_mm: 20_000.0, ..TrackerOffset::default() };
-    assert_near(&read(Physical::TrackerOffset(quarter), 0.0, [3.0, 0.0, 4.0]), &[3.000_06, 0.0, 4.000_08], 1e-12);
+    let ranges = TrackerOffset {
+        constant_um: 75.0,
+        um_per_m2: 1.0,
+        ..TrackerOffset::default()
+    };
+    assert_near(
+        &read(Physical::TrackerOffset(ranges), 0.0, [3.0, 0.0, 4.0]),
+        &[3.000_06, 0.0, 4.000_08],
+        1e-12,
+    );
+    let quarter = TrackerOffset {
+        cyclic_um: 100.0,
+        wave_mm: 20_000.0,
+        ..TrackerOffset::default()
+    };
+    assert_near(
+        &read(Physical::TrackerOffset(quarter), 0.0, [3.0, 0.0, 4.0]),
+        &[3.000_06, 0.0, 4.000_08],
+        1e-12,
+    );
 }
 
 /// 1 um/m/K, 5 K, 5 m: 25 um of range; the chain of the recording takes the memory of the right effect.
 #[test]
 fn warm_air_stretches_ranges_after_the_arm_has_settled() {
-    let air = TrackerRefraction { um_per_m_k: 1.0, reference_c: 20.0, lag_s: 0.0, own_rise_k: 0.0, warm_up_h: 1.0 };
+    let air = TrackerRefraction {
+        um_per_m_k: 1.0,
+        reference_c: 20.0,
+        lag_s: 0.0,
+        own_rise_k: 0.0,
+        warm_up_h: 1.0,
+    };
     let robot = Kind::Five5r.description([0.0; 3]);
     let arm = Arm::new(&robot, &TrueRobot::default());
     let effects = [
-        Physical::Presliding(Presliding { joint: 1, amplitude_arcsec: 0.0, dahl_deg: 1.0, slip_deg: vec![] }),
+        Physical::Presliding(Presliding {
+            joint: 1,
+            amplitude_arcsec: 0.0,
+            dahl_deg: 1.0,
+            slip_deg: vec![],
+        }),
         Physical::TrackerRefraction(air),
     ];
     let warm = moves(&[0.0; 5]);
@@ -159,18 +284,36 @@ fn warm_air_stretches_ranges_after_the_arm_has_settled() {
     let row = row(&[0.0; 5], memory);
     let rest: Equilibrium = settle(&arm, &row, &effects);
     let seen = sighted(&rest, &IDENTITY, &row, &effects);
-    assert_near(&seen, &[1.010 * (1.0 + 5e-6), 0.0, 1.130 * (1.0 + 5e-6)], 1e-12);
+    assert_near(
+        &seen,
+        &[1.010 * (1.0 + 5e-6), 0.0, 1.130 * (1.0 + 5e-6)],
+        1e-12,
+    );
 }
 
 /// 100 arcsec/Nm times sin(90 deg) times the torque of the wrist's weight: the hand's centre lies 115 mm before joint 4 in x.
 #[test]
 fn a_gear_under_load_errs_with_what_it_carries() {
     let robot = Kind::Five5r.description([0.0; 3]);
-    let gear = GearLoad { joint: 4, order: 2.0, arcsec_per_nm: 100.0, phase_deg: 90.0, full_nm: 0.0 };
-    let rest = settle(&Arm::new(&robot, &TrueRobot::default()), &row(&[0.0; 5], Vec::new()), &[Physical::GearLoad(gear)]);
+    let gear = GearLoad {
+        joint: 4,
+        order: 2.0,
+        arcsec_per_nm: 100.0,
+        phase_deg: 90.0,
+        full_nm: 0.0,
+    };
+    let rest = settle(
+        &Arm::new(&robot, &TrueRobot::default()),
+        &row(&[0.0; 5], Vec::new()),
+        &[Physical::GearLoad(gear)],
+    );
     // About +y the weight of 7.5 kg at 45 mm and of 2.1 kg at 115 mm turns downwards, positive.
     let torque = 9.81 * (7.5 * 0.045 + 2.1 * 0.115);
-    assert!((rest.motion.joint[3] / (100.0 * ARCSEC * torque) - 1.0).abs() < 1e-2, "{:?}", rest.motion.joint);
+    assert!(
+        (rest.motion.joint[3] / (100.0 * ARCSEC * torque) - 1.0).abs() < 1e-2,
+        "{:?}",
+        rest.motion.joint
+    );
 }
 
 #[test]
@@ -178,12 +321,27 @@ fn beyond_the_library_every_family_is_plain_in_both_forms() {
     for (row, family) in BEYOND.iter().enumerate() {
         for other_forms in [0.0, 1.0] {
             let collection = Collection::Beyond;
-            let design = Design { seed: 8, points: Some(50), other_forms, faulty: 0.0, collection, ..Design::default() };
+            let design = Design {
+                seed: 8,
+                points: Some(50),
+                other_forms,
+                faulty: 0.0,
+                collection,
+                ..Design::default()
+            };
             let case = Case::make(&design, row, Content::Single(row)).expect("a case");
             let first = case.concealed.first().expect("an effect");
             let name = format!("{} ({}, {})", family.name, first.form, case.kind.name());
-            assert!(first.cause.effect == family.name && case.want().len() == 1, "{name}: {:?}", case.want());
-            assert!((50.0..=201.0).contains(&first.strength), "{name}: L {}", first.strength);
+            assert!(
+                first.cause.effect == family.name && case.want().len() == 1,
+                "{name}: {:?}",
+                case.want()
+            );
+            assert!(
+                (50.0..=201.0).contains(&first.strength),
+                "{name}: L {}",
+                first.strength
+            );
             assert_eq!(first.strange, other_forms > 0.5, "{name}");
         }
     }
@@ -206,26 +364,64 @@ fn beyond_the_library_arms_have_five_joints_too_and_come_from_near_by() {
     assert_eq!(case.robot.joints.len(), 5);
     assert!(case.recording().is_ok() && case.climate.swing_k > 0.0);
     let far = |pair: &[calib::twin::recorder::Shot]| {
-        pair[0].q.iter().zip(&pair[1].q).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max).to_degrees()
+        pair[0]
+            .q
+            .iter()
+            .zip(&pair[1].q)
+            .map(|(a, b)| (a - b).abs())
+            .fold(0.0, f64::max)
+            .to_degrees()
     };
-    let near = case.shots.windows(2).filter(|pair| (1e-3..6.01).contains(&far(pair))).count();
-    assert!((10..45).contains(&near), "{near} of {} short moves", case.shots.len());
+    let near = case
+        .shots
+        .windows(2)
+        .filter(|pair| (1e-3..6.01).contains(&far(pair)))
+        .count();
+    assert!(
+        (10..45).contains(&near),
+        "{near} of {} short moves",
+        case.shots.len()
+    );
 }
 
 /// The set of the library is frozen: what a seed drew before there was another list it draws still.
 #[test]
 fn the_librarys_recordings_are_those_of_before() {
     let told = |seed: u64, cases: usize, share: f64| -> Vec<String> {
-        let design = Design { seed, cases, points: Some(40), nulls: share, pairs: share, open: share, ..Design::default() };
+        let design = Design {
+            seed,
+            cases,
+            points: Some(40),
+            nulls: share,
+            pairs: share,
+            open: share,
+            ..Design::default()
+        };
         let contents = design.contents();
-        let cases = contents.iter().enumerate().map(|(number, content)| Case::make(&design, number, *content).expect("a case"));
+        let cases = contents
+            .iter()
+            .enumerate()
+            .map(|(number, content)| Case::make(&design, number, *content).expect("a case"));
         let line = |case: Case| {
             let causes = case.concealed.iter();
             let causes: Vec<String> = causes
-                .map(|one| format!("{} at {}, {}, L {:.3}", one.cause.effect, one.cause.place, one.form, one.strength))
+                .map(|one| {
+                    format!(
+                        "{} at {}, {}, L {:.3}",
+                        one.cause.effect, one.cause.place, one.form, one.strength
+                    )
+                })
                 .collect();
-            let causes = if causes.is_empty() { "nothing".into() } else { causes.join(" + ") };
-            format!("{}, {} held out: {causes}", case.kind.name(), case.shots.len() - case.fit)
+            let causes = if causes.is_empty() {
+                "nothing".into()
+            } else {
+                causes.join(" + ")
+            };
+            format!(
+                "{}, {} held out: {causes}",
+                case.kind.name(),
+                case.shots.len() - case.fit
+            )
         };
         cases.map(line).collect()
     };

@@ -36,11 +36,19 @@ impl Memory {
     }
     fn ask(&self) -> Result<()> {
         let mut answers = self.answers.lock().unwrap();
-        *answers = answers.checked_sub(1).ok_or_else(|| Error::store("bucket", "the network is gone"))?;
+        *answers = answers
+            .checked_sub(1)
+            .ok_or_else(|| Error::store("bucket", "the network is gone"))?;
         Ok(())
     }
     fn keys(&self, folder: &str) -> Vec<String> {
-        self.files.lock().unwrap().keys().filter(|key| key.starts_with(folder)).cloned().collect()
+        self.files
+            .lock()
+            .unwrap()
+            .keys()
+            .filter(|key| key.starts_with(folder))
+            .cloned()
+            .collect()
     }
     fn flip(&self, key: &str, at: usize) {
         let mut files = self.files.lock().unwrap();
@@ -57,13 +65,19 @@ impl Bucket for Memory {
     fn fetch(&self, key: &str, to: &Path) -> Result<bool> {
         self.ask()?;
         let found = self.files.lock().unwrap().get(key).cloned();
-        self.files.lock().unwrap().append(&mut self.elsewhere.lock().unwrap());
+        self.files
+            .lock()
+            .unwrap()
+            .append(&mut self.elsewhere.lock().unwrap());
         found.iter().for_each(|bytes| fs::write(to, bytes).unwrap());
         Ok(found.is_some())
     }
     fn send(&self, from: &Path, key: &str) -> Result<()> {
         self.ask()?;
-        self.files.lock().unwrap().insert(key.into(), fs::read(from).unwrap());
+        self.files
+            .lock()
+            .unwrap()
+            .insert(key.into(), fs::read(from).unwrap());
         Ok(())
     }
     fn create(&self, from: &Path, key: &str) -> Result<bool> {
@@ -71,7 +85,9 @@ impl Bucket for Memory {
         let mut files = self.files.lock().unwrap();
         let fresh = !files.contains_key(key);
         *self.refused_creates.lock().unwrap() += usize::from(!fresh && key.starts_with("actions/"));
-        files.entry(key.into()).or_insert_with(|| fs::read(from).unwrap());
+        files
+            .entry(key.into())
+            .or_insert_with(|| fs::read(from).unwrap());
         Ok(fresh || self.careless)
     }
     fn remove(&self, key: &str) -> Result<()> {
@@ -82,20 +98,37 @@ impl Bucket for Memory {
     fn list(&self, folder: &str, most: usize) -> Result<Vec<(String, u64)>> {
         self.ask()?;
         let files = self.files.lock().unwrap();
-        let below = files.iter().filter(|(key, _)| key.starts_with(folder)).take(most);
-        Ok(below.map(|(key, bytes)| (key.clone(), bytes.len() as u64)).collect())
+        let below = files
+            .iter()
+            .filter(|(key, _)| key.starts_with(folder))
+            .take(most);
+        Ok(below
+            .map(|(key, bytes)| (key.clone(), bytes.len() as u64))
+            .collect())
     }
 }
 
 /// A bucket that holds what a folder holds, and a store before it that has fetched nothing yet.
 pub fn bucket_of(folder: &Path, cache: &Path) -> Store {
     fn put(bucket: &Memory, root: &Path, folder: &Path) {
-        for path in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+        for path in fs::read_dir(folder)
+            .unwrap()
+            .map(|entry| entry.unwrap().path())
+        {
             if path.is_dir() {
                 put(bucket, root, &path);
             } else {
-                let key = path.strip_prefix(root).unwrap().to_str().unwrap().replace('\\', "/");
-                bucket.files.lock().unwrap().insert(key, fs::read(&path).unwrap());
+                let key = path
+                    .strip_prefix(root)
+                    .unwrap()
+                    .to_str()
+                    .unwrap()
+                    .replace('\\', "/");
+                bucket
+                    .files
+                    .lock()
+                    .unwrap()
+                    .insert(key, fs::read(&path).unwrap());
             }
         }
     }
@@ -140,11 +173,16 @@ fn what_one_machine_made_another_takes() {
     run(&first, FIRST).unwrap();
     first.tag("as delivered", FIRST).unwrap();
     let (_b, second) = machine(&bucket);
-    let Lookup::Done(record) = second.action(&key("split", 1)).unwrap() else { panic!("not done") };
+    let Lookup::Done(record) = second.action(&key("split", 1)).unwrap() else {
+        panic!("not done")
+    };
     assert_eq!(second.load(&record.tables["out"]).unwrap(), split(0..100));
     assert_eq!(second.records().unwrap().len(), 1);
     assert_eq!(
-        (second.runs().unwrap(), calib::pipeline::find_run(&second, "as delivered").unwrap()),
+        (
+            second.runs().unwrap(),
+            calib::pipeline::find_run(&second, "as delivered").unwrap()
+        ),
         (vec![FIRST.into()], FIRST.into())
     );
     assert_eq!(second.manifest(FIRST).unwrap()["status"], "done");
@@ -152,12 +190,35 @@ fn what_one_machine_made_another_takes() {
     second.untag("as delivered").unwrap();
     // The first machine opens it again, with what it has.
     let again = Store::open_before(first.root(), bucket.clone()).unwrap();
-    assert_eq!((again.runs().unwrap().len(), again.tags().unwrap().len()), (2, 0));
-    assert!(again.verify().unwrap().faults.is_empty(), "{:?}", again.verify().unwrap().faults);
-    assert_eq!(again.sweep(&Default::default(), std::time::SystemTime::now(), false).unwrap_err().exit_code(), 2);
+    assert_eq!(
+        (again.runs().unwrap().len(), again.tags().unwrap().len()),
+        (2, 0)
+    );
+    assert!(
+        again.verify().unwrap().faults.is_empty(),
+        "{:?}",
+        again.verify().unwrap().faults
+    );
+    assert_eq!(
+        again
+            .sweep(&Default::default(), std::time::SystemTime::now(), false)
+            .unwrap_err()
+            .exit_code(),
+        2
+    );
     // What is taken out of the bucket is taken out of what was fetched from it.
-    bucket.files.lock().unwrap().retain(|key, _| !key.contains(SECOND));
-    assert_eq!(Store::open_before(first.root(), bucket.clone()).unwrap().runs().unwrap(), [FIRST]);
+    bucket
+        .files
+        .lock()
+        .unwrap()
+        .retain(|key, _| !key.contains(SECOND));
+    assert_eq!(
+        Store::open_before(first.root(), bucket.clone())
+            .unwrap()
+            .runs()
+            .unwrap(),
+        [FIRST]
+    );
 }
 
 #[test]
@@ -174,14 +235,34 @@ fn cut_off_after_any_request_nothing_is_visible_by_half_and_another_machine_goes
         }
         if !bucket.keys("").is_empty() {
             let (_c, looking) = machine(&bucket);
-            assert_eq!(looking.verify().unwrap().faults, [], "after {answers} requests");
-            assert!(!matches!(looking.action(&key("split", 1)).unwrap(), Lookup::Damaged(_)), "after {answers} requests");
+            assert_eq!(
+                looking.verify().unwrap().faults,
+                [],
+                "after {answers} requests"
+            );
+            assert!(
+                !matches!(
+                    looking.action(&key("split", 1)).unwrap(),
+                    Lookup::Damaged(_)
+                ),
+                "after {answers} requests"
+            );
         }
         // The same machine and another one, in turn.
         let (_d, other) = machine(&bucket);
-        for (id, store) in [(SECOND, Store::open_before(first.root(), bucket.clone()).unwrap()), (THIRD, other)] {
+        for (id, store) in [
+            (
+                SECOND,
+                Store::open_before(first.root(), bucket.clone()).unwrap(),
+            ),
+            (THIRD, other),
+        ] {
             run(&store, id).unwrap();
-            assert_eq!(store.verify().unwrap().faults, [], "after {answers} requests and {id}");
+            assert_eq!(
+                store.verify().unwrap().faults,
+                [],
+                "after {answers} requests and {id}"
+            );
         }
         assert_eq!(bucket.keys("actions/").len(), 1);
         whole += usize::from(ended.is_ok());
@@ -190,7 +271,10 @@ fn cut_off_after_any_request_nothing_is_visible_by_half_and_another_machine_goes
         }
         answers += 1;
     }
-    assert_eq!(answers, 9, "format twice, manifest, table, record; events and manifest, twice");
+    assert_eq!(
+        answers, 9,
+        "format twice, manifest, table, record; events and manifest, twice"
+    );
 }
 
 #[test]
@@ -199,11 +283,23 @@ fn of_those_who_commit_at_once_one_is_first_and_its_record_is_everybodys() {
     let workers: Vec<_> = (0..8)
         .map(|_| {
             let (folder, store) = machine(&bucket);
-            std::thread::spawn(move || (publish(&store, &key("split", 1), &split(0..100)).unwrap(), folder))
+            std::thread::spawn(move || {
+                (
+                    publish(&store, &key("split", 1), &split(0..100)).unwrap(),
+                    folder,
+                )
+            })
         })
         .collect();
-    let records: Vec<_> = workers.into_iter().map(|worker| worker.join().unwrap().0).collect();
-    assert!(records.iter().all(|published| published.record == records[0].record && published.conflict.is_none()));
+    let records: Vec<_> = workers
+        .into_iter()
+        .map(|worker| worker.join().unwrap().0)
+        .collect();
+    assert!(
+        records
+            .iter()
+            .all(|published| published.record == records[0].record && published.conflict.is_none())
+    );
     assert_eq!(*bucket.refused_creates.lock().unwrap(), 7);
     // Other content under the same key: told, and the first stands.
     let (_folder, store) = machine(&bucket);
@@ -225,28 +321,50 @@ fn a_flipped_bit_in_any_file_of_the_bucket_is_found_and_a_run_mends_it() {
             bucket.flip(&name, at);
             let folder = tempfile::tempdir().unwrap();
             let damaged = Store::open_before(folder.path().join("cache"), bucket.clone());
-            let faults = damaged.map_or_else(|error| error.to_string(), |store| format!("{:?}", store.verify().unwrap().faults));
-            assert!(faults.contains("s3://cell/seven/"), "{name} at {at}: {faults}");
+            let faults = damaged.map_or_else(
+                |error| error.to_string(),
+                |store| format!("{:?}", store.verify().unwrap().faults),
+            );
+            assert!(
+                faults.contains("s3://cell/seven/"),
+                "{name} at {at}: {faults}"
+            );
         }
     }
     *bucket.files.lock().unwrap() = sound;
     let object = bucket.keys("objects/").remove(0);
     bucket.flip(&object, 500);
     // What was fetched before stands until a verification says that the bucket lost it.
-    assert!(matches!(first.action(&key("split", 1)).unwrap(), Lookup::Done(_)));
+    assert!(matches!(
+        first.action(&key("split", 1)).unwrap(),
+        Lookup::Done(_)
+    ));
     let (_b, second) = machine(&bucket);
-    assert!(matches!(second.action(&key("split", 1)).unwrap(), Lookup::Damaged(_)));
+    assert!(matches!(
+        second.action(&key("split", 1)).unwrap(),
+        Lookup::Damaged(_)
+    ));
     assert_eq!(first.verify().unwrap().faults.len(), 1);
-    assert!(matches!(first.action(&key("split", 1)).unwrap(), Lookup::Damaged(_)));
+    assert!(matches!(
+        first.action(&key("split", 1)).unwrap(),
+        Lookup::Damaged(_)
+    ));
     publish(&first, &key("split", 1), &split(0..100)).unwrap();
     assert_eq!(first.verify().unwrap().faults, []);
-    assert!(matches!(second.action(&key("split", 1)).unwrap(), Lookup::Done(_)));
+    assert!(matches!(
+        second.action(&key("split", 1)).unwrap(),
+        Lookup::Done(_)
+    ));
 }
 
 #[test]
 fn a_store_that_another_machine_begins_in_this_moment_is_a_store() {
     let bucket = Memory::new();
-    bucket.elsewhere.lock().unwrap().insert("format.json".into(), br#"{"calib_store":1}"#.to_vec());
+    bucket
+        .elsewhere
+        .lock()
+        .unwrap()
+        .insert("format.json".into(), br#"{"calib_store":1}"#.to_vec());
     let (_folder, store) = machine(&bucket);
     run(&store, FIRST).unwrap();
     assert_eq!(store.verify().unwrap().faults, []);
@@ -256,20 +374,40 @@ fn a_store_that_another_machine_begins_in_this_moment_is_a_store() {
 fn a_server_without_put_if_absent_is_refused() {
     let (_folder, store) = machine(&Memory::with(true));
     let error = run(&store, FIRST).unwrap_err();
-    assert!(error.exit_code() == 2 && error.to_string().contains("put-if-absent"), "{error}");
+    assert!(
+        error.exit_code() == 2 && error.to_string().contains("put-if-absent"),
+        "{error}"
+    );
 }
 
 #[test]
 fn a_place_that_is_no_store_is_left_alone() {
     let bucket = Memory::new();
-    bucket.files.lock().unwrap().insert("holidays/one.jpg".into(), vec![1]);
+    bucket
+        .files
+        .lock()
+        .unwrap()
+        .insert("holidays/one.jpg".into(), vec![1]);
     let folder = tempfile::tempdir().unwrap();
-    let open = |bucket: &Arc<Memory>| Store::open_before(folder.path().join("cache"), bucket.clone());
+    let open =
+        |bucket: &Arc<Memory>| Store::open_before(folder.path().join("cache"), bucket.clone());
     let error = open(&bucket).unwrap_err();
-    assert!(error.exit_code() == 2 && error.to_string().contains("holidays/one.jpg"), "{error}");
+    assert!(
+        error.exit_code() == 2 && error.to_string().contains("holidays/one.jpg"),
+        "{error}"
+    );
     let bucket = Memory::new();
-    bucket.files.lock().unwrap().insert("format.json".into(), br#"{"calib_store":9}"#.to_vec());
-    assert!(open(&bucket).unwrap_err().to_string().contains("newer calib"));
+    bucket
+        .files
+        .lock()
+        .unwrap()
+        .insert("format.json".into(), br#"{"calib_store":9}"#.to_vec());
+    assert!(
+        open(&bucket)
+            .unwrap_err()
+            .to_string()
+            .contains("newer calib")
+    );
     let (_folder, store) = machine(&Memory::new());
     assert_eq!(store.verify().unwrap_err().exit_code(), 2);
 }
@@ -277,6 +415,10 @@ fn a_place_that_is_no_store_is_left_alone() {
 #[cfg(not(feature = "s3"))]
 #[test]
 fn without_the_feature_it_is_said_how_to_come_by_it() {
-    let error = Store::open_s3("s3://cell/seven", &BTreeMap::new(), Path::new("cache")).unwrap_err();
-    assert!(error.exit_code() == 2 && error.to_string().contains("--features s3"), "{error}");
+    let error =
+        Store::open_s3("s3://cell/seven", &BTreeMap::new(), Path::new("cache")).unwrap_err();
+    assert!(
+        error.exit_code() == 2 && error.to_string().contains("--features s3"),
+        "{error}"
+    );
 }

@@ -36,13 +36,25 @@ stages:
 /// Exit code, stdout and stderr of `check` with these files.
 fn checked(robot: &str, pipeline: &str, arm: &str, points: &str) -> (i32, String, String) {
     let folder = tempfile::tempdir().expect("a folder");
-    for (name, text) in [("robot.yaml", robot), ("pipeline.yaml", pipeline), ("arm.csv", arm), ("points.csv", points)] {
+    for (name, text) in [
+        ("robot.yaml", robot),
+        ("pipeline.yaml", pipeline),
+        ("arm.csv", arm),
+        ("points.csv", points),
+    ] {
         std::fs::write(folder.path().join(name), text).expect("a file");
     }
     let output = calib(folder.path(), &["check", "pipeline.yaml"], "");
-    assert!(!folder.path().join(".calib").exists(), "check writes nothing");
+    assert!(
+        !folder.path().join(".calib").exists(),
+        "check writes nothing"
+    );
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
-    (output.status.code().expect("a code"), text(output.stdout), text(output.stderr))
+    (
+        output.status.code().expect("a code"),
+        text(output.stdout),
+        text(output.stderr),
+    )
 }
 
 const ARM: &str = "id,q1,q2\nA,1,2\n";
@@ -51,9 +63,21 @@ const POINTS: &str = "id,x,y,z\nA,1,2,3\n";
 #[test]
 fn a_sound_pipeline_is_ready_and_shows_its_graph_on_demand() {
     let (code, out, err) = checked(ROBOT, PIPELINE, ARM, POINTS);
-    assert_eq!((code, err.as_str(), out.as_str()), (0, "", "ready     2 stages can run: calib run pipeline.yaml\n"));
+    assert_eq!(
+        (code, err.as_str(), out.as_str()),
+        (
+            0,
+            "",
+            "ready     2 stages can run: calib run pipeline.yaml\n"
+        )
+    );
     let folder = tempfile::tempdir().expect("a folder");
-    for (name, text) in [("robot.yaml", ROBOT), ("pipeline.yaml", PIPELINE), ("arm.csv", ARM), ("points.csv", POINTS)] {
+    for (name, text) in [
+        ("robot.yaml", ROBOT),
+        ("pipeline.yaml", PIPELINE),
+        ("arm.csv", ARM),
+        ("points.csv", POINTS),
+    ] {
         std::fs::write(folder.path().join(name), text).expect("a file");
     }
     let out = calib(folder.path(), &["check", "pipeline.yaml", "--details"], "").stdout;
@@ -65,7 +89,10 @@ fn a_sound_pipeline_is_ready_and_shows_its_graph_on_demand() {
 fn a_broken_robot_file_is_a_fault_with_its_place() {
     let (code, _, err) = checked(&ROBOT.replace("tool:", "tol:"), PIPELINE, ARM, POINTS);
     assert_eq!(code, 2, "{err}");
-    assert!(err.contains("robot.yaml:8") && err.contains("did you mean `tool`"), "{err}");
+    assert!(
+        err.contains("robot.yaml:8") && err.contains("did you mean `tool`"),
+        "{err}"
+    );
     let (code, _, err) = checked("\0 {no YAML: [", PIPELINE, ARM, POINTS);
     assert_eq!(code, 2, "{err}");
     assert!(err.contains("robot.yaml:1"), "{err}");
@@ -77,7 +104,10 @@ fn faults_of_the_yaml_and_of_the_robot_file_are_told_in_one_pass() {
     assert_ne!(pipeline, PIPELINE);
     let (code, _, err) = checked(&ROBOT.replace("tool:", "tol:"), &pipeline, ARM, POINTS);
     assert_eq!(code, 2, "{err}");
-    assert!(err.contains("did you mean `tool`") && err.contains("did you mean `split`"), "{err}");
+    assert!(
+        err.contains("did you mean `tool`") && err.contains("did you mean `split`"),
+        "{err}"
+    );
 }
 
 #[test]
@@ -92,11 +122,25 @@ fn columns_that_are_not_there_are_named_with_the_nearest_all_at_once() {
     ] {
         assert!(err.contains(part), "{part} in {err}");
     }
-    let (code, _, err) = checked(&ROBOT.replace("[0, 0, 400]}\ntool", "[0, 0]}\ntool"), PIPELINE, ARM, "id,x,y,Z\n");
+    let (code, _, err) = checked(
+        &ROBOT.replace("[0, 0, 400]}\ntool", "[0, 0]}\ntool"),
+        PIPELINE,
+        ARM,
+        "id,x,y,Z\n",
+    );
     assert_eq!(code, 2, "the robot's fault decides: {err}");
-    assert!(err.contains("robot.yaml:7") && err.contains("points.csv:1: no column `z`"), "{err}");
+    assert!(
+        err.contains("robot.yaml:7") && err.contains("points.csv:1: no column `z`"),
+        "{err}"
+    );
     let (code, _, err) = checked(ROBOT, PIPELINE, "", POINTS);
-    assert_eq!((code, err.as_str()), (10, "error: arm.csv: is empty; allowed: a header and at least one data row\n"));
+    assert_eq!(
+        (code, err.as_str()),
+        (
+            10,
+            "error: arm.csv: is empty; allowed: a header and at least one data row\n"
+        )
+    );
 }
 
 #[test]
@@ -124,59 +168,96 @@ fn lines_that_init_marked_are_listed_and_are_no_faults() {
 fn told(command: &str, pipeline: &str, tuesday: &str) -> (i32, String) {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::create_dir(folder.path().join("tue")).expect("a folder");
-    let files = [("robot.yaml", ROBOT), ("pipeline.yaml", pipeline), ("arm.csv", ARM), ("points.csv", POINTS)];
-    for (name, text) in files.into_iter().chain([("tue/arm.csv", ARM), ("tue/points.csv", tuesday)]) {
+    let files = [
+        ("robot.yaml", ROBOT),
+        ("pipeline.yaml", pipeline),
+        ("arm.csv", ARM),
+        ("points.csv", POINTS),
+    ];
+    for (name, text) in files
+        .into_iter()
+        .chain([("tue/arm.csv", ARM), ("tue/points.csv", tuesday)])
+    {
         std::fs::write(folder.path().join(name), text).expect("a file");
     }
     let output = calib(folder.path(), &[command, "pipeline.yaml"], "");
-    (output.status.code().expect("a code"), String::from_utf8(output.stderr).expect("UTF-8"))
+    (
+        output.status.code().expect("a code"),
+        String::from_utf8(output.stderr).expect("UTF-8"),
+    )
 }
 
 #[test]
 fn a_set_that_the_split_does_not_deal_to_is_a_fault_with_its_place() {
-    let with = |split: &str, more: &str| told("check", &format!("{PIPELINE}  - uses: split\n    with: {split}\n{more}"), POINTS);
-    let on = |set: &str| format!("  - uses: identify\n    with: {{effects: [base_frame], on: [{set}]}}\n");
+    let with = |split: &str, more: &str| {
+        told(
+            "check",
+            &format!("{PIPELINE}  - uses: split\n    with: {split}\n{more}"),
+            POINTS,
+        )
+    };
+    let on = |set: &str| {
+        format!("  - uses: identify\n    with: {{effects: [base_frame], on: [{set}]}}\n")
+    };
     let (code, err) = with("{by: every, n: 4}", &on("Fit"));
-    let expected =
-        "pipeline.yaml:23:40: stages[3].with.on[0]: no set `Fit` in the split; did you mean `fit`? Allowed: fit, validate";
+    let expected = "pipeline.yaml:23:40: stages[3].with.on[0]: no set `Fit` in the split; did you mean `fit`? Allowed: fit, validate";
     assert!(code == 2 && err.contains(expected), "{err}");
-    let (code, err) =
-        with("{by: blocks, count: 4, sets: [training, test]}", "  - uses: identify\n    with: {effects: [base_frame]}\n");
+    let (code, err) = with(
+        "{by: blocks, count: 4, sets: [training, test]}",
+        "  - uses: identify\n    with: {effects: [base_frame]}\n",
+    );
     let expected = "stages[3].with.on[0]: not given, which means `fit`: no set of the split. Allowed: test, training";
     assert!(code == 2 && err.contains(expected), "{err}");
     let reference = "  - uses: validate\n    with: {reference: [{label: L, step: identify, set: fitt, mean_mm: 1}]}\n";
     let (code, err) = with("{by: every, n: 4}", &(on("fit") + reference));
     assert!(
-        code == 2 && err.contains("stages[4].with.reference[0].set: no set `fitt` in the split; did you mean `fit`?"),
+        code == 2
+            && err.contains(
+                "stages[4].with.reference[0].set: no set `fitt` in the split; did you mean `fit`?"
+            ),
         "{err}"
     );
     // Labels of the data may be any.
     assert_eq!(with("{by: usage}", &on("Fit")), (0, String::new()));
-    let (code, err) = with("{by: usage, sets: {a: fit, b: check}, blank: rest}", &on("validate"));
-    assert!(code == 2 && err.contains("no set `validate` in the split. Allowed: check, fit, rest"), "{err}");
+    let (code, err) = with(
+        "{by: usage, sets: {a: fit, b: check}, blank: rest}",
+        &on("validate"),
+    );
+    assert!(
+        code == 2 && err.contains("no set `validate` in the split. Allowed: check, fit, rest"),
+        "{err}"
+    );
 }
 
 #[test]
 fn a_setting_that_only_the_data_refute_is_named_with_its_line_and_stage() {
     let with = |split: &str| {
         let identify = "  - uses: identify\n    with: {effects: [base_frame], on: [Fit]}\n";
-        told("run", &format!("{PIPELINE}  - uses: split\n    with: {split}\n{identify}"), POINTS)
+        told(
+            "run",
+            &format!("{PIPELINE}  - uses: split\n    with: {split}\n{identify}"),
+            POINTS,
+        )
     };
     let (code, err) = with("{by: every, n: 4, rest: Fit}");
-    let expected =
-        "pipeline.yaml:21:26: stages[2].with.n: stage `split`: set `validate` gets none of the 1 row; say a smaller `n`";
+    let expected = "pipeline.yaml:21:26: stages[2].with.n: stage `split`: set `validate` gets none of the 1 row; say a smaller `n`";
     assert!(code == 10 && err.contains(expected), "{err}");
     let (code, err) = with("{by: usage, blank: fit}");
-    let expected =
-        "pipeline.yaml:23:40: stages[3].with.on[0]: stage `identify`: no row is in set `Fit`; did you mean `fit`? Allowed: fit";
+    let expected = "pipeline.yaml:23:40: stages[3].with.on[0]: stage `identify`: no row is in set `Fit`; did you mean `fit`? Allowed: fit";
     assert!(code == 10 && err.contains(expected), "{err}");
 }
 
 #[test]
 fn files_of_one_name_are_told_by_their_folder() {
-    let pipeline = PIPELINE.replace("join:", "later:\n        - files: [tue/arm.csv, tue/points.csv]\n      join:");
+    let pipeline = PIPELINE.replace(
+        "join:",
+        "later:\n        - files: [tue/arm.csv, tue/points.csv]\n      join:",
+    );
     let (code, err) = told("check", &pipeline, "id,x,y\nA,1,2\n");
-    assert!(code == 10 && err.contains("tue/points.csv:1: no column `z`"), "{err}");
+    assert!(
+        code == 10 && err.contains("tue/points.csv:1: no column `z`"),
+        "{err}"
+    );
 }
 
 #[test]
@@ -186,8 +267,16 @@ fn a_name_that_is_too_long_says_how_long_it_may_be() {
         .replace("name: two", &format!("name: {name}"))
         .replace("  - uses: robot", &format!("  - id: {id}\n    uses: robot"));
     let (code, err) = told("check", &pipeline, POINTS);
-    assert!(code == 2 && err.contains(&format!("name: `{name}`: 65 letters; allowed: up to 64")), "{err}");
-    assert!(err.contains(&format!("stages[0].id: `{id}`: 70 letters; allowed: up to 64")), "{err}");
+    assert!(
+        code == 2 && err.contains(&format!("name: `{name}`: 65 letters; allowed: up to 64")),
+        "{err}"
+    );
+    assert!(
+        err.contains(&format!(
+            "stages[0].id: `{id}`: 70 letters; allowed: up to 64"
+        )),
+        "{err}"
+    );
 }
 
 #[test]
@@ -201,19 +290,44 @@ fn check_of_the_data_fits_base_and_geometry_and_names_rows_that_have_no_partner(
         let (along, up) = (800.0 * d, 400.0 - 800.0 * t);
         writeln!(arm, "P{k},{},{}", q[0], q[1]).expect("text");
         // The last five were measured under other names.
-        let name = if k < 35 { format!("P{k}") } else { format!("Q{k}") };
-        writeln!(points, "{name},{:.4},{:.4},{:.4}", along * c - 50.0 * s, along * s + 50.0 * c, up).expect("text");
+        let name = if k < 35 {
+            format!("P{k}")
+        } else {
+            format!("Q{k}")
+        };
+        writeln!(
+            points,
+            "{name},{:.4},{:.4},{:.4}",
+            along * c - 50.0 * s,
+            along * s + 50.0 * c,
+            up
+        )
+        .expect("text");
     }
     let folder = tempfile::tempdir().expect("a folder");
     let fits = "  - uses: split\n    with: {by: every, n: 4}\n  - id: nominal\n    uses: identify\n    with: {effects: [base_frame]}\n\
                 \x20 - id: geometry\n    uses: identify\n    with: {effects: [base_frame, tool_offset, joint_offset, link_geometry]}\n";
     let pipeline = format!("{PIPELINE}{fits}");
-    for (name, text) in [("robot.yaml", ROBOT), ("pipeline.yaml", &pipeline), ("arm.csv", &arm), ("points.csv", &points)] {
+    for (name, text) in [
+        ("robot.yaml", ROBOT),
+        ("pipeline.yaml", &pipeline),
+        ("arm.csv", &arm),
+        ("points.csv", &points),
+    ] {
         std::fs::write(folder.path().join(name), text).expect("a file");
     }
-    let output = calib(folder.path(), &["check", "pipeline.yaml", "--data", "--store", "kept"], "");
+    let output = calib(
+        folder.path(),
+        &["check", "pipeline.yaml", "--data", "--store", "kept"],
+        "",
+    );
     let out = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert_eq!(output.status.code(), Some(0), "{out}{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(
+        output.status.code(),
+        Some(0),
+        "{out}{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     for part in [
         "rows      35 used, of 35 points\n",
         "ranges    J1 -60.0 deg to 53.0 deg\n",
@@ -225,16 +339,33 @@ fn check_of_the_data_fits_base_and_geometry_and_names_rows_that_have_no_partner(
         assert!(out.contains(part), "{part} in\n{out}");
     }
     assert!(folder.path().join("kept").exists() && !folder.path().join(".calib").exists());
-    let run = calib(folder.path(), &["run", "pipeline.yaml", "--store", "kept"], "");
+    let run = calib(
+        folder.path(),
+        &["run", "pipeline.yaml", "--store", "kept"],
+        "",
+    );
     let told = String::from_utf8_lossy(&run.stderr).into_owned();
     assert!(told.contains("geometry  cached"), "{told}");
-    let diagnosed = format!("{PIPELINE}  - uses: split\n    with: {{by: every, n: 4}}\n  - uses: diagnose\n");
+    let diagnosed =
+        format!("{PIPELINE}  - uses: split\n    with: {{by: every, n: 4}}\n  - uses: diagnose\n");
     std::fs::write(folder.path().join("diagnosed.yaml"), diagnosed).expect("a file");
-    assert_eq!(calib(folder.path(), &["run", "diagnosed.yaml", "--store", "kept"], "").status.code(), Some(0));
+    assert_eq!(
+        calib(
+            folder.path(),
+            &["run", "diagnosed.yaml", "--store", "kept"],
+            ""
+        )
+        .status
+        .code(),
+        Some(0)
+    );
     for what in ["diagnosed.yaml", "HEAD"] {
         let output = calib(folder.path(), &["diagnose", what, "--store", "kept"], "");
         let out = String::from_utf8_lossy(&output.stdout).into_owned();
         let told = String::from_utf8_lossy(&output.stderr);
-        assert!(out.contains("rejected  10 rows, each with its reason in kept/tables/"), "{out}{told}");
+        assert!(
+            out.contains("rejected  10 rows, each with its reason in kept/tables/"),
+            "{out}{told}"
+        );
     }
 }

@@ -6,24 +6,35 @@ use crate::source::{Source, Use, home, sources, uses};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Files that list what belongs to them, and the folder in which their members are.
-const REGISTRIES: [(&str, &str); 2] =
-    [("numerics/effect/form.rs", "numerics/effect/"), ("numerics/effect/cause.rs", "numerics/effect/")];
+const REGISTRIES: [(&str, &str); 2] = [
+    ("numerics/effect/form.rs", "numerics/effect/"),
+    ("numerics/effect/cause.rs", "numerics/effect/"),
+];
 
 /// File -> file that it uses -> where and by which path.
 type Arrows<'a> = BTreeMap<&'a str, BTreeMap<&'a str, &'a Use>>;
 
 fn arrows(sources: &[Source]) -> Arrows<'_> {
-    let by_module: BTreeMap<&[String], &Source> = sources.iter().map(|source| (source.module.as_slice(), source)).collect();
+    let by_module: BTreeMap<&[String], &Source> = sources
+        .iter()
+        .map(|source| (source.module.as_slice(), source))
+        .collect();
     let lists = |lister: &Source, member: &Source| {
         member.module.starts_with(&lister.module)
-            || REGISTRIES.iter().any(|(file, folder)| lister.file == *file && member.file.starts_with(folder))
+            || REGISTRIES
+                .iter()
+                .any(|(file, folder)| lister.file == *file && member.file.starts_with(folder))
     };
     let mut arrows = Arrows::new();
     for source in sources {
         let own = source.uses.iter().filter(|one| !one.handed_on);
         for (one, to) in own.filter_map(|one| Some((one, home(&one.path, &by_module)?))) {
             if to.file != source.file && !lists(source, to) {
-                arrows.entry(&source.file).or_default().entry(&to.file).or_insert(one);
+                arrows
+                    .entry(&source.file)
+                    .or_default()
+                    .entry(&to.file)
+                    .or_insert(one);
             }
         }
     }
@@ -46,10 +57,24 @@ fn reached<'a>(arrows: &Arrows<'a>, file: &str) -> BTreeSet<&'a str> {
 
 /// Sets of files that all use each other, at least by detours.
 fn circles<'a>(arrows: &Arrows<'a>) -> BTreeSet<Vec<&'a str>> {
-    let reached: BTreeMap<&str, BTreeSet<&'a str>> = arrows.keys().map(|file| (*file, reached(arrows, file))).collect();
-    let mutual = |file: &str, other: &str| reached.get(other).is_some_and(|files| files.contains(file));
-    let circle = |file: &&str| -> Vec<&'a str> { reached[file].iter().copied().filter(|other| mutual(file, other)).collect() };
-    reached.keys().map(circle).filter(|circle| !circle.is_empty()).collect()
+    let reached: BTreeMap<&str, BTreeSet<&'a str>> = arrows
+        .keys()
+        .map(|file| (*file, reached(arrows, file)))
+        .collect();
+    let mutual =
+        |file: &str, other: &str| reached.get(other).is_some_and(|files| files.contains(file));
+    let circle = |file: &&str| -> Vec<&'a str> {
+        reached[file]
+            .iter()
+            .copied()
+            .filter(|other| mutual(file, other))
+            .collect()
+    };
+    reached
+        .keys()
+        .map(circle)
+        .filter(|circle| !circle.is_empty())
+        .collect()
 }
 
 #[test]
@@ -62,7 +87,11 @@ fn no_file_uses_what_uses_it() {
         faults.push(format!("a circle of {} files:", circle.len()));
         for file in circle {
             for (to, one) in arrows[file].iter().filter(|(to, _)| circle.contains(to)) {
-                faults.push(format!("  src/{file}:{} uses {to} by {}", one.line, one.path.join("::")));
+                faults.push(format!(
+                    "  src/{file}:{} uses {to} by {}",
+                    one.line,
+                    one.path.join("::")
+                ));
             }
         }
     }
@@ -85,5 +114,8 @@ fn a_circle_is_found_behind_a_door_that_hands_on() {
         module: words(name),
         uses: uses(text(name), &words(name), &modules),
     });
-    assert_eq!(circles(&arrows(&sources)), BTreeSet::from([vec!["room/left", "room/right"]]));
+    assert_eq!(
+        circles(&arrows(&sources)),
+        BTreeSet::from([vec!["room/left", "room/right"]])
+    );
 }

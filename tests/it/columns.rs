@@ -22,7 +22,11 @@ fn fields(column: &DeclaredColumn) -> Vec<Value> {
     for slides in [false, true] {
         let ([lower, upper], stored) = (column.of_joint(slides).1, column.columns(&[slides]));
         for (name, unit) in stored {
-            let name = if column.is_of_joints() { name.replacen('1', "{j}", 1) } else { name };
+            let name = if column.is_of_joints() {
+                name.replacen('1', "{j}", 1)
+            } else {
+                name
+            };
             let within = json!({"min": unit.from_si(lower), "max": unit.from_si(upper)});
             let field = json!({"name": name, "type": "float64", "unit": unit.symbol(), "constraints": within});
             out.extend((!out.iter().any(|other| other["name"] == field["name"])).then_some(field));
@@ -33,16 +37,30 @@ fn fields(column: &DeclaredColumn) -> Vec<Value> {
 
 /// A field as the schema writes it, of a column that need not be there.
 fn line(field: &Value, about: &str) -> String {
-    let each = if field["name"].to_string().contains("{j}") { "\"per_joint\": true, " } else { "" };
+    let each = if field["name"].to_string().contains("{j}") {
+        "\"per_joint\": true, "
+    } else {
+        ""
+    };
     let number = match field["unit"].as_str() {
         None => String::new(),
         Some(unit) => {
-            let close = if unit.starts_with("rad") || unit == "1" { "1e-06" } else { "0.001" };
-            let [least, most] = ["min", "max"].map(|end| field["constraints"][end].as_f64().expect("a number"));
-            format!("\"constraints\": {{\"min\": {least}, \"max\": {most}}}, \"diff\": {{\"atol\": {close}}}, ")
+            let close = if unit.starts_with("rad") || unit == "1" {
+                "1e-06"
+            } else {
+                "0.001"
+            };
+            let [least, most] =
+                ["min", "max"].map(|end| field["constraints"][end].as_f64().expect("a number"));
+            format!(
+                "\"constraints\": {{\"min\": {least}, \"max\": {most}}}, \"diff\": {{\"atol\": {close}}}, "
+            )
         }
     };
-    let unit = field["unit"].as_str().map(|unit| format!("\"unit\": \"{unit}\", ")).unwrap_or_default();
+    let unit = field["unit"]
+        .as_str()
+        .map(|unit| format!("\"unit\": \"{unit}\", "))
+        .unwrap_or_default();
     let (name, kind, about) = (&field["name"], &field["type"], Value::from(about));
     format!(
         "    {{\"name\": {name}, \"type\": {kind}, {unit}{each}\"optional\": true, \"nullable\": true, {number}\"description\": {about}}}"
@@ -56,20 +74,29 @@ fn every_declared_column_is_stored() {
     let schema: Value = serde_json::from_str(&text).unwrap();
     let stored = schema["fields"].as_array().unwrap();
     let mut missing = Vec::new();
-    for (column, field) in recording_columns().flat_map(|column| fields(column).into_iter().map(move |field| (column, field))) {
+    for (column, field) in recording_columns()
+        .flat_map(|column| fields(column).into_iter().map(move |field| (column, field)))
+    {
         match stored.iter().find(|stored| stored["name"] == field["name"]) {
             None => missing.push(line(&field, column.about)),
             Some(stored) => {
-                assert!(stored["type"] == field["type"] && stored["unit"] == field["unit"], "{stored} is declared as {field}")
+                assert!(
+                    stored["type"] == field["type"] && stored["unit"] == field["unit"],
+                    "{stored} is declared as {field}"
+                )
             }
         }
     }
     if std::env::var_os("CALIB_UPDATE").is_some() && !missing.is_empty() {
         let (head, _) = text.split_once("\n  ]").unwrap();
-        return std::fs::write(path, format!("{head},\n{}\n  ]\n}}\n", missing.join(",\n"))).unwrap();
+        return std::fs::write(path, format!("{head},\n{}\n  ]\n}}\n", missing.join(",\n")))
+            .unwrap();
     }
     let missing = missing.join("\n");
-    assert!(missing.is_empty(), "CALIB_UPDATE=1 writes these fields; then count the schema's version up:\n{missing}");
+    assert!(
+        missing.is_empty(),
+        "CALIB_UPDATE=1 writes these fields; then count the schema's version up:\n{missing}"
+    );
 }
 
 /// An arm whose third joint follows the air's humidity, 4e-6 rad by percent; what a tracker saw of it.
@@ -85,7 +112,10 @@ fn recording() -> String {
         let point = base.point(&robot.forward(&real).translation);
         let numbers = q.iter().copied().chain([humidity]);
         let noisy = (0..3).map(|axis| point[axis] + 2e-5 * normal(3 * row + axis));
-        let cells: Vec<String> = numbers.chain(noisy).map(|number| format!("{number:.7}")).collect();
+        let cells: Vec<String> = numbers
+            .chain(noisy)
+            .map(|number| format!("{number:.7}"))
+            .collect();
         text.push_str(&format!("{}\n", cells.join(",")));
     }
     text
@@ -98,7 +128,8 @@ fn a_circumstance_that_is_declared_in_one_line_is_a_law_of_a_users_own_effect() 
     std::fs::write(here.join("recording.csv"), recording()).unwrap();
     std::fs::write(
         here.join("robot.yaml"),
-        std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sr210d/robot.yaml")).unwrap(),
+        std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sr210d/robot.yaml"))
+            .unwrap(),
     )
     .unwrap();
     let effect = "calib_effect: 1\nname: swelling\nplace: joint\nmotion: angle\nlaw: humidity - 50\nunit: arcsec\nsize: 1\nper: percent\n\
@@ -110,18 +141,38 @@ fn a_circumstance_that_is_declared_in_one_line_is_a_law_of_a_users_own_effect() 
                     - {uses: split, with: {by: every, n: 5}}\n  - {uses: diagnose, with: {effects: [swelling.yaml]}}\n";
     std::fs::write(here.join("p.yaml"), pipeline).unwrap();
     let calib = |arguments: &[&str]| {
-        let output = Command::new(env!("CARGO_BIN_EXE_calib")).args(arguments).current_dir(here).output().unwrap();
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let output = Command::new(env!("CARGO_BIN_EXE_calib"))
+            .args(arguments)
+            .current_dir(here)
+            .output()
+            .unwrap();
+        assert!(
+            output.status.success(),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
         String::from_utf8(output.stdout).unwrap()
     };
     calib(&["run", "p.yaml", "--quiet", "--store", "s"]);
-    let said: Value = serde_json::from_str(&calib(&["diagnose", "p.yaml", "--json", "--quiet", "--store", "s"])).unwrap();
+    let said: Value = serde_json::from_str(&calib(&[
+        "diagnose", "p.yaml", "--json", "--quiet", "--store", "s",
+    ]))
+    .unwrap();
     let findings = said["findings"].as_array().unwrap();
-    let named: Vec<[&Value; 2]> = findings.iter().map(|finding| ["effect", "where"].map(|key| &finding[key])).collect();
+    let named: Vec<[&Value; 2]> = findings
+        .iter()
+        .map(|finding| ["effect", "where"].map(|key| &finding[key]))
+        .collect();
     assert_eq!(named, [[&json!("swelling"), &json!("joint 3")]], "{said:#}");
     // 4e-6 rad are 0.825 arcsec.
     let value = findings[0]["parameters"][0]["value"].as_f64().unwrap();
     assert!((value - 0.825).abs() < 0.08, "{value} arcsec: {said:#}");
-    let stored = from_file::<Recording>(&here.join("s/tables/humid/ingest.recording.parquet")).unwrap().table;
-    assert!(stored.readings["humidity"].iter().all(|percent| (20.0..=80.0).contains(percent)));
+    let stored = from_file::<Recording>(&here.join("s/tables/humid/ingest.recording.parquet"))
+        .unwrap()
+        .table;
+    assert!(
+        stored.readings["humidity"]
+            .iter()
+            .all(|percent| (20.0..=80.0).contains(percent))
+    );
 }

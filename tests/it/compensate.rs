@@ -29,7 +29,10 @@ use std::sync::OnceLock;
 fn a_cartesian_pose_is_found_and_reached_within_the_limits() {
     let robot = RobotModel::new(Kind::Sr210d.description([0.0; 3]));
     let q = [0.3, 0.2, -0.4, 0.5, 0.8, -1.0];
-    let wanted = ToolGoal { pose: robot.forward(&q), oriented: true };
+    let wanted = ToolGoal {
+        pose: robot.forward(&q),
+        oriented: true,
+    };
     let found = inverse(&robot, &wanted, &[0.0; 6]);
     let placed = Nominal::new(&robot).place(&found);
     assert!((placed.translation - wanted.pose.translation).norm() < 1e-9);
@@ -44,19 +47,35 @@ fn a_cartesian_pose_is_found_and_reached_within_the_limits() {
 fn a_redundant_arm_moves_its_joints_no_more_than_needed() {
     let robot = RobotModel::new(Kind::Seven7r.description([60.0, 0.0, 20.0]));
     let home = [0.4, 0.7, -0.3, 1.0, 0.2, 0.6, -0.5];
-    let mut wanted = ToolGoal { pose: robot.forward(&home), oriented: false };
+    let mut wanted = ToolGoal {
+        pose: robot.forward(&home),
+        oriented: false,
+    };
     wanted.pose.translation += Vector3::new(3e-3, -2e-3, 4e-3);
     let mut chain = Nominal::new(&robot);
     let found = least_change(&mut chain, &wanted, &home, &home);
     assert!(found.residual <= SETTLED && found.iterations < 8);
     // The change of least length lies in the row space of the Jacobian: no part of it leaves the point where it is.
     chain.place(&found.q);
-    let change: Vec<f64> = found.q.iter().zip(&home).map(|(q, home)| q - home).collect();
+    let change: Vec<f64> = found
+        .q
+        .iter()
+        .zip(&home)
+        .map(|(q, home)| q - home)
+        .collect();
     let length = change.iter().map(|d| d * d).sum::<f64>();
-    let jacobian =
-        nalgebra::Matrix3xX::from_columns(&chain.velocities().iter().map(|v| Vector3::new(v[0], v[1], v[2])).collect::<Vec<_>>());
-    let solved =
-        jacobian.clone().svd(true, true).solve(&(&jacobian * nalgebra::DVector::from_vec(change)), 1e-12).expect("a solution");
+    let jacobian = nalgebra::Matrix3xX::from_columns(
+        &chain
+            .velocities()
+            .iter()
+            .map(|v| Vector3::new(v[0], v[1], v[2]))
+            .collect::<Vec<_>>(),
+    );
+    let solved = jacobian
+        .clone()
+        .svd(true, true)
+        .solve(&(&jacobian * nalgebra::DVector::from_vec(change)), 1e-12)
+        .expect("a solution");
     assert!((solved.norm_squared() / length - 1.0).abs() < 1e-6);
 }
 
@@ -106,7 +125,11 @@ pub fn cell() -> &'static Path {
         std::fs::write(folder.path().join("robot.yaml"), ROBOT).expect("a file");
         std::fs::write(folder.path().join("pipeline.yaml"), PIPELINE).expect("a file");
         let output = calib(folder.path(), &["run", "pipeline.yaml", "--quiet"], "");
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        assert!(
+            output.status.success(),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
         folder
     });
     folder.path()
@@ -136,15 +159,39 @@ fn text(bytes: &[u8]) -> String {
 #[test]
 fn only_the_numbers_of_joints_change_in_a_text_of_targets() {
     let input = "\u{feff}name;A1_deg;A2_deg;A3_deg;A4_deg;A5_deg;A6_deg;note\r\nP1;10,5;20;-30;5;40;0;\"a;b\"\r\n\r\nP2; -10;  20.25;3e1;5;40;1; x \r\n";
-    let output = calib(cell(), &["compensate", "latest", "--plain", "--quiet"], input);
+    let output = calib(
+        cell(),
+        &["compensate", "latest", "--plain", "--quiet"],
+        input,
+    );
     assert!(output.status.success(), "{}", text(&output.stderr));
     let corrected = text(&output.stdout);
     assert_eq!(corrected.matches('\n').count(), 4);
-    let (before, after): (Vec<&str>, Vec<&str>) = (input.split("\r\n").collect(), corrected.split("\r\n").collect());
-    assert_eq!((before[0], before[2], before[4]), (after[0], after[2], after[4]));
-    assert!(after[1].starts_with("P1;10,") && after[1].ends_with(";\"a;b\""), "{}", after[1]);
-    assert!(after[3].starts_with("P2;-") && after[3].ends_with("; x "), "{}", after[3]);
-    let first: f64 = after[1].split(';').nth(1).expect("a field").replace(',', ".").parse().expect("a number");
+    let (before, after): (Vec<&str>, Vec<&str>) = (
+        input.split("\r\n").collect(),
+        corrected.split("\r\n").collect(),
+    );
+    assert_eq!(
+        (before[0], before[2], before[4]),
+        (after[0], after[2], after[4])
+    );
+    assert!(
+        after[1].starts_with("P1;10,") && after[1].ends_with(";\"a;b\""),
+        "{}",
+        after[1]
+    );
+    assert!(
+        after[3].starts_with("P2;-") && after[3].ends_with("; x "),
+        "{}",
+        after[3]
+    );
+    let first: f64 = after[1]
+        .split(';')
+        .nth(1)
+        .expect("a field")
+        .replace(',', ".")
+        .parse()
+        .expect("a number");
     assert!((first - 10.5).abs() > 1e-3 && (first - 10.5).abs() < 0.5);
 }
 
@@ -153,9 +200,17 @@ fn units_of_targets_are_written_as_in_headers_of_recordings() {
     let row = "10,20,-30,5,40,0\n";
     let joints = |header: fn(usize) -> String| {
         let input = (1..=6).map(header).collect::<Vec<_>>().join(",") + "\n" + row;
-        let output = calib(cell(), &["compensate", "latest", "--plain", "--quiet"], &input);
+        let output = calib(
+            cell(),
+            &["compensate", "latest", "--plain", "--quiet"],
+            &input,
+        );
         assert!(output.status.success(), "{input}{}", text(&output.stderr));
-        text(&output.stdout).lines().nth(1).expect("a row").to_string()
+        text(&output.stdout)
+            .lines()
+            .nth(1)
+            .expect("a row")
+            .to_string()
     };
     let expected = joints(|n| format!("q{n}_deg"));
     assert_ne!(expected, row.trim_end());
@@ -178,29 +233,50 @@ fn units_of_targets_are_written_as_in_headers_of_recordings() {
 
 #[test]
 fn what_is_known_of_a_target_stands_behind_it() {
-    let input = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n10,20,-30,5,40,0\n119.999,20,-30,5,40,179\n";
+    let input =
+        "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n10,20,-30,5,40,0\n119.999,20,-30,5,40,179\n";
     let output = calib(cell(), &["compensate", "pipeline.yaml", "-"], input);
     assert!(output.status.success(), "{}", text(&output.stderr));
     let said = text(&output.stdout);
     let mut lines = said.lines();
-    assert!(lines.next().expect("a header").ends_with("q6_deg,uncorrected_mm,residual_mm,iterations,sigma_mm,u95_mm,remark"));
+    assert!(
+        lines
+            .next()
+            .expect("a header")
+            .ends_with("q6_deg,uncorrected_mm,residual_mm,iterations,sigma_mm,u95_mm,remark")
+    );
     let first: Vec<&str> = lines.next().expect("a row").split(',').collect();
     let number = |k: usize| first[k].parse::<f64>().expect("a number");
     assert!((0.1..3.0).contains(&number(6)), "{first:?}");
-    assert!(number(7) < 1e-5 && (2.0..8.0).contains(&number(8)), "{first:?}");
+    assert!(
+        number(7) < 1e-5 && (2.0..8.0).contains(&number(8)),
+        "{first:?}"
+    );
     assert!((0.001..0.1).contains(&number(9)), "{first:?}");
     // Between 1.96 standard deviations along one axis and 2.8 along three, in lengths of one sigma 1.96 to 1.62.
     assert!((1.6..2.0).contains(&(number(10) / number(9))), "{first:?}");
     assert_eq!(first[11], "");
-    assert!(lines.next().expect("a row").contains("joint 6 beyond its limits"), "{said}");
+    assert!(
+        lines
+            .next()
+            .expect("a row")
+            .contains("joint 6 beyond its limits"),
+        "{said}"
+    );
     assert!(text(&output.stderr).contains("1 of them leaves the joint limits"));
 }
 
 #[test]
 fn joints_and_the_pose_they_stand_for_are_corrected_alike() {
     let joints = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n10,20,-30,25,40,10\n";
-    let robot = calib::robot::import::read_calib(calib::robot::import::RobotFileText { label: "robot.yaml", text: ROBOT }, None)
-        .expect("a robot");
+    let robot = calib::robot::import::read_calib(
+        calib::robot::import::RobotFileText {
+            label: "robot.yaml",
+            text: ROBOT,
+        },
+        None,
+    )
+    .expect("a robot");
     let q = [10.0f64, 20.0, -30.0, 25.0, 40.0, 10.0].map(f64::to_radians);
     let pose = RobotModel::new(robot.robot).forward(&q);
     let [x, y, z]: [f64; 3] = (pose.translation * 1e3).into();
@@ -208,11 +284,25 @@ fn joints_and_the_pose_they_stand_for_are_corrected_alike() {
     let [qx, qy, qz, qw]: [f64; 4] = turn.coords.into();
     let cartesian = format!("x_mm,y_mm,z_mm,qw,qx,qy,qz\n{x},{y},{z},{qw},{qx},{qy},{qz}\n");
     let quiet = ["compensate", "latest", "--plain", "--quiet"];
-    let by_joints = calib(cell(), &[&quiet[..], &["--orientation", "keep"]].concat(), joints);
-    let by_pose = calib(cell(), &[&quiet[..], &["--start", "12,18,-28,20,45,5"]].concat(), &cartesian);
+    let by_joints = calib(
+        cell(),
+        &[&quiet[..], &["--orientation", "keep"]].concat(),
+        joints,
+    );
+    let by_pose = calib(
+        cell(),
+        &[&quiet[..], &["--start", "12,18,-28,20,45,5"]].concat(),
+        &cartesian,
+    );
     let last = |output: &Output| -> Vec<f64> {
         let said = text(&output.stdout);
-        let row: Vec<f64> = said.lines().nth(1).expect("a row").split(',').map(|cell| cell.parse().expect("a number")).collect();
+        let row: Vec<f64> = said
+            .lines()
+            .nth(1)
+            .expect("a row")
+            .split(',')
+            .map(|cell| cell.parse().expect("a number"))
+            .collect();
         row[row.len() - 6..].to_vec()
     };
     for (a, b) in last(&by_joints).iter().zip(last(&by_pose)) {
@@ -224,25 +314,46 @@ fn joints_and_the_pose_they_stand_for_are_corrected_alike() {
 fn a_faulty_text_of_targets_is_refused_with_line_and_column() {
     let run = |input: &str| {
         let output = calib(cell(), &["compensate", "latest", "--quiet"], input);
-        (output.status.code(), text(&output.stderr), text(&output.stdout))
+        (
+            output.status.code(),
+            text(&output.stderr),
+            text(&output.stdout),
+        )
     };
     let header = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n";
     let (code, said, _) = run(&format!("{header}1,2,3,4,5,6\n1,2,x,4,5,6\n1,2\n"));
     assert_eq!(code, Some(10));
-    assert!(said.contains("stdin:3: column 5: field 3 is `x`, no number"), "{said}");
-    assert!(said.contains("stdin:4: has 2 fields, the header 6"), "{said}");
+    assert!(
+        said.contains("stdin:3: column 5: field 3 is `x`, no number"),
+        "{said}"
+    );
+    assert!(
+        said.contains("stdin:4: has 2 fields, the header 6"),
+        "{said}"
+    );
     // A quote inside a field is a letter of it; one that begins a field ends it.
     let open = header.replace("q6_deg", "q6_deg,note");
-    let (code, said, _) = run(&format!("{open}1,2,3,4,5,6,3\" bolt\n1,2,3,4,5,6,\"3, and 4\n"));
+    let (code, said, _) = run(&format!(
+        "{open}1,2,3,4,5,6,3\" bolt\n1,2,3,4,5,6,\"3, and 4\n"
+    ));
     assert_eq!(code, Some(10));
     assert_eq!(said.matches("stdin:").count(), 1, "{said}");
-    assert!(said.contains("stdin:3: column 13: `\"` is not closed on its line"), "{said}");
+    assert!(
+        said.contains("stdin:3: column 13: `\"` is not closed on its line"),
+        "{said}"
+    );
     let (code, said, _) = run(&header.replace("q6_deg", "\"q6_deg"));
     assert_eq!(code, Some(10));
-    assert!(said.contains("stdin:1: column 36: `\"` is not closed on its line"), "{said}");
+    assert!(
+        said.contains("stdin:1: column 36: `\"` is not closed on its line"),
+        "{said}"
+    );
     let (code, said, _) = run("A1,A2,A3,A4,A5,A6\n1,2,3,4,5,6\n");
     assert_eq!(code, Some(2));
-    assert!(said.contains("`A1` has no unit") && said.contains("--angle deg"), "{said}");
+    assert!(
+        said.contains("`A1` has no unit") && said.contains("--angle deg"),
+        "{said}"
+    );
     let (code, said, _) = run("foo,bar\n1,2\n");
     assert_eq!(code, Some(2));
     assert!(said.contains("no targets found"), "{said}");
@@ -252,25 +363,58 @@ fn a_faulty_text_of_targets_is_refused_with_line_and_column() {
 fn a_target_that_is_not_reached_gets_no_joints_and_the_others_do() {
     let input = "id,x_mm,y_mm,z_mm\nnear,800,40,900\nfar,7800,40,900\nnear,810,40,900\n";
     for more in [&[][..], &["--one-step"]] {
-        let output = calib(cell(), &[&["compensate", "latest", "--quiet"], more].concat(), input);
+        let output = calib(
+            cell(),
+            &[&["compensate", "latest", "--quiet"], more].concat(),
+            input,
+        );
         assert_eq!(output.status.code(), Some(10));
         let (said, told) = (text(&output.stdout), text(&output.stderr));
         let rows: Vec<Vec<&str>> = said.lines().map(|line| line.split(',').collect()).collect();
-        assert_eq!((rows.len(), rows[0][4], rows[0][9]), (4, "q1_deg", "q6_deg"));
+        assert_eq!(
+            (rows.len(), rows[0][4], rows[0][9]),
+            (4, "q1_deg", "q6_deg")
+        );
         for row in [&rows[1], &rows[3]] {
-            assert!(row[4..10].iter().all(|cell| cell.parse::<f64>().is_ok_and(f64::is_finite)), "{said}");
+            assert!(
+                row[4..10]
+                    .iter()
+                    .all(|cell| cell.parse::<f64>().is_ok_and(f64::is_finite)),
+                "{said}"
+            );
         }
         assert_eq!(rows[2][4..10], [""; 6]);
         // The arm reaches 1.4 m from its second axis, which stands 0.4 m above the base.
         let off: f64 = rows[2][11].parse().expect("a residual");
         assert!((6000.0..7000.0).contains(&off), "{said}");
-        assert!(said.lines().nth(2).is_some_and(|row| row.contains(",\"not reached, 6") && row.ends_with(" mm off\"")), "{said}");
-        assert!(told.contains("stdin:3: not reached, 6") && told.contains(" mm off: no joints are written"), "{told}");
-        assert!(told.contains("warning: 1 of them could not be reached and has no joints (column `remark`)"), "{told}");
+        assert!(
+            said.lines()
+                .nth(2)
+                .is_some_and(|row| row.contains(",\"not reached, 6") && row.ends_with(" mm off\"")),
+            "{said}"
+        );
+        assert!(
+            told.contains("stdin:3: not reached, 6")
+                && told.contains(" mm off: no joints are written"),
+            "{told}"
+        );
+        assert!(
+            told.contains(
+                "warning: 1 of them could not be reached and has no joints (column `remark`)"
+            ),
+            "{told}"
+        );
     }
-    let plain = calib(cell(), &["compensate", "latest", "--quiet", "--plain"], input);
+    let plain = calib(
+        cell(),
+        &["compensate", "latest", "--quiet", "--plain"],
+        input,
+    );
     assert_eq!(plain.status.code(), Some(10));
-    assert_eq!(text(&plain.stdout).lines().nth(2), Some("far,7800,40,900,,,,,,"));
+    assert_eq!(
+        text(&plain.stdout).lines().nth(2),
+        Some("far,7800,40,900,,,,,,")
+    );
 }
 
 #[test]
@@ -280,41 +424,96 @@ fn a_pose_that_only_another_orientation_reaches_gets_no_joints() {
     let output = calib(cell(), &["compensate", "latest", "--quiet"], input);
     let (said, told) = (text(&output.stdout), text(&output.stderr));
     assert_eq!(output.status.code(), Some(10), "{said}{told}");
-    assert!(said.lines().nth(2).is_some_and(|row| row.contains(",,,,,,") && row.contains("not reached")), "{said}");
+    assert!(
+        said.lines()
+            .nth(2)
+            .is_some_and(|row| row.contains(",,,,,,") && row.contains("not reached")),
+        "{said}"
+    );
 }
 
 #[test]
 fn a_target_that_is_not_reached_is_null_in_parquet() {
     use arrow::array::{Array, AsArray, Float64Array, RecordBatch};
     use arrow::datatypes::Float64Type;
-    let column = |values: [f64; 2]| -> arrow::array::ArrayRef { std::sync::Arc::new(Float64Array::from(values.to_vec())) };
-    let axes = [("x_mm", column([800.0, 7800.0])), ("y_mm", column([40.0; 2])), ("z_mm", column([900.0; 2]))];
+    let column = |values: [f64; 2]| -> arrow::array::ArrayRef {
+        std::sync::Arc::new(Float64Array::from(values.to_vec()))
+    };
+    let axes = [
+        ("x_mm", column([800.0, 7800.0])),
+        ("y_mm", column([40.0; 2])),
+        ("z_mm", column([900.0; 2])),
+    ];
     let batch = RecordBatch::try_from_iter(axes).expect("a batch");
     let file = std::fs::File::create(cell().join("points.parquet")).expect("a file");
-    let mut writer = parquet::arrow::ArrowWriter::try_new(file, batch.schema(), None).expect("a writer");
-    writer.write(&batch).and_then(|()| writer.close().map(|_| ())).expect("written");
-    let output = calib(cell(), &["compensate", "latest", "points.parquet", "--out", "points_c.parquet", "--quiet"], "");
+    let mut writer =
+        parquet::arrow::ArrowWriter::try_new(file, batch.schema(), None).expect("a writer");
+    writer
+        .write(&batch)
+        .and_then(|()| writer.close().map(|_| ()))
+        .expect("written");
+    let output = calib(
+        cell(),
+        &[
+            "compensate",
+            "latest",
+            "points.parquet",
+            "--out",
+            "points_c.parquet",
+            "--quiet",
+        ],
+        "",
+    );
     assert_eq!(output.status.code(), Some(10));
-    assert!(text(&output.stderr).contains("points.parquet: row 2: not reached, 6"), "{}", text(&output.stderr));
-    let file = std::fs::File::open(cell().join("points_c.parquet")).expect("written though a row is not reached");
-    let builder = parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder::try_new(file).expect("Parquet");
-    let batch = builder.build().expect("a reader").next().expect("a batch").expect("rows");
+    assert!(
+        text(&output.stderr).contains("points.parquet: row 2: not reached, 6"),
+        "{}",
+        text(&output.stderr)
+    );
+    let file = std::fs::File::open(cell().join("points_c.parquet"))
+        .expect("written though a row is not reached");
+    let builder = parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder::try_new(file)
+        .expect("Parquet");
+    let batch = builder
+        .build()
+        .expect("a reader")
+        .next()
+        .expect("a batch")
+        .expect("rows");
     for joint in 1..=6 {
-        let q = batch.column_by_name(&format!("q{joint}_rad")).expect("a joint").as_primitive::<Float64Type>();
+        let q = batch
+            .column_by_name(&format!("q{joint}_rad"))
+            .expect("a joint")
+            .as_primitive::<Float64Type>();
         assert!(q.is_valid(0) && q.value(0).is_finite() && q.is_null(1));
     }
-    let remark = batch.column_by_name("remark").expect("remarks").as_string::<i32>();
+    let remark = batch
+        .column_by_name("remark")
+        .expect("remarks")
+        .as_string::<i32>();
     assert!(remark.value(0).is_empty() && remark.value(1).starts_with("not reached, 6"));
 }
 
 #[test]
 fn quiet_keeps_warnings_and_takes_the_summary() {
     let input = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n119.999,20,-30,5,40,179\n";
-    let told = |more: &[&str]| text(&calib(cell(), &[&["compensate", "latest"], more].concat(), input).stderr);
+    let told = |more: &[&str]| {
+        text(&calib(cell(), &[&["compensate", "latest"], more].concat(), input).stderr)
+    };
     let (loud, quiet) = (told(&[]), told(&["-q"]));
-    assert!(loud.contains("model: ") && loud.contains("1 target; "), "{loud}");
-    let warnings: String = loud.lines().filter(|line| line.starts_with("warning: ")).map(|line| format!("{line}\n")).collect();
-    assert!(warnings.contains("1 of them leaves the joint limits"), "{loud}");
+    assert!(
+        loud.contains("model: ") && loud.contains("1 target; "),
+        "{loud}"
+    );
+    let warnings: String = loud
+        .lines()
+        .filter(|line| line.starts_with("warning: "))
+        .map(|line| format!("{line}\n"))
+        .collect();
+    assert!(
+        warnings.contains("1 of them leaves the joint limits"),
+        "{loud}"
+    );
     assert_eq!(quiet, warnings);
 }
 
@@ -323,26 +522,61 @@ fn partial_targets_of_a_program_stay_where_that_is_wished_and_nothing_is_written
     let program = "PTP {A1 10,A2 20,A3 -30,A4 5,A5 40,A6 0}\r\nLIN {X 10,Y 20}\r\nPTP {A1 20}\r\n";
     std::fs::write(cell().join("partial.src"), program).expect("a file");
     let run = |more: &[&str]| {
-        let output =
-            calib(cell(), &[&["compensate", "latest", "partial.src", "--out", "partial_c.src", "-q"], more].concat(), "");
+        let output = calib(
+            cell(),
+            &[
+                &[
+                    "compensate",
+                    "latest",
+                    "partial.src",
+                    "--out",
+                    "partial_c.src",
+                    "-q",
+                ],
+                more,
+            ]
+            .concat(),
+            "",
+        );
         (output.status.code(), text(&output.stderr))
     };
     let whole = "a target is corrected whole or not at all";
     let (code, told) = run(&[]);
     assert_eq!(code, Some(10));
-    assert!(told.contains(&format!("partial.src:2:5: the target has no Z, A, B, C; {whole}")), "{told}");
-    assert!(told.contains(&format!("partial.src:3:5: the target has no A2, A3, A4, A5, A6; {whole}")), "{told}");
-    assert!(told.contains("partial.src: partial targets stay as they are with --leave-partial"), "{told}");
+    assert!(
+        told.contains(&format!(
+            "partial.src:2:5: the target has no Z, A, B, C; {whole}"
+        )),
+        "{told}"
+    );
+    assert!(
+        told.contains(&format!(
+            "partial.src:3:5: the target has no A2, A3, A4, A5, A6; {whole}"
+        )),
+        "{told}"
+    );
+    assert!(
+        told.contains("partial.src: partial targets stay as they are with --leave-partial"),
+        "{told}"
+    );
     assert!(!cell().join("partial_c.src").exists());
     let (code, told) = run(&["--leave-partial"]);
     assert_eq!(code, Some(0), "{told}");
     assert!(
-        told.contains(&format!("warning: partial.src:3:5: left as it is: the target has no A2, A3, A4, A5, A6; {whole}")),
+        told.contains(&format!(
+            "warning: partial.src:3:5: left as it is: the target has no A2, A3, A4, A5, A6; {whole}"
+        )),
         "{told}"
     );
     let written = std::fs::read_to_string(cell().join("partial_c.src")).expect("written");
     let (mark, rest) = written.split_once('\n').expect("lines");
     assert!(mark.starts_with("; corrected by calib"), "{mark}");
-    assert!(rest.starts_with("PTP {A1 10.") || rest.starts_with("PTP {A1 9."), "{written}");
-    assert!(written.ends_with("\r\nLIN {X 10,Y 20}\r\nPTP {A1 20}\r\n"), "{written}");
+    assert!(
+        rest.starts_with("PTP {A1 10.") || rest.starts_with("PTP {A1 9."),
+        "{written}"
+    );
+    assert!(
+        written.ends_with("\r\nLIN {X 10,Y 20}\r\nPTP {A1 20}\r\n"),
+        "{written}"
+    );
 }

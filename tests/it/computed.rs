@@ -50,21 +50,49 @@ fn told(minus: &str, noise_mm: f64) -> String {
         let point = robot.forward(&q).translation * 1e3;
         let cells: Vec<String> = q.iter().map(|q| format!("{q:.9}")).collect();
         let difference = noise_mm * normal(1000 + row);
-        writeln!(text, "{},{:.5},{:.5},{:.5},{difference:.5}", cells.join(","), point.x, point.y, point.z).expect("text");
+        writeln!(
+            text,
+            "{},{:.5},{:.5},{:.5},{difference:.5}",
+            cells.join(","),
+            point.x,
+            point.y,
+            point.z
+        )
+        .expect("text");
     }
     let folder = tempfile::tempdir().expect("a folder");
-    let minus = if minus.is_empty() { String::new() } else { format!("minus: {minus},") };
-    for (name, text) in [("robot.yaml", ROBOT), ("pipeline.yaml", &PIPELINE.replace("MINUS", &minus)), ("data.csv", &text)] {
+    let minus = if minus.is_empty() {
+        String::new()
+    } else {
+        format!("minus: {minus},")
+    };
+    for (name, text) in [
+        ("robot.yaml", ROBOT),
+        ("pipeline.yaml", &PIPELINE.replace("MINUS", &minus)),
+        ("data.csv", &text),
+    ] {
         std::fs::write(folder.path().join(name), text).expect("a file");
     }
-    let output = calib(folder.path(), &["run", "pipeline.yaml", "--json", "--quiet"], "");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let output = calib(
+        folder.path(),
+        &["run", "pipeline.yaml", "--json", "--quiet"],
+        "",
+    );
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
 #[test]
 fn a_target_taken_for_the_measured_point_is_a_warning_and_noise_is_none() {
     let warning = "they are probably computed (a target, a nominal point), not measured; check the column mapping";
-    assert_eq!(told("", 0.0).matches(warning).count(), 2, "identify and validate say so");
+    assert_eq!(
+        told("", 0.0).matches(warning).count(),
+        2,
+        "identify and validate say so"
+    );
     assert_eq!(told("x_dif", 0.03).matches(warning).count(), 0);
 }

@@ -33,11 +33,16 @@ const NAMES: [&str; 20] = [
 ];
 
 fn is_a_place(place: &str) -> bool {
-    let number = |text: &str| text.parse::<usize>().is_ok_and(|number| (1..=9).contains(&number));
+    let number = |text: &str| {
+        text.parse::<usize>()
+            .is_ok_and(|number| (1..=9).contains(&number))
+    };
     match place.split_once(' ') {
         None => ["base", "tool", "tracker", "recording"].contains(&place),
         Some(("joint", rest)) => number(rest),
-        Some(("link", rest)) => rest.split_once('-').map_or_else(|| number(rest), |(a, b)| number(a) && number(b) && a < b),
+        Some(("link", rest)) => rest
+            .split_once('-')
+            .map_or_else(|| number(rest), |(a, b)| number(a) && number(b) && a < b),
         Some(_) => false,
     }
 }
@@ -46,17 +51,44 @@ fn is_a_place(place: &str) -> bool {
 fn every_family_moves_the_tool_and_is_wanted_by_a_canonical_name() {
     for (row, family) in FAMILIES.iter().enumerate() {
         for other_forms in [0.0, 1.0] {
-            let design = Design { seed: 5, cases: 1, points: Some(40), other_forms, faulty: 0.0, ..Design::default() };
+            let design = Design {
+                seed: 5,
+                cases: 1,
+                points: Some(40),
+                other_forms,
+                faulty: 0.0,
+                ..Design::default()
+            };
             let case = Case::make(&design, row, Content::Single(row)).expect("a case");
-            let name = format!("{} ({})", family.name, case.concealed.first().map_or("", |one| one.form));
+            let name = format!(
+                "{} ({})",
+                family.name,
+                case.concealed.first().map_or("", |one| one.form)
+            );
             assert!(!case.concealed.is_empty(), "{name} hides nothing");
-            assert!(case.concealed.iter().any(|one| one.cause.effect == family.name), "{name} hides something else");
+            assert!(
+                case.concealed
+                    .iter()
+                    .any(|one| one.cause.effect == family.name),
+                "{name} hides something else"
+            );
             for one in &case.concealed {
-                assert!(one.raw_mm > 1e-5, "{name} moves the tool by {} mm", one.raw_mm);
-                assert!(one.visible_mm <= one.raw_mm && one.strength <= one.strength_alone * (1.0 + 1e-9), "{name}");
+                assert!(
+                    one.raw_mm > 1e-5,
+                    "{name} moves the tool by {} mm",
+                    one.raw_mm
+                );
+                assert!(
+                    one.visible_mm <= one.raw_mm
+                        && one.strength <= one.strength_alone * (1.0 + 1e-9),
+                    "{name}"
+                );
             }
             for (effect, place) in case.want() {
-                assert!(NAMES.contains(&effect) && is_a_place(&place), "{effect} at {place}");
+                assert!(
+                    NAMES.contains(&effect) && is_a_place(&place),
+                    "{effect} at {place}"
+                );
             }
         }
     }
@@ -65,32 +97,66 @@ fn every_family_moves_the_tool_and_is_wanted_by_a_canonical_name() {
 /// Of single effects that are sized, most are as visible as drawn: the strength is that of the differences between two recordings.
 #[test]
 fn an_effect_is_as_visible_as_the_seal_says() {
-    let row = FAMILIES.iter().position(|family| family.name == "gear_cyclic").expect("a family");
-    let design = Design { seed: 3, points: Some(120), natural: 0.0, faulty: 0.0, other_forms: 0.0, ..Design::default() };
+    let row = FAMILIES
+        .iter()
+        .position(|family| family.name == "gear_cyclic")
+        .expect("a family");
+    let design = Design {
+        seed: 3,
+        points: Some(120),
+        natural: 0.0,
+        faulty: 0.0,
+        other_forms: 0.0,
+        ..Design::default()
+    };
     let case = Case::make(&design, 0, Content::Single(row)).expect("a case");
     let one = &case.concealed[0];
     let from_sizes = 3.0 * 120.0 * (one.visible_mm / case.noise_mm[0]).powi(2);
-    assert!((one.strength / from_sizes - 1.0).abs() < 1e-9, "{} against {from_sizes}", one.strength);
+    assert!(
+        (one.strength / from_sizes - 1.0).abs() < 1e-9,
+        "{} against {from_sizes}",
+        one.strength
+    );
     assert!((0.9..=5100.0).contains(&one.strength), "{}", one.strength);
     // 6 joints with 4 numbers each and 3 of the tool, ratios, one coupling on the big robot; the rank does not hang on rounding.
     let joints = case.robot.joints.len();
-    assert_eq!(case.geometry_rank, 4 * joints + 3 + joints + case.robot.couplings.len());
+    assert_eq!(
+        case.geometry_rank,
+        4 * joints + 3 + joints + case.robot.couplings.len()
+    );
 }
 
 /// All that a wrong metre does is what a larger robot does.
 #[test]
 fn a_wrong_metre_is_there_and_cannot_be_seen() {
-    let row = FAMILIES.iter().position(|family| family.name == "tracker_scale").expect("a family");
+    let row = FAMILIES
+        .iter()
+        .position(|family| family.name == "tracker_scale")
+        .expect("a family");
     for number in 0..3 {
-        let design = Design { seed: 6, points: Some(60), faulty: 0.0, ..Design::default() };
+        let design = Design {
+            seed: 6,
+            points: Some(60),
+            faulty: 0.0,
+            ..Design::default()
+        };
         let case = Case::make(&design, number, Content::Single(row)).expect("a case");
-        assert!(case.concealed[0].raw_mm > 1e-3 && case.concealed[0].strength < 0.01, "{:?}", case.concealed[0]);
+        assert!(
+            case.concealed[0].raw_mm > 1e-3 && case.concealed[0].strength < 0.01,
+            "{:?}",
+            case.concealed[0]
+        );
     }
 }
 
 #[test]
 fn a_null_hides_nothing_and_wants_nothing() {
-    let design = Design { seed: 2, points: Some(40), faulty: 0.0, ..Design::default() };
+    let design = Design {
+        seed: 2,
+        points: Some(40),
+        faulty: 0.0,
+        ..Design::default()
+    };
     for number in 0..4 {
         let case = Case::make(&design, number, Content::Null).expect("a case");
         assert!(case.concealed.is_empty() && case.want().is_empty() && case.tampered.is_empty());
@@ -99,22 +165,44 @@ fn a_null_hides_nothing_and_wants_nothing() {
 
 #[test]
 fn shares_are_kept_and_pairs_sit_in_two_places() {
-    let design = Design { seed: 4, cases: 40, nulls: 0.25, pairs: 0.2, open: 0.1, points: Some(30), ..Design::default() };
+    let design = Design {
+        seed: 4,
+        cases: 40,
+        nulls: 0.25,
+        pairs: 0.2,
+        open: 0.1,
+        points: Some(30),
+        ..Design::default()
+    };
     let contents = design.contents();
-    let count = |what: fn(&Content) -> bool| contents.iter().filter(|content| what(content)).count();
+    let count =
+        |what: fn(&Content) -> bool| contents.iter().filter(|content| what(content)).count();
     assert_eq!(count(|content| matches!(content, Content::Null)), 10);
     assert_eq!(count(|content| matches!(content, Content::Pair(..))), 8);
-    let open = count(|content| matches!(content, Content::Single(row) if FAMILIES[*row].name == "unknown"));
+    let open = count(
+        |content| matches!(content, Content::Single(row) if FAMILIES[*row].name == "unknown"),
+    );
     assert_eq!(open, 4);
-    for (number, content) in contents.iter().enumerate().filter(|(_, content)| matches!(content, Content::Pair(..))) {
+    for (number, content) in contents
+        .iter()
+        .enumerate()
+        .filter(|(_, content)| matches!(content, Content::Pair(..)))
+    {
         let case = Case::make(&design, number, *content).expect("a case");
-        let places: Vec<&str> = case.concealed.iter().map(|one| one.cause.place.as_str()).collect();
+        let places: Vec<&str> = case
+            .concealed
+            .iter()
+            .map(|one| one.cause.place.as_str())
+            .collect();
         assert!(places.len() == 2 && places[0] != places[1], "{places:?}");
     }
 }
 
 fn calib(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_calib")).args(arguments).output().expect("the binary")
+    Command::new(env!("CARGO_BIN_EXE_calib"))
+        .args(arguments)
+        .output()
+        .expect("the binary")
 }
 
 fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {
@@ -126,7 +214,11 @@ fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {
             if path.is_dir() {
                 folders.push(path);
             } else {
-                let name = path.strip_prefix(folder).expect("below").to_string_lossy().into_owned();
+                let name = path
+                    .strip_prefix(folder)
+                    .expect("below")
+                    .to_string_lossy()
+                    .into_owned();
                 out.push((name, std::fs::read(&path).expect("a file")));
             }
         }
@@ -142,8 +234,15 @@ fn a_seed_gives_the_same_bytes_on_one_and_two_threads() {
         .map(|jobs| {
             let out = root.path().join(jobs);
             let text = out.to_string_lossy().into_owned();
-            let done = calib(&["simulate", "conceal", "--out", &text, "--cases", "4", "--points", "30", "--jobs", jobs]);
-            assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+            let done = calib(&[
+                "simulate", "conceal", "--out", &text, "--cases", "4", "--points", "30", "--jobs",
+                jobs,
+            ]);
+            assert!(
+                done.status.success(),
+                "{}",
+                String::from_utf8_lossy(&done.stderr)
+            );
             files(&out)
         })
         .into();
@@ -170,15 +269,28 @@ fn judged(root: &Path, say: impl Fn(&Value) -> Vec<Value>) -> (PathBuf, PathBuf)
         "--open",
         "0.1",
     ]);
-    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    assert!(
+        done.status.success(),
+        "{}",
+        String::from_utf8_lossy(&done.stderr)
+    );
     std::fs::create_dir(&verdicts).expect("a folder");
     for entry in std::fs::read_dir(set.join("sealed")).expect("truths") {
         let path = entry.expect("a truth").path();
-        let truth: Value = serde_json::from_slice(&std::fs::read(&path).expect("a file")).expect("JSON");
+        let truth: Value =
+            serde_json::from_slice(&std::fs::read(&path).expect("a file")).expect("JSON");
         let findings = say(&truth);
-        let verdict = if findings.is_empty() { "nothing_missing" } else { "explained" };
+        let verdict = if findings.is_empty() {
+            "nothing_missing"
+        } else {
+            "explained"
+        };
         let answer = json!({ "verdict": verdict, "findings": findings });
-        std::fs::write(verdicts.join(path.file_name().expect("a name")), answer.to_string()).expect("written");
+        std::fs::write(
+            verdicts.join(path.file_name().expect("a name")),
+            answer.to_string(),
+        )
+        .expect("written");
     }
     (set, verdicts)
 }
@@ -188,14 +300,28 @@ fn wanted(truth: &Value) -> Vec<Value> {
 }
 
 fn score(set: &Path, verdicts: &Path) -> Value {
-    let done = calib(&["simulate", "reveal", &set.to_string_lossy(), "--verdicts", &verdicts.to_string_lossy(), "--json"]);
-    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    let done = calib(&[
+        "simulate",
+        "reveal",
+        &set.to_string_lossy(),
+        "--verdicts",
+        &verdicts.to_string_lossy(),
+        "--json",
+    ]);
+    assert!(
+        done.status.success(),
+        "{}",
+        String::from_utf8_lossy(&done.stderr)
+    );
     serde_json::from_slice(&done.stdout).expect("JSON")
 }
 
 fn total(board: &Value, outcome: &str) -> u64 {
-    let bins = ["alone", "beside"].into_iter().flat_map(|company| board[company].as_array().expect("bins").clone());
-    bins.map(|bin| bin["outcomes"][outcome].as_u64().expect("a count")).sum()
+    let bins = ["alone", "beside"]
+        .into_iter()
+        .flat_map(|company| board[company].as_array().expect("bins").clone());
+    bins.map(|bin| bin["outcomes"][outcome].as_u64().expect("a count"))
+        .sum()
 }
 
 #[test]
@@ -217,7 +343,9 @@ fn who_says_the_truth_gets_full_marks_and_who_says_nothing_none() {
 #[test]
 fn a_false_name_is_wrong_and_in_a_null_a_false_alarm() {
     let root = tempfile::tempdir().expect("a folder");
-    let (set, verdicts) = judged(root.path(), |_| vec![json!({ "effect": "joint_table", "where": "joint 9" })]);
+    let (set, verdicts) = judged(root.path(), |_| {
+        vec![json!({ "effect": "joint_table", "where": "joint 9" })]
+    });
     let board = score(&set, &verdicts);
     assert_eq!(total(&board, "wrong"), total(&board, "n"));
     assert_eq!(
@@ -232,25 +360,38 @@ fn a_false_name_is_wrong_and_in_a_null_a_false_alarm() {
         findings
     });
     let board = score(&set, &verdicts);
-    assert_eq!((total(&board, "exact"), board["failures"].as_array().map(Vec::len)), (total(&board, "n"), Some(12)));
+    assert_eq!(
+        (
+            total(&board, "exact"),
+            board["failures"].as_array().map(Vec::len)
+        ),
+        (total(&board, "n"), Some(12))
+    );
 }
 
 #[test]
 fn a_rival_and_a_run_of_links_count_as_the_set() {
     let root = tempfile::tempdir().expect("a folder");
     let (set, verdicts) = judged(root.path(), |truth| {
-        let as_rival = |name: &Value| json!({ "effect": "joint_table", "where": "joint 9", "rivals": [name] });
+        let as_rival =
+            |name: &Value| json!({ "effect": "joint_table", "where": "joint 9", "rivals": [name] });
         wanted(truth).iter().map(as_rival).collect()
     });
     let board = score(&set, &verdicts);
     assert_eq!(total(&board, "in_set"), total(&board, "n"));
-    assert_eq!(board["shares"][1]["share"]["count"], 0, "what has the truth for a rival is no stray");
+    assert_eq!(
+        board["shares"][1]["share"]["count"], 0,
+        "what has the truth for a rival is no stray"
+    );
 }
 
 /// The share of due effects of which this holds, as count and of how many.
 fn placed(board: &Value, what: &str) -> (u64, u64) {
     let share = &board["places"]["all"][what];
-    (share["count"].as_u64().expect("a count"), share["of"].as_u64().expect("a count"))
+    (
+        share["count"].as_u64().expect("a count"),
+        share["of"].as_u64().expect("a count"),
+    )
 }
 
 #[test]
@@ -259,12 +400,17 @@ fn the_place_counts_apart_from_the_name_and_unknown_is_no_wrong_name() {
         let root = tempfile::tempdir().expect("a folder");
         let (set, verdicts) = judged(root.path(), say);
         let board = score(&set, &verdicts);
-        let [place, name, wrong] = ["place", "name_or_unknown", "wrong_name"].map(|what| placed(&board, what));
-        assert!(place.1 >= 4 && place.1 == name.1 && place.1 == wrong.1, "{place:?}");
+        let [place, name, wrong] =
+            ["place", "name_or_unknown", "wrong_name"].map(|what| placed(&board, what));
+        assert!(
+            place.1 >= 4 && place.1 == name.1 && place.1 == wrong.1,
+            "{place:?}"
+        );
         ([place.0, name.0, wrong.0], place.1)
     };
     let at_its_place = |effect: &str, truth: &Value| -> Vec<Value> {
-        let renamed = |name: &Value| json!({ "effect": effect, "where": name["where"], "rivals": [name] });
+        let renamed =
+            |name: &Value| json!({ "effect": effect, "where": name["where"], "rivals": [name] });
         wanted(truth).iter().map(renamed).collect()
     };
     let (said, all) = score_of(&wanted);
@@ -274,7 +420,8 @@ fn the_place_counts_apart_from_the_name_and_unknown_is_no_wrong_name() {
     // The true name for a rival saves the place and not the name.
     let (said, all) = score_of(&|truth| at_its_place("no_such_effect", truth));
     assert_eq!(said, [all, 0, all]);
-    let (said, all) = score_of(&|_| vec![json!({ "effect": "no_such_effect", "where": "joint 9" })]);
+    let (said, all) =
+        score_of(&|_| vec![json!({ "effect": "no_such_effect", "where": "joint 9" })]);
     assert_eq!(said, [0, 0, all]);
     let (said, _) = score_of(&|_| vec![json!({ "effect": "unknown", "where": "joint 9" })]);
     assert_eq!(said, [0, 0, 0]);
@@ -297,15 +444,34 @@ fn one_changed_byte_breaks_the_seal() {
         let last = after.iter().rposition(u8::is_ascii_digit).expect("a digit");
         after[last] = if after[last] == b'1' { b'2' } else { b'1' };
         std::fs::write(&path, after).expect("written");
-        let done = calib(&["simulate", "reveal", &set.to_string_lossy(), "--verdicts", &verdicts.to_string_lossy()]);
+        let done = calib(&[
+            "simulate",
+            "reveal",
+            &set.to_string_lossy(),
+            "--verdicts",
+            &verdicts.to_string_lossy(),
+        ]);
         let said = String::from_utf8_lossy(&done.stderr).into_owned();
         assert_eq!(done.status.code(), Some(10), "{said}");
-        assert!(said.contains(&format!("{name}: was changed since it was sealed")) && done.stdout.is_empty(), "{said}");
+        assert!(
+            said.contains(&format!("{name}: was changed since it was sealed"))
+                && done.stdout.is_empty(),
+            "{said}"
+        );
         std::fs::write(&path, before).expect("written");
     }
     std::fs::remove_file(set.join("recordings/c0001/robot.json")).expect("removed");
-    let done = calib(&["simulate", "reveal", &set.to_string_lossy(), "--verdicts", &verdicts.to_string_lossy()]);
-    assert!(String::from_utf8_lossy(&done.stderr).contains("recordings/c0001/robot.json: was sealed, but cannot be read"));
+    let done = calib(&[
+        "simulate",
+        "reveal",
+        &set.to_string_lossy(),
+        "--verdicts",
+        &verdicts.to_string_lossy(),
+    ]);
+    assert!(
+        String::from_utf8_lossy(&done.stderr)
+            .contains("recordings/c0001/robot.json: was sealed, but cannot be read")
+    );
 }
 
 #[test]
@@ -314,12 +480,34 @@ fn the_scoreboard_is_a_table_with_a_row_for_each_effect() {
     let (set, verdicts) = judged(root.path(), wanted);
     let out = root.path().join("scoreboard.parquet");
     let text = out.to_string_lossy();
-    let done = calib(&["simulate", "reveal", &set.to_string_lossy(), "--verdicts", &verdicts.to_string_lossy(), "--out", &text]);
-    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
-    let reader = ParquetRecordBatchReaderBuilder::try_new(std::fs::File::open(&out).expect("a file")).expect("Parquet");
-    let rows: usize = reader.build().expect("a reader").map(|batch| batch.expect("rows").num_rows()).sum();
+    let done = calib(&[
+        "simulate",
+        "reveal",
+        &set.to_string_lossy(),
+        "--verdicts",
+        &verdicts.to_string_lossy(),
+        "--out",
+        &text,
+    ]);
+    assert!(
+        done.status.success(),
+        "{}",
+        String::from_utf8_lossy(&done.stderr)
+    );
+    let reader =
+        ParquetRecordBatchReaderBuilder::try_new(std::fs::File::open(&out).expect("a file"))
+            .expect("Parquet");
+    let rows: usize = reader
+        .build()
+        .expect("a reader")
+        .map(|batch| batch.expect("rows").num_rows())
+        .sum();
     let board = score(&set, &verdicts);
-    assert_eq!(rows as u64, total(&board, "n") + 3, "three nulls have a row, too");
+    assert_eq!(
+        rows as u64,
+        total(&board, "n") + 3,
+        "three nulls have a row, too"
+    );
 }
 
 /// What is diagnosed already is not diagnosed again: with all verdicts at hand a proof reveals at once.
@@ -352,9 +540,15 @@ fn an_interrupted_proof_goes_on_where_it_stood_and_only_with_the_same_set() {
     };
     let done = prove("12");
     let said = String::from_utf8_lossy(&done.stderr).into_owned();
-    assert!(done.status.success() && said.matches("diagnosed before").count() == 12, "{said}");
+    assert!(
+        done.status.success() && said.matches("diagnosed before").count() == 12,
+        "{said}"
+    );
     let board: Value = serde_json::from_slice(&done.stdout).expect("JSON");
-    assert_eq!((&board["recordings"], &board["failures"]), (&json!(12), &json!([])));
+    assert_eq!(
+        (&board["recordings"], &board["failures"]),
+        (&json!(12), &json!([]))
+    );
     let other = prove("11");
     assert_eq!(other.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&other.stderr).contains("holds a set made with other options"));
@@ -400,18 +594,46 @@ fn a_stated_twin_is_written_as_a_case_folder_that_the_estimator_reads() {
         ])
     };
     let held_out = |out: &str| {
-        let (case, variable) = (format!("{pipelines}/case/pipeline.yaml"), format!("case={}", path(out)));
-        let done =
-            calib(&["run", &case, "--set", &variable, "--store", &path("store"), "--until", "validate", "--json", "--quiet"]);
-        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        let (case, variable) = (
+            format!("{pipelines}/case/pipeline.yaml"),
+            format!("case={}", path(out)),
+        );
+        let done = calib(&[
+            "run",
+            &case,
+            "--set",
+            &variable,
+            "--store",
+            &path("store"),
+            "--until",
+            "validate",
+            "--json",
+            "--quiet",
+        ]);
+        assert!(
+            done.status.success(),
+            "{}",
+            String::from_utf8_lossy(&done.stderr)
+        );
         let document: Value = serde_json::from_slice(&done.stdout).expect("JSON");
-        let rows = document["statistics"].as_array().expect("statistics").clone();
-        let row = rows.iter().find(|row| row["step"] == "geometry" && row["set"] == "validate").expect("a row").clone();
+        let rows = document["statistics"]
+            .as_array()
+            .expect("statistics")
+            .clone();
+        let row = rows
+            .iter()
+            .find(|row| row["step"] == "geometry" && row["set"] == "validate")
+            .expect("a row")
+            .clone();
         row["rms_mm"].as_f64().expect("a number") / row["noise_rms_mm"].as_f64().expect("a number")
     };
     for (out, remainder) in [("bare", "none"), ("worn", "all")] {
         let done = record(out, remainder);
-        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        assert!(
+            done.status.success(),
+            "{}",
+            String::from_utf8_lossy(&done.stderr)
+        );
     }
     // 60 points leave the 34 numbers of geometry uncertain by a quarter of the noise; 30 arcsec at 2 m are 0.3 mm.
     let (bare, worn) = (held_out("bare"), held_out("worn"));
@@ -419,25 +641,54 @@ fn a_stated_twin_is_written_as_a_case_folder_that_the_estimator_reads() {
     assert!(worn > 5.0 * bare, "{worn} against {bare}");
 
     let truth = std::fs::read_to_string(root.path().join("worn/truth.csv")).expect("true numbers");
-    assert!(truth.contains("\nbacklash.j2.gap,backlash,joint 2,arcsec,60\n"), "{truth}");
+    assert!(
+        truth.contains("\nbacklash.j2.gap,backlash,joint 2,arcsec,60\n"),
+        "{truth}"
+    );
     let again = record("worn", "all");
-    assert!(again.status.code() == Some(2) && String::from_utf8_lossy(&again.stderr).contains("is not empty"));
+    assert!(
+        again.status.code() == Some(2)
+            && String::from_utf8_lossy(&again.stderr).contains("is not empty")
+    );
 }
 
 #[test]
 fn a_path_and_its_shuffled_rows_have_the_same_poses_and_only_the_path_is_smooth() {
     use calib::twin::conceal::layout::Layout;
     let poses = |layout| {
-        let design = Design { seed: 31, cases: 1, points: Some(120), faulty: 0.0, layout, ..Design::default() };
+        let design = Design {
+            seed: 31,
+            cases: 1,
+            points: Some(120),
+            faulty: 0.0,
+            layout,
+            ..Design::default()
+        };
         let case = Case::make(&design, 0, Content::Null).expect("a case");
-        case.shots.iter().take(case.fit).map(|shot| shot.q.clone()).collect::<Vec<Vec<f64>>>()
+        case.shots
+            .iter()
+            .take(case.fit)
+            .map(|shot| shot.q.clone())
+            .collect::<Vec<Vec<f64>>>()
     };
     let step = |poses: &[Vec<f64>]| {
-        let apart = |pair: &[Vec<f64>]| pair[0].iter().zip(&pair[1]).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+        let apart = |pair: &[Vec<f64>]| {
+            pair[0]
+                .iter()
+                .zip(&pair[1])
+                .map(|(a, b)| (a - b).powi(2))
+                .sum::<f64>()
+                .sqrt()
+        };
         poses.windows(2).map(apart).sum::<f64>() / (poses.len() - 1) as f64
     };
     let (mut path, mut shuffled) = (poses(Layout::Path), poses(Layout::Shuffled));
-    assert!(step(&path) < 0.35 * step(&shuffled), "{} and {} rad", step(&path), step(&shuffled));
+    assert!(
+        step(&path) < 0.35 * step(&shuffled),
+        "{} and {} rad",
+        step(&path),
+        step(&shuffled)
+    );
     let order = |a: &Vec<f64>, b: &Vec<f64>| a.partial_cmp(b).expect("numbers");
     path.sort_by(order);
     shuffled.sort_by(order);

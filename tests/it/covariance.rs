@@ -12,7 +12,14 @@ fn fitted(data: &Measurements, robot: &calib::robot::RobotModel) -> (Model, Fitt
     let rows: Vec<usize> = (0..data.rows()).collect();
     let model = model(robot, align(robot, data, &rows), &GEOMETRY);
     let candidates: Vec<usize> = (0..model.x.len()).collect();
-    fit(&model, data, &FitOptions { rows: &rows, candidates: &candidates })
+    fit(
+        &model,
+        data,
+        &FitOptions {
+            rows: &rows,
+            candidates: &candidates,
+        },
+    )
 }
 
 #[test]
@@ -21,23 +28,48 @@ fn the_table_has_the_variances_of_the_parameters_and_every_pair_once() {
     let (model, fitted) = fitted(&data, &truth.robot);
     let table = CovarianceTable::of(&model, &fitted, None);
     let parameters = Parameters::of("geometry", &model, &fitted, &[], None);
-    let free: Vec<_> = parameters.0.iter().filter(|row| row.sigma.is_some()).collect();
+    let free: Vec<_> = parameters
+        .0
+        .iter()
+        .filter(|row| row.sigma.is_some())
+        .collect();
     assert!(free.len() > 20);
     assert_eq!(table.0.len(), free.len() * (free.len() + 1) / 2);
     for row in &free {
-        let own = table.0.iter().find(|pair| pair.parameter == row.name && pair.other == row.name).expect("its variance");
+        let own = table
+            .0
+            .iter()
+            .find(|pair| pair.parameter == row.name && pair.other == row.name)
+            .expect("its variance");
         let sigma = row.sigma.expect("free");
-        assert!((own.covariance.sqrt() / sigma - 1.0).abs() < 1e-9, "{}: {} and {sigma}", row.name, own.covariance.sqrt());
+        assert!(
+            (own.covariance.sqrt() / sigma - 1.0).abs() < 1e-9,
+            "{}: {} and {sigma}",
+            row.name,
+            own.covariance.sqrt()
+        );
         assert_eq!(own.unit, format!("{0} {0}", row.unit));
     }
     for pair in &table.0 {
-        let variance =
-            |name: &str| table.0.iter().find(|row| row.parameter == name && row.other == name).expect("there").covariance;
+        let variance = |name: &str| {
+            table
+                .0
+                .iter()
+                .find(|row| row.parameter == name && row.other == name)
+                .expect("there")
+                .covariance
+        };
         let bound = (variance(&pair.parameter) * variance(&pair.other)).sqrt();
-        assert!((pair.covariance - pair.correlation * bound).abs() <= 1e-9 * bound, "{pair:?}");
+        assert!(
+            (pair.covariance - pair.correlation * bound).abs() <= 1e-9 * bound,
+            "{pair:?}"
+        );
     }
     let frame = table.to_frame().expect("a frame that its schema allows");
-    assert_eq!(CovarianceTable::from_frame(&frame).expect("reads back"), table);
+    assert_eq!(
+        CovarianceTable::from_frame(&frame).expect("reads back"),
+        table
+    );
 }
 
 #[test]
@@ -45,16 +77,30 @@ fn a_stored_covariance_says_of_every_point_what_the_fit_said() {
     let (data, truth) = recording(&fixture::offset_wrist(), &GEOMETRY, 60, 9);
     let (model, fitted) = fitted(&data, &truth.robot);
     let parameters = Parameters::of("geometry", &model, &fitted, &[], None);
-    let read = parameters.model(truth.robot.clone(), &[], Load::GravityTorque).expect("a model");
-    let covariance = CovarianceTable::of(&model, &fitted, None).of_model(&read).expect("a covariance");
-    let want = fitted.covariance.as_ref().expect("a covariance").of_predictions(&model, &data);
+    let read = parameters
+        .model(truth.robot.clone(), &[], Load::GravityTorque)
+        .expect("a model");
+    let covariance = CovarianceTable::of(&model, &fitted, None)
+        .of_model(&read)
+        .expect("a covariance");
+    let want = fitted
+        .covariance
+        .as_ref()
+        .expect("a covariance")
+        .of_predictions(&model, &data);
     let arm = IdentifiedArm::new(read, None);
     let uncertainty = Uncertainty::new(&arm, covariance, Scatter::default());
     let mut reach = arm.reach();
     for (row, want) in want.iter().enumerate() {
-        reach.under(&Circumstance { payload: data.payload[row], ..Circumstance::unknown(data.joints) });
+        reach.under(&Circumstance {
+            payload: data.payload[row],
+            ..Circumstance::unknown(data.joints)
+        });
         let found = uncertainty.at(&mut reach, data.q(row)).sigma;
-        assert!((found / want - 1.0).abs() < 1e-3, "row {row}: {found} and {want}");
+        assert!(
+            (found / want - 1.0).abs() < 1e-3,
+            "row {row}: {found} and {want}"
+        );
     }
 }
 
@@ -64,15 +110,39 @@ fn what_an_earlier_step_estimated_stays_in_the_table_of_a_later_one() {
     let (model, fitted) = fitted(&data, &truth.robot);
     let first = CovarianceTable::of(&model, &fitted, None);
     let rows: Vec<usize> = (0..data.rows()).collect();
-    let joints: Vec<usize> = (0..model.x.len()).filter(|k| model.stack.specs()[*k].name.starts_with("joint_offset")).collect();
-    let (model, again) = fit(&model, &data, &FitOptions { rows: &rows, candidates: &joints });
+    let joints: Vec<usize> = (0..model.x.len())
+        .filter(|k| model.stack.specs()[*k].name.starts_with("joint_offset"))
+        .collect();
+    let (model, again) = fit(
+        &model,
+        &data,
+        &FitOptions {
+            rows: &rows,
+            candidates: &joints,
+        },
+    );
     let second = CovarianceTable::of(&model, &again, Some(&first));
     let is_offset = |name: &str| name.starts_with("joint_offset");
-    let mixed = |table: &CovarianceTable| table.0.iter().filter(|row| is_offset(&row.parameter) != is_offset(&row.other)).count();
+    let mixed = |table: &CovarianceTable| {
+        table
+            .0
+            .iter()
+            .filter(|row| is_offset(&row.parameter) != is_offset(&row.other))
+            .count()
+    };
     assert!(mixed(&first) > 0);
-    assert_eq!(mixed(&second), 0, "steps of their own are held to be independent");
+    assert_eq!(
+        mixed(&second),
+        0,
+        "steps of their own are held to be independent"
+    );
     let others = |table: &CovarianceTable| {
-        table.0.iter().filter(|row| !is_offset(&row.parameter) && !is_offset(&row.other)).cloned().collect::<Vec<_>>()
+        table
+            .0
+            .iter()
+            .filter(|row| !is_offset(&row.parameter) && !is_offset(&row.other))
+            .cloned()
+            .collect::<Vec<_>>()
     };
     assert_eq!(others(&first), others(&second));
     assert!(second.of_model(&model).is_some());

@@ -6,10 +6,20 @@ use std::collections::BTreeSet;
 use crate::source::sources;
 
 /// Kinds of sources.
-const KINDS: [&str; 5] = ["literature: ", "physics: ", "count: ", "measured by tests/reference/", "judgement: "];
+const KINDS: [&str; 5] = [
+    "literature: ",
+    "physics: ",
+    "count: ",
+    "measured by tests/reference/",
+    "judgement: ",
+];
 
 /// Rooms whose deciding numbers are in the tables.
-const ROOMS: [&str; 3] = ["numerics/diagnose/", "numerics/estimate/choose/", "numerics/estimate/screen/"];
+const ROOMS: [&str; 3] = [
+    "numerics/diagnose/",
+    "numerics/estimate/choose/",
+    "numerics/estimate/screen/",
+];
 
 /// Numbers of those rooms that decide nothing: how work is dealt out, steps and bounds of solvers and of grids, roundings, units.
 const MECHANICS: [&str; 39] = [
@@ -59,8 +69,15 @@ fn every_criterion_has_a_meaning_a_unit_and_a_source() {
     let mut names = BTreeSet::new();
     for row in TABLES.iter().copied().flatten() {
         let called = format!("{}::{}", row.room, row.name);
-        assert!(!row.meaning.trim().is_empty() && !row.unit.is_empty(), "{called}");
-        assert!(KINDS.iter().any(|kind| row.source.starts_with(kind)), "{called}: source `{}`", row.source);
+        assert!(
+            !row.meaning.trim().is_empty() && !row.unit.is_empty(),
+            "{called}"
+        );
+        assert!(
+            KINDS.iter().any(|kind| row.source.starts_with(kind)),
+            "{called}: source `{}`",
+            row.source
+        );
         assert!(names.insert(called.clone()), "{called} twice");
     }
     assert!(names.len() > 150);
@@ -69,16 +86,34 @@ fn every_criterion_has_a_meaning_a_unit_and_a_source() {
 #[test]
 fn no_number_decides_outside_the_tables() {
     let mut faults = Vec::new();
-    for source in sources().iter().filter(|source| ROOMS.iter().any(|room| source.file.starts_with(room))) {
-        let text = std::fs::read_to_string(format!("{}/src/{}", env!("CARGO_MANIFEST_DIR"), source.file)).unwrap();
+    for source in sources()
+        .iter()
+        .filter(|source| ROOMS.iter().any(|room| source.file.starts_with(room)))
+    {
+        let text = std::fs::read_to_string(format!(
+            "{}/src/{}",
+            env!("CARGO_MANIFEST_DIR"),
+            source.file
+        ))
+        .unwrap();
         for (at, line) in text.lines().enumerate() {
-            let Some((_, rest)) = line.split_once("const ") else { continue };
-            let Some((name, kind)) = rest.split_once(": ") else { continue };
-            let number = ["f64", "usize", "u64", "u32", "i64", "i32", "[f64", "[usize"].iter().any(|own| kind.starts_with(own));
+            let Some((_, rest)) = line.split_once("const ") else {
+                continue;
+            };
+            let Some((name, kind)) = rest.split_once(": ") else {
+                continue;
+            };
+            let number = ["f64", "usize", "u64", "u32", "i64", "i32", "[f64", "[usize"]
+                .iter()
+                .any(|own| kind.starts_with(own));
             if number && !MECHANICS.contains(&name) && name != "UNSEEN" {
                 faults.push(format!("{}:{}: {name}", source.file, at + 1));
             }
         }
     }
-    assert!(faults.is_empty(), "state meaning, unit and source in src/numerics/criteria:\n{}", faults.join("\n"));
+    assert!(
+        faults.is_empty(),
+        "state meaning, unit and source in src/numerics/criteria:\n{}",
+        faults.join("\n")
+    );
 }

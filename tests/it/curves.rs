@@ -13,7 +13,10 @@ const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
 const ROWS: usize = 40;
 
 fn labelled<T>(table: T) -> Vec<Labelled<T>> {
-    vec![Labelled { stage: "diagnose".into(), table }]
+    vec![Labelled {
+        stage: "diagnose".into(),
+        table,
+    }]
 }
 
 fn finding(rank: i64, effect: &str, forms: &serde_json::Value) -> FindingRow {
@@ -74,11 +77,17 @@ fn curves_of(
         }
     }
     parameters.0.sort_by(|a, b| a.name.cmp(&b.name));
-    let model = parameters.model(robot, &[], Load::GravityTorque).expect("a model");
+    let model = parameters
+        .model(robot, &[], Load::GravityTorque)
+        .expect("a model");
     let joints = description.joints.len();
     let mut recording = Recording {
         joints,
-        prismatic: description.joints.iter().map(|joint| joint.kind == JointKind::Prismatic).collect(),
+        prismatic: description
+            .joints
+            .iter()
+            .map(|joint| joint.kind == JointKind::Prismatic)
+            .collect(),
         sequence: (0..ROWS as i64).collect(),
         point_id: (0..ROWS).map(|row| format!("P{row}")).collect(),
         usage: vec![None; ROWS],
@@ -86,11 +95,27 @@ fn curves_of(
         position: vec![[0.0; 3]; ROWS],
         ..Recording::default()
     };
-    recording.position = model.predict(&recording.measurements()).into_iter().map(Into::into).collect();
+    recording.position = model
+        .predict(&recording.measurements())
+        .into_iter()
+        .map(Into::into)
+        .collect();
     let data = recording.measurements();
-    let split = |row: usize| SplitRow { sequence: row as i64, point_id: format!("P{row}"), set: "validate".into() };
+    let split = |row: usize| SplitRow {
+        sequence: row as i64,
+        point_id: format!("P{row}"),
+        set: "validate".into(),
+    };
     let split = Split((0..ROWS).map(split).collect());
-    let prediction = Prediction::of("diagnose", &model, &data, &recording, &split, &[true; ROWS], None);
+    let prediction = Prediction::of(
+        "diagnose",
+        &model,
+        &data,
+        &recording,
+        &split,
+        &[true; ROWS],
+        None,
+    );
     let reads = ReportReads {
         statistics: Statistics::default(),
         prediction: labelled(prediction),
@@ -115,7 +140,9 @@ fn curves_of(
         cells: Vec::new(),
         suspects: Vec::new(),
     };
-    let tables = Desk::default().run(&Report::default(), reads).expect("a report");
+    let tables = Desk::default()
+        .run(&Report::default(), reads)
+        .expect("a report");
     (recording, table(&tables).remove(0))
 }
 
@@ -131,38 +158,69 @@ fn a_pull_with_a_gear_error_in_it_and_a_gear_error_beside_it_each_have_their_own
     let (once, twice) = (gear(1), gear(2));
     let pulled = [9.0, -4.0, 6.0, 3.0].map(|size| size * ARCSEC);
     let [geared, evenly] = [[5.0, -7.0], [-8.0, 2.0]].map(|sizes| sizes.map(|size| size * ARCSEC));
-    let findings = vec![finding(1, "cable_drag", &json!([pull, once])), finding(2, "gear_cyclic", &json!([twice]))];
-    let (recording, curves) =
-        curves_of(&fixture::spherical(), &[(&pull, &pulled), (&once, &geared), (&twice, &evenly)], findings);
+    let findings = vec![
+        finding(1, "cable_drag", &json!([pull, once])),
+        finding(2, "gear_cyclic", &json!([twice])),
+    ];
+    let (recording, curves) = curves_of(
+        &fixture::spherical(),
+        &[(&pull, &pulled), (&once, &geared), (&twice, &evenly)],
+        findings,
+    );
     assert_eq!(curves.0.len(), 2 * ROWS);
     for point in &curves.0 {
         let q = recording.q(point.sequence as usize);
         let ((s2, c2), (s3, c3)) = (q[1].sin_cos(), q[2].sin_cos());
         let arcsec = match point.rank {
-            1 => 9.0 * s2 * s3 - 4.0 * s2 * c3 + 6.0 * c2 * s3 + 3.0 * c2 * c3 + 5.0 * s3 - 7.0 * c3,
+            1 => {
+                9.0 * s2 * s3 - 4.0 * s2 * c3 + 6.0 * c2 * s3 + 3.0 * c2 * c3 + 5.0 * s3 - 7.0 * c3
+            }
             _ => -8.0 * (2.0 * q[2]).sin() + 2.0 * (2.0 * q[2]).cos(),
         };
-        assert_eq!((point.over.as_str(), point.unit.as_str()), ("joint 3", "rad"));
+        assert_eq!(
+            (point.over.as_str(), point.unit.as_str()),
+            ("joint 3", "rad")
+        );
         assert!((point.x - q[2]).abs() < 1e-12);
         // A chord is the arc to second order.
-        assert!((point.fitted / ARCSEC - arcsec).abs() < 0.01, "{point:?}: {arcsec} arcsec");
-        assert!(point.with.abs() < 1e-9 && (point.without - point.fitted).abs() < 1e-9, "{point:?}");
+        assert!(
+            (point.fitted / ARCSEC - arcsec).abs() < 0.01,
+            "{point:?}: {arcsec} arcsec"
+        );
+        assert!(
+            point.with.abs() < 1e-9 && (point.without - point.fitted).abs() < 1e-9,
+            "{point:?}"
+        );
     }
 }
 
 #[test]
 fn what_a_joint_that_slides_errs_by_is_put_over_its_place_in_millimetres() {
-    let law = json!({"of": {"angle": {"joint": 0}}, "basis": {"rise": {"centre": 1.2, "width": 0.3}}});
+    let law =
+        json!({"of": {"angle": {"joint": 0}}, "basis": {"rise": {"centre": 1.2, "width": 0.3}}});
     let rise = json!({"unknown": {"motion": {"joint": {"joint": 0}}, "law": law}});
-    let one = FindingRow { place: "joint 1".into(), ..finding(1, "unknown", &json!([rise])) };
+    let one = FindingRow {
+        place: "joint 1".into(),
+        ..finding(1, "unknown", &json!([rise]))
+    };
     let (recording, curves) = curves_of(&fixture::on_track(), &[(&rise, &[0.4])], vec![one]);
     assert_eq!(curves.0.len(), ROWS);
     for point in &curves.0 {
         let q = recording.q(point.sequence as usize)[0];
-        assert_eq!((point.over.as_str(), point.x_unit.as_str(), point.unit.as_str()), ("joint 1", "mm", "mm"));
+        assert_eq!(
+            (
+                point.over.as_str(),
+                point.x_unit.as_str(),
+                point.unit.as_str()
+            ),
+            ("joint 1", "mm", "mm")
+        );
         assert!((point.x - 1e3 * q).abs() < 1e-9, "{point:?}");
         let mm = 0.4 * ((q - 1.2) / 0.3).tanh();
         // A length has the sign of the direction in which most of it goes.
-        assert!((point.fitted.abs() - mm.abs()).abs() < 1e-6, "{point:?}: {mm} mm");
+        assert!(
+            (point.fitted.abs() - mm.abs()).abs() < 1e-6,
+            "{point:?}: {mm} mm"
+        );
     }
 }

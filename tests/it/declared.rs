@@ -2,8 +2,8 @@
 
 use crate::fixture;
 use calib::effect::{
-    Axes, AxisPoint, Basis, DeclaredCause, DeclaredForm, EffectDeclaration, EffectStack, Form, Law, Laws, Motion, Polar,
-    ShapeRange, Starts, Survey, Term, Variable, cause,
+    Axes, AxisPoint, Basis, DeclaredCause, DeclaredForm, EffectDeclaration, EffectStack, Form, Law,
+    Laws, Motion, Polar, ShapeRange, Starts, Survey, Term, Variable, cause,
 };
 use calib::robot::{Measurements, PointReadings, RobotModel};
 use calib::spatial::{Pose, Twist};
@@ -17,7 +17,12 @@ fn data(robot: &RobotModel) -> Measurements {
     let base = Pose::exp(&Twist::new(9.0, -1.0, 0.5, 0.1, -0.2, 2.0));
     Measurements {
         joints: n,
-        points: PointReadings::new(q.chunks(n).map(|q| base.point(&robot.forward(q).translation)).collect(), 1e-5),
+        points: PointReadings::new(
+            q.chunks(n)
+                .map(|q| base.point(&robot.forward(q).translation))
+                .collect(),
+            1e-5,
+        ),
         q,
         payload: (0..ROWS).map(|row| [0.0, 4.0, 10.0][row % 3]).collect(),
         temperature: Some((0..ROWS).map(|row| 20.0 + 0.3 * row as f64).collect()),
@@ -43,18 +48,25 @@ fn forms(declaration: &EffectDeclaration, robot: &RobotModel, data: &Measurement
     let torque = vec![1.0; ROWS * robot.joints()];
     let compliance = vec![0.0; robot.joints()];
     let survey = Survey::new(robot, data, &rows, &torque, &compliance);
-    DeclaredForm::hypotheses(declared, &survey).into_iter().map(|hypothesis| hypothesis.form).collect()
+    DeclaredForm::hypotheses(declared, &survey)
+        .into_iter()
+        .map(|hypothesis| hypothesis.form)
+        .collect()
 }
 
 /// Points and partials of an arm with one form at these coefficients.
 fn moved(robot: &RobotModel, data: &Measurements, form: &Form) -> Vec<Vec<Vector3<f64>>> {
     let base = Pose::exp(&Twist::new(9.0, -1.0, 0.5, 0.1, -0.2, 2.0));
     let stack = EffectStack::new(robot, base, vec![Box::new(form.clone())]);
-    let x: Vec<f64> = (0..stack.specs().len()).map(|k| 1e-4 * (1.0 + k as f64)).collect();
+    let x: Vec<f64> = (0..stack.specs().len())
+        .map(|k| 1e-4 * (1.0 + k as f64))
+        .collect();
     let mut scratch = stack.scratch(robot);
     let row = |row: usize| {
         let mut out = vec![Vector3::zeros(); x.len() + 1];
-        let point = stack.derivatives(robot, data, row, &x, &mut scratch, |k, partial| out[k] += partial);
+        let point = stack.derivatives(robot, data, row, &x, &mut scratch, |k, partial| {
+            out[k] += partial
+        });
         out[x.len()] = point;
         out
     };
@@ -69,7 +81,13 @@ fn term(name: &str, motion: Motion, law: Law) -> Form {
 fn a_formula_moves_the_arm_as_the_same_law_of_the_library() {
     let robot = RobotModel::new(fixture::spherical());
     let data = data(&robot);
-    let warm = Law::new(Variable::Temperature, Basis::Linear { zero: 20.0, per: 1.0 });
+    let warm = Law::new(
+        Variable::Temperature,
+        Basis::Linear {
+            zero: 20.0,
+            per: 1.0,
+        },
+    );
     let joint = 2;
     let pairs: Vec<(EffectDeclaration, Form)> = vec![
         (
@@ -77,27 +95,49 @@ fn a_formula_moves_the_arm_as_the_same_law_of_the_library() {
             term(
                 "gear_cyclic",
                 Motion::Joint { joint },
-                Law::new(Variable::Angle { joint }, Basis::Wave { order: 3, overtone: false }),
+                Law::new(
+                    Variable::Angle { joint },
+                    Basis::Wave {
+                        order: 3,
+                        overtone: false,
+                    },
+                ),
             ),
         ),
         (
             declaration("joint 3", "angle", &["(temperature - 20) * q"]),
-            term("joint_warming", Motion::Joint { joint }, warm.times(Variable::Angle { joint }, Basis::PROPORTIONAL)),
+            term(
+                "joint_warming",
+                Motion::Joint { joint },
+                warm.times(Variable::Angle { joint }, Basis::PROPORTIONAL),
+            ),
         ),
         (
             declaration("joint 3", "angle", &["q_before * load"]),
             term(
                 "unknown",
                 Motion::Joint { joint },
-                Law::of(Variable::Angle { joint: 1 }).times(Variable::Load { joint }, Basis::PROPORTIONAL),
+                Law::of(Variable::Angle { joint: 1 })
+                    .times(Variable::Load { joint }, Basis::PROPORTIONAL),
             ),
         ),
         (
             declaration("joint 3", "axis", &["sin(q)", "cos(q)"]),
             term(
                 "axis_wobble",
-                Motion::Axis { joint, about: None, turning: false, at: AxisPoint::Own },
-                Law::new(Variable::Angle { joint }, Basis::Wave { order: 1, overtone: false }),
+                Motion::Axis {
+                    joint,
+                    about: None,
+                    turning: false,
+                    at: AxisPoint::Own,
+                },
+                Law::new(
+                    Variable::Angle { joint },
+                    Basis::Wave {
+                        order: 1,
+                        overtone: false,
+                    },
+                ),
             ),
         ),
         (
@@ -106,14 +146,24 @@ fn a_formula_moves_the_arm_as_the_same_law_of_the_library() {
         ),
         (
             declaration("tool", "displacement", &["step(payload - 5)"]),
-            term("unknown", Motion::Tool { axes: Axes::Place }, Law::new(Variable::Payload, Basis::After { at: 5.0 })),
+            term(
+                "unknown",
+                Motion::Tool { axes: Axes::Place },
+                Law::new(Variable::Payload, Basis::After { at: 5.0 }),
+            ),
         ),
         (
             declaration("base", "both", &["1 - exp(-time / 100)"]),
             term(
                 "base_shift",
                 Motion::Base { axes: Axes::Both },
-                Law::new(Variable::Time, Basis::Settling { start: 0.0, constant: 100.0 }),
+                Law::new(
+                    Variable::Time,
+                    Basis::Settling {
+                        start: 0.0,
+                        constant: 100.0,
+                    },
+                ),
             ),
         ),
         (
@@ -121,23 +171,41 @@ fn a_formula_moves_the_arm_as_the_same_law_of_the_library() {
             term(
                 "tracker_circle",
                 Motion::Instrument { of: Polar::Azimuth },
-                Law::new(Variable::Azimuth, Basis::Wave { order: 1, overtone: false }),
+                Law::new(
+                    Variable::Azimuth,
+                    Basis::Wave {
+                        order: 1,
+                        overtone: false,
+                    },
+                ),
             ),
         ),
         (
             declaration("joint 3", "angle", &["slip(0.05)"]),
-            term("presliding", Motion::Joint { joint }, Law::of(Variable::Slip { joint, travel: 0.05 })),
+            term(
+                "presliding",
+                Motion::Joint { joint },
+                Law::of(Variable::Slip {
+                    joint,
+                    travel: 0.05,
+                }),
+            ),
         ),
     ];
     for (declared, library) in pairs {
         let own = forms(&declared, &robot, &data);
-        let [own] = &own[..] else { panic!("{} forms of {declared:?}", own.len()) };
+        let [own] = &own[..] else {
+            panic!("{} forms of {declared:?}", own.len())
+        };
         assert_eq!(own.place(), library.place(), "{declared:?}");
         let (own, library) = (moved(&robot, &data, own), moved(&robot, &data, &library));
         for (row, (own, library)) in own.iter().zip(&library).enumerate() {
             assert_eq!(own.len(), library.len(), "{declared:?}");
             for (own, library) in own.iter().zip(library) {
-                assert!((own - library).norm() < 1e-12, "{declared:?} at row {row}: {own} instead of {library}");
+                assert!(
+                    (own - library).norm() < 1e-12,
+                    "{declared:?} at row {row}: {own} instead of {library}"
+                );
             }
         }
     }
@@ -147,7 +215,11 @@ fn a_formula_moves_the_arm_as_the_same_law_of_the_library() {
 fn a_form_carries_its_declaration_wherever_its_json_goes() {
     let robot = RobotModel::new(fixture::spherical());
     let data = data(&robot);
-    let range = ShapeRange { from: -3.0, to: 3.0, start: Starts(vec![-1.0, 1.0]) };
+    let range = ShapeRange {
+        from: -3.0,
+        to: 3.0,
+        start: Starts(vec![-1.0, 1.0]),
+    };
     let declared = EffectDeclaration {
         shape: [("centre".to_string(), range)].into(),
         sentence: Some("{place} by {value} near {centre}".into()),
@@ -158,17 +230,31 @@ fn a_form_carries_its_declaration_wherever_its_json_goes() {
     for form in &all {
         let text = serde_json::to_string(form).expect("JSON");
         let again: Form = serde_json::from_str(&text).expect("the same");
-        assert!(again == *form && again.key() == form.key() && serde_json::to_string(&again).expect("JSON") == text);
+        assert!(
+            again == *form
+                && again.key() == form.key()
+                && serde_json::to_string(&again).expect("JSON") == text
+        );
     }
     let text = serde_json::to_string(&all[0]).expect("JSON");
     for (from, to, said) in [
         ("abs(q", "abs(p", "`p` is no name"),
-        ("\"shape\":[-1.0]", "\"shape\":[]", "is not as it was declared"),
-        ("{\"own_effect\":", "{\"other_effect\":", "is not as it was declared"),
+        (
+            "\"shape\":[-1.0]",
+            "\"shape\":[]",
+            "is not as it was declared",
+        ),
+        (
+            "{\"own_effect\":",
+            "{\"other_effect\":",
+            "is not as it was declared",
+        ),
         ("\"declared\"", "\"decleared\"", "no cause `own_effect`"),
     ] {
         assert!(text.contains(from), "{from}: {text}");
-        let error = serde_json::from_str::<Form>(&text.replace(from, to)).expect_err("not a form").to_string();
+        let error = serde_json::from_str::<Form>(&text.replace(from, to))
+            .expect_err("not a form")
+            .to_string();
         assert!(error.contains(said), "{error}");
     }
 }
@@ -179,10 +265,21 @@ fn a_declaration_says_what_it_needs_and_is_not_tried_without() {
     let mut data = data(&robot);
     let declared = declaration("joint", "angle", &["lagging(300) * q"]);
     let about = DeclaredCause::of(&declared).expect("a cause").about();
-    assert_eq!((about.name, about.needs, about.formula), ("own_effect", "temperature", "lagging(300) * q"));
+    assert_eq!(
+        (about.name, about.needs, about.formula),
+        ("own_effect", "temperature", "lagging(300) * q")
+    );
     assert_eq!(forms(&declared, &robot, &data).len(), robot.joints());
     // The first joint has none before it.
-    assert_eq!(forms(&declaration("joint", "angle", &["q_before * q"]), &robot, &data).len(), robot.joints() - 1);
+    assert_eq!(
+        forms(
+            &declaration("joint", "angle", &["q_before * q"]),
+            &robot,
+            &data
+        )
+        .len(),
+        robot.joints() - 1
+    );
     data.temperature = None;
     assert_eq!(forms(&declared, &robot, &data).len(), 0);
 }

@@ -2,7 +2,8 @@
 
 use calib::error::{Error, Result};
 use calib::stage::{
-    Context, ErasedStage, InputTable, OpenedInput, Output, Port, RawFile, Services, Sink, Stage, StageEntry, Streamed, Writes,
+    Context, ErasedStage, InputTable, OpenedInput, Output, Port, RawFile, Services, Sink, Stage,
+    StageEntry, Streamed, Writes,
 };
 use calib::store::frame::Frame;
 use calib::table::Table;
@@ -31,8 +32,14 @@ impl Desk {
         self
     }
     /// Runs a stage and gives the chunks of each table that it wrote.
-    pub fn run<S: Stage>(&self, stage: &S, reads: S::Reads) -> Result<BTreeMap<&'static str, Vec<Frame>>> {
-        self.written(&S::Writes::ports(), |context| stage.run(reads, context)?.give())
+    pub fn run<S: Stage>(
+        &self,
+        stage: &S,
+        reads: S::Reads,
+    ) -> Result<BTreeMap<&'static str, Vec<Frame>>> {
+        self.written(&S::Writes::ports(), |context| {
+            stage.run(reads, context)?.give()
+        })
     }
     /// The same of a stage whose type is not known, on the tables of each of its ports.
     pub fn run_any(
@@ -42,7 +49,10 @@ impl Desk {
         frames: Vec<Vec<(String, Frame)>>,
     ) -> Result<BTreeMap<&'static str, Vec<Frame>>> {
         let input = |(stage, frame): (String, Frame)| (stage, Box::new(frame) as InputTable);
-        let inputs = frames.into_iter().map(|port| port.into_iter().map(input).collect()).collect();
+        let inputs = frames
+            .into_iter()
+            .map(|port| port.into_iter().map(input).collect())
+            .collect();
         self.written(&(entry.writes)(), |context| stage.run(inputs, context))
     }
     /// Runs what gives the tables of these ports.
@@ -52,7 +62,12 @@ impl Desk {
         run: impl FnOnce(&Context) -> Result<Vec<Output>>,
     ) -> Result<BTreeMap<&'static str, Vec<Frame>>> {
         self.chunks.lock().unwrap().clear();
-        let outputs = run(&Context { id: "stage", seed: 7, jobs: 1, services: self })?;
+        let outputs = run(&Context {
+            id: "stage",
+            seed: 7,
+            jobs: 1,
+            services: self,
+        })?;
         let mut tables = std::mem::take(&mut *self.chunks.lock().unwrap());
         for (port, output) in ports.iter().zip(outputs) {
             match output {
@@ -66,7 +81,10 @@ impl Desk {
 
 /// The chunks of one table as Rust values.
 pub fn table<T: Table>(tables: &BTreeMap<&'static str, Vec<Frame>>) -> Vec<T> {
-    tables[T::KIND].iter().map(|frame| T::from_frame(frame).unwrap()).collect()
+    tables[T::KIND]
+        .iter()
+        .map(|frame| T::from_frame(frame).unwrap())
+        .collect()
 }
 
 struct Keep {
@@ -85,7 +103,11 @@ impl Sink for Keep {
     }
     fn finish(self: Box<Self>) -> Result<Streamed> {
         self.chunks.lock().unwrap().insert(self.kind, self.frames);
-        Ok(Streamed { kind: self.kind, rows: self.rows, handle: Box::new(()) })
+        Ok(Streamed {
+            kind: self.kind,
+            rows: self.rows,
+            handle: Box::new(()),
+        })
     }
 }
 
@@ -95,13 +117,27 @@ impl Services for Desk {
         self.opened.lock().unwrap().push(label.clone());
         if let Some(content) = self.files.get(&file.0) {
             let reader = Box::new(std::io::Cursor::new(content.clone()));
-            return Ok(OpenedInput { label, reader, size: Some(content.len() as u64) });
+            return Ok(OpenedInput {
+                label,
+                reader,
+                size: Some(content.len() as u64),
+            });
         }
-        let reader = std::fs::File::open(&file.0).map_err(|error| Error::data(&label, error.to_string()))?;
-        Ok(OpenedInput { label, reader: Box::new(reader), size: None })
+        let reader =
+            std::fs::File::open(&file.0).map_err(|error| Error::data(&label, error.to_string()))?;
+        Ok(OpenedInput {
+            label,
+            reader: Box::new(reader),
+            size: None,
+        })
     }
     fn sink(&self, kind: &'static str) -> Result<Box<dyn Sink>> {
-        Ok(Box::new(Keep { kind, rows: 0, frames: Vec::new(), chunks: self.chunks.clone() }))
+        Ok(Box::new(Keep {
+            kind,
+            rows: 0,
+            frames: Vec::new(),
+            chunks: self.chunks.clone(),
+        }))
     }
     fn begin(&self, _what: &str, _total: Option<u64>, _unit: &str) {}
     fn advance(&self, _done: u64, _message: &str) {}
@@ -128,7 +164,10 @@ pub fn shared(folder: &str) -> Option<PathBuf> {
 
 /// Skips this test, or a part of it, for want of recordings, where that is allowed.
 pub fn missing(why: &str) {
-    assert!(std::env::var_os("CALIB_ALL_TESTS").is_none(), "nothing may be skipped here: {why}");
+    assert!(
+        std::env::var_os("CALIB_ALL_TESTS").is_none(),
+        "nothing may be skipped here: {why}"
+    );
     skipped(why);
 }
 
@@ -136,7 +175,14 @@ pub fn missing(why: &str) {
 pub fn skipped(why: &str) {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("skipped");
     std::fs::create_dir_all(&folder).expect("a folder");
-    let test = std::thread::current().name().expect("a test").replace("::", " ");
-    let mut notes = std::fs::OpenOptions::new().create(true).append(true).open(folder.join(test)).expect("a note");
+    let test = std::thread::current()
+        .name()
+        .expect("a test")
+        .replace("::", " ");
+    let mut notes = std::fs::OpenOptions::new()
+        .create(true)
+        .append(true)
+        .open(folder.join(test))
+        .expect("a note");
     writeln!(notes, "{why}").expect("a note");
 }

@@ -30,47 +30,93 @@ type Named = BTreeSet<(String, String)>;
 
 fn wanted(value: &Value) -> Named {
     let text = |entry: &Value, key: &str| entry[key].as_str().expect("a name").to_string();
-    value.as_array().expect("a list").iter().map(|entry| (text(entry, "effect"), text(entry, "where"))).collect()
+    value
+        .as_array()
+        .expect("a list")
+        .iter()
+        .map(|entry| (text(entry, "effect"), text(entry, "where")))
+        .collect()
 }
 
 #[test]
 fn the_practice_cases_are_solved() {
-    let Some(folder) = shared("practice") else { return };
+    let Some(folder) = shared("practice") else {
+        return;
+    };
     let mut wrong = Vec::new();
-    for case in std::fs::read_dir(&folder).expect("the folder").map(|entry| entry.expect("an entry").path()) {
-        let Ok(want) = std::fs::read_to_string(case.join("want.json")) else { continue };
+    for case in std::fs::read_dir(&folder)
+        .expect("the folder")
+        .map(|entry| entry.expect("an entry").path())
+    {
+        let Ok(want) = std::fs::read_to_string(case.join("want.json")) else {
+            continue;
+        };
         let want: Value = serde_json::from_str(&want).expect("JSON");
-        let (inputs, stage): (Inputs, Diagnose) = pipeline("case", &[("case", &case.display().to_string())], "diagnose");
+        let (inputs, stage): (Inputs, Diagnose) =
+            pipeline("case", &[("case", &case.display().to_string())], "diagnose");
         let robot = RobotModel::new(inputs.robot.to_description().expect("a robot"));
         let data = inputs.recording.measurements();
-        let reads = DiagnoseReads { robot: inputs.robot, recording: inputs.recording, split: inputs.split };
+        let reads = DiagnoseReads {
+            robot: inputs.robot,
+            recording: inputs.recording,
+            split: inputs.split,
+        };
         let tables = Desk::default().run(&stage, reads).expect("a diagnosis");
         let findings: Findings = table(&tables).remove(0);
-        let found: Named = findings.0.into_iter().map(|row| (row.effect, row.place)).collect();
+        let found: Named = findings
+            .0
+            .into_iter()
+            .map(|row| (row.effect, row.place))
+            .collect();
         let verdict: Verdict = table(&tables).remove(0);
         let row = &verdict.0[0];
         // Held-out rows come down to what a complete model of so many parameters leaves.
-        let (after, floor) = (row.after_rms_mm.expect("held-out rows"), row.noise_floor_mm.expect("lengths"));
+        let (after, floor) = (
+            row.after_rms_mm.expect("held-out rows"),
+            row.noise_floor_mm.expect("lengths"),
+        );
         let wanted = wanted(&want["effects"]);
         let is = |(effect, place): &(String, String), found: &(String, String)| {
-            effect.trim_start_matches('?').split('|').any(|name| name == found.0) && *place == found.1
+            effect
+                .trim_start_matches('?')
+                .split('|')
+                .any(|name| name == found.0)
+                && *place == found.1
         };
-        let missing = wanted.iter().any(|want| !want.0.starts_with('?') && !found.iter().any(|found| is(want, found)));
-        let false_ones = found.iter().any(|found| !wanted.iter().any(|want| is(want, found)));
+        let missing = wanted
+            .iter()
+            .any(|want| !want.0.starts_with('?') && !found.iter().any(|found| is(want, found)));
+        let false_ones = found
+            .iter()
+            .any(|found| !wanted.iter().any(|want| is(want, found)));
         if missing || false_ones {
-            wrong.push(format!("{}: {found:?}, after {after:.4}, floor {floor:.4}", case.display()));
+            wrong.push(format!(
+                "{}: {found:?}, after {after:.4}, floor {floor:.4}",
+                case.display()
+            ));
             continue;
         }
         // Wrong points among the held-out rows are off whatever the model.
-        assert!(after < 1.35 * floor || !found.iter().all(|found| found.1 != "recording"), "{}: {after} {floor}", case.display());
+        assert!(
+            after < 1.35 * floor || !found.iter().all(|found| found.1 != "recording"),
+            "{}: {after} {floor}",
+            case.display()
+        );
         let predictions: Prediction = table(&tables).remove(0);
         assert!(predictions.0.len() >= 160);
         // The table of parameters alone is the corrected model, but for products of small motions of the base.
         let parameters: Parameters = table(&tables).remove(0);
-        let model = parameters.model(robot, &[], Load::GravityTorque).expect("a model");
+        let model = parameters
+            .model(robot, &[], Load::GravityTorque)
+            .expect("a model");
         for (point, row) in model.predict(&data).iter().zip(&predictions.0) {
             let apart = (point * 1e3 - Vector3::new(row.x_mm, row.y_mm, row.z_mm)).norm();
-            assert!(apart < 1e-5, "{}: {apart} mm at row {}", case.display(), row.sequence);
+            assert!(
+                apart < 1e-5,
+                "{}: {apart} mm at row {}",
+                case.display(),
+                row.sequence
+            );
         }
     }
     // An elevation that errs is also what a base does that follows the place of the tool (p23).
@@ -78,21 +124,38 @@ fn the_practice_cases_are_solved() {
 }
 
 fn calib(arguments: &[&str], folder: &Path) -> String {
-    let output = Command::new(env!("CARGO_BIN_EXE_calib")).args(arguments).current_dir(folder).output().expect("calib");
-    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    let output = Command::new(env!("CARGO_BIN_EXE_calib"))
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .expect("calib");
+    assert!(
+        output.status.success(),
+        "{arguments:?}: {}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     String::from_utf8(output.stdout).expect("UTF-8")
 }
 
 /// The exit code and what is printed on stdout.
 fn ended(arguments: &[&str], folder: &Path) -> (Option<i32>, String) {
-    let output = Command::new(env!("CARGO_BIN_EXE_calib")).args(arguments).current_dir(folder).output().expect("calib");
-    (output.status.code(), String::from_utf8(output.stdout).expect("UTF-8"))
+    let output = Command::new(env!("CARGO_BIN_EXE_calib"))
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .expect("calib");
+    (
+        output.status.code(),
+        String::from_utf8(output.stdout).expect("UTF-8"),
+    )
 }
 
 /// Diagnoses a concealed recording of the twin: the document, and what the seal holds.
 fn blind(family: &str, seed: &str) -> (Value, Value) {
     let folder = tempfile::tempdir().expect("a folder");
-    let mut arguments = vec!["simulate", "conceal", "--out", "sealed", "--cases", "1", "--seed", seed, "--points", "120"];
+    let mut arguments = vec![
+        "simulate", "conceal", "--out", "sealed", "--cases", "1", "--seed", seed, "--points", "120",
+    ];
     if family == "nothing" {
         arguments.extend(["--nulls", "1"])
     } else {
@@ -102,9 +165,23 @@ fn blind(family: &str, seed: &str) -> (Value, Value) {
     calib(&arguments, folder.path());
     let pipeline = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/case/pipeline.yaml");
     let pipeline = pipeline.display().to_string();
-    let said = calib(&["diagnose", &pipeline, "--set", "case=sealed/recordings/c0001", "--json", "--quiet"], folder.path());
-    let truth = std::fs::read_to_string(folder.path().join("sealed/sealed/c0001.json")).expect("the truth");
-    (serde_json::from_str(&said).expect("JSON"), serde_json::from_str(&truth).expect("JSON"))
+    let said = calib(
+        &[
+            "diagnose",
+            &pipeline,
+            "--set",
+            "case=sealed/recordings/c0001",
+            "--json",
+            "--quiet",
+        ],
+        folder.path(),
+    );
+    let truth =
+        std::fs::read_to_string(folder.path().join("sealed/sealed/c0001.json")).expect("the truth");
+    (
+        serde_json::from_str(&said).expect("JSON"),
+        serde_json::from_str(&truth).expect("JSON"),
+    )
 }
 
 #[test]
@@ -113,23 +190,44 @@ fn a_recording_without_a_missing_effect_has_no_findings() {
     assert_eq!(said["verdict"], "nothing_missing");
     assert_eq!(said["findings"], serde_json::json!([]));
     assert!(
-        said["not_observable"].as_array().expect("a list").iter().any(|line| line.as_str().unwrap().contains("tracker_scale"))
+        said["not_observable"]
+            .as_array()
+            .expect("a list")
+            .iter()
+            .any(|line| line.as_str().unwrap().contains("tracker_scale"))
     );
 }
 
 #[test]
 fn effects_of_the_twin_are_named_and_placed() {
-    for (family, seed) in [("zero_shift", "923"), ("thermal_growth", "922"), ("joint_log_lag", "922"), ("base_compliance", "925")]
-    {
+    for (family, seed) in [
+        ("zero_shift", "923"),
+        ("thermal_growth", "922"),
+        ("joint_log_lag", "922"),
+        ("base_compliance", "925"),
+    ] {
         let (said, truth) = blind(family, seed);
         let found = wanted(&said["findings"]);
         assert_eq!(found, wanted(&truth["want"]), "{family}: {said:#}");
-        let rms = |when: &str| said[when]["validate_rms_mm"].as_f64().expect("held-out rows");
+        let rms = |when: &str| {
+            said[when]["validate_rms_mm"]
+                .as_f64()
+                .expect("held-out rows")
+        };
         let floor = said["noise_floor_mm"].as_f64().expect("a number");
         // What is hardly larger than the noise may gain nothing on some fifty points.
         let visible = rms("before") > 1.2 * floor;
-        assert!(!visible || rms("after") < rms("before"), "{family}: {} to {}", rms("before"), rms("after"));
-        assert!(rms("after") < 1.4 * floor, "{family}: {} above {floor}", rms("after"));
+        assert!(
+            !visible || rms("after") < rms("before"),
+            "{family}: {} to {}",
+            rms("before"),
+            rms("after")
+        );
+        assert!(
+            rms("after") < 1.4 * floor,
+            "{family}: {} above {floor}",
+            rms("after")
+        );
     }
 }
 
@@ -157,32 +255,61 @@ stages:
     );
     let folder = concealed("backlash", "31", "40");
     std::fs::write(folder.path().join("p.yaml"), pipeline).expect("written");
-    serde_json::from_str(&calib(&["diagnose", "p.yaml", "--json", "--quiet"], folder.path())).expect("JSON")
+    serde_json::from_str(&calib(
+        &["diagnose", "p.yaml", "--json", "--quiet"],
+        folder.path(),
+    ))
+    .expect("JSON")
 }
 
 #[test]
 fn lost_motion_that_heavy_loads_decide_is_one_cause_with_its_gap_and_its_torque() {
-    let said = simulated("{backlash: {joint: 3, gap_arcsec: 60, closing_nm: 12}}", 3, 120);
+    let said = simulated(
+        "{backlash: {joint: 3, gap_arcsec: 60, closing_nm: 12}}",
+        3,
+        120,
+    );
     let findings = said["findings"].as_array().expect("a list");
-    assert_eq!(wanted(&said["findings"]), Named::from([("backlash".into(), "joint 3".into())]), "{said:#}");
+    assert_eq!(
+        wanted(&said["findings"]),
+        Named::from([("backlash".into(), "joint 3".into())]),
+        "{said:#}"
+    );
     let gap = &findings[0]["parameters"][0];
-    let (value, sigma) = (gap["value"].as_f64().expect("a number"), gap["sigma"].as_f64().expect("a number"));
+    let (value, sigma) = (
+        gap["value"].as_f64().expect("a number"),
+        gap["sigma"].as_f64().expect("a number"),
+    );
     assert!((value - 30.0).abs() < 3.0 * sigma && sigma < 3.0, "{gap}");
     let statement = findings[0]["statement"].as_str().expect("a sentence");
-    let torque: f64 =
-        statement.split(" Nm").next().and_then(|text| text.rsplit(' ').next()).expect("Nm").parse().expect("a number");
+    let torque: f64 = statement
+        .split(" Nm")
+        .next()
+        .and_then(|text| text.rsplit(' ').next())
+        .expect("Nm")
+        .parse()
+        .expect("a number");
     assert!((9.0..=15.0).contains(&torque), "{statement}");
 }
 
 #[test]
 fn a_joint_of_the_wrong_sign_is_named_with_the_line_that_mends_it() {
     let folder = tempfile::tempdir().expect("a folder");
-    let arguments =
-        ["simulate", "conceal", "--out", "sealed", "--cases", "1", "--seed", "901", "--points", "120", "--nulls", "1"];
-    calib(&[&arguments[..], &["--robot", "compact6", "--faulty", "0"]].concat(), folder.path());
+    let arguments = [
+        "simulate", "conceal", "--out", "sealed", "--cases", "1", "--seed", "901", "--points",
+        "120", "--nulls", "1",
+    ];
+    calib(
+        &[&arguments[..], &["--robot", "compact6", "--faulty", "0"]].concat(),
+        folder.path(),
+    );
     let file = folder.path().join("sealed/recordings/c0001/controller.csv");
     let text = std::fs::read_to_string(&file).expect("the log");
-    let column = text.lines().next().and_then(|head| head.split(',').position(|name| name == "q4_deg")).expect("q4_deg");
+    let column = text
+        .lines()
+        .next()
+        .and_then(|head| head.split(',').position(|name| name == "q4_deg"))
+        .expect("q4_deg");
     let reverse = |(row, line): (usize, &str)| -> String {
         let mut cells: Vec<String> = line.split(',').map(String::from).collect();
         if row > 0 {
@@ -192,76 +319,180 @@ fn a_joint_of_the_wrong_sign_is_named_with_the_line_that_mends_it() {
     };
     let turned: Vec<String> = text.lines().enumerate().map(reverse).collect();
     std::fs::write(&file, turned.join("\n")).expect("written");
-    let pipeline = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/case/pipeline.yaml").display().to_string();
-    let asked = ["diagnose", &pipeline, "--set", "case=sealed/recordings/c0001", "--json", "--quiet"];
+    let pipeline = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("pipelines/case/pipeline.yaml")
+        .display()
+        .to_string();
+    let asked = [
+        "diagnose",
+        &pipeline,
+        "--set",
+        "case=sealed/recordings/c0001",
+        "--json",
+        "--quiet",
+    ];
     let (code, said) = ended(&asked, folder.path());
     assert_eq!(code, Some(10), "{said}");
     let said: Value = serde_json::from_str(&said).expect("JSON");
     let findings = said["findings"].as_array().expect("a list");
     assert_eq!(findings.len(), 1, "{said:#}");
-    assert_eq!((&said["verdict"], &findings[0]["effect"]), (&"wrong_setup".into(), &"setup".into()));
+    assert_eq!(
+        (&said["verdict"], &findings[0]["effect"]),
+        (&"wrong_setup".into(), &"setup".into())
+    );
     let sign = "sign: [1, 1, 1, -1, 1, 1]";
-    assert!(findings[0]["statement"].as_str().expect("a sentence").contains(sign), "{said:#}");
+    assert!(
+        findings[0]["statement"]
+            .as_str()
+            .expect("a sentence")
+            .contains(sign),
+        "{said:#}"
+    );
     // The line of YAML mends it, and physics is asked.
     let here = folder.path();
-    case_with(here, &[("unit: deg, linear_unit: mm}", &format!("unit: deg, linear_unit: mm, {sign}}}"))]);
-    let mended = calib(&[&["diagnose", "p.yaml", "--json", "--quiet"], &CASE[..]].concat(), here);
+    case_with(
+        here,
+        &[(
+            "unit: deg, linear_unit: mm}",
+            &format!("unit: deg, linear_unit: mm, {sign}}}"),
+        )],
+    );
+    let mended = calib(
+        &[&["diagnose", "p.yaml", "--json", "--quiet"], &CASE[..]].concat(),
+        here,
+    );
     let mended: Value = serde_json::from_str(&mended).expect("JSON");
-    assert_eq!((&mended["verdict"], &mended["findings"]), (&"nothing_missing".into(), &serde_json::json!([])), "{mended:#}");
+    assert_eq!(
+        (&mended["verdict"], &mended["findings"]),
+        (&"nothing_missing".into(), &serde_json::json!([])),
+        "{mended:#}"
+    );
 }
 
 #[test]
 fn what_another_simulation_knows_is_not_missing_from_it() {
     let folder = tempfile::tempdir().expect("a folder");
-    let arguments = ["simulate", "conceal", "--out", "sealed", "--cases", "1", "--seed", "931", "--points", "120"];
-    calib(&[&arguments[..], &["--family", "joint_compliance", "--robot", "compact6", "--faulty", "0"]].concat(), folder.path());
+    let arguments = [
+        "simulate", "conceal", "--out", "sealed", "--cases", "1", "--seed", "931", "--points",
+        "120",
+    ];
+    calib(
+        &[
+            &arguments[..],
+            &[
+                "--family",
+                "joint_compliance",
+                "--robot",
+                "compact6",
+                "--faulty",
+                "0",
+            ],
+        ]
+        .concat(),
+        folder.path(),
+    );
     let case = folder.path().join("sealed/recordings/c0001");
     let diagnosed = |simulated: Option<Vec<[f64; 3]>>| {
-        let (inputs, stage): (Inputs, Diagnose) = pipeline("case", &[("case", &case.display().to_string())], "diagnose");
+        let (inputs, stage): (Inputs, Diagnose) =
+            pipeline("case", &[("case", &case.display().to_string())], "diagnose");
         let robot = RobotModel::new(inputs.robot.to_description().expect("a robot"));
         let data = inputs.recording.measurements();
-        let reads = DiagnoseReads { recording: inputs.recording, robot: inputs.robot, split: inputs.split };
-        let reads = DiagnoseReads { recording: calib::table::Recording { simulated, ..reads.recording }, ..reads };
+        let reads = DiagnoseReads {
+            recording: inputs.recording,
+            robot: inputs.robot,
+            split: inputs.split,
+        };
+        let reads = DiagnoseReads {
+            recording: calib::table::Recording {
+                simulated,
+                ..reads.recording
+            },
+            ..reads
+        };
         let tables = Desk::default().run(&stage, reads).expect("a diagnosis");
         let findings: Findings = table(&tables).remove(0);
-        let found: Named = findings.0.into_iter().map(|row| (row.effect, row.place)).collect();
+        let found: Named = findings
+            .0
+            .into_iter()
+            .map(|row| (row.effect, row.place))
+            .collect();
         let parameters: Parameters = table(&tables).remove(0);
-        (found, parameters.model(robot, &[], Load::GravityTorque).expect("a model"), data)
+        (
+            found,
+            parameters
+                .model(robot, &[], Load::GravityTorque)
+                .expect("a model"),
+            data,
+        )
     };
     let (alone, mut model, data) = diagnosed(None);
-    let truth = std::fs::read_to_string(folder.path().join("sealed/sealed/c0001.json")).expect("the truth");
+    let truth =
+        std::fs::read_to_string(folder.path().join("sealed/sealed/c0001.json")).expect("the truth");
     let truth: Value = serde_json::from_str(&truth).expect("JSON");
     assert_eq!(alone, wanted(&truth["want"]));
     // Beside a rigid arm in a frame of its own the same is missing.
     let rigid = |row: usize| model.robot.forward(data.q(row)).translation;
     let turned = |p: Vector3<f64>| [p.y + 3.0, -p.x, p.z - 1.0];
-    let (beside, ..) = diagnosed(Some((0..data.rows()).map(|row| turned(rigid(row))).collect()));
+    let (beside, ..) = diagnosed(Some(
+        (0..data.rows()).map(|row| turned(rigid(row))).collect(),
+    ));
     assert_eq!(beside, alone);
     // A simulation of the nominal geometry that knows the compliance leaves the errors of geometry alone.
     let specs = model.stack.specs().to_vec();
-    for (x, _) in model.x.iter_mut().zip(&specs).filter(|(_, spec)| !spec.name.starts_with("joint_compliance")) {
+    for (x, _) in model
+        .x
+        .iter_mut()
+        .zip(&specs)
+        .filter(|(_, spec)| !spec.name.starts_with("joint_compliance"))
+    {
         *x = 0.0;
     }
-    let (left, ..) = diagnosed(Some(model.predict(&data).into_iter().map(<[f64; 3]>::from).collect()));
+    let (left, ..) = diagnosed(Some(
+        model
+            .predict(&data)
+            .into_iter()
+            .map(<[f64; 3]>::from)
+            .collect(),
+    ));
     assert_eq!(left, Named::new());
 }
 
 /// A recording of the twin in `sealed/recordings/c0001` of a new folder.
 fn concealed(family: &str, seed: &str, points: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
-    let arguments = ["simulate", "conceal", "--out", "sealed", "--cases", "1", "--seed", seed, "--points", points];
-    calib(&[&arguments[..], &["--family", family, "--robot", "compact6", "--faulty", "0"]].concat(), folder.path());
+    let arguments = [
+        "simulate", "conceal", "--out", "sealed", "--cases", "1", "--seed", seed, "--points",
+        points,
+    ];
+    calib(
+        &[
+            &arguments[..],
+            &["--family", family, "--robot", "compact6", "--faulty", "0"],
+        ]
+        .concat(),
+        folder.path(),
+    );
     folder
 }
 
 fn refused(arguments: &[&str], folder: &Path) -> (Option<i32>, String) {
-    let output = Command::new(env!("CARGO_BIN_EXE_calib")).args(arguments).current_dir(folder).output().expect("calib");
-    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    let output = Command::new(env!("CARGO_BIN_EXE_calib"))
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .expect("calib");
+    (
+        output.status.code(),
+        String::from_utf8_lossy(&output.stderr).into_owned(),
+    )
 }
 
 /// The pipeline of cases, with one text in place of another.
 fn case_with(folder: &Path, changes: &[(&str, &str)]) {
-    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/case/pipeline.yaml")).expect("it");
+    let text = std::fs::read_to_string(
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/case/pipeline.yaml"),
+    )
+    .expect("it");
     let text = changes.iter().fold(text, |text, (from, to)| {
         assert!(text.contains(from), "{from}");
         text.replacen(from, to, 1)
@@ -274,48 +505,109 @@ const CASE: [&str; 2] = ["--set", "case=sealed/recordings/c0001"];
 /// The last run of a folder's store, whatever it was for.
 fn newest(folder: &Path) -> String {
     let runs = std::fs::read_dir(folder.join(".calib/runs")).expect("runs");
-    runs.map(|run| run.expect("a run").file_name().into_string().expect("UTF-8")).max().expect("a run")
+    runs.map(|run| {
+        run.expect("a run")
+            .file_name()
+            .into_string()
+            .expect("UTF-8")
+    })
+    .max()
+    .expect("a run")
 }
 
 #[test]
 fn a_diagnosis_is_shown_again_from_its_run_as_it_was_printed() {
     let folder = concealed("zero_shift", "923", "60");
     let here = folder.path();
-    let twice = ("  - uses: validate\n", "  - {id: again, uses: diagnose}\n\n  - uses: validate\n");
+    let twice = (
+        "  - uses: validate\n",
+        "  - {id: again, uses: diagnose}\n\n  - uses: validate\n",
+    );
     case_with(here, &[]);
-    let told = calib(&[&["diagnose", "p.yaml", "--quiet"], &CASE[..]].concat(), here);
+    let told = calib(
+        &[&["diagnose", "p.yaml", "--quiet"], &CASE[..]].concat(),
+        here,
+    );
     let made = [told, calib(&["diagnose", &newest(here), "--json"], here)];
-    let runs = std::fs::read_dir(here.join(".calib/runs")).expect("runs").count();
+    let runs = std::fs::read_dir(here.join(".calib/runs"))
+        .expect("runs")
+        .count();
     assert_eq!(calib(&["diagnose", &newest(here)], here), made[0]);
     // Nothing was run, and nothing was computed anew.
-    assert_eq!(std::fs::read_dir(here.join(".calib/runs")).expect("runs").count(), runs);
-    assert_eq!(calib(&[&["diagnose", "p.yaml", "--quiet", "--json"], &CASE[..]].concat(), here), made[1]);
+    assert_eq!(
+        std::fs::read_dir(here.join(".calib/runs"))
+            .expect("runs")
+            .count(),
+        runs
+    );
+    assert_eq!(
+        calib(
+            &[&["diagnose", "p.yaml", "--quiet", "--json"], &CASE[..]].concat(),
+            here
+        ),
+        made[1]
+    );
     calib(&["tag", &newest(here), "found"], here);
-    calib(&[&["run", "p.yaml", "--quiet", "--until", "geometry", "--set", "seed=9"], &CASE[..]].concat(), here);
+    calib(
+        &[
+            &[
+                "run", "p.yaml", "--quiet", "--until", "geometry", "--set", "seed=9",
+            ],
+            &CASE[..],
+        ]
+        .concat(),
+        here,
+    );
     let (code, said) = refused(&["diagnose", &newest(here)], here);
     assert_eq!(code, Some(2), "{said}");
-    assert!(said.contains("never came to its stage `diagnose`"), "{said}");
-    assert!(said.contains("calib diagnose p.yaml --set seed=9 --set case=sealed/recordings/c0001"), "{said}");
+    assert!(
+        said.contains("never came to its stage `diagnose`"),
+        "{said}"
+    );
+    assert!(
+        said.contains("calib diagnose p.yaml --set seed=9 --set case=sealed/recordings/c0001"),
+        "{said}"
+    );
     assert_eq!(calib(&["diagnose", "found", "--json"], here), made[1]);
     case_with(here, &[("  - uses: diagnose\n", "")]);
-    calib(&[&["run", "p.yaml", "--quiet", "--until", "geometry"], &CASE[..]].concat(), here);
+    calib(
+        &[
+            &["run", "p.yaml", "--quiet", "--until", "geometry"],
+            &CASE[..],
+        ]
+        .concat(),
+        here,
+    );
     let (code, said) = refused(&["diagnose", &newest(here)], here);
     assert_eq!(code, Some(2), "{said}");
-    assert!(said.contains("has no stage `diagnose`: put `- uses: diagnose` after the split of p.yaml"), "{said}");
+    assert!(
+        said.contains("has no stage `diagnose`: put `- uses: diagnose` after the split of p.yaml"),
+        "{said}"
+    );
     case_with(here, &[twice]);
-    calib(&[&["run", "p.yaml", "--quiet", "--until", "again"], &CASE[..]].concat(), here);
+    calib(
+        &[&["run", "p.yaml", "--quiet", "--until", "again"], &CASE[..]].concat(),
+        here,
+    );
     let run = newest(here);
     for place in [&[run.as_str()][..], &[&["p.yaml"], &CASE[..]].concat()] {
         let (code, said) = refused(&[&["diagnose"], place].concat(), here);
         assert_eq!(code, Some(2), "{said}");
-        assert!(said.contains("has several diagnoses; say which with --step: diagnose, again"), "{said}");
+        assert!(
+            said.contains("has several diagnoses; say which with --step: diagnose, again"),
+            "{said}"
+        );
     }
     assert_eq!(
         calib(&["diagnose", &format!("{run}/again"), "--json"], here),
         calib(&["diagnose", &run, "--step", "again", "--json"], here)
     );
     let (code, said) = refused(&["diagnose", &run, "--set", "seed=2"], here);
-    assert_eq!((code, said.contains("a finished run cannot be changed")), (Some(2), true), "{said}");
+    assert_eq!(
+        (code, said.contains("a finished run cannot be changed")),
+        (Some(2), true),
+        "{said}"
+    );
 }
 
 #[test]
@@ -324,21 +616,36 @@ fn parameters_that_correct_an_outside_simulation_are_not_taken_for_the_robots_ow
     let here = folder.path();
     let file = here.join("sealed/recordings/c0001/tracker.csv");
     let text = std::fs::read_to_string(&file).expect("the tracker's");
-    let column = text.lines().next().and_then(|head| head.split(',').position(|name| name == "x_mm")).expect("x_mm");
+    let column = text
+        .lines()
+        .next()
+        .and_then(|head| head.split(',').position(|name| name == "x_mm"))
+        .expect("x_mm");
     let beside = |(row, line): (usize, &str)| match row {
         0 => format!("{line},sx,sy,sz\n"),
         _ => {
             let cells: Vec<&str> = line.split(',').collect();
-            let near =
-                |k: usize| cells[column + k].parse::<f64>().expect("a number") + 0.05 * (row as f64 * (k + 1) as f64).sin();
+            let near = |k: usize| {
+                cells[column + k].parse::<f64>().expect("a number")
+                    + 0.05 * (row as f64 * (k + 1) as f64).sin()
+            };
             format!("{line},{},{},{}\n", near(0), near(1), near(2))
         }
     };
-    std::fs::write(&file, text.lines().enumerate().map(beside).collect::<String>()).expect("written");
+    std::fs::write(
+        &file,
+        text.lines().enumerate().map(beside).collect::<String>(),
+    )
+    .expect("written");
     let z = "            z: {column: z_mm, unit: mm}\n";
-    let simulated = ["x", "y", "z"].map(|axis| format!("            sim_{axis}: {{column: s{axis}, unit: mm}}\n")).concat();
+    let simulated = ["x", "y", "z"]
+        .map(|axis| format!("            sim_{axis}: {{column: s{axis}, unit: mm}}\n"))
+        .concat();
     case_with(here, &[(z, &format!("{z}{simulated}"))]);
-    calib(&[&["diagnose", "p.yaml", "--quiet"], &CASE[..]].concat(), here);
+    calib(
+        &[&["diagnose", "p.yaml", "--quiet"], &CASE[..]].concat(),
+        here,
+    );
     std::fs::write(here.join("t.csv"), "x_mm,y_mm,z_mm\n600,0,700\n").expect("written");
     let table = ".calib/tables/case/diagnose.parameters.parquet";
     let robot = "sealed/recordings/c0001/robot.json";
@@ -350,16 +657,40 @@ fn parameters_that_correct_an_outside_simulation_are_not_taken_for_the_robots_ow
     ] {
         let (code, said) = refused(verb, here);
         assert_eq!(code, Some(2), "{said}");
-        assert!(said.contains("correct the simulation of sim_x, sim_y, sim_z") && said.contains("--step"), "{said}");
+        assert!(
+            said.contains("correct the simulation of sim_x, sim_y, sim_z")
+                && said.contains("--step"),
+            "{said}"
+        );
     }
-    calib(&[&["run", "p.yaml", "--quiet", "--until", "geometry"], &CASE[..]].concat(), here);
-    calib(&["export", &newest(here), "--step", "geometry", "--format", "json", "--quiet"], here);
+    calib(
+        &[
+            &["run", "p.yaml", "--quiet", "--until", "geometry"],
+            &CASE[..],
+        ]
+        .concat(),
+        here,
+    );
+    calib(
+        &[
+            "export",
+            &newest(here),
+            "--step",
+            "geometry",
+            "--format",
+            "json",
+            "--quiet",
+        ],
+        here,
+    );
 }
 
 /// A table that a run of the pipeline of cases wrote.
 fn table_of<T: calib::table::Table>(folder: &Path, name: &str) -> T {
     let path = folder.join(".calib/tables/case").join(name);
-    calib::table::from_parquet(name, std::fs::read(path).expect("a table")).expect("a sound table").table
+    calib::table::from_parquet(name, std::fs::read(path).expect("a table"))
+        .expect("a sound table")
+        .table
 }
 
 /// What is left, squared and over the noise, of points that `truth` makes where `other` is fitted to them in all that is `free`.
@@ -367,18 +698,45 @@ fn left(truth: &Model, other: &Model, free: &[usize], data: &Measurements) -> f6
     let mut data = data.clone();
     data.points.position = truth.predict(&data);
     let rows: Vec<usize> = (0..data.rows()).collect();
-    let (fitted, _) = fit(other, &data, &FitOptions { rows: &rows, candidates: free });
-    let off = fitted.predict(&data).into_iter().zip(&data.points.position).zip(&data.points.sigma);
-    off.map(|((model, point), sigma)| (model - point).component_div(sigma).norm_squared()).sum()
+    let (fitted, _) = fit(
+        other,
+        &data,
+        &FitOptions {
+            rows: &rows,
+            candidates: free,
+        },
+    );
+    let off = fitted
+        .predict(&data)
+        .into_iter()
+        .zip(&data.points.position)
+        .zip(&data.points.sigma);
+    off.map(|((model, point), sigma)| (model - point).component_div(sigma).norm_squared())
+        .sum()
 }
 
 /// Rows of a recording followed by some more.
 fn joined(data: &Measurements, rows: &[usize], more: &Measurements, sigma: f64) -> Measurements {
-    let q = rows.iter().flat_map(|row| data.q(*row)).chain(&more.q).copied().collect();
-    let payload: Vec<f64> = rows.iter().map(|row| data.payload[*row]).chain(more.payload.iter().copied()).collect();
+    let q = rows
+        .iter()
+        .flat_map(|row| data.q(*row))
+        .chain(&more.q)
+        .copied()
+        .collect();
+    let payload: Vec<f64> = rows
+        .iter()
+        .map(|row| data.payload[*row])
+        .chain(more.payload.iter().copied())
+        .collect();
     let count = payload.len();
     let position = vec![Vector3::zeros(); count];
-    Measurements { joints: data.joints, q, payload, points: PointReadings::new(position, sigma), ..Measurements::default() }
+    Measurements {
+        joints: data.joints,
+        q,
+        payload,
+        points: PointReadings::new(position, sigma),
+        ..Measurements::default()
+    }
 }
 
 #[test]
@@ -387,73 +745,145 @@ fn proposed_poses_tell_a_finding_from_its_rival_three_times_better_than_random_o
     let folder = concealed("base_compliance", "14", "60");
     let here = folder.path();
     case_with(here, &[]);
-    let said = calib(&[&["diagnose", "p.yaml", "--quiet"], &CASE[..]].concat(), here);
+    let said = calib(
+        &[&["diagnose", "p.yaml", "--quiet"], &CASE[..]].concat(),
+        here,
+    );
     // The command is printed as it is to be typed.
-    let command = said.lines().find_map(|line| line.trim_start().strip_prefix("calib ")).expect("a command");
-    assert!(command.ends_with("--separate 1 'link_compliance@link 1'"), "{said}");
-    let words: Vec<&str> = command.trim_end_matches(" 'link_compliance@link 1'").split(' ').collect();
+    let command = said
+        .lines()
+        .find_map(|line| line.trim_start().strip_prefix("calib "))
+        .expect("a command");
+    assert!(
+        command.ends_with("--separate 1 'link_compliance@link 1'"),
+        "{said}"
+    );
+    let words: Vec<&str> = command
+        .trim_end_matches(" 'link_compliance@link 1'")
+        .split(' ')
+        .collect();
     let more = ["link_compliance@link 1", "--count", "50", "--json"];
-    let told: Value = serde_json::from_str(&calib(&[&words[..], &more].concat(), here)).expect("JSON");
+    let told: Value =
+        serde_json::from_str(&calib(&[&words[..], &more].concat(), here)).expect("JSON");
     let number = |value: &Value| value.as_f64().expect("a number");
     let sides = told["separation"].as_array().expect("both");
     assert_eq!(sides[0]["if"], "base_compliance at base");
     for side in sides {
-        assert!(number(&side["proposed"]) > 25.0 && number(&side["proposed"]) > number(&side["recorded"]), "{told:#}");
+        assert!(
+            number(&side["proposed"]) > 25.0
+                && number(&side["proposed"]) > number(&side["recorded"]),
+            "{told:#}"
+        );
     }
     // Measured: recordings without noise, made by the diagnosed model at these poses, and the rival fitted to them with all else.
-    let robot = table_of::<Robot>(here, "robot.robot.parquet").to_description().expect("a robot");
+    let robot = table_of::<Robot>(here, "robot.robot.parquet")
+        .to_description()
+        .expect("a robot");
     let parameters: Parameters = table_of(here, "diagnose.parameters.parquet");
-    let truth = parameters.model(RobotModel::new(robot.clone()), &[], Load::GravityTorque).expect("a model");
+    let truth = parameters
+        .model(RobotModel::new(robot.clone()), &[], Load::GravityTorque)
+        .expect("a model");
     let data = table_of::<Recording>(here, "ingest.recording.parquet").measurements();
     let prediction: Prediction = table_of(here, "diagnose.prediction.parquet");
-    let rows: Vec<usize> = (0..data.rows()).filter(|row| !prediction.0[*row].held_out && !prediction.0[*row].suspect).collect();
+    let rows: Vec<usize> = (0..data.rows())
+        .filter(|row| !prediction.0[*row].held_out && !prediction.0[*row].suspect)
+        .collect();
     let form = told["rival"]["form"].to_string();
     let parsed: Form = serde_json::from_str(&form).expect("a form");
     let mut table = parameters.clone();
-    let own = table.0.iter().position(|row| row.effect == "base_compliance").expect("the finding");
+    let own = table
+        .0
+        .iter()
+        .position(|row| row.effect == "base_compliance")
+        .expect("the finding");
     let row = table.0.remove(own);
     table.0.retain(|row| row.effect != "base_compliance");
     for spec in parsed.parameters(&RobotModel::new(robot.clone())) {
-        let more = ParameterRow { name: spec.name, form: Some(form.clone()), value: 0.0, ..row.clone() };
-        table.0.push(ParameterRow { effect: "link_compliance".into(), unit: spec.unit.symbol().into(), ..more });
+        let more = ParameterRow {
+            name: spec.name,
+            form: Some(form.clone()),
+            value: 0.0,
+            ..row.clone()
+        };
+        table.0.push(ParameterRow {
+            effect: "link_compliance".into(),
+            unit: spec.unit.symbol().into(),
+            ..more
+        });
     }
-    let other = table.model(RobotModel::new(robot.clone()), &[], Load::GravityTorque).expect("a model");
-    let estimated = |name: &String| table.0.iter().any(|row| row.name == *name && row.status == "free");
-    let free: Vec<usize> = (0..other.x.len()).filter(|k| estimated(&other.stack.specs()[*k].name)).collect();
+    let other = table
+        .model(RobotModel::new(robot.clone()), &[], Load::GravityTorque)
+        .expect("a model");
+    let estimated = |name: &String| {
+        table
+            .0
+            .iter()
+            .any(|row| row.name == *name && row.status == "free")
+    };
+    let free: Vec<usize> = (0..other.x.len())
+        .filter(|k| estimated(&other.stack.specs()[*k].name))
+        .collect();
     let sigma = number(&told["sigma_mm"]) * 1e-3;
-    let measured = |more: &Measurements| left(&truth, &other, &free, &joined(&data, &rows, more, sigma));
-    let mut proposed = Measurements { joints: 6, ..Measurements::default() };
+    let measured =
+        |more: &Measurements| left(&truth, &other, &free, &joined(&data, &rows, more, sigma));
+    let mut proposed = Measurements {
+        joints: 6,
+        ..Measurements::default()
+    };
     for pose in told["poses"].as_array().expect("poses") {
-        proposed.q.extend((1..=6).map(|joint| number(&pose[format!("q{joint}_deg")]).to_radians()));
+        proposed
+            .q
+            .extend((1..=6).map(|joint| number(&pose[format!("q{joint}_deg")]).to_radians()));
         proposed.payload.push(number(&pose["payload_kg"]));
     }
     assert_eq!(proposed.payload.len(), COUNT);
     // The robot file says no limits: joints keep to where they were.
     let ranges = (0..6).map(|joint| {
         let all = rows.iter().map(|row| data.q(*row)[joint]);
-        all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], q| [low.min(q), high.max(q)])
+        all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], q| {
+            [low.min(q), high.max(q)]
+        })
     });
     let mut payloads: Vec<f64> = proposed.payload.clone();
     payloads.sort_by(f64::total_cmp);
     payloads.dedup();
     let bounds = [[f64::NEG_INFINITY, f64::INFINITY]; 3];
-    let site = Site { ranges: ranges.collect(), bounds, floor: f64::NEG_INFINITY, payloads };
+    let site = Site {
+        ranges: ranges.collect(),
+        bounds,
+        floor: f64::NEG_INFINITY,
+        payloads,
+    };
     let random = (0..9).map(|seed| {
-        let mut drawn = site.draw(&truth.robot, COUNT, sigma, 70 + seed).expect("poses");
+        let mut drawn = site
+            .draw(&truth.robot, COUNT, sigma, 70 + seed)
+            .expect("poses");
         // One payload a pose.
         let count = site.payloads.len();
         let kept: Vec<usize> = (0..COUNT).map(|k| k * count + k % count).collect();
         drawn = Measurements {
             q: kept.iter().flat_map(|row| drawn.q(*row)).copied().collect(),
             payload: kept.iter().map(|row| drawn.payload[*row]).collect(),
-            ..Measurements { joints: 6, ..Measurements::default() }
+            ..Measurements {
+                joints: 6,
+                ..Measurements::default()
+            }
         };
         measured(&drawn)
     });
     let (ours, theirs) = (measured(&proposed), median(random.collect()));
-    println!("L with {COUNT} proposed poses {ours:.1}, with random ones {theirs:.1}; predicted {}", sides[0]["proposed"]);
-    assert!(ours >= 3.0 * theirs, "{ours:.1}, with random poses {theirs:.1}");
-    assert!((ours / number(&sides[0]["proposed"]) - 1.0).abs() < 0.2, "{ours:.1}: {told:#}");
+    println!(
+        "L with {COUNT} proposed poses {ours:.1}, with random ones {theirs:.1}; predicted {}",
+        sides[0]["proposed"]
+    );
+    assert!(
+        ours >= 3.0 * theirs,
+        "{ours:.1}, with random poses {theirs:.1}"
+    );
+    assert!(
+        (ours / number(&sides[0]["proposed"]) - 1.0).abs() < 0.2,
+        "{ours:.1}: {told:#}"
+    );
 }
 
 #[test]
@@ -462,30 +892,67 @@ fn what_no_pose_tells_apart_is_said_with_what_would() {
     let here = folder.path();
     case_with(here, &[]);
     let found = |here: &Path| -> Value {
-        let said = calib(&[&["diagnose", "p.yaml", "--quiet", "--json"], &CASE[..]].concat(), here);
+        let said = calib(
+            &[&["diagnose", "p.yaml", "--quiet", "--json"], &CASE[..]].concat(),
+            here,
+        );
         serde_json::from_str(&said).expect("JSON")
     };
     // A balancer at a joint of unknown stiffness is a gear error of order 1.
-    assert_eq!(found(here)["findings"][0]["rivals"][0]["effect"], "counterbalance");
-    let said = calib(&["poses", "--run", &newest(here), "--separate", "gear_cyclic", "counterbalance@j4"], here);
-    assert!(said.contains("no pose separates gear_cyclic at joint 4 from counterbalance at joint 4"), "{said}");
-    assert!(said.contains("instead: log motor currents at rest"), "{said}");
+    assert_eq!(
+        found(here)["findings"][0]["rivals"][0]["effect"],
+        "counterbalance"
+    );
+    let said = calib(
+        &[
+            "poses",
+            "--run",
+            &newest(here),
+            "--separate",
+            "gear_cyclic",
+            "counterbalance@j4",
+        ],
+        here,
+    );
+    assert!(
+        said.contains("no pose separates gear_cyclic at joint 4 from counterbalance at joint 4"),
+        "{said}"
+    );
+    assert!(
+        said.contains("instead: log motor currents at rest"),
+        "{said}"
+    );
     let folder = concealed("zero_shift", "9", "60");
     let here = folder.path();
     case_with(here, &[]);
     // A step of the first joint is one turn of the base.
-    assert_eq!(found(here)["findings"][0]["rivals"][0]["effect"], "base_shift");
+    assert_eq!(
+        found(here)["findings"][0]["rivals"][0]["effect"],
+        "base_shift"
+    );
     let said = calib(&["poses", "--run", &newest(here), "--separate"], here);
-    assert!(said.contains("base_shift at base can imitate zero_shift at joint 1 completely"), "{said}");
-    assert!(said.contains("instead: return to a few anchor poses"), "{said}");
+    assert!(
+        said.contains("base_shift at base can imitate zero_shift at joint 1 completely"),
+        "{said}"
+    );
+    assert!(
+        said.contains("instead: return to a few anchor poses"),
+        "{said}"
+    );
     for (names, wanted) in [
         (&["9"][..], "`9` matches no finding of run"),
         (&["zero_shift@joint 7"], "matches no finding of run"),
         (&["1", "gear_cyclc@joint 1"], "did you mean `gear_cyclic`?"),
-        (&["1", "gear_cyclic@joint 9"], "gear_cyclic has no place `joint 9` here; allowed: joint 1, joint 2"),
+        (
+            &["1", "gear_cyclic@joint 9"],
+            "gear_cyclic has no place `joint 9` here; allowed: joint 1, joint 2",
+        ),
         (&["1", "gear_cyclic"], "say where, e.g. 'gear_cyclic@"),
     ] {
-        let (code, said) = refused(&[&["poses", "--run", &newest(here), "--separate"], names].concat(), here);
+        let (code, said) = refused(
+            &[&["poses", "--run", &newest(here), "--separate"], names].concat(),
+            here,
+        );
         assert_eq!((code, said.contains(wanted)), (Some(2), true), "{said}");
     }
 }
@@ -495,14 +962,39 @@ fn of_few_rows_no_law_takes_a_size_that_no_gear_has() {
     // 51 rows of an arm with four soft joints and a wrong mass, 34 parameters of the base: gears of 2700 arcsec explained as much of them.
     let folder = tempfile::tempdir().expect("a folder");
     case_with(folder.path(), &[]);
-    let rows = format!("case={}/tests/it/diagnose/few_rows", env!("CARGO_MANIFEST_DIR"));
-    let said = calib(&["diagnose", "p.yaml", "--set", &rows, "--json", "--quiet"], folder.path());
+    let rows = format!(
+        "case={}/tests/it/diagnose/few_rows",
+        env!("CARGO_MANIFEST_DIR")
+    );
+    let said = calib(
+        &["diagnose", "p.yaml", "--set", &rows, "--json", "--quiet"],
+        folder.path(),
+    );
     let said: Value = serde_json::from_str(&said).expect("JSON");
-    let findings = said["findings"].as_array().expect("a list").iter().filter(|finding| finding["effect"] != "outlier");
-    let names: Vec<String> = findings.map(|finding| format!("{} {}", finding["effect"], finding["where"])).collect();
+    let findings = said["findings"]
+        .as_array()
+        .expect("a list")
+        .iter()
+        .filter(|finding| finding["effect"] != "outlier");
+    let names: Vec<String> = findings
+        .map(|finding| format!("{} {}", finding["effect"], finding["where"]))
+        .collect();
     let soft = |joint: usize| names.contains(&format!("\"joint_compliance\" \"joint {joint}\""));
-    let of_loads = |name: &String| ["\"joint_compliance", "\"link_mass"].iter().any(|own| name.starts_with(own));
-    assert!(soft(2) && soft(3) && names.iter().all(of_loads), "{names:?}");
+    let of_loads = |name: &String| {
+        ["\"joint_compliance", "\"link_mass"]
+            .iter()
+            .any(|own| name.starts_with(own))
+    };
+    assert!(
+        soft(2) && soft(3) && names.iter().all(of_loads),
+        "{names:?}"
+    );
     // The instrument's noise is 0.017 mm.
-    assert!(said["after"]["validate_rms_mm"].as_f64().is_some_and(|rms| rms < 0.03), "{}", said["after"]);
+    assert!(
+        said["after"]["validate_rms_mm"]
+            .as_f64()
+            .is_some_and(|rms| rms < 0.03),
+        "{}",
+        said["after"]
+    );
 }

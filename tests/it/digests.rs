@@ -22,8 +22,7 @@ use std::path::{Path, PathBuf};
 const TOLERANCE: f64 = 1e-6;
 const CONTROLLER: &str = "name,time,q1,q2,q3,q4,q5,q6\nA,0,0,-10,20,5,40,0\nB,10,10,0,-20,15,30,90\nC,20,-40,20,10,0,-30,10\n\
                           D,30,x,20,10,0,-30,10\nE,40,5,5,5,5,5,5\n";
-const TRACKER: &str =
-    "name;x;y;z\nA;1834,112;-402,871;1290,455\nC;2034,5;-102,871;990,001\nC;2034,5;-102,871;990,001\nB;0;0;0\nE;1,0;2,0;3,0\n";
+const TRACKER: &str = "name;x;y;z\nA;1834,112;-402,871;1290,455\nC;2034,5;-102,871;990,001\nC;2034,5;-102,871;990,001\nB;0;0;0\nE;1,0;2,0;3,0\n";
 
 /// Whose tables are read by ports that ask for an earlier recording: a motion that ends before the other does.
 const EARLIER: &str = "earlier";
@@ -46,8 +45,16 @@ const TRIALS: &[(&str, &str, &str)] = &[
          effects: [{backlash: {joint: 1, gap_arcsec: 25}}], blocks: [{usage: fit, points: 20}]}",
     ),
     ("split", "points", "{by: every, n: 4}"),
-    ("identify", "points", "{on: [fit, loaded], effects: [base_frame, tool_offset, joint_offset, joint_compliance]}"),
-    ("stiffness", "points", "{on: [loaded], load: current, joints: [2, 3]}"),
+    (
+        "identify",
+        "points",
+        "{on: [fit, loaded], effects: [base_frame, tool_offset, joint_offset, joint_compliance]}",
+    ),
+    (
+        "stiffness",
+        "points",
+        "{on: [loaded], load: current, joints: [2, 3]}",
+    ),
     ("transfer", "points", "{on: [validate]}"),
     ("diagnose", "points", "{on: [fit]}"),
     ("ingest_torques", "torques", ""),
@@ -55,8 +62,16 @@ const TRIALS: &[(&str, &str, &str)] = &[
     ("masses", "torques", "{}"),
     ("compare_torques", "torques", "{}"),
     ("report_torques", "torques", "{}"),
-    ("compare", "points", "{previous_parameters: parameters.parquet, previous_recording: recording.parquet}"),
-    ("learn", "points", "{rivals: [ridge, curves, mlp], starts: [bso], ensemble: 1, generations: 10, iterations: 20, folds: 2}"),
+    (
+        "compare",
+        "points",
+        "{previous_parameters: parameters.parquet, previous_recording: recording.parquet}",
+    ),
+    (
+        "learn",
+        "points",
+        "{rivals: [ridge, curves, mlp], starts: [bso], ensemble: 1, generations: 10, iterations: 20, folds: 2}",
+    ),
     ("optimise", "points", "{seeds: 2, evaluations: 1000}"),
     ("validate", "points", "{}"),
     ("report", "points", "{}"),
@@ -80,7 +95,13 @@ impl TableDigest {
     fn of(frames: &[Frame]) -> Self {
         let (mut words, mut sums) = (blake3::Hasher::new(), [0.0; 2]);
         for frame in frames {
-            for (at, (column, name)) in frame.batch().columns().iter().zip(frame.column_names()).enumerate() {
+            for (at, (column, name)) in frame
+                .batch()
+                .columns()
+                .iter()
+                .zip(frame.column_names())
+                .enumerate()
+            {
                 words.update(name.as_bytes());
                 if column.data_type() != &DataType::Float64 {
                     let cells = ArrayFormatter::try_new(column, &FormatOptions::default()).unwrap();
@@ -96,13 +117,24 @@ impl TableDigest {
                     weighted += value.unwrap_or(0.0) * (1.0 + (0.618_034 * row as f64).fract());
                 }
                 let weight = 1.0 + (0.754_878 * at as f64).fract();
-                sums = [sums[0] + weight * size.ln(), sums[1] + weight * weighted / size];
+                sums = [
+                    sums[0] + weight * size.ln(),
+                    sums[1] + weight * weighted / size,
+                ];
             }
         }
-        Self { rows: frames.iter().map(Frame::rows).sum(), words: short(&words), sums }
+        Self {
+            rows: frames.iter().map(Frame::rows).sum(),
+            words: short(&words),
+            sums,
+        }
     }
     fn is(&self, other: &Self) -> bool {
-        let near = self.sums.iter().zip(other.sums).all(|(a, b)| (a - b).abs() < TOLERANCE);
+        let near = self
+            .sums
+            .iter()
+            .zip(other.sums)
+            .all(|(a, b)| (a - b).abs() < TOLERANCE);
         (self.rows, &self.words, near) == (other.rows, &other.words, true)
     }
 }
@@ -117,18 +149,38 @@ struct StageDigest {
 impl StageDigest {
     /// Tables that are others than before.
     fn moved<'a>(&'a self, before: &'a Self) -> Vec<&'a str> {
-        let names = self.tables.keys().chain(before.tables.keys().filter(|name| !self.tables.contains_key(*name)));
-        let same = |name: &String| self.tables.get(name).zip(before.tables.get(name)).is_some_and(|(a, b)| a.is(b));
-        names.filter(|name| !same(name)).map(String::as_str).collect()
+        let names = self.tables.keys().chain(
+            before
+                .tables
+                .keys()
+                .filter(|name| !self.tables.contains_key(*name)),
+        );
+        let same = |name: &String| {
+            self.tables
+                .get(name)
+                .zip(before.tables.get(name))
+                .is_some_and(|(a, b)| a.is(b))
+        };
+        names
+            .filter(|name| !same(name))
+            .map(String::as_str)
+            .collect()
     }
 }
 
 impl Display for StageDigest {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         writeln!(f, "{} {}", self.implementation, self.inputs)?;
-        self.tables.iter().try_for_each(|(name, TableDigest { rows, words, sums: [size, weighted] })| {
-            writeln!(f, "  {name} {rows} {words} {size:.8} {weighted:.8}")
-        })
+        self.tables.iter().try_for_each(
+            |(
+                name,
+                TableDigest {
+                    rows,
+                    words,
+                    sums: [size, weighted],
+                },
+            )| { writeln!(f, "  {name} {rows} {words} {size:.8} {weighted:.8}") },
+        )
     }
 }
 
@@ -142,13 +194,28 @@ fn stored() -> BTreeMap<String, StageDigest> {
         match words.as_slice() {
             [stage, implementation, inputs] => {
                 last = stage.to_string();
-                let (implementation, inputs) = (implementation.parse().unwrap(), inputs.to_string());
-                all.insert(last.clone(), StageDigest { implementation, inputs, tables: BTreeMap::new() });
+                let (implementation, inputs) =
+                    (implementation.parse().unwrap(), inputs.to_string());
+                all.insert(
+                    last.clone(),
+                    StageDigest {
+                        implementation,
+                        inputs,
+                        tables: BTreeMap::new(),
+                    },
+                );
             }
             [table, rows, words, size, weighted] => {
                 let sums = [size.parse().unwrap(), weighted.parse().unwrap()];
-                let digest = TableDigest { rows: rows.parse().unwrap(), words: words.to_string(), sums };
-                all.get_mut(&last).unwrap().tables.insert(table.to_string(), digest);
+                let digest = TableDigest {
+                    rows: rows.parse().unwrap(),
+                    words: words.to_string(),
+                    sums,
+                };
+                all.get_mut(&last)
+                    .unwrap()
+                    .tables
+                    .insert(table.to_string(), digest);
             }
             other => panic!("digests.txt: {other:?}"),
         }
@@ -158,18 +225,41 @@ fn stored() -> BTreeMap<String, StageDigest> {
 
 /// The tables of a folder with the stages that wrote them, in the order of the files' names.
 fn tables(folder: &Path) -> Vec<(String, PathBuf, Frame)> {
-    let mut paths: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    let mut paths: Vec<PathBuf> = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .collect();
     paths.retain(|path| path.extension().is_some_and(|ending| ending == "parquet"));
     paths.sort();
-    let stage = |path: &Path| path.file_stem().unwrap().to_str().unwrap().split('.').next().unwrap().to_string();
-    let table = |path: PathBuf| (stage(&path), path.clone(), read_table(&path, None).unwrap().table);
+    let stage = |path: &Path| {
+        path.file_stem()
+            .unwrap()
+            .to_str()
+            .unwrap()
+            .split('.')
+            .next()
+            .unwrap()
+            .to_string()
+    };
+    let table = |path: PathBuf| {
+        (
+            stage(&path),
+            path.clone(),
+            read_table(&path, None).unwrap().table,
+        )
+    };
     paths.into_iter().map(table).collect()
 }
 
 fn parsed(entry: &StageEntry, folder: &Path, settings: &str) -> Box<dyn ErasedStage> {
     let pipeline = std::fs::read_to_string(folder.join("pipeline.yaml")).unwrap();
     let node = match settings {
-        "" => calib::yaml::parse(&pipeline).0.unwrap().at("stages[1].with").unwrap().clone(),
+        "" => calib::yaml::parse(&pipeline)
+            .0
+            .unwrap()
+            .at("stages[1].with")
+            .unwrap()
+            .clone(),
         settings => calib::yaml::parse(settings).0.unwrap(),
     };
     (entry.parse)(&node).unwrap_or_else(|faults| panic!("{}: {faults:?}", entry.name))
@@ -183,45 +273,90 @@ fn run(entry: &StageEntry, name: &str, settings: &str) -> StageDigest {
         ("robot.yaml", read(root.join("pipelines/sr210d/robot.yaml"))),
         ("controller.csv", CONTROLLER.into()),
         ("tracker.csv", TRACKER.into()),
-        ("recording.csv", read(self::folder().join("torques/recording.csv"))),
-        ("parameters.parquet", read(self::folder().join("points/identify.parameters.parquet"))),
-        ("recording.parquet", read(self::folder().join("points/simulate.recording.parquet"))),
+        (
+            "recording.csv",
+            read(self::folder().join("torques/recording.csv")),
+        ),
+        (
+            "parameters.parquet",
+            read(self::folder().join("points/identify.parameters.parquet")),
+        ),
+        (
+            "recording.parquet",
+            read(self::folder().join("points/simulate.recording.parquet")),
+        ),
     ];
     let stage = parsed(entry, &folder, settings);
     let mut inputs = blake3::Hasher::new();
     inputs.update(stage.settings().to_string().as_bytes());
     for (_, file) in stage.files() {
-        inputs.update(&files.iter().find(|(name, _)| Path::new(name) == file.0).expect("a file of the test").1);
+        inputs.update(
+            &files
+                .iter()
+                .find(|(name, _)| Path::new(name) == file.0)
+                .expect("a file of the test")
+                .1,
+        );
     }
-    let desk = files.iter().fold(Desk::default(), |desk, (name, bytes)| desk.with(name, bytes.clone()));
+    let desk = files.iter().fold(Desk::default(), |desk, (name, bytes)| {
+        desk.with(name, bytes.clone())
+    });
     let all = tables(&folder);
     let mut frames = |port: &Port| {
         let is_earlier = |stage: &str| (stage == EARLIER) == port.name.starts_with(EARLIER);
-        let mut of_kind: Vec<_> = all.iter().filter(|(_, _, frame)| frame.kind() == port.kind).collect();
+        let mut of_kind: Vec<_> = all
+            .iter()
+            .filter(|(_, _, frame)| frame.kind() == port.kind)
+            .collect();
         if of_kind.iter().any(|(stage, ..)| is_earlier(stage)) {
             of_kind.retain(|(stage, ..)| is_earlier(stage));
         }
-        assert!(of_kind.len() == 1 || port.arity != Arity::One, "{}: {} tables {}", entry.name, of_kind.len(), port.kind);
+        assert!(
+            of_kind.len() == 1 || port.arity != Arity::One,
+            "{}: {} tables {}",
+            entry.name,
+            of_kind.len(),
+            port.kind
+        );
         for (_, path, _) in &of_kind {
             inputs.update(&read(path.clone()));
         }
-        of_kind.iter().map(|(stage, _, frame)| (stage.clone(), frame.clone())).collect()
+        of_kind
+            .iter()
+            .map(|(stage, _, frame)| (stage.clone(), frame.clone()))
+            .collect()
     };
     let frames = (entry.reads)().iter().map(&mut frames).collect();
-    let written = desk.run_any(entry, stage.as_ref(), frames).unwrap_or_else(|error| panic!("{}: {error}", entry.name));
-    let tables = written.into_iter().map(|(kind, frames)| (kind.to_string(), TableDigest::of(&frames))).collect();
-    StageDigest { implementation: entry.implementation, inputs: short(&inputs), tables }
+    let written = desk
+        .run_any(entry, stage.as_ref(), frames)
+        .unwrap_or_else(|error| panic!("{}: {error}", entry.name));
+    let tables = written
+        .into_iter()
+        .map(|(kind, frames)| (kind.to_string(), TableDigest::of(&frames)))
+        .collect();
+    StageDigest {
+        implementation: entry.implementation,
+        inputs: short(&inputs),
+        tables,
+    }
 }
 
 #[test]
 fn equal_inputs_give_equal_tables_unless_the_implementation_has_another_number() {
     let (mut kept, mut unnumbered, mut stale) = (stored(), Vec::new(), Vec::new());
     for (name, folder, settings) in TRIALS {
-        let entry = STAGES.iter().find(|entry| entry.name == *name).expect("a stage");
+        let entry = STAGES
+            .iter()
+            .find(|entry| entry.name == *name)
+            .expect("a stage");
         let now = run(entry, folder, settings);
         let before = kept.get(*name);
-        let moved: Vec<String> = before.map_or(Vec::new(), |before| now.moved(before).into_iter().map(String::from).collect());
-        let same = |before: &StageDigest| (now.implementation, &now.inputs) == (before.implementation, &before.inputs);
+        let moved: Vec<String> = before.map_or(Vec::new(), |before| {
+            now.moved(before).into_iter().map(String::from).collect()
+        });
+        let same = |before: &StageDigest| {
+            (now.implementation, &now.inputs) == (before.implementation, &before.inputs)
+        };
         if before.is_some_and(same) && moved.is_empty() {
             continue;
         }
@@ -238,33 +373,57 @@ fn equal_inputs_give_equal_tables_unless_the_implementation_has_another_number()
     }
     kept.retain(|name, _| STAGES.iter().any(|entry| entry.name == name));
     if std::env::var_os("CALIB_UPDATE").is_some() {
-        let head =
-            "# Of each stage its IMPLEMENTATION and its inputs; of each of its tables rows, texts and sums. See ../digests.rs.\n";
-        let text: String = kept.iter().map(|(name, digest)| format!("{name} {digest}")).collect();
+        let head = "# Of each stage its IMPLEMENTATION and its inputs; of each of its tables rows, texts and sums. See ../digests.rs.\n";
+        let text: String = kept
+            .iter()
+            .map(|(name, digest)| format!("{name} {digest}"))
+            .collect();
         std::fs::write(folder().join("digests.txt"), format!("{head}{text}")).unwrap();
         stale.clear();
     }
-    assert!(unnumbered.is_empty(), "bump the numbers, then write digests.txt anew:\n{}", unnumbered.join("\n"));
-    assert!(stale.is_empty(), "write digests.txt anew with CALIB_UPDATE=1 cargo test --test it digests: {stale:?}");
+    assert!(
+        unnumbered.is_empty(),
+        "bump the numbers, then write digests.txt anew:\n{}",
+        unnumbered.join("\n")
+    );
+    assert!(
+        stale.is_empty(),
+        "write digests.txt anew with CALIB_UPDATE=1 cargo test --test it digests: {stale:?}"
+    );
 }
 
 #[test]
 fn every_stage_has_a_digest() {
     let (tried, stored) = (TRIALS.iter().map(|trial| trial.0), stored());
-    assert_eq!(tried.collect::<Vec<_>>(), STAGES.iter().map(|entry| entry.name).collect::<Vec<_>>());
-    STAGES.iter().for_each(|entry| assert!(!stored[entry.name].tables.is_empty(), "{}", entry.name));
+    assert_eq!(
+        tried.collect::<Vec<_>>(),
+        STAGES.iter().map(|entry| entry.name).collect::<Vec<_>>()
+    );
+    STAGES
+        .iter()
+        .for_each(|entry| assert!(!stored[entry.name].tables.is_empty(), "{}", entry.name));
 }
 
 #[test]
 fn a_table_that_differs_in_one_number_has_another_digest() {
-    let table = |name: &str| read_table(&folder().join("points").join(name), None).unwrap().table;
-    let (before, other) = (table("identify.prediction.parquet"), table("identify.parameters.parquet"));
+    let table = |name: &str| {
+        read_table(&folder().join("points").join(name), None)
+            .unwrap()
+            .table
+    };
+    let (before, other) = (
+        table("identify.prediction.parquet"),
+        table("identify.parameters.parquet"),
+    );
     let digest = |frame: &Frame| TableDigest::of(std::slice::from_ref(frame));
     assert!(digest(&before).is(&digest(&before)) && !digest(&before).is(&digest(&other)));
     let mut rows = <calib::table::Prediction as calib::table::Table>::from_frame(&before).unwrap();
     rows.0[17].error_mm += 1e-2;
     let changed = calib::table::Table::to_frame(&rows).unwrap();
-    let moved =
-        |frame: &Frame| StageDigest { implementation: 1, inputs: String::new(), tables: [("t".into(), digest(frame))].into() };
+    let moved = |frame: &Frame| StageDigest {
+        implementation: 1,
+        inputs: String::new(),
+        tables: [("t".into(), digest(frame))].into(),
+    };
     assert_eq!(moved(&changed).moved(&moved(&before)), ["t"]);
 }

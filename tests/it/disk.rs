@@ -13,9 +13,16 @@ fn text(bytes: &[u8]) -> String {
 /// Files may grow to so many blocks of 512 bytes; writing more fails as on a full disk.
 #[cfg(unix)]
 fn run_within(blocks: u32, store: &Path) -> Output {
-    let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" run \"$1\" --quiet --json --store \"$2\"");
+    let script = format!(
+        "trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" run \"$1\" --quiet --json --store \"$2\""
+    );
     let mut shell = Command::new("sh");
-    shell.args(["-c", &script, env!("CARGO_BIN_EXE_calib")]).arg(pipeline()).arg(store).output().unwrap()
+    shell
+        .args(["-c", &script, env!("CARGO_BIN_EXE_calib")])
+        .arg(pipeline())
+        .arg(store)
+        .output()
+        .unwrap()
 }
 
 #[cfg(unix)]
@@ -25,16 +32,40 @@ fn a_full_disk_is_said_so_and_loses_nothing() {
     let store = folder.path().join("store");
     for blocks in [8, 32, 48] {
         let full = run_within(blocks, &store);
-        assert_eq!(full.status.code(), Some(75), "{blocks} blocks: {}", text(&full.stderr));
+        assert_eq!(
+            full.status.code(),
+            Some(75),
+            "{blocks} blocks: {}",
+            text(&full.stderr)
+        );
         let said = text(&full.stderr);
-        assert!(said.contains("free some space there") && said.contains("--store DIR"), "{said}");
+        assert!(
+            said.contains("free some space there") && said.contains("--store DIR"),
+            "{said}"
+        );
         let failure: serde_json::Value = serde_json::from_slice(&full.stdout).unwrap();
-        assert_eq!((&failure["status"], &failure["exit_code"]), (&"failed".into(), &75.into()));
+        assert_eq!(
+            (&failure["status"], &failure["exit_code"]),
+            (&"failed".into(), &75.into())
+        );
     }
-    let after = Command::new(env!("CARGO_BIN_EXE_calib")).arg("run").arg(pipeline()).arg("--store").arg(&store).output().unwrap();
+    let after = Command::new(env!("CARGO_BIN_EXE_calib"))
+        .arg("run")
+        .arg(pipeline())
+        .arg("--store")
+        .arg(&store)
+        .output()
+        .unwrap();
     assert!(after.status.success(), "{}", text(&after.stderr));
-    assert!(text(&after.stderr).contains("robot     cached"), "{}", text(&after.stderr));
-    let left: Vec<_> = std::fs::read_dir(store.join("tmp")).unwrap().flatten().collect();
+    assert!(
+        text(&after.stderr).contains("robot     cached"),
+        "{}",
+        text(&after.stderr)
+    );
+    let left: Vec<_> = std::fs::read_dir(store.join("tmp"))
+        .unwrap()
+        .flatten()
+        .collect();
     assert!(left.is_empty(), "{left:?}");
 }
 
@@ -43,12 +74,18 @@ fn a_full_disk_is_said_so_and_loses_nothing() {
 #[test]
 fn a_read_only_place_for_the_store_is_said_so() {
     let store = Path::new("/sys/calib-store");
-    let refused =
-        Command::new(env!("CARGO_BIN_EXE_calib")).arg("run").arg(pipeline()).arg("--store").arg(store).output().unwrap();
+    let refused = Command::new(env!("CARGO_BIN_EXE_calib"))
+        .arg("run")
+        .arg(pipeline())
+        .arg("--store")
+        .arg(store)
+        .output()
+        .unwrap();
     assert_eq!(refused.status.code(), Some(75));
     let said = text(&refused.stderr);
     assert!(
-        said.contains("/sys/calib-store: cannot make the folder") && said.contains("choose another with --store DIR"),
+        said.contains("/sys/calib-store: cannot make the folder")
+            && said.contains("choose another with --store DIR"),
         "{said}"
     );
 }

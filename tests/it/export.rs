@@ -6,23 +6,46 @@ use calib::robot::import::{RobotFileText, read_calib};
 use serde_json::Value;
 
 fn exported(format: &str) -> String {
-    let output = calib(cell(), &["export", "latest", "--format", format, "--force"], "");
+    let output = calib(
+        cell(),
+        &["export", "latest", "--format", format, "--force"],
+        "",
+    );
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{said}");
-    assert!(said.contains("not carried: reduction_ratio at joint 3"), "{said}");
+    assert!(
+        said.contains("not carried: reduction_ratio at joint 3"),
+        "{said}"
+    );
     String::from_utf8(output.stdout).expect("UTF-8")
 }
 
 /// The tool at a joint position by the exported JSON: product of exponentials written out here.
 fn by_json(model: &Value, q: &[f64]) -> [f64; 3] {
-    let three = |value: &Value| -> [f64; 3] { [0, 1, 2].map(|k| value[k].as_f64().expect("a number")) };
+    let three =
+        |value: &Value| -> [f64; 3] { [0, 1, 2].map(|k| value[k].as_f64().expect("a number")) };
     let mut point = three(&model["tool"]["point_m"]);
-    for (joint, angle) in model["joints"].as_array().expect("joints").iter().zip(q).rev() {
+    for (joint, angle) in model["joints"]
+        .as_array()
+        .expect("joints")
+        .iter()
+        .zip(q)
+        .rev()
+    {
         let (axis, on) = (three(&joint["axis"]), three(&joint["point_m"]));
         let p = [0, 1, 2].map(|k| point[k] - on[k]);
-        let cross = [axis[1] * p[2] - axis[2] * p[1], axis[2] * p[0] - axis[0] * p[2], axis[0] * p[1] - axis[1] * p[0]];
+        let cross = [
+            axis[1] * p[2] - axis[2] * p[1],
+            axis[2] * p[0] - axis[0] * p[2],
+            axis[0] * p[1] - axis[1] * p[0],
+        ];
         let along: f64 = (0..3).map(|k| axis[k] * p[k]).sum();
-        point = [0, 1, 2].map(|k| on[k] + p[k] * angle.cos() + cross[k] * angle.sin() + axis[k] * along * (1.0 - angle.cos()));
+        point = [0, 1, 2].map(|k| {
+            on[k]
+                + p[k] * angle.cos()
+                + cross[k] * angle.sin()
+                + axis[k] * along * (1.0 - angle.cos())
+        });
     }
     point
 }
@@ -32,17 +55,32 @@ fn tables_and_urdf_are_the_arm_that_was_identified() {
     let model: Value = serde_json::from_str(&exported("json")).expect("JSON");
     let urdf = exported("urdf");
     let beside = "calib_robot: 1\nname: u\nunits: {length: mm, angle: deg}\nkinematics:\n  urdf: {base: base_link, tip: tool0}\n";
-    let label = |text| RobotFileText { label: "robot.yaml", text };
+    let label = |text| RobotFileText {
+        label: "robot.yaml",
+        text,
+    };
     let robots = [
-        read_calib(label(beside), Some(RobotFileText { label: "arm.urdf", text: &urdf })).expect("a URDF"),
+        read_calib(
+            label(beside),
+            Some(RobotFileText {
+                label: "arm.urdf",
+                text: &urdf,
+            }),
+        )
+        .expect("a URDF"),
         read_calib(label(&exported("dh")), None).expect("a DH table"),
         read_calib(label(&exported("mdh")), None).expect("a modified DH table"),
     ];
     for robot in robots.map(|imported| RobotModel::new(imported.robot)) {
         for k in 0..50 {
-            let q: Vec<f64> = (0..6).map(|j| (1.3 * k as f64 + 0.7 * j as f64).sin()).collect();
+            let q: Vec<f64> = (0..6)
+                .map(|j| (1.3 * k as f64 + 0.7 * j as f64).sin())
+                .collect();
             let (found, wanted) = (robot.forward(&q).translation, by_json(&model, &q));
-            let apart = (0..3).map(|k| (found[k] - wanted[k]).powi(2)).sum::<f64>().sqrt();
+            let apart = (0..3)
+                .map(|k| (found[k] - wanted[k]).powi(2))
+                .sum::<f64>()
+                .sqrt();
             assert!(apart < 1e-9, "{apart} m");
         }
     }
@@ -54,22 +92,46 @@ fn an_sdf_is_the_arm_that_was_identified_and_states_no_limit_that_is_not_known()
     let text = exported("sdf");
     let document = roxmltree::Document::parse(&text).expect("XML");
     let child = |node: roxmltree::Node<'_, '_>, name: &str| -> Vec<f64> {
-        let found = node.descendants().find(|child| child.has_tag_name(name)).unwrap_or_else(|| panic!("no {name}"));
-        found.text().expect("numbers").split(' ').map(|number| number.parse().expect("a number")).collect()
+        let found = node
+            .descendants()
+            .find(|child| child.has_tag_name(name))
+            .unwrap_or_else(|| panic!("no {name}"));
+        found
+            .text()
+            .expect("numbers")
+            .split(' ')
+            .map(|number| number.parse().expect("a number"))
+            .collect()
     };
-    let moving = |node: &roxmltree::Node| node.has_tag_name("joint") && node.attribute("type") != Some("fixed");
+    let moving = |node: &roxmltree::Node| {
+        node.has_tag_name("joint") && node.attribute("type") != Some("fixed")
+    };
     let joints: Vec<roxmltree::Node> = document.descendants().filter(moving).collect();
     let mut point = [0.0; 3];
-    for (joint, told) in joints.iter().zip(model["joints"].as_array().expect("joints")) {
+    for (joint, told) in joints
+        .iter()
+        .zip(model["joints"].as_array().expect("joints"))
+    {
         point = [0, 1, 2].map(|k| point[k] + child(*joint, "pose")[k]);
         for k in 0..3 {
             assert!((point[k] - told["point_m"][k].as_f64().expect("a number")).abs() < 1e-12);
-            assert_eq!(child(*joint, "xyz")[k], told["axis"][k].as_f64().expect("a number"));
+            assert_eq!(
+                child(*joint, "xyz")[k],
+                told["axis"][k].as_f64().expect("a number")
+            );
         }
     }
-    let tool = document.descendants().find(|node| node.has_tag_name("frame")).expect("a tool");
+    let tool = document
+        .descendants()
+        .find(|node| node.has_tag_name("frame"))
+        .expect("a tool");
     for k in 0..3 {
-        assert!((point[k] + child(tool, "pose")[k] - model["tool"]["point_m"][k].as_f64().expect("a number")).abs() < 1e-12);
+        assert!(
+            (point[k] + child(tool, "pose")[k]
+                - model["tool"]["point_m"][k].as_f64().expect("a number"))
+            .abs()
+                < 1e-12
+        );
     }
     assert_eq!(joints.len(), 6);
     assert!(!text.contains("effort") && !exported("urdf").contains("effort=\"0\""));
@@ -81,42 +143,86 @@ fn a_file_says_whose_it_is_and_whether_it_was_edited() {
     let held = |name: &str, text: &str| {
         let path = here.path().join(name);
         std::fs::write(&path, text).expect("a file");
-        let output = calib(cell(), &["check-export", path.to_str().expect("a path"), "--against", "latest"], "");
+        let output = calib(
+            cell(),
+            &[
+                "check-export",
+                path.to_str().expect("a path"),
+                "--against",
+                "latest",
+            ],
+            "",
+        );
         let said = String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned();
         (output.status.code(), said)
     };
     for format in ["urdf", "dh", "mdh", "json", "mjcf", "sdf", "controller"] {
         let text = exported(format);
         let (code, said) = held(format, &text);
-        assert!(code == Some(0) && said.contains(": is the export of run"), "{format}: {said}");
+        assert!(
+            code == Some(0) && said.contains(": is the export of run"),
+            "{format}: {said}"
+        );
         // One digit of one number.
         let at = text.rfind("0.").expect("a number") + 2;
-        let digit = if text.as_bytes()[at] == b'7' { "8" } else { "7" };
+        let digit = if text.as_bytes()[at] == b'7' {
+            "8"
+        } else {
+            "7"
+        };
         let edited = format!("{}{digit}{}", &text[..at], &text[at + 1..]);
         let (code, said) = held(format, &edited);
         let line = text[..at].lines().count();
-        assert!(code == Some(1) && said.contains(&format!("line {line} is not as run")), "{format}: {said}");
+        assert!(
+            code == Some(1) && said.contains(&format!("line {line} is not as run")),
+            "{format}: {said}"
+        );
     }
     let text = exported("urdf");
     let (start, _) = text.split_once(", model ").expect("a mark");
-    let other = format!("{start}, model 0123456789abcdef{}", &text[start.len() + 8 + 16..]);
+    let other = format!(
+        "{start}, model 0123456789abcdef{}",
+        &text[start.len() + 8 + 16..]
+    );
     let (code, said) = held("other", &other);
-    assert!(code == Some(1) && said.contains("is of the model 0123456789abcdef; that of run"), "{said}");
-    let (code, said) = held("other", &text.replace("robot serial not stated", "robot serial 77"));
-    assert!(code == Some(1) && said.contains("is of the robot with serial 77; that of run"), "{said}");
+    assert!(
+        code == Some(1) && said.contains("is of the model 0123456789abcdef; that of run"),
+        "{said}"
+    );
+    let (code, said) = held(
+        "other",
+        &text.replace("robot serial not stated", "robot serial 77"),
+    );
+    assert!(
+        code == Some(1) && said.contains("is of the robot with serial 77; that of run"),
+        "{said}"
+    );
     let (code, said) = held("none", "<robot/>");
-    assert!(code == Some(10) && said.contains("carries no mark of calib"), "{said}");
+    assert!(
+        code == Some(10) && said.contains("carries no mark of calib"),
+        "{said}"
+    );
 }
 
 /// A folder with an arm of the library that was identified.
 fn of_the_library(name: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
-    let robot = calib::robot::LibraryArm::find(name).expect("an arm").text.replace("point: [0, 0, 0]", "point: [40, 30, 120]");
+    let robot = calib::robot::LibraryArm::find(name)
+        .expect("an arm")
+        .text
+        .replace("point: [0, 0, 0]", "point: [40, 30, 120]");
     std::fs::write(folder.path().join("robot.yaml"), robot).expect("a file");
-    let pipeline = PIPELINE.replace("[0.4, 0.2, -0.3]", "[0.4, 0.2, -0.3], tilt_arcsec: [40, 20, 60]");
+    let pipeline = PIPELINE.replace(
+        "[0.4, 0.2, -0.3]",
+        "[0.4, 0.2, -0.3], tilt_arcsec: [40, 20, 60]",
+    );
     std::fs::write(folder.path().join("pipeline.yaml"), pipeline).expect("a file");
     let output = calib(folder.path(), &["run", "pipeline.yaml", "--quiet"], "");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     folder
 }
 
@@ -125,15 +231,34 @@ fn a_drivers_kinematics_are_those_of_the_arm_near_the_frames_of_its_meshes() {
     let folder = of_the_library("ur10e");
     let export = |format: &str| {
         let output = calib(folder.path(), &["export", "latest", "--format", format], "");
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        assert!(
+            output.status.success(),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
         String::from_utf8(output.stdout).expect("UTF-8")
     };
     let model: Value = serde_json::from_str(&export("json")).expect("JSON");
     let text = export("ur_kinematics");
-    let tool = text.split_once("in tool0 it stands at ").expect("the tool").1;
-    let tool: Vec<f64> = tool.split(' ').take(3).map(|number| number.parse().expect("a number")).collect();
-    let value = |line: &str| line.trim().split_once(": ").and_then(|(_, number)| number.parse::<f64>().ok());
-    let numbers: Vec<f64> = text.lines().filter(|line| line.starts_with("    ")).filter_map(value).collect();
+    let tool = text
+        .split_once("in tool0 it stands at ")
+        .expect("the tool")
+        .1;
+    let tool: Vec<f64> = tool
+        .split(' ')
+        .take(3)
+        .map(|number| number.parse().expect("a number"))
+        .collect();
+    let value = |line: &str| {
+        line.trim()
+            .split_once(": ")
+            .and_then(|(_, number)| number.parse::<f64>().ok())
+    };
+    let numbers: Vec<f64> = text
+        .lines()
+        .filter(|line| line.starts_with("    "))
+        .filter_map(value)
+        .collect();
     // The file that the maker ships for this arm, config/ur10e/default_kinematics.yaml.
     let half = std::f64::consts::FRAC_PI_2;
     let shipped = [
@@ -149,22 +274,37 @@ fn a_drivers_kinematics_are_those_of_the_arm_near_the_frames_of_its_meshes() {
         assert!((number - shipped).abs() < 3e-3, "{number} {shipped}");
     }
     for k in 0..50 {
-        let q: Vec<f64> = (0..6).map(|j| (1.3 * k as f64 + 0.7 * j as f64).sin()).collect();
+        let q: Vec<f64> = (0..6)
+            .map(|j| (1.3 * k as f64 + 0.7 * j as f64).sin())
+            .collect();
         let mut point: [f64; 3] = [tool[0], tool[1], tool[2]];
         for (origin, angle) in numbers.chunks(6).zip(&q).rev() {
             let turned_by = |axis, angle| about(axis, angle);
             let rpy = product(
                 turned_by([0.0, 0.0, 1.0], origin[5]),
-                product(turned_by([0.0, 1.0, 0.0], origin[4]), turned_by([1.0, 0.0, 0.0], origin[3])),
+                product(
+                    turned_by([0.0, 1.0, 0.0], origin[4]),
+                    turned_by([1.0, 0.0, 0.0], origin[3]),
+                ),
             );
             let moved = turned(rpy, turned(about([0.0, 0.0, 1.0], *angle), point));
             point = [0, 1, 2].map(|axis| moved[axis] + origin[axis]);
         }
         let wanted = by_json(&model, &q);
-        assert!((0..3).all(|axis| (point[axis] - wanted[axis]).abs() < 1e-12), "{point:?} {wanted:?}");
+        assert!(
+            (0..3).all(|axis| (point[axis] - wanted[axis]).abs() < 1e-12),
+            "{point:?} {wanted:?}"
+        );
     }
-    let other = calib(cell(), &["export", "latest", "--format", "ur_kinematics"], "");
-    assert!(other.status.code() == Some(10) && String::from_utf8_lossy(&other.stderr).contains("is no arm of Universal Robots"));
+    let other = calib(
+        cell(),
+        &["export", "latest", "--format", "ur_kinematics"],
+        "",
+    );
+    assert!(
+        other.status.code() == Some(10)
+            && String::from_utf8_lossy(&other.stderr).contains("is no arm of Universal Robots")
+    );
 }
 
 type Turn = [[f64; 3]; 3];
@@ -184,12 +324,18 @@ fn about([x, y, z]: [f64; 3], angle: f64) -> Turn {
     let cross = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]];
     let square = product(cross, cross);
     let unit = |i, k| if i == k { 1.0 } else { 0.0 };
-    [0, 1, 2].map(|i| [0, 1, 2].map(|k| unit(i, k) + sin * cross[i][k] + (1.0 - cos) * square[i][k]))
+    [0, 1, 2]
+        .map(|i| [0, 1, 2].map(|k| unit(i, k) + sin * cross[i][k] + (1.0 - cos) * square[i][k]))
 }
 
 fn numbers<const N: usize>(element: roxmltree::Node, name: &str) -> [f64; N] {
-    let text = element.attribute(name).unwrap_or_else(|| panic!("no {name}"));
-    let all: Vec<f64> = text.split(' ').map(|number| number.parse().expect("a number")).collect();
+    let text = element
+        .attribute(name)
+        .unwrap_or_else(|| panic!("no {name}"));
+    let all: Vec<f64> = text
+        .split(' ')
+        .map(|number| number.parse().expect("a number"))
+        .collect();
     all.try_into().expect("as many numbers")
 }
 
@@ -197,9 +343,15 @@ fn numbers<const N: usize>(element: roxmltree::Node, name: &str) -> [f64; N] {
 fn by_mjcf(text: &str, q: &[f64]) -> ([f64; 3], Turn) {
     let document = roxmltree::Document::parse(text).expect("XML");
     let child = |node: roxmltree::Node<'_, '_>, name: &str| {
-        node.children().find(|child| child.has_tag_name(name)).map(|child| child.id())
+        node.children()
+            .find(|child| child.has_tag_name(name))
+            .map(|child| child.id())
     };
-    let mut body = document.root_element().children().find(|node| node.has_tag_name("worldbody")).expect("a world");
+    let mut body = document
+        .root_element()
+        .children()
+        .find(|node| node.has_tag_name("worldbody"))
+        .expect("a world");
     let (mut place, mut turn, mut joints) = ([0.0; 3], about([0.0, 0.0, 1.0], 0.0), q.iter());
     while let Some(next) = child(body, "body") {
         body = document.get_node(next).expect("a body");
@@ -209,17 +361,37 @@ fn by_mjcf(text: &str, q: &[f64]) -> ([f64; 3], Turn) {
         }
         if let Some(joint) = child(body, "joint") {
             let joint = document.get_node(joint).expect("a joint");
-            assert_eq!((joint.attribute("type"), numbers(joint, "pos")), (Some("hinge"), [0.0; 3]));
-            turn = product(turn, about(numbers(joint, "axis"), *joints.next().expect("an angle")));
+            assert_eq!(
+                (joint.attribute("type"), numbers(joint, "pos")),
+                (Some("hinge"), [0.0; 3])
+            );
+            turn = product(
+                turn,
+                about(numbers(joint, "axis"), *joints.next().expect("an angle")),
+            );
         }
     }
     assert_eq!(joints.next(), None, "a joint for every angle");
-    let site = document.get_node(child(body, "site").expect("a site")).expect("a site");
+    let site = document
+        .get_node(child(body, "site").expect("a site"))
+        .expect("a site");
     let [w, x, y, z] = numbers(site, "quat");
     let own = [
-        [w * w + x * x - y * y - z * z, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-        [2.0 * (x * y + w * z), w * w - x * x + y * y - z * z, 2.0 * (y * z - w * x)],
-        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w - x * x - y * y + z * z],
+        [
+            w * w + x * x - y * y - z * z,
+            2.0 * (x * y - w * z),
+            2.0 * (x * z + w * y),
+        ],
+        [
+            2.0 * (x * y + w * z),
+            w * w - x * x + y * y - z * z,
+            2.0 * (y * z - w * x),
+        ],
+        [
+            2.0 * (x * z - w * y),
+            2.0 * (y * z + w * x),
+            w * w - x * x - y * y + z * z,
+        ],
     ];
     let step = turned(turn, numbers(site, "pos"));
     ([0, 1, 2].map(|k| place[k] + step[k]), product(turn, own))
@@ -232,38 +404,78 @@ fn a_mujoco_model_is_the_arm_that_was_identified_with_its_limits_and_known_masse
     // The cell's arm by another name, of which the table must be a model.
     let folder = tempfile::tempdir().expect("a folder");
     let here = folder.path();
-    std::fs::write(here.join("heavy <1>.yaml"), heavy.replace("name: small", "name: \"<a & b> ---\"")).expect("a file");
+    std::fs::write(
+        here.join("heavy <1>.yaml"),
+        heavy.replace("name: small", "name: \"<a & b> ---\""),
+    )
+    .expect("a file");
     let pipeline = std::fs::read_to_string(cell().join("pipeline.yaml")).expect("a file");
-    std::fs::write(here.join("pipeline.yaml"), pipeline.replace("robot.yaml", "'heavy <1>.yaml'")).expect("a file");
+    std::fs::write(
+        here.join("pipeline.yaml"),
+        pipeline.replace("robot.yaml", "'heavy <1>.yaml'"),
+    )
+    .expect("a file");
     let export = |format: &str| {
         let output = calib(here, &["export", "pipeline.yaml", "--format", format], "");
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        assert!(
+            output.status.success(),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
         String::from_utf8(output.stdout).expect("UTF-8")
     };
     let (text, model) = (export("mjcf"), export("json"));
     let model: Value = serde_json::from_str(&model).expect("JSON");
     for k in 0..20 {
-        let q: Vec<f64> = (0..6).map(|j| 2.0 * (1.7 * k as f64 + 0.9 * j as f64).sin()).collect();
+        let q: Vec<f64> = (0..6)
+            .map(|j| 2.0 * (1.7 * k as f64 + 0.9 * j as f64).sin())
+            .collect();
         let (found, wanted) = (by_mjcf(&text, &q).0, by_json(&model, &q));
-        let apart = (0..3).map(|k| (found[k] - wanted[k]).powi(2)).sum::<f64>().sqrt();
+        let apart = (0..3)
+            .map(|k| (found[k] - wanted[k]).powi(2))
+            .sum::<f64>()
+            .sqrt();
         assert!(apart < 1e-9, "{apart} m");
     }
     let at_zero = by_mjcf(&text, &[0.0; 6]).1;
     for (i, row) in at_zero.iter().enumerate() {
         for (k, found) in row.iter().enumerate() {
-            assert!((found - model["tool"]["rotation"][i][k].as_f64().expect("a number")).abs() < 1e-12);
+            assert!(
+                (found - model["tool"]["rotation"][i][k].as_f64().expect("a number")).abs() < 1e-12
+            );
         }
     }
     let document = roxmltree::Document::parse(&text).expect("XML");
-    let all = |name: &'static str| document.descendants().filter(move |node| node.has_tag_name(name));
-    assert_eq!(document.root_element().attribute("model"), Some("<a & b> ---"));
+    let all = |name: &'static str| {
+        document
+            .descendants()
+            .filter(move |node| node.has_tag_name(name))
+    };
+    assert_eq!(
+        document.root_element().attribute("model"),
+        Some("<a & b> ---")
+    );
     let masses: Vec<[f64; 1]> = all("inertial").map(|node| numbers(node, "mass")).collect();
     assert_eq!(masses, [[90.0], [60.0]]);
     let limits: [f64; 2] = numbers(all("joint").nth(1).expect("a joint"), "range");
-    assert!((limits[0].to_degrees() + 60.0).abs() < 1e-9 && (limits[1].to_degrees() - 75.0).abs() < 1e-9, "{limits:?}");
-    let remarks: String = document.root().children().filter_map(|node| node.text()).collect();
-    assert!(remarks.contains("not carried: reduction_ratio at joint 3"), "{remarks}");
-    assert!(remarks.contains("bodies whose mass is not known have 0.001 kg"), "{remarks}");
+    assert!(
+        (limits[0].to_degrees() + 60.0).abs() < 1e-9
+            && (limits[1].to_degrees() - 75.0).abs() < 1e-9,
+        "{limits:?}"
+    );
+    let remarks: String = document
+        .root()
+        .children()
+        .filter_map(|node| node.text())
+        .collect();
+    assert!(
+        remarks.contains("not carried: reduction_ratio at joint 3"),
+        "{remarks}"
+    );
+    assert!(
+        remarks.contains("bodies whose mass is not known have 0.001 kg"),
+        "{remarks}"
+    );
 }
 
 const KRL: &str = "DEF weld( )\r\n; {A1 9, A2 not code\r\nDECL E6AXIS XHOME={A1 0.0,A2 -10.0,A3 20.0,A4 5,A5 30,A6 0.0,E1 0.0}\r\n PTP {A1 10,A2 20,A3 -30,A4 5,A5 40,A6 0} C_PTP\r\nLIN {E6POS: X 900.0,Y 40.0,Z 930.5,A 0.0,B 0.0,C 0.0,S 2,T 4,E1 0.0}\r\n$BASE={X 0,Y 0,Z 0,A 0,B 0,C 0}\r\nEND\r\n";
@@ -273,15 +485,36 @@ const RAPID: &str = "MODULE m\n  ! [[1,2\n  CONST jointtarget home:=[[0,-10,20,5
 fn program(name: &str, text: &str) -> (Option<i32>, String, String) {
     let path = cell().join(name);
     std::fs::write(&path, text).expect("a file");
-    let output = calib(cell(), &["compensate", "latest", name, "--quiet", "--assume-frames"], "");
+    let output = calib(
+        cell(),
+        &["compensate", "latest", name, "--quiet", "--assume-frames"],
+        "",
+    );
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
-    (output.status.code(), text(output.stdout), text(output.stderr))
+    (
+        output.status.code(),
+        text(output.stdout),
+        text(output.stderr),
+    )
 }
 
 /// The text with every number taken out, where `keep` does not hold for its line.
 fn without_numbers(text: &str, targets: &[usize]) -> Vec<String> {
-    let strip = |line: &str| line.chars().filter(|c| !(c.is_ascii_digit() || *c == '.' || *c == '-')).collect();
-    text.split('\n').enumerate().map(|(k, line)| if targets.contains(&k) { strip(line) } else { line.to_string() }).collect()
+    let strip = |line: &str| {
+        line.chars()
+            .filter(|c| !(c.is_ascii_digit() || *c == '.' || *c == '-'))
+            .collect()
+    };
+    text.split('\n')
+        .enumerate()
+        .map(|(k, line)| {
+            if targets.contains(&k) {
+                strip(line)
+            } else {
+                line.to_string()
+            }
+        })
+        .collect()
 }
 
 #[test]
@@ -292,17 +525,33 @@ fn programs_differ_in_the_numbers_of_targets_and_nothing_else() {
         assert_ne!(corrected, text);
         // The second line is the mark of what was corrected.
         let mark = corrected.split('\n').nth(1).expect("a line");
-        assert!(mark.starts_with("; corrected by calib") || mark.starts_with("! corrected by calib"), "{mark}");
+        assert!(
+            mark.starts_with("; corrected by calib") || mark.starts_with("! corrected by calib"),
+            "{mark}"
+        );
         let corrected = corrected.replacen(&format!("{mark}\n"), "", 1);
-        assert_eq!(without_numbers(&corrected, &targets), without_numbers(text, &targets));
+        assert_eq!(
+            without_numbers(&corrected, &targets),
+            without_numbers(text, &targets)
+        );
         for k in targets {
-            assert_ne!(corrected.split('\n').nth(k), text.split('\n').nth(k), "line {k} has a target");
+            assert_ne!(
+                corrected.split('\n').nth(k),
+                text.split('\n').nth(k),
+                "line {k} has a target"
+            );
         }
     }
     let (_, corrected, said) = program("weld.src", KRL);
     // The target stands at A1 0 and A6 0, and its correction takes both below: the turns say so, or they would go once round.
-    assert!(corrected.contains(",E1 0.0}") && corrected.contains(",S 2,T 37,"), "{corrected}");
-    assert!(said.contains("posture S 2, T 37 of the corrected joints, was S 2, T 4"), "{said}");
+    assert!(
+        corrected.contains(",E1 0.0}") && corrected.contains(",S 2,T 37,"),
+        "{corrected}"
+    );
+    assert!(
+        said.contains("posture S 2, T 37 of the corrected joints, was S 2, T 4"),
+        "{said}"
+    );
 }
 
 #[test]
@@ -315,11 +564,23 @@ fn malformed_programs_are_refused_with_line_and_column() {
         }
     };
     let krl = "DEF x()\n PTP {A1 10,A2 foo,A3 -30,A4 5,A5 40,A6 0}\nPTP {A1 10,A2 3\nLIN {E6POS: X 1,Y 2}\n";
-    refused("bad.src", krl, &["bad.src:2:16: A2 is `foo`", "bad.src:3:5: `{` without `}`", "bad.src:4:5: the target has no Z"]);
+    refused(
+        "bad.src",
+        krl,
+        &[
+            "bad.src:2:16: A2 is `foo`",
+            "bad.src:3:5: `{` without `}`",
+            "bad.src:4:5: the target has no Z",
+        ],
+    );
     let rapid = "CONST jointtarget a:=[[1,2,3],[9E9,1,1,1,1,1]];\nCONST robtarget b:=[[1,2,x],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\nCONST robtarget c:=[[1,2;\n";
     refused(
         "bad.mod",
         rapid,
-        &["bad.mod:1:23: 3 numbers, expected 6", "bad.mod:2:26: `x` is no number", "bad.mod:3:21: `[` without `]`"],
+        &[
+            "bad.mod:1:23: 3 numbers, expected 6",
+            "bad.mod:2:26: `x` is no number",
+            "bad.mod:3:21: `[` without `]`",
+        ],
     );
 }

@@ -18,7 +18,11 @@ fn robot(name: &str, chain: Chain, tool_mm: [f64; 3], masses: &[f64]) -> RobotDe
                 kind: *kind,
                 axis: *axis,
                 point: metres(*point),
-                limits: Some(if *kind == JointKind::Revolute { [-2.5, 2.5] } else { [0.0, 3.0] }),
+                limits: Some(if *kind == JointKind::Revolute {
+                    [-2.5, 2.5]
+                } else {
+                    [0.0, 3.0]
+                }),
                 reduction_ratio: Some(100.0),
                 motor_constant: Some(1.0),
                 mass: Some(masses[j]),
@@ -56,8 +60,17 @@ pub fn spherical() -> RobotDescription {
         (NEG_Y, [1594.0, 0.0, 1310.0], R),
         (X, [0.0, 0.0, 1310.0], R),
     ];
-    let mut out = robot("spherical", &chain, [1954.0, 60.0, 1400.0], &[350.0, 310.0, 230.0, 90.0, 45.0, 15.0]);
-    out.couplings = vec![Coupling { moved: 5, by: 4, ratio: 0.02 }];
+    let mut out = robot(
+        "spherical",
+        &chain,
+        [1954.0, 60.0, 1400.0],
+        &[350.0, 310.0, 230.0, 90.0, 45.0, 15.0],
+    );
+    out.couplings = vec![Coupling {
+        moved: 5,
+        by: 4,
+        ratio: 0.02,
+    }];
     out
 }
 
@@ -71,7 +84,12 @@ pub fn offset_wrist() -> RobotDescription {
         ([0.0, 0.0, -1.0], [-1184.3, -163.9, 127.3], R),
         (NEG_Y, [-1184.3, -163.9, 11.6], R),
     ];
-    robot("offset wrist", &chain, [-1184.3, -340.0, -40.0], &[7.1, 12.7, 4.3, 2.0, 2.0, 0.4])
+    robot(
+        "offset wrist",
+        &chain,
+        [-1184.3, -340.0, -40.0],
+        &[7.1, 12.7, 4.3, 2.0, 2.0, 0.4],
+    )
 }
 
 /// A 7R arm with alternating axes.
@@ -85,7 +103,12 @@ pub fn seven() -> RobotDescription {
         (Y, [0.0, 0.0, 1140.0], R),
         (Z, [0.0, 0.0, 1140.0], R),
     ];
-    robot("seven", &chain, [70.0, 30.0, 1300.0], &[6.0, 6.0, 4.0, 4.0, 2.0, 2.0, 0.5])
+    robot(
+        "seven",
+        &chain,
+        [70.0, 30.0, 1300.0],
+        &[6.0, 6.0, 4.0, 4.0, 2.0, 2.0, 0.5],
+    )
 }
 
 /// The offset-wrist arm on a linear track.
@@ -109,8 +132,16 @@ pub fn all() -> Vec<RobotDescription> {
 
 /// A fixed sequence of numbers in [0, 1): additive recurrence, evenly spread in every dimension.
 pub fn spread(index: usize, dimension: usize) -> f64 {
-    const ROOTS: [f64; 8] =
-        [0.754_877_666, 0.569_840_291, 0.819_172_513, 0.671_043_607, 0.549_700_478, 0.856_674_884, 0.733_891_857, 0.628_706_721];
+    const ROOTS: [f64; 8] = [
+        0.754_877_666,
+        0.569_840_291,
+        0.819_172_513,
+        0.671_043_607,
+        0.549_700_478,
+        0.856_674_884,
+        0.733_891_857,
+        0.628_706_721,
+    ];
     (0.5 + (index + 1) as f64 * ROOTS[dimension % 8] + dimension as f64 * 0.137).fract()
 }
 

@@ -43,12 +43,17 @@ fn run(file: &Path, store: &Path, code: i32) -> Value {
 
 /// Recordings of different robots: `DIR/recordings/c0001`.
 fn recordings(folder: &Path, cases: usize) {
-    let (output, said) = output(calib(&["simulate", "conceal", "--points", "40", "--robot", "compact6", "--nulls", "1"]).args([
-        "--cases",
-        &cases.to_string(),
-        "--out",
-        folder.to_str().unwrap(),
-    ]));
+    let (output, said) = output(
+        calib(&[
+            "simulate", "conceal", "--points", "40", "--robot", "compact6", "--nulls", "1",
+        ])
+        .args([
+            "--cases",
+            &cases.to_string(),
+            "--out",
+            folder.to_str().unwrap(),
+        ]),
+    );
     assert!(output.status.success(), "{said}");
 }
 
@@ -60,7 +65,10 @@ fn write(path: PathBuf, text: &str) -> PathBuf {
 
 /// A fleet file beside its recordings.
 fn file(folder: &Path, name: &str, rest: &str) -> PathBuf {
-    let text = format!("calib: 1\nname: {name}\npipeline: {}\n{rest}", pipeline().display());
+    let text = format!(
+        "calib: 1\nname: {name}\npipeline: {}\n{rest}",
+        pipeline().display()
+    );
     write(folder.join(format!("{name}.yaml")), &text)
 }
 
@@ -70,9 +78,15 @@ fn tables(store: &Path, name: &str) -> BTreeMap<String, String> {
     let mut found = BTreeMap::new();
     for entry in std::fs::read_dir(folder).unwrap().flatten() {
         let bytes = std::fs::read(entry.path()).unwrap();
-        found.insert(entry.file_name().into_string().unwrap(), blake3::hash(&bytes).to_hex().to_string());
+        found.insert(
+            entry.file_name().into_string().unwrap(),
+            blake3::hash(&bytes).to_hex().to_string(),
+        );
     }
-    assert_eq!(found.keys().collect::<Vec<_>>(), ["fleet.fleet.parquet", "fleet.fleet_changes.parquet"]);
+    assert_eq!(
+        found.keys().collect::<Vec<_>>(),
+        ["fleet.fleet.parquet", "fleet.fleet_changes.parquet"]
+    );
     found
 }
 
@@ -89,30 +103,60 @@ fn broken_robots_are_listed_with_their_reasons_and_the_others_finish() {
     let (cases, store) = (folder.path().join("cases"), folder.path().join("store"));
     recordings(&cases, 5);
     let recordings = cases.join("recordings");
-    std::fs::write(recordings.join("c0002/tracker.csv"), "point_id,x_mm\n1,wrong\n").unwrap();
+    std::fs::write(
+        recordings.join("c0002/tracker.csv"),
+        "point_id,x_mm\n1,wrong\n",
+    )
+    .unwrap();
     std::fs::remove_file(recordings.join("c0003/robot.json")).unwrap();
-    let file = file(folder.path(), "line", "robots:\n  - folders: cases/recordings/*\n");
+    let file = file(
+        folder.path(),
+        "line",
+        "robots:\n  - folders: cases/recordings/*\n",
+    );
     let (result, said) = output(&mut fleet("run", &file, &store));
     assert_eq!(result.status.code(), Some(10), "{said}");
-    for line in ["error: 2 faults", "c0002: rejected: ", "c0003: rejected: ", "robot.json"] {
+    for line in [
+        "error: 2 faults",
+        "c0002: rejected: ",
+        "c0003: rejected: ",
+        "robot.json",
+    ] {
         assert!(said.contains(line), "{line}: {said}");
     }
     let told = run(&file, &store, 10);
-    assert_eq!((told["done"].as_u64(), told["rejected"].as_u64(), told["computed"].as_u64()), (Some(3), Some(2), Some(0)));
-    assert!(told["robots"][0]["after_rms_mm"].as_f64().unwrap() < told["robots"][0]["before_rms_mm"].as_f64().unwrap());
+    assert_eq!(
+        (
+            told["done"].as_u64(),
+            told["rejected"].as_u64(),
+            told["computed"].as_u64()
+        ),
+        (Some(3), Some(2), Some(0))
+    );
+    assert!(
+        told["robots"][0]["after_rms_mm"].as_f64().unwrap()
+            < told["robots"][0]["before_rms_mm"].as_f64().unwrap()
+    );
 
     // Mended data are other data: the same command takes them up.
     copy(&recordings.join("c0001"), &recordings.join("c0003"));
     let told = run(&file, &store, 10);
-    assert_eq!((told["done"].as_u64(), told["computed"].as_u64()), (Some(4), Some(1)));
+    assert_eq!(
+        (told["done"].as_u64(), told["computed"].as_u64()),
+        (Some(4), Some(1))
+    );
     // Asked for, what was rejected is tried again.
-    let (result, said) = output(fleet("retry", &file, &store).args(["--failed", "--json", "--quiet"]));
+    let (result, said) =
+        output(fleet("retry", &file, &store).args(["--failed", "--json", "--quiet"]));
     assert_eq!(result.status.code(), Some(10), "{said}");
     let told: Value = serde_json::from_slice(&result.stdout).unwrap();
     assert_eq!(told["computed"].as_u64(), Some(1));
     let (result, _) = output(fleet("status", &file, &store).args(["--robot", "c0002"]));
     let text = String::from_utf8(result.stdout).unwrap();
-    assert!(text.starts_with("c0002: rejected\n") && text.contains("manifest.json"), "{text}");
+    assert!(
+        text.starts_with("c0002: rejected\n") && text.contains("manifest.json"),
+        "{text}"
+    );
 }
 
 #[test]
@@ -120,7 +164,11 @@ fn a_sweep_leaves_what_the_records_of_a_fleet_need() {
     let folder = tempfile::tempdir().unwrap();
     let (cases, store) = (folder.path().join("cases"), folder.path().join("store"));
     recordings(&cases, 3);
-    let file = file(folder.path(), "line", "robots:\n  - folders: cases/recordings/*\n");
+    let file = file(
+        folder.path(),
+        "line",
+        "robots:\n  - folders: cases/recordings/*\n",
+    );
     run(&file, &store, 0);
     // The same robot with other data: of two runs of its pipeline the earlier is a record's as well.
     let tracker = |case: &str| cases.join("recordings").join(case).join("tracker.csv");
@@ -128,17 +176,30 @@ fn a_sweep_leaves_what_the_records_of_a_fleet_need() {
     let shorter = before.trim_end().rsplit_once('\n').unwrap().0;
     std::fs::write(tracker("c0001"), format!("{shorter}\n")).unwrap();
     assert_eq!(run(&file, &store, 0)["computed"].as_u64(), Some(1));
-    let (result, said) = output(calib(&["gc", "--keep-runs", "1", "--grace-hours", "0", "--store"]).arg(&store));
+    let (result, said) =
+        output(calib(&["gc", "--keep-runs", "1", "--grace-hours", "0", "--store"]).arg(&store));
     assert!(result.status.success(), "{said}");
     std::fs::write(tracker("c0001"), before).unwrap();
-    assert_eq!(run(&file, &store, 0)["computed"].as_u64(), Some(0), "nothing that is recorded was taken");
+    assert_eq!(
+        run(&file, &store, 0)["computed"].as_u64(),
+        Some(0),
+        "nothing that is recorded was taken"
+    );
     let (result, _) = output(calib(&["verify", "--store"]).arg(&store));
-    assert!(result.status.success(), "{}", String::from_utf8_lossy(&result.stdout));
+    assert!(
+        result.status.success(),
+        "{}",
+        String::from_utf8_lossy(&result.stdout)
+    );
     // With its records a fleet gives its tables up.
     std::fs::remove_dir_all(store.join("fleets")).unwrap();
-    let (result, _) = output(calib(&["gc", "--keep-runs", "1", "--grace-hours", "0", "--store"]).arg(&store));
+    let (result, _) =
+        output(calib(&["gc", "--keep-runs", "1", "--grace-hours", "0", "--store"]).arg(&store));
     let text = String::from_utf8_lossy(&result.stdout).into_owned();
-    assert!(text.starts_with("removed ") && !text.starts_with("removed 0 tables"), "{text}");
+    assert!(
+        text.starts_with("removed ") && !text.starts_with("removed 0 tables"),
+        "{text}"
+    );
 }
 
 #[test]
@@ -146,14 +207,21 @@ fn a_cancelled_run_stops_and_the_next_goes_on() {
     let folder = tempfile::tempdir().unwrap();
     let (cases, store) = (folder.path().join("cases"), folder.path().join("store"));
     recordings(&cases, 12);
-    let file = file(folder.path(), "line", "robots:\n  - folders: cases/recordings/*\n");
+    let file = file(
+        folder.path(),
+        "line",
+        "robots:\n  - folders: cases/recordings/*\n",
+    );
     // One robot that nobody can take, so that the run cannot be over before it is cancelled.
     let alone = folder.path().join("alone");
     let (result, said) = output(fleet("run", &file, &alone).args(["--robot", "c0012"]));
     assert!(result.status.success(), "{said}");
     let held = killed::hold(&alone, &store, "line", 1);
     let mut command = fleet("run", &file, &store);
-    command.args(["--quiet", "-j", "1"]).stdout(std::process::Stdio::null()).stderr(std::process::Stdio::piped());
+    command
+        .args(["--quiet", "-j", "1"])
+        .stdout(std::process::Stdio::null())
+        .stderr(std::process::Stdio::piped());
     let mut child = command.spawn().unwrap();
     held_locks::until(&mut child, || !killed::records(&store, "line").is_empty());
     let (result, said) = output(&mut fleet("cancel", &file, &store));
@@ -163,7 +231,10 @@ fn a_cancelled_run_stops_and_the_next_goes_on() {
     let stood = killed::records(&store, "line").len();
     assert!((1..12).contains(&stood), "{stood}");
     let told = run(&file, &store, 0);
-    assert_eq!((told["done"].as_u64(), told["computed"].as_u64()), (Some(12), Some(12 - stood as u64)));
+    assert_eq!(
+        (told["done"].as_u64(), told["computed"].as_u64()),
+        (Some(12), Some(12 - stood as u64))
+    );
 }
 
 #[test]
@@ -174,17 +245,33 @@ fn every_fault_of_a_fleet_file_comes_at_once_with_its_place() {
     let path = write(folder.path().join("FLEET.yaml"), text);
     let (result, said) = output(&mut fleet("run", &path, &store));
     assert_eq!(result.status.code(), Some(2));
-    for part in ["5:5: robots[0].folder: unknown key; did you mean `folders`?", "7:1: priors: unknown key; did you mean `prior`?"]
-    {
+    for part in [
+        "5:5: robots[0].folder: unknown key; did you mean `folders`?",
+        "7:1: priors: unknown key; did you mean `prior`?",
+    ] {
         assert!(said.contains(part), "{part}: {said}");
     }
-    let text = text.replace("folder: x", "list: none.csv").replace("priors: 1\n", "");
+    let text = text
+        .replace("folder: x", "list: none.csv")
+        .replace("priors: 1\n", "");
     let path = write(folder.path().join("FLEET.yaml"), &text);
     let (_, said) = output(&mut fleet("run", &path, &store));
-    for part in ["calib: format 2", "expected letters, digits, `-` and `_`", "robots[1]: expected exactly one"] {
+    for part in [
+        "calib: format 2",
+        "expected letters, digits, `-` and `_`",
+        "robots[1]: expected exactly one",
+    ] {
         assert!(said.contains(part), "{part}: {said}");
     }
-    let file = file(folder.path(), "sound", "robots:\n  - folders: nothing/*\noverrides:\n  - {robots: [r7]}\n");
+    let file = file(
+        folder.path(),
+        "sound",
+        "robots:\n  - folders: nothing/*\noverrides:\n  - {robots: [r7]}\n",
+    );
     let (_, said) = output(&mut fleet("run", &file, &store));
-    assert!(said.contains("robots[0].folders: no folder matches") && said.contains("overrides[0].robots[0]: no robot"), "{said}");
+    assert!(
+        said.contains("robots[0].folders: no folder matches")
+            && said.contains("overrides[0].robots[0]: no robot"),
+        "{said}"
+    );
 }

@@ -4,9 +4,13 @@ use crate::desk::{Desk, table};
 use crate::fixture;
 use crate::identify::{GEOMETRY, SIGMA, model, recording};
 use crate::sr210d::{experiment, settings};
-use calib::estimate::{FitOptions, Fitted, Folds, Model, Session, align, cross_validate, fit, leave_one_out};
+use calib::estimate::{
+    FitOptions, Fitted, Folds, Model, Session, align, cross_validate, fit, leave_one_out,
+};
 use calib::robot::{Measurements, RobotModel};
-use calib::stage::{FoldSetting, Identify, IdentifyReads, Labelled, Stage, Validate, ValidateReads};
+use calib::stage::{
+    FoldSetting, Identify, IdentifyReads, Labelled, Stage, Validate, ValidateReads,
+};
 use calib::table::{Observability, Prediction, Statistics};
 
 fn identify(data: &Measurements, effects: &[&str]) -> (Model, Fitted) {
@@ -14,13 +18,29 @@ fn identify(data: &Measurements, effects: &[&str]) -> (Model, Fitted) {
     let rows: Vec<usize> = (0..data.rows()).collect();
     let model = model(&robot, align(&robot, data, &rows), effects);
     let candidates: Vec<usize> = (0..model.x.len()).collect();
-    fit(&model, data, &FitOptions { rows: &rows, candidates: &candidates })
+    fit(
+        &model,
+        data,
+        &FitOptions {
+            rows: &rows,
+            candidates: &candidates,
+        },
+    )
 }
 
 fn folds(data: &Measurements, effects: &[&str], count: usize) -> Option<Folds> {
     let (model, fitted) = identify(data, effects);
     let rows: Vec<usize> = (0..data.rows()).collect();
-    cross_validate(&Session { data, rows: &rows, model: &model, fitted: &fitted }, count, 7)
+    cross_validate(
+        &Session {
+            data,
+            rows: &rows,
+            model: &model,
+            fitted: &fitted,
+        },
+        count,
+        7,
+    )
 }
 
 fn rms(errors: &[f64]) -> f64 {
@@ -38,14 +58,21 @@ fn folds_of_a_complete_model_show_the_noise_and_what_its_parameters_cost() {
         blocks.extend(found.blocks);
         let (model, _) = identify(&data, &effects);
         training.extend(
-            model.predict(&data).iter().zip(&data.points.position).map(|(predicted, measured)| (measured - predicted).norm()),
+            model
+                .predict(&data)
+                .iter()
+                .zip(&data.points.position)
+                .map(|(predicted, measured)| (measured - predicted).norm()),
         );
     }
     // 33 parameters from 64 points of three values.
     let expected = SIGMA * 3f64.sqrt() * f64::sqrt(1.0 + 33.0 / (192.0 - 34.0));
     for (name, errors) in [("random", &random), ("blocks", &blocks)] {
         let ratio = rms(errors) / expected;
-        assert!((0.96..1.06).contains(&ratio), "{name}: {ratio:.3} of what is expected");
+        assert!(
+            (0.96..1.06).contains(&ratio),
+            "{name}: {ratio:.3} of what is expected"
+        );
     }
     assert!(rms(&training) < 0.95 * SIGMA * 3f64.sqrt());
 }
@@ -64,10 +91,18 @@ fn a_fold_is_what_a_fit_without_its_rows_says() {
             let kept: Vec<usize> = (0..80).filter(|row| row / 16 != block).collect();
             let start = model(&robot, align(&robot, &data, &kept), &effects);
             let candidates: Vec<usize> = (0..start.x.len()).collect();
-            let (model, _) = fit(&start, &data, &FitOptions { rows: &kept, candidates: &candidates });
+            let (model, _) = fit(
+                &start,
+                &data,
+                &FitOptions {
+                    rows: &kept,
+                    candidates: &candidates,
+                },
+            );
             let predicted = model.predict(&data);
             differences.extend(
-                (16 * block..16 * (block + 1)).map(|row| found[row] - (data.points.position[row] - predicted[row]).norm()),
+                (16 * block..16 * (block + 1))
+                    .map(|row| found[row] - (data.points.position[row] - predicted[row]).norm()),
             );
         }
         let off = rms(&differences) / (SIGMA * 3f64.sqrt());
@@ -84,10 +119,18 @@ fn rows_of_one_pose_are_never_on_both_sides() {
     twice.points.position.extend_from_within(..);
     twice.points.sigma.extend_from_within(..);
     twice.payload.extend_from_within(..);
-    let (one, two) = (folds(&once, &GEOMETRY, 6).expect("poses"), folds(&twice, &GEOMETRY, 6).expect("poses"));
+    let (one, two) = (
+        folds(&once, &GEOMETRY, 6).expect("poses"),
+        folds(&twice, &GEOMETRY, 6).expect("poses"),
+    );
     // A row whose twin was fitted would be predicted far better.
     for (one, two) in [(one.random, two.random), (one.blocks, two.blocks)] {
-        assert!((rms(&two) / rms(&one) - 1.0).abs() < 0.05, "{:e} and {:e}", rms(&two), rms(&one));
+        assert!(
+            (rms(&two) / rms(&one) - 1.0).abs() < 0.05,
+            "{:e} and {:e}",
+            rms(&two),
+            rms(&one)
+        );
     }
 }
 
@@ -104,7 +147,10 @@ fn too_few_poses_make_no_folds() {
 fn any_number_of_threads_gives_the_same_folds() {
     let (data, _) = recording(&fixture::offset_wrist(), &GEOMETRY, 60, 6);
     let on = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .expect("threads");
         pool.install(|| folds(&data, &GEOMETRY, 5))
     };
     assert_eq!(on(1), on(2));
@@ -114,28 +160,76 @@ fn any_number_of_threads_gives_the_same_folds() {
 fn statistics_have_the_folds_of_fitted_rows_and_of_no_others() {
     let of = experiment("none", 5);
     let stage: Identify = settings("geometry", "none");
-    let reads = IdentifyReads { robot: of.robot.clone(), recording: of.recording.clone(), split: of.split.clone() };
+    let reads = IdentifyReads {
+        robot: of.robot.clone(),
+        recording: of.recording.clone(),
+        split: of.split.clone(),
+    };
     let tables = Desk::default().run(&stage, reads).expect("identify runs");
     let prediction: Prediction = table(&tables).remove(0);
-    assert!(prediction.0.iter().all(|row| row.fold_error_mm.is_some() == (row.set == "unloaded_fit")));
+    assert!(
+        prediction
+            .0
+            .iter()
+            .all(|row| row.fold_error_mm.is_some() == (row.set == "unloaded_fit"))
+    );
     let observability: Observability = table(&tables).remove(0);
     let label = |stage: &str| stage.to_string();
     let reads = ValidateReads {
-        prediction: vec![Labelled { stage: label("geometry"), table: prediction.clone() }],
-        observability: vec![Labelled { stage: label("geometry"), table: observability }],
+        prediction: vec![Labelled {
+            stage: label("geometry"),
+            table: prediction.clone(),
+        }],
+        observability: vec![Labelled {
+            stage: label("geometry"),
+            table: observability,
+        }],
     };
-    let statistics: Statistics = table(&Desk::default().run(&Validate::default(), reads).expect("validate runs")).remove(0);
+    let statistics: Statistics = table(
+        &Desk::default()
+            .run(&Validate::default(), reads)
+            .expect("validate runs"),
+    )
+    .remove(0);
     for row in &statistics.0 {
-        assert_eq!(row.fold_rms_mm.is_some(), row.set == "unloaded_fit", "{}", row.set);
+        assert_eq!(
+            row.fold_rms_mm.is_some(),
+            row.set == "unloaded_fit",
+            "{}",
+            row.set
+        );
     }
-    let row = statistics.0.iter().find(|row| row.set == "unloaded_fit").expect("the set");
-    let errors: Vec<f64> = prediction.0.iter().filter_map(|row| row.fold_error_mm).collect();
-    assert!(row.fold_rms_mm.is_some_and(|found| (found / rms(&errors) - 1.0).abs() < 1e-12));
+    let row = statistics
+        .0
+        .iter()
+        .find(|row| row.set == "unloaded_fit")
+        .expect("the set");
+    let errors: Vec<f64> = prediction
+        .0
+        .iter()
+        .filter_map(|row| row.fold_error_mm)
+        .collect();
+    assert!(
+        row.fold_rms_mm
+            .is_some_and(|found| (found / rms(&errors) - 1.0).abs() < 1e-12)
+    );
     assert!(row.fold_rms_mm > Some(row.rms_mm));
-    assert!(row.fold_expected_mm.is_some_and(|expected| (1.02..1.4).contains(&(expected / row.noise_rms_mm))));
-    let wrong = Identify { folds: FoldSetting::Parts(1), ..stage };
-    let allowed = "folds: allowed: 0 for none, 2 to 100, or n to leave out one pose after the other";
-    assert!(wrong.check().iter().any(|fault| fault.to_string() == allowed));
+    assert!(
+        row.fold_expected_mm
+            .is_some_and(|expected| (1.02..1.4).contains(&(expected / row.noise_rms_mm)))
+    );
+    let wrong = Identify {
+        folds: FoldSetting::Parts(1),
+        ..stage
+    };
+    let allowed =
+        "folds: allowed: 0 for none, 2 to 100, or n to leave out one pose after the other";
+    assert!(
+        wrong
+            .check()
+            .iter()
+            .any(|fault| fault.to_string() == allowed)
+    );
 }
 
 #[test]
@@ -144,7 +238,12 @@ fn with_one_fold_a_pose_each_is_predicted_by_a_fit_to_all_others() {
     let one_out = |data: &Measurements| {
         let (model, fitted) = identify(data, &GEOMETRY);
         let rows: Vec<usize> = (0..data.rows()).collect();
-        leave_one_out(&Session { data, rows: &rows, model: &model, fitted: &fitted })
+        leave_one_out(&Session {
+            data,
+            rows: &rows,
+            model: &model,
+            fitted: &fitted,
+        })
     };
     let found = one_out(&data).expect("enough poses");
     assert_eq!((found.count, &found.random), (40, &found.blocks));
@@ -153,16 +252,31 @@ fn with_one_fold_a_pose_each_is_predicted_by_a_fit_to_all_others() {
         let kept: Vec<usize> = (0..40).filter(|row| *row != left).collect();
         let start = model(&robot, align(&robot, &data, &kept), &GEOMETRY);
         let candidates: Vec<usize> = (0..start.x.len()).collect();
-        let (model, _) = fit(&start, &data, &FitOptions { rows: &kept, candidates: &candidates });
+        let (model, _) = fit(
+            &start,
+            &data,
+            &FitOptions {
+                rows: &kept,
+                candidates: &candidates,
+            },
+        );
         let error = (data.points.position[left] - model.predict(&data)[left]).norm();
-        assert!((found.random[left] - error).abs() < 0.02 * SIGMA, "{left}: {:e} for {error:e}", found.random[left]);
+        assert!(
+            (found.random[left] - error).abs() < 0.02 * SIGMA,
+            "{left}: {:e} for {error:e}",
+            found.random[left]
+        );
     }
     let mut twice = data.clone();
     twice.q.extend_from_within(..);
     twice.points.position.extend_from_within(..);
     twice.points.sigma.extend_from_within(..);
     twice.payload.extend_from_within(..);
-    assert_eq!(one_out(&twice).expect("enough poses").count, 40, "a pose that is measured twice is one");
+    assert_eq!(
+        one_out(&twice).expect("enough poses").count,
+        40,
+        "a pose that is measured twice is one"
+    );
     let (few, _) = recording(&fixture::offset_wrist(), &GEOMETRY, 8, 5);
     assert_eq!(one_out(&few), None);
 }
@@ -174,16 +288,38 @@ fn folds_are_a_number_or_n_and_a_cross_validation_that_is_dropped_is_told() {
     assert_eq!(yaml("\"n\"").expect("a setting"), FoldSetting::EachPose);
     assert_eq!(yaml("5").expect("a setting"), FoldSetting::default());
     let wrong = yaml("\"all\"").expect_err("no setting").to_string();
-    assert!(wrong.contains("a number of folds (0 for none), or n for one a pose"), "{wrong}");
+    assert!(
+        wrong.contains("a number of folds (0 for none), or n for one a pose"),
+        "{wrong}"
+    );
     let run = |folds: FoldSetting| {
         let desk = Desk::default();
-        let stage = Identify { folds, ..settings("geometry", "none") };
-        let reads = IdentifyReads { robot: of.robot.clone(), recording: of.recording.clone(), split: of.split.clone() };
+        let stage = Identify {
+            folds,
+            ..settings("geometry", "none")
+        };
+        let reads = IdentifyReads {
+            robot: of.robot.clone(),
+            recording: of.recording.clone(),
+            split: of.split.clone(),
+        };
         let tables = desk.run(&stage, reads).expect("identify runs");
         let observability: Observability = table(&tables).remove(0);
-        let value = |quantity: &str| observability.0.iter().find(|row| row.quantity == quantity).map(|row| row.value);
-        let warned: Vec<String> =
-            desk.warnings.lock().expect("warnings").iter().filter(|line| line.contains("cross")).cloned().collect();
+        let value = |quantity: &str| {
+            observability
+                .0
+                .iter()
+                .find(|row| row.quantity == quantity)
+                .map(|row| row.value)
+        };
+        let warned: Vec<String> = desk
+            .warnings
+            .lock()
+            .expect("warnings")
+            .iter()
+            .filter(|line| line.contains("cross"))
+            .cloned()
+            .collect();
         (value("folds"), value("unfolded"), warned)
     };
     let each = run(FoldSetting::EachPose);
@@ -191,7 +327,13 @@ fn folds_are_a_number_or_n_and_a_cross_validation_that_is_dropped_is_told() {
     assert_eq!((each.1, each.2.len()), (None, 0));
     let (folds, unfolded, warned) = run(FoldSetting::Parts(100));
     assert_eq!((folds, unfolded), (None, Some(poses)));
-    assert!(warned[0].starts_with(&format!("not cross-validated: {poses} poses in ")), "{warned:?}");
-    assert!(warned[0].contains("allowed: two poses for each of 100 folds"), "{warned:?}");
+    assert!(
+        warned[0].starts_with(&format!("not cross-validated: {poses} poses in ")),
+        "{warned:?}"
+    );
+    assert!(
+        warned[0].contains("allowed: two poses for each of 100 folds"),
+        "{warned:?}"
+    );
     assert_eq!(run(FoldSetting::Parts(0)), (None, None, Vec::new()));
 }

@@ -2,8 +2,9 @@
 
 use crate::fixture;
 use calib::effect::{
-    Axes, AxisPoint, Basis, CAUSES, Clock, Effect, EffectContext, EffectStack, Form, Hypothesis, Law, Load, Motion,
-    ParameterEstimate, ParameterSpec, Place, Polar, Summary, Survey, Term, Unknown, Variable, arm_effect, cause, people,
+    Axes, AxisPoint, Basis, CAUSES, Clock, Effect, EffectContext, EffectStack, Form, Hypothesis,
+    Law, Load, Motion, ParameterEstimate, ParameterSpec, Place, Polar, Summary, Survey, Term,
+    Unknown, Variable, arm_effect, cause, people,
 };
 use calib::robot::{LoadCorrection, Measurements, PointReadings, Posture, RobotModel};
 use calib::spatial::{Pose, Twist};
@@ -19,12 +20,18 @@ const COMPLIANCE: f64 = 2e-7;
 
 fn data(robot: &RobotModel, moving: bool) -> Measurements {
     let n = robot.joints();
-    let spread = |salt: usize, count: usize| (0..count).map(move |k| fixture::spread(k, salt) - 0.5);
+    let spread =
+        |salt: usize, count: usize| (0..count).map(move |k| fixture::spread(k, salt) - 0.5);
     let q = fixture::poses(robot.description(), ROWS);
     Measurements {
         joints: n,
         q: q.clone(),
-        points: PointReadings::new(q.chunks(n).map(|q| setting().base.point(&robot.forward(q).translation)).collect(), 1e-5),
+        points: PointReadings::new(
+            q.chunks(n)
+                .map(|q| setting().base.point(&robot.forward(q).translation))
+                .collect(),
+            1e-5,
+        ),
         payload: (0..ROWS).map(|row| [0.0, 4.0, 10.0][row % 3]).collect(),
         current: Some(spread(3, ROWS * n).map(|value| 5.0 * value).collect()),
         direction: Some(spread(5, ROWS * n).map(f64::signum).collect()),
@@ -48,10 +55,20 @@ fn survey_of<'a>(
 fn torques(robot: &RobotModel, data: &Measurements) -> Vec<f64> {
     let mut posture = Posture::new(robot.joints());
     let mut out = Vec::new();
-    let stack = EffectStack::new(robot, Pose::identity(), vec![arm_effect("joint_compliance", &setting()).expect("a cause")]);
+    let stack = EffectStack::new(
+        robot,
+        Pose::identity(),
+        vec![arm_effect("joint_compliance", &setting()).expect("a cause")],
+    );
     let mut scratch = stack.scratch(robot);
     for row in 0..data.rows() {
-        let motion = stack.point_motion(robot, data, row, &vec![0.0; stack.specs().len()], &mut scratch);
+        let motion = stack.point_motion(
+            robot,
+            data,
+            row,
+            &vec![0.0; stack.specs().len()],
+            &mut scratch,
+        );
         posture.clone_from(&motion.posture);
         out.extend_from_slice(&posture.torque);
     }
@@ -59,58 +76,143 @@ fn torques(robot: &RobotModel, data: &Measurements) -> Vec<f64> {
 }
 
 fn setting() -> EffectContext {
-    EffectContext { base: Pose::exp(&Twist::new(9.0, -1.0, 0.5, 0.1, -0.2, 2.0)), load: Load::GravityTorque }
+    EffectContext {
+        base: Pose::exp(&Twist::new(9.0, -1.0, 0.5, 0.1, -0.2, 2.0)),
+        load: Load::GravityTorque,
+    }
 }
 
 /// What no cause of the list is: motions over variables, as lines, curves, steps and products.
 fn unnamed(survey: &Survey) -> Vec<Hypothesis> {
     let last = survey.joints() - 1;
-    let axis = |turning| Motion::Axis { joint: 1, about: None, turning, at: AxisPoint::Own };
+    let axis = |turning| Motion::Axis {
+        joint: 1,
+        about: None,
+        turning,
+        at: AxisPoint::Own,
+    };
     let motions = [
         Motion::Joint { joint: 0 },
         Motion::Joint { joint: 1 },
         axis(true),
         axis(false),
-        Motion::Slide { joint: 1, along: true },
-        Motion::Slide { joint: 1, along: false },
+        Motion::Slide {
+            joint: 1,
+            along: true,
+        },
+        Motion::Slide {
+            joint: 1,
+            along: false,
+        },
         Motion::Links { first: 1, last: 1 },
         Motion::Bend { link: 1 },
         Motion::Tool { axes: Axes::Place },
         Motion::Base { axes: Axes::Place },
-        Motion::Base { axes: Axes::Rotation },
+        Motion::Base {
+            axes: Axes::Rotation,
+        },
     ];
     let read = [Polar::Azimuth, Polar::Elevation, Polar::Range].map(|of| Motion::Instrument { of });
     let along = [0.0, 0.6, 0.8];
-    let everywhere =
-        [Variable::Angle { joint: 1 }, Variable::Approach { joint: 1 }, Variable::Time, Variable::Temperature, Variable::Payload];
+    let everywhere = [
+        Variable::Angle { joint: 1 },
+        Variable::Approach { joint: 1 },
+        Variable::Time,
+        Variable::Temperature,
+        Variable::Payload,
+    ];
     let inside = [
         Variable::Load { joint: 1 },
         Variable::Move { joint: 1 },
-        Variable::Stretch { joint: 1, limit: 0.2 },
-        Variable::Recent { joint: 1, time: 35.0 },
+        Variable::Stretch {
+            joint: 1,
+            limit: 0.2,
+        },
+        Variable::Recent {
+            joint: 1,
+            time: 35.0,
+        },
         Variable::Position { along },
-        Variable::Gravity { axis: Some(last % 3) },
+        Variable::Gravity {
+            axis: Some(last % 3),
+        },
     ];
-    let outside = [Variable::Azimuth, Variable::Elevation, Variable::Range, Variable::Sighted { along }];
+    let outside = [
+        Variable::Azimuth,
+        Variable::Elevation,
+        Variable::Range,
+        Variable::Sighted { along },
+    ];
     let mut out = Vec::new();
     let mut add = |motion, law| out.push(Hypothesis::new(Term::new(&Unknown, motion, law), 1));
     for (motions, others) in [(&motions[..], &inside[..]), (&read[..], &outside[..])] {
-        for (motion, of) in motions.iter().flat_map(|motion| everywhere.iter().chain(others).map(move |of| (*motion, *of))) {
+        for (motion, of) in motions.iter().flat_map(|motion| {
+            everywhere
+                .iter()
+                .chain(others)
+                .map(move |of| (*motion, *of))
+        }) {
             // Wide: what follows a load moves it a little by what it does.
             let (low, high) = (-300.0, 900.0);
-            add(motion, Law::new(of, Basis::Linear { zero: 0.2, per: 300.0 }));
-            add(motion, Law::new(of, Basis::Cosines { low, high, count: 4 }));
             add(
                 motion,
-                Law::new(of, Basis::Series { low, high, count: 3 })
-                    .times(Variable::Time, Basis::Straight { zero: 0.0, per: 9e2 }),
+                Law::new(
+                    of,
+                    Basis::Linear {
+                        zero: 0.2,
+                        per: 300.0,
+                    },
+                ),
+            );
+            add(
+                motion,
+                Law::new(
+                    of,
+                    Basis::Cosines {
+                        low,
+                        high,
+                        count: 4,
+                    },
+                ),
+            );
+            add(
+                motion,
+                Law::new(
+                    of,
+                    Basis::Series {
+                        low,
+                        high,
+                        count: 3,
+                    },
+                )
+                .times(
+                    Variable::Time,
+                    Basis::Straight {
+                        zero: 0.0,
+                        per: 9e2,
+                    },
+                ),
             );
         }
-        motions.iter().for_each(|motion| add(*motion, Law::new(Variable::Time, Basis::After { at: 700.0 })));
+        motions.iter().for_each(|motion| {
+            add(
+                *motion,
+                Law::new(Variable::Time, Basis::After { at: 700.0 }),
+            )
+        });
     }
-    let wave = Basis::Wave { order: 1, overtone: false };
-    add(Motion::Bend { link: 1 }, Law::new(Variable::Angle { joint: 1 }, wave));
-    add(Motion::Joint { joint: 1 }, Law::new(Variable::Angle { joint: 1 }, wave).times(Variable::Angle { joint: 2 }, wave));
+    let wave = Basis::Wave {
+        order: 1,
+        overtone: false,
+    };
+    add(
+        Motion::Bend { link: 1 },
+        Law::new(Variable::Angle { joint: 1 }, wave),
+    );
+    add(
+        Motion::Joint { joint: 1 },
+        Law::new(Variable::Angle { joint: 1 }, wave).times(Variable::Angle { joint: 2 }, wave),
+    );
     out
 }
 
@@ -121,12 +223,20 @@ fn over_all(mut law: impl FnMut(&Survey, &Hypothesis)) -> usize {
         let robot = RobotModel::new(description.clone());
         let mut bare = description;
         bare.joints.iter_mut().for_each(|joint| joint.mass = None);
-        for (robot, moving) in [(robot.clone(), false), (robot, true), (RobotModel::new(bare), false)] {
+        for (robot, moving) in [
+            (robot.clone(), false),
+            (robot, true),
+            (RobotModel::new(bare), false),
+        ] {
             let data = data(&robot, moving);
             let (rows, torque) = ((0..data.rows()).collect::<Vec<_>>(), torques(&robot, &data));
             let compliance = vec![COMPLIANCE; robot.joints()];
             let survey = survey_of(&robot, &data, &rows, &torque, &compliance);
-            let all: Vec<Hypothesis> = CAUSES.iter().flat_map(|cause| cause.propose(&survey)).chain(unnamed(&survey)).collect();
+            let all: Vec<Hypothesis> = CAUSES
+                .iter()
+                .flat_map(|cause| cause.propose(&survey))
+                .chain(unnamed(&survey))
+                .collect();
             count += all.len();
             all.iter().for_each(|hypothesis| law(&survey, hypothesis));
         }
@@ -137,18 +247,33 @@ fn over_all(mut law: impl FnMut(&Survey, &Hypothesis)) -> usize {
 /// The stack of yielding joints and a form, the form first or last, and the range of its parameters.
 fn stack(robot: &RobotModel, form: &Form, first: bool) -> (EffectStack, std::ops::Range<usize>) {
     let setting = setting();
-    let mut effects =
-        vec![arm_effect("joint_compliance", &setting).expect("a cause"), arm_effect("joint_offset", &setting).expect("a cause")];
+    let mut effects = vec![
+        arm_effect("joint_compliance", &setting).expect("a cause"),
+        arm_effect("joint_offset", &setting).expect("a cause"),
+    ];
     effects.insert(if first { 0 } else { 2 }, Box::new(form.clone()));
     let stack = EffectStack::new(robot, setting.base, effects);
-    let range = stack.effects().find(|(effect, _)| effect.form().is_some()).expect("the form").1;
+    let range = stack
+        .effects()
+        .find(|(effect, _)| effect.form().is_some())
+        .expect("the form")
+        .1;
     (stack, range)
 }
 
 /// Parameters with all joints yielding, zeros off, and those of the form at `values`.
 fn at(stack: &EffectStack, own: &std::ops::Range<usize>, values: &[f64]) -> Vec<f64> {
-    let mut x: Vec<f64> =
-        stack.specs().iter().map(|spec| if spec.name.starts_with("joint_compliance") { COMPLIANCE } else { 1e-4 }).collect();
+    let mut x: Vec<f64> = stack
+        .specs()
+        .iter()
+        .map(|spec| {
+            if spec.name.starts_with("joint_compliance") {
+                COMPLIANCE
+            } else {
+                1e-4
+            }
+        })
+        .collect();
     x[own.clone()].copy_from_slice(values);
     x
 }
@@ -174,7 +299,9 @@ fn a_form_without_size_moves_nothing_and_its_partials_are_central_differences() 
         let (stack, own) = stack(robot, form, false);
         let without = EffectStack::new(robot, setting().base, {
             let names = ["joint_compliance", "joint_offset"];
-            names.map(|name| arm_effect(name, &setting()).expect("a cause")).into()
+            names
+                .map(|name| arm_effect(name, &setting()).expect("a cause"))
+                .into()
         });
         let none = at(&stack, &own, &vec![0.0; own.len()]);
         let bare: Vec<f64> = none[..own.start].to_vec();
@@ -184,9 +311,14 @@ fn a_form_without_size_moves_nothing_and_its_partials_are_central_differences() 
         for row in LOOKED_AT {
             let nominal = without.point(robot, survey.data, row, &bare, &mut other);
             let point = stack.point(robot, survey.data, row, &none, &mut scratch);
-            assert!((point - nominal).norm() < 1e-12, "{form:?} moves the point without a size");
+            assert!(
+                (point - nominal).norm() < 1e-12,
+                "{form:?} moves the point without a size"
+            );
             let mut partials = vec![Vector3::zeros(); x.len()];
-            stack.derivatives(robot, survey.data, row, &x, &mut scratch, |k, d| partials[k] += d);
+            stack.derivatives(robot, survey.data, row, &x, &mut scratch, |k, d| {
+                partials[k] += d
+            });
             for (k, value) in own.clone().zip(&values) {
                 let mut moved = x.clone();
                 moved[k] = x[k] + value;
@@ -196,7 +328,11 @@ fn a_form_without_size_moves_nothing_and_its_partials_are_central_differences() 
                 let difference = (plus - minus) / (2.0 * value);
                 // Torques move with the deflection: second order. Below a nanometre a difference of points is rounding.
                 let tolerance = 1e-10 / value.abs() + 1e-2 * difference.norm();
-                assert!((difference - partials[k]).norm() < tolerance, "{form:?}: {difference} against {}", partials[k]);
+                assert!(
+                    (difference - partials[k]).norm() < tolerance,
+                    "{form:?}: {difference} against {}",
+                    partials[k]
+                );
             }
         }
     });
@@ -212,7 +348,13 @@ fn the_order_of_forms_is_irrelevant() {
         let ends = [false, true].map(|first| {
             let (stack, own) = stack(robot, form, first);
             let x = at(&stack, &own, &values);
-            stack.point(robot, survey.data, LOOKED_AT[2], &x, &mut stack.scratch(robot))
+            stack.point(
+                robot,
+                survey.data,
+                LOOKED_AT[2],
+                &x,
+                &mut stack.scratch(robot),
+            )
         });
         assert!((ends[0] - ends[1]).norm() < 1e-12, "{form:?}");
     });
@@ -223,13 +365,24 @@ fn a_form_is_the_same_after_it_was_stored_and_its_neighbours_are_of_its_kind() {
     over_all(|survey, hypothesis| {
         let form = &hypothesis.form;
         let text = serde_json::to_string(form).expect("numbers and names");
-        let read: Form = serde_json::from_str(&text).unwrap_or_else(|error| panic!("{text}: {error}"));
+        let read: Form =
+            serde_json::from_str(&text).unwrap_or_else(|error| panic!("{text}: {error}"));
         assert_eq!(read, *form, "{text}");
-        assert_eq!(serde_json::to_string(&read).expect("numbers and names"), text);
+        assert_eq!(
+            serde_json::to_string(&read).expect("numbers and names"),
+            text
+        );
         for near in form.near(survey, 0) {
-            assert_eq!((near.name(), near.place()), (form.name(), form.place()), "{text}");
+            assert_eq!(
+                (near.name(), near.place()),
+                (form.name(), form.place()),
+                "{text}"
+            );
             assert_ne!(near, *form, "{text} is its own neighbour");
-            assert_eq!(near.parameters(survey.robot).len(), form.parameters(survey.robot).len());
+            assert_eq!(
+                near.parameters(survey.robot).len(),
+                form.parameters(survey.robot).len()
+            );
         }
     });
 }
@@ -242,14 +395,26 @@ fn a_form_has_named_numbers_a_place_variables_a_cause_and_a_sentence() {
         let specs = form.parameters(survey.robot);
         assert!(!specs.is_empty(), "{form:?}");
         let names: BTreeSet<&str> = specs.iter().map(|spec| spec.name.as_str()).collect();
-        assert_eq!(names.len(), specs.len(), "{form:?} has two numbers of one name");
+        assert_eq!(
+            names.len(),
+            specs.len(),
+            "{form:?} has two numbers of one name"
+        );
         for spec in &specs {
-            assert!(spec.name.starts_with(&format!("{}.{}", form.name(), form.place().tag())), "{}", spec.name);
+            assert!(
+                spec.name
+                    .starts_with(&format!("{}.{}", form.name(), form.place().tag())),
+                "{}",
+                spec.name
+            );
             assert!(spec.prior_sigma > 0.0 && spec.prior_sigma.is_finite());
             assert_eq!(spec.place, form.place());
         }
         let variables: Vec<String> = form.variables().iter().map(ToString::to_string).collect();
-        assert!(!variables.is_empty() && variables.iter().all(|name| !name.is_empty()), "{form:?}");
+        assert!(
+            !variables.is_empty() && variables.iter().all(|name| !name.is_empty()),
+            "{form:?}"
+        );
         places.insert(form.place());
         let numbers = numbers_of(form, survey.robot);
         let summary = Summary {
@@ -267,8 +432,13 @@ fn a_form_has_named_numbers_a_place_variables_a_cause_and_a_sentence() {
 }
 
 fn numbers_of(form: &Form, robot: &RobotModel) -> Vec<ParameterEstimate> {
-    let estimate =
-        |spec: ParameterSpec| ParameterEstimate { name: spec.name, form: 0, value: 1.5, unit: people(spec.unit).1, sigma: None };
+    let estimate = |spec: ParameterSpec| ParameterEstimate {
+        name: spec.name,
+        form: 0,
+        value: 1.5,
+        unit: people(spec.unit).1,
+        sigma: None,
+    };
     form.parameters(robot).into_iter().map(estimate).collect()
 }
 
@@ -277,9 +447,14 @@ fn without_numbers(sentence: &str) -> String {
     let mut out = String::new();
     let mut before = ' ';
     for (i, letter) in sentence.char_indices() {
-        let next = sentence[i + letter.len_utf8()..].chars().next().unwrap_or(' ');
+        let next = sentence[i + letter.len_utf8()..]
+            .chars()
+            .next()
+            .unwrap_or(' ');
         let sign = letter == '-' && before == ' ' && next.is_ascii_digit();
-        let inside = before == '#' && (letter == '.' || letter == 'e' || letter == '-') && (next.is_ascii_digit() || next == '-');
+        let inside = before == '#'
+            && (letter == '.' || letter == 'e' || letter == '-')
+            && (next.is_ascii_digit() || next == '-');
         if letter.is_ascii_digit() || sign || inside {
             if before != '#' {
                 out.push('#');
@@ -300,8 +475,17 @@ fn every_sentence_is_as_it_was_read() {
         let form = &hypothesis.form;
         let numbers = numbers_of(form, survey.robot);
         for clock in [Clock::Seconds { first: 0.0 }, Clock::Rows] {
-            let summary = Summary { place: form.place(), forms: std::slice::from_ref(form), parameters: &numbers, clock };
-            said.insert(format!("{}: {}", form.name(), without_numbers(&form.cause().sentence(&summary))));
+            let summary = Summary {
+                place: form.place(),
+                forms: std::slice::from_ref(form),
+                parameters: &numbers,
+                clock,
+            };
+            said.insert(format!(
+                "{}: {}",
+                form.name(),
+                without_numbers(&form.cause().sentence(&summary))
+            ));
         }
     });
     let said: String = said.into_iter().map(|line| line + "\n").collect();
@@ -309,7 +493,10 @@ fn every_sentence_is_as_it_was_read() {
     if said != read {
         let path = std::env::temp_dir().join("sentences.txt");
         std::fs::write(&path, &said).expect("a file");
-        panic!("read {} and put it in place of tests/it/forms/sentences.txt if it reads well", path.display());
+        panic!(
+            "read {} and put it in place of tests/it/forms/sentences.txt if it reads well",
+            path.display()
+        );
     }
 }
 
@@ -328,9 +515,18 @@ fn a_joint_that_slides_errs_at_millimetres_and_has_no_turns() {
         .collect();
     assert_eq!(named, BTreeSet::from(["zero_shift"]));
     let by_length = |joint: usize| {
-        let all = unnamed(&survey).into_iter().map(|hypothesis| hypothesis.form);
-        let mut own = all.filter(move |form| form.term().is_some_and(|term| term.motion() == Motion::Joint { joint }));
-        own.all(|form| form.parameters(&robot).iter().all(|spec| spec.unit == Unit::Millimetre))
+        let all = unnamed(&survey)
+            .into_iter()
+            .map(|hypothesis| hypothesis.form);
+        let mut own = all.filter(move |form| {
+            form.term()
+                .is_some_and(|term| term.motion() == Motion::Joint { joint })
+        });
+        own.all(|form| {
+            form.parameters(&robot)
+                .iter()
+                .all(|spec| spec.unit == Unit::Millimetre)
+        })
     };
     assert!(by_length(0) && !by_length(1));
 }
@@ -339,55 +535,93 @@ fn a_joint_that_slides_errs_at_millimetres_and_has_no_turns() {
 fn in_full(hypothesis: &Hypothesis) -> String {
     fn rounded(value: &serde_json::Value) -> String {
         match value {
-            serde_json::Value::Number(number) => format!("{:.4e}", number.as_f64().expect("a number")),
-            serde_json::Value::Array(all) => format!("[{}]", all.iter().map(rounded).collect::<Vec<_>>().join(",")),
+            serde_json::Value::Number(number) => {
+                format!("{:.4e}", number.as_f64().expect("a number"))
+            }
+            serde_json::Value::Array(all) => format!(
+                "[{}]",
+                all.iter().map(rounded).collect::<Vec<_>>().join(",")
+            ),
             serde_json::Value::Object(all) => {
-                let each = all.iter().map(|(key, value)| format!("{key}:{}", rounded(value)));
+                let each = all
+                    .iter()
+                    .map(|(key, value)| format!("{key}:{}", rounded(value)));
                 format!("{{{}}}", each.collect::<Vec<_>>().join(","))
             }
             other => other.to_string(),
         }
     }
-    let Hypothesis { form, tried, prior_penalty, positive, largest, .. } = hypothesis;
+    let Hypothesis {
+        form,
+        tried,
+        prior_penalty,
+        positive,
+        largest,
+        ..
+    } = hypothesis;
     let body = rounded(&form.body());
-    format!("{} {body} {tried} {prior_penalty:.3} {positive} {largest:.3e}", form.key())
+    format!(
+        "{} {body} {tried} {prior_penalty:.3} {positive} {largest:.3e}",
+        form.key()
+    )
 }
 
 /// Fowler, Noll and Vo's hash of some lines (FNV-1a, 64 bits).
 fn digest(lines: &[String]) -> u64 {
     let bytes = lines.iter().flat_map(|line| line.bytes());
-    bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+    bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+    })
 }
 
 #[test]
 fn every_cause_proposes_the_forms_that_are_listed() {
     let mut cells: BTreeMap<String, usize> = BTreeMap::new();
-    let mut full: BTreeMap<&str, Vec<String>> = CAUSES.iter().map(|cause| (cause.name(), Vec::new())).collect();
+    let mut full: BTreeMap<&str, Vec<String>> = CAUSES
+        .iter()
+        .map(|cause| (cause.name(), Vec::new()))
+        .collect();
     over_all(|survey, hypothesis| {
         let form = &hypothesis.form;
         if form.name() == "unknown" {
             return;
         }
-        full.get_mut(form.name()).expect("a cause").push(in_full(hypothesis));
-        if survey.robot.description().name == "spherical" && survey.robot.has_masses() && !survey.moves() {
-            *cells.entry(format!("{}@{}", form.name(), form.place())).or_default() += 1;
+        full.get_mut(form.name())
+            .expect("a cause")
+            .push(in_full(hypothesis));
+        if survey.robot.description().name == "spherical"
+            && survey.robot.has_masses()
+            && !survey.moves()
+        {
+            *cells
+                .entry(format!("{}@{}", form.name(), form.place()))
+                .or_default() += 1;
         }
     });
     let mut out = String::new();
     for (name, all) in &mut full {
         all.sort();
-        out.push_str(&format!("{name}: {} forms, {:016x}\n", all.len(), digest(all)));
+        out.push_str(&format!(
+            "{name}: {} forms, {:016x}\n",
+            all.len(),
+            digest(all)
+        ));
     }
     out.push_str("\nOf an arm that stands:\n");
     for (cell, count) in cells {
         out.push_str(&format!("{cell} {count}\n"));
     }
     if out != include_str!("forms/proposed.txt") {
-        let [list, all] = ["proposed.txt", "proposed_in_full.txt"].map(|name| std::env::temp_dir().join(name));
+        let [list, all] =
+            ["proposed.txt", "proposed_in_full.txt"].map(|name| std::env::temp_dir().join(name));
         let text: Vec<String> = full.into_values().flatten().collect();
         std::fs::write(&list, &out).expect("a file");
         std::fs::write(&all, text.join("\n")).expect("a file");
-        panic!("other forms are proposed: read {} and {}", list.display(), all.display());
+        panic!(
+            "other forms are proposed: read {} and {}",
+            list.display(),
+            all.display()
+        );
     }
 }
 
@@ -397,7 +631,17 @@ fn every_cause_is_listed_once_and_described() {
     for cause in CAUSES {
         let about = cause;
         assert!(seen.insert(about.name), "{} is listed twice", about.name);
-        assert!([about.place, about.formula, about.size, about.confounded, about.needs].iter().all(|words| !words.is_empty()));
+        assert!(
+            [
+                about.place,
+                about.formula,
+                about.size,
+                about.confounded,
+                about.needs
+            ]
+            .iter()
+            .all(|words| !words.is_empty())
+        );
         if let Some(effect) = cause.arm_effect(&setting()) {
             assert_eq!(effect.name(), about.name);
         }
@@ -410,9 +654,18 @@ fn a_burden_is_that_of_the_forms_alone() {
     over_all(|survey, hypothesis| {
         let form = &hypothesis.form;
         let mut load_correction = LoadCorrection::new(survey.joints());
-        form.load_correction(survey.data.q(7), 10.0, &plausible(form, survey.robot), &mut load_correction);
+        form.load_correction(
+            survey.data.q(7),
+            10.0,
+            &plausible(form, survey.robot),
+            &mut load_correction,
+        );
         let none = LoadCorrection::new(survey.joints());
-        assert_eq!(format!("{load_correction:?}") != format!("{none:?}"), form.is_of_torque_model(), "{form:?}");
+        assert_eq!(
+            format!("{load_correction:?}") != format!("{none:?}"),
+            form.is_of_torque_model(),
+            "{form:?}"
+        );
     });
 }
 
@@ -420,10 +673,24 @@ fn a_burden_is_that_of_the_forms_alone() {
 fn only_a_coefficient_of_the_load_itself_is_per_newton_metre() {
     let robot = RobotModel::new(fixture::offset_wrist());
     let unit = |basis: Basis| {
-        let law = Law::of(Variable::Approach { joint: 1 }).times(Variable::Load { joint: 1 }, basis);
+        let law =
+            Law::of(Variable::Approach { joint: 1 }).times(Variable::Load { joint: 1 }, basis);
         Form::from(Term::new(&Unknown, Motion::Joint { joint: 1 }, law)).parameters(&robot)[0].unit
     };
     assert_eq!(unit(Basis::PROPORTIONAL), Unit::RadianPerNewtonMetre);
-    assert_eq!(unit(Basis::Series { low: -10.0, high: 10.0, count: 4 }), Unit::Radian);
-    assert_eq!(unit(Basis::Linear { zero: 5.0, per: 10.0 }), Unit::Radian);
+    assert_eq!(
+        unit(Basis::Series {
+            low: -10.0,
+            high: 10.0,
+            count: 4
+        }),
+        Unit::Radian
+    );
+    assert_eq!(
+        unit(Basis::Linear {
+            zero: 5.0,
+            per: 10.0
+        }),
+        Unit::Radian
+    );
 }

@@ -11,7 +11,9 @@ use crate::fixture;
 use crate::identify::{GEOMETRY, model, normal};
 use calib::description::RobotDescription;
 use calib::estimate::{FitOptions, Fitted, Known, Model, ParameterStatus, Prior, fit, gauge};
-use calib::robot::{MeasurementSetup, Measurements, Named, PointReadings, Readings, RobotModel, Target};
+use calib::robot::{
+    MeasurementSetup, Measurements, Named, PointReadings, Readings, RobotModel, Target,
+};
 use calib::spatial::{Pose, Twist};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
@@ -36,7 +38,10 @@ impl Cell {
             mounting: Pose::new(home.rotation, home.point(&(Vector3::from(*offset) * 1e-3))),
             oriented: false,
         };
-        let setup = MeasurementSetup { targets: targets.iter().map(target).collect(), anchors: Vec::new() };
+        let setup = MeasurementSetup {
+            targets: targets.iter().map(target).collect(),
+            anchors: Vec::new(),
+        };
         let base = Pose::exp(&Twist::new(3.0, -1.5, 0.4, 0.05, -0.1, 2.2));
         let mut truth = model(&robot.measured_by(setup), base, &GEOMETRY);
         for (k, spec) in truth.stack.specs().to_vec().iter().enumerate() {
@@ -44,7 +49,11 @@ impl Cell {
                 truth.x[k] = 5e-4 * normal(1000 * seed + k);
             }
         }
-        Self { description, truth, seed }
+        Self {
+            description,
+            truth,
+            seed,
+        }
     }
 
     fn noise(&self, index: usize) -> f64 {
@@ -56,12 +65,21 @@ impl Cell {
         let all = fixture::poses(&self.description, poses * (part + 1));
         let joints = self.description.joints.len();
         let q = &all[poses * part * joints..];
-        let names: Vec<&str> = self.truth.robot.setup().targets.iter().map(|target| target.name.as_str()).collect();
+        let names: Vec<&str> = self
+            .truth
+            .robot
+            .setup()
+            .targets
+            .iter()
+            .map(|target| target.name.as_str())
+            .collect();
         let count = names.len().max(1);
         let rows = poses * count;
         let mut data = Measurements {
             joints,
-            q: (0..rows).flat_map(|row| q[row / count * joints..(row / count + 1) * joints].to_vec()).collect(),
+            q: (0..rows)
+                .flat_map(|row| q[row / count * joints..(row / count + 1) * joints].to_vec())
+                .collect(),
             points: PointReadings::new(vec![Vector3::zeros(); rows], SIGMA),
             payload: vec![0.0; rows],
             target: (!names.is_empty()).then(|| Named::of((0..rows).map(|row| names[row % count]))),
@@ -81,25 +99,43 @@ impl Cell {
     fn turns(&self, data: &Measurements) -> Vec<Matrix3<f64>> {
         let moved = |axis: usize| {
             let mut setup = self.truth.robot.setup().clone();
-            setup.targets.iter_mut().for_each(|target| target.mounting.translation[axis] += 0.5);
-            Model { robot: self.truth.robot.clone().measured_by(setup), ..self.truth.clone() }.predict(data)
+            setup
+                .targets
+                .iter_mut()
+                .for_each(|target| target.mounting.translation[axis] += 0.5);
+            Model {
+                robot: self.truth.robot.clone().measured_by(setup),
+                ..self.truth.clone()
+            }
+            .predict(data)
         };
         let (own, beside) = (self.truth.predict(data), [moved(0), moved(1), moved(2)]);
         (0..data.rows())
-            .map(|row| Matrix3::from_columns(&[0, 1, 2].map(|axis: usize| (beside[axis][row] - own[row]) / 0.5)))
+            .map(|row| {
+                Matrix3::from_columns(
+                    &[0, 1, 2].map(|axis: usize| (beside[axis][row] - own[row]) / 0.5),
+                )
+            })
             .collect()
     }
 
     /// Adds measured orientations of frames that sit askew on the tool.
     fn turn(&self, data: &mut Measurements) {
-        let askew = Pose::from_rotation_vector(Vector3::new(0.9, -1.2, 0.4), Vector3::zeros()).rotation;
-        let noise = |row: usize| Vector3::from_fn(|axis, _| SIGMA_TURN * self.noise(500_000 + 3 * row + axis));
+        let askew =
+            Pose::from_rotation_vector(Vector3::new(0.9, -1.2, 0.4), Vector3::zeros()).rotation;
+        let noise = |row: usize| {
+            Vector3::from_fn(|axis, _| SIGMA_TURN * self.noise(500_000 + 3 * row + axis))
+        };
         let turns = self.turns(data).into_iter().enumerate();
-        let measured = turns.map(|(row, turn)| Pose::from_rotation_vector(noise(row), Vector3::zeros()).rotation * turn * askew);
+        let measured = turns.map(|(row, turn)| {
+            Pose::from_rotation_vector(noise(row), Vector3::zeros()).rotation * turn * askew
+        });
         data.readings.push(Readings {
             kind: "orientation",
             width: 9,
-            values: measured.flat_map(|rotation| rotation.data.0.concat()).collect(),
+            values: measured
+                .flat_map(|rotation| rotation.data.0.concat())
+                .collect(),
             sigma: vec![SIGMA_TURN; data.rows()],
             anchor: None,
         });
@@ -109,26 +145,47 @@ impl Cell {
     fn reach(&self, data: &mut Measurements, anchors: &[(&str, Vector3<f64>)], sigma: f64) {
         let own = self.truth.predict(data);
         let rows = 0..data.rows();
-        let length = |row: usize| (own[row] - anchors[row % anchors.len()].1).norm() + sigma * self.noise(900_000 + row);
+        let length = |row: usize| {
+            (own[row] - anchors[row % anchors.len()].1).norm() + sigma * self.noise(900_000 + row)
+        };
         data.readings.push(Readings {
             kind: "distance",
             width: 1,
-            anchor: Some(Named::of(rows.clone().map(|row| anchors[row % anchors.len()].0))),
+            anchor: Some(Named::of(
+                rows.clone().map(|row| anchors[row % anchors.len()].0),
+            )),
             values: rows.map(length).collect(),
             sigma: vec![sigma; data.rows()],
         });
     }
 
     /// A fit that starts at the nominal robot and knows the targets by name alone.
-    fn fit(&self, data: &Measurements, known: impl Fn(&Model) -> BTreeMap<usize, Known>) -> (Model, Fitted) {
+    fn fit(
+        &self,
+        data: &Measurements,
+        known: impl Fn(&Model) -> BTreeMap<usize, Known>,
+    ) -> (Model, Fitted) {
         let rows: Vec<usize> = (0..data.rows()).collect();
         let stated = BTreeMap::new();
-        let (robot, base) = gauge(RobotModel::new(self.description.clone()), data, &rows, &stated).unwrap();
+        let (robot, base) = gauge(
+            RobotModel::new(self.description.clone()),
+            data,
+            &rows,
+            &stated,
+        )
+        .unwrap();
         let effects = [&["anchor"][..], &GEOMETRY].concat();
         let mut model = model(&robot, base, &effects);
         model.known = known(&model);
         let candidates: Vec<usize> = (0..model.stack.specs().len()).collect();
-        fit(&model, data, &FitOptions { rows: &rows, candidates: &candidates })
+        fit(
+            &model,
+            data,
+            &FitOptions {
+                rows: &rows,
+                candidates: &candidates,
+            },
+        )
     }
 }
 
@@ -137,17 +194,34 @@ fn nothing(_: &Model) -> BTreeMap<usize, Known> {
 }
 
 fn free(fitted: &Fitted) -> usize {
-    fitted.statuses.iter().filter(|status| matches!(status, ParameterStatus::Free(_))).count()
+    fitted
+        .statuses
+        .iter()
+        .filter(|status| matches!(status, ParameterStatus::Free(_)))
+        .count()
 }
 
 /// Mean square of what predictions miss the truth by over what their sigma says.
 fn honesty(model: &Model, fitted: &Fitted, at: &Measurements) -> f64 {
-    let off: f64 = model.predict(at).iter().zip(&at.points.position).map(|(a, b)| (a - b).norm_squared()).sum();
-    let sigma = fitted.covariance.as_ref().expect("not singular").of_predictions(model, at);
+    let off: f64 = model
+        .predict(at)
+        .iter()
+        .zip(&at.points.position)
+        .map(|(a, b)| (a - b).norm_squared())
+        .sum();
+    let sigma = fitted
+        .covariance
+        .as_ref()
+        .expect("not singular")
+        .of_predictions(model, at);
     off / sigma.iter().map(|sigma| sigma * sigma).sum::<f64>()
 }
 
-const THREE: [(&str, [f64; 3]); 3] = [("A", [120.0, 0.0, 30.0]), ("B", [-60.0, 90.0, 30.0]), ("C", [-50.0, -80.0, -40.0])];
+const THREE: [(&str, [f64; 3]); 3] = [
+    ("A", [120.0, 0.0, 30.0]),
+    ("B", [-60.0, 90.0, 30.0]),
+    ("C", [-50.0, -80.0, -40.0]),
+];
 
 #[test]
 fn every_target_adds_three_to_the_rank_and_their_places_come_out() {
@@ -158,9 +232,18 @@ fn every_target_adds_three_to_the_rank_and_their_places_come_out() {
         let (model, fitted) = cell.fit(&data, nothing);
         let name = &cell.description.name;
         assert_eq!(free(&fitted), axes + 9, "{name}");
-        assert!(fitted.clusters == 60, "{name}: rows of a pose stay together, {} clusters", fitted.clusters);
+        assert!(
+            fitted.clusters == 60,
+            "{name}: rows of a pose stay together, {} clusters",
+            fitted.clusters
+        );
         let fresh = cell.rows(60, 1);
-        let off = model.predict(&fresh).iter().zip(&fresh.points.position).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+        let off = model
+            .predict(&fresh)
+            .iter()
+            .zip(&fresh.points.position)
+            .map(|(a, b)| (a - b).norm())
+            .fold(0.0, f64::max);
         assert!(off < 5.0 * SIGMA, "{name}: new poses are off by {off:e} m");
     }
 }
@@ -170,19 +253,52 @@ fn targets_known_from_elsewhere_show_the_zero_of_the_last_joint() {
     let cell = Cell::new(fixture::offset_wrist(), &THREE, 4);
     let mut data = cell.rows(60, 0);
     cell.disturb(&mut data);
-    let stated: BTreeMap<String, Vector3<f64>> =
-        THREE.iter().map(|(name, offset)| ((*name).to_string(), Vector3::from(*offset) * 1e-3)).collect();
+    let stated: BTreeMap<String, Vector3<f64>> = THREE
+        .iter()
+        .map(|(name, offset)| ((*name).to_string(), Vector3::from(*offset) * 1e-3))
+        .collect();
     let rows: Vec<usize> = (0..data.rows()).collect();
-    let (robot, base) = gauge(RobotModel::new(cell.description.clone()), &data, &rows, &stated).unwrap();
+    let (robot, base) = gauge(
+        RobotModel::new(cell.description.clone()),
+        &data,
+        &rows,
+        &stated,
+    )
+    .unwrap();
     let mut model = model(&robot, base, &GEOMETRY);
     let specs = model.stack.specs().to_vec();
-    for (k, _) in specs.iter().enumerate().filter(|(_, spec)| spec.name.starts_with("tool_offset")) {
-        model.known.insert(k, Known { prior: Some(Prior { mean: 0.0, sigma: 1e-5 }), bounds: None });
+    for (k, _) in specs
+        .iter()
+        .enumerate()
+        .filter(|(_, spec)| spec.name.starts_with("tool_offset"))
+    {
+        model.known.insert(
+            k,
+            Known {
+                prior: Some(Prior {
+                    mean: 0.0,
+                    sigma: 1e-5,
+                }),
+                bounds: None,
+            },
+        );
     }
     let candidates: Vec<usize> = (0..specs.len()).collect();
-    let (_, fitted) = fit(&model, &data, &FitOptions { rows: &rows, candidates: &candidates });
-    let zero = specs.iter().position(|spec| spec.name == "joint_offset.j6").expect("a parameter");
-    let ParameterStatus::Free(sigma) = fitted.statuses[zero] else { panic!("{:?}", fitted.statuses[zero]) };
+    let (_, fitted) = fit(
+        &model,
+        &data,
+        &FitOptions {
+            rows: &rows,
+            candidates: &candidates,
+        },
+    );
+    let zero = specs
+        .iter()
+        .position(|spec| spec.name == "joint_offset.j6")
+        .expect("a parameter");
+    let ParameterStatus::Free(sigma) = fitted.statuses[zero] else {
+        panic!("{:?}", fitted.statuses[zero])
+    };
     assert!(sigma < 1e-4, "{sigma:e} rad");
     // What a turn of the last joint cannot be told from without the targets' places stays where it is.
     let (_, blind) = cell.fit(&data, nothing);
@@ -202,15 +318,28 @@ fn poses_add_the_orientation_of_the_tool_to_the_rank() {
         let name = &cell.description.name;
         assert_eq!(free(&fitted), axes + 6, "{name}");
         // The median of 80 scatters by a tenth.
-        assert!(fitted.excess_sigma < 0.6 * SIGMA, "{name}: {:e} m", fitted.excess_sigma);
         assert!(
-            fitted.excess_sigma_angle.is_some_and(|turn| turn < 0.6 * SIGMA_TURN),
+            fitted.excess_sigma < 0.6 * SIGMA,
+            "{name}: {:e} m",
+            fitted.excess_sigma
+        );
+        assert!(
+            fitted
+                .excess_sigma_angle
+                .is_some_and(|turn| turn < 0.6 * SIGMA_TURN),
             "{name}: {:?} rad",
             fitted.excess_sigma_angle
         );
-        let turns: Vec<f64> = model.row_errors(&data).iter().filter_map(|error| error.angle).collect();
+        let turns: Vec<f64> = model
+            .row_errors(&data)
+            .iter()
+            .filter_map(|error| error.angle)
+            .collect();
         let rms = (turns.iter().map(|turn| turn * turn).sum::<f64>() / turns.len() as f64).sqrt();
-        assert!((0.85..1.12).contains(&(rms / (3f64.sqrt() * SIGMA_TURN))), "{name}: orientations are off by {rms:e} rad");
+        assert!(
+            (0.85..1.12).contains(&(rms / (3f64.sqrt() * SIGMA_TURN))),
+            "{name}: orientations are off by {rms:e} rad"
+        );
     }
 }
 
@@ -218,15 +347,26 @@ fn poses_add_the_orientation_of_the_tool_to_the_rank() {
 fn distances_from_one_anchor_see_all_but_where_the_cell_stands() {
     let cell = Cell::new(fixture::offset_wrist(), &[], 6);
     let mut data = cell.rows(200, 0);
-    cell.reach(&mut data, &[("", cell.truth.base().point(&Vector3::new(-0.9, 1.6, -0.5)))], 2e-5);
+    cell.reach(
+        &mut data,
+        &[("", cell.truth.base().point(&Vector3::new(-0.9, 1.6, -0.5)))],
+        2e-5,
+    );
     data.points.position.fill(Vector3::zeros());
     data.points.sigma.fill(Vector3::repeat(f64::INFINITY));
     let (model, fitted) = cell.fit(&data, nothing);
     assert_eq!(free(&fitted), 27 + 3 - 6);
-    let off: Vec<f64> = model.row_errors(&data).iter().map(|error| error.length).collect();
+    let off: Vec<f64> = model
+        .row_errors(&data)
+        .iter()
+        .map(|error| error.length)
+        .collect();
     let rms = (off.iter().map(|off| off * off).sum::<f64>() / off.len() as f64).sqrt();
     let expected = 2e-5 * (1.0f64 - 24.0 / 200.0).sqrt();
-    assert!((0.85..1.15).contains(&(rms / expected)), "{rms:e} m are left, {expected:e} expected");
+    assert!(
+        (0.85..1.15).contains(&(rms / expected)),
+        "{rms:e} m are left, {expected:e} expected"
+    );
 }
 
 #[test]
@@ -234,15 +374,36 @@ fn an_anchor_beside_a_tracker_is_placed_where_it_is() {
     let cell = Cell::new(fixture::spherical(), &[], 7);
     let mut data = cell.rows(80, 0);
     cell.disturb(&mut data);
-    let anchors = [("north", Vector3::new(4.0, 1.0, 0.3)), ("south", Vector3::new(1.0, -3.0, 0.2))];
+    let anchors = [
+        ("north", Vector3::new(4.0, 1.0, 0.3)),
+        ("south", Vector3::new(1.0, -3.0, 0.2)),
+    ];
     cell.reach(&mut data, &anchors, 3e-5);
     let (model, fitted) = cell.fit(&data, nothing);
     assert_eq!(free(&fitted), 27 + 6);
-    for (k, spec) in model.stack.specs().iter().enumerate().filter(|(_, spec)| spec.name.starts_with("anchor.")) {
-        let (name, axis) = (spec.name.split('.').nth(1).unwrap_or_default(), spec.name.chars().last().unwrap_or_default());
-        let axis = ['x', 'y', 'z'].iter().position(|known| *known == axis).expect("an axis");
-        let truth = anchors.iter().find(|(known, _)| *known == name).expect("an anchor").1[axis];
-        let ParameterStatus::Free(sigma) = fitted.statuses[k] else { panic!("{}: {:?}", spec.name, fitted.statuses[k]) };
+    for (k, spec) in model
+        .stack
+        .specs()
+        .iter()
+        .enumerate()
+        .filter(|(_, spec)| spec.name.starts_with("anchor."))
+    {
+        let (name, axis) = (
+            spec.name.split('.').nth(1).unwrap_or_default(),
+            spec.name.chars().last().unwrap_or_default(),
+        );
+        let axis = ['x', 'y', 'z']
+            .iter()
+            .position(|known| *known == axis)
+            .expect("an axis");
+        let truth = anchors
+            .iter()
+            .find(|(known, _)| *known == name)
+            .expect("an anchor")
+            .1[axis];
+        let ParameterStatus::Free(sigma) = fitted.statuses[k] else {
+            panic!("{}: {:?}", spec.name, fitted.statuses[k])
+        };
         let pull = (model.standing(k).1 - truth) / sigma;
         assert!(pull.abs() < 3.5, "{}: {pull:.1} sigma off", spec.name);
     }
@@ -268,7 +429,10 @@ fn rows_of_one_axis_count_for_that_axis_alone() {
     let only: Vec<usize> = (0..60).collect();
     let half = Measurements {
         q: data.q[..60 * 6].to_vec(),
-        points: PointReadings::new(only.iter().map(|row| data.points.position[*row]).collect(), SIGMA),
+        points: PointReadings::new(
+            only.iter().map(|row| data.points.position[*row]).collect(),
+            SIGMA,
+        ),
         payload: vec![0.0; 60],
         joints: 6,
         ..Measurements::default()
@@ -276,12 +440,24 @@ fn rows_of_one_axis_count_for_that_axis_alone() {
     let (_, few) = cell.fit(&half, nothing);
     let fresh = cell.rows(60, 2);
     let sigma = |fitted: &Fitted| {
-        let all = fitted.covariance.as_ref().expect("not singular").of_predictions(&model, &fresh);
+        let all = fitted
+            .covariance
+            .as_ref()
+            .expect("not singular")
+            .of_predictions(&model, &fresh);
         all.iter().map(|sigma| sigma * sigma).sum::<f64>()
     };
     let [all, some, none] = [&whole, &fitted, &few].map(sigma);
-    assert!(all < some && some < none, "more axes tell more: {all:e}, {some:e}, {none:e}");
-    let off = model.predict(&fresh).iter().zip(&fresh.points.position).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+    assert!(
+        all < some && some < none,
+        "more axes tell more: {all:e}, {some:e}, {none:e}"
+    );
+    let off = model
+        .predict(&fresh)
+        .iter()
+        .zip(&fresh.points.position)
+        .map(|(a, b)| (a - b).norm())
+        .fold(0.0, f64::max);
     assert!(off < 4.0 * SIGMA, "new poses are off by {off:e} m");
 }
 
@@ -319,6 +495,9 @@ fn what_is_said_of_predictions_is_what_they_are_off_by_whatever_was_measured() {
             honesty(&model, &fitted, &cell.rows(40, 3))
         });
         let mean = mean.sum::<f64>() / seeds as f64;
-        assert!((0.75..1.3).contains(&mean), "{kind}: squared errors are {mean:.2} of what sigma says");
+        assert!(
+            (0.75..1.3).contains(&mean),
+            "{kind}: squared errors are {mean:.2} of what sigma says"
+        );
     }
 }

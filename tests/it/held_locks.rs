@@ -28,7 +28,11 @@ fn take(store: &Path, folder: &Path, name: &str) -> Held {
         // A folder with anything in it is a store only with this.
         fs::write(format, r#"{"calib_store":1}"#).unwrap();
     }
-    let file = File::options().create(true).append(true).open(folder.join(format!("{name}.lock"))).unwrap();
+    let file = File::options()
+        .create(true)
+        .append(true)
+        .open(folder.join(format!("{name}.lock")))
+        .unwrap();
     file.try_lock().expect("nobody else has it");
     Held { _file: file }
 }
@@ -38,7 +42,9 @@ pub fn actions_of(store: &Path, run: &str) -> Vec<String> {
     let manifest = fs::read(store.join("runs").join(run).join("manifest.json")).unwrap();
     let manifest: Value = serde_json::from_slice(&manifest).unwrap();
     let stages = manifest["stages"].as_array().unwrap().iter();
-    stages.map(|stage| stage["action"].as_str().unwrap().to_string()).collect()
+    stages
+        .map(|stage| stage["action"].as_str().unwrap().to_string())
+        .collect()
 }
 
 /// Waits until something holds while a child lives. Ten minutes are no measure of speed: a child that hangs ends the test.

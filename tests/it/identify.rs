@@ -25,13 +25,24 @@ pub fn normal(index: usize) -> f64 {
 }
 
 pub fn model(robot: &RobotModel, base: Pose, effects: &[&str]) -> Model {
-    let setting = EffectContext { base, load: Load::GravityTorque };
-    let made = effects.iter().map(|name| arm_effect(name, &setting).expect("registered")).collect();
+    let setting = EffectContext {
+        base,
+        load: Load::GravityTorque,
+    };
+    let made = effects
+        .iter()
+        .map(|name| arm_effect(name, &setting).expect("registered"))
+        .collect();
     Model::nominal(robot.clone(), EffectStack::new(robot, base, made))
 }
 
 /// A recording of a robot whose true parameters are drawn, with the names and values of what was drawn.
-pub fn recording(description: &RobotDescription, effects: &[&str], rows: usize, seed: usize) -> (Measurements, Model) {
+pub fn recording(
+    description: &RobotDescription,
+    effects: &[&str],
+    rows: usize,
+    seed: usize,
+) -> (Measurements, Model) {
     recording_where(description, effects, rows, seed, |_| true)
 }
 
@@ -54,7 +65,9 @@ pub fn recording_where(
     seed: usize,
     drawn: impl Fn(usize) -> bool,
 ) -> (Measurements, Model) {
-    recording_drawn(description, effects, rows, seed, |k| f64::from(u8::from(drawn(k))))
+    recording_drawn(description, effects, rows, seed, |k| {
+        f64::from(u8::from(drawn(k)))
+    })
 }
 
 /// The same with the size of every parameter multiplied.
@@ -81,27 +94,51 @@ fn recording_drawn(
         joints: robot.joints(),
         q: fixture::poses(description, rows),
         points: PointReadings::new(vec![Vector3::zeros(); rows], SIGMA),
-        payload: (0..rows).map(|row| if row % 2 == 0 { 0.0 } else { description.payload_mass }).collect(),
+        payload: (0..rows)
+            .map(|row| {
+                if row % 2 == 0 {
+                    0.0
+                } else {
+                    description.payload_mass
+                }
+            })
+            .collect(),
         ..Measurements::default()
     };
     data.points.position = truth.predict(&data);
     for (row, point) in data.points.position.iter_mut().enumerate() {
-        *point += Vector3::from_fn(|axis, _| SIGMA * normal(7_777 + 31 * seed + 1_000_000 * (seed + 1) + 3 * row + axis));
+        *point += Vector3::from_fn(|axis, _| {
+            SIGMA * normal(7_777 + 31 * seed + 1_000_000 * (seed + 1) + 3 * row + axis)
+        });
     }
     (data, truth)
 }
 
-fn identify(data: &Measurements, description: &RobotDescription, effects: &[&str], rows: &[usize]) -> (Model, Fitted) {
+fn identify(
+    data: &Measurements,
+    description: &RobotDescription,
+    effects: &[&str],
+    rows: &[usize],
+) -> (Model, Fitted) {
     let robot = RobotModel::new(description.clone());
     let base = align(&robot, data, rows);
     let model = model(&robot, base, effects);
     let candidates: Vec<usize> = (0..model.stack.specs().len()).collect();
-    fit(&model, data, &FitOptions { rows, candidates: &candidates })
+    fit(
+        &model,
+        data,
+        &FitOptions {
+            rows,
+            candidates: &candidates,
+        },
+    )
 }
 
 fn rms(model: &Model, data: &Measurements, rows: impl Iterator<Item = usize>) -> f64 {
     let predicted = model.predict(data);
-    let squares: Vec<f64> = rows.map(|row| (data.points.position[row] - predicted[row]).norm_squared()).collect();
+    let squares: Vec<f64> = rows
+        .map(|row| (data.points.position[row] - predicted[row]).norm_squared())
+        .collect();
     (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
 }
 
@@ -111,30 +148,58 @@ fn position_data_see_four_parameters_a_revolute_joint_two_a_prismatic_one_and_th
         let (data, _) = recording(&description, &GEOMETRY, 120, 1);
         let rows: Vec<usize> = (0..120).collect();
         let (_, fitted) = identify(&data, &description, &GEOMETRY, &rows);
-        let free = fitted.statuses.iter().filter(|status| matches!(status, ParameterStatus::Free(_))).count();
+        let free = fitted
+            .statuses
+            .iter()
+            .filter(|status| matches!(status, ParameterStatus::Free(_)))
+            .count();
         assert_eq!(free, expected, "{}", description.name);
         let gap = fitted.singular_all[expected - 1] / fitted.singular_all[expected].max(1e-300);
-        assert!(gap > 1e6, "{}: the singular values fall by {gap:.1e} behind the rank", description.name);
+        assert!(
+            gap > 1e6,
+            "{}: the singular values fall by {gap:.1e} behind the rank",
+            description.name
+        );
         assert_eq!(fitted.stop, Stop::Converged);
     }
 }
 
 #[test]
 fn geometry_ratios_coupling_and_compliance_come_back_and_held_out_points_reach_the_noise() {
-    let effects = [&GEOMETRY[..], &["reduction_ratio", "coupling_ratio", "joint_compliance"]].concat();
+    let effects = [
+        &GEOMETRY[..],
+        &["reduction_ratio", "coupling_ratio", "joint_compliance"],
+    ]
+    .concat();
     for description in fixture::all() {
         let (data, truth) = recording(&description, &effects, 400, 2);
-        let rows: Vec<usize> = (0..400).filter(|row| row % 2 == 0 || row % 3 == 0).collect();
+        let rows: Vec<usize> = (0..400)
+            .filter(|row| row % 2 == 0 || row % 3 == 0)
+            .collect();
         let (model, fitted) = identify(&data, &description, &effects, &rows);
         let held_out = rms(&model, &data, (0..400).filter(|row| !rows.contains(row)));
         let floor = SIGMA * 3f64.sqrt();
-        assert!((0.85..1.15).contains(&(held_out / floor)), "{}: held-out {held_out:.2e}, noise {floor:.2e}", description.name);
-        assert!(fitted.excess_sigma < 3e-6, "{}: nothing is left out, yet {:.1e} m", description.name, fitted.excess_sigma);
+        assert!(
+            (0.85..1.15).contains(&(held_out / floor)),
+            "{}: held-out {held_out:.2e}, noise {floor:.2e}",
+            description.name
+        );
+        assert!(
+            fitted.excess_sigma < 3e-6,
+            "{}: nothing is left out, yet {:.1e} m",
+            description.name,
+            fitted.excess_sigma
+        );
         for (k, spec) in model.stack.specs().iter().enumerate() {
             let gauge = GEOMETRY.iter().any(|name| spec.name.starts_with(name));
             if let (false, ParameterStatus::Free(sigma)) = (gauge, &fitted.statuses[k]) {
                 let off = (model.x[k] - truth.x[k]) / sigma;
-                assert!(off.abs() < 4.5, "{} {}: {off:.1} sigma off", description.name, spec.name);
+                assert!(
+                    off.abs() < 4.5,
+                    "{} {}: {off:.1} sigma off",
+                    description.name,
+                    spec.name
+                );
             }
         }
     }
@@ -151,7 +216,10 @@ fn scatter_of_ratios_over_robots_is_what_sigma_says() {
         let rows: Vec<usize> = (0..80).collect();
         let (model, fitted) = identify(&data, &description, &effects, &rows);
         for (k, spec) in model.stack.specs().iter().enumerate() {
-            if let (true, ParameterStatus::Free(sigma)) = (spec.name.starts_with("reduction_ratio"), &fitted.statuses[k]) {
+            if let (true, ParameterStatus::Free(sigma)) = (
+                spec.name.starts_with("reduction_ratio"),
+                &fitted.statuses[k],
+            ) {
                 squares += ((model.x[k] - truth.x[k]) / sigma).powi(2);
                 count += 1.0;
             }
@@ -159,7 +227,10 @@ fn scatter_of_ratios_over_robots_is_what_sigma_says() {
     }
     let scatter: f64 = (squares / count).sqrt();
     assert!(count > 100.0);
-    assert!((0.8..1.2).contains(&scatter), "scatter over reported sigma {scatter:.2}");
+    assert!(
+        (0.8..1.2).contains(&scatter),
+        "scatter over reported sigma {scatter:.2}"
+    );
 }
 
 #[test]
@@ -172,7 +243,10 @@ fn a_few_gross_outliers_do_not_move_the_fit() {
     }
     let (model, fitted) = identify(&data, &description, &GEOMETRY, &rows);
     let held_out = rms(&model, &data, 120..160);
-    assert!(held_out < 1.5 * SIGMA * 3f64.sqrt(), "held-out {held_out:.2e} m");
+    assert!(
+        held_out < 1.5 * SIGMA * 3f64.sqrt(),
+        "held-out {held_out:.2e} m"
+    );
     assert!(fitted.downweighted.len() >= 3);
 }
 
@@ -186,22 +260,37 @@ fn a_point_on_the_last_axis_leaves_the_last_ratio_unseen() {
     data.points.position = model(&robot, Pose::identity(), &[]).predict(&data);
     let rows: Vec<usize> = (0..100).collect();
     let (model, fitted) = identify(&data, &description, &effects, &rows);
-    let k = model.stack.specs().iter().position(|spec| spec.name == "reduction_ratio.j6").expect("joint 6");
+    let k = model
+        .stack
+        .specs()
+        .iter()
+        .position(|spec| spec.name == "reduction_ratio.j6")
+        .expect("joint 6");
     assert_eq!(fitted.statuses[k], ParameterStatus::Unseen);
     assert_eq!(model.x[k], 0.0);
 }
 
 /// z-scores of every free parameter over many robots of one kinematics, their names, and whether the rank was right each time.
-fn scores(description: &RobotDescription, effects: &[&str], robots: usize, rows: usize) -> (Vec<String>, Vec<Vec<f64>>) {
+fn scores(
+    description: &RobotDescription,
+    effects: &[&str],
+    robots: usize,
+    rows: usize,
+) -> (Vec<String>, Vec<Vec<f64>>) {
     let all: Vec<usize> = (0..rows).collect();
     let (data, _) = recording(description, &[], rows, 0);
     let (model, fitted) = identify(&data, description, effects, &all);
-    let free: Vec<usize> =
-        (0..fitted.statuses.len()).filter(|k| matches!(fitted.statuses[*k], ParameterStatus::Free(_))).collect();
-    let names = free.iter().map(|k| model.stack.specs()[*k].name.clone()).collect();
+    let free: Vec<usize> = (0..fitted.statuses.len())
+        .filter(|k| matches!(fitted.statuses[*k], ParameterStatus::Free(_)))
+        .collect();
+    let names = free
+        .iter()
+        .map(|k| model.stack.specs()[*k].name.clone())
+        .collect();
     let mut scores = vec![Vec::new(); free.len()];
     for seed in 100..100 + robots {
-        let (data, truth) = recording_where(description, effects, rows, seed, |k| free.contains(&k));
+        let (data, truth) =
+            recording_where(description, effects, rows, seed, |k| free.contains(&k));
         let (model, fitted) = identify(&data, description, effects, &all);
         for (score, k) in scores.iter_mut().zip(&free) {
             let ParameterStatus::Free(sigma) = fitted.statuses[*k] else {
@@ -212,7 +301,14 @@ fn scores(description: &RobotDescription, effects: &[&str], robots: usize, rows:
                 score.push((model.x[*k] - truth.x[*k]) / sigma);
             }
         }
-        assert_eq!(fitted.statuses.iter().filter(|status| matches!(status, ParameterStatus::Free(_))).count(), free.len());
+        assert_eq!(
+            fitted
+                .statuses
+                .iter()
+                .filter(|status| matches!(status, ParameterStatus::Free(_)))
+                .count(),
+            free.len()
+        );
     }
     (names, scores)
 }
@@ -220,25 +316,44 @@ fn scores(description: &RobotDescription, effects: &[&str], robots: usize, rows:
 #[test]
 fn two_hundred_robots_of_each_kinematics_scatter_as_their_sigmas_say() {
     const ROBOTS: usize = 200;
-    let effects = [&GEOMETRY[..], &["reduction_ratio", "coupling_ratio", "joint_compliance"]].concat();
+    let effects = [
+        &GEOMETRY[..],
+        &["reduction_ratio", "coupling_ratio", "joint_compliance"],
+    ]
+    .concat();
     for description in fixture::all() {
         let (names, scores) = scores(&description, &effects, ROBOTS, 100);
         let (mut inside, mut count) = (0, 0);
-        for (name, scores) in names.iter().zip(&scores).filter(|(_, scores)| !scores.is_empty()) {
+        for (name, scores) in names
+            .iter()
+            .zip(&scores)
+            .filter(|(_, scores)| !scores.is_empty())
+        {
             let scatter = (scores.iter().map(|z| z * z).sum::<f64>() / scores.len() as f64).sqrt();
-            assert!((0.85..1.18).contains(&scatter), "{} {name}: scatter over reported sigma {scatter:.3}", description.name);
+            assert!(
+                (0.85..1.18).contains(&scatter),
+                "{} {name}: scatter over reported sigma {scatter:.3}",
+                description.name
+            );
             inside += scores.iter().filter(|z| z.abs() < 1.96).count();
             count += scores.len();
         }
         let cover = inside as f64 / count as f64;
-        assert!((0.92..0.98).contains(&cover), "{}: 95 % intervals cover {cover:.3}", description.name);
+        assert!(
+            (0.92..0.98).contains(&cover),
+            "{}: 95 % intervals cover {cover:.3}",
+            description.name
+        );
     }
 }
 
 #[test]
 fn a_point_meant_to_lie_on_the_last_axis_is_predicted_as_well_as_any() {
     // Where it really lies makes visible what the nominal robot hides; left out, it costs more than the noise.
-    let mut cases = [(fixture::spherical(), [1.954, 0.0, 1.31]), (fixture::offset_wrist(), [-1.1843, -0.26, 0.0116])];
+    let mut cases = [
+        (fixture::spherical(), [1.954, 0.0, 1.31]),
+        (fixture::offset_wrist(), [-1.1843, -0.26, 0.0116]),
+    ];
     for (description, tool) in &mut cases {
         description.tool = *tool;
         let mut worst: f64 = 0.0;
@@ -246,9 +361,17 @@ fn a_point_meant_to_lie_on_the_last_axis_is_predicted_as_well_as_any() {
             let (data, truth) = recording_of(description, &GEOMETRY, 160, seed, 1.5);
             let rows: Vec<usize> = (0..160).collect();
             let (model, _) = identify(&data, description, &GEOMETRY, &rows);
-            let off = model.predict(&data).into_iter().zip(truth.predict(&data)).map(|(a, b)| (a - b).norm_squared());
+            let off = model
+                .predict(&data)
+                .into_iter()
+                .zip(truth.predict(&data))
+                .map(|(a, b)| (a - b).norm_squared());
             worst = worst.max((off.sum::<f64>() / 160.0).sqrt() / (SIGMA * 3f64.sqrt()));
         }
-        assert!(worst < 0.5, "{}: predictions are off by {worst:.2} of the noise", description.name);
+        assert!(
+            worst < 0.5,
+            "{}: predictions are off by {worst:.2} of the noise",
+            description.name
+        );
     }
 }

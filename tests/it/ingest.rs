@@ -87,11 +87,25 @@ fn taken(tables: BTreeMap<&'static str, Vec<Frame>>) -> Result<Taken> {
     let mut chunks = table::<Recording>(&tables).into_iter();
     let first = chunks.next().unwrap();
     assert!(chunks.next().is_none(), "more than one chunk");
-    let rejected = Rejected(table::<Rejected>(&tables).into_iter().flat_map(|chunk| chunk.0).collect());
-    let taken = Taken { recording: first, rejected, intake: table::<Intake>(&tables).remove(0) };
+    let rejected = Rejected(
+        table::<Rejected>(&tables)
+            .into_iter()
+            .flat_map(|chunk| chunk.0)
+            .collect(),
+    );
+    let taken = Taken {
+        recording: first,
+        rejected,
+        intake: table::<Intake>(&tables).remove(0),
+    };
     for file in &taken.intake.0 {
         assert_eq!(file.accepted + file.rejected, file.read, "{}", file.file);
-        let listed = taken.rejected.0.iter().filter(|row| row.file == file.file).count() as i64;
+        let listed = taken
+            .rejected
+            .0
+            .iter()
+            .filter(|row| row.file == file.file)
+            .count() as i64;
         assert_eq!(listed, file.rejected, "{}", file.file);
     }
     Ok(taken)
@@ -99,7 +113,11 @@ fn taken(tables: BTreeMap<&'static str, Vec<Frame>>) -> Result<Taken> {
 
 fn refusal(desk: &Desk, yaml: &str, robot: Robot) -> String {
     match take(desk, yaml, robot) {
-        Err(Error::Data(faults)) => faults.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"),
+        Err(Error::Data(faults)) => faults
+            .iter()
+            .map(ToString::to_string)
+            .collect::<Vec<_>>()
+            .join("\n"),
         Err(other) => panic!("another error: {other}"),
         Ok(_) => panic!("was accepted"),
     }
@@ -124,16 +142,26 @@ fn rows(text: &str) -> Desk {
 
 /// Good rows named `g1`, `g2`, ...
 fn good(count: usize) -> String {
-    (1..=count).map(|row| format!("g{row},{row},20,100.5,200,{row}\n")).collect()
+    (1..=count)
+        .map(|row| format!("g{row},{row},20,100.5,200,{row}\n"))
+        .collect()
 }
 
 #[test]
 fn quantities_arrive_in_si_under_the_names_of_the_file() {
-    let taken = take(&rows("P1,180,-90,1000,-2000.5,3\nP2,10,20,4,5,6\n"), TWO, robot("rr", 1.0)).unwrap();
+    let taken = take(
+        &rows("P1,180,-90,1000,-2000.5,3\nP2,10,20,4,5,6\n"),
+        TWO,
+        robot("rr", 1.0),
+    )
+    .unwrap();
     let recording = &taken.recording;
     assert_eq!(recording.point_id, ["P1", "P2"]);
     assert_eq!(recording.sequence, [1, 2]);
-    assert_eq!(recording.q(0), [std::f64::consts::PI, -std::f64::consts::FRAC_PI_2]);
+    assert_eq!(
+        recording.q(0),
+        [std::f64::consts::PI, -std::f64::consts::FRAC_PI_2]
+    );
     assert_eq!(recording.position[0], [1.0, -2.0005, 0.003]);
     assert_eq!((&recording.time, &recording.current), (&None, &None));
     assert_eq!(recording.usage, [None, None]);
@@ -143,29 +171,72 @@ fn quantities_arrive_in_si_under_the_names_of_the_file() {
 fn every_refused_row_has_its_line_reason_and_text() {
     let bad = [
         ("B1,1,2,,2,3", "blank", "x is blank"),
-        ("B2,1,abc,1,2,3", "not_a_number", "q2: `abc` is not a number"),
-        ("B3,1,2,1,NaN,3", "not_a_number", "y: `NaN` is not a finite number"),
-        ("B4,1,2,1,2,inf", "not_a_number", "z: `inf` is not a finite number"),
+        (
+            "B2,1,abc,1,2,3",
+            "not_a_number",
+            "q2: `abc` is not a number",
+        ),
+        (
+            "B3,1,2,1,NaN,3",
+            "not_a_number",
+            "y: `NaN` is not a finite number",
+        ),
+        (
+            "B4,1,2,1,2,inf",
+            "not_a_number",
+            "z: `inf` is not a finite number",
+        ),
         ("B5,1,2,1", "short_row", "4 fields; allowed: 6"),
         ("B6,1,2,1,2,3,4", "long_row", "7 fields; allowed: 6"),
-        ("B7,1,2,0,0.0,0", "lost_beam", "the position is 0, 0, 0: the tracker saw nothing"),
+        (
+            "B7,1,2,0,0.0,0",
+            "lost_beam",
+            "the position is 0, 0, 0: the tracker saw nothing",
+        ),
         (",1,2,1,2,3", "blank", "point_id is blank"),
         (",,,,,", "blank", "the whole row is blank"),
-        ("B8,1,2,1e6,2,3", "out_of_range", "x: `1e6`; allowed: -200000 to 200000 mm"),
-        ("B9,1,2000,1,2,3", "out_of_range", "q2: `2000`; allowed: -1145.91559 to 1145.91559 deg"),
-        ("g1,1,2,1,2,3", "duplicate_id", "point id `g1` also stands on line 13"),
+        (
+            "B8,1,2,1e6,2,3",
+            "out_of_range",
+            "x: `1e6`; allowed: -200000 to 200000 mm",
+        ),
+        (
+            "B9,1,2000,1,2,3",
+            "out_of_range",
+            "q2: `2000`; allowed: -1145.91559 to 1145.91559 deg",
+        ),
+        (
+            "g1,1,2,1,2,3",
+            "duplicate_id",
+            "point id `g1` also stands on line 13",
+        ),
     ];
     let text: String = bad.iter().map(|(row, _, _)| format!("{row}\n")).collect();
     // g1 again, so both are refused; trailing delimiters make no long row.
-    let taken = take(&rows(&format!("{text}{}T1,1,2,3,4,5,,\n", good(20))), TWO, robot("rr", 1.0));
+    let taken = take(
+        &rows(&format!("{text}{}T1,1,2,3,4,5,,\n", good(20))),
+        TWO,
+        robot("rr", 1.0),
+    );
     let taken = match taken {
         Ok(taken) => taken,
         Err(error) => panic!("{error}"),
     };
     for (index, (row, reason, detail)) in bad.iter().enumerate() {
         let rejected = &taken.rejected.0[index];
-        let detail = if *reason == "duplicate_id" { "point id `g1` also stands on line 14" } else { detail };
-        assert_eq!((rejected.line, rejected.reason.as_str(), rejected.detail.as_str()), (index as i64 + 2, *reason, detail));
+        let detail = if *reason == "duplicate_id" {
+            "point id `g1` also stands on line 14"
+        } else {
+            detail
+        };
+        assert_eq!(
+            (
+                rejected.line,
+                rejected.reason.as_str(),
+                rejected.detail.as_str()
+            ),
+            (index as i64 + 2, *reason, detail)
+        );
         assert_eq!(&rejected.text, row);
         assert_eq!(rejected.file, "a.csv");
     }
@@ -174,8 +245,14 @@ fn every_refused_row_has_its_line_reason_and_text() {
     assert_eq!(last.detail, "point id `g1` also stands on line 13");
     assert_eq!(last.point_id.as_deref(), Some("g1"));
     let intake = &taken.intake.0[0];
-    assert_eq!((intake.lines, intake.read, intake.accepted, intake.rejected), (34, 33, 20, 13));
-    assert_eq!(taken.recording.sequence[0], 14, "the sequence counts data rows, refused ones too");
+    assert_eq!(
+        (intake.lines, intake.read, intake.accepted, intake.rejected),
+        (34, 33, 20, 13)
+    );
+    assert_eq!(
+        taken.recording.sequence[0], 14,
+        "the sequence counts data rows, refused ones too"
+    );
 }
 
 const CASE: &str = r#"
@@ -201,9 +278,14 @@ join: {by: id}
 
 #[test]
 fn the_practice_recordings_join_fully() {
-    let Some(root) = shared("practice") else { return };
-    let mut folders: Vec<_> =
-        std::fs::read_dir(root).unwrap().map(|entry| entry.unwrap().path()).filter(|path| path.is_dir()).collect();
+    let Some(root) = shared("practice") else {
+        return;
+    };
+    let mut folders: Vec<_> = std::fs::read_dir(root)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.is_dir())
+        .collect();
     folders.sort();
     assert_eq!(folders.len(), 28);
     for folder in folders {
@@ -211,18 +293,36 @@ fn the_practice_recordings_join_fully() {
         let arm: serde_json::Value = serde_json::from_str(&arm).unwrap();
         let joints = arm["axes"].as_array().unwrap().len();
         let desk = Desk::default();
-        let taken = take(&desk, &CASE.replace("CASE", &folder.display().to_string()), robot(&"r".repeat(joints), 2.0)).unwrap();
+        let taken = take(
+            &desk,
+            &CASE.replace("CASE", &folder.display().to_string()),
+            robot(&"r".repeat(joints), 2.0),
+        )
+        .unwrap();
         assert_eq!(taken.recording.rows(), 240, "{}", folder.display());
         assert_eq!(taken.rejected.0, []);
         assert_eq!(
-            taken.intake.0.iter().map(|file| (file.file.as_str(), file.lines)).collect::<Vec<_>>(),
+            taken
+                .intake
+                .0
+                .iter()
+                .map(|file| (file.file.as_str(), file.lines))
+                .collect::<Vec<_>>(),
             [("controller.csv", 241), ("tracker.csv", 241)]
         );
-        let labels: std::collections::BTreeSet<_> = taken.recording.usage.iter().flatten().collect();
+        let labels: std::collections::BTreeSet<_> =
+            taken.recording.usage.iter().flatten().collect();
         assert_eq!(labels.into_iter().collect::<Vec<_>>(), ["fit", "validate"]);
         let lacks = folder.ends_with("p10_drift_no_temp");
         assert_eq!(taken.recording.temperature.is_none(), lacks);
-        assert_eq!(desk.notes.lock().unwrap().iter().any(|note| note.contains("no column `temp_c`")), lacks);
+        assert_eq!(
+            desk.notes
+                .lock()
+                .unwrap()
+                .iter()
+                .any(|note| note.contains("no column `temp_c`")),
+            lacks
+        );
         assert_eq!(desk.warnings.lock().unwrap().as_slice(), [""; 0]);
     }
 }
@@ -247,19 +347,41 @@ files:
 
 #[test]
 fn the_ur10_recordings_are_read_to_the_last_row() {
-    let Some(root) = shared("data/ipa_ur10") else { return };
-    for (file, rows, sigma) in
-        [("Series_A/measurements_grid.csv", 11_911, false), ("Series_C/measurements_random_poses.csv", 2_773, true)]
-    {
+    let Some(root) = shared("data/ipa_ur10") else {
+        return;
+    };
+    for (file, rows, sigma) in [
+        ("Series_A/measurements_grid.csv", 11_911, false),
+        ("Series_C/measurements_random_poses.csv", 2_773, true),
+    ] {
         let yaml = UR10.replace("FILE", &root.join(file).display().to_string());
         let taken = take(&Desk::default(), &yaml, robot("rrrrrr", 2.0)).unwrap();
         let intake = &taken.intake.0[0];
-        assert_eq!((intake.lines, intake.read, intake.accepted, intake.rejected), (rows + 1, rows, rows, 0));
-        let source = if sigma { SigmaSource::Recorded } else { SigmaSource::Inferred };
-        assert!(taken.recording.sigma_source.iter().flatten().filter(|own| **own == source).count() as i64 > rows - 5);
+        assert_eq!(
+            (intake.lines, intake.read, intake.accepted, intake.rejected),
+            (rows + 1, rows, rows, 0)
+        );
+        let source = if sigma {
+            SigmaSource::Recorded
+        } else {
+            SigmaSource::Inferred
+        };
+        assert!(
+            taken
+                .recording
+                .sigma_source
+                .iter()
+                .flatten()
+                .filter(|own| **own == source)
+                .count() as i64
+                > rows - 5
+        );
         assert_eq!(taken.recording.point_id[16], "row 17");
         if sigma {
-            assert_eq!(taken.recording.q(1), [-4.08444, -2.6946, 1.69873, -2.031, 0.99275, -0.0673035]);
+            assert_eq!(
+                taken.recording.q(1),
+                [-4.08444, -2.6946, 1.69873, -2.031, 0.99275, -0.0673035]
+            );
             assert!((taken.recording.position[1][1] - -3.1343677).abs() < 1e-15);
         }
     }

@@ -14,7 +14,9 @@ fn what_init_writes_is_understood_and_never_overwrites() {
     let mut controller = String::from("Controller log\n\nPoint;A1;A2;A3;A4;A5;A6;load;remark\n");
     let mut tracker = String::from("name,X,Y,Z\n");
     for k in 0..40 {
-        let q: Vec<String> = (0..6).map(|j| format!("{:.2}", 50.0 * f64::from(k * 7 + j).sin()).replace('.', ",")).collect();
+        let q: Vec<String> = (0..6)
+            .map(|j| format!("{:.2}", 50.0 * f64::from(k * 7 + j).sin()).replace('.', ","))
+            .collect();
         writeln!(controller, "P{k};{};10,0;ok", q.join(";")).expect("text");
         writeln!(tracker, "P{k},{}.5,-200,900", 1500 + k).expect("text");
     }
@@ -23,9 +25,17 @@ fn what_init_writes_is_understood_and_never_overwrites() {
     let arguments = ["init", ".", "--data", "controller.csv", "tracker.csv"];
     let output = calib(folder.path(), &arguments, "");
     let said = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    assert!(said.contains("6 joints (A1 to A6)") && said.contains("not used: remark"), "{said}");
-    let pipeline = std::fs::read_to_string(folder.path().join("pipeline.yaml")).expect("a pipeline");
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    assert!(
+        said.contains("6 joints (A1 to A6)") && said.contains("not used: remark"),
+        "{said}"
+    );
+    let pipeline =
+        std::fs::read_to_string(folder.path().join("pipeline.yaml")).expect("a pipeline");
     for part in [
         "file: \"controller.csv\"",
         "delimiter: \";\"",
@@ -37,13 +47,36 @@ fn what_init_writes_is_understood_and_never_overwrites() {
         assert!(pipeline.contains(part), "{part} in\n{pipeline}");
     }
     let check = calib(folder.path(), &["check", "pipeline.yaml"], "");
-    assert!(check.status.success(), "{}", String::from_utf8_lossy(&check.stderr));
-    let ingest = calib(folder.path(), &["run", "pipeline.yaml", "--until", "split", "--quiet"], "");
-    assert!(ingest.status.success(), "{}", String::from_utf8_lossy(&ingest.stderr));
+    assert!(
+        check.status.success(),
+        "{}",
+        String::from_utf8_lossy(&check.stderr)
+    );
+    let ingest = calib(
+        folder.path(),
+        &["run", "pipeline.yaml", "--until", "split", "--quiet"],
+        "",
+    );
+    assert!(
+        ingest.status.success(),
+        "{}",
+        String::from_utf8_lossy(&ingest.stderr)
+    );
     let again = calib(folder.path(), &arguments, "");
     assert_eq!(again.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&again.stderr).contains("is already there"));
-    let seven = calib(folder.path(), &["init", "other", "--data", "controller.csv", "--robot", "seven"], "");
+    let seven = calib(
+        folder.path(),
+        &[
+            "init",
+            "other",
+            "--data",
+            "controller.csv",
+            "--robot",
+            "seven",
+        ],
+        "",
+    );
     assert!(String::from_utf8_lossy(&seven.stderr).contains("seven has 7 joints, the recording 6"));
 }
 
@@ -54,13 +87,25 @@ fn a_foreign_table_is_understood_as_it_stands_and_what_is_left_to_do_is_said() {
         "Messpunkt;Achse1 [\u{b0}];Achse2 [\u{b0}];Achse3 [\u{b0}];Achse4 [\u{b0}];Achse5 [\u{b0}];Achse6 [\u{b0}];X_soll [mm];Y_soll [mm];Z_soll [mm];X_ist [mm];Y_ist [mm];Z_ist [mm];Bemerkung\r\n",
     );
     for k in 0..12 {
-        let q: Vec<String> = (0..6).map(|j| format!("{:.4}", 70.0 * f64::from(k * 5 + j).sin()).replace('.', ",")).collect();
-        write!(table, "P{k:03};{};1000,5;{k},0;900,0;1000,7;{k},1;900,2;ok\r\n", q.join(";")).expect("text");
+        let q: Vec<String> = (0..6)
+            .map(|j| format!("{:.4}", 70.0 * f64::from(k * 5 + j).sin()).replace('.', ","))
+            .collect();
+        write!(
+            table,
+            "P{k:03};{};1000,5;{k},0;900,0;1000,7;{k},1;900,2;ok\r\n",
+            q.join(";")
+        )
+        .expect("text");
     }
     std::fs::write(folder.path().join("messung.csv"), table).expect("a file");
     let output = calib(folder.path(), &["init", ".", "--data", "messung.csv"], "");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let pipeline = std::fs::read_to_string(folder.path().join("pipeline.yaml")).expect("a pipeline");
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let pipeline =
+        std::fs::read_to_string(folder.path().join("pipeline.yaml")).expect("a pipeline");
     for part in [
         "point_id: {column: \"Messpunkt\"}",
         "q: {column: \"Achse{j} [\u{b0}]\", unit: deg}\n",
@@ -71,18 +116,34 @@ fn a_foreign_table_is_understood_as_it_stands_and_what_is_left_to_do_is_said() {
         assert!(pipeline.contains(part), "{part} in\n{pipeline}");
     }
     let check = calib(folder.path(), &["check", "pipeline.yaml"], "");
-    assert!(check.status.success(), "{}", String::from_utf8_lossy(&check.stderr));
+    assert!(
+        check.status.success(),
+        "{}",
+        String::from_utf8_lossy(&check.stderr)
+    );
     let said = String::from_utf8_lossy(&check.stdout).into_owned();
-    assert!(said.contains("replace   5 lines: ") && said.contains("          robot.yaml:"), "{said}");
-    let identified = pipeline.replace("# limits:", "limits:").replace("# identity:", "identity:");
+    assert!(
+        said.contains("replace   5 lines: ") && said.contains("          robot.yaml:"),
+        "{said}"
+    );
+    let identified = pipeline
+        .replace("# limits:", "limits:")
+        .replace("# identity:", "identity:");
     std::fs::write(folder.path().join("pipeline.yaml"), identified).expect("a file");
     let check = calib(folder.path(), &["check", "pipeline.yaml"], "");
-    assert!(check.status.success(), "the commented settings are none: {}", String::from_utf8_lossy(&check.stderr));
+    assert!(
+        check.status.success(),
+        "the commented settings are none: {}",
+        String::from_utf8_lossy(&check.stderr)
+    );
 
     std::fs::write(folder.path().join("bare.csv"), "a;b;c;d\n1;2;3;4\n").expect("a file");
     let output = calib(folder.path(), &["init", "bare", "--data", "bare.csv"], "");
     let said = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(said.contains("name columns of joints and the measured point where it says REPLACE"), "{said}");
+    assert!(
+        said.contains("name columns of joints and the measured point where it says REPLACE"),
+        "{said}"
+    );
     let check = calib(folder.path(), &["check", "bare/pipeline.yaml"], "");
     assert!(String::from_utf8_lossy(&check.stdout).contains("replace   9 lines: "));
 }
@@ -94,8 +155,12 @@ fn every_kind_of_robot_that_init_writes_is_read() {
         let output = calib(folder.path(), &["init", "--robot", kind], "");
         assert!(output.status.success());
         let text = std::fs::read_to_string(folder.path().join("robot.yaml")).expect("a robot file");
-        let file = calib::robot::import::RobotFileText { label: "robot.yaml", text: &text };
-        calib::robot::import::read_calib(file, None).unwrap_or_else(|error| panic!("{kind}: {error}"));
+        let file = calib::robot::import::RobotFileText {
+            label: "robot.yaml",
+            text: &text,
+        };
+        calib::robot::import::read_calib(file, None)
+            .unwrap_or_else(|error| panic!("{kind}: {error}"));
     }
 }
 
@@ -104,7 +169,10 @@ fn shells_and_readers_of_manuals_are_served() {
     let folder = tempfile::tempdir().expect("a folder");
     for shell in ["bash", "zsh", "fish", "powershell"] {
         let output = calib(folder.path(), &["completions", shell], "");
-        assert!(String::from_utf8_lossy(&output.stdout).contains("compensate"), "{shell}");
+        assert!(
+            String::from_utf8_lossy(&output.stdout).contains("compensate"),
+            "{shell}"
+        );
     }
     let page = calib(folder.path(), &["man", "compensate"], "");
     assert!(String::from_utf8_lossy(&page.stdout).contains(".TH calib-compensate"));

@@ -8,7 +8,16 @@ use crate::source::{Source, sources, uses};
 
 /// What every layer may use without saying so.
 const FREE: [&str; 3] = ["error", "units", "statistics"];
-const NUMERICS: [&str; 8] = ["description", "spatial", "robot", "effect", "observation", "estimate", "diagnose", "dynamics"];
+const NUMERICS: [&str; 8] = [
+    "description",
+    "spatial",
+    "robot",
+    "effect",
+    "observation",
+    "estimate",
+    "diagnose",
+    "dynamics",
+];
 
 fn source() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
@@ -17,12 +26,16 @@ fn source() -> PathBuf {
 /// Layer -> what it may use, from the rows ``| [`layer`] | holds | may use |``. A use is a module or `module::file`.
 fn table() -> BTreeMap<String, BTreeSet<String>> {
     let text = fs::read_to_string(source().join("lib.rs")).unwrap();
-    let rows = text.lines().filter_map(|line| line.strip_prefix("//! | [`"));
+    let rows = text
+        .lines()
+        .filter_map(|line| line.strip_prefix("//! | [`"));
     let mut table = BTreeMap::new();
     for row in rows {
         let row = format!("[`{row}");
         let cells: Vec<&str> = row.trim_end_matches(" |").split(" | ").collect();
-        let [names, _, uses] = cells[..] else { continue };
+        let [names, _, uses] = cells[..] else {
+            continue;
+        };
         let mut allowed = BTreeSet::new();
         for word in uses.split([',', ';']).map(str::trim) {
             match word {
@@ -34,7 +47,10 @@ fn table() -> BTreeMap<String, BTreeSet<String>> {
                 other => allowed.extend([other.to_string()]),
             }
         }
-        for name in names.split(", ").map(|name| name.trim_matches(['[', ']', '`'])) {
+        for name in names
+            .split(", ")
+            .map(|name| name.trim_matches(['[', ']', '`']))
+        {
             table.insert(name.to_string(), allowed.clone());
         }
     }
@@ -43,11 +59,16 @@ fn table() -> BTreeMap<String, BTreeSet<String>> {
 
 #[test]
 fn every_layer_is_a_row_of_the_map_and_every_row_a_layer() {
-    let text =
-        ["lib.rs", "foundation/lib.rs", "numerics/lib.rs"].map(|file| fs::read_to_string(source().join(file)).unwrap()).concat();
+    let text = ["lib.rs", "foundation/lib.rs", "numerics/lib.rs"]
+        .map(|file| fs::read_to_string(source().join(file)).unwrap())
+        .concat();
     let declared: BTreeSet<String> = text
         .lines()
-        .filter_map(|line| line.strip_prefix("pub mod ")?.strip_suffix(';').map(String::from))
+        .filter_map(|line| {
+            line.strip_prefix("pub mod ")?
+                .strip_suffix(';')
+                .map(String::from)
+        })
         .chain(["twin".into()])
         .collect();
     assert_eq!(declared, table().into_keys().collect::<BTreeSet<_>>());
@@ -63,12 +84,23 @@ fn leads_to(path: &[String]) -> (&str, String) {
 fn breaches(sources: &[Source], table: &BTreeMap<String, BTreeSet<String>>) -> Vec<String> {
     let mut faults = Vec::new();
     for source in sources {
-        let Some((layer, allowed)) = source.module.first().and_then(|layer| table.get_key_value(layer)) else { continue };
+        let Some((layer, allowed)) = source
+            .module
+            .first()
+            .and_then(|layer| table.get_key_value(layer))
+        else {
+            continue;
+        };
         for one in &source.uses {
             let (module, item) = leads_to(&one.path);
             let free = FREE.contains(&module) || module == layer;
             let known = table.contains_key(module);
-            if known && !free && !["*", module, &item].iter().any(|name| allowed.contains(*name)) {
+            if known
+                && !free
+                && !["*", module, &item]
+                    .iter()
+                    .any(|name| allowed.contains(*name))
+            {
                 faults.push(format!("{}:{}: {layer} uses {item}", source.file, one.line));
             }
         }
@@ -79,7 +111,11 @@ fn breaches(sources: &[Source], table: &BTreeMap<String, BTreeSet<String>>) -> V
 #[test]
 fn layers_use_only_what_the_map_allows() {
     let faults = breaches(&sources(), &table());
-    assert!(faults.is_empty(), "not in the map of src/lib.rs:\n{}", faults.join("\n"));
+    assert!(
+        faults.is_empty(),
+        "not in the map of src/lib.rs:\n{}",
+        faults.join("\n")
+    );
 }
 
 #[test]
@@ -87,7 +123,11 @@ fn a_breach_is_found_in_a_group_behind_unit_tests_and_inside_an_expression() {
     let text = "#[cfg(test)]\nmod tests;\nuse crate::{error::Result, cli::{self, run::main}};\n\
                 fn f() { crate::pipeline::run(); super::super::stage::Plan; }\n";
     let module = vec!["store".to_string(), "key".to_string()];
-    let source = Source { file: "store/key.rs".into(), uses: uses(text, &module, &[]), module };
+    let source = Source {
+        file: "store/key.rs".into(),
+        uses: uses(text, &module, &[]),
+        module,
+    };
     assert_eq!(
         breaches(&[source], &table()),
         [
@@ -105,12 +145,17 @@ fn stages_do_not_use_each_other() {
         .unwrap()
         .map(|entry| entry.unwrap().path())
         // What several stages share is no stage.
-        .filter(|path| path.is_file() && fs::read_to_string(path).unwrap().contains("impl Stage for"))
+        .filter(|path| {
+            path.is_file() && fs::read_to_string(path).unwrap().contains("impl Stage for")
+        })
         .map(|path| path.file_stem().unwrap().to_string_lossy().into_owned())
         .collect();
     let mut faults = Vec::new();
     for source in sources() {
-        let ["stage", own, ..] = source.module.iter().map(String::as_str).collect::<Vec<_>>()[..] else { continue };
+        let ["stage", own, ..] = source.module.iter().map(String::as_str).collect::<Vec<_>>()[..]
+        else {
+            continue;
+        };
         for one in &source.uses {
             let (module, item) = leads_to(&one.path);
             let other = item.trim_start_matches("stage::");
@@ -119,5 +164,9 @@ fn stages_do_not_use_each_other() {
             }
         }
     }
-    assert!(faults.is_empty(), "stages know tables, not each other:\n{}", faults.join("\n"));
+    assert!(
+        faults.is_empty(),
+        "stages know tables, not each other:\n{}",
+        faults.join("\n")
+    );
 }

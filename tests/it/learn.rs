@@ -7,7 +7,9 @@ use calib::stage::split::{SplitBy, SplitReads};
 use calib::stage::{Context, Learn, LearnReads, LearnWrites, Stage};
 use calib::stage::{Identify, IdentifyReads, Simulate, SimulateReads, Stiffness, StiffnessReads};
 use calib::store::frame::Frame;
-use calib::table::{Parameters, Prediction, PredictionRow, Recording, Robot, Split, SplitRow, Table};
+use calib::table::{
+    Parameters, Prediction, PredictionRow, Recording, Robot, Split, SplitRow, Table,
+};
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use serde_json::{Value, json};
@@ -23,7 +25,12 @@ fn only<T: Table>(tables: &BTreeMap<&'static str, Vec<Frame>>) -> T {
 }
 
 fn mean_error(prediction: &Prediction, set: &str) -> f64 {
-    let errors: Vec<f64> = prediction.0.iter().filter(|row| row.set == set).map(|row| row.error_mm).collect();
+    let errors: Vec<f64> = prediction
+        .0
+        .iter()
+        .filter(|row| row.set == set)
+        .map(|row| row.error_mm)
+        .collect();
     errors.iter().sum::<f64>() / errors.len() as f64
 }
 
@@ -31,22 +38,57 @@ fn mean_error(prediction: &Prediction, set: &str) -> f64 {
 fn paper_sequence(seed: u64) -> (Recording, Split, Prediction) {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sr210d");
     let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
-    let description = read_calib(RobotFileText { label: "robot.yaml", text: &read("robot.yaml") }, None).unwrap().robot;
+    let description = read_calib(
+        RobotFileText {
+            label: "robot.yaml",
+            text: &read("robot.yaml"),
+        },
+        None,
+    )
+    .unwrap()
+    .robot;
     let robot = Robot::from_description(&description);
-    let yaml: Value = serde_saphyr::from_str(&read("pipeline.yaml").replace("${remainder}", "all")).unwrap();
+    let yaml: Value =
+        serde_saphyr::from_str(&read("pipeline.yaml").replace("${remainder}", "all")).unwrap();
     let stages = yaml["stages"].as_array().unwrap();
-    let mut twin = stages.iter().find(|stage| stage["uses"] == "simulate").unwrap()["with"].clone();
+    let mut twin = stages
+        .iter()
+        .find(|stage| stage["uses"] == "simulate")
+        .unwrap()["with"]
+        .clone();
     twin["seed"] = json!(seed);
 
     let desk = Desk::default();
-    let recording: Recording = only(&desk.run(&settings::<Simulate>(twin), SimulateReads { robot: robot.clone() }).unwrap());
+    let recording: Recording = only(
+        &desk
+            .run(
+                &settings::<Simulate>(twin),
+                SimulateReads {
+                    robot: robot.clone(),
+                },
+            )
+            .unwrap(),
+    );
     let by_usage = settings::<SplitBy>(json!({"by": "usage"}));
-    let split: Split = only(&desk.run(&by_usage, SplitReads { recording: recording.clone() }).unwrap());
+    let split: Split = only(
+        &desk
+            .run(
+                &by_usage,
+                SplitReads {
+                    recording: recording.clone(),
+                },
+            )
+            .unwrap(),
+    );
     let geometry = settings::<Identify>(json!({
         "on": ["unloaded_fit"], "load": "current",
         "effects": ["base_frame", "tool_offset", "joint_offset", "link_geometry", "reduction_ratio", "coupling_ratio"],
     }));
-    let reads = IdentifyReads { robot: robot.clone(), recording: recording.clone(), split: split.clone() };
+    let reads = IdentifyReads {
+        robot: robot.clone(),
+        recording: recording.clone(),
+        split: split.clone(),
+    };
     let tables = desk.run(&geometry, reads).unwrap();
     let reads = StiffnessReads {
         robot,
@@ -64,11 +106,20 @@ fn paper_sequence(seed: u64) -> (Recording, Split, Prediction) {
 /// `rows` poses of a six-joint arm, the last third in set `check`; residuals of `signal` mm along smooth functions plus `noise` mm.
 fn arm(rows: usize, signal: f64, noise: f64, seed: u64) -> (Recording, Split, Prediction) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let mut recording = Recording { joints: 6, prismatic: vec![false; 6], ..Recording::default() };
+    let mut recording = Recording {
+        joints: 6,
+        prismatic: vec![false; 6],
+        ..Recording::default()
+    };
     let (mut split, mut prediction) = (Split::default(), Prediction::default());
     for (row, sequence) in (0..rows).zip(1..) {
         let q: Vec<f64> = (0..6).map(|_| rng.random_range(-1.2..1.2)).collect();
-        let mut residual = [q[0].sin() * q[1].cos(), (2.0 * q[1]).sin(), q[2].cos() - q[4]].map(|value| signal * value);
+        let mut residual = [
+            q[0].sin() * q[1].cos(),
+            (2.0 * q[1]).sin(),
+            q[2].cos() - q[4],
+        ]
+        .map(|value| signal * value);
         for value in &mut residual {
             *value += noise * ((0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0);
         }
@@ -79,7 +130,11 @@ fn arm(rows: usize, signal: f64, noise: f64, seed: u64) -> (Recording, Split, Pr
         recording.usage.push(None);
         recording.q.extend(q);
         recording.position.push([1.0; 3]);
-        split.0.push(SplitRow { sequence, point_id: sequence.to_string(), set: set.into() });
+        split.0.push(SplitRow {
+            sequence,
+            point_id: sequence.to_string(),
+            set: set.into(),
+        });
         prediction.0.push(PredictionRow {
             sequence,
             point_id: sequence.to_string(),
@@ -108,11 +163,30 @@ fn arm(rows: usize, signal: f64, noise: f64, seed: u64) -> (Recording, Split, Pr
     (recording, split, prediction)
 }
 
-fn learn(settings_: Value, arm: &(Recording, Split, Prediction), jobs: usize, desk: &Desk) -> Result<LearnWrites> {
+fn learn(
+    settings_: Value,
+    arm: &(Recording, Split, Prediction),
+    jobs: usize,
+    desk: &Desk,
+) -> Result<LearnWrites> {
     let (recording, split, prediction) = arm.clone();
     let (robot, parameters) = (None, None);
-    let context = Context { id: "network", seed: 11, jobs, services: desk };
-    settings::<Learn>(settings_).run(LearnReads { robot, recording, split, parameters, prediction }, &context)
+    let context = Context {
+        id: "network",
+        seed: 11,
+        jobs,
+        services: desk,
+    };
+    settings::<Learn>(settings_).run(
+        LearnReads {
+            robot,
+            recording,
+            split,
+            parameters,
+            prediction,
+        },
+        &context,
+    )
 }
 
 /// Settings that train in a moment.
@@ -153,10 +227,22 @@ fn pure_noise_leaves_the_prediction_as_it_was_and_says_why() {
         assert!(written.network.0.is_empty() && written.training.0.is_empty());
         for (after, before) in written.prediction.0.iter().zip(&noise.2.0) {
             let held_out = before.held_out && before.set != "fit";
-            assert_eq!(*after, PredictionRow { step: "network".into(), held_out, ..before.clone() });
+            assert_eq!(
+                *after,
+                PredictionRow {
+                    step: "network".into(),
+                    held_out,
+                    ..before.clone()
+                }
+            );
         }
         let notes = desk.notes.lock().unwrap();
-        assert!(notes.iter().any(|note| note.starts_with("no correction was kept; cross-validated error")), "{notes:?}");
+        assert!(
+            notes
+                .iter()
+                .any(|note| note.starts_with("no correction was kept; cross-validated error")),
+            "{notes:?}"
+        );
     }
 }
 
@@ -166,7 +252,10 @@ fn what_it_writes_does_not_depend_on_the_threads() {
     let one = learn(quick(), &arm, 1, &Desk::default()).unwrap();
     let two = learn(quick(), &arm, 2, &Desk::default()).unwrap();
     assert!(!one.network.0.is_empty());
-    assert_eq!((one.network, one.training, one.prediction), (two.network, two.training, two.prediction));
+    assert_eq!(
+        (one.network, one.training, one.prediction),
+        (two.network, two.training, two.prediction)
+    );
 }
 
 #[test]
@@ -178,12 +267,27 @@ fn a_smooth_remainder_shrinks_on_rows_that_were_not_trained_on() {
     for (after, before) in written.prediction.0.iter().zip(&arm.2.0) {
         assert_eq!(after.held_out, before.held_out && before.set == "check");
         // Predicted and left over still add up to what was measured.
-        let measured = [(after.x_mm, after.dx_mm), (after.y_mm, after.dy_mm), (after.z_mm, after.dz_mm)];
-        assert!(measured.iter().all(|(at, left)| (at + left - 1000.0).abs() < 1e-9));
+        let measured = [
+            (after.x_mm, after.dx_mm),
+            (after.y_mm, after.dy_mm),
+            (after.z_mm, after.dz_mm),
+        ];
+        assert!(
+            measured
+                .iter()
+                .all(|(at, left)| (at + left - 1000.0).abs() < 1e-9)
+        );
         let length = (after.dx_mm.powi(2) + after.dy_mm.powi(2) + after.dz_mm.powi(2)).sqrt();
         assert!((after.error_mm - length).abs() < 1e-12);
     }
-    let phases = |phase: &str| written.training.0.iter().filter(|row| row.phase == phase).count();
+    let phases = |phase: &str| {
+        written
+            .training
+            .0
+            .iter()
+            .filter(|row| row.phase == phase)
+            .count()
+    };
     assert_eq!(phases("swarm"), 11);
     assert!(phases("gradient") > 20);
 }
@@ -201,7 +305,10 @@ fn gross_errors_are_not_learnt_and_rows_outside_the_range_are_left_alone() {
     assert!(ratio < 0.5, "{ratio}");
     assert_eq!(after.0[299].dx_mm, arm.2.0[299].dx_mm);
     let notes = desk.notes.lock().unwrap().join("\n");
-    assert!(notes.contains("1 of 200 rows are not learnt from") && notes.contains("silent on 1"), "{notes}");
+    assert!(
+        notes.contains("1 of 200 rows are not learnt from") && notes.contains("silent on 1"),
+        "{notes}"
+    );
 }
 
 #[test]
@@ -211,25 +318,46 @@ fn what_was_learnt_under_load_is_not_applied_without() {
     let mut payload = vec![210.0; 300];
     (payload[297], payload[298], payload[299]) = (205.0, 0.0, f64::NAN);
     arm.0.payload = Some(payload);
-    let after = learn(quick(), &arm, 1, &Desk::default()).unwrap().prediction;
+    let after = learn(quick(), &arm, 1, &Desk::default())
+        .unwrap()
+        .prediction;
     let changed = |row: usize| after.0[row].dx_mm != arm.2.0[row].dx_mm;
-    assert_eq!([296, 297, 298, 299].map(changed), [true, true, false, false]);
+    assert_eq!(
+        [296, 297, 298, 299].map(changed),
+        [true, true, false, false]
+    );
 }
 
 #[test]
 fn settings_and_sets_that_make_no_sense_are_named() {
-    let faults = settings::<Learn>(json!({"on": [], "hidden": 0, "keep_back": 0.5, "folds": 1, "decay": -1.0})).check();
+    let faults = settings::<Learn>(
+        json!({"on": [], "hidden": 0, "keep_back": 0.5, "folds": 1, "decay": -1.0}),
+    )
+    .check();
     let places: Vec<&str> = faults.iter().map(|fault| fault.place.as_str()).collect();
     assert_eq!(places, ["on", "hidden", "folds", "keep_back", "decay"]);
     assert!(settings::<Learn>(quick()).check().is_empty());
 
     let arm = arm(40, 0.5, 0.05, 4);
     let desk = Desk::default();
-    let message = learn(json!({"on": ["training"]}), &arm, 1, &desk).err().unwrap().to_string();
-    assert!(message.contains("`training`") && message.contains("check, fit"), "{message}");
-    let message = learn(json!({"payload": true}), &arm, 1, &desk).err().unwrap().to_string();
+    let message = learn(json!({"on": ["training"]}), &arm, 1, &desk)
+        .err()
+        .unwrap()
+        .to_string();
+    assert!(
+        message.contains("`training`") && message.contains("check, fit"),
+        "{message}"
+    );
+    let message = learn(json!({"payload": true}), &arm, 1, &desk)
+        .err()
+        .unwrap()
+        .to_string();
     assert!(message.contains("with.payload"), "{message}");
     let written = learn(quick(), &arm, 1, &desk).unwrap();
     assert!(written.network.0.is_empty());
-    assert!(desk.warnings.lock().unwrap()[0].contains("only 27 rows to learn from"), "{:?}", desk.warnings);
+    assert!(
+        desk.warnings.lock().unwrap()[0].contains("only 27 rows to learn from"),
+        "{:?}",
+        desk.warnings
+    );
 }

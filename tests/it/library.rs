@@ -37,18 +37,43 @@ fn rows(robot: &RobotModel, count: usize) -> Measurements {
 #[test]
 fn an_arm_is_identified_from_arrays() {
     let text = example("calib_robot:");
-    let robot = RobotModel::new(read_calib(RobotFileText { label: "page", text: &text }, None).expect("a robot").robot);
+    let robot = RobotModel::new(
+        read_calib(
+            RobotFileText {
+                label: "page",
+                text: &text,
+            },
+            None,
+        )
+        .expect("a robot")
+        .robot,
+    );
     let mut data = rows(&robot, 60);
     let mut truth = model(&robot, base(), &["joint_offset"]);
-    let third = truth.stack.specs().iter().position(|spec| spec.name == "joint_offset.j3").expect("a zero");
+    let third = truth
+        .stack
+        .specs()
+        .iter()
+        .position(|spec| spec.name == "joint_offset.j3")
+        .expect("a zero");
     truth.x[third] = 1.5e-3;
     data.points.position = truth.predict(&data);
-    let noisy = |(row, point): (usize, &Vector3<f64>)| [0, 1, 2].map(|axis: usize| point[axis] + NOISE * normal(3 * row + axis));
+    let noisy = |(row, point): (usize, &Vector3<f64>)| {
+        [0, 1, 2].map(|axis: usize| point[axis] + NOISE * normal(3 * row + axis))
+    };
     let points: Vec<[f64; 3]> = data.points.position.iter().enumerate().map(noisy).collect();
     let q: Vec<Vec<f64>> = data.q.chunks(robot.joints()).map(<[f64]>::to_vec).collect();
     let found = identify::identify(&text, &q, &points).expect("enough rows");
-    let zero = found.iter().find(|one| one.name == "joint_offset.j3").expect("the zero of joint 3");
-    assert!((zero.value - 1.5e-3).abs() < 4.0 * zero.sigma && zero.sigma < 1e-4, "{} +- {}", zero.value, zero.sigma);
+    let zero = found
+        .iter()
+        .find(|one| one.name == "joint_offset.j3")
+        .expect("the zero of joint 3");
+    assert!(
+        (zero.value - 1.5e-3).abs() < 4.0 * zero.sigma && zero.sigma < 1e-4,
+        "{} +- {}",
+        zero.value,
+        zero.sigma
+    );
     // 4 for each revolute joint, 3 for the target; the base has its share in them.
     assert_eq!(found.len(), 27);
 }
@@ -62,7 +87,10 @@ fn missing_physics_is_named_from_arrays() {
         "law": {"of": {"angle": {"joint": 2}}, "basis": {"wave": {"order": 5, "overtone": false}}},
     }});
     let gear: Box<dyn Effect> = Box::new(serde_json::from_value::<Form>(gear).expect("a form"));
-    let context = EffectContext { base: base(), load: Load::GravityTorque };
+    let context = EffectContext {
+        base: base(),
+        load: Load::GravityTorque,
+    };
     let effects = vec![arm_effect("joint_offset", &context).expect("a cause"), gear];
     let mut truth = Model::nominal(robot.clone(), EffectStack::new(&robot, base(), effects));
     let sine = truth.x.len() - 2;
@@ -72,9 +100,27 @@ fn missing_physics_is_named_from_arrays() {
         *point += Vector3::new(normal(3 * k), normal(3 * k + 1), normal(3 * k + 2)) * NOISE;
     }
     let said = diagnose::missing_physics(&robot, &data);
-    let names: Vec<(&str, Place)> = said.findings.iter().map(|finding| (finding.effect, finding.place)).collect();
-    assert_eq!((said.verdict, names), (VerdictKind::Explained, vec![("gear_cyclic", Place::Joint(2))]), "{}", said.statement);
-    assert!(said.findings[0].statement.contains("5 times a turn by 21 arcsec"), "{}", said.findings[0].statement);
+    let names: Vec<(&str, Place)> = said
+        .findings
+        .iter()
+        .map(|finding| (finding.effect, finding.place))
+        .collect();
+    assert_eq!(
+        (said.verdict, names),
+        (
+            VerdictKind::Explained,
+            vec![("gear_cyclic", Place::Joint(2))]
+        ),
+        "{}",
+        said.statement
+    );
+    assert!(
+        said.findings[0]
+            .statement
+            .contains("5 times a turn by 21 arcsec"),
+        "{}",
+        said.findings[0].statement
+    );
 }
 
 #[test]
@@ -82,20 +128,41 @@ fn the_tables_of_a_run_are_read_as_rust_values() {
     let store = tempfile::tempdir().expect("a folder");
     let pipeline = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/it/resume/pipeline.yaml");
     let mut command = Command::new(env!("CARGO_BIN_EXE_calib"));
-    let output = command.arg("run").arg(pipeline).args(["--quiet", "--store"]).arg(store.path()).output().expect("calib");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let output = command
+        .arg("run")
+        .arg(pipeline)
+        .args(["--quiet", "--store"])
+        .arg(store.path())
+        .output()
+        .expect("calib");
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     let worst = |step| tables::worst_points(store.path(), "HEAD", step).expect("a table");
     let (nominal, geometry) = (worst("nominal"), worst("geometry"));
     assert_eq!((nominal.len(), geometry.len()), (20, 20));
     assert!(geometry.windows(2).all(|pair| pair[0].1 >= pair[1].1));
-    assert!(geometry[0].1 < 0.2 && nominal[0].1 > 2.0 * geometry[0].1, "{} after {}", geometry[0].1, nominal[0].1);
+    assert!(
+        geometry[0].1 < 0.2 && nominal[0].1 > 2.0 * geometry[0].1,
+        "{} after {}",
+        geometry[0].1,
+        nominal[0].1
+    );
     assert!(tables::worst_points(store.path(), "HEAD", "network").is_err());
 }
 
 #[test]
 fn the_documentation_shows_these_files() {
-    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("src/lib.rs")).expect("the library");
+    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("src/lib.rs"))
+        .expect("the library");
     for name in ["identify", "diagnose", "tables"] {
-        assert!(text.contains(&format!("#![doc = include_str!(\"../tests/it/library/{name}.rs\")]")), "{name}");
+        assert!(
+            text.contains(&format!(
+                "#![doc = include_str!(\"../tests/it/library/{name}.rs\")]"
+            )),
+            "{name}"
+        );
     }
 }

@@ -9,7 +9,10 @@ use serde_json::Value;
 use std::fmt::Write;
 
 fn reference() -> Value {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/reference/library/poses.json");
+    let path = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/tests/reference/library/poses.json"
+    );
     serde_json::from_str(&std::fs::read_to_string(path).expect("the reference")).expect("JSON")
 }
 
@@ -28,12 +31,26 @@ fn arms_of_the_library_stand_where_public_models_put_them() {
     let reference = reference();
     let mut compared = 0;
     for arm in LIBRARY {
-        let robot = RobotModel::new(arm.read().unwrap_or_else(|error| panic!("{}: {error}", arm.name)).robot);
+        let robot = RobotModel::new(
+            arm.read()
+                .unwrap_or_else(|error| panic!("{}: {error}", arm.name))
+                .robot,
+        );
         let known = &reference[arm.name];
-        assert!(known["reach_mm"].is_number(), "{}: tests/reference/library.py has to be run", arm.name);
+        assert!(
+            known["reach_mm"].is_number(),
+            "{}: tests/reference/library.py has to be run",
+            arm.name
+        );
         for pose in known["poses"].as_array().into_iter().flatten() {
-            let numbers =
-                |key: &str| pose[key].as_array().expect("numbers").iter().map(|x| x.as_f64().expect("a number")).collect();
+            let numbers = |key: &str| {
+                pose[key]
+                    .as_array()
+                    .expect("numbers")
+                    .iter()
+                    .map(|x| x.as_f64().expect("a number"))
+                    .collect()
+            };
             let (q, there): (Vec<f64>, Vec<f64>) = (numbers("q_rad"), numbers("point_mm"));
             let here = robot.forward(&q).translation * 1e3;
             let apart = (here - Vector3::from_row_slice(&there)).norm();
@@ -41,7 +58,10 @@ fn arms_of_the_library_stand_where_public_models_put_them() {
             compared += 1;
         }
         assert!(
-            known.get("largest_mm").and_then(Value::as_f64).is_none_or(|largest| largest <= allowed(arm.name)),
+            known
+                .get("largest_mm")
+                .and_then(Value::as_f64)
+                .is_none_or(|largest| largest <= allowed(arm.name)),
             "{}",
             arm.name
         );
@@ -50,15 +70,22 @@ fn arms_of_the_library_stand_where_public_models_put_them() {
 }
 
 /// Makers of cobots call a working radius what is smaller than the arm's own lengths.
-const RADIUS: [&str; 9] = ["ur3e", "ur5", "ur5e", "ur10", "ur10e", "ur16e", "ur20", "panda", "tm12"];
+const RADIUS: [&str; 9] = [
+    "ur3e", "ur5", "ur5e", "ur10", "ur10e", "ur16e", "ur20", "panda", "tm12",
+];
 
 #[test]
 fn lengths_reach_as_far_as_makers_publish() {
     for (name, known) in reference().as_object().expect("arms") {
-        let [here, published] = ["reach_mm", "published_mm"].map(|key| known[key].as_f64().expect("mm"));
+        let [here, published] =
+            ["reach_mm", "published_mm"].map(|key| known[key].as_f64().expect("mm"));
         let off = (here - published) / published;
         assert!(
-            if RADIUS.contains(&name.as_str()) { (-0.002..0.16).contains(&off) } else { off.abs() < 0.0015 },
+            if RADIUS.contains(&name.as_str()) {
+                (-0.002..0.16).contains(&off)
+            } else {
+                off.abs() < 0.0015
+            },
             "{name}: {here} for {published} mm"
         );
     }
@@ -74,7 +101,10 @@ pub(super) fn tracker() -> Pose {
 
 /// Where the joints really are: zeros are off by a milliradian or so.
 pub(super) fn real(q: &[f64]) -> Vec<f64> {
-    q.iter().enumerate().map(|(j, q)| q + if j % 2 == 0 { 0.0010 } else { -0.0015 }).collect()
+    q.iter()
+        .enumerate()
+        .map(|(j, q)| q + if j % 2 == 0 { 0.0010 } else { -0.0015 })
+        .collect()
 }
 
 /// A robot file of the library with the reflector's place on the flange, which a person fills in.
@@ -82,7 +112,10 @@ pub(super) fn on_flange(text: &str, arm: &str, robot: &RobotModel) -> String {
     let lines = text.lines().map(|line| match line.starts_with("tool: ") {
         true if text.contains("  screws:") => {
             let point = robot.home().point(&REFLECTOR) * 1e3;
-            format!("tool: {{point: [{:.1}, {:.1}, {:.1}]}}", point.x, point.y, point.z)
+            format!(
+                "tool: {{point: [{:.1}, {:.1}, {:.1}]}}",
+                point.x, point.y, point.z
+            )
         }
         true if arm == "panda" => "tool: {point: [60, 40, 157]}".into(),
         true => "tool: {point: [60, 40, 50]}".into(),
@@ -99,18 +132,34 @@ pub(super) fn recording(robot: &RobotModel, coupled: &[calib::robot::CountedCoup
     text.push_str(",x,y,z\n");
     for k in 0..160_u32 {
         // A sequence that fills the ranges evenly.
-        let drawn = |j: usize| (f64::from(k) * f64::from(2 * u32::try_from(j).expect("few") + 3).sqrt() + 0.13).fract();
-        let range =
-            |j: usize| robot.description().joints[j].limits.map_or([-2.0, 2.0], |limits| limits.map(|end| end.clamp(-2.6, 2.6)));
-        let q: Vec<f64> = (0..joints).map(|j| range(j)[0] + drawn(j) * (range(j)[1] - range(j)[0])).collect();
+        let drawn = |j: usize| {
+            (f64::from(k) * f64::from(2 * u32::try_from(j).expect("few") + 3).sqrt() + 0.13).fract()
+        };
+        let range = |j: usize| {
+            robot.description().joints[j]
+                .limits
+                .map_or([-2.0, 2.0], |limits| limits.map(|end| end.clamp(-2.6, 2.6)))
+        };
+        let q: Vec<f64> = (0..joints)
+            .map(|j| range(j)[0] + drawn(j) * (range(j)[1] - range(j)[0]))
+            .collect();
         let point = tracker().point(&robot.forward(&real(&q)).point(&REFLECTOR));
         let mut shown = q.clone();
         for coupling in coupled.iter().rev() {
             shown[coupling.joint] += coupling.ratio * q[coupling.by];
         }
         write!(text, "P{k}").expect("text");
-        shown.iter().for_each(|q| write!(text, ",{:.5}", q.to_degrees()).expect("text"));
-        writeln!(text, ",{:.4},{:.4},{:.4}", 1e3 * point.x, 1e3 * point.y, 1e3 * point.z).expect("text");
+        shown
+            .iter()
+            .for_each(|q| write!(text, ",{:.5}", q.to_degrees()).expect("text"));
+        writeln!(
+            text,
+            ",{:.4},{:.4},{:.4}",
+            1e3 * point.x,
+            1e3 * point.y,
+            1e3 * point.z
+        )
+        .expect("text");
     }
     text
 }
@@ -121,24 +170,58 @@ fn every_arm_of_the_library_goes_from_init_to_a_run() {
         let read = arm.read().expect("a robot");
         let robot = RobotModel::new(read.robot.clone());
         let folder = tempfile::tempdir().expect("a folder");
-        std::fs::write(folder.path().join("measured.csv"), recording(&robot, &read.about.coupled)).expect("a file");
+        std::fs::write(
+            folder.path().join("measured.csv"),
+            recording(&robot, &read.about.coupled),
+        )
+        .expect("a file");
         let run = |arguments: &[&str]| {
             let output = calib(folder.path(), arguments, "");
-            let said = [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).concat();
-            assert!(output.status.success(), "{}: {arguments:?}: {said}", arm.name);
+            let said = [output.stdout, output.stderr]
+                .map(|bytes| String::from_utf8_lossy(&bytes).into_owned())
+                .concat();
+            assert!(
+                output.status.success(),
+                "{}: {arguments:?}: {said}",
+                arm.name
+            );
             said
         };
-        run(&["init", "cell", "--data", "measured.csv", "--robot", arm.name]);
+        run(&[
+            "init",
+            "cell",
+            "--data",
+            "measured.csv",
+            "--robot",
+            arm.name,
+        ]);
         let file = folder.path().join("cell/robot.yaml");
         let text = std::fs::read_to_string(&file).expect("a robot file");
         std::fs::write(&file, on_flange(&text, arm.name, &robot)).expect("a file");
         run(&["check", "cell/pipeline.yaml"]);
-        run(&["run", "cell/pipeline.yaml", "--until", "geometry", "--quiet"]);
+        run(&[
+            "run",
+            "cell/pipeline.yaml",
+            "--until",
+            "geometry",
+            "--quiet",
+        ]);
         let name = "geometry.prediction.parquet";
-        let bytes = std::fs::read(folder.path().join(".calib/tables/cell").join(name)).expect("a table");
+        let bytes =
+            std::fs::read(folder.path().join(".calib/tables/cell").join(name)).expect("a table");
         let prediction: Prediction = from_parquet(name, bytes).expect("a sound table").table;
-        let rows = prediction.0.iter().filter(|row| row.step == "geometry").map(|row| row.error_mm).collect::<Vec<f64>>();
+        let rows = prediction
+            .0
+            .iter()
+            .filter(|row| row.step == "geometry")
+            .map(|row| row.error_mm)
+            .collect::<Vec<f64>>();
         let mean = rows.iter().sum::<f64>() / rows.len() as f64;
-        assert!(rows.len() == 160 && mean < 0.002, "{}: {} points, mean {mean} mm", arm.name, rows.len());
+        assert!(
+            rows.len() == 160 && mean < 0.002,
+            "{}: {} points, mean {mean} mm",
+            arm.name,
+            rows.len()
+        );
     }
 }

@@ -6,7 +6,8 @@ use calib::estimate::network::loss::{Batch, Loss, LossBuffers};
 use calib::estimate::network::region::Region;
 use calib::estimate::network::rivals::{RivalComparison, RivalContest, learn};
 use calib::estimate::network::{
-    Activation, Correction, LayerSizes, Recipe, Rival, TrainingSamples, TrainingStart, compare, train,
+    Activation, Correction, LayerSizes, Recipe, Rival, TrainingSamples, TrainingStart, compare,
+    train,
 };
 use calib::estimate::swarm::Algorithm;
 use calib::robot::RobotModel;
@@ -47,10 +48,18 @@ fn arm(rows: usize, signal: f64, noise: f64, seed: u64) -> TrainingSamples {
     for _ in 0..rows {
         let q: Vec<f64> = (0..6).map(|_| rng.random_range(-1.2..1.2)).collect();
         let reach = (q[1] + 0.3).sin() + (q[1] + q[2]).cos();
-        let lift = 0.5e-3 * (2.0 * q[1]).sin() + 0.4e-3 * reach * (q[2]).cos() + 0.2e-3 * q[4].sin() * q[3].cos();
+        let lift = 0.5e-3 * (2.0 * q[1]).sin()
+            + 0.4e-3 * reach * (q[2]).cos()
+            + 0.2e-3 * q[4].sin() * q[3].cos();
         let turn = 0.45e-3 * (2.0 * q[0] + 0.4).sin() + 0.2e-3 * q[3].sin();
-        let clean = [q[0].cos() * lift - q[0].sin() * turn, q[0].sin() * lift + q[0].cos() * turn, 1.2 * lift - 0.2e-3 * q[4]];
-        samples.residual.push(clean.map(|r| signal * r + noise * normal(&mut rng)));
+        let clean = [
+            q[0].cos() * lift - q[0].sin() * turn,
+            q[0].sin() * lift + q[0].cos() * turn,
+            1.2 * lift - 0.2e-3 * q[4],
+        ];
+        samples
+            .residual
+            .push(clean.map(|r| signal * r + noise * normal(&mut rng)));
         samples.sources.push(q);
     }
     samples
@@ -59,7 +68,10 @@ fn arm(rows: usize, signal: f64, noise: f64, seed: u64) -> TrainingSamples {
 fn mean_error(samples: &TrainingSamples, correction: Option<&Correction>) -> f64 {
     let left = samples.sources.iter().zip(&samples.residual).map(|(q, r)| {
         let delta = correction.map_or([0.0; 3], |correction| correction.at(q).delta);
-        (0..3).map(|k| (r[k] - delta[k]).powi(2)).sum::<f64>().sqrt()
+        (0..3)
+            .map(|k| (r[k] - delta[k]).powi(2))
+            .sum::<f64>()
+            .sqrt()
     });
     left.sum::<f64>() / samples.rows() as f64
 }
@@ -69,10 +81,19 @@ fn activations_are_those_of_the_textbook_for_any_number() {
     for k in -4000..=4000 {
         let z = f64::from(k) * 0.01 + 1e-5;
         let (sigmoid, tanh) = (1.0 / (1.0 + (-z).exp()), z.tanh());
-        assert!((Activation::Sigmoid.value(z) / sigmoid - 1.0).abs() < 5e-15 * z.abs().max(1.0), "{z}");
+        assert!(
+            (Activation::Sigmoid.value(z) / sigmoid - 1.0).abs() < 5e-15 * z.abs().max(1.0),
+            "{z}"
+        );
         assert!((Activation::Tanh.value(z) - tanh).abs() < 2e-15, "{z}");
     }
-    for (z, limit) in [(700.0, 1.0), (1e300, 1.0), (f64::INFINITY, 1.0), (-1e300, 0.0), (f64::NEG_INFINITY, 0.0)] {
+    for (z, limit) in [
+        (700.0, 1.0),
+        (1e300, 1.0),
+        (f64::INFINITY, 1.0),
+        (-1e300, 0.0),
+        (f64::NEG_INFINITY, 0.0),
+    ] {
         assert!((Activation::Sigmoid.value(z) - limit).abs() < 1e-300, "{z}");
     }
     assert!(Activation::Sigmoid.value(f64::NAN).is_nan());
@@ -81,21 +102,50 @@ fn activations_are_those_of_the_textbook_for_any_number() {
 #[test]
 fn the_gradient_is_that_of_central_differences() {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
-    for (activation, outputs) in [(Activation::Sigmoid, 3), (Activation::Tanh, 3), (Activation::Sigmoid, 6)] {
+    for (activation, outputs) in [
+        (Activation::Sigmoid, 3),
+        (Activation::Tanh, 3),
+        (Activation::Sigmoid, 6),
+    ] {
         // 150 rows: a full block, and another that is not full.
-        let x: Vec<Vec<f64>> = (0..150).map(|_| (0..7).map(|_| rng.random_range(-2.0..2.0)).collect()).collect();
-        let y: Vec<[f64; 3]> = (0..150).map(|_| std::array::from_fn(|_| rng.random_range(-2.0..2.0))).collect();
+        let x: Vec<Vec<f64>> = (0..150)
+            .map(|_| (0..7).map(|_| rng.random_range(-2.0..2.0)).collect())
+            .collect();
+        let y: Vec<[f64; 3]> = (0..150)
+            .map(|_| std::array::from_fn(|_| rng.random_range(-2.0..2.0)))
+            .collect();
         let mut way = || std::array::from_fn(|_| rng.random_range(-1.0..1.0));
-        let ways: Vec<Vec<[f64; 3]>> = (0..150).map(|_| (0..outputs).map(|_| way()).collect()).collect();
+        let ways: Vec<Vec<[f64; 3]>> = (0..150)
+            .map(|_| (0..outputs).map(|_| way()).collect())
+            .collect();
         let batch = Batch::new(&x, &y);
-        let batch = if outputs == 3 { batch } else { batch.through(&ways) };
-        let shape = LayerSizes { inputs: 7, hidden: 5, outputs, activation };
-        let loss = Loss { shape, batch: &batch, decay: 0.7 };
+        let batch = if outputs == 3 {
+            batch
+        } else {
+            batch.through(&ways)
+        };
+        let shape = LayerSizes {
+            inputs: 7,
+            hidden: 5,
+            outputs,
+            activation,
+        };
+        let loss = Loss {
+            shape,
+            batch: &batch,
+            decay: 0.7,
+        };
         let mut scratch = LossBuffers::new(shape);
-        let mut w: Vec<f64> = (0..shape.parameters()).map(|_| rng.random_range(-1.0..1.0)).collect();
+        let mut w: Vec<f64> = (0..shape.parameters())
+            .map(|_| rng.random_range(-1.0..1.0))
+            .collect();
         let mut gradient = vec![0.0; w.len()];
         let (value, squares) = loss.gradient(&w, &mut gradient, &mut scratch);
-        assert_eq!(squares.map(|s| (s * 1e9).round()), loss.mean_squares(&w, &mut scratch).map(|s| (s * 1e9).round()));
+        assert_eq!(
+            squares.map(|s| (s * 1e9).round()),
+            loss.mean_squares(&w, &mut scratch)
+                .map(|s| (s * 1e9).round())
+        );
         assert!((value - loss.value(&w, &mut scratch)).abs() < 1e-14);
         for i in 0..w.len() {
             let step = 1e-5;
@@ -106,18 +156,29 @@ fn the_gradient_is_that_of_central_differences() {
             let down = loss.value(&w, &mut scratch);
             w[i] = at;
             let difference = (up - down) / (2.0 * step);
-            assert!((difference - gradient[i]).abs() < 1e-9, "{activation:?} {i}: {difference} {}", gradient[i]);
+            assert!(
+                (difference - gradient[i]).abs() < 1e-9,
+                "{activation:?} {i}: {difference} {}",
+                gradient[i]
+            );
         }
         // The single-row function and the batched one are the same network.
         let mut squares = 0.0;
         for ((x, y), ways) in x.iter().zip(&y).zip(&ways) {
             let out = shape.at(&w, x);
             for k in 0..3 {
-                let at = if outputs == 3 { out[k] } else { out.iter().zip(ways).map(|(o, way)| o * way[k]).sum() };
+                let at = if outputs == 3 {
+                    out[k]
+                } else {
+                    out.iter().zip(ways).map(|(o, way)| o * way[k]).sum()
+                };
                 squares += (at - y[k]).powi(2);
             }
         }
-        assert!((squares / 150.0 - loss.mean_squares(&w, &mut scratch).iter().sum::<f64>()).abs() < 1e-12);
+        assert!(
+            (squares / 150.0 - loss.mean_squares(&w, &mut scratch).iter().sum::<f64>()).abs()
+                < 1e-12
+        );
     }
 }
 
@@ -135,7 +196,9 @@ fn a_smooth_remainder_is_learnt_and_the_noise_is_not() {
     assert!(seen < held_out && seen > 0.25, "{seen}");
     for member in 1..=4 {
         let own: Vec<_> = course.iter().filter(|c| c.member == member).collect();
-        assert!(own.len() > 10 && own.last().unwrap().best < own[0].best && own[0].check_rms.is_some());
+        assert!(
+            own.len() > 10 && own.last().unwrap().best < own[0].best && own[0].check_rms.is_some()
+        );
     }
     assert_eq!(course.iter().filter(|c| c.member == 0).count(), 31);
 }
@@ -144,8 +207,21 @@ fn a_smooth_remainder_is_learnt_and_the_noise_is_not() {
 fn sr210d() -> ScrewArm {
     let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sr210d/robot.yaml");
     let text = std::fs::read_to_string(file).unwrap();
-    let robot = RobotModel::new(read_calib(RobotFileText { label: "robot.yaml", text: &text }, None).unwrap().robot);
-    ScrewArm::of(&robot, &Pose::from_rotation_vector([0.02, -0.03, 2.0].into(), [4.5, -1.8, 0.9].into()))
+    let robot = RobotModel::new(
+        read_calib(
+            RobotFileText {
+                label: "robot.yaml",
+                text: &text,
+            },
+            None,
+        )
+        .unwrap()
+        .robot,
+    );
+    ScrewArm::of(
+        &robot,
+        &Pose::from_rotation_vector([0.02, -0.03, 2.0].into(), [4.5, -1.8, 0.9].into()),
+    )
 }
 
 /// Poses of that arm whose joints 1 and 2 have encoders with waves of 90 and 60 urad, plus `noise` m per axis.
@@ -155,20 +231,31 @@ fn waves(rows: usize, arm: &ScrewArm, noise: f64, seed: u64) -> TrainingSamples 
     for _ in 0..rows {
         let q: Vec<f64> = (0..6).map(|_| rng.random_range(-1.2..1.2)).collect();
         let stance = arm.stance(&q);
-        let moved = stance.turn(0) * (90e-6 * (11.0 * q[0] + 0.4).sin()) + stance.turn(1) * (60e-6 * (5.0 * q[1]).cos());
-        samples.residual.push(std::array::from_fn(|k| moved[k] + noise * normal(&mut rng)));
+        let moved = stance.turn(0) * (90e-6 * (11.0 * q[0] + 0.4).sin())
+            + stance.turn(1) * (60e-6 * (5.0 * q[1]).cos());
+        samples
+            .residual
+            .push(std::array::from_fn(|k| moved[k] + noise * normal(&mut rng)));
         samples.sources.push(q);
     }
     samples
 }
 
-fn contest<'a>(arm: Option<&'a ScrewArm>, rivals: &[Rival], cheap: &Recipe, folds: usize) -> RivalContest<'a> {
+fn contest<'a>(
+    arm: Option<&'a ScrewArm>,
+    rivals: &[Rival],
+    cheap: &Recipe,
+    folds: usize,
+) -> RivalContest<'a> {
     RivalContest {
         rivals: rivals.to_vec(),
         arm,
         prismatic: &[false; 6],
         recipe: cheap.clone(),
-        trial: Recipe { members: 2, ..cheap.clone() },
+        trial: Recipe {
+            members: 2,
+            ..cheap.clone()
+        },
         decays: vec![0.5, 5.0],
         hidden: vec![8],
         folds,
@@ -185,7 +272,12 @@ const ALL: [Rival; 6] = [
 ];
 
 fn error(comparison: &RivalComparison, rival: Rival) -> f64 {
-    comparison.judged.iter().find(|judged| judged.rival == Some(rival)).unwrap().mean()
+    comparison
+        .judged
+        .iter()
+        .find(|judged| judged.rival == Some(rival))
+        .unwrap()
+        .mean()
 }
 
 #[test]
@@ -197,15 +289,41 @@ fn training_is_the_same_on_one_thread_and_on_three() {
         TrainingStart::Swarm(Algorithm::Bso),
         TrainingStart::Swarm(Algorithm::Abc),
     ] {
-        let on = |jobs| train(&samples, &Recipe { jobs, start, ..recipe(6) }, &mut |_| {});
+        let on = |jobs| {
+            train(
+                &samples,
+                &Recipe {
+                    jobs,
+                    start,
+                    ..recipe(6)
+                },
+                &mut |_| {},
+            )
+        };
         assert_eq!(on(1), on(3), "{start:?}");
     }
     let tool = sr210d();
-    let cheap = Recipe { generations: 5, iterations: 40, ..recipe(6) };
+    let cheap = Recipe {
+        generations: 5,
+        iterations: 40,
+        ..recipe(6)
+    };
     let judged = |jobs| {
-        let contest = contest(Some(&tool), &ALL, &Recipe { jobs, ..cheap.clone() }, 3);
+        let contest = contest(
+            Some(&tool),
+            &ALL,
+            &Recipe {
+                jobs,
+                ..cheap.clone()
+            },
+            3,
+        );
         let comparison = compare(&samples, &contest, &|_, _| {});
-        let learnt: Vec<_> = comparison.judged.iter().map(|judged| learn(&samples, &contest, judged, &mut |_| {})).collect();
+        let learnt: Vec<_> = comparison
+            .judged
+            .iter()
+            .map(|judged| learn(&samples, &contest, judged, &mut |_| {}))
+            .collect();
         (comparison, learnt)
     };
     assert_eq!(judged(1), judged(3));
@@ -215,17 +333,27 @@ fn training_is_the_same_on_one_thread_and_on_three() {
 fn joint_curves_find_waves_that_no_other_rival_can_see() {
     let tool = sr210d();
     let (training, unseen) = (waves(300, &tool, 20e-6, 1), waves(300, &tool, 20e-6, 2));
-    let cheap = Recipe { generations: 5, iterations: 60, ..recipe(6) };
+    let cheap = Recipe {
+        generations: 5,
+        iterations: 60,
+        ..recipe(6)
+    };
     let contest = contest(Some(&tool), &ALL, &cheap, 4);
     let comparison = compare(&training, &contest, &|_, _| {});
     let before = mean_error(&unseen, None);
     let best = &comparison.judged[comparison.chosen];
     assert_eq!(best.rival, Some(Rival::Curves));
-    assert!(ALL.iter().all(|rival| *rival == Rival::Curves || error(&comparison, *rival) > 1.2 * best.mean()));
+    assert!(
+        ALL.iter()
+            .all(|rival| *rival == Rival::Curves || error(&comparison, *rival) > 1.2 * best.mean())
+    );
     let (correction, _) = learn(&training, &contest, best, &mut |_| {}).unwrap();
     let after = mean_error(&unseen, Some(&correction));
     // Noise alone is 1.596 * 20 um.
-    assert!(after > 30e-6 && after < 45e-6 && after < 0.3 * before, "{before} {after}");
+    assert!(
+        after > 30e-6 && after < 45e-6 && after < 0.3 * before,
+        "{before} {after}"
+    );
     // What is stated of it is what is left.
     let spread = correction.at(&unseen.sources[0]).spread.unwrap();
     assert!((15e-6..35e-6).contains(&spread), "{spread}");
@@ -237,16 +365,27 @@ fn a_joint_curve_does_not_swing_where_no_row_was_and_says_its_doubt() {
     let tool = sr210d();
     let in_gap = |q: &[f64]| q[0].abs() < 0.35;
     let (all, unseen) = (waves(900, &tool, 20e-6, 3), waves(600, &tool, 20e-6, 4));
-    let visited: Vec<usize> = (0..all.rows()).filter(|row| !in_gap(&all.sources[*row])).collect();
+    let visited: Vec<usize> = (0..all.rows())
+        .filter(|row| !in_gap(&all.sources[*row]))
+        .collect();
     let training = all.pick(&visited);
     let contest = contest(Some(&tool), &[Rival::Curves], &recipe(6), 4);
     let comparison = compare(&training, &contest, &|_, _| {});
-    let (correction, _) = learn(&training, &contest, &comparison.judged[comparison.chosen], &mut |_| {}).unwrap();
+    let (correction, _) = learn(
+        &training,
+        &contest,
+        &comparison.judged[comparison.chosen],
+        &mut |_| {},
+    )
+    .unwrap();
     let length = |v: [f64; 3]| v.iter().map(|v| v * v).sum::<f64>().sqrt();
-    let (mut largest, mut spread, mut covered, mut rows) = ([0.0f64; 2], [0.0; 2], [0.0; 2], [0.0; 2]);
+    let (mut largest, mut spread, mut covered, mut rows) =
+        ([0.0f64; 2], [0.0; 2], [0.0; 2], [0.0; 2]);
     for (q, residual) in unseen.sources.iter().zip(&unseen.residual) {
         let (applied, at) = (correction.at(q), usize::from(in_gap(q)));
-        let Some(doubt) = applied.spread else { continue };
+        let Some(doubt) = applied.spread else {
+            continue;
+        };
         let left = std::array::from_fn(|k| residual[k] - applied.delta[k]);
         largest[at] = largest[at].max(length(applied.delta));
         spread[at] += doubt;
@@ -256,7 +395,9 @@ fn a_joint_curve_does_not_swing_where_no_row_was_and_says_its_doubt() {
     }
     let mean = |sums: [f64; 2]| [sums[0] / rows[0], sums[1] / rows[1]];
     let (spread, covered) = (mean(spread), mean(covered));
-    println!("beside and in the gap: largest {largest:?} m, spread {spread:?} m, within 95 % {covered:.3?} of {rows:?} rows");
+    println!(
+        "beside and in the gap: largest {largest:?} m, spread {spread:?} m, within 95 % {covered:.3?} of {rows:?} rows"
+    );
     assert!(rows[0] > 200.0 && rows[1] > 50.0, "{rows:?}");
     assert!(largest[1] < 1.2 * largest[0], "{largest:?}");
     assert!(spread[1] > spread[0], "{spread:?}");
@@ -271,15 +412,27 @@ fn a_network_of_joint_motions_learns_what_joints_do_better_than_one_of_displacem
         let mut samples = waves(rows, &tool, 20e-6, seed);
         for (q, r) in samples.sources.iter().zip(&mut samples.residual) {
             let stance = tool.stance(q);
-            let moved = stance.turn(1) * (0.4e-3 * (q[1] + q[2]).cos()) + stance.turn(4) * (1e-3 * q[4].sin() * q[3].cos());
+            let moved = stance.turn(1) * (0.4e-3 * (q[1] + q[2]).cos())
+                + stance.turn(4) * (1e-3 * q[4].sin() * q[3].cos());
             *r = std::array::from_fn(|k| r[k] + moved[k]);
         }
         samples
     };
     let (training, unseen) = (slow(200, 11), slow(300, 12));
-    let cheap = Recipe { generations: 5, iterations: 100, ..recipe(6) };
+    let cheap = Recipe {
+        generations: 5,
+        iterations: 100,
+        ..recipe(6)
+    };
     let left = |through: Option<ScrewArm>| {
-        let (correction, _) = train(&training, &Recipe { through, ..cheap.clone() }, &mut |_| {});
+        let (correction, _) = train(
+            &training,
+            &Recipe {
+                through,
+                ..cheap.clone()
+            },
+            &mut |_| {},
+        );
         mean_error(&unseen, Some(&correction)) / mean_error(&unseen, None)
     };
     let (point, joints) = (left(None), left(Some(tool.clone())));
@@ -289,18 +442,46 @@ fn a_network_of_joint_motions_learns_what_joints_do_better_than_one_of_displacem
 
 #[test]
 fn the_judge_keeps_what_helps_and_refuses_what_was_learnt_from_noise() {
-    let cheap = Recipe { generations: 5, members: 2, iterations: 60, ..recipe(6) };
+    let cheap = Recipe {
+        generations: 5,
+        members: 2,
+        iterations: 60,
+        ..recipe(6)
+    };
     let tool = sr210d();
-    let smooth = compare(&arm(150, 1.0, 0.2e-3, 4), &contest(Some(&tool), &ALL, &cheap, 5), &|_, _| {});
+    let smooth = compare(
+        &arm(150, 1.0, 0.2e-3, 4),
+        &contest(Some(&tool), &ALL, &cheap, 5),
+        &|_, _| {},
+    );
     let best = &smooth.judged[smooth.chosen];
-    assert!(best.helps() && best.mean() < 0.8 * smooth.judged[0].mean(), "{smooth:?}");
+    assert!(
+        best.helps() && best.mean() < 0.8 * smooth.judged[0].mean(),
+        "{smooth:?}"
+    );
     let refused = (0..20).filter(|seed| {
-        let recipe = Recipe { seed: *seed, ..cheap.clone() };
-        let rivals = [Rival::Ridge, Rival::Process, Rival::Network(TrainingStart::Random)];
-        compare(&arm(120, 0.0, 0.5e-3, 200 + seed), &contest(None, &rivals, &recipe, 4), &|_, _| {}).chosen == 0
+        let recipe = Recipe {
+            seed: *seed,
+            ..cheap.clone()
+        };
+        let rivals = [
+            Rival::Ridge,
+            Rival::Process,
+            Rival::Network(TrainingStart::Random),
+        ];
+        compare(
+            &arm(120, 0.0, 0.5e-3, 200 + seed),
+            &contest(None, &rivals, &recipe, 4),
+            &|_, _| {},
+        )
+        .chosen
+            == 0
     });
     let refused = refused.count();
-    assert!(refused >= 18, "useless corrections pass: {refused} of 20 refused");
+    assert!(
+        refused >= 18,
+        "useless corrections pass: {refused} of 20 refused"
+    );
 }
 
 /// A recording that goes through its poses once for each of three targets: what each pose adds is the same for all of them.
@@ -311,11 +492,27 @@ fn targets_of_one_pose_do_not_vouch_for_each_other() {
     let mut thrice = TrainingSamples::default();
     for _target in 0..3 {
         thrice.sources.extend(once.sources.iter().cloned());
-        thrice.residual.extend(once.residual.iter().map(|r| r.map(|value| value + 0.02e-3 * normal(&mut rng))));
+        thrice.residual.extend(
+            once.residual
+                .iter()
+                .map(|r| r.map(|value| value + 0.02e-3 * normal(&mut rng))),
+        );
     }
-    assert_eq!(thrice.poses(), (0..180).map(|row| row % 60).collect::<Vec<_>>());
-    let cheap = Recipe { generations: 5, members: 2, iterations: 60, ..recipe(6) };
-    let comparison = compare(&thrice, &contest(None, &[Rival::Ridge, Rival::Process], &cheap, 5), &|_, _| {});
+    assert_eq!(
+        thrice.poses(),
+        (0..180).map(|row| row % 60).collect::<Vec<_>>()
+    );
+    let cheap = Recipe {
+        generations: 5,
+        members: 2,
+        iterations: 60,
+        ..recipe(6)
+    };
+    let comparison = compare(
+        &thrice,
+        &contest(None, &[Rival::Ridge, Rival::Process], &cheap, 5),
+        &|_, _| {},
+    );
     assert_eq!(comparison.chosen, 0, "nothing carries over to another pose");
     // Of rows that share a pose with trained ones a Gaussian process leaves next to nothing.
     assert!(error(&comparison, Rival::Process) > 0.8 * comparison.judged[0].mean());
@@ -336,14 +533,22 @@ fn outside_the_range_it_saw_the_correction_fades_to_nothing() {
     for step in 1..=20 {
         q[1] = range.upper + margin * f64::from(step) / 20.0;
         let now = correction.at(&q);
-        assert!(now.share < last.share && length(now.delta) <= length(last.delta), "step {step}");
+        assert!(
+            now.share < last.share && length(now.delta) <= length(last.delta),
+            "step {step}"
+        );
         // No jump: the smoothstep falls by at most 1.5/20 a step.
         assert!(last.share - now.share < 0.08);
         last = now;
     }
     assert_eq!((last.share, last.delta, last.spread), (0.0, [0.0; 3], None));
     // Every joint within its range, but all at once at their ends: no such posture was seen.
-    let corner: Vec<f64> = correction.region.ranges.iter().map(|range| range.upper).collect();
+    let corner: Vec<f64> = correction
+        .region
+        .ranges
+        .iter()
+        .map(|range| range.upper)
+        .collect();
     assert!(correction.region.jointly.is_some() && correction.at(&corner).share < 1.0);
     q[1] = f64::NAN;
     assert_eq!(correction.at(&q).share, 0.0);
@@ -355,32 +560,67 @@ fn a_correction_comes_back_from_its_table() {
     let prismatic = [true, false, false];
     let mut rng = ChaCha8Rng::seed_from_u64(8);
     let features = features(&prismatic, true, true);
-    let shape = LayerSizes { inputs: features.len(), hidden: 4, outputs: 3, activation: Activation::Tanh };
+    let shape = LayerSizes {
+        inputs: features.len(),
+        hidden: 4,
+        outputs: 3,
+        activation: Activation::Tanh,
+    };
     let mut number = |from: f64, to: f64| rng.random_range(from..to);
-    let mut scaling = || Scaling { mean: number(-1.0, 1.0), scale: number(0.1, 2.0) };
+    let mut scaling = || Scaling {
+        mean: number(-1.0, 1.0),
+        scale: number(0.1, 2.0),
+    };
     let dress = NetworkScaling {
         inputs: features.iter().map(|_| scaling()).collect(),
         outputs: [scaling(), scaling(), scaling()],
         features,
     };
     assert_eq!(dress.features.len(), 6);
-    let members = (0..3).map(|_| (0..shape.parameters()).map(|_| number(-3.0, 3.0)).collect()).collect();
-    let sources: Vec<Vec<f64>> = (0..40).map(|_| (0..4).map(|_| number(-1.5, 1.5)).collect()).collect();
+    let members = (0..3)
+        .map(|_| (0..shape.parameters()).map(|_| number(-3.0, 3.0)).collect())
+        .collect();
+    let sources: Vec<Vec<f64>> = (0..40)
+        .map(|_| (0..4).map(|_| number(-1.5, 1.5)).collect())
+        .collect();
     let region = Region::of(&sources, 3);
-    let correction = Correction { body: Body::Networks(dress, Networks { shape, joints: None, members }), region, left: 1e-4 };
+    let correction = Correction {
+        body: Body::Networks(
+            dress,
+            Networks {
+                shape,
+                joints: None,
+                members,
+            },
+        ),
+        region,
+        left: 1e-4,
+    };
     let table = Network::of(&correction, &prismatic);
-    let back = Network::from_frame(&table.to_frame().unwrap()).unwrap().correction(&prismatic).unwrap().unwrap();
+    let back = Network::from_frame(&table.to_frame().unwrap())
+        .unwrap()
+        .correction(&prismatic)
+        .unwrap()
+        .unwrap();
     for _ in 0..100 {
         let q: Vec<f64> = (0..4).map(|_| number(-2.5, 2.5)).collect();
         let (there, here) = (correction.at(&q), back.at(&q));
         // mm and m differ in the last bit only.
-        assert!((0..3).all(|k| (there.delta[k] - here.delta[k]).abs() <= 1e-12), "{there:?} {here:?}");
-        assert!((there.share - here.share).abs() < 1e-12 && there.spread.is_some() == here.spread.is_some());
+        assert!(
+            (0..3).all(|k| (there.delta[k] - here.delta[k]).abs() <= 1e-12),
+            "{there:?} {here:?}"
+        );
+        assert!(
+            (there.share - here.share).abs() < 1e-12
+                && there.spread.is_some() == here.spread.is_some()
+        );
     }
     let empty = Network::from_frame(&Network(Vec::new()).to_frame().unwrap()).unwrap();
     assert!(empty.correction(&prismatic).unwrap().is_none());
     let mut holed = table;
-    holed.0.retain(|row| !(row.member == 2 && row.part == "bias" && row.layer == 1 && row.to == 3));
+    holed
+        .0
+        .retain(|row| !(row.member == 2 && row.part == "bias" && row.layer == 1 && row.to == 3));
     let message = holed.correction(&prismatic).unwrap_err().to_string();
     assert!(message.contains("bias"), "{message}");
 }
@@ -389,20 +629,37 @@ fn a_correction_comes_back_from_its_table() {
 fn every_kind_of_correction_comes_back_from_its_table() {
     let tool = sr210d();
     let samples = waves(120, &tool, 50e-6, 7);
-    let cheap = Recipe { generations: 3, iterations: 20, ..recipe(6) };
+    let cheap = Recipe {
+        generations: 3,
+        iterations: 20,
+        ..recipe(6)
+    };
     let contest = contest(Some(&tool), &ALL, &cheap, 2);
     let comparison = compare(&samples, &contest, &|_, _| {});
     for judged in &comparison.judged[1..] {
         let (correction, _) = learn(&samples, &contest, judged, &mut |_| {}).unwrap();
         let table = Network::of(&correction, &[false; 6]);
-        let back = Network::from_frame(&table.to_frame().unwrap()).unwrap().correction(&[false; 6]).unwrap().unwrap();
+        let back = Network::from_frame(&table.to_frame().unwrap())
+            .unwrap()
+            .correction(&[false; 6])
+            .unwrap()
+            .unwrap();
         for q in &samples.sources {
             let (there, here) = (correction.at(q), back.at(q));
             let near = |a: f64, b: f64| (a - b).abs() < 1e-12;
-            assert!((0..3).all(|k| near(there.delta[k], here.delta[k])) && near(there.spread.unwrap(), here.spread.unwrap()));
+            assert!(
+                (0..3).all(|k| near(there.delta[k], here.delta[k]))
+                    && near(there.spread.unwrap(), here.spread.unwrap())
+            );
         }
         let mut twice = table.clone();
         twice.0.push(table.0[0].clone());
-        assert!(twice.correction(&[false; 6]).unwrap_err().to_string().contains("twice"));
+        assert!(
+            twice
+                .correction(&[false; 6])
+                .unwrap_err()
+                .to_string()
+                .contains("twice")
+        );
     }
 }

@@ -9,12 +9,20 @@ fn root() -> &'static Path {
 }
 
 fn output(arguments: &[&str], folder: &Path) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_calib")).args(arguments).current_dir(folder).output().expect("calib")
+    Command::new(env!("CARGO_BIN_EXE_calib"))
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .expect("calib")
 }
 
 fn calib(arguments: &[&str], folder: &Path) -> String {
     let output = output(arguments, folder);
-    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    assert!(
+        output.status.success(),
+        "{arguments:?}: {}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     String::from_utf8(output.stdout).expect("UTF-8")
 }
 
@@ -24,15 +32,30 @@ fn diagnosed(arguments: &[&str], folder: &Path) -> Value {
 
 /// Findings as `effect at place`.
 fn found(said: &Value) -> Vec<String> {
-    let one = |finding: &Value| format!("{} at {}", finding["effect"].as_str().unwrap(), finding["where"].as_str().unwrap());
-    said["findings"].as_array().expect("findings").iter().map(one).collect()
+    let one = |finding: &Value| {
+        format!(
+            "{} at {}",
+            finding["effect"].as_str().unwrap(),
+            finding["where"].as_str().unwrap()
+        )
+    };
+    said["findings"]
+        .as_array()
+        .expect("findings")
+        .iter()
+        .map(one)
+        .collect()
 }
 
 /// The pipeline of cases without its reports, with an effect of one's own.
 fn pipeline(folder: &Path, effect: &str) {
-    let text = std::fs::read_to_string(root().join("pipelines/case/pipeline.yaml")).expect("a pipeline");
+    let text =
+        std::fs::read_to_string(root().join("pipelines/case/pipeline.yaml")).expect("a pipeline");
     let (head, _) = text.split_once("  - uses: validate").expect("its end");
-    let text = head.replace("  - uses: diagnose\n", &format!("  - uses: diagnose\n    with: {{effects: [{effect}]}}\n"));
+    let text = head.replace(
+        "  - uses: diagnose\n",
+        &format!("  - uses: diagnose\n    with: {{effects: [{effect}]}}\n"),
+    );
     assert!(text.contains(effect));
     std::fs::write(folder.join("p.yaml"), text).expect("written");
 }
@@ -55,58 +78,144 @@ fn bumps(folder: &Path) -> Vec<(String, String)> {
         "--natural",
         "1",
     ];
-    calib(&[&["simulate", "conceal", "--out", "sealed"], &cases[..]].concat(), folder);
-    let mut sealed: Vec<PathBuf> =
-        std::fs::read_dir(folder.join("sealed/sealed")).expect("the truth").map(|file| file.expect("a file").path()).collect();
+    calib(
+        &[&["simulate", "conceal", "--out", "sealed"], &cases[..]].concat(),
+        folder,
+    );
+    let mut sealed: Vec<PathBuf> = std::fs::read_dir(folder.join("sealed/sealed"))
+        .expect("the truth")
+        .map(|file| file.expect("a file").path())
+        .collect();
     sealed.sort();
-    let truth = |file: &PathBuf| -> Value { serde_json::from_str(&std::fs::read_to_string(file).unwrap()).expect("JSON") };
-    let name = |file: &PathBuf| file.file_stem().expect("a name").to_string_lossy().into_owned();
-    let place = |truth: &Value| truth["want"][0]["where"].as_str().expect("a place").to_string();
-    let of_bumps =
-        sealed.iter().map(|file| (name(file), truth(file))).filter(|(_, truth)| truth.to_string().contains("\"bump\""));
-    of_bumps.map(|(name, truth)| (name, place(&truth))).collect()
+    let truth = |file: &PathBuf| -> Value {
+        serde_json::from_str(&std::fs::read_to_string(file).unwrap()).expect("JSON")
+    };
+    let name = |file: &PathBuf| {
+        file.file_stem()
+            .expect("a name")
+            .to_string_lossy()
+            .into_owned()
+    };
+    let place = |truth: &Value| {
+        truth["want"][0]["where"]
+            .as_str()
+            .expect("a place")
+            .to_string()
+    };
+    let of_bumps = sealed
+        .iter()
+        .map(|file| (name(file), truth(file)))
+        .filter(|(_, truth)| truth.to_string().contains("\"bump\""));
+    of_bumps
+        .map(|(name, truth)| (name, place(&truth)))
+        .collect()
 }
 
 #[test]
 fn an_effect_of_ones_own_is_found_at_its_joint_and_stays_with_its_run() {
     let folder = tempfile::tempdir().expect("a folder");
     let here = folder.path();
-    std::fs::copy(root().join("pipelines/case/effects/worn_tooth.yaml"), here.join("worn_tooth.yaml")).expect("a copy");
+    std::fs::copy(
+        root().join("pipelines/case/effects/worn_tooth.yaml"),
+        here.join("worn_tooth.yaml"),
+    )
+    .expect("a copy");
     pipeline(here, "worn_tooth.yaml");
     let bumps = bumps(here);
     assert_eq!(bumps.len(), 3, "{bumps:?}");
     let case = |name: &str| format!("case=sealed/recordings/{name}");
     for (name, place) in &bumps {
-        let said = diagnosed(&["diagnose", "p.yaml", "--json", "--quiet", "--set", &case(name)], here);
-        assert_eq!(found(&said), [format!("worn_tooth at {place}")], "{name}: {said:#}");
-        let statement = said["findings"][0]["statement"].as_str().expect("a sentence");
-        assert!(statement.starts_with(&format!("a tooth of {place} is worn near ")), "{statement}");
+        let said = diagnosed(
+            &[
+                "diagnose",
+                "p.yaml",
+                "--json",
+                "--quiet",
+                "--set",
+                &case(name),
+            ],
+            here,
+        );
+        assert_eq!(
+            found(&said),
+            [format!("worn_tooth at {place}")],
+            "{name}: {said:#}"
+        );
+        let statement = said["findings"][0]["statement"]
+            .as_str()
+            .expect("a sentence");
+        assert!(
+            statement.starts_with(&format!("a tooth of {place} is worn near ")),
+            "{statement}"
+        );
         assert_eq!(said["findings"][0]["parameters"][0]["unit"], "arcsec");
     }
 
     // From the store, and without the file.
     let set = ["--set", &case(&bumps[0].0)];
     calib(&[&["run", "p.yaml", "--quiet"], &set[..]].concat(), here);
-    let again: Value = serde_json::from_str(&calib(&[&["run", "p.yaml", "--quiet", "--json"], &set[..]].concat(), here)).unwrap();
-    assert!(again["stages"].as_array().expect("stages").iter().all(|stage| stage["status"] == "cached"), "{again:#}");
+    let again: Value = serde_json::from_str(&calib(
+        &[&["run", "p.yaml", "--quiet", "--json"], &set[..]].concat(),
+        here,
+    ))
+    .unwrap();
+    assert!(
+        again["stages"]
+            .as_array()
+            .expect("stages")
+            .iter()
+            .all(|stage| stage["status"] == "cached"),
+        "{again:#}"
+    );
     let targets = "name,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\na,10,-100,20,5,30,0\nb,-20,-70,40,15,-25,60\n";
     std::fs::write(here.join("targets.csv"), targets).expect("written");
     let corrected = || calib(&["compensate", "HEAD", "targets.csv"], here);
     let with_the_file = corrected();
-    assert_ne!(with_the_file, calib(&["compensate", "HEAD", "--step", "geometry", "targets.csv"], here));
+    assert_ne!(
+        with_the_file,
+        calib(
+            &["compensate", "HEAD", "--step", "geometry", "targets.csv"],
+            here
+        )
+    );
     std::fs::remove_file(here.join("worn_tooth.yaml")).expect("gone");
     assert_eq!(corrected(), with_the_file);
-    assert_eq!(found(&diagnosed(&["diagnose", "HEAD", "--json"], here)), [format!("worn_tooth at {}", bumps[0].1)]);
+    assert_eq!(
+        found(&diagnosed(&["diagnose", "HEAD", "--json"], here)),
+        [format!("worn_tooth at {}", bumps[0].1)]
+    );
     calib(&["diff", "HEAD~1", "HEAD"], here);
-    for verb in [&["show", "HEAD"][..], &["log"], &["export", "HEAD", "--format", "json"], &["verify"]] {
+    for verb in [
+        &["show", "HEAD"][..],
+        &["log"],
+        &["export", "HEAD", "--format", "json"],
+        &["verify"],
+    ] {
         calib(verb, here);
     }
     // The law as it stood is part of what decides whether a run is the same.
-    let law = std::fs::read_to_string(root().join("pipelines/case/effects/worn_tooth.yaml")).expect("it");
-    std::fs::write(here.join("worn_tooth.yaml"), law.replace("to: 1.2", "to: 1.1")).expect("written");
-    let other: Value = serde_json::from_str(&calib(&[&["run", "p.yaml", "--quiet", "--json"], &set[..]].concat(), here)).unwrap();
-    let computed: Vec<&Value> = other["stages"].as_array().unwrap().iter().filter(|stage| stage["status"] != "cached").collect();
-    assert!(computed.len() == 1 && computed[0]["id"] == "diagnose", "{other:#}");
+    let law =
+        std::fs::read_to_string(root().join("pipelines/case/effects/worn_tooth.yaml")).expect("it");
+    std::fs::write(
+        here.join("worn_tooth.yaml"),
+        law.replace("to: 1.2", "to: 1.1"),
+    )
+    .expect("written");
+    let other: Value = serde_json::from_str(&calib(
+        &[&["run", "p.yaml", "--quiet", "--json"], &set[..]].concat(),
+        here,
+    ))
+    .unwrap();
+    let computed: Vec<&Value> = other["stages"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(|stage| stage["status"] != "cached")
+        .collect();
+    assert!(
+        computed.len() == 1 && computed[0]["id"] == "diagnose",
+        "{other:#}"
+    );
 }
 
 /// What a diagnosis has no name for gets a formula; that one, declared, is the name in the next recording.
@@ -117,44 +226,117 @@ fn a_formula_of_an_unknown_is_found_by_its_name_in_the_next_recording() {
     pipeline(here, "");
     let bumps = bumps(here);
     let case = |name: &str| format!("case=sealed/recordings/{name}");
-    let said = diagnosed(&["diagnose", "p.yaml", "--json", "--quiet", "--set", &case(&bumps[2].0)], here);
+    let said = diagnosed(
+        &[
+            "diagnose",
+            "p.yaml",
+            "--json",
+            "--quiet",
+            "--set",
+            &case(&bumps[2].0),
+        ],
+        here,
+    );
     let finding = &said["findings"][0];
     assert_eq!(finding["where"], bumps[2].1.as_str(), "{said:#}");
     let forms = finding["forms"].as_array().expect("formulas");
     assert!((1..=3).contains(&forms.len()), "{finding:#}");
-    let proposed: Vec<&Value> = forms.iter().filter(|form| form["proposed"] == true).collect();
-    let [proposed] = proposed[..] else { panic!("{forms:#?}") };
-    assert_eq!(proposed["formula"], "exp(-((q - centre) / width)^2)", "{forms:#?}");
+    let proposed: Vec<&Value> = forms
+        .iter()
+        .filter(|form| form["proposed"] == true)
+        .collect();
+    let [proposed] = proposed[..] else {
+        panic!("{forms:#?}")
+    };
+    assert_eq!(
+        proposed["formula"], "exp(-((q - centre) / width)^2)",
+        "{forms:#?}"
+    );
     let number = |name: &str| {
         let of = |key: &str| {
-            let number = proposed["numbers"].as_array().unwrap().iter().find(|number| number["name"] == name).expect(name);
+            let number = proposed["numbers"]
+                .as_array()
+                .unwrap()
+                .iter()
+                .find(|number| number["name"] == name)
+                .expect(name);
             number[key].as_f64().expect("a number")
         };
         [of("value"), of("sigma")]
     };
     // The twin's own: -41 deg, 34 deg.
-    let truth = std::fs::read_to_string(here.join(format!("sealed/sealed/{}.json", bumps[2].0))).expect("the truth");
+    let truth = std::fs::read_to_string(here.join(format!("sealed/sealed/{}.json", bumps[2].0)))
+        .expect("the truth");
     let truth: Value = serde_json::from_str(&truth).expect("JSON");
     let bump = &truth["effects"][0]["physical"][0]["joint_bump"];
     for (name, key) in [("centre", "centre_deg"), ("width", "width_deg")] {
-        let ([value, sigma], expected) = (number(name), bump[key].as_f64().expect("degrees").to_radians());
-        assert!((value - expected).abs() < 4.0 * sigma && sigma < 0.1, "{name}: {value} +- {sigma}, truth {expected}");
+        let ([value, sigma], expected) = (
+            number(name),
+            bump[key].as_f64().expect("degrees").to_radians(),
+        );
+        assert!(
+            (value - expected).abs() < 4.0 * sigma && sigma < 0.1,
+            "{name}: {value} +- {sigma}, truth {expected}"
+        );
     }
-    let prices: Vec<(i64, f64)> =
-        forms.iter().map(|form| (form["price"].as_i64().unwrap(), form["folds_rms_mm"].as_f64().unwrap())).collect();
-    assert!(prices.windows(2).all(|pair| pair[0].0 < pair[1].0 && pair[0].1 > pair[1].1), "{prices:?}");
+    let prices: Vec<(i64, f64)> = forms
+        .iter()
+        .map(|form| {
+            (
+                form["price"].as_i64().unwrap(),
+                form["folds_rms_mm"].as_f64().unwrap(),
+            )
+        })
+        .collect();
+    assert!(
+        prices
+            .windows(2)
+            .all(|pair| pair[0].0 < pair[1].0 && pair[0].1 > pair[1].1),
+        "{prices:?}"
+    );
 
     let set = case(&bumps[2].0);
-    let export = ["diagnose", "p.yaml", "--quiet", "--set", &set, "--export-effect", "mine.yaml"];
+    let export = [
+        "diagnose",
+        "p.yaml",
+        "--quiet",
+        "--set",
+        &set,
+        "--export-effect",
+        "mine.yaml",
+    ];
     calib(&export, here);
     let refused = output(&export, here);
-    assert_eq!(refused.status.code(), Some(2), "{}", String::from_utf8_lossy(&refused.stderr));
+    assert_eq!(
+        refused.status.code(),
+        Some(2),
+        "{}",
+        String::from_utf8_lossy(&refused.stderr)
+    );
     let text = std::fs::read_to_string(here.join("mine.yaml")).expect("a file");
-    std::fs::write(here.join("mine.yaml"), text.replace("bump_of_q", "soft_spot")).expect("written");
+    std::fs::write(
+        here.join("mine.yaml"),
+        text.replace("bump_of_q", "soft_spot"),
+    )
+    .expect("written");
     pipeline(here, "mine.yaml");
     for (name, place) in &bumps {
-        let said = diagnosed(&["diagnose", "p.yaml", "--json", "--quiet", "--set", &case(name)], here);
-        assert_eq!(found(&said)[0], format!("soft_spot at {place}"), "{name}: {said:#}");
+        let said = diagnosed(
+            &[
+                "diagnose",
+                "p.yaml",
+                "--json",
+                "--quiet",
+                "--set",
+                &case(name),
+            ],
+            here,
+        );
+        assert_eq!(
+            found(&said)[0],
+            format!("soft_spot at {place}"),
+            "{name}: {said:#}"
+        );
     }
 }
 
@@ -162,17 +344,43 @@ fn a_formula_of_an_unknown_is_found_by_its_name_in_the_next_recording() {
 fn a_fleet_finds_an_effect_of_ones_own() {
     let folder = tempfile::tempdir().expect("a folder");
     let here = folder.path();
-    std::fs::copy(root().join("pipelines/case/effects/worn_tooth.yaml"), here.join("worn_tooth.yaml")).expect("a copy");
+    std::fs::copy(
+        root().join("pipelines/case/effects/worn_tooth.yaml"),
+        here.join("worn_tooth.yaml"),
+    )
+    .expect("a copy");
     pipeline(here, "worn_tooth.yaml");
     let bumps = bumps(here);
-    let robots: Vec<String> = bumps.iter().map(|(name, _)| format!("  - folders: sealed/recordings/{name}\n")).collect();
-    std::fs::write(here.join("f.yaml"), format!("calib: 1\nname: line\npipeline: p.yaml\nrobots:\n{}", robots.concat())).unwrap();
-    let said: Value = serde_json::from_str(&calib(&["fleet", "run", "f.yaml", "--json", "--quiet"], here)).expect("JSON");
+    let robots: Vec<String> = bumps
+        .iter()
+        .map(|(name, _)| format!("  - folders: sealed/recordings/{name}\n"))
+        .collect();
+    std::fs::write(
+        here.join("f.yaml"),
+        format!(
+            "calib: 1\nname: line\npipeline: p.yaml\nrobots:\n{}",
+            robots.concat()
+        ),
+    )
+    .unwrap();
+    let said: Value = serde_json::from_str(&calib(
+        &["fleet", "run", "f.yaml", "--json", "--quiet"],
+        here,
+    ))
+    .expect("JSON");
     assert_eq!(said["done"], 3, "{said:#}");
     for ((name, place), robot) in bumps.iter().zip(said["robots"].as_array().expect("robots")) {
-        assert!(robot.to_string().contains(&format!("worn_tooth at {place}")), "{name}: {robot:#}");
+        assert!(
+            robot
+                .to_string()
+                .contains(&format!("worn_tooth at {place}")),
+            "{name}: {robot:#}"
+        );
     }
-    assert_eq!(diagnosed(&["fleet", "run", "f.yaml", "--json", "--quiet"], here)["computed"], 0);
+    assert_eq!(
+        diagnosed(&["fleet", "run", "f.yaml", "--json", "--quiet"], here)["computed"],
+        0
+    );
 }
 
 /// The same law under a name of the library's and under one's own: declared, it is found where the library may not look for it.
@@ -190,11 +398,40 @@ unit: arcsec
 ";
     std::fs::write(here.join("late_zero.yaml"), declared).expect("written");
     pipeline(here, "late_zero.yaml], without: [zero_shift");
-    let arguments = ["simulate", "conceal", "--out", "sealed", "--cases", "1", "--seed", "923", "--points", "120"];
-    calib(&[&arguments[..], &["--family", "zero_shift", "--robot", "compact6", "--faulty", "0"]].concat(), here);
-    let truth: Value =
-        serde_json::from_str(&std::fs::read_to_string(here.join("sealed/sealed/c0001.json")).unwrap()).expect("JSON");
-    let said = diagnosed(&["diagnose", "p.yaml", "--json", "--quiet", "--set", "case=sealed/recordings/c0001"], here);
+    let arguments = [
+        "simulate", "conceal", "--out", "sealed", "--cases", "1", "--seed", "923", "--points",
+        "120",
+    ];
+    calib(
+        &[
+            &arguments[..],
+            &[
+                "--family",
+                "zero_shift",
+                "--robot",
+                "compact6",
+                "--faulty",
+                "0",
+            ],
+        ]
+        .concat(),
+        here,
+    );
+    let truth: Value = serde_json::from_str(
+        &std::fs::read_to_string(here.join("sealed/sealed/c0001.json")).unwrap(),
+    )
+    .expect("JSON");
+    let said = diagnosed(
+        &[
+            "diagnose",
+            "p.yaml",
+            "--json",
+            "--quiet",
+            "--set",
+            "case=sealed/recordings/c0001",
+        ],
+        here,
+    );
     let place = truth["want"][0]["where"].as_str().expect("a place");
     assert_eq!(found(&said), [format!("late_zero at {place}")], "{said:#}");
 }

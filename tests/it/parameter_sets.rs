@@ -4,7 +4,9 @@ use crate::desk::{Desk, table};
 use crate::fixture;
 use crate::identify::{GEOMETRY, model, recording};
 use crate::sr210d::experiment;
-use calib::estimate::{Bounds, CONFLICT, FitOptions, Fitted, Known, Model, ParameterStatus, Prior, align, fit};
+use calib::estimate::{
+    Bounds, CONFLICT, FitOptions, Fitted, Known, Model, ParameterStatus, Prior, align, fit,
+};
 use calib::robot::{Measurements, RobotModel};
 use calib::stage::{Identify, IdentifyReads, Stage};
 use calib::table::{ParameterRow, Parameters};
@@ -23,33 +25,57 @@ fn case(seed: usize) -> Case {
     let (data, truth) = recording(&description, &effects, 100, seed);
     let robot = RobotModel::new(description);
     let base = align(&robot, &data, &(0..100).collect::<Vec<_>>());
-    Case { start: model(&robot, base, &effects), data, truth }
+    Case {
+        start: model(&robot, base, &effects),
+        data,
+        truth,
+    }
 }
 
 impl Case {
     fn position(&self, name: &str) -> usize {
-        self.start.stack.specs().iter().position(|spec| spec.name == name).expect("a parameter of this robot")
+        self.start
+            .stack
+            .specs()
+            .iter()
+            .position(|spec| spec.name == name)
+            .expect("a parameter of this robot")
     }
     fn fit(&mut self, known: &[(usize, Known)], fixed: &[(usize, f64)]) -> (Vec<f64>, Fitted) {
         let rows: Vec<usize> = (0..self.data.rows()).collect();
         let count = self.start.x.len();
-        let candidates: Vec<usize> = (0..count).filter(|k| fixed.iter().all(|(other, _)| other != k)).collect();
+        let candidates: Vec<usize> = (0..count)
+            .filter(|k| fixed.iter().all(|(other, _)| other != k))
+            .collect();
         self.start.x = vec![0.0; count];
         for (k, value) in fixed {
             self.start.x[*k] = *value;
         }
         self.start.known = known.iter().copied().collect();
-        let (model, fitted) = fit(&self.start, &self.data, &FitOptions { rows: &rows, candidates: &candidates });
+        let (model, fitted) = fit(
+            &self.start,
+            &self.data,
+            &FitOptions {
+                rows: &rows,
+                candidates: &candidates,
+            },
+        );
         (model.x, fitted)
     }
 }
 
 fn between(low: f64, high: f64) -> Known {
-    Known { bounds: Some(Bounds { low, high }), prior: None }
+    Known {
+        bounds: Some(Bounds { low, high }),
+        prior: None,
+    }
 }
 
 fn about(mean: f64, sigma: f64) -> Known {
-    Known { prior: Some(Prior { mean, sigma }), bounds: None }
+    Known {
+        prior: Some(Prior { mean, sigma }),
+        bounds: None,
+    }
 }
 
 fn close(a: &[f64], b: &[f64], tolerance: f64) {
@@ -64,11 +90,21 @@ fn a_parameter_at_its_bound_leaves_the_others_as_if_it_were_held_there() {
     let k = case.position("reduction_ratio.j2");
     let (free, _) = case.fit(&[], &[]);
     let bound = 0.5 * free[k];
-    let known = if bound > 0.0 { between(-bound, bound) } else { between(bound, -bound) };
+    let known = if bound > 0.0 {
+        between(-bound, bound)
+    } else {
+        between(bound, -bound)
+    };
     let (bounded, fitted) = case.fit(&[(k, known)], &[]);
     assert_eq!(bounded[k], bound);
-    let ParameterStatus::Bound(wanted) = fitted.statuses[k] else { panic!("{:?}", fitted.statuses[k]) };
-    assert!((wanted / free[k] - 1.0).abs() < 0.05, "the data would have {wanted:e}, let go they give {:e}", free[k]);
+    let ParameterStatus::Bound(wanted) = fitted.statuses[k] else {
+        panic!("{:?}", fitted.statuses[k])
+    };
+    assert!(
+        (wanted / free[k] - 1.0).abs() < 0.05,
+        "the data would have {wanted:e}, let go they give {:e}",
+        free[k]
+    );
     let (held, _) = case.fit(&[], &[(k, bound)]);
     // The noise is estimated by two fits: a fiftieth of it may differ.
     close(&bounded, &held, 2e-7);
@@ -83,9 +119,17 @@ fn bounds_that_do_not_bite_change_nothing_and_a_start_on_a_bound_is_left() {
     let (loose, fitted) = case.fit(&wide, &[]);
     close(&free, &loose, 1e-10);
     assert_eq!(fitted.course.len(), plain.course.len());
-    let known = if free[k] > 0.0 { between(0.0, 0.01) } else { between(-0.01, 0.0) };
+    let known = if free[k] > 0.0 {
+        between(0.0, 0.01)
+    } else {
+        between(-0.01, 0.0)
+    };
     let (released, fitted) = case.fit(&[(k, known)], &[]);
-    assert!(matches!(fitted.statuses[k], ParameterStatus::Free(_)), "{:?}", fitted.statuses[k]);
+    assert!(
+        matches!(fitted.statuses[k], ParameterStatus::Free(_)),
+        "{:?}",
+        fitted.statuses[k]
+    );
     close(&free, &released, 1e-8);
 }
 
@@ -93,18 +137,40 @@ fn bounds_that_do_not_bite_change_nothing_and_a_start_on_a_bound_is_left() {
 fn several_bounds_at_once_end_where_no_allowed_step_lowers_the_cost() {
     let mut case = case(43);
     let (free, _) = case.fit(&[], &[]);
-    let ratios: Vec<usize> = (1..=6).map(|j| case.position(&format!("reduction_ratio.j{j}"))).collect();
-    let tight: Vec<(usize, Known)> = ratios.iter().map(|k| (*k, between(-0.3 * free[*k].abs(), 0.3 * free[*k].abs()))).collect();
+    let ratios: Vec<usize> = (1..=6)
+        .map(|j| case.position(&format!("reduction_ratio.j{j}")))
+        .collect();
+    let tight: Vec<(usize, Known)> = ratios
+        .iter()
+        .map(|k| (*k, between(-0.3 * free[*k].abs(), 0.3 * free[*k].abs())))
+        .collect();
     let (bounded, fitted) = case.fit(&tight, &[]);
-    let cost = |fitted: &Fitted| fitted.course.last().map_or(f64::NAN, |iteration| iteration.rms);
-    let stopped: Vec<usize> =
-        ratios.iter().copied().filter(|k| matches!(fitted.statuses[*k], ParameterStatus::Bound(_))).collect();
+    let cost = |fitted: &Fitted| {
+        fitted
+            .course
+            .last()
+            .map_or(f64::NAN, |iteration| iteration.rms)
+    };
+    let stopped: Vec<usize> = ratios
+        .iter()
+        .copied()
+        .filter(|k| matches!(fitted.statuses[*k], ParameterStatus::Bound(_)))
+        .collect();
     assert!(stopped.len() >= 4, "{} of 6 stopped", stopped.len());
     // Each moved inwards and held there, with the other bounds kept: worse every time.
     for k in &stopped {
-        let others: Vec<(usize, Known)> = tight.iter().copied().filter(|(other, _)| other != k).collect();
+        let others: Vec<(usize, Known)> = tight
+            .iter()
+            .copied()
+            .filter(|(other, _)| other != k)
+            .collect();
         let (_, inside) = case.fit(&others, &[(*k, 0.9 * bounded[*k])]);
-        assert!(cost(&inside) >= cost(&fitted) * 0.9999, "{k}: {:e} and {:e}", cost(&inside), cost(&fitted));
+        assert!(
+            cost(&inside) >= cost(&fitted) * 0.9999,
+            "{k}: {:e} and {:e}",
+            cost(&inside),
+            cost(&fitted)
+        );
     }
 }
 
@@ -113,18 +179,30 @@ fn a_prior_and_the_data_meet_where_their_sigmas_say_and_the_data_alone_can_be_to
     let mut case = case(44);
     let k = case.position("reduction_ratio.j4");
     let (free, plain) = case.fit(&[], &[]);
-    let ParameterStatus::Free(sigma) = plain.statuses[k] else { panic!("not free") };
+    let ParameterStatus::Free(sigma) = plain.statuses[k] else {
+        panic!("not free")
+    };
     let (mean, own) = (free[k] + 3.0 * sigma, 0.7 * sigma);
     let (both, fitted) = case.fit(&[(k, about(mean, own))], &[]);
     let weight = |sigma: f64| sigma.powi(-2);
     let expected = (free[k] * weight(sigma) + mean * weight(own)) / (weight(sigma) + weight(own));
-    assert!((both[k] - expected).abs() < 0.02 * sigma, "{:e} for {expected:e}", both[k]);
-    let ParameterStatus::Free(narrow) = fitted.statuses[k] else { panic!("not free") };
+    assert!(
+        (both[k] - expected).abs() < 0.02 * sigma,
+        "{:e} for {expected:e}",
+        both[k]
+    );
+    let ParameterStatus::Free(narrow) = fitted.statuses[k] else {
+        panic!("not free")
+    };
     assert!((narrow / (weight(sigma) + weight(own)).powf(-0.5) - 1.0).abs() < 0.02);
     let prior_check = fitted.prior_checks[&k];
     let (without, spread) = prior_check.without.expect("the data see it");
     assert!((without - free[k]).abs() < 0.05 * sigma && (spread / sigma - 1.0).abs() < 0.03);
-    assert!((prior_check.conflict - 3.0 / f64::hypot(1.0, 0.7)).abs() < 0.05, "{}", prior_check.conflict);
+    assert!(
+        (prior_check.conflict - 3.0 / f64::hypot(1.0, 0.7)).abs() < 0.05,
+        "{}",
+        prior_check.conflict
+    );
 }
 
 #[test]
@@ -146,7 +224,9 @@ fn what_only_a_prior_tells_keeps_its_mean_and_its_sigma() {
     let (_, plain) = case.fit(&[], &[]);
     assert!(matches!(plain.statuses[k], ParameterStatus::Redundant(_)));
     let (x, fitted) = case.fit(&[(k, about(2e-3, 1e-4))], &[]);
-    let ParameterStatus::Free(sigma) = fitted.statuses[k] else { panic!("{:?}", fitted.statuses[k]) };
+    let ParameterStatus::Free(sigma) = fitted.statuses[k] else {
+        panic!("{:?}", fitted.statuses[k])
+    };
     assert!((x[k] - 2e-3).abs() < 1e-8, "{:e}", x[k]);
     assert!((sigma / 1e-4 - 1.0).abs() < 1e-3);
     assert_eq!(fitted.prior_checks[&k].without, None);
@@ -157,18 +237,34 @@ fn stage(settings: serde_json::Value) -> Identify {
 }
 
 fn row<'a>(table: &'a Parameters, name: &str) -> &'a ParameterRow {
-    table.0.iter().find(|row| row.name == name).expect("a parameter")
+    table
+        .0
+        .iter()
+        .find(|row| row.name == name)
+        .expect("a parameter")
 }
 
 #[test]
 fn settings_by_name_are_found_again_in_the_table_and_what_matches_nothing_is_said() {
     let of = experiment("none", 5);
-    let effects = ["base_frame", "tool_offset", "joint_offset", "link_geometry", "reduction_ratio"];
+    let effects = [
+        "base_frame",
+        "tool_offset",
+        "joint_offset",
+        "link_geometry",
+        "reduction_ratio",
+    ];
     let run = |settings: serde_json::Value| {
         let mut all = json!({"on": ["unloaded_fit"], "effects": effects});
-        all.as_object_mut().expect("a map").extend(settings.as_object().cloned().expect("a map"));
+        all.as_object_mut()
+            .expect("a map")
+            .extend(settings.as_object().cloned().expect("a map"));
         let desk = Desk::default();
-        let reads = IdentifyReads { robot: of.robot.clone(), recording: of.recording.clone(), split: of.split.clone() };
+        let reads = IdentifyReads {
+            robot: of.robot.clone(),
+            recording: of.recording.clone(),
+            split: of.split.clone(),
+        };
         let tables = desk.run(&stage(all), reads).expect("identify runs");
         let warnings = desk.warnings.lock().expect("one thread").clone();
         (table::<Parameters>(&tables).remove(0), warnings)
@@ -180,17 +276,48 @@ fn settings_by_name_are_found_again_in_the_table_and_what_matches_nothing_is_sai
         "bounds": {"reduction_ratio.*": [-5e-4, 5e-4], "reduction_ratio.j3": [-1e-2, 1e-2]},
         "prior": {"tool_offset.x": {"sigma": 0.001, "mean": 3}},
     }));
-    assert!(parameters.0.iter().filter(|row| row.effect == "link_geometry").all(|row| row.status == "held"));
+    assert!(
+        parameters
+            .0
+            .iter()
+            .filter(|row| row.effect == "link_geometry")
+            .all(|row| row.status == "held")
+    );
     assert_eq!(row(&parameters, "reduction_ratio.j1").status, "held");
     let stopped = row(&parameters, "reduction_ratio.j2");
-    assert_eq!((stopped.status.as_str(), stopped.value, stopped.sigma), ("bound", 5e-4, None));
-    assert!(stopped.remark.as_deref().is_some_and(|remark| remark.starts_with("stopped by its upper bound")));
-    assert_eq!(row(&parameters, "reduction_ratio.j3").status, "free", "the longer pattern counts");
+    assert_eq!(
+        (stopped.status.as_str(), stopped.value, stopped.sigma),
+        ("bound", 5e-4, None)
+    );
+    assert!(
+        stopped
+            .remark
+            .as_deref()
+            .is_some_and(|remark| remark.starts_with("stopped by its upper bound"))
+    );
+    assert_eq!(
+        row(&parameters, "reduction_ratio.j3").status,
+        "free",
+        "the longer pattern counts"
+    );
     let told = row(&parameters, "tool_offset.x");
     assert!((told.value - 3.0).abs() < 0.5, "in mm: {}", told.value);
-    assert!(told.remark.as_deref().is_some_and(|remark| remark.contains("contradict each other")), "{:?}", told.remark);
-    let said = |text: &str| assert!(warnings.iter().any(|line| line.contains(text)), "`{text}` in {warnings:#?}");
-    said("hold: `reduction_ratio.k2` matches no parameter of this model; did you mean `reduction_ratio.j2`?");
+    assert!(
+        told.remark
+            .as_deref()
+            .is_some_and(|remark| remark.contains("contradict each other")),
+        "{:?}",
+        told.remark
+    );
+    let said = |text: &str| {
+        assert!(
+            warnings.iter().any(|line| line.contains(text)),
+            "`{text}` in {warnings:#?}"
+        )
+    };
+    said(
+        "hold: `reduction_ratio.k2` matches no parameter of this model; did you mean `reduction_ratio.j2`?",
+    );
     said("tool_offset.x: the prior says 3.0000 +- 0.0010 mm, the data say");
 }
 
@@ -203,12 +330,21 @@ fn settings_that_say_nothing_or_something_impossible_are_faults_with_their_place
     }))
     .check();
     let faults: Vec<String> = faults.iter().map(ToString::to_string).collect();
-    let said = |text: &str| assert!(faults.iter().any(|fault| fault.contains(text)), "`{text}` in {faults:#?}");
+    let said = |text: &str| {
+        assert!(
+            faults.iter().any(|fault| fault.contains(text)),
+            "`{text}` in {faults:#?}"
+        )
+    };
     assert_eq!(faults.len(), 4, "{faults:#?}");
     said("free: `reduction_ration.j2` names no effect; did you mean `reduction_ratio`?");
     said("prior.joint_offset.j2: expected a sigma above zero");
     said("prior.base_frame.x: where the robot stands");
     said("bounds.link_geometry.*: expected two numbers, the lower one first");
     assert_eq!(stage(json!({"free": []})).check().len(), 1);
-    assert!(stage(json!({"free": ["*"], "hold": ["*.j6"]})).check().is_empty());
+    assert!(
+        stage(json!({"free": ["*"], "hold": ["*.j6"]}))
+            .check()
+            .is_empty()
+    );
 }

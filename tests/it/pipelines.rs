@@ -14,8 +14,13 @@ fn root() -> &'static Path {
 }
 
 fn pipelines() -> Vec<PathBuf> {
-    let folders = std::fs::read_dir(root().join("pipelines")).unwrap().map(|entry| entry.unwrap().path());
-    let mut files: Vec<PathBuf> = folders.map(|folder| folder.join("pipeline.yaml")).filter(|file| file.is_file()).collect();
+    let folders = std::fs::read_dir(root().join("pipelines"))
+        .unwrap()
+        .map(|entry| entry.unwrap().path());
+    let mut files: Vec<PathBuf> = folders
+        .map(|folder| folder.join("pipeline.yaml"))
+        .filter(|file| file.is_file())
+        .collect();
     files.sort();
     files
 }
@@ -24,8 +29,18 @@ fn pipelines() -> Vec<PathBuf> {
 fn missing_data(file: &Path) -> Option<String> {
     match Plan::load(file, &[], STAGES) {
         Ok(_) => None,
-        Err(Error::Spec(faults)) if faults.iter().all(|fault| fault.message.starts_with("no such file")) => {
-            Some(faults.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))
+        Err(Error::Spec(faults))
+            if faults
+                .iter()
+                .all(|fault| fault.message.starts_with("no such file")) =>
+        {
+            Some(
+                faults
+                    .iter()
+                    .map(ToString::to_string)
+                    .collect::<Vec<_>>()
+                    .join("\n"),
+            )
         }
         Err(error) => panic!("{error}"),
     }
@@ -38,9 +53,13 @@ fn shorter(name: &str, folder: &Path) -> Vec<String> {
     match name {
         "pipelines/swarm/pipeline.yaml" => [set("table2.seeds=20"), set("ten.seeds=3")].concat(),
         "pipelines/ur10/pipeline.yaml" => {
-            let whole = std::fs::read_to_string(root().join("../shared/data/ipa_ur10").join(SERIES)).unwrap();
+            let whole =
+                std::fs::read_to_string(root().join("../shared/data/ipa_ur10").join(SERIES))
+                    .unwrap();
             let (header, rows) = whole.split_once('\n').unwrap();
-            let kept: Vec<&str> = std::iter::once(header).chain(rows.lines().step_by(6)).collect();
+            let kept: Vec<&str> = std::iter::once(header)
+                .chain(rows.lines().step_by(6))
+                .collect();
             std::fs::create_dir_all(folder.join("Series_C")).unwrap();
             std::fs::write(folder.join(SERIES), kept.join("\n")).unwrap();
             set(&format!("data={}", folder.display())).to_vec()
@@ -69,23 +88,42 @@ fn every_pipeline_is_sound_and_runs_where_its_data_are() {
     for file in pipelines() {
         let name = file.strip_prefix(root()).unwrap().display().to_string();
         if let Some(missing) = missing_data(&file) {
-            desk::missing(&format!("{name}: {}", missing.lines().next().unwrap_or_default()));
+            desk::missing(&format!(
+                "{name}: {}",
+                missing.lines().next().unwrap_or_default()
+            ));
             continue;
         }
         let store = tempfile::tempdir().unwrap();
         let settings = shorter(&name, store.path());
         let run = || {
             let mut command = Command::new(env!("CARGO_BIN_EXE_calib"));
-            command.arg("run").arg(&file).args(&settings).arg("--store").arg(store.path().join("store"));
+            command
+                .arg("run")
+                .arg(&file)
+                .args(&settings)
+                .arg("--store")
+                .arg(store.path().join("store"));
             command.output().unwrap()
         };
         let first = run();
-        assert!(first.status.success(), "{name}:\n{}", String::from_utf8_lossy(&first.stderr));
+        assert!(
+            first.status.success(),
+            "{name}:\n{}",
+            String::from_utf8_lossy(&first.stderr)
+        );
         let made = store_files(store.path());
         let second = run();
         let said = String::from_utf8_lossy(&second.stdout);
-        assert!(second.status.success() && said.contains("nothing to do: "), "{name}:\n{said}");
-        assert_eq!(store_files(store.path()), made, "{name}: the second run wrote no table and no record anew");
+        assert!(
+            second.status.success() && said.contains("nothing to do: "),
+            "{name}:\n{said}"
+        );
+        assert_eq!(
+            store_files(store.path()),
+            made,
+            "{name}: the second run wrote no table and no record anew"
+        );
     }
 }
 
@@ -94,8 +132,13 @@ fn every_pipeline_names_its_schema_for_editors() {
     for file in pipelines() {
         let text = std::fs::read_to_string(&file).unwrap();
         let first = text.lines().next().unwrap_or_default();
-        let path =
-            first.strip_prefix("# yaml-language-server: $schema=").unwrap_or_else(|| panic!("{}: {first}", file.display()));
-        assert!(file.parent().unwrap().join(path).is_file(), "{}: {path}", file.display());
+        let path = first
+            .strip_prefix("# yaml-language-server: $schema=")
+            .unwrap_or_else(|| panic!("{}: {first}", file.display()));
+        assert!(
+            file.parent().unwrap().join(path).is_file(),
+            "{}: {path}",
+            file.display()
+        );
     }
 }

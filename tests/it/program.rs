@@ -10,17 +10,26 @@ mod reader;
 mod surroundings;
 mod urscript;
 
-use calib::program::{Language, Literal, Note, Partial, PostureStatement, Program, SolvedLiteral, TargetKind};
+use calib::program::{
+    Language, Literal, Note, Partial, PostureStatement, Program, SolvedLiteral, TargetKind,
+};
 
 fn told(notes: &[Note]) -> Vec<String> {
-    notes.iter().map(|note| format!("{}:{}: {}", note.line, note.column, note.message)).collect()
+    notes
+        .iter()
+        .map(|note| format!("{}:{}: {}", note.line, note.column, note.message))
+        .collect()
 }
 
 /// Targets and warnings of a program that is accepted.
 fn accepted(language: Language, text: &str) -> (Vec<(TargetKind, Vec<f64>)>, Vec<String>) {
     let program = Program::parse(text.as_bytes(), language, Partial::Refused)
         .unwrap_or_else(|refusal| panic!("{text}\n{:#?}", told(&refusal.faults)));
-    let targets = program.literals().iter().map(|literal| (literal.kind, literal.values.clone())).collect();
+    let targets = program
+        .literals()
+        .iter()
+        .map(|literal| (literal.kind, literal.values.clone()))
+        .collect();
     (targets, told(program.warnings()))
 }
 
@@ -39,14 +48,22 @@ fn moved(program: &Program, by: f64) -> Vec<u8> {
         posture: literal.posture,
         remark: String::new(),
     };
-    let answers = program.literals().iter().map(|literal| Ok(answer(literal))).collect();
-    program.rewritten(answers).expect("every target has an answer").bytes
+    let answers = program
+        .literals()
+        .iter()
+        .map(|literal| Ok(answer(literal)))
+        .collect();
+    program
+        .rewritten(answers)
+        .expect("every target has an answer")
+        .bytes
 }
 
 #[test]
 fn a_number_stays_as_it_was_written_where_nothing_is_to_be_corrected() {
     let text = "DECL E6AXIS H={A1 -0,A2 - 10.50,A3 2E1,A4 +5,A5 30.0000004,A6 1e-3,E1 0}\r\n";
-    let program = Program::parse(text.as_bytes(), Language::Krl, Partial::Refused).expect("accepted");
+    let program =
+        Program::parse(text.as_bytes(), Language::Krl, Partial::Refused).expect("accepted");
     assert_eq!(String::from_utf8_lossy(&moved(&program, 0.0)), text);
     assert_eq!(String::from_utf8_lossy(&moved(&program, 4e-7)), text);
     assert_eq!(
@@ -58,8 +75,12 @@ fn a_number_stays_as_it_was_written_where_nothing_is_to_be_corrected() {
 #[test]
 fn a_number_that_loses_its_sign_does_not_run_into_its_name() {
     let text = "PTP {A1-0.1,A2-0.3,A3+0,A4 0,A5 0,A6-9}";
-    let program = Program::parse(text.as_bytes(), Language::Krl, Partial::Refused).expect("accepted");
-    assert_eq!(program.literals()[0].values, [-0.1, -0.3, 0.0, 0.0, 0.0, -9.0]);
+    let program =
+        Program::parse(text.as_bytes(), Language::Krl, Partial::Refused).expect("accepted");
+    assert_eq!(
+        program.literals()[0].values,
+        [-0.1, -0.3, 0.0, 0.0, 0.0, -9.0]
+    );
     let written = "PTP {A1 0.100000,A2-0.100000,A3 0.200000,A4 0.200000,A5 0.200000,A6-8.800000}";
     assert_eq!(String::from_utf8_lossy(&moved(&program, 0.2)), written);
 }
@@ -67,20 +88,33 @@ fn a_number_that_loses_its_sign_does_not_run_into_its_name() {
 #[test]
 fn a_program_with_one_target_without_an_answer_is_refused_whole() {
     let text = "PTP {A1 1,A2 2,A3 3,A4 4,A5 5,A6 6}\nPTP {A1 1,A2 2,A3 3,A4 4,A5 5,A6 7}\n";
-    let program = Program::parse(text.as_bytes(), Language::Krl, Partial::Refused).expect("accepted");
-    let good = SolvedLiteral { values: vec![1.0; 6], posture: PostureStatement::Unstated, remark: String::new() };
-    let refusal = program.rewritten(vec![Ok(good), Err("not reached".into())]).expect_err("no answer");
+    let program =
+        Program::parse(text.as_bytes(), Language::Krl, Partial::Refused).expect("accepted");
+    let good = SolvedLiteral {
+        values: vec![1.0; 6],
+        posture: PostureStatement::Unstated,
+        remark: String::new(),
+    };
+    let refusal = program
+        .rewritten(vec![Ok(good), Err("not reached".into())])
+        .expect_err("no answer");
     assert_eq!(told(&refusal.faults), ["2:9: not reached"]);
 }
 
 #[test]
 fn what_other_readers_may_take_for_the_end_of_a_line_is_refused() {
     let text = "; a comment\rPTP {A1 1,A2 2,A3 3,A4 4,A5 5,A6 6}\r\n";
-    assert_eq!(refused(Language::Krl, text), ["1:12: a carriage return without a line feed"]);
+    assert_eq!(
+        refused(Language::Krl, text),
+        ["1:12: a carriage return without a line feed"]
+    );
     let text = "! a comment\rMoveAbsJ p,v1,z1,t;\n\0";
     assert_eq!(
         refused(Language::Rapid, text),
-        ["1:12: a carriage return without a line feed", "2:1: a zero byte: no program text (UTF-16 is not read)"]
+        [
+            "1:12: a carriage return without a line feed",
+            "2:1: a zero byte: no program text (UTF-16 is not read)"
+        ]
     );
 }
 
@@ -89,43 +123,81 @@ fn a_language_is_known_by_the_ending_of_a_file() {
     let of = |ending| Language::of_ending(ending);
     assert_eq!(
         (of("SRC"), of("dat"), of("Mod"), of("csv")),
-        (Some(Language::Krl), Some(Language::Krl), Some(Language::Rapid), None)
+        (
+            Some(Language::Krl),
+            Some(Language::Krl),
+            Some(Language::Rapid),
+            None
+        )
     );
 }
 
 #[test]
 fn brackets_without_end_are_a_fault_and_no_overflow() {
-    let deep = |open: &str, close: &str| format!("{}{}", open.repeat(200_000), close.repeat(200_000));
-    assert_eq!(refused(Language::Krl, &format!("X={}", deep("{", "}"))), ["1:18: brackets are nested too deep"]);
-    assert_eq!(refused(Language::Rapid, &format!("X:={};", deep("[", "]"))), ["1:19: brackets are nested too deep"]);
+    let deep =
+        |open: &str, close: &str| format!("{}{}", open.repeat(200_000), close.repeat(200_000));
+    assert_eq!(
+        refused(Language::Krl, &format!("X={}", deep("{", "}"))),
+        ["1:18: brackets are nested too deep"]
+    );
+    assert_eq!(
+        refused(Language::Rapid, &format!("X:={};", deep("[", "]"))),
+        ["1:19: brackets are nested too deep"]
+    );
 }
 
 #[test]
 fn configurations_and_turns_are_read_as_postures() {
     let postures = |language: Language, text: &str| -> Vec<PostureStatement> {
-        let program = Program::parse(text.as_bytes(), language, Partial::Refused).expect("accepted");
-        program.literals().iter().map(|literal| literal.posture).collect()
+        let program =
+            Program::parse(text.as_bytes(), language, Partial::Refused).expect("accepted");
+        program
+            .literals()
+            .iter()
+            .map(|literal| literal.posture)
+            .collect()
     };
-    let robtarget = |cf: &str| format!("MoveL [[1,2,3],[1,0,0,0],[{cf}],[9E9,9E9,9E9,9E9,9E9,9E9]],v1,z1,t;");
-    assert_eq!(postures(Language::Rapid, &robtarget("1,-2,0,4")), [PostureStatement::Configuration([1, -2, 0, 4])]);
-    assert_eq!(postures(Language::Rapid, &robtarget("9E9,9E9,9E9,9E9")), [PostureStatement::Unstated]);
+    let robtarget =
+        |cf: &str| format!("MoveL [[1,2,3],[1,0,0,0],[{cf}],[9E9,9E9,9E9,9E9,9E9,9E9]],v1,z1,t;");
+    assert_eq!(
+        postures(Language::Rapid, &robtarget("1,-2,0,4")),
+        [PostureStatement::Configuration([1, -2, 0, 4])]
+    );
+    assert_eq!(
+        postures(Language::Rapid, &robtarget("9E9,9E9,9E9,9E9")),
+        [PostureStatement::Unstated]
+    );
     assert_eq!(
         refused(Language::Rapid, &robtarget("0,0,0,8")),
         ["1:33: 8 is no configuration cfx, expected a whole number from 0 to 7"]
     );
     let found = refused(Language::Rapid, &robtarget("0.5,0,0,0"));
-    assert_eq!(found, ["1:27: 0.5 is no quadrant of a joint, expected a whole number"]);
+    assert_eq!(
+        found,
+        ["1:27: 0.5 is no quadrant of a joint, expected a whole number"]
+    );
     let of = |status, turn| PostureStatement::StatusTurn { status, turn };
     let pos = |rest: &str| format!("LIN {{X 1,Y 2,Z 3,A 4,B 5,C 6{rest}}}");
     for (text, bits) in [("T 10", 10), ("T 'B101010'", 42), ("T 'H2A'", 42)] {
-        assert_eq!(postures(Language::Krl, &pos(&format!(",{text}"))), [of(None, Some(bits))], "{text}");
+        assert_eq!(
+            postures(Language::Krl, &pos(&format!(",{text}"))),
+            [of(None, Some(bits))],
+            "{text}"
+        );
     }
-    assert_eq!(postures(Language::Krl, &pos("")), [PostureStatement::Unstated]);
+    assert_eq!(
+        postures(Language::Krl, &pos("")),
+        [PostureStatement::Unstated]
+    );
     assert_eq!(postures(Language::Krl, &pos(",S 2")), [of(Some(2), None)]);
-    assert_eq!(postures(Language::Krl, &pos(",S 'B110',T 27")), [of(Some(6), Some(27))]);
+    assert_eq!(
+        postures(Language::Krl, &pos(",S 'B110',T 27")),
+        [of(Some(6), Some(27))]
+    );
     for text in ["T -1", "T 1.5", "T 'B12'", "T x"] {
         assert!(
-            refused(Language::Krl, &pos(&format!(",{text}")))[0].contains("expected a whole number or a bit pattern"),
+            refused(Language::Krl, &pos(&format!(",{text}")))[0]
+                .contains("expected a whole number or a bit pattern"),
             "{text}"
         );
     }

@@ -16,13 +16,21 @@ use crate::bucket::bucket_of;
 static STORE: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
     let folder = tempfile::tempdir().unwrap();
     let pipeline = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/it/resume/pipeline.yaml");
-    let output = calib(folder.path(), &["run", pipeline.to_str().unwrap(), "--quiet"]);
+    let output = calib(
+        folder.path(),
+        &["run", pipeline.to_str().unwrap(), "--quiet"],
+    );
     assert!(output.status.success(), "{}", text(&output));
     folder
 });
 
 fn calib(store: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_calib")).args(arguments).arg("--store").arg(store).output().unwrap()
+    Command::new(env!("CARGO_BIN_EXE_calib"))
+        .args(arguments)
+        .arg("--store")
+        .arg(store)
+        .output()
+        .unwrap()
 }
 fn text(output: &Output) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr)
@@ -34,7 +42,12 @@ fn ask(arguments: &[&str]) -> String {
 }
 fn refused(sql: &str) -> String {
     let output = calib(STORE.path(), &["query", "HEAD", sql]);
-    assert_eq!((output.status.code(), output.stdout.len()), (Some(2), 0), "{sql}: {}", text(&output));
+    assert_eq!(
+        (output.status.code(), output.stdout.len()),
+        (Some(2), 0),
+        "{sql}: {}",
+        text(&output)
+    );
     String::from_utf8(output.stderr).unwrap()
 }
 /// The objects of `--json`.
@@ -43,12 +56,18 @@ fn rows(sql: &str) -> Vec<Value> {
 }
 fn table<T: Table>(name: &str) -> T {
     let store = Store::open(STORE.path()).unwrap();
-    let tables = QueryTables::of(&Manifest::of(&store, &find_run(&store, "HEAD").unwrap()).unwrap());
+    let tables =
+        QueryTables::of(&Manifest::of(&store, &find_run(&store, "HEAD").unwrap()).unwrap());
     T::from_frame(&store.load(&tables.find(name).unwrap().table).unwrap()).unwrap()
 }
 fn objects(store: &Path) -> Vec<PathBuf> {
-    let folders = std::fs::read_dir(store.join("objects")).into_iter().flatten();
-    folders.flat_map(|folder| std::fs::read_dir(folder.unwrap().path()).unwrap()).map(|file| file.unwrap().path()).collect()
+    let folders = std::fs::read_dir(store.join("objects"))
+        .into_iter()
+        .flatten();
+    folders
+        .flat_map(|folder| std::fs::read_dir(folder.unwrap().path()).unwrap())
+        .map(|file| file.unwrap().path())
+        .collect()
 }
 fn prediction(stage: &str) -> Vec<PredictionRow> {
     table::<Prediction>(&format!("{stage}_prediction")).0
@@ -68,15 +87,29 @@ fn without_sql_tables_are_listed_with_rows_columns_and_units() {
     assert!(!told.contains("also `prediction`"), "{told}");
     let one = ask(&["geometry.prediction"]);
     assert!(
-        one.starts_with("prediction: ") && one.contains("geometry_prediction") && !one.contains("nominal_prediction"),
+        one.starts_with("prediction: ")
+            && one.contains("geometry_prediction")
+            && !one.contains("nominal_prediction"),
         "{one}"
     );
     let listed: Vec<Value> = serde_json::from_str(&ask(&["--json"])).unwrap();
-    let recording = listed.iter().find(|table| table["table"] == "simulate_recording").unwrap();
-    assert_eq!((&recording["rows"], &recording["short"]), (&80.into(), &"recording".into()));
+    let recording = listed
+        .iter()
+        .find(|table| table["table"] == "simulate_recording")
+        .unwrap();
+    assert_eq!(
+        (&recording["rows"], &recording["short"]),
+        (&80.into(), &"recording".into())
+    );
     let columns = recording["columns"].as_array().unwrap();
-    let q6 = columns.iter().find(|column| column["name"] == "q6_rad").unwrap();
-    assert_eq!((&q6["unit"], &q6["type"]), (&"rad".into(), &"float64".into()));
+    let q6 = columns
+        .iter()
+        .find(|column| column["name"] == "q6_rad")
+        .unwrap();
+    assert_eq!(
+        (&q6["unit"], &q6["type"]),
+        (&"rad".into(), &"float64".into())
+    );
 }
 
 #[test]
@@ -94,13 +127,24 @@ fn groups_hold_what_the_table_holds_in_the_order_of_its_rows() {
     let sql = "SELECT step, \"set\", count(*) AS points, avg(error_mm) AS mean_mm, max(error_mm) AS max_mm \
                FROM geometry.prediction GROUP BY step, \"set\"";
     let told = rows(sql);
-    assert_eq!(told.iter().map(|row| row["set"].as_str().unwrap()).collect::<Vec<_>>(), order);
+    assert_eq!(
+        told.iter()
+            .map(|row| row["set"].as_str().unwrap())
+            .collect::<Vec<_>>(),
+        order
+    );
     for row in &told {
         let errors = &groups[row["set"].as_str().unwrap()];
         let mean = errors.iter().sum::<f64>() / errors.len() as f64;
-        assert_eq!((&row["step"], &row["points"]), (&"geometry".into(), &errors.len().into()));
+        assert_eq!(
+            (&row["step"], &row["points"]),
+            (&"geometry".into(), &errors.len().into())
+        );
         assert!((row["mean_mm"].as_f64().unwrap() - mean).abs() < 1e-12);
-        assert_eq!(row["max_mm"].as_f64().unwrap(), errors.iter().copied().fold(0.0, f64::max));
+        assert_eq!(
+            row["max_mm"].as_f64().unwrap(),
+            errors.iter().copied().fold(0.0, f64::max)
+        );
     }
     // As many groups as rows, which threads would give in any order; the same of what is joined, distinct or left over.
     let errors: Vec<f64> = own.iter().map(|row| row.error_mm).collect();
@@ -111,17 +155,26 @@ fn groups_hold_what_the_table_holds_in_the_order_of_its_rows() {
         "SELECT error_mm FROM geometry_prediction EXCEPT SELECT error_mm FROM geometry_prediction WHERE error_mm < 0",
         "SELECT error_mm FROM geometry_prediction WHERE sequence IN (SELECT sequence FROM recording)",
     ] {
-        let told: Vec<f64> = rows(sql).iter().map(|row| row["error_mm"].as_f64().unwrap()).collect();
+        let told: Vec<f64> = rows(sql)
+            .iter()
+            .map(|row| row["error_mm"].as_f64().unwrap())
+            .collect();
         assert_eq!(told, errors, "{sql}");
     }
     let grid = ask(&[sql]);
-    assert!(grid.starts_with("step ") && grid.lines().count() == 1 + told.len(), "{grid}");
+    assert!(
+        grid.starts_with("step ") && grid.lines().count() == 1 + told.len(),
+        "{grid}"
+    );
 }
 
 #[test]
 fn tables_are_joined_by_their_points_in_the_order_of_the_first() {
     let (nominal, geometry) = (prediction("nominal"), prediction("geometry"));
-    let after: BTreeMap<i64, f64> = geometry.iter().map(|row| (row.sequence, row.error_mm)).collect();
+    let after: BTreeMap<i64, f64> = geometry
+        .iter()
+        .map(|row| (row.sequence, row.error_mm))
+        .collect();
     let told = rows(
         "SELECT n.sequence, n.error_mm - g.error_mm AS gain_mm FROM nominal.prediction n \
          JOIN \"geometry/prediction\" AS g ON n.sequence = g.sequence",
@@ -129,7 +182,10 @@ fn tables_are_joined_by_their_points_in_the_order_of_the_first() {
     assert_eq!(told.len(), nominal.len());
     for (row, own) in told.iter().zip(&nominal) {
         assert_eq!(row["sequence"], own.sequence);
-        assert_eq!(row["gain_mm"].as_f64().unwrap(), own.error_mm - after[&own.sequence]);
+        assert_eq!(
+            row["gain_mm"].as_f64().unwrap(),
+            own.error_mm - after[&own.sequence]
+        );
     }
     // Another kind of table, by its short name, and what has no pair.
     let recording: Recording = table("recording");
@@ -138,8 +194,15 @@ fn tables_are_joined_by_their_points_in_the_order_of_the_first() {
          (SELECT sequence FROM geometry_prediction WHERE error_mm >= 0)",
     );
     assert_eq!((told.len(), recording.to_frame().unwrap().rows()), (0, 80));
-    let own = rows("SELECT geometry.prediction.step AS s FROM geometry.prediction JOIN recording USING (sequence) LIMIT 3");
-    assert_eq!(own.iter().map(|row| row["s"].as_str().unwrap()).collect::<Vec<_>>(), ["geometry"; 3]);
+    let own = rows(
+        "SELECT geometry.prediction.step AS s FROM geometry.prediction JOIN recording USING (sequence) LIMIT 3",
+    );
+    assert_eq!(
+        own.iter()
+            .map(|row| row["s"].as_str().unwrap())
+            .collect::<Vec<_>>(),
+        ["geometry"; 3]
+    );
 }
 
 #[test]
@@ -150,8 +213,14 @@ fn with_window_and_order_are_answered() {
         "WITH worst AS (SELECT sequence, error_mm, ROW_NUMBER() OVER (PARTITION BY step ORDER BY error_mm DESC) AS place \
          FROM geometry_prediction) SELECT sequence FROM worst WHERE place <= 3 ORDER BY place",
     );
-    let worst: Vec<i64> = told.iter().map(|row| row["sequence"].as_i64().unwrap()).collect();
-    assert_eq!(worst, own[..3].iter().map(|row| row.sequence).collect::<Vec<_>>());
+    let worst: Vec<i64> = told
+        .iter()
+        .map(|row| row["sequence"].as_i64().unwrap())
+        .collect();
+    assert_eq!(
+        worst,
+        own[..3].iter().map(|row| row.sequence).collect::<Vec<_>>()
+    );
 }
 
 #[test]
@@ -160,14 +229,26 @@ fn csv_and_json_hold_every_row_to_the_last_digit() {
     let sql = "SELECT sequence, point_id, error_mm, turn_rad FROM (SELECT *, NULL AS turn_rad FROM geometry_prediction)";
     let text = ask(&[sql, "--csv"]);
     let mut reader = csv::Reader::from_reader(text.as_bytes());
-    assert_eq!(reader.headers().unwrap(), vec!["sequence", "point_id", "error_mm", "turn_rad"]);
+    assert_eq!(
+        reader.headers().unwrap(),
+        vec!["sequence", "point_id", "error_mm", "turn_rad"]
+    );
     let records: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
     assert_eq!(records.len(), own.len());
     let objects = rows(sql);
     for ((record, object), row) in records.iter().zip(&objects).zip(&own) {
-        assert_eq!((record[2].parse::<f64>().unwrap(), &record[3]), (row.error_mm, ""));
-        assert_eq!((&record[0], &record[1]), (row.sequence.to_string().as_str(), row.point_id.as_str()));
-        assert_eq!((object["error_mm"].as_f64().unwrap(), &object["turn_rad"]), (row.error_mm, &Value::Null));
+        assert_eq!(
+            (record[2].parse::<f64>().unwrap(), &record[3]),
+            (row.error_mm, "")
+        );
+        assert_eq!(
+            (&record[0], &record[1]),
+            (row.sequence.to_string().as_str(), row.point_id.as_str())
+        );
+        assert_eq!(
+            (object["error_mm"].as_f64().unwrap(), &object["turn_rad"]),
+            (row.error_mm, &Value::Null)
+        );
     }
     assert_eq!(objects.len(), own.len());
 }
@@ -177,38 +258,69 @@ fn fifty_rows_are_shown_and_the_others_counted() {
     let sql = "SELECT sequence, error_mm FROM geometry_prediction";
     let told = ask(&[sql]);
     assert_eq!(told.lines().count(), 52);
-    assert!(told.ends_with("\n30 more rows: --rows N shows N of them, --csv and --json all\n"), "{told}");
+    assert!(
+        told.ends_with("\n30 more rows: --rows N shows N of them, --csv and --json all\n"),
+        "{told}"
+    );
     assert_eq!(ask(&[sql, "--rows", "0"]).lines().count(), 81);
     assert_eq!(ask(&[sql, "--rows", "3"]).lines().count(), 5);
-    assert!(ask(&["SELECT sequence FROM geometry_prediction WHERE error_mm < 0"]).ends_with("no rows\n"));
+    assert!(
+        ask(&["SELECT sequence FROM geometry_prediction WHERE error_mm < 0"])
+            .ends_with("no rows\n")
+    );
 }
 
 #[test]
 fn what_is_not_there_is_named_with_what_is() {
     let told = refused("SELECT * FROM geometry_predicton");
-    assert!(told.contains("no table `geometry_predicton`; did you mean `geometry_prediction`? Its tables: "), "{told}");
-    assert!(told.contains("simulate_recording") && told.contains("nominal_parameters"), "{told}");
+    assert!(
+        told.contains(
+            "no table `geometry_predicton`; did you mean `geometry_prediction`? Its tables: "
+        ),
+        "{told}"
+    );
+    assert!(
+        told.contains("simulate_recording") && told.contains("nominal_parameters"),
+        "{told}"
+    );
     let told = refused("SELECT eror_mm FROM geometry_prediction");
     assert!(told.contains("no column `eror_mm`; did you mean `error_mm`? Columns of geometry_prediction: sequence, "), "{told}");
-    let told = refused("SELECT g.eror_mm FROM geometry_prediction g JOIN recording USING (sequence)");
-    assert!(told.contains("no column `eror_mm`; did you mean `error_mm`?") && told.contains("of recording: "), "{told}");
+    let told =
+        refused("SELECT g.eror_mm FROM geometry_prediction g JOIN recording USING (sequence)");
+    assert!(
+        told.contains("no column `eror_mm`; did you mean `error_mm`?")
+            && told.contains("of recording: "),
+        "{told}"
+    );
     let told = refused("SELECT sequence FROM prediction");
     assert!(
         told.contains("`prediction` is written by several stages; say which: nominal.prediction, geometry.prediction"),
         "{told}"
     );
     let told = refused("SELECT step, sum(error_mm FROM geometry_prediction");
-    assert!(told.contains("SQL: Expected: ") && told.contains("Line: 1, Column: "), "{told}");
+    assert!(
+        told.contains("SQL: Expected: ") && told.contains("Line: 1, Column: "),
+        "{told}"
+    );
     let told = refused("SELECT step FROM geometry_prediction ORDER BY 0");
-    assert!(told.starts_with("error: SQL: ") && told.lines().count() == 1, "{told}");
+    assert!(
+        told.starts_with("error: SQL: ") && told.lines().count() == 1,
+        "{told}"
+    );
     assert!(refused("recordin").contains("did you mean `recording`?"));
 }
 
 #[test]
 fn under_json_a_fault_is_a_document_too() {
-    let output = calib(STORE.path(), &["query", "HEAD", "SELECT * FROM nosuch", "--json"]);
+    let output = calib(
+        STORE.path(),
+        &["query", "HEAD", "SELECT * FROM nosuch", "--json"],
+    );
     let said: Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert_eq!((output.status.code(), &said["status"], &said["exit_code"]), (Some(2), &"failed".into(), &2.into()));
+    assert_eq!(
+        (output.status.code(), &said["status"], &said["exit_code"]),
+        (Some(2), &"failed".into(), &2.into())
+    );
     let message = said["faults"][0]["message"].as_str().unwrap();
     assert!(message.contains("no table `nosuch`"), "{said}");
     assert!(String::from_utf8_lossy(&output.stderr).contains(message));
@@ -223,12 +335,16 @@ fn a_product_of_tables_that_no_memory_holds_is_refused_before_it_is_made() {
     ] {
         let told = refused(sql);
         assert!(
-            told.contains("every row of one table with every row of the other gives") && told.contains("USING"),
+            told.contains("every row of one table with every row of the other gives")
+                && told.contains("USING"),
             "{sql}: {told}"
         );
     }
     // 80 rows twice are no harm.
-    assert_eq!(rows("SELECT a.sequence FROM recording a CROSS JOIN recording b").len(), 6400);
+    assert_eq!(
+        rows("SELECT a.sequence FROM recording a CROSS JOIN recording b").len(),
+        6400
+    );
 }
 
 #[test]
@@ -254,14 +370,24 @@ fn nothing_but_the_tables_of_the_run_is_read_and_nothing_changed() {
     assert_eq!(objects(STORE.path()), before);
     let output = calib(STORE.path(), &["query", "SELECT * FROM recording"]);
     assert_eq!(output.status.code(), Some(2));
-    assert!(text(&output).contains("the run comes before the SQL"), "{}", text(&output));
+    assert!(
+        text(&output).contains("the run comes before the SQL"),
+        "{}",
+        text(&output)
+    );
 }
 
 #[test]
 fn of_a_store_in_a_bucket_the_tables_that_are_asked_are_fetched() {
     let folder = tempfile::tempdir().unwrap();
     let store = bucket_of(STORE.path(), &folder.path().join("cache"));
-    let tables = QueryTables::of(&Manifest::of(&store, &find_run(&store, "HEAD").unwrap()).unwrap());
-    let answer = audit::query(&store, &tables, "SELECT r.sequence FROM recording r JOIN split USING (sequence)").unwrap();
+    let tables =
+        QueryTables::of(&Manifest::of(&store, &find_run(&store, "HEAD").unwrap()).unwrap());
+    let answer = audit::query(
+        &store,
+        &tables,
+        "SELECT r.sequence FROM recording r JOIN split USING (sequence)",
+    )
+    .unwrap();
     assert_eq!((answer.rows(), objects(store.root()).len()), (80, 2));
 }

@@ -10,9 +10,15 @@ use std::sync::Arc;
 
 /// Targets of six joints as Parquet.
 fn targets() -> Vec<u8> {
-    let column =
-        |joint: usize| -> ArrayRef { Arc::new(Float64Array::from_iter_values((0..3).map(|row| (row + joint) as f64 / 10.0))) };
-    let batch = RecordBatch::try_from_iter((0..6).map(|joint| (format!("q{}_rad", joint + 1), column(joint)))).unwrap();
+    let column = |joint: usize| -> ArrayRef {
+        Arc::new(Float64Array::from_iter_values(
+            (0..3).map(|row| (row + joint) as f64 / 10.0),
+        ))
+    };
+    let batch = RecordBatch::try_from_iter(
+        (0..6).map(|joint| (format!("q{}_rad", joint + 1), column(joint))),
+    )
+    .unwrap();
     let mut writer = ArrowWriter::try_new(Vec::new(), batch.schema(), None).unwrap();
     writer.write(&batch).unwrap();
     writer.into_inner().unwrap()
@@ -24,23 +30,40 @@ fn message(output: &Output) -> String {
 
 /// With the backtraces that somebody may have asked for.
 fn run(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_calib")).args(arguments).current_dir(folder).env("RUST_BACKTRACE", "1").output().unwrap()
+    Command::new(env!("CARGO_BIN_EXE_calib"))
+        .args(arguments)
+        .current_dir(folder)
+        .env("RUST_BACKTRACE", "1")
+        .output()
+        .unwrap()
 }
 
 #[test]
 fn a_decoder_that_gives_up_is_a_fault_of_the_file() {
     let sound = targets();
-    assert_eq!(raw::parquet(bytes::Bytes::from(sound.clone()), 8).unwrap().whole().unwrap().num_rows(), 3);
+    assert_eq!(
+        raw::parquet(bytes::Bytes::from(sound.clone()), 8)
+            .unwrap()
+            .whole()
+            .unwrap()
+            .num_rows(),
+        3
+    );
     // Every byte of the footer, where lengths, types and places stand, one bit each.
-    let footer = sound.len() - 8 - u32::from_le_bytes(sound[sound.len() - 8..][..4].try_into().unwrap()) as usize;
+    let footer = sound.len()
+        - 8
+        - u32::from_le_bytes(sound[sound.len() - 8..][..4].try_into().unwrap()) as usize;
     let damaged = (footer..sound.len()).map(|at| {
         let mut damaged = sound.clone();
         damaged[at] ^= 1 << (at % 8);
         damaged
     });
-    let read = |bytes: &Vec<u8>| raw::parquet(bytes::Bytes::from(bytes.clone()), 8).and_then(raw::ParquetFile::whole);
-    let gives_up: Vec<Vec<u8>> =
-        damaged.filter(|bytes| read(bytes).is_err_and(|message| message.contains("its decoder gives up"))).collect();
+    let read = |bytes: &Vec<u8>| {
+        raw::parquet(bytes::Bytes::from(bytes.clone()), 8).and_then(raw::ParquetFile::whole)
+    };
+    let gives_up: Vec<Vec<u8>> = damaged
+        .filter(|bytes| read(bytes).is_err_and(|message| message.contains("its decoder gives up")))
+        .collect();
     // Else this test tests nothing: take other bits.
     assert!(!gives_up.is_empty());
     let folder = cell();
@@ -53,18 +76,48 @@ fn a_decoder_that_gives_up_is_a_fault_of_the_file() {
     )
     .unwrap();
     for (arguments, code) in [
-        (&["compensate", "latest", "damaged.parquet", "--out", "raw_out.parquet"][..], 10),
-        (&["compensate", "damaged.parquet", "--robot", "robot.yaml", "damaged.parquet"], 10),
+        (
+            &[
+                "compensate",
+                "latest",
+                "damaged.parquet",
+                "--out",
+                "raw_out.parquet",
+            ][..],
+            10,
+        ),
+        (
+            &[
+                "compensate",
+                "damaged.parquet",
+                "--robot",
+                "robot.yaml",
+                "damaged.parquet",
+            ],
+            10,
+        ),
         (&["poses", "robot.yaml", "--against", "damaged.parquet"], 10),
-        (&["schema", "check", "damaged.parquet", "--as", "recording"], 10),
+        (
+            &["schema", "check", "damaged.parquet", "--as", "recording"],
+            10,
+        ),
         (&["run", "raw.yaml", "--quiet", "--store", "raw_store"], 10),
-        (&["diff", "damaged.parquet", "robot.yaml", "--key", "q1_rad"], 2),
+        (
+            &["diff", "damaged.parquet", "robot.yaml", "--key", "q1_rad"],
+            2,
+        ),
     ] {
         let output = run(folder, arguments);
         let told = message(&output);
         assert_eq!(output.status.code(), Some(code), "{arguments:?}: {told}");
-        assert!(code == 2 || told.contains("damaged.parquet") && told.contains("gives up"), "{arguments:?}: {told}");
-        assert!(!told.contains("panicked") && !told.contains("backtrace"), "{arguments:?}: {told}");
+        assert!(
+            code == 2 || told.contains("damaged.parquet") && told.contains("gives up"),
+            "{arguments:?}: {told}"
+        );
+        assert!(
+            !told.contains("panicked") && !told.contains("backtrace"),
+            "{arguments:?}: {told}"
+        );
     }
     assert!(!folder.join("raw_out.parquet").exists());
 }
@@ -82,34 +135,79 @@ fn what_never_ends_is_not_opened_where_a_file_is_needed() {
     assert!(made.unwrap().success());
     std::fs::copy(cell().join("robot.yaml"), folder.join("robot.yaml")).unwrap();
     let pipeline = "calib: 1\nname: raw\nstages:\n  - uses: robot\n    with: {file: FILE}\n";
-    std::fs::write(folder.join("of_pipe.yaml"), pipeline.replace("FILE", "pipe.yaml")).unwrap();
-    std::fs::write(folder.join("of_device.yaml"), pipeline.replace("FILE", "/dev/zero")).unwrap();
+    std::fs::write(
+        folder.join("of_pipe.yaml"),
+        pipeline.replace("FILE", "pipe.yaml"),
+    )
+    .unwrap();
+    std::fs::write(
+        folder.join("of_device.yaml"),
+        pipeline.replace("FILE", "/dev/zero"),
+    )
+    .unwrap();
     std::fs::write(folder.join("of_folder.yaml"), pipeline.replace("FILE", "/")).unwrap();
     let model = ["compensate", "pipe.parquet", "--robot", "robot.yaml"];
     for (arguments, what) in [
-        (&["check", "pipe.yaml"][..], "pipe.yaml: is a named pipe, not a regular file"),
-        (&["run", "/dev/zero"], "/dev/zero: is a device, not a regular file"),
-        (&["run", "of_pipe.yaml", "--quiet"], "pipe.yaml: cannot be read: is a named pipe"),
-        (&["run", "of_device.yaml", "--quiet"], "/dev/zero: cannot be read: is a device"),
+        (
+            &["check", "pipe.yaml"][..],
+            "pipe.yaml: is a named pipe, not a regular file",
+        ),
+        (
+            &["run", "/dev/zero"],
+            "/dev/zero: is a device, not a regular file",
+        ),
+        (
+            &["run", "of_pipe.yaml", "--quiet"],
+            "pipe.yaml: cannot be read: is a named pipe",
+        ),
+        (
+            &["run", "of_device.yaml", "--quiet"],
+            "/dev/zero: cannot be read: is a device",
+        ),
         (&["run", "of_folder.yaml", "--quiet"], "`/` is a folder"),
-        (&["poses", "/dev/zero"], "/dev/zero: cannot be read: is a device"),
-        (&["poses", "robot.yaml", "--against", "pipe.parquet"], "is a named pipe"),
+        (
+            &["poses", "/dev/zero"],
+            "/dev/zero: cannot be read: is a device",
+        ),
+        (
+            &["poses", "robot.yaml", "--against", "pipe.parquet"],
+            "is a named pipe",
+        ),
         (&model, "pipe.parquet: cannot be read: is a named pipe"),
-        (&["diff", "pipe.parquet", "pipe.parquet"], "pipe.parquet: cannot be read: is a named pipe"),
-        (&["schema", "check", "pipe.parquet"], "pipe.parquet: cannot be read: is a named pipe"),
+        (
+            &["diff", "pipe.parquet", "pipe.parquet"],
+            "pipe.parquet: cannot be read: is a named pipe",
+        ),
+        (
+            &["schema", "check", "pipe.parquet"],
+            "pipe.parquet: cannot be read: is a named pipe",
+        ),
         (&["init", "made", "--data", "pipe.csv"], "is a named pipe"),
         (&["fleet", "run", "pipe.yaml"], "is a named pipe"),
     ] {
         let output = run(folder, arguments);
-        assert!(matches!(output.status.code(), Some(2 | 10)), "{arguments:?}: {:?} {}", output.status, message(&output));
-        assert!(message(&output).contains(what), "{arguments:?}: {}", message(&output));
+        assert!(
+            matches!(output.status.code(), Some(2 | 10)),
+            "{arguments:?}: {:?} {}",
+            output.status,
+            message(&output)
+        );
+        assert!(
+            message(&output).contains(what),
+            "{arguments:?}: {}",
+            message(&output)
+        );
     }
-    let made = Command::new("mkfifo").arg(cell().join("pipe.csv")).arg(cell().join("pipe.src")).status();
+    let made = Command::new("mkfifo")
+        .arg(cell().join("pipe.csv"))
+        .arg(cell().join("pipe.src"))
+        .status();
     assert!(made.unwrap().success());
     for targets in ["/dev/zero", "pipe.csv", "pipe.src"] {
         let output = run(cell(), &["compensate", "latest", targets]);
         assert!(
-            matches!(output.status.code(), Some(2 | 10)) && message(&output).contains("not a regular file"),
+            matches!(output.status.code(), Some(2 | 10))
+                && message(&output).contains("not a regular file"),
             "{}",
             message(&output)
         );
@@ -119,7 +217,11 @@ fn what_never_ends_is_not_opened_where_a_file_is_needed() {
 #[cfg(unix)]
 #[test]
 fn a_pipe_of_targets_is_read_and_one_line_without_end_refused() {
-    let output = calib(cell(), &["compensate", "latest"], "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n1,2,3,4,5,6\n");
+    let output = calib(
+        cell(),
+        &["compensate", "latest"],
+        "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n1,2,3,4,5,6\n",
+    );
     assert!(output.status.success(), "{}", message(&output));
     let zero = std::fs::File::open("/dev/zero").unwrap();
     let output = Command::new(env!("CARGO_BIN_EXE_calib"))
@@ -129,15 +231,35 @@ fn a_pipe_of_targets_is_read_and_one_line_without_end_refused() {
         .output()
         .unwrap();
     assert_eq!(output.status.code(), Some(10), "{}", message(&output));
-    assert!(message(&output).contains("stdin: has a line of more than 16 MB"), "{}", message(&output));
+    assert!(
+        message(&output).contains("stdin: has a line of more than 16 MB"),
+        "{}",
+        message(&output)
+    );
 }
 
 #[test]
 fn a_target_that_no_robot_has_is_refused_with_its_line() {
     let header = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n1,2,3,4,5,6\n";
-    let output = calib(cell(), &["compensate", "latest"], &format!("{header}1,2,3,4,5,1e308\n"));
+    let output = calib(
+        cell(),
+        &["compensate", "latest"],
+        &format!("{header}1,2,3,4,5,1e308\n"),
+    );
     assert_eq!(output.status.code(), Some(10));
-    assert!(message(&output).contains("stdin:3: 1.7453292519943295e306 rad is more than 63 rad"), "{}", message(&output));
-    let output = calib(cell(), &["compensate", "latest"], "x_mm,y_mm,z_mm\n1e308,0,0\n");
-    assert!(message(&output).contains("stdin:2: 1e305 m is more than 1000 m"), "{}", message(&output));
+    assert!(
+        message(&output).contains("stdin:3: 1.7453292519943295e306 rad is more than 63 rad"),
+        "{}",
+        message(&output)
+    );
+    let output = calib(
+        cell(),
+        &["compensate", "latest"],
+        "x_mm,y_mm,z_mm\n1e308,0,0\n",
+    );
+    assert!(
+        message(&output).contains("stdin:2: 1e305 m is more than 1000 m"),
+        "{}",
+        message(&output)
+    );
 }

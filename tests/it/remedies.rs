@@ -6,21 +6,47 @@ use calib::description::RobotDescription;
 use calib::estimate::{FitOptions, Fitted, Model, ParameterStatus, Remedy, align, fit, remedies};
 use calib::robot::{Measurements, RobotModel};
 
-fn identify(description: &RobotDescription, data: &Measurements, effects: &[&str]) -> (Model, Fitted) {
+fn identify(
+    description: &RobotDescription,
+    data: &Measurements,
+    effects: &[&str],
+) -> (Model, Fitted) {
     let robot = RobotModel::new(description.clone());
     let rows: Vec<usize> = (0..data.rows()).collect();
     let model = model(&robot, align(&robot, data, &rows), effects);
     let candidates: Vec<usize> = (0..model.x.len()).collect();
-    fit(&model, data, &FitOptions { rows: &rows, candidates: &candidates })
+    fit(
+        &model,
+        data,
+        &FitOptions {
+            rows: &rows,
+            candidates: &candidates,
+        },
+    )
 }
 
 /// What would show the named parameter, which must be hidden now.
-fn remedy(description: &RobotDescription, data: &Measurements, effects: &[&str], name: &str) -> Remedy {
+fn remedy(
+    description: &RobotDescription,
+    data: &Measurements,
+    effects: &[&str],
+    name: &str,
+) -> Remedy {
     let (model, fitted) = identify(description, data, effects);
     let rows: Vec<usize> = (0..data.rows()).collect();
-    let k = model.stack.specs().iter().position(|spec| spec.name == name).expect("a parameter");
-    assert!(!matches!(fitted.statuses[k], ParameterStatus::Free(_)), "{name} is seen");
-    remedies(&model, data, &rows, &fitted).remove(&k).expect("hidden parameters have one")
+    let k = model
+        .stack
+        .specs()
+        .iter()
+        .position(|spec| spec.name == name)
+        .expect("a parameter");
+    assert!(
+        !matches!(fitted.statuses[k], ParameterStatus::Free(_)),
+        "{name} is seen"
+    );
+    remedies(&model, data, &rows, &fitted)
+        .remove(&k)
+        .expect("hidden parameters have one")
 }
 
 /// A recording of the nominal robot with joints and payload bent.
@@ -35,8 +61,13 @@ fn nominal(description: &RobotDescription, bend: impl Fn(&mut Measurements)) -> 
 fn a_joint_that_never_moves_is_to_be_moved() {
     let description = fixture::offset_wrist();
     let effects = [&GEOMETRY[..], &["reduction_ratio"]].concat();
-    let data = nominal(&description, |data| data.q.iter_mut().skip(3).step_by(6).for_each(|q| *q = 0.4));
-    assert_eq!(remedy(&description, &data, &effects, "reduction_ratio.j4"), Remedy::Move(vec![3]));
+    let data = nominal(&description, |data| {
+        data.q.iter_mut().skip(3).step_by(6).for_each(|q| *q = 0.4)
+    });
+    assert_eq!(
+        remedy(&description, &data, &effects, "reduction_ratio.j4"),
+        Remedy::Move(vec![3])
+    );
 }
 
 #[test]
@@ -45,15 +76,24 @@ fn a_target_on_the_last_axis_wants_another_beside_it() {
     description.tool = [1.954, 0.0, 1.31];
     let effects = [&GEOMETRY[..], &["reduction_ratio"]].concat();
     let data = nominal(&description, |_| {});
-    assert_eq!(remedy(&description, &data, &effects, "reduction_ratio.j6"), Remedy::SecondTarget);
+    assert_eq!(
+        remedy(&description, &data, &effects, "reduction_ratio.j6"),
+        Remedy::SecondTarget
+    );
 }
 
 #[test]
 fn what_is_the_same_to_every_point_is_said_so() {
     let description = fixture::offset_wrist();
     let data = nominal(&description, |_| {});
-    assert_eq!(remedy(&description, &data, &GEOMETRY, "joint_offset.j1"), Remedy::Nothing);
-    assert_eq!(remedy(&description, &data, &GEOMETRY, "link_geometry.l1.z"), Remedy::Nothing);
+    assert_eq!(
+        remedy(&description, &data, &GEOMETRY, "joint_offset.j1"),
+        Remedy::Nothing
+    );
+    assert_eq!(
+        remedy(&description, &data, &GEOMETRY, "link_geometry.l1.z"),
+        Remedy::Nothing
+    );
 }
 
 #[test]

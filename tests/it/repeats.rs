@@ -15,7 +15,13 @@ use serde_json::json;
 const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
 
 /// A recording of `poses` poses with so many visits of so many rows; at each visit every joint misses by `joint_sigma`.
-fn visited(poses: usize, visits: usize, rows: usize, joint_sigma: f64, seed: usize) -> (Measurements, Model) {
+fn visited(
+    poses: usize,
+    visits: usize,
+    rows: usize,
+    joint_sigma: f64,
+    seed: usize,
+) -> (Measurements, Model) {
     let description = fixture::offset_wrist();
     let effects = [&GEOMETRY[..], &["reduction_ratio"]].concat();
     let (once, truth) = recording(&description, &effects, poses, seed);
@@ -31,14 +37,22 @@ fn visited(poses: usize, visits: usize, rows: usize, joint_sigma: f64, seed: usi
     for row in 0..count {
         let visit = row / rows;
         data.q.extend(once.q(visit % poses));
-        let missed = (0..once.joints).map(|joint| joint_sigma * normal(seed * 1_000_003 + visit * once.joints + joint));
-        real.extend(once.q(visit % poses).iter().zip(missed).map(|(q, missed)| q + missed));
+        let missed = (0..once.joints)
+            .map(|joint| joint_sigma * normal(seed * 1_000_003 + visit * once.joints + joint));
+        real.extend(
+            once.q(visit % poses)
+                .iter()
+                .zip(missed)
+                .map(|(q, missed)| q + missed),
+        );
     }
     let commanded = std::mem::replace(&mut data.q, real);
     data.points.position = truth.predict(&data);
     data.q = commanded;
     for (row, point) in data.points.position.iter_mut().enumerate() {
-        *point += Vector3::from_fn(|axis, _| SIGMA * normal(77_777_777 + seed * 900_001 + 3 * row + axis));
+        *point += Vector3::from_fn(|axis, _| {
+            SIGMA * normal(77_777_777 + seed * 900_001 + 3 * row + axis)
+        });
     }
     (data, truth)
 }
@@ -54,7 +68,14 @@ fn identify(data: &Measurements, effects: &[&str]) -> (Model, Fitted) {
     let model = start(data, effects);
     let rows: Vec<usize> = (0..data.rows()).collect();
     let candidates: Vec<usize> = (0..model.x.len()).collect();
-    fit(&model, data, &FitOptions { rows: &rows, candidates: &candidates })
+    fit(
+        &model,
+        data,
+        &FitOptions {
+            rows: &rows,
+            candidates: &candidates,
+        },
+    )
 }
 
 #[test]
@@ -63,15 +84,28 @@ fn joint_repeatability_comes_back_from_returns_and_is_not_seen_where_there_is_no
     let (data, _) = visited(60, 4, 2, 5.0 * ARCSEC, 1);
     let poses = Poses::of(&data, &all(&data));
     assert_eq!((poses.all().len(), poses.repeated().count()), (60, 60));
-    let found = poses.joint_repeatability(&start(&data, &["base_frame"]), &data).expect("it is there");
-    assert!((found / (5.0 * ARCSEC) - 1.0).abs() < 0.12, "{:.2} arcsec", found / ARCSEC);
+    let found = poses
+        .joint_repeatability(&start(&data, &["base_frame"]), &data)
+        .expect("it is there");
+    assert!(
+        (found / (5.0 * ARCSEC) - 1.0).abs() < 0.12,
+        "{:.2} arcsec",
+        found / ARCSEC
+    );
     for seed in 2..6 {
         let (still, _) = visited(60, 4, 1, 0.0, seed);
-        assert_eq!(Poses::of(&still, &all(&still)).joint_repeatability(&start(&still, &["base_frame"]), &still), None);
+        assert_eq!(
+            Poses::of(&still, &all(&still))
+                .joint_repeatability(&start(&still, &["base_frame"]), &still),
+            None
+        );
     }
     // The arm never moves between the rows of a pose: nothing can be said.
     let (once, _) = visited(60, 1, 4, 5.0 * ARCSEC, 1);
-    assert_eq!(Poses::of(&once, &all(&once)).joint_repeatability(&start(&once, &["base_frame"]), &once), None);
+    assert_eq!(
+        Poses::of(&once, &all(&once)).joint_repeatability(&start(&once, &["base_frame"]), &once),
+        None
+    );
 }
 
 #[test]
@@ -79,8 +113,14 @@ fn two_exchanged_returns_do_not_spoil_the_repeatability() {
     let (mut data, _) = visited(60, 4, 1, 5.0 * ARCSEC, 3);
     data.points.position.swap(60, 61);
     let rows: Vec<usize> = (0..data.rows()).collect();
-    let found = Poses::of(&data, &rows).joint_repeatability(&start(&data, &["base_frame"]), &data).expect("it is there");
-    assert!((found / (5.0 * ARCSEC) - 1.0).abs() < 0.12, "{:.2} arcsec", found / ARCSEC);
+    let found = Poses::of(&data, &rows)
+        .joint_repeatability(&start(&data, &["base_frame"]), &data)
+        .expect("it is there");
+    assert!(
+        (found / (5.0 * ARCSEC) - 1.0).abs() < 0.12,
+        "{:.2} arcsec",
+        found / ARCSEC
+    );
 }
 
 #[test]
@@ -90,15 +130,29 @@ fn lack_of_fit_tells_a_complete_model_from_one_without_ratios() {
     for seed in 10..30 {
         let (data, _) = visited(40, 2, 1, 0.0, seed);
         let repeated = identify(&data, &effects).1.repeated.expect("repeats");
-        assert_eq!((repeated.poses, repeated.freedom, repeated.revisited), (40, 120, true));
-        assert!((repeated.noise / SIGMA - 1.0).abs() < 0.25, "{:e}", repeated.noise);
+        assert_eq!(
+            (repeated.poses, repeated.freedom, repeated.revisited),
+            (40, 120, true)
+        );
+        assert!(
+            (repeated.noise / SIGMA - 1.0).abs() < 0.25,
+            "{:e}",
+            repeated.noise
+        );
         chances.push(repeated.lack_of_fit.expect("more poses than parameters").1);
     }
     // Uniform under a complete model.
     let below = chances.iter().filter(|chance| **chance < 0.5).count();
-    assert!((4..=16).contains(&below) && chances.iter().all(|chance| *chance > 1e-3), "{chances:?}");
+    assert!(
+        (4..=16).contains(&below) && chances.iter().all(|chance| *chance > 1e-3),
+        "{chances:?}"
+    );
     let (data, _) = visited(40, 2, 1, 0.0, 10);
-    let (ratio, chance) = identify(&data, &GEOMETRY).1.repeated.and_then(|repeated| repeated.lack_of_fit).expect("repeats");
+    let (ratio, chance) = identify(&data, &GEOMETRY)
+        .1
+        .repeated
+        .and_then(|repeated| repeated.lack_of_fit)
+        .expect("repeats");
     assert!(ratio > 10.0 && chance < 1e-9, "F {ratio}, p {chance:e}");
 }
 
@@ -106,7 +160,10 @@ fn lack_of_fit_tells_a_complete_model_from_one_without_ratios() {
 fn diagnosed(data: &Measurements, stated: f64) -> Diagnosis {
     let robot = RobotModel::new(fixture::offset_wrist());
     let mut data = data.clone();
-    data.points.sigma.iter_mut().for_each(|sigma| *sigma *= stated);
+    data.points
+        .sigma
+        .iter_mut()
+        .for_each(|sigma| *sigma *= stated);
     let fit: Vec<usize> = (0..data.rows()).collect();
     let question = Question {
         robot: &robot,
@@ -130,8 +187,14 @@ fn shots_of_a_standing_arm_show_the_noise_however_it_is_stated() {
     for stated in [6.0, 1.0, 1.0 / 6.0] {
         let found = diagnosed(&data, stated);
         let floor = found.noise_floor / (SIGMA * f64::sqrt(3.0));
-        assert!((floor - 1.0).abs() < 0.12, "stated {stated:.2} times: {floor:.3} of the noise");
-        assert_eq!((found.noise_basis, found.repeatability.repeats), (NoiseBasis::Repeats, 120));
+        assert!(
+            (floor - 1.0).abs() < 0.12,
+            "stated {stated:.2} times: {floor:.3} of the noise"
+        );
+        assert_eq!(
+            (found.noise_basis, found.repeatability.repeats),
+            (NoiseBasis::Repeats, 120)
+        );
     }
 }
 
@@ -140,7 +203,11 @@ fn returns_add_the_joints_to_the_noise_that_shots_show() {
     let (data, _) = visited(40, 3, 3, 5.0 * ARCSEC, 22);
     let found = diagnosed(&data, 6.0);
     let joints = found.repeatability.sigma / (5.0 * ARCSEC);
-    assert!((joints - 1.0).abs() < 0.15 && found.noise_floor > 2.0 * SIGMA, "{joints:.3}, {:e}", found.noise_floor);
+    assert!(
+        (joints - 1.0).abs() < 0.15 && found.noise_floor > 2.0 * SIGMA,
+        "{joints:.3}, {:e}",
+        found.noise_floor
+    );
     assert_eq!(found.noise_basis, NoiseBasis::Repeats);
 }
 
@@ -148,11 +215,16 @@ fn returns_add_the_joints_to_the_noise_that_shots_show() {
 fn what_a_model_leaves_at_a_pose_is_no_correlated_noise_for_being_measured_three_times() {
     let (mut data, _) = visited(80, 1, 3, 0.0, 23);
     for (row, point) in data.points.position.iter_mut().enumerate() {
-        *point += Vector3::from_fn(|axis, _| 4.0 * SIGMA * normal(5_000_011 + 3 * (row / 3) + axis));
+        *point +=
+            Vector3::from_fn(|axis, _| 4.0 * SIGMA * normal(5_000_011 + 3 * (row / 3) + axis));
     }
     let found = diagnosed(&data, 1.0);
     let said = found.not_observable.join("; ");
-    let names: Vec<&str> = found.findings.iter().map(|finding| finding.statement.as_str()).collect();
+    let names: Vec<&str> = found
+        .findings
+        .iter()
+        .map(|finding| finding.statement.as_str())
+        .collect();
     assert!(!said.contains("correlated"), "{names:?} {said}");
 }
 
@@ -168,7 +240,10 @@ fn scatter(robots: usize, rows: usize, know: bool) -> (f64, f64) {
         let (model, fitted) = identify(&data, &effects);
         assert_eq!(fitted.clusters, if rows > 1 { 60 } else { 0 });
         for (k, spec) in model.stack.specs().iter().enumerate() {
-            if let (true, ParameterStatus::Free(sigma)) = (spec.name.starts_with("reduction_ratio"), &fitted.statuses[k]) {
+            if let (true, ParameterStatus::Free(sigma)) = (
+                spec.name.starts_with("reduction_ratio"),
+                &fitted.statuses[k],
+            ) {
                 squares += ((model.x[k] - truth.x[k]) / sigma).powi(2);
                 sigmas += sigma;
                 count += 1.0;
@@ -181,37 +256,62 @@ fn scatter(robots: usize, rows: usize, know: bool) -> (f64, f64) {
 #[test]
 fn sigmas_allow_for_what_the_rows_of_a_pose_share() {
     let (repeated, wide) = scatter(40, 4, false);
-    assert!((0.85..1.18).contains(&repeated), "scatter over reported sigma {repeated:.3}");
+    assert!(
+        (0.85..1.18).contains(&repeated),
+        "scatter over reported sigma {repeated:.3}"
+    );
     // Four rows at rest say hardly more than one where joints err more than the tracker.
     let (_, once) = scatter(40, 1, false);
-    assert!((0.8..1.05).contains(&(wide / once)), "four rows {wide:e}, one row {once:e}");
+    assert!(
+        (0.8..1.05).contains(&(wide / once)),
+        "four rows {wide:e}, one row {once:e}"
+    );
 }
 
 #[test]
 fn known_repeatability_weighs_rows_better_than_one_figure_for_all() {
     let (scattered, informed) = scatter(40, 1, true);
     let (_, plain) = scatter(40, 1, false);
-    assert!((0.85..1.18).contains(&scattered), "scatter over reported sigma {scattered:.3}");
+    assert!(
+        (0.85..1.18).contains(&scattered),
+        "scatter over reported sigma {scattered:.3}"
+    );
     assert!(informed < plain, "{informed:e} and {plain:e}");
 }
 
 #[test]
 fn the_stage_weighs_by_the_stated_repeatability_and_tables_what_repeats_say() {
     let of = experiment("none", 5);
-    let mut settings =
-        json!({"on": ["unloaded_fit"], "effects": ["base_frame", "tool_offset"], "repeatability": {"arcsec": 4.0}});
+    let mut settings = json!({"on": ["unloaded_fit"], "effects": ["base_frame", "tool_offset"], "repeatability": {"arcsec": 4.0}});
     let run = |settings: &serde_json::Value, recording: &calib::table::Recording, split: &Split| {
         let desk = Desk::default();
         let stage: Identify = serde_json::from_value(settings.clone()).expect("settings");
         assert!(stage.check().is_empty());
-        let reads = IdentifyReads { robot: of.robot.clone(), recording: recording.clone(), split: split.clone() };
+        let reads = IdentifyReads {
+            robot: of.robot.clone(),
+            recording: recording.clone(),
+            split: split.clone(),
+        };
         let tables = desk.run(&stage, reads).expect("identify runs");
         let notes = desk.notes.lock().expect("one thread").clone();
-        (table::<Observability>(&tables).remove(0), table::<Parameters>(&tables).remove(0), notes)
+        (
+            table::<Observability>(&tables).remove(0),
+            table::<Parameters>(&tables).remove(0),
+            notes,
+        )
     };
-    let value = |table: &Observability, quantity: &str| table.0.iter().find(|row| row.quantity == quantity).map(|row| row.value);
+    let value = |table: &Observability, quantity: &str| {
+        table
+            .0
+            .iter()
+            .find(|row| row.quantity == quantity)
+            .map(|row| row.value)
+    };
     let (stated, _, _) = run(&settings, &of.recording, &of.split);
-    assert!(value(&stated, "joint_repeatability_rad").is_some_and(|sigma| (sigma / (4.0 * ARCSEC) - 1.0).abs() < 1e-9));
+    assert!(
+        value(&stated, "joint_repeatability_rad")
+            .is_some_and(|sigma| (sigma / (4.0 * ARCSEC) - 1.0).abs() < 1e-9)
+    );
     assert_eq!(value(&stated, "repeated_poses"), None);
     // Every second of the first hundred rows takes the joints of the one before: fifty poses at rest.
     let mut recording = of.recording.clone();
@@ -226,8 +326,23 @@ fn the_stage_weighs_by_the_stated_repeatability_and_tables_what_repeats_say() {
     assert_eq!(value(&measured, "clusters"), Some(25.0));
     assert!(value(&measured, "repeat_noise_mm").is_some_and(|noise| noise < 0.01));
     assert!(value(&measured, "lack_of_fit_p").is_some_and(|chance| chance < 1e-6));
-    assert!(notes.iter().any(|line| line.contains("measured more than once: 25 poses")), "{notes:#?}");
-    assert!(notes.iter().any(|line| line.contains("this model lacks something")), "{notes:#?}");
-    let wrong: Identify = serde_json::from_value(json!({"repeatability": {"arcsec": 0.0}})).expect("settings");
-    assert!(wrong.check().iter().any(|fault| fault.to_string().starts_with("repeatability: expected `measured`")));
+    assert!(
+        notes
+            .iter()
+            .any(|line| line.contains("measured more than once: 25 poses")),
+        "{notes:#?}"
+    );
+    assert!(
+        notes
+            .iter()
+            .any(|line| line.contains("this model lacks something")),
+        "{notes:#?}"
+    );
+    let wrong: Identify =
+        serde_json::from_value(json!({"repeatability": {"arcsec": 0.0}})).expect("settings");
+    assert!(wrong.check().iter().any(|fault| {
+        fault
+            .to_string()
+            .starts_with("repeatability: expected `measured`")
+    }));
 }

@@ -2,9 +2,13 @@
 
 mod browser;
 mod language;
+mod literals;
 mod tables;
 
-use calib::stage::{Context, Labelled, OpenedInput, Report, ReportReads, Services, Sink, Stage, Validate, ValidateReads};
+use calib::stage::{
+    Context, Labelled, OpenedInput, Report, ReportReads, Services, Sink, Stage, Validate,
+    ValidateReads,
+};
 use calib::table::*;
 use tables::{point, tables};
 
@@ -23,26 +27,69 @@ impl Services for Silent {
 }
 
 fn context() -> Context<'static> {
-    Context { id: "report", seed: 7, jobs: 1, services: &Silent }
+    Context {
+        id: "report",
+        seed: 7,
+        jobs: 1,
+        services: &Silent,
+    }
 }
 
 fn validate(tables: Vec<Prediction>) -> Statistics {
-    let prediction = tables.into_iter().map(|table| Labelled { stage: "identify".into(), table }).collect();
-    Validate::default().run(ValidateReads { prediction, observability: Vec::new() }, &context()).expect("statistics").statistics
+    let prediction = tables
+        .into_iter()
+        .map(|table| Labelled {
+            stage: "identify".into(),
+            table,
+        })
+        .collect();
+    Validate::default()
+        .run(
+            ValidateReads {
+                prediction,
+                observability: Vec::new(),
+            },
+            &context(),
+        )
+        .expect("statistics")
+        .statistics
 }
 
 fn near(found: f64, expected: f64) {
-    assert!((found - expected).abs() < 1e-12, "{found} is not {expected}");
+    assert!(
+        (found - expected).abs() < 1e-12,
+        "{found} is not {expected}"
+    );
 }
 
 #[test]
 fn statistics_of_four_points_are_those_of_pencil_and_paper() {
     // Errors 1, 2, 3, 6: mean 3, sum of squared deviations 14, sum of squares 50.
-    let rows = [[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 3.0], [6.0, 0.0, 0.0]];
-    let rows = rows.into_iter().zip(0..).map(|(residual, k)| point(k, "geometry", "validate", true, residual)).collect();
+    let rows = [
+        [1.0, 0.0, 0.0],
+        [0.0, 2.0, 0.0],
+        [0.0, 0.0, 3.0],
+        [6.0, 0.0, 0.0],
+    ];
+    let rows = rows
+        .into_iter()
+        .zip(0..)
+        .map(|(residual, k)| point(k, "geometry", "validate", true, residual))
+        .collect();
     let statistics = validate(vec![Prediction(rows)]);
-    let [row] = statistics.0.as_slice() else { panic!("one row expected: {statistics:?}") };
-    assert_eq!((row.order, row.step.as_str(), row.set.as_str(), row.held_out, row.points), (0, "geometry", "validate", true, 4));
+    let [row] = statistics.0.as_slice() else {
+        panic!("one row expected: {statistics:?}")
+    };
+    assert_eq!(
+        (
+            row.order,
+            row.step.as_str(),
+            row.set.as_str(),
+            row.held_out,
+            row.points
+        ),
+        (0, "geometry", "validate", true, 4)
+    );
     near(row.mean_mm, 3.0);
     near(row.std_mm, (14.0f64 / 3.0).sqrt());
     near(row.rms_mm, 12.5f64.sqrt());
@@ -57,22 +104,54 @@ fn statistics_of_four_points_are_those_of_pencil_and_paper() {
 
 #[test]
 fn a_set_of_which_part_was_fitted_makes_two_rows_and_two_tables_of_one_stage_two_steps() {
-    let nominal = (0..4).map(|k| point(k, "nominal", "all", true, [1.0, 0.0, 0.0])).collect();
-    let geometry = (0..4).map(|k| point(k, "geometry", "all", k == 3, [0.1 * (k + 1) as f64, 0.0, 0.0])).collect();
+    let nominal = (0..4)
+        .map(|k| point(k, "nominal", "all", true, [1.0, 0.0, 0.0]))
+        .collect();
+    let geometry = (0..4)
+        .map(|k| {
+            point(
+                k,
+                "geometry",
+                "all",
+                k == 3,
+                [0.1 * (k + 1) as f64, 0.0, 0.0],
+            )
+        })
+        .collect();
     let statistics = validate(vec![Prediction(nominal), Prediction(geometry)]);
-    let found: Vec<_> = statistics.0.iter().map(|r| (r.order, r.step.as_str(), r.held_out, r.points)).collect();
-    assert_eq!(found, [(0, "nominal", true, 4), (1, "geometry", false, 3), (1, "geometry", true, 1)]);
+    let found: Vec<_> = statistics
+        .0
+        .iter()
+        .map(|r| (r.order, r.step.as_str(), r.held_out, r.points))
+        .collect();
+    assert_eq!(
+        found,
+        [
+            (0, "nominal", true, 4),
+            (1, "geometry", false, 3),
+            (1, "geometry", true, 1)
+        ]
+    );
     near(statistics.0[1].mean_mm, 0.2);
     near(statistics.0[2].mean_mm, 0.4);
     near(statistics.0[2].std_mm, 0.0);
     let frame = statistics.to_frame().expect("the schema allows both rows");
-    assert_eq!(Statistics::from_frame(&frame).expect("read back"), statistics);
+    assert_eq!(
+        Statistics::from_frame(&frame).expect("read back"),
+        statistics
+    );
 }
 
 #[test]
 fn nothing_to_validate_is_an_error_of_the_pipeline() {
     let error = Validate::default()
-        .run(ValidateReads { prediction: Vec::new(), observability: Vec::new() }, &context())
+        .run(
+            ValidateReads {
+                prediction: Vec::new(),
+                observability: Vec::new(),
+            },
+            &context(),
+        )
         .err()
         .expect("refused");
     assert_eq!(error.exit_code(), 2);
@@ -92,9 +171,14 @@ fn pictures(html: &str) -> usize {
     for part in html.split("<svg ").skip(1) {
         let body = part.split("</svg>").next().expect("split gives one part");
         let text = format!("<svg {body}</svg>");
-        let svg = roxmltree::Document::parse(&text).unwrap_or_else(|e| panic!("picture {count}: {e}\n{text}"));
+        let svg = roxmltree::Document::parse(&text)
+            .unwrap_or_else(|e| panic!("picture {count}: {e}\n{text}"));
         assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
-        assert!(svg.root_element().children().any(|child| child.has_tag_name("title")));
+        assert!(
+            svg.root_element()
+                .children()
+                .any(|child| child.has_tag_name("title"))
+        );
         count += 1;
     }
     count
@@ -103,11 +187,23 @@ fn pictures(html: &str) -> usize {
 #[test]
 fn a_report_stands_alone_and_its_pictures_are_sound() {
     let page = html(Report::default(), tables("Heavy 6R, cell 4"));
-    for foreign in ["http://", "https://", "src=", "href=", "<script", "@import", "url("] {
-        assert!(!page.contains(foreign), "the report refers to something outside itself: {foreign}");
+    for foreign in [
+        "http://", "https://", "src=", "href=", "<script", "@import", "url(",
+    ] {
+        assert!(
+            !page.contains(foreign),
+            "the report refers to something outside itself: {foreign}"
+        );
     }
-    for command in page.split("<code>calib ").skip(1).filter_map(|rest| rest.split([' ', '<']).next()) {
-        assert!(["run", "check", "schema"].contains(&command), "the report names `calib {command}`, which does not exist");
+    for command in page
+        .split("<code>calib ")
+        .skip(1)
+        .filter_map(|rest| rest.split([' ', '<']).next())
+    {
+        assert!(
+            ["run", "check", "schema"].contains(&command),
+            "the report names `calib {command}`, which does not exist"
+        );
     }
     // Two held-out sets with two pictures each, four views, one spectrum, one convergence, two trainings.
     assert_eq!(pictures(&page), 12);
@@ -119,23 +215,52 @@ fn a_report_stands_alone_and_its_pictures_are_sound() {
 fn the_first_sentence_states_the_held_out_means_of_the_statistics() {
     let reads = tables("Heavy 6R, cell 4");
     let mean = |order: i64, set: &str| {
-        let row = reads.statistics.0.iter().find(|r| r.order == order && r.set == set && r.held_out).expect("a row");
+        let row = reads
+            .statistics
+            .0
+            .iter()
+            .find(|r| r.order == order && r.set == set && r.held_out)
+            .expect("a row");
         format!("{:.3}", row.mean_mm)
     };
-    let expected = |set: &str| format!("The mean position error fell from {} mm to {} mm on", mean(0, set), mean(3, set));
+    let expected = |set: &str| {
+        format!(
+            "The mean position error fell from {} mm to {} mm on",
+            mean(0, set),
+            mean(3, set)
+        )
+    };
     let (largest, wished) = (expected("check"), expected("unloaded_check"));
-    assert!(html(Report::default(), tables("Heavy 6R, cell 4")).contains(&largest), "{largest}");
-    let settings = Report { set: Some("unloaded_check".into()), ..Report::default() };
-    assert!(html(settings, tables("Heavy 6R, cell 4")).contains(&wished), "{wished}");
+    assert!(
+        html(Report::default(), tables("Heavy 6R, cell 4")).contains(&largest),
+        "{largest}"
+    );
+    let settings = Report {
+        set: Some("unloaded_check".into()),
+        ..Report::default()
+    };
+    assert!(
+        html(settings, tables("Heavy 6R, cell 4")).contains(&wished),
+        "{wished}"
+    );
 }
 
 #[test]
 fn a_wished_set_that_is_not_held_out_is_refused_with_the_allowed_ones() {
-    let settings = Report { set: Some("learn".into()), ..Report::default() };
-    let error = settings.run(tables("Heavy 6R, cell 4"), &context()).err().expect("refused");
+    let settings = Report {
+        set: Some("learn".into()),
+        ..Report::default()
+    };
+    let error = settings
+        .run(tables("Heavy 6R, cell 4"), &context())
+        .err()
+        .expect("refused");
     assert_eq!(error.exit_code(), 2);
     let text = error.to_string();
-    assert!(text.starts_with("report.with.set: `learn`") && text.ends_with("check, unloaded_check"), "{text}");
+    assert!(
+        text.starts_with("report.with.set: `learn`") && text.ends_with("check, unloaded_check"),
+        "{text}"
+    );
 }
 
 #[test]
@@ -148,7 +273,13 @@ fn hostile_names_are_shown_and_not_run() {
             row.step = format!("{}{HOSTILE}", row.step);
         }
     }
-    reads.statistics = validate(reads.prediction.iter().map(|labelled| labelled.table.clone()).collect());
+    reads.statistics = validate(
+        reads
+            .prediction
+            .iter()
+            .map(|labelled| labelled.table.clone())
+            .collect(),
+    );
     reads.parameters.0[0].name = HOSTILE.into();
     reads.parameters.0[0].status = "\" onmouseover=\"alert(1)".into();
     reads.parameters.0[0].remark = Some(HOSTILE.into());
@@ -158,44 +289,86 @@ fn hostile_names_are_shown_and_not_run() {
     reads.rejected[0].table.0[0].text = HOSTILE.into();
     reads.intake[0].table.0[0].file = HOSTILE.into();
     reads.split.0[0].set = HOSTILE.into();
-    let page = html(Report { title: Some(HOSTILE.into()), ..Report::default() }, reads);
+    let page = html(
+        Report {
+            title: Some(HOSTILE.into()),
+            ..Report::default()
+        },
+        reads,
+    );
     assert!(!page.contains("<script"), "markup from a name came through");
-    assert!(!page.contains("\" onmouseover=\""), "an attribute from a name came through");
+    assert!(
+        !page.contains("\" onmouseover=\""),
+        "an attribute from a name came through"
+    );
     assert!(page.contains("&lt;script&gt;alert(1)"));
     assert!(pictures(&page) > 10);
 }
 
 #[test]
 fn reference_figures_stand_beside_ours_only_where_there_are_any() {
-    assert!(!html(Report::default(), tables("Heavy 6R, cell 4")).contains("Beside reference figures"));
+    assert!(
+        !html(Report::default(), tables("Heavy 6R, cell 4")).contains("Beside reference figures")
+    );
     let mut reads = tables("Heavy 6R, cell 4");
-    let row = reads.statistics.0.iter_mut().find(|row| row.step == "network" && row.set == "check").expect("a row");
+    let row = reads
+        .statistics
+        .0
+        .iter_mut()
+        .find(|row| row.step == "network" && row.set == "check")
+        .expect("a row");
     row.reference = Some("Table 9 <paper>".into());
     row.reference_mean_mm = Some(0.6522);
     row.reference_max_mm = Some(0.9834);
     let ours = format!("{:.3}", row.mean_mm);
     let page = html(Report::default(), reads);
-    let table = page.split("Beside reference figures").nth(1).and_then(|rest| rest.split("</table>").next()).expect("a table");
-    assert!(table.contains("Table 9 &lt;paper&gt;") && table.contains("held out"), "{table}");
-    assert!(table.contains(&format!("<b>{ours}</b></td><td>0.652</td>")), "{table}");
+    let table = page
+        .split("Beside reference figures")
+        .nth(1)
+        .and_then(|rest| rest.split("</table>").next())
+        .expect("a table");
+    assert!(
+        table.contains("Table 9 &lt;paper&gt;") && table.contains("held out"),
+        "{table}"
+    );
+    assert!(
+        table.contains(&format!("<b>{ours}</b></td><td>0.652</td>")),
+        "{table}"
+    );
     assert!(table.contains("<td>0.983</td>"), "{table}");
 }
 
 #[test]
 fn rivals_of_a_correction_stand_with_their_errors_and_why_they_were_not_kept() {
     let page = html(Report::default(), tables("Heavy 6R, cell 4"));
-    let section = page.split("id=\"corrections\"").nth(1).and_then(|rest| rest.split("</section>").next()).expect("a section");
-    assert!(section.contains("the mean error falls from 0.810 to 0.550 mm on rows that it did not see"), "{section}");
+    let section = page
+        .split("id=\"corrections\"")
+        .nth(1)
+        .and_then(|rest| rest.split("</section>").next())
+        .expect("a section");
+    assert!(
+        section.contains("the mean error falls from 0.810 to 0.550 mm on rows that it did not see"),
+        "{section}"
+    );
     assert!(section.contains(
         "kept</span> network, started by BSO</th><td>0.550</td><td>0.605</td><td>1.650</td><td>+0.260 \u{b1} 0.021</td>"
     ));
-    assert!(section.contains("0.070 mm behind mlp_bso &lt;b&gt;</td>"), "{section}");
-    assert!(section.contains("joint curves</th><td></td><td></td><td></td><td></td>"), "{section}");
+    assert!(
+        section.contains("0.070 mm behind mlp_bso &lt;b&gt;</td>"),
+        "{section}"
+    );
+    assert!(
+        section.contains("joint curves</th><td></td><td></td><td></td><td></td>"),
+        "{section}"
+    );
     let mut reads = tables("Heavy 6R, cell 4");
     let rows = &mut reads.corrections[0].table.0;
     (rows[0].chosen, rows[2].chosen) = (true, false);
     rows[0].reason = "nothing that was tried helps clearly".into();
-    assert!(html(Report::default(), reads).contains("no correction was kept: nothing that was tried helps clearly."));
+    assert!(
+        html(Report::default(), reads)
+            .contains("no correction was kept: nothing that was tried helps clearly.")
+    );
     let mut reads = tables("Heavy 6R, cell 4");
     reads.corrections = Vec::new();
     assert!(!html(Report::default(), reads).contains("id=\"corrections\""));
@@ -203,7 +376,10 @@ fn rivals_of_a_correction_stand_with_their_errors_and_why_they_were_not_kept() {
 
 #[test]
 fn the_range_of_a_joint_that_slides_is_in_millimetres() {
-    assert!(html(Report::default(), tables("Heavy 6R, cell 4")).contains("Valid for joint 2 from -45.8 to 63.0 deg."));
+    assert!(
+        html(Report::default(), tables("Heavy 6R, cell 4"))
+            .contains("Valid for joint 2 from -45.8 to 63.0 deg.")
+    );
     let mut reads = tables("Heavy 6R, cell 4");
     let row = &mut reads.findings[0].table.0[0];
     (row.valid_from_rad, row.valid_to_rad) = (None, None);
@@ -235,13 +411,22 @@ fn empty_tables_make_a_report_that_says_so() {
     reads.statistics = Statistics::default();
     reads.parameters = Parameters::default();
     reads.robot = Robot::default();
-    reads.recording = Recording { joints: 3, prismatic: vec![false; 3], ..Recording::default() };
+    reads.recording = Recording {
+        joints: 3,
+        prismatic: vec![false; 3],
+        ..Recording::default()
+    };
     reads.split = Split::default();
     (reads.intake, reads.rejected, reads.fit) = (Vec::new(), Vec::new(), Vec::new());
     (reads.observability, reads.training, reads.corrections) = (Vec::new(), Vec::new(), Vec::new());
     let page = html(Report::default(), reads);
     assert_eq!(pictures(&page), 0);
-    for sentence in ["No point was held out", "identified no parameters", "No row was rejected", "No file was read"] {
+    for sentence in [
+        "No point was held out",
+        "identified no parameters",
+        "No row was rejected",
+        "No file was read",
+    ] {
         assert!(page.contains(sentence), "{sentence}");
     }
 }
@@ -251,7 +436,10 @@ fn one_point_without_error_still_draws() {
     let mut reads = tables("Heavy 6R, cell 4");
     let one = Prediction(vec![point(0, "nominal", "check", true, [0.0; 3])]);
     reads.statistics = validate(vec![one.clone()]);
-    reads.prediction = vec![Labelled { stage: "identify".into(), table: one }];
+    reads.prediction = vec![Labelled {
+        stage: "identify".into(),
+        table: one,
+    }];
     reads.fit[0].table.0.truncate(1);
     reads.fit[0].table.0[0].rms_mm = 0.0;
     let page = html(Report::default(), reads);
@@ -264,17 +452,34 @@ fn the_certificate_is_green_only_where_the_error_is_explained_and_within_the_lim
     let card = |said: &str, mean_mm: Option<f64>| {
         let mut reads = tables("Heavy 6R, cell 4");
         reads.verdict[0].table.0[0].verdict = said.into();
-        let limits = calib::stage::Accepted { mean_mm, ..Default::default() };
+        let limits = calib::stage::Accepted {
+            mean_mm,
+            ..Default::default()
+        };
         let identity = [("robot serial".to_string(), "4711".to_string())].into();
-        let page = html(Report { limits, identity, ..Report::default() }, reads);
-        let card =
-            page.split("id=\"verdict\"").next().and_then(|head| head.rsplit("<section class=\"verdict ").next()).expect("a card");
+        let page = html(
+            Report {
+                limits,
+                identity,
+                ..Report::default()
+            },
+            reads,
+        );
+        let card = page
+            .split("id=\"verdict\"")
+            .next()
+            .and_then(|head| head.rsplit("<section class=\"verdict ").next())
+            .expect("a card");
         assert!(
-            page.contains("<dt>robot serial</dt><dd translate=\"no\">4711</dd>") && page.matches("signature</span>").count() == 1
+            page.contains("<dt>robot serial</dt><dd translate=\"no\">4711</dd>")
+                && page.matches("signature</span>").count() == 1
         );
         assert!(page.contains("expanded uncertainty of the corrected robot"));
         // What is not explained is not called accepted.
-        assert_eq!(page.contains("Accepted: within"), ["explained", "nothing_missing"].contains(&said) && mean_mm == Some(100.0));
+        assert_eq!(
+            page.contains("Accepted: within"),
+            ["explained", "nothing_missing"].contains(&said) && mean_mm == Some(100.0)
+        );
         card.trim_end_matches(['"', ' ']).to_string()
     };
     assert_eq!(card("explained", Some(100.0)), "better");
@@ -290,7 +495,11 @@ fn the_certificate_is_green_only_where_the_error_is_explained_and_within_the_lim
 #[test]
 fn the_table_of_causes_shows_what_was_found_and_what_is_left() {
     let grid = CauseGrid::of(&tables::cells(), &tables::findings());
-    assert_eq!(grid.columns, ["own angle", "load"], "columns in which something is");
+    assert_eq!(
+        grid.columns,
+        ["own angle", "load"],
+        "columns in which something is"
+    );
     assert_eq!(grid.others, ["other angle", "time", "temperature"]);
     let places: Vec<&str> = grid.rows.iter().map(|row| row.place.as_str()).collect();
     assert_eq!(
@@ -298,11 +507,26 @@ fn the_table_of_causes_shows_what_was_found_and_what_is_left() {
         ["base", "joint 2"],
         "a coupling belongs to the joint that is moved, a run of links has a row where something was found alone"
     );
-    let [base, joint] = &grid.rows[..] else { panic!("two rows") };
-    assert!(base.found.iter().chain(&base.left).all(Option::is_none), "the base was asked neither by angle nor by load");
+    let [base, joint] = &grid.rows[..] else {
+        panic!("two rows")
+    };
+    assert!(
+        base.found.iter().chain(&base.left).all(Option::is_none),
+        "the base was asked neither by angle nor by load"
+    );
     let found = joint.found[0].as_ref().expect("asked");
-    assert_eq!((found.mm, &found.effects[..]), (Some(0.28), &["gear_cyclic".to_string()][..]));
-    assert_eq!(joint.left[0].as_ref().expect("asked").mm, None, "nothing is left by the angle");
+    assert_eq!(
+        (found.mm, &found.effects[..]),
+        (Some(0.28), &["gear_cyclic".to_string()][..])
+    );
+    assert_eq!(
+        joint.left[0].as_ref().expect("asked").mm,
+        None,
+        "nothing is left by the angle"
+    );
     assert_eq!(joint.left[1].as_ref().expect("asked").mm, Some(0.012));
-    assert_eq!(grid.text(), "found        own angle\njoint 2         280 um\n");
+    assert_eq!(
+        grid.text(),
+        "found        own angle\njoint 2         280 um\n"
+    );
 }

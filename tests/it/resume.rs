@@ -14,12 +14,20 @@ fn pipeline() -> PathBuf {
 }
 fn calib(store: &Path) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_calib"));
-    command.arg("run").arg(pipeline()).args(["--json", "--quiet", "--store"]).arg(store);
+    command
+        .arg("run")
+        .arg(pipeline())
+        .args(["--json", "--quiet", "--store"])
+        .arg(store);
     command
 }
 fn run(command: &mut Command) -> Value {
     let output = command.output().unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     serde_json::from_slice(&output.stdout).unwrap()
 }
 /// `stage.port` -> hash of the table's content.
@@ -27,7 +35,11 @@ fn hashes(result: &Value) -> BTreeMap<String, String> {
     let mut hashes = BTreeMap::new();
     for stage in result["stages"].as_array().unwrap() {
         for output in stage["outputs"].as_array().unwrap() {
-            let name = format!("{}.{}", stage["id"].as_str().unwrap(), output["port"].as_str().unwrap());
+            let name = format!(
+                "{}.{}",
+                stage["id"].as_str().unwrap(),
+                output["port"].as_str().unwrap()
+            );
             hashes.insert(name, output["table_hash"].as_str().unwrap().to_string());
         }
     }
@@ -37,14 +49,27 @@ fn hashes(result: &Value) -> BTreeMap<String, String> {
 /// Action records, the commit points.
 fn actions(store: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
-    for folder in std::fs::read_dir(store.join("actions")).into_iter().flatten().flatten() {
-        found.extend(std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path()));
+    for folder in std::fs::read_dir(store.join("actions"))
+        .into_iter()
+        .flatten()
+        .flatten()
+    {
+        found.extend(
+            std::fs::read_dir(folder.path())
+                .unwrap()
+                .map(|entry| entry.unwrap().path()),
+        );
     }
     found.sort();
     found
 }
 fn executed(result: &Value) -> usize {
-    result["stages"].as_array().unwrap().iter().filter(|stage| stage["status"] == "executed").count()
+    result["stages"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(|stage| stage["status"] == "executed")
+        .count()
 }
 
 /// An undisturbed run, on two threads.
@@ -59,7 +84,11 @@ static UNDISTURBED: LazyLock<Undisturbed> = LazyLock::new(|| {
     let folder = tempfile::tempdir().unwrap();
     let result = run(calib(folder.path()).args(["--jobs", "2"]));
     let actions = held_locks::actions_of(folder.path(), result["run_id"].as_str().unwrap());
-    Undisturbed { stages: executed(&result), hashes: hashes(&result), actions }
+    Undisturbed {
+        stages: executed(&result),
+        hashes: hashes(&result),
+        actions,
+    }
 });
 
 #[test]
@@ -74,7 +103,11 @@ fn a_killed_run_resumes_and_ends_as_an_undisturbed_one() {
         let mut seen = 0;
         // Twice in a row: what a killed run left, and what a killed resumption left.
         for _ in 0..2 {
-            let mut child = calib(&store).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+            let mut child = calib(&store)
+                .stdout(Stdio::null())
+                .stderr(Stdio::null())
+                .spawn()
+                .unwrap();
             let enough = random.random_range(1..=barrier);
             held_locks::until(&mut child, || actions(&store).len() >= enough);
             // Somewhere in the next stage, or at the barrier.
@@ -85,15 +118,32 @@ fn a_killed_run_resumes_and_ends_as_an_undisturbed_one() {
         }
         drop(held);
         let finished = actions(&store);
-        assert!((seen..=barrier).contains(&finished.len()), "round {round}: {} of {barrier}", finished.len());
-        let modified: Vec<_> = finished.iter().map(|path| path.metadata().unwrap().modified().unwrap()).collect();
+        assert!(
+            (seen..=barrier).contains(&finished.len()),
+            "round {round}: {} of {barrier}",
+            finished.len()
+        );
+        let modified: Vec<_> = finished
+            .iter()
+            .map(|path| path.metadata().unwrap().modified().unwrap())
+            .collect();
         let resumed = run(&mut calib(&store));
-        assert_eq!(executed(&resumed), UNDISTURBED.stages - finished.len(), "round {round}: finished stages are not redone");
-        let after: Vec<_> = finished.iter().map(|path| path.metadata().unwrap().modified().unwrap()).collect();
+        assert_eq!(
+            executed(&resumed),
+            UNDISTURBED.stages - finished.len(),
+            "round {round}: finished stages are not redone"
+        );
+        let after: Vec<_> = finished
+            .iter()
+            .map(|path| path.metadata().unwrap().modified().unwrap())
+            .collect();
         assert_eq!(modified, after, "round {round}: records stand");
         assert_eq!(hashes(&resumed), UNDISTURBED.hashes, "round {round}");
         assert_eq!(executed(&run(&mut calib(&store))), 0);
-        let left: Vec<_> = std::fs::read_dir(store.join("tmp")).unwrap().flatten().collect();
+        let left: Vec<_> = std::fs::read_dir(store.join("tmp"))
+            .unwrap()
+            .flatten()
+            .collect();
         assert!(left.is_empty(), "round {round}: {left:?}");
     }
 }
@@ -101,20 +151,37 @@ fn a_killed_run_resumes_and_ends_as_an_undisturbed_one() {
 #[test]
 fn results_do_not_depend_on_the_number_of_threads() {
     let folder = tempfile::tempdir().unwrap();
-    assert_eq!(hashes(&run(calib(folder.path()).args(["--jobs", "1"]))), UNDISTURBED.hashes);
+    assert_eq!(
+        hashes(&run(calib(folder.path()).args(["--jobs", "1"]))),
+        UNDISTURBED.hashes
+    );
 }
 
 #[test]
 fn two_runs_at_once_share_their_work() {
     let folder = tempfile::tempdir().unwrap();
-    let start = || calib(folder.path()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let start = || {
+        calib(folder.path())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap()
+    };
     let results = [start(), start()].map(|child| {
         let output = child.wait_with_output().unwrap();
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        assert!(
+            output.status.success(),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
         serde_json::from_slice::<Value>(&output.stdout).unwrap()
     });
     let stages = results[0]["stages"].as_array().unwrap().len();
-    assert_eq!(executed(&results[0]) + executed(&results[1]), stages, "every stage was executed once");
+    assert_eq!(
+        executed(&results[0]) + executed(&results[1]),
+        stages,
+        "every stage was executed once"
+    );
     assert_eq!(hashes(&results[0]), hashes(&results[1]));
 }
 
@@ -123,15 +190,24 @@ fn the_manifest_of_a_killed_run_says_that_it_did_not_end() {
     let folder = tempfile::tempdir().unwrap();
     // Nobody comes past the first stage.
     let _held = held_locks::action(folder.path(), &UNDISTURBED.actions[0]);
-    let mut child = calib(folder.path()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let mut child = calib(folder.path())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
     let manifest = || {
-        let runs = std::fs::read_dir(folder.path().join("runs")).into_iter().flatten().flatten();
-        runs.map(|entry| entry.path().join("manifest.json")).find(|path| path.is_file())
+        let runs = std::fs::read_dir(folder.path().join("runs"))
+            .into_iter()
+            .flatten()
+            .flatten();
+        runs.map(|entry| entry.path().join("manifest.json"))
+            .find(|path| path.is_file())
     };
     held_locks::until(&mut child, || manifest().is_some());
     child.kill().unwrap();
     child.wait().unwrap();
-    let manifest: Value = serde_json::from_slice(&std::fs::read(manifest().unwrap()).unwrap()).unwrap();
+    let manifest: Value =
+        serde_json::from_slice(&std::fs::read(manifest().unwrap()).unwrap()).unwrap();
     assert_eq!(manifest["status"], "running");
     assert_eq!(manifest["seed"], 11);
 }
@@ -141,16 +217,37 @@ fn the_log_counts_the_stages_that_a_killed_run_finished() {
     let folder = tempfile::tempdir().unwrap();
     let store = folder.path();
     let _held = held_locks::action(store, &UNDISTURBED.actions[3]);
-    let mut child = calib(store).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let mut child = calib(store)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
     let ended = || {
-        let runs = std::fs::read_dir(store.join("runs")).into_iter().flatten().flatten();
-        let events = runs.filter_map(|run| std::fs::read_to_string(run.path().join("events.jsonl")).ok());
-        events.map(|text| text.lines().filter(|line| line.contains("\"ends\"")).count()).sum::<usize>()
+        let runs = std::fs::read_dir(store.join("runs"))
+            .into_iter()
+            .flatten()
+            .flatten();
+        let events =
+            runs.filter_map(|run| std::fs::read_to_string(run.path().join("events.jsonl")).ok());
+        events
+            .map(|text| {
+                text.lines()
+                    .filter(|line| line.contains("\"ends\""))
+                    .count()
+            })
+            .sum::<usize>()
     };
     held_locks::until(&mut child, || ended() == 3);
     child.kill().unwrap();
     child.wait().unwrap();
-    let log = Command::new(env!("CARGO_BIN_EXE_calib")).args(["log", "--store"]).arg(store).output().unwrap();
+    let log = Command::new(env!("CARGO_BIN_EXE_calib"))
+        .args(["log", "--store"])
+        .arg(store)
+        .output()
+        .unwrap();
     let said = String::from_utf8_lossy(&log.stdout).into_owned();
-    assert!(said.contains("running or killed, 3 run, 0 cached"), "{said}");
+    assert!(
+        said.contains("running or killed, 3 run, 0 cached"),
+        "{said}"
+    );
 }

@@ -12,7 +12,13 @@ tool: {point: [900, 0, 0]}
 ";
 
 fn calib(text: &str) -> String {
-    match read_calib(RobotFileText { label: "robot.yaml", text }, None) {
+    match read_calib(
+        RobotFileText {
+            label: "robot.yaml",
+            text,
+        },
+        None,
+    ) {
         Ok(_) => "no fault".into(),
         Err(error) => {
             assert_eq!(error.exit_code(), 2);
@@ -32,10 +38,21 @@ fn added(text: &str) -> String {
 }
 
 fn urdf(text: &str, base: &str, tip: &str) -> String {
-    let file = format!("calib_robot: 1\nunits: {{length: mm, angle: deg}}\nkinematics: {{urdf: {{base: {base}, tip: {tip}}}}}\n");
-    let urdf = RobotFileText { label: "arm.urdf", text };
-    read_calib(RobotFileText { label: "robot.yaml", text: &file }, Some(urdf))
-        .map_or_else(|e| e.to_string(), |_| "no fault".into())
+    let file = format!(
+        "calib_robot: 1\nunits: {{length: mm, angle: deg}}\nkinematics: {{urdf: {{base: {base}, tip: {tip}}}}}\n"
+    );
+    let urdf = RobotFileText {
+        label: "arm.urdf",
+        text,
+    };
+    read_calib(
+        RobotFileText {
+            label: "robot.yaml",
+            text: &file,
+        },
+        Some(urdf),
+    )
+    .map_or_else(|e| e.to_string(), |_| "no fault".into())
 }
 
 #[test]
@@ -88,11 +105,17 @@ fn an_axis_has_a_direction() {
         "robot.yaml:6:14: kinematics.screws[1].axis: has no direction: its length is zero"
     );
     assert_eq!(
-        changed("axis: [0, 1, 0], point: [300, 0, 0]", "twist: [0, 0, 0, 0, 0, 0]"),
+        changed(
+            "axis: [0, 1, 0], point: [300, 0, 0]",
+            "twist: [0, 0, 0, 0, 0, 0]"
+        ),
         "robot.yaml:6:15: kinematics.screws[1].twist: is no screw: all six numbers are zero"
     );
     assert_eq!(
-        changed("axis: [0, 1, 0], point: [300, 0, 0]", "twist: [0, 5, 0, 0, 1, 0]"),
+        changed(
+            "axis: [0, 1, 0], point: [300, 0, 0]",
+            "twist: [0, 5, 0, 0, 1, 0]"
+        ),
         "robot.yaml:6:15: kinematics.screws[1].twist: moves 5 along its axis per rad; expected a pure rotation, v perpendicular to w, or w = 0"
     );
 }
@@ -112,13 +135,19 @@ fn numbers_are_finite() {
 
 #[test]
 fn units_are_stated_and_known() {
-    assert_eq!(changed("length: mm", "length: cm"), "robot.yaml:2:17: units.length: unknown value `cm` (allowed: mm, um, m, in)");
+    assert_eq!(
+        changed("length: mm", "length: cm"),
+        "robot.yaml:2:17: units.length: unknown value `cm` (allowed: mm, um, m, in)"
+    );
     assert_eq!(
         changed("units: {length: mm, angle: deg}\n", ""),
         "robot.yaml:1:1: units: missing; expected a map with the keys length, angle"
     );
     assert_eq!(
-        calib(&format!("{}joints: [{{limits: [-185, 185]}}, ]\n", GOOD.replace("deg", "rad"))),
+        calib(&format!(
+            "{}joints: [{{limits: [-185, 185]}}, ]\n",
+            GOOD.replace("deg", "rad")
+        )),
         "robot.yaml:8:9: joints: 1 entries for 2 joints; expected one per joint\n\
          robot.yaml:8:19: joints[0].limits: -185 rad is more than 63 rad, ten turns; is it in another unit?"
     );
@@ -127,7 +156,10 @@ fn units_are_stated_and_known() {
 #[test]
 fn lists_have_one_entry_per_joint() {
     let message = added("links: [{mass: 1, centre: [0, 0, 0]}, null, null]");
-    assert_eq!(message, "robot.yaml:8:8: links: 3 entries for 2 joints; expected one per joint");
+    assert_eq!(
+        message,
+        "robot.yaml:8:8: links: 3 entries for 2 joints; expected one per joint"
+    );
     let message = added("couplings: [{moved: 3, by: 1}, {moved: 1, by: 1}, {moved: 2, by: 0.5}]");
     assert_eq!(
         message,
@@ -140,7 +172,10 @@ fn lists_have_one_entry_per_joint() {
 #[test]
 fn a_file_describes_one_arm_once() {
     assert_eq!(
-        changed("kinematics:\n", "kinematics:\n  dh: [{d: 1, a: 0, alpha: 0}]\n"),
+        changed(
+            "kinematics:\n",
+            "kinematics:\n  dh: [{d: 1, a: 0, alpha: 0}]\n"
+        ),
         "robot.yaml:4:3: kinematics: more than one description of the arm; expected one of screws, dh, mdh, urdf"
     );
     assert_eq!(
@@ -151,18 +186,35 @@ fn a_file_describes_one_arm_once() {
         calib("calib_robot: 1\nunits: {length: mm, angle: deg}\nkinematics: {dh: []}\n"),
         "robot.yaml:3:13: kinematics: no joints; expected at least one"
     );
-    let urdf = calib("calib_robot: 1\nunits: {length: mm, angle: deg}\nkinematics: {urdf: {base: a, tip: b}}\n");
-    assert!(urdf.starts_with("robot.yaml:3:20: kinematics.urdf: the URDF itself is missing; name it in the pipeline"), "{urdf}");
+    let urdf = calib(
+        "calib_robot: 1\nunits: {length: mm, angle: deg}\nkinematics: {urdf: {base: a, tip: b}}\n",
+    );
+    assert!(
+        urdf.starts_with(
+            "robot.yaml:3:20: kinematics.urdf: the URDF itself is missing; name it in the pipeline"
+        ),
+        "{urdf}"
+    );
 }
 
 #[test]
 fn a_key_twice_and_broken_yaml_show_the_line() {
     let twice = added("tool: {point: [0, 0, 0]}");
-    assert!(twice.starts_with("robot.yaml:8:1: key `tool` is given twice"), "{twice}");
+    assert!(
+        twice.starts_with("robot.yaml:8:1: key `tool` is given twice"),
+        "{twice}"
+    );
     let broken = changed("tool: {point: [900, 0, 0]}", "tool: {point: [900, 0, 0]");
-    assert!(broken.starts_with("robot.yaml:7:7: unclosed bracket"), "{broken}");
+    assert!(
+        broken.starts_with("robot.yaml:7:7: unclosed bracket"),
+        "{broken}"
+    );
     for text in ["", "just text", "[1, 2]", "# nothing\n"] {
-        assert!(calib(text).contains("expected a map with the keys calib_robot, name"), "{}", calib(text));
+        assert!(
+            calib(text).contains("expected a map with the keys calib_robot, name"),
+            "{}",
+            calib(text)
+        );
     }
 }
 
@@ -180,7 +232,11 @@ fn a_urdf_fault_names_its_line() {
         "arm.urdf:1: no link `tool`; did you mean `tool0`? (links: base_link, tool0, upper)"
     );
     assert_eq!(
-        urdf(&ARM.replace("child link=\"upper\"", "child link=\"uper\""), "base_link", "tool0"),
+        urdf(
+            &ARM.replace("child link=\"upper\"", "child link=\"uper\""),
+            "base_link",
+            "tool0"
+        ),
         "arm.urdf:3: joint `j1` refers to link `uper`, which does not exist; did you mean `upper`?"
     );
     assert_eq!(
@@ -200,20 +256,37 @@ fn a_urdf_fault_names_its_line() {
         "arm.urdf:3: joint `j1` has the type `floating` (allowed: revolute, continuous, prismatic, fixed)"
     );
     assert_eq!(
-        urdf(&ARM.replace("<axis xyz=\"0 0 1\"/>", "\n<mimic joint=\"j2\"/>"), "base_link", "tool0"),
+        urdf(
+            &ARM.replace("<axis xyz=\"0 0 1\"/>", "\n<mimic joint=\"j2\"/>"),
+            "base_link",
+            "tool0"
+        ),
         "arm.urdf:4: joint `j1` mimics another joint; expected a serial chain of independent joints"
     );
     assert_eq!(
         urdf(&ARM.replace("revolute", "fixed"), "base_link", "tool0"),
         "robot.yaml:3:13: kinematics: no joints; expected at least one"
     );
-    assert_eq!(urdf("<sdf/>", "a", "b"), "arm.urdf:1: expected a URDF, whose root is <robot>, found <sdf>");
+    assert_eq!(
+        urdf("<sdf/>", "a", "b"),
+        "arm.urdf:1: expected a URDF, whose root is <robot>, found <sdf>"
+    );
     assert!(urdf("<robot", "a", "b").starts_with("arm.urdf: not readable as XML: "));
     let circle = ARM.replace("child link=\"tool0\"", "child link=\"base_link\"");
-    assert_eq!(urdf(&circle, "tool0", "upper"), "arm.urdf:1: the joints from `upper` run in a circle; expected a tree");
+    assert_eq!(
+        urdf(&circle, "tool0", "upper"),
+        "arm.urdf:1: the joints from `upper` run in a circle; expected a tree"
+    );
     assert!(
-        urdf(&ARM.replace("<robot ", "<robot xmlns:xacro=\"http://www.ros.org/wiki/xacro\" "), "base_link", "tool0")
-            .contains("no fault")
+        urdf(
+            &ARM.replace(
+                "<robot ",
+                "<robot xmlns:xacro=\"http://www.ros.org/wiki/xacro\" "
+            ),
+            "base_link",
+            "tool0"
+        )
+        .contains("no fault")
     );
 }
 
@@ -229,15 +302,25 @@ fn a_name_stands_for_one_joint() {
         "robot.yaml:8:17: joints[0].name: joint 2 is called `J2` too; expected a name of its own"
     );
     let two = ARM.replace("\"j2\" type=\"fixed\"", "\"j1\" type=\"revolute\"");
-    assert_eq!(urdf(&two, "base_link", "tool0"), "arm.urdf:4: joint `j1` is there twice");
+    assert_eq!(
+        urdf(&two, "base_link", "tool0"),
+        "arm.urdf:4: joint `j1` is there twice"
+    );
 }
 
 #[test]
 fn a_practice_robot_is_checked_too() {
-    let case =
-        |text: &str| read_case(RobotFileText { label: "robot.json", text }).map_or_else(|e| e.to_string(), |_| "no fault".into());
+    let case = |text: &str| {
+        read_case(RobotFileText {
+            label: "robot.json",
+            text,
+        })
+        .map_or_else(|e| e.to_string(), |_| "no fault".into())
+    };
     assert_eq!(
-        case(r#"{"axes": [[0, 0, 1], [0, 0, 0]], "points": [[0, 0, 0]], "mass": [1, -2], "coupling": [[2, 0]]}"#),
+        case(
+            r#"{"axes": [[0, 0, 1], [0, 0, 0]], "points": [[0, 0, 0]], "mass": [1, -2], "coupling": [[2, 0]]}"#
+        ),
         "robot.json:1:44: points: 1 entries for 2 joints; expected one per joint\n\
          robot.json:1:22: axes[1]: has no direction: its length is zero\n\
          robot.json:1:69: mass[1]: expected a mass in kg, not less than 0, found -2\n\
@@ -246,14 +329,23 @@ fn a_practice_robot_is_checked_too() {
     );
     let not_a_number = case("{\"axes\": [[0, 0, NaN]]}");
     assert!(
-        not_a_number.contains("robot.json:1:18: axes[0][2]: expected a finite number, found the text `NaN`"),
+        not_a_number.contains(
+            "robot.json:1:18: axes[0][2]: expected a finite number, found the text `NaN`"
+        ),
         "{not_a_number}"
     );
     let twice = case("{\"tool\": 1, \"tool\": 2}");
-    assert!(twice.starts_with("robot.json:1:13: key `tool` is given twice in this block\n"), "{twice}");
+    assert!(
+        twice.starts_with("robot.json:1:13: key `tool` is given twice in this block\n"),
+        "{twice}"
+    );
     assert_eq!(case("{\"axes\": 1"), "robot.json:1:1: unclosed bracket '{'");
     for text in ["[]", ""] {
-        assert!(case(text).starts_with("robot.json:1:1: expected a map with the keys name, axes"), "{}", case(text));
+        assert!(
+            case(text).starts_with("robot.json:1:1: expected a map with the keys name, axes"),
+            "{}",
+            case(text)
+        );
     }
 }
 
@@ -264,12 +356,17 @@ fn a_number_that_no_robot_has_is_refused_at_its_place() {
         "robot.yaml:6:38: kinematics.screws[1].point[1]: 1e305 m is more than 1000 m; is it in another unit?"
     );
     assert_eq!(
-        changed("tool: {point: [900, 0, 0]", "tool: {point: [900, 0, -2000001], orientation: {rpy: [0, 0, 9e307]}"),
+        changed(
+            "tool: {point: [900, 0, 0]",
+            "tool: {point: [900, 0, -2000001], orientation: {rpy: [0, 0, 9e307]}"
+        ),
         "robot.yaml:7:24: tool.point[2]: -2000.001 m is more than 1000 m; is it in another unit?\n\
          robot.yaml:7:61: tool.orientation.rpy[2]: 1.5707963267948965e306 rad is more than 63 rad, ten turns; is it in another unit?"
     );
     assert_eq!(
-        added("joints:\n  - {name: A, reduction_ratio: 1e308}\n  - {name: B, motor_constant: -1e7}"),
+        added(
+            "joints:\n  - {name: A, reduction_ratio: 1e308}\n  - {name: B, motor_constant: -1e7}"
+        ),
         "robot.yaml:9:32: joints[0].reduction_ratio: 1e308 is more than 1e6\nrobot.yaml:10:31: joints[1].motor_constant: -1e7 is more than 1e6"
     );
     assert_eq!(
@@ -277,15 +374,20 @@ fn a_number_that_no_robot_has_is_refused_at_its_place() {
         "robot.yaml:8:39: payload.offset[2]: 1e297 m is more than 1000 m; is it in another unit?\n\
          robot.yaml:8:17: payload.mass: 1e300 kg is more than 1e6 kg; is it in another unit?"
     );
-    let table =
-        "calib_robot: 1\nunits: {length: m, angle: rad}\nkinematics:\n  dh:\n    - {theta: 1e3, d: 1e308, a: 0, alpha: 0}\n";
+    let table = "calib_robot: 1\nunits: {length: m, angle: rad}\nkinematics:\n  dh:\n    - {theta: 1e3, d: 1e308, a: 0, alpha: 0}\n";
     assert_eq!(
         calib(table),
         "robot.yaml:5:15: kinematics.dh[0].theta: 1000 rad is more than 63 rad, ten turns; is it in another unit?\n\
          robot.yaml:5:23: kinematics.dh[0].d: 1e308 m is more than 1e9 m; is it in another unit?"
     );
-    let case = r#"{"axes": [[0, 0, 1]], "points": [[0, 0, 1e308]], "tool": [0, 0, 0], "mass": [1e9]}"#;
-    let told = read_case(RobotFileText { label: "robot.json", text: case }).unwrap_err().to_string();
+    let case =
+        r#"{"axes": [[0, 0, 1]], "points": [[0, 0, 1e308]], "tool": [0, 0, 0], "mass": [1e9]}"#;
+    let told = read_case(RobotFileText {
+        label: "robot.json",
+        text: case,
+    })
+    .unwrap_err()
+    .to_string();
     assert_eq!(
         told.lines().collect::<Vec<_>>(),
         [
@@ -298,10 +400,16 @@ fn a_number_that_no_robot_has_is_refused_at_its_place() {
 #[test]
 fn a_direction_may_have_any_length() {
     for axis in ["[0, 0, 1e308]", "[1e308, 0, 1e308]", "[0, 3e-5, 0]"] {
-        assert_eq!(changed("axis: [0, 0, 1]", &format!("axis: {axis}")), "no fault");
+        assert_eq!(
+            changed("axis: [0, 0, 1]", &format!("axis: {axis}")),
+            "no fault"
+        );
     }
     assert_eq!(
-        changed("{axis: [0, 1, 0], point: [300, 0, 0]}", "{twist: [1e6, 0, 0, 0, 1e-3, 0]}"),
+        changed(
+            "{axis: [0, 1, 0], point: [300, 0, 0]}",
+            "{twist: [1e6, 0, 0, 0, 1e-3, 0]}"
+        ),
         "robot.yaml:6:15: kinematics.screws[1].twist: its axis is away from the base: -1e6 m is more than 1000 m; is it in another unit?"
     );
 }
@@ -315,13 +423,28 @@ fn a_urdf_with_numbers_that_no_robot_has_names_the_lines() {
              <axis xyz=\"{axis}\"/>\n<limit {limit}/></joint></robot>"
         )
     };
-    assert_eq!(urdf(&arm("0 0 1", "1e308 0 1e308", "lower=\"-3\" upper=\"3\""), "a", "b"), "no fault");
     assert_eq!(
-        urdf(&arm("1e308 0 1e308", "0 0 1", "lower=\"-180\" upper=\"180\""), "a", "b"),
+        urdf(
+            &arm("0 0 1", "1e308 0 1e308", "lower=\"-3\" upper=\"3\""),
+            "a",
+            "b"
+        ),
+        "no fault"
+    );
+    assert_eq!(
+        urdf(
+            &arm("1e308 0 1e308", "0 0 1", "lower=\"-180\" upper=\"180\""),
+            "a",
+            "b"
+        ),
         "arm.urdf:5: <origin xyz>: 1e308 m is more than 1000 m; is it in another unit?"
     );
     assert_eq!(
-        urdf(&arm("0 0 1", "0 0 1", "lower=\"-180\" upper=\"3\""), "a", "b"),
+        urdf(
+            &arm("0 0 1", "0 0 1", "lower=\"-180\" upper=\"3\""),
+            "a",
+            "b"
+        ),
         "arm.urdf:7: <limit lower>: -180 rad is more than 63 rad, ten turns; is it in another unit?"
     );
 }

@@ -20,25 +20,52 @@ fn every_stage_is_registered_once_and_documented() {
     let names: BTreeSet<&str> = STAGES.iter().map(|entry| entry.name).collect();
     assert_eq!(names.len(), STAGES.len());
     for entry in STAGES {
-        assert!(!entry.summary.is_empty() && entry.implementation > 0, "{}", entry.name);
+        assert!(
+            !entry.summary.is_empty() && entry.implementation > 0,
+            "{}",
+            entry.name
+        );
         for port in (entry.reads)().iter().chain(&(entry.writes)()) {
-            assert!(calib::table::TABLES.contains(&port.kind), "{}: no table `{}`", entry.name, port.kind);
+            assert!(
+                calib::table::TABLES.contains(&port.kind),
+                "{}: no table `{}`",
+                entry.name,
+                port.kind
+            );
         }
     }
 }
 
 #[test]
 fn every_file_with_a_stage_is_in_the_list() {
-    let folders = ["src/stage", "src/stage/ingest"].map(|folder| Path::new(env!("CARGO_MANIFEST_DIR")).join(folder));
-    let entries = folders.iter().flat_map(|folder| std::fs::read_dir(folder).unwrap());
-    let files = entries.map(|entry| entry.unwrap().path()).filter(|path| path.is_file());
-    let stages = files.filter(|path| std::fs::read_to_string(path).unwrap().contains("\nimpl Stage for ")).count();
-    assert_eq!(stages, STAGES.len(), "a stage is missing in STAGES (src/stage/mod.rs)");
+    let folders = ["src/stage", "src/stage/ingest"]
+        .map(|folder| Path::new(env!("CARGO_MANIFEST_DIR")).join(folder));
+    let entries = folders
+        .iter()
+        .flat_map(|folder| std::fs::read_dir(folder).unwrap());
+    let files = entries
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.is_file());
+    let stages = files
+        .filter(|path| {
+            std::fs::read_to_string(path)
+                .unwrap()
+                .contains("\nimpl Stage for ")
+        })
+        .count();
+    assert_eq!(
+        stages,
+        STAGES.len(),
+        "a stage is missing in STAGES (src/stage/mod.rs)"
+    );
 }
 
 #[test]
 fn the_schema_of_fleet_files_is_that_of_their_type() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("schemas/fleet.v1.schema.json");
     let fresh = calib::fleet::file::json_schema();
-    assert!(std::fs::read_to_string(file).unwrap() == fresh, "run: calib schema fleet > schemas/fleet.v1.schema.json");
+    assert!(
+        std::fs::read_to_string(file).unwrap() == fresh,
+        "run: calib schema fleet > schemas/fleet.v1.schema.json"
+    );
 }

@@ -12,7 +12,13 @@ use rand::{RngExt, SeedableRng};
 use std::collections::BTreeMap;
 
 const SIGMA: f64 = 1e-5;
-const EFFECTS: [&str; 5] = ["base_frame", "tool_offset", "joint_offset", "link_geometry", "reduction_ratio"];
+const EFFECTS: [&str; 5] = [
+    "base_frame",
+    "tool_offset",
+    "joint_offset",
+    "link_geometry",
+    "reduction_ratio",
+];
 
 fn normal(dice: &mut ChaCha8Rng) -> f64 {
     let (radius, angle): (f64, f64) = (dice.random(), dice.random());
@@ -29,8 +35,14 @@ fn direction(dice: &mut ChaCha8Rng) -> Vector3<f64> {
 }
 
 fn model(robot: &RobotModel, base: Pose) -> Model {
-    let setting = EffectContext { base, load: Load::GravityTorque };
-    let made = EFFECTS.iter().map(|name| arm_effect(name, &setting).expect("registered")).collect();
+    let setting = EffectContext {
+        base,
+        load: Load::GravityTorque,
+    };
+    let made = EFFECTS
+        .iter()
+        .map(|name| arm_effect(name, &setting).expect("registered"))
+        .collect();
     Model::nominal(robot.clone(), EffectStack::new(robot, base, made))
 }
 
@@ -43,12 +55,24 @@ struct Trial {
 }
 
 impl Trial {
-    fn new(description: RobotDescription, rows: usize, seed: u64, noise: fn(&mut ChaCha8Rng) -> f64) -> Self {
+    fn new(
+        description: RobotDescription,
+        rows: usize,
+        seed: u64,
+        noise: fn(&mut ChaCha8Rng) -> f64,
+    ) -> Self {
         let mut dice = ChaCha8Rng::seed_from_u64(seed);
         let robot = RobotModel::new(description.clone());
-        let mut truth = model(&robot, Pose::exp(&Twist::new(3.0, -1.5, 0.4, 0.05, -0.1, 2.2)));
+        let mut truth = model(
+            &robot,
+            Pose::exp(&Twist::new(3.0, -1.5, 0.4, 0.05, -0.1, 2.2)),
+        );
         for (k, spec) in truth.stack.specs().to_vec().iter().enumerate() {
-            let size = if spec.name.starts_with("base_frame") { 0.0 } else { 4e-4 };
+            let size = if spec.name.starts_with("base_frame") {
+                0.0
+            } else {
+                4e-4
+            };
             truth.x[k] = size * normal(&mut dice);
         }
         let mut data = Measurements {
@@ -62,7 +86,12 @@ impl Trial {
         for point in &mut data.points.position {
             *point += Vector3::from_fn(|_, _| SIGMA * noise(&mut dice));
         }
-        Self { description, data, truth, dice }
+        Self {
+            description,
+            data,
+            truth,
+            dice,
+        }
     }
 
     fn rows(&self) -> usize {
@@ -82,23 +111,46 @@ impl Trial {
     fn screen(&self) -> (Model, Screening) {
         let start = self.start();
         let candidates: Vec<usize> = (0..start.x.len()).collect();
-        let set: Vec<usize> = (0..self.rows()).map(|row| usize::from(row % 4 == 3)).collect();
+        let set: Vec<usize> = (0..self.rows())
+            .map(|row| usize::from(row % 4 == 3))
+            .collect();
         let rows = self.fit_rows();
-        let (model, _, screening) = fit_screened(&start, &self.data, &FitOptions { rows: &rows, candidates: &candidates }, &set);
+        let (model, _, screening) = fit_screened(
+            &start,
+            &self.data,
+            &FitOptions {
+                rows: &rows,
+                candidates: &candidates,
+            },
+            &set,
+        );
         (model, screening)
     }
 
     /// Root mean square distance (m) of the model's points from the true ones.
     fn off(&self, model: &Model) -> f64 {
         let (a, b) = (model.predict(&self.data), self.truth.predict(&self.data));
-        (a.iter().zip(&b).map(|(a, b)| (a - b).norm_squared()).sum::<f64>() / self.rows() as f64).sqrt()
+        (a.iter()
+            .zip(&b)
+            .map(|(a, b)| (a - b).norm_squared())
+            .sum::<f64>()
+            / self.rows() as f64)
+            .sqrt()
     }
 
     fn plain(&self) -> Model {
         let start = self.start();
         let candidates: Vec<usize> = (0..start.x.len()).collect();
         let rows = self.fit_rows();
-        fit(&start, &self.data, &FitOptions { rows: &rows, candidates: &candidates }).0
+        fit(
+            &start,
+            &self.data,
+            &FitOptions {
+                rows: &rows,
+                candidates: &candidates,
+            },
+        )
+        .0
     }
 
     /// `count` different rows.
@@ -167,7 +219,9 @@ fn slipped_block(trial: &mut Trial) -> Spoilt {
 fn shifted_block(trial: &mut Trial) -> Spoilt {
     let first = trial.dice.random_range(0..trial.rows() - 20);
     trial.data.points.position[first..first + 20].rotate_left(1);
-    (first..first + 20).map(|row| (row, "shifted_block")).collect()
+    (first..first + 20)
+        .map(|row| (row, "shifted_block"))
+        .collect()
 }
 
 /// Three points that changed names in a circle.
@@ -200,7 +254,13 @@ struct Score {
 }
 
 impl Score {
-    fn add(&mut self, description: RobotDescription, rows: usize, seed: u64, spoil: &dyn Fn(&mut Trial) -> Spoilt) {
+    fn add(
+        &mut self,
+        description: RobotDescription,
+        rows: usize,
+        seed: u64,
+        spoil: &dyn Fn(&mut Trial) -> Spoilt,
+    ) {
         let mut trial = Trial::new(description, rows, seed, normal);
         self.clean += trial.off(&trial.plain()).powi(2);
         let spoilt = spoil(&mut trial);
@@ -212,7 +272,10 @@ impl Score {
             let right = spoilt.get(&suspect.row) == Some(&name(suspect.kind));
             self.named += f64::from(right);
             if !right {
-                println!("seed {seed}: {suspect:?}, in truth {:?}", spoilt.get(&suspect.row));
+                println!(
+                    "seed {seed}: {suspect:?}, in truth {:?}",
+                    spoilt.get(&suspect.row)
+                );
             }
         }
         for (row, kind) in &spoilt {
@@ -239,10 +302,16 @@ fn mistakes_are_found_and_named_and_the_fit_is_as_good_as_without_them() {
     type Spoil = Box<dyn Fn(&mut Trial) -> Spoilt>;
     let mut suite: Vec<(String, Spoil)> = Vec::new();
     for share in [0.01, 0.05, 0.1] {
-        suite.push((format!("{} % outliers", 100.0 * share), Box::new(move |trial| outliers(trial, share))));
+        suite.push((
+            format!("{} % outliers", 100.0 * share),
+            Box::new(move |trial| outliers(trial, share)),
+        ));
     }
     for pairs in 1..=5 {
-        suite.push((format!("{pairs} exchanged pairs"), Box::new(move |trial| exchanges(trial, pairs))));
+        suite.push((
+            format!("{pairs} exchanged pairs"),
+            Box::new(move |trial| exchanges(trial, pairs)),
+        ));
     }
     suite.push(("zeros".into(), Box::new(zeros)));
     suite.push(("unit slips".into(), Box::new(slips)));
@@ -254,7 +323,12 @@ fn mistakes_are_found_and_named_and_the_fit_is_as_good_as_without_them() {
     for (k, (what, spoil)) in suite.iter().enumerate() {
         let mut score = Score::default();
         for (robot, description) in fixture::all().into_iter().enumerate() {
-            score.add(description, 160 + 20 * robot, 100 * k as u64 + robot as u64, spoil);
+            score.add(
+                description,
+                160 + 20 * robot,
+                100 * k as u64 + robot as u64,
+                spoil,
+            );
         }
         println!(
             "{what}: {} rows, precision {:.3}, recall {:.3}, error {:.2} of the clean fit's",
@@ -268,7 +342,12 @@ fn mistakes_are_found_and_named_and_the_fit_is_as_good_as_without_them() {
         all.flagged += score.flagged;
         all.named += score.named;
     }
-    println!("in all: {} rows, precision {:.4}, recall {:.4}", all.spoilt, all.precision(), all.recall());
+    println!(
+        "in all: {} rows, precision {:.4}, recall {:.4}",
+        all.spoilt,
+        all.precision(),
+        all.recall()
+    );
     assert!(worst < 1.2, "error {worst:.2} of the clean fit's");
     assert!(all.precision() >= 0.98, "precision {:.4}", all.precision());
     assert!(all.recall() >= 0.98, "recall {:.4}", all.recall());
@@ -278,10 +357,22 @@ fn mistakes_are_found_and_named_and_the_fit_is_as_good_as_without_them() {
 fn a_held_out_row_is_set_aside_only_by_evidence_beside_the_model() {
     let off = Vector3::new(0.0, 3e-3, 0.0);
     let trial = || Trial::new(fixture::all().remove(0), 160, 4411, normal);
-    let aside = |trial: &Trial| trial.screen().1.suspects.iter().map(|suspect| suspect.row).collect::<Vec<_>>();
+    let aside = |trial: &Trial| {
+        trial
+            .screen()
+            .1
+            .suspects
+            .iter()
+            .map(|suspect| suspect.row)
+            .collect::<Vec<_>>()
+    };
     let mut held_out = trial();
     held_out.data.points.position[43] += off;
-    assert_eq!(aside(&held_out), Vec::<usize>::new(), "3 mm off where the model is the only witness");
+    assert_eq!(
+        aside(&held_out),
+        Vec::<usize>::new(),
+        "3 mm off where the model is the only witness"
+    );
     assert_eq!(held_out.screen().1.crowd, 1);
     let mut fitted = trial();
     fitted.data.points.position[42] += off;
@@ -289,7 +380,10 @@ fn a_held_out_row_is_set_aside_only_by_evidence_beside_the_model() {
     // The same pose again, measured where the model predicts it.
     let mut again = trial();
     let joints = again.data.joints;
-    again.data.q.copy_within(43 * joints..44 * joints, 51 * joints);
+    again
+        .data
+        .q
+        .copy_within(43 * joints..44 * joints, 51 * joints);
     again.data.points.position[51] = again.data.points.position[43] + Vector3::repeat(1e-6);
     again.data.points.position[43] += off;
     assert_eq!(aside(&again), [43]);
@@ -297,7 +391,10 @@ fn a_held_out_row_is_set_aside_only_by_evidence_beside_the_model() {
 
 #[test]
 fn clean_recordings_keep_their_rows_also_with_heavy_tails() {
-    for (what, noise) in [("normal", normal as fn(&mut ChaCha8Rng) -> f64), ("Student's t, 3", student_3)] {
+    for (what, noise) in [
+        ("normal", normal as fn(&mut ChaCha8Rng) -> f64),
+        ("Student's t, 3", student_3),
+    ] {
         let (mut rows, mut flagged) = (0, 0);
         for seed in 0..10 {
             for (robot, description) in fixture::all().into_iter().enumerate() {
@@ -308,7 +405,10 @@ fn clean_recordings_keep_their_rows_also_with_heavy_tails() {
             }
         }
         println!("{what}: {flagged} of {rows} clean rows flagged");
-        assert!(1000 * flagged <= rows, "{what}: {flagged} of {rows} clean rows flagged");
+        assert!(
+            1000 * flagged <= rows,
+            "{what}: {flagged} of {rows} clean rows flagged"
+        );
     }
 }
 
@@ -317,7 +417,8 @@ fn slip_log(trial: &mut Trial, from: usize, slip: usize) {
     let joints = trial.data.joints;
     let whole = trial.data.q.clone();
     for row in from.max(slip)..trial.rows() {
-        trial.data.q[row * joints..(row + 1) * joints].copy_from_slice(&whole[(row - slip) * joints..(row - slip + 1) * joints]);
+        trial.data.q[row * joints..(row + 1) * joints]
+            .copy_from_slice(&whole[(row - slip) * joints..(row - slip + 1) * joints]);
     }
 }
 
@@ -329,14 +430,26 @@ fn a_joint_log_that_slips_in_the_middle_is_told_by_its_rows_and_the_rest_is_fitt
         slip_log(&mut trial, 180, 30);
         let (model, screening) = trial.screen();
         assert_eq!(screening.apart, None, "arm {seed}");
-        let shifted = screening.suspects.iter().filter(|suspect| suspect.kind == SuspectKind::ShiftedBlock(30));
+        let shifted = screening
+            .suspects
+            .iter()
+            .filter(|suspect| suspect.kind == SuspectKind::ShiftedBlock(30));
         // The last 30 points have lost their joints.
         let shifted = shifted.filter(|suspect| suspect.row >= 180).count();
         assert!(shifted >= 118, "arm {seed}: {shifted} of 120");
-        let kept: Vec<usize> = screening.kept.iter().copied().filter(|row| *row >= 180).collect();
+        let kept: Vec<usize> = screening
+            .kept
+            .iter()
+            .copied()
+            .filter(|row| *row >= 180)
+            .collect();
         assert!(kept.is_empty(), "arm {seed}: {kept:?}");
         trial.data = whole;
-        assert!(trial.off(&model) < 2.0 * SIGMA, "arm {seed}: {}", trial.off(&model));
+        assert!(
+            trial.off(&model) < 2.0 * SIGMA,
+            "arm {seed}: {}",
+            trial.off(&model)
+        );
     }
 }
 
@@ -347,13 +460,27 @@ fn a_slip_is_told_in_a_robot_that_has_more_errors_than_its_model() {
         // Two waves of a joint that no effect in this model follows, far above the noise.
         for row in 0..trial.rows() {
             let angle = 2.0 * trial.data.q[row * trial.data.joints];
-            trial.data.points.position[row] += 40.0 * SIGMA * Vector3::new(angle.cos(), angle.sin(), (3.0 * angle).sin());
+            trial.data.points.position[row] +=
+                40.0 * SIGMA * Vector3::new(angle.cos(), angle.sin(), (3.0 * angle).sin());
         }
         slip_log(&mut trial, 1203, 30);
         let screening = trial.screen().1;
-        let shifted = screening.suspects.iter().filter(|suspect| suspect.kind == SuspectKind::ShiftedBlock(30));
-        assert_eq!(shifted.map(|suspect| suspect.row).collect::<Vec<_>>(), (1203..2000).collect::<Vec<_>>(), "arm {seed}");
-        assert!(screening.suspects.iter().all(|suspect| suspect.partner.is_none_or(|row| row < 2000)), "arm {seed}");
+        let shifted = screening
+            .suspects
+            .iter()
+            .filter(|suspect| suspect.kind == SuspectKind::ShiftedBlock(30));
+        assert_eq!(
+            shifted.map(|suspect| suspect.row).collect::<Vec<_>>(),
+            (1203..2000).collect::<Vec<_>>(),
+            "arm {seed}"
+        );
+        assert!(
+            screening
+                .suspects
+                .iter()
+                .all(|suspect| suspect.partner.is_none_or(|row| row < 2000)),
+            "arm {seed}"
+        );
         assert!(screening.kept.iter().all(|row| *row < 1203), "arm {seed}");
     }
 }
@@ -372,7 +499,10 @@ fn a_joint_log_that_slipped_throughout_is_told_by_how_many_rows() {
 /// own follows as if two logs had slipped by a row, where a row with wrong joints falls out at the end of a stretch.
 #[test]
 fn rows_beside_a_wrong_one_in_a_dense_grid_are_not_apart() {
-    for (seed, description) in [fixture::spherical(), fixture::offset_wrist()].into_iter().enumerate() {
+    for (seed, description) in [fixture::spherical(), fixture::offset_wrist()]
+        .into_iter()
+        .enumerate()
+    {
         let mut trial = Trial::new(description, 600, 80 + seed as u64, normal);
         let joints = trial.data.joints;
         // All other joints follow the line: each line is one stiff arm that turns about its foot.
@@ -393,7 +523,12 @@ fn rows_beside_a_wrong_one_in_a_dense_grid_are_not_apart() {
             trial.data.q[row * joints + 1] += 0.1;
         }
         let screening = trial.screen().1;
-        let aside: Vec<usize> = screening.suspects.iter().filter(|suspect| !suspect.used()).map(|suspect| suspect.row).collect();
+        let aside: Vec<usize> = screening
+            .suspects
+            .iter()
+            .filter(|suspect| !suspect.used())
+            .map(|suspect| suspect.row)
+            .collect();
         assert_eq!(aside, wrong, "arm {seed}: {:?}", screening.suspects);
     }
 }

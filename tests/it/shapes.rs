@@ -32,7 +32,9 @@ fn refinement_never_leaves_the_bounds_of_a_shape() {
         ..Measurements::default()
     };
     let rows: Vec<usize> = (0..ROWS).collect();
-    let torque: Vec<f64> = (0..ROWS * n).map(|k| 600.0 * (fixture::spread(k, 2) - 0.5)).collect();
+    let torque: Vec<f64> = (0..ROWS * n)
+        .map(|k| 600.0 * (fixture::spread(k, 2) - 0.5))
+        .collect();
     let compliance = vec![0.0; n];
     let survey = Survey::new(&robot, &data, &rows, &torque, &compliance);
     // 590 s were recorded, no joint carries more than 300 Nm.
@@ -58,7 +60,10 @@ fn refinement_never_leaves_the_bounds_of_a_shape() {
                 numbers(&text, name, &mut found);
                 *seen += found.len();
                 for number in found {
-                    assert!((*low * (1.0 - 1e-12)..=*high * (1.0 + 1e-12)).contains(&number.abs()), "{name} of {text}");
+                    assert!(
+                        (*low * (1.0 - 1e-12)..=*high * (1.0 + 1e-12)).contains(&number.abs()),
+                        "{name} of {text}"
+                    );
                 }
             }
         }

@@ -16,7 +16,9 @@ use crate::identify::{GEOMETRY, model, normal};
 use calib::description::RobotDescription;
 use calib::effect::names;
 use calib::error::Result;
-use calib::estimate::{FitOptions, Fitted, Known, KnownLength, Model, ParameterStatus, Prior, fit, gauge};
+use calib::estimate::{
+    FitOptions, Fitted, Known, KnownLength, Model, ParameterStatus, Prior, fit, gauge,
+};
 use calib::robot::{Measurements, Named, RobotModel};
 use calib::stage::{Context, OpenedInput, RawFile, Services, Simulate, SimulateReads, Sink, Stage};
 use calib::table::{Recording, Robot};
@@ -42,16 +44,46 @@ impl Services for Quiet {
 
 fn socket(name: &str, centre_mm: [f64; 3], points: usize, sigma_um: f64) -> Fixture {
     let (normal, radius_mm, usage) = (None, None, "fit".into());
-    Fixture { kind: FixtureKind::Socket, name: name.into(), centre_mm, normal, radius_mm, points, sigma_um, usage }
+    Fixture {
+        kind: FixtureKind::Socket,
+        name: name.into(),
+        centre_mm,
+        normal,
+        radius_mm,
+        points,
+        sigma_um,
+        usage,
+    }
 }
 
-fn plane(name: &str, centre_mm: [f64; 3], normal: [f64; 3], points: usize, sigma_um: f64) -> Fixture {
+fn plane(
+    name: &str,
+    centre_mm: [f64; 3],
+    normal: [f64; 3],
+    points: usize,
+    sigma_um: f64,
+) -> Fixture {
     let (kind, normal, radius_mm) = (FixtureKind::Plane, Some(normal), Some(300.0));
-    Fixture { kind, normal, radius_mm, ..socket(name, centre_mm, points, sigma_um) }
+    Fixture {
+        kind,
+        normal,
+        radius_mm,
+        ..socket(name, centre_mm, points, sigma_um)
+    }
 }
 
-fn sphere(name: &str, centre_mm: [f64; 3], radius_mm: f64, points: usize, sigma_um: f64) -> Fixture {
-    Fixture { kind: FixtureKind::Sphere, radius_mm: Some(radius_mm), ..socket(name, centre_mm, points, sigma_um) }
+fn sphere(
+    name: &str,
+    centre_mm: [f64; 3],
+    radius_mm: f64,
+    points: usize,
+    sigma_um: f64,
+) -> Fixture {
+    Fixture {
+        kind: FixtureKind::Sphere,
+        radius_mm: Some(radius_mm),
+        ..socket(name, centre_mm, points, sigma_um)
+    }
 }
 
 /// Errors of every link and joint as a maker leaves them: 0.3 mm, 1 mrad, zeros of 2 mrad.
@@ -65,18 +97,31 @@ fn truth(robot: &RobotDescription, seed: usize) -> TrueRobot {
     };
     TrueRobot {
         links: (0..joints).map(link).collect(),
-        offset_deg: (0..joints).map(|joint| 0.115 * draw(1000 + joint)).collect(),
+        offset_deg: (0..joints)
+            .map(|joint| 0.115 * draw(1000 + joint))
+            .collect(),
         ..TrueRobot::default()
     }
 }
 
 /// What a twin records at fixtures.
-fn touched(robot: &RobotDescription, truth: &TrueRobot, fixtures: &[Fixture], seed: usize) -> Recording {
+fn touched(
+    robot: &RobotDescription,
+    truth: &TrueRobot,
+    fixtures: &[Fixture],
+    seed: usize,
+) -> Recording {
     touched_with(robot, truth, "[]", fixtures, seed)
 }
 
 /// The same with effects of the twin, YAML.
-fn touched_with(robot: &RobotDescription, truth: &TrueRobot, effects: &str, fixtures: &[Fixture], seed: usize) -> Recording {
+fn touched_with(
+    robot: &RobotDescription,
+    truth: &TrueRobot,
+    effects: &str,
+    fixtures: &[Fixture],
+    seed: usize,
+) -> Recording {
     let settings = Simulate {
         effects: serde_saphyr::from_str(effects).expect("effects of the twin"),
         truth: truth.clone(),
@@ -85,15 +130,33 @@ fn touched_with(robot: &RobotDescription, truth: &TrueRobot, effects: &str, fixt
         ..serde_saphyr::from_str("{}").expect("every setting has a default")
     };
     assert_eq!(settings.check(), []);
-    let context = Context { id: "simulate", seed: 1, jobs: 1, services: &Quiet };
-    settings.run(SimulateReads { robot: Robot::from_description(robot) }, &context).expect("all in reach").recording
+    let context = Context {
+        id: "simulate",
+        seed: 1,
+        jobs: 1,
+        services: &Quiet,
+    };
+    settings
+        .run(
+            SimulateReads {
+                robot: Robot::from_description(robot),
+            },
+            &context,
+        )
+        .expect("all in reach")
+        .recording
 }
 
 /// A length between two fixtures of a setup, m.
 struct Length<'a>(&'a str, &'a str, f64, f64);
 
 /// A fit of the geometry to all rows, from the nominal robot.
-fn calibrated(robot: &RobotDescription, data: &Measurements, lengths: &[Length], effects: &[&str]) -> (Model, Fitted) {
+fn calibrated(
+    robot: &RobotDescription,
+    data: &Measurements,
+    lengths: &[Length],
+    effects: &[&str],
+) -> (Model, Fitted) {
     calibrated_knowing(robot, data, lengths, effects, &[])
 }
 
@@ -106,8 +169,18 @@ fn calibrated_knowing(
     known: &[(String, f64, f64)],
 ) -> (Model, Fitted) {
     let rows: Vec<usize> = (0..data.rows()).collect();
-    let (robot, base) = gauge(RobotModel::new(robot.clone()), data, &rows, &BTreeMap::new()).expect("placed");
-    let mut model = model(&robot, base, &[&["anchor"][..], &GEOMETRY, effects].concat());
+    let (robot, base) = gauge(
+        RobotModel::new(robot.clone()),
+        data,
+        &rows,
+        &BTreeMap::new(),
+    )
+    .expect("placed");
+    let mut model = model(
+        &robot,
+        base,
+        &[&["anchor"][..], &GEOMETRY, effects].concat(),
+    );
     let number = |name: &str| robot.setup().anchor(name).expect("a fixture");
     model.lengths = lengths
         .iter()
@@ -118,27 +191,59 @@ fn calibrated_knowing(
         })
         .collect();
     for (name, value, sigma) in known {
-        let k = model.stack.specs().iter().position(|spec| spec.name == *name).expect("a parameter");
+        let k = model
+            .stack
+            .specs()
+            .iter()
+            .position(|spec| spec.name == *name)
+            .expect("a parameter");
         let mean = value - model.standing(k).0;
-        model.known.insert(k, Known { prior: Some(Prior { mean, sigma: *sigma }), bounds: None });
+        model.known.insert(
+            k,
+            Known {
+                prior: Some(Prior {
+                    mean,
+                    sigma: *sigma,
+                }),
+                bounds: None,
+            },
+        );
     }
     let candidates: Vec<usize> = (0..model.x.len()).collect();
-    fit(&model, data, &FitOptions { rows: &rows, candidates: &candidates })
+    fit(
+        &model,
+        data,
+        &FitOptions {
+            rows: &rows,
+            candidates: &candidates,
+        },
+    )
 }
 
 /// What a socket's known place (mm) says of its parameters.
 fn known_place(name: &str, place: [f64; 3]) -> Vec<(String, f64, f64)> {
-    ["x", "y", "z"].iter().zip(place).map(|(axis, mm)| (format!("anchor.{name}.{axis}"), 1e-3 * mm, 1e-6)).collect()
+    ["x", "y", "z"]
+        .iter()
+        .zip(place)
+        .map(|(axis, mm)| (format!("anchor.{name}.{axis}"), 1e-3 * mm, 1e-6))
+        .collect()
 }
 
 fn free(fitted: &Fitted) -> usize {
-    fitted.statuses.iter().filter(|status| matches!(status, ParameterStatus::Free(_))).count()
+    fitted
+        .statuses
+        .iter()
+        .filter(|status| matches!(status, ParameterStatus::Free(_)))
+        .count()
 }
 
 /// One standard deviation beforehand, SI, of what a maker's tolerances justify.
 fn priors(name: &str) -> Option<f64> {
     let effect = name.split('.').next().unwrap_or_default();
-    let tilt = name.rsplit('.').next().is_some_and(|ending| ending.starts_with('r'));
+    let tilt = name
+        .rsplit('.')
+        .next()
+        .is_some_and(|ending| ending.starts_with('r'));
     match effect {
         "link_geometry" => Some(if tilt { 1e-3 } else { 3e-4 }),
         "joint_offset" => Some(0.03),
@@ -156,28 +261,67 @@ fn fitted_with(
     pairs: &[[String; 2]],
     prior: impl Fn(&str) -> Option<f64>,
 ) -> (Model, Fitted) {
-    let (robot, base) = gauge(RobotModel::new(robot.clone()), data, rows, &BTreeMap::new()).expect("placed");
-    let mut model = model(&robot, base, &[&["anchor", "base_frame", "tool_offset"][..], effects].concat());
+    let (robot, base) =
+        gauge(RobotModel::new(robot.clone()), data, rows, &BTreeMap::new()).expect("placed");
+    let mut model = model(
+        &robot,
+        base,
+        &[&["anchor", "base_frame", "tool_offset"][..], effects].concat(),
+    );
     for (k, spec) in model.stack.specs().iter().enumerate() {
         if let Some(sigma) = prior(&spec.name) {
-            model.known.insert(k, Known { prior: Some(Prior { mean: 0.0, sigma }), bounds: None });
+            model.known.insert(
+                k,
+                Known {
+                    prior: Some(Prior { mean: 0.0, sigma }),
+                    bounds: None,
+                },
+            );
         }
     }
-    let seen = |name: &String| rows.iter().any(|row| data.anchor(*row) == Some(name.as_str()));
+    let seen = |name: &String| {
+        rows.iter()
+            .any(|row| data.anchor(*row) == Some(name.as_str()))
+    };
     let number = |name: &String| robot.setup().anchor(name).expect("a socket");
-    let there: Vec<&[String; 2]> = pairs.iter().filter(|[from, to]| seen(from) && seen(to)).collect();
+    let there: Vec<&[String; 2]> = pairs
+        .iter()
+        .filter(|[from, to]| seen(from) && seen(to))
+        .collect();
     // One print, of 0.1 mm, at all positions.
     let sigma = 1e-4 * (there.len() as f64).sqrt();
-    model.lengths =
-        there.into_iter().map(|[from, to]| KnownLength { between: [number(from), number(to)], length: 0.05, sigma }).collect();
+    model.lengths = there
+        .into_iter()
+        .map(|[from, to]| KnownLength {
+            between: [number(from), number(to)],
+            length: 0.05,
+            sigma,
+        })
+        .collect();
     let candidates: Vec<usize> = (0..model.x.len()).collect();
-    fit(&model, data, &FitOptions { rows, candidates: &candidates })
+    fit(
+        &model,
+        data,
+        &FitOptions {
+            rows,
+            candidates: &candidates,
+        },
+    )
 }
 
 /// Where a fit has the sockets, m.
 fn places_of(model: &Model) -> BTreeMap<String, Vector3<f64>> {
-    let first = model.stack.parameters_of(names::ANCHOR).next().expect("anchors");
+    let first = model
+        .stack
+        .parameters_of(names::ANCHOR)
+        .next()
+        .expect("anchors");
     let all = model.robot.setup().anchors.iter().enumerate();
-    all.map(|(k, anchor)| (anchor.name.clone(), anchor.place + Vector3::from_column_slice(&model.x[first + 3 * k..][..3])))
-        .collect()
+    all.map(|(k, anchor)| {
+        (
+            anchor.name.clone(),
+            anchor.place + Vector3::from_column_slice(&model.x[first + 3 * k..][..3]),
+        )
+    })
+    .collect()
 }

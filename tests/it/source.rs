@@ -30,12 +30,20 @@ pub fn sources() -> Vec<Source> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     let mut found = Vec::new();
     for path in files(&root) {
-        let file = path.strip_prefix(&root).unwrap().to_string_lossy().replace('\\', "/");
+        let file = path
+            .strip_prefix(&root)
+            .unwrap()
+            .to_string_lossy()
+            .replace('\\', "/");
         let text = fs::read_to_string(&path).unwrap();
         found.push((module_of(&file), file, text));
     }
     let modules: Vec<Vec<String>> = found.iter().map(|(module, ..)| module.clone()).collect();
-    let sources = found.into_iter().map(|(module, file, text)| Source { uses: uses(&text, &module, &modules), file, module });
+    let sources = found.into_iter().map(|(module, file, text)| Source {
+        uses: uses(&text, &module, &modules),
+        file,
+        module,
+    });
     sources.collect()
 }
 
@@ -45,7 +53,9 @@ pub fn files(dir: &Path) -> Vec<PathBuf> {
         let path = entry.unwrap().path();
         if path.is_dir() {
             found.extend(files(&path));
-        } else if path.extension().is_some_and(|extension| extension == "rs") && !path.ends_with("tests.rs") {
+        } else if path.extension().is_some_and(|extension| extension == "rs")
+            && !path.ends_with("tests.rs")
+        {
             found.push(path);
         }
     }
@@ -56,8 +66,15 @@ pub fn files(dir: &Path) -> Vec<PathBuf> {
 /// `store/key.rs` -> `store::key`, `store/mod.rs` -> `store`, `lib.rs` -> the root. What the packages below `src` hold has the path by which
 /// the crate `calib` hands it on: `numerics/effect/form.rs` -> `effect::form`, `twin/arm.rs` -> `twin::arm`.
 fn module_of(file: &str) -> Vec<String> {
-    let mut parts: Vec<String> = file.trim_end_matches(".rs").split('/').map(String::from).collect();
-    if parts.last().is_some_and(|last| ["mod", "lib"].contains(&last.as_str())) {
+    let mut parts: Vec<String> = file
+        .trim_end_matches(".rs")
+        .split('/')
+        .map(String::from)
+        .collect();
+    if parts
+        .last()
+        .is_some_and(|last| ["mod", "lib"].contains(&last.as_str()))
+    {
         parts.pop();
     }
     if parts.len() > 1 && ["foundation", "numerics"].contains(&parts[0].as_str()) {
@@ -72,7 +89,12 @@ pub fn uses(text: &str, module: &[String], modules: &[Vec<String>]) -> Vec<Use> 
     let mut found = Vec::new();
     let mut add = |line: usize, path: Vec<String>, name: Option<String>, handed_on: bool| {
         if let Some(path) = absolute(&path, module, modules) {
-            found.push(Use { line, path, name, handed_on });
+            found.push(Use {
+                line,
+                path,
+                name,
+                handed_on,
+            });
         }
     };
     let mut at = 0;
@@ -88,7 +110,9 @@ pub fn uses(text: &str, module: &[String], modules: &[Vec<String>]) -> Vec<Use> 
         } else if tokens[at].is_word() && before != Some("::") {
             let line = tokens[at].line;
             let mut path = vec![tokens[at].text.clone()];
-            while tokens.get(at + 1).is_some_and(|token| token.text == "::") && tokens.get(at + 2).is_some_and(Token::is_word) {
+            while tokens.get(at + 1).is_some_and(|token| token.text == "::")
+                && tokens.get(at + 2).is_some_and(Token::is_word)
+            {
                 path.push(tokens[at + 2].text.clone());
                 at += 2;
             }
@@ -104,7 +128,12 @@ pub fn uses(text: &str, module: &[String], modules: &[Vec<String>]) -> Vec<Use> 
 }
 
 /// The leaves of an import's tree that begins at a token: line, path, name. Gives the token after it.
-fn tree(tokens: &[Token], mut at: usize, path: &mut Vec<String>, leaves: &mut Vec<(usize, Vec<String>, String)>) -> usize {
+fn tree(
+    tokens: &[Token],
+    mut at: usize,
+    path: &mut Vec<String>,
+    leaves: &mut Vec<(usize, Vec<String>, String)>,
+) -> usize {
     let depth = path.len();
     let mut name = None;
     let line = tokens[at].line;
@@ -116,7 +145,11 @@ fn tree(tokens: &[Token], mut at: usize, path: &mut Vec<String>, leaves: &mut Ve
                 group = true;
                 at += 1;
                 while tokens[at].text != "}" {
-                    at = if tokens[at].text == "," { at + 1 } else { tree(tokens, at, path, leaves) };
+                    at = if tokens[at].text == "," {
+                        at + 1
+                    } else {
+                        tree(tokens, at, path, leaves)
+                    };
                 }
                 at += 1;
             }
@@ -177,13 +210,29 @@ fn absolute(path: &[String], module: &[String], modules: &[Vec<String>]) -> Opti
 }
 
 /// Which file a path leads to, through what modules hand on or import themselves.
-pub fn home<'a>(path: &[String], by_module: &BTreeMap<&[String], &'a Source>) -> Option<&'a Source> {
-    let length = (0..=path.len()).rev().find(|length| by_module.contains_key(&path[..*length]))?;
+pub fn home<'a>(
+    path: &[String],
+    by_module: &BTreeMap<&[String], &'a Source>,
+) -> Option<&'a Source> {
+    let length = (0..=path.len())
+        .rev()
+        .find(|length| by_module.contains_key(&path[..*length]))?;
     let source = by_module[&path[..length]];
-    let Some(item) = path.get(length) else { return Some(source) };
-    match source.uses.iter().find(|import| import.name.as_ref() == Some(item) && import.path != path[..=length]) {
+    let Some(item) = path.get(length) else {
+        return Some(source);
+    };
+    match source
+        .uses
+        .iter()
+        .find(|import| import.name.as_ref() == Some(item) && import.path != path[..=length])
+    {
         Some(import) => {
-            let further: Vec<String> = import.path.iter().chain(&path[length + 1..]).cloned().collect();
+            let further: Vec<String> = import
+                .path
+                .iter()
+                .chain(&path[length + 1..])
+                .cloned()
+                .collect();
             home(&further, by_module)
         }
         None => Some(source),
@@ -199,7 +248,8 @@ struct Token {
 
 impl Token {
     fn is_word(&self) -> bool {
-        self.text.starts_with(|c: char| c.is_alphabetic() || c == '_')
+        self.text
+            .starts_with(|c: char| c.is_alphabetic() || c == '_')
     }
 }
 
@@ -215,29 +265,43 @@ fn tokens(text: &str) -> Vec<Token> {
             'r' | 'b' if raw(&chars, at).is_some() => raw(&chars, at).unwrap_or(at),
             '\'' => after_tick(&chars, at),
             ':' if next == Some(':') => {
-                found.push(Token { line, text: "::".into() });
+                found.push(Token {
+                    line,
+                    text: "::".into(),
+                });
                 at + 2
             }
             c if c.is_alphanumeric() || c == '_' => {
                 let end = to(&chars, at, |c| !(c.is_alphanumeric() || c == '_'));
-                found.push(Token { line, text: chars[at..end].iter().collect() });
+                found.push(Token {
+                    line,
+                    text: chars[at..end].iter().collect(),
+                });
                 end
             }
             c => {
                 if !c.is_whitespace() {
-                    found.push(Token { line, text: c.to_string() });
+                    found.push(Token {
+                        line,
+                        text: c.to_string(),
+                    });
                 }
                 at + 1
             }
         };
-        line += chars[at..end.min(chars.len())].iter().filter(|c| **c == '\n').count();
+        line += chars[at..end.min(chars.len())]
+            .iter()
+            .filter(|c| **c == '\n')
+            .count();
         at = end;
     }
     found
 }
 
 fn to(chars: &[char], from: usize, stop: impl Fn(char) -> bool) -> usize {
-    (from..chars.len()).find(|at| stop(chars[*at])).unwrap_or(chars.len())
+    (from..chars.len())
+        .find(|at| stop(chars[*at]))
+        .unwrap_or(chars.len())
 }
 
 fn after_comment(chars: &[char], from: usize) -> usize {
@@ -277,8 +341,18 @@ fn raw(chars: &[char], from: usize) -> Option<usize> {
     if !prefix.contains('r') {
         return Some(after_text(chars, quote + 1));
     }
-    let closes = |at: &usize| chars[*at] == '"' && chars[at + 1..].iter().take(marks).filter(|c| **c == '#').count() == marks;
-    (quote + 1..chars.len()).find(closes).map(|at| at + 1 + marks)
+    let closes = |at: &usize| {
+        chars[*at] == '"'
+            && chars[at + 1..]
+                .iter()
+                .take(marks)
+                .filter(|c| **c == '#')
+                .count()
+                == marks
+    };
+    (quote + 1..chars.len())
+        .find(closes)
+        .map(|at| at + 1 + marks)
 }
 
 /// After a character, or after the tick of a lifetime.
@@ -295,7 +369,11 @@ fn without_tests(tokens: &[Token]) -> Vec<Token> {
     let mut kept = Vec::new();
     let mut at = 0;
     while at < tokens.len() {
-        let here: Vec<&str> = tokens[at..].iter().take(7).map(|token| token.text.as_str()).collect();
+        let here: Vec<&str> = tokens[at..]
+            .iter()
+            .take(7)
+            .map(|token| token.text.as_str())
+            .collect();
         if here != ["#", "[", "cfg", "(", "test", ")", "]"] {
             kept.push(tokens[at].clone());
             at += 1;
@@ -333,10 +411,14 @@ fn g<'a>(x: &'a str) -> char { let _ = r#"crate::text::b"#; let _ = "crate::text
 fn k() { std::mem::swap(); child::call(self::own::Six); vec![super::super::top::Seven]; }
 "##;
     let words = |path: &str| path.split("::").map(String::from).collect::<Vec<_>>();
-    let named: Vec<Vec<String>> = uses("use crate::arm::Arm; use calib_foundation::units::Unit;", &words("twin::motion"), &[])
-        .into_iter()
-        .map(|one| one.path)
-        .collect();
+    let named: Vec<Vec<String>> = uses(
+        "use crate::arm::Arm; use calib_foundation::units::Unit;",
+        &words("twin::motion"),
+        &[],
+    )
+    .into_iter()
+    .map(|one| one.path)
+    .collect();
     assert_eq!(named, [words("twin::arm::Arm"), words("units::Unit")]);
     let modules = [words("room::here"), words("room::here::child")];
     let found: Vec<(usize, String, bool)> = uses(text, &words("room::here"), &modules)
@@ -356,5 +438,8 @@ fn k() { std::mem::swap(); child::call(self::own::Six); vec![super::super::top::
         (10, "room::here::own::Six", false),
         (10, "top::Seven", false),
     ];
-    assert_eq!(found, wanted.map(|(line, path, handed_on)| (line, path.to_string(), handed_on)));
+    assert_eq!(
+        found,
+        wanted.map(|(line, path, handed_on)| (line, path.to_string(), handed_on))
+    );
 }

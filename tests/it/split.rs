@@ -31,11 +31,21 @@ fn settings(yaml: &str) -> SplitBy {
 }
 
 fn sets(yaml: &str, recording: Recording) -> Result<Vec<String>> {
-    let (rows, sequence, ids) = (recording.rows(), recording.sequence.clone(), recording.point_id.clone());
+    let (rows, sequence, ids) = (
+        recording.rows(),
+        recording.sequence.clone(),
+        recording.point_id.clone(),
+    );
     let tables = Desk::default().run(&settings(yaml), SplitReads { recording })?;
     let split = table::<Split>(&tables).remove(0);
     assert_eq!(split.0.len(), rows);
-    assert!(split.0.iter().zip(sequence.iter().zip(&ids)).all(|(row, (s, id))| row.sequence == *s && row.point_id == *id));
+    assert!(
+        split
+            .0
+            .iter()
+            .zip(sequence.iter().zip(&ids))
+            .all(|(row, (s, id))| row.sequence == *s && row.point_id == *id)
+    );
     Ok(split.0.into_iter().map(|row| row.set).collect())
 }
 
@@ -50,21 +60,42 @@ fn refusal(yaml: &str, recording: Recording) -> String {
 fn every_fourth_row_validates() {
     assert_eq!(
         sets("{by: every, n: 4}", distinct(9)).unwrap(),
-        ["fit", "fit", "fit", "validate", "fit", "fit", "fit", "validate", "fit"]
+        [
+            "fit", "fit", "fit", "validate", "fit", "fit", "fit", "validate", "fit"
+        ]
     );
-    let named = sets("{by: every, n: 3, offset: 0, set: check, rest: learn}", distinct(4)).unwrap();
+    let named = sets(
+        "{by: every, n: 3, offset: 0, set: check, rest: learn}",
+        distinct(4),
+    )
+    .unwrap();
     assert_eq!(named, ["check", "learn", "learn", "check"]);
-    assert_eq!(refusal("{by: every, n: 4}", distinct(3)), "with.n: set `validate` gets none of the 3 rows; say a smaller `n`");
+    assert_eq!(
+        refusal("{by: every, n: 4}", distinct(3)),
+        "with.n: set `validate` gets none of the 3 rows; say a smaller `n`"
+    );
     let few = refusal("{by: random, fraction: 0.0001}", distinct(9));
-    assert_eq!(few, "with.fraction: set `validate` gets none of the 9 rows; say a larger `fraction`");
+    assert_eq!(
+        few,
+        "with.fraction: set `validate` gets none of the 9 rows; say a larger `fraction`"
+    );
 }
 
 #[test]
 fn blocks_are_dealt_in_turn_and_break_at_poses() {
-    assert_eq!(sets("{by: blocks, length: 2, sets: [a, b]}", distinct(5)).unwrap(), ["a", "a", "b", "b", "a"]);
-    assert_eq!(sets("{by: blocks, count: 3, sets: [a, a, b]}", distinct(6)).unwrap(), ["a", "a", "a", "a", "b", "b"]);
+    assert_eq!(
+        sets("{by: blocks, length: 2, sets: [a, b]}", distinct(5)).unwrap(),
+        ["a", "a", "b", "b", "a"]
+    );
+    assert_eq!(
+        sets("{by: blocks, count: 3, sets: [a, a, b]}", distinct(6)).unwrap(),
+        ["a", "a", "a", "a", "b", "b"]
+    );
     let repeats = recording(&[0, 1, 1, 2, 3, 4]);
-    assert_eq!(sets("{by: blocks, length: 2, sets: [a, b]}", repeats).unwrap(), ["a", "a", "a", "b", "a", "a"]);
+    assert_eq!(
+        sets("{by: blocks, length: 2, sets: [a, b]}", repeats).unwrap(),
+        ["a", "a", "a", "b", "a", "a"]
+    );
 }
 
 #[test]
@@ -73,24 +104,46 @@ fn random_choice_keeps_repeats_together_and_follows_the_seed() {
     let first = sets("{by: random, fraction: 0.25}", recording(&poses)).unwrap();
     let drawn = first.iter().filter(|set| *set == "validate").count();
     assert!((74..=76).contains(&drawn), "{drawn}");
-    assert!(first.chunks(3).all(|pose| pose.iter().all(|set| *set == pose[0])));
-    assert_eq!(sets("{by: random, fraction: 0.25}", recording(&poses)).unwrap(), first);
+    assert!(
+        first
+            .chunks(3)
+            .all(|pose| pose.iter().all(|set| *set == pose[0]))
+    );
+    assert_eq!(
+        sets("{by: random, fraction: 0.25}", recording(&poses)).unwrap(),
+        first
+    );
 }
 
 #[test]
 fn usage_labels_become_sets() {
     let labelled = |labels: &[&str]| {
         let mut recording = distinct(labels.len() as i32);
-        recording.usage = labels.iter().map(|label| (!label.is_empty()).then(|| label.to_string())).collect();
+        recording.usage = labels
+            .iter()
+            .map(|label| (!label.is_empty()).then(|| label.to_string()))
+            .collect();
         recording
     };
-    assert_eq!(sets("{by: usage}", labelled(&["fit", "validate"])).unwrap(), ["fit", "validate"]);
+    assert_eq!(
+        sets("{by: usage}", labelled(&["fit", "validate"])).unwrap(),
+        ["fit", "validate"]
+    );
     let mapped = "{by: usage, sets: {train: fit, test: validate}, blank: rest}";
-    assert_eq!(sets(mapped, labelled(&["test", "train", ""])).unwrap(), ["validate", "fit", "rest"]);
+    assert_eq!(
+        sets(mapped, labelled(&["test", "train", ""])).unwrap(),
+        ["validate", "fit", "rest"]
+    );
     let unknown = refusal(mapped, labelled(&["test", "trian"]));
-    assert_eq!(unknown, "with.sets: label `trian` (point `P1`) has no set; mapped: test, train; found: test, trian");
+    assert_eq!(
+        unknown,
+        "with.sets: label `trian` (point `P1`) has no set; mapped: test, train; found: test, trian"
+    );
     let none = refusal("{by: usage}", labelled(&["", ""]));
-    assert_eq!(none, "with.blank: point `P0` has no usage label; found: none; allowed: map `usage` in ingest, or say `blank`");
+    assert_eq!(
+        none,
+        "with.blank: point `P0` has no usage label; found: none; allowed: map `usage` in ingest, or say `blank`"
+    );
 }
 
 #[test]
@@ -98,33 +151,72 @@ fn counts_in_the_order_of_recording_must_fit_the_rows() {
     let yaml = "{by: order, sets: [{set: a, rows: 2}, {set: b, rows: 1}, {set: a}]}";
     assert_eq!(sets(yaml, distinct(5)).unwrap(), ["a", "a", "b", "a", "a"]);
     let short = "{by: order, sets: [{set: a, rows: 2}, {set: b, rows: 4}]}";
-    assert_eq!(refusal(short, distinct(5)), "with.sets[1].rows: set `b` takes 4 rows, but only 3 of 5 remain");
-    let message = "with.sets: the sets take 6 of 7 rows; let the last one leave `rows` out, or name one more";
+    assert_eq!(
+        refusal(short, distinct(5)),
+        "with.sets[1].rows: set `b` takes 4 rows, but only 3 of 5 remain"
+    );
+    let message =
+        "with.sets: the sets take 6 of 7 rows; let the last one leave `rows` out, or name one more";
     assert_eq!(refusal(short, distinct(7)), message);
 }
 
 #[test]
 fn faulty_settings_are_named_by_their_place() {
-    let places = |yaml: &str| settings(yaml).check().iter().map(|fault| fault.place.clone()).collect::<Vec<_>>();
-    assert_eq!(places("{by: every, n: 1, offset: 5, set: a, rest: a}"), ["n", "offset", "rest"]);
-    assert_eq!(places("{by: blocks, length: 0, sets: []}"), ["length", "sets"]);
+    let places = |yaml: &str| {
+        settings(yaml)
+            .check()
+            .iter()
+            .map(|fault| fault.place.clone())
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(
+        places("{by: every, n: 1, offset: 5, set: a, rest: a}"),
+        ["n", "offset", "rest"]
+    );
+    assert_eq!(
+        places("{by: blocks, length: 0, sets: []}"),
+        ["length", "sets"]
+    );
     assert_eq!(places("{by: random, fraction: 1.5}"), ["fraction"]);
-    assert_eq!(places("{by: order, sets: [{set: a}, {set: b, rows: 0}]}"), ["sets[0].rows", "sets[1].rows"]);
+    assert_eq!(
+        places("{by: order, sets: [{set: a}, {set: b, rows: 0}]}"),
+        ["sets[0].rows", "sets[1].rows"]
+    );
 }
 
 /// Three targets a pose, whose logs differ in the last digits.
 fn targets(poses: usize) -> Recording {
-    let mut recording = recording(&(0..poses as i32).flat_map(|pose| [100 * pose; 3]).collect::<Vec<_>>());
-    recording.q.iter_mut().enumerate().for_each(|(row, q)| *q += 1e-6 * row as f64);
-    recording.target = Some((0..3 * poses).map(|row| Some(["A", "B", "C"][row % 3].into())).collect());
+    let mut recording = recording(
+        &(0..poses as i32)
+            .flat_map(|pose| [100 * pose; 3])
+            .collect::<Vec<_>>(),
+    );
+    recording
+        .q
+        .iter_mut()
+        .enumerate()
+        .for_each(|(row, q)| *q += 1e-6 * row as f64);
+    recording.target = Some(
+        (0..3 * poses)
+            .map(|row| Some(["A", "B", "C"][row % 3].into()))
+            .collect(),
+    );
     recording
 }
 
 #[test]
 fn no_choice_parts_the_targets_of_a_pose() {
-    for yaml in ["{by: every, n: 4}", "{by: random, fraction: 0.3}", "{by: blocks, count: 4, sets: [fit, fit, fit, validate]}"] {
+    for yaml in [
+        "{by: every, n: 4}",
+        "{by: random, fraction: 0.3}",
+        "{by: blocks, count: 4, sets: [fit, fit, fit, validate]}",
+    ] {
         let sets = sets(yaml, targets(20)).unwrap();
-        assert!(sets.chunks(3).all(|pose| pose[0] == pose[1] && pose[1] == pose[2]), "{yaml}: {sets:?}");
+        assert!(
+            sets.chunks(3)
+                .all(|pose| pose[0] == pose[1] && pose[1] == pose[2]),
+            "{yaml}: {sets:?}"
+        );
         assert!(sets.iter().any(|set| set == "validate"), "{yaml}");
     }
     let every = sets("{by: every, n: 4}", targets(8)).unwrap();
@@ -145,7 +237,12 @@ fn copies_of_a_row_under_other_ids_stay_in_one_set_and_are_counted() {
         "{by: order, sets: [{set: fit, rows: 8}, {set: validate}]}",
     ] {
         let desk = Desk::default();
-        let tables = desk.run(&settings(yaml), SplitReads { recording: copied() });
+        let tables = desk.run(
+            &settings(yaml),
+            SplitReads {
+                recording: copied(),
+            },
+        );
         let tables = match (&tables, yaml.contains("order")) {
             // All of a set are copies of another's.
             (Err(error), true) => {
@@ -156,15 +253,29 @@ fn copies_of_a_row_under_other_ids_stay_in_one_set_and_are_counted() {
         };
         let split = table::<Split>(&tables).remove(0);
         for k in 0..4 {
-            assert_eq!(split.0[8 + k].set, split.0[k].set, "{yaml}: P{} copies P{k}", 8 + k);
+            assert_eq!(
+                split.0[8 + k].set,
+                split.0[k].set,
+                "{yaml}: P{} copies P{k}",
+                8 + k
+            );
         }
         let warnings = desk.warnings.lock().unwrap().join("\n");
-        assert!(warnings.contains("4 rows") && warnings.contains("P8 is P0"), "{yaml}: {warnings}");
+        assert!(
+            warnings.contains("4 rows") && warnings.contains("P8 is P0"),
+            "{yaml}: {warnings}"
+        );
     }
     // A pose that was measured again is no copy.
     let mut again = copied();
-    again.position[8..].iter_mut().for_each(|point| point[0] += 1e-6);
+    again.position[8..]
+        .iter_mut()
+        .for_each(|point| point[0] += 1e-6);
     let desk = Desk::default();
-    desk.run(&settings("{by: every, n: 3}"), SplitReads { recording: again }).unwrap();
+    desk.run(
+        &settings("{by: every, n: 3}"),
+        SplitReads { recording: again },
+    )
+    .unwrap();
     assert!(desk.warnings.lock().unwrap().is_empty());
 }

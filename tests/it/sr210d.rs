@@ -15,9 +15,12 @@ fn folder() -> PathBuf {
 /// The settings of a stage of the pipeline, with the variable `remainder` put in.
 pub fn settings<T: DeserializeOwned>(id: &str, remainder: &str) -> T {
     let text = std::fs::read_to_string(folder().join("pipeline.yaml")).expect("the pipeline");
-    let whole: Value = serde_saphyr::from_str(&text.replace("${remainder}", remainder)).expect("YAML");
+    let whole: Value =
+        serde_saphyr::from_str(&text.replace("${remainder}", remainder)).expect("YAML");
     let stages = whole["stages"].as_array().expect("stages");
-    let stage = stages.iter().find(|stage| stage["id"] == id || (stage["id"].is_null() && stage["uses"] == id));
+    let stage = stages
+        .iter()
+        .find(|stage| stage["id"] == id || (stage["id"].is_null() && stage["uses"] == id));
     serde_json::from_value(stage.expect("the stage")["with"].clone()).expect("settings")
 }
 
@@ -29,35 +32,69 @@ pub struct Experiment {
 }
 
 pub fn experiment(remainder: &str, seed: u64) -> Experiment {
-    experiment_on(Simulate { seed: Some(seed), ..settings("simulate", remainder) })
+    experiment_on(Simulate {
+        seed: Some(seed),
+        ..settings("simulate", remainder)
+    })
 }
 
 fn experiment_on(twin: Simulate) -> Experiment {
     let desk = Desk::default();
     let mut robot: ReadRobot = settings("robot", "none");
     robot.file.0 = folder().join(&robot.file.0);
-    let robot: Robot = table(&desk.run(&robot, RobotReads {}).expect("a good robot file")).remove(0);
-    let tables = desk.run(&twin, SimulateReads { robot: robot.clone() }).expect("the twin runs");
+    let robot: Robot =
+        table(&desk.run(&robot, RobotReads {}).expect("a good robot file")).remove(0);
+    let tables = desk
+        .run(
+            &twin,
+            SimulateReads {
+                robot: robot.clone(),
+            },
+        )
+        .expect("the twin runs");
     let recording: Recording = table(&tables).remove(0);
-    let rows = recording.sequence.iter().zip(&recording.point_id).zip(&recording.usage);
+    let rows = recording
+        .sequence
+        .iter()
+        .zip(&recording.point_id)
+        .zip(&recording.usage);
     let rows = rows.map(|((sequence, id), set)| SplitRow {
         sequence: *sequence,
         point_id: id.clone(),
         set: set.clone().expect("every row has a usage"),
     });
     let split = Split(rows.collect());
-    Experiment { robot, truth: table(&tables).remove(0), recording, split }
+    Experiment {
+        robot,
+        truth: table(&tables).remove(0),
+        recording,
+        split,
+    }
 }
 
 fn mean_mm(prediction: &Prediction, set: &str) -> f64 {
-    let errors: Vec<f64> = prediction.0.iter().filter(|row| row.set == set).map(|row| row.error_mm).collect();
+    let errors: Vec<f64> = prediction
+        .0
+        .iter()
+        .filter(|row| row.set == set)
+        .map(|row| row.error_mm)
+        .collect();
     errors.iter().sum::<f64>() / errors.len() as f64
 }
 
 fn identified(of: &Experiment, id: &str, remainder: &str) -> (Parameters, Prediction) {
     let stage: Identify = settings(id, remainder);
-    let Experiment { robot, recording, split, .. } = of;
-    let reads = IdentifyReads { robot: robot.clone(), recording: recording.clone(), split: split.clone() };
+    let Experiment {
+        robot,
+        recording,
+        split,
+        ..
+    } = of;
+    let reads = IdentifyReads {
+        robot: robot.clone(),
+        recording: recording.clone(),
+        split: split.clone(),
+    };
     let tables = Desk::default().run(&stage, reads).expect("identify runs");
     (table(&tables).remove(0), table(&tables).remove(0))
 }
@@ -66,10 +103,25 @@ fn identified(of: &Experiment, id: &str, remainder: &str) -> (Parameters, Predic
 fn papers_sequence(of: &Experiment, remainder: &str) -> (Prediction, Prediction) {
     let (parameters, prediction) = identified(of, "geometry", remainder);
     let stage: Stiffness = settings("stiffness", remainder);
-    let Experiment { robot, recording, split, .. } = of;
+    let Experiment {
+        robot,
+        recording,
+        split,
+        ..
+    } = of;
     let (robot, recording, split) = (robot.clone(), recording.clone(), split.clone());
-    let reads = StiffnessReads { robot, recording, split, parameters, covariance: None, prediction: prediction.clone() };
-    (prediction, table(&Desk::default().run(&stage, reads).expect("stiffness runs")).remove(0))
+    let reads = StiffnessReads {
+        robot,
+        recording,
+        split,
+        parameters,
+        covariance: None,
+        prediction: prediction.clone(),
+    };
+    (
+        prediction,
+        table(&Desk::default().run(&stage, reads).expect("stiffness runs")).remove(0),
+    )
 }
 
 /// Tables 5, 7 and 9 of Wang et al. (2020), mean position error in mm, within 20 % either way whatever the seed.
@@ -79,14 +131,27 @@ fn the_papers_own_sequence_ends_at_the_papers_figures() {
         let experiment = experiment("all", seed);
         let (geometry, stiffness) = papers_sequence(&experiment, "all");
         for (what, prediction, set, paper) in [
-            ("other unloaded points after geometry", &geometry, "unloaded_check", 0.3008),
+            (
+                "other unloaded points after geometry",
+                &geometry,
+                "unloaded_check",
+                0.3008,
+            ),
             ("210 kg before stiffness", &geometry, "loaded", 7.0261),
             ("210 kg after stiffness", &stiffness, "loaded", 0.9847),
             ("200 points before the network", &stiffness, "learn", 0.9262),
-            ("200 other points before the network", &stiffness, "check", 0.9370),
+            (
+                "200 other points before the network",
+                &stiffness,
+                "check",
+                0.9370,
+            ),
         ] {
             let ratio = mean_mm(prediction, set) / paper;
-            assert!((0.8..=1.2).contains(&ratio), "{what}, seed {seed}: {ratio:.3} times the paper's {paper} mm");
+            assert!(
+                (0.8..=1.2).contains(&ratio),
+                "{what}, seed {seed}: {ratio:.3} times the paper's {paper} mm"
+            );
         }
     }
 }
@@ -98,7 +163,10 @@ fn identifying_everything_at_once_beats_the_sequence_on_points_neither_has_seen(
     let (_, joint) = identified(&experiment, "joint", "all");
     for (set, at_most) in [("check", 0.75), ("unloaded_check", 0.5)] {
         let share = mean_mm(&joint, set) / mean_mm(&sequence, set);
-        assert!((0.05..at_most).contains(&share), "{set}: {share} of what the sequence leaves");
+        assert!(
+            (0.05..at_most).contains(&share),
+            "{set}: {share} of what the sequence leaves"
+        );
     }
 }
 
@@ -108,11 +176,21 @@ fn without_the_remainder_every_true_parameter_comes_back_and_nothing_but_noise_i
     let (parameters, prediction) = identified(&experiment, "joint", "none");
     let mut compared = 0;
     for row in &parameters.0 {
-        let truth = experiment.truth.0.iter().find(|truth| truth.name == row.name);
+        let truth = experiment
+            .truth
+            .0
+            .iter()
+            .find(|truth| truth.name == row.name);
         if let (Some(sigma), Some(truth)) = (row.sigma, truth) {
             assert_eq!(truth.unit, row.unit, "{}", row.name);
             let off = (row.value - truth.value) / sigma;
-            assert!(off.abs() <= 3.0, "{}: {} is {off} sigma from {}", row.name, row.value, truth.value);
+            assert!(
+                off.abs() <= 3.0,
+                "{}: {} is {off} sigma from {}",
+                row.name,
+                row.value,
+                truth.value
+            );
             compared += 1;
         }
     }
@@ -125,7 +203,10 @@ fn without_the_remainder_every_true_parameter_comes_back_and_nothing_but_noise_i
         };
         let ratio = rms(&|row| row.error_mm) / rms(&|row| row.noise_mm);
         // Currents carry 20 mA of noise, worth a few um; 50 points scatter by 6 %.
-        assert!((0.85..1.2).contains(&ratio), "{set}: {ratio} times the tracker's noise");
+        assert!(
+            (0.85..1.2).contains(&ratio),
+            "{set}: {ratio} times the tracker's noise"
+        );
     }
 }
 
@@ -139,9 +220,17 @@ fn where_gears_are_exact_and_only_the_arms_weight_bends_it_ratios_are_not_believ
         twin["seed"] = seed.into();
         let of = experiment_on(serde_json::from_value(twin).expect("settings"));
         let desk = Desk::default();
-        let reads = IdentifyReads { robot: of.robot, recording: of.recording, split: of.split };
-        desk.run(&settings::<Identify>("geometry", "none"), reads).expect("identify runs");
+        let reads = IdentifyReads {
+            robot: of.robot,
+            recording: of.recording,
+            split: of.split,
+        };
+        desk.run(&settings::<Identify>("geometry", "none"), reads)
+            .expect("identify runs");
         let warned = desk.warnings.lock().unwrap().join("\n");
-        assert!(warned.contains("the data favour compliance"), "seed {seed}: {warned}");
+        assert!(
+            warned.contains("the data favour compliance"),
+            "seed {seed}: {warned}"
+        );
     }
 }

@@ -3,7 +3,9 @@
 use arrow::array::{ArrayRef, Float64Array, Int64Array, StringArray};
 use calib::error::{Error, Result};
 use calib::store::frame::{Frame, FrameBuilder};
-use calib::store::{Account, KEY_FORMAT, Lookup, PendingTable, Published, StageKey, Store, TableHash, TableRef};
+use calib::store::{
+    Account, KEY_FORMAT, Lookup, PendingTable, Published, StageKey, Store, TableHash, TableRef,
+};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
@@ -25,11 +27,22 @@ pub(super) fn key(stage: &str, seed: u64) -> StageKey {
 
 fn columns(keys: &[i64]) -> FrameBuilder {
     let mut frame = FrameBuilder::new("split");
-    frame.push("sequence", Arc::new(Int64Array::from(keys.to_vec())) as ArrayRef);
-    frame.push("point_id", Arc::new(StringArray::from_iter_values(keys.iter().map(|key| format!("P{key}")))));
+    frame.push(
+        "sequence",
+        Arc::new(Int64Array::from(keys.to_vec())) as ArrayRef,
+    );
+    frame.push(
+        "point_id",
+        Arc::new(StringArray::from_iter_values(
+            keys.iter().map(|key| format!("P{key}")),
+        )),
+    );
     frame.push(
         "set",
-        Arc::new(StringArray::from_iter_values(keys.iter().map(|key| if key % 4 == 3 { "validate" } else { "fit" }))),
+        Arc::new(StringArray::from_iter_values(
+            keys.iter()
+                .map(|key| if key % 4 == 3 { "validate" } else { "fit" }),
+        )),
     );
     frame
 }
@@ -39,7 +52,11 @@ pub(super) fn split(keys: std::ops::Range<i64>) -> Frame {
 }
 
 pub(super) fn publish(store: &Store, key: &StageKey, frame: &Frame) -> Result<Published> {
-    store.publish(key, vec![("out".into(), PendingTable::Frame(frame.clone()))], Account::default())
+    store.publish(
+        key,
+        vec![("out".into(), PendingTable::Frame(frame.clone()))],
+        Account::default(),
+    )
 }
 
 fn place() -> (tempfile::TempDir, Store) {
@@ -49,8 +66,13 @@ fn place() -> (tempfile::TempDir, Store) {
 }
 
 fn files(dir: &Path) -> usize {
-    let Ok(entries) = fs::read_dir(dir) else { return 0 };
-    entries.map(|entry| entry.unwrap().path()).map(|path| if path.is_dir() { files(&path) } else { 1 }).sum()
+    let Ok(entries) = fs::read_dir(dir) else {
+        return 0;
+    };
+    entries
+        .map(|entry| entry.unwrap().path())
+        .map(|path| if path.is_dir() { files(&path) } else { 1 })
+        .sum()
 }
 
 fn streamed(store: &Store, chunks: &[std::ops::Range<i64>]) -> TableRef {
@@ -65,7 +87,16 @@ fn streamed(store: &Store, chunks: &[std::ops::Range<i64>]) -> TableRef {
 fn chunks_change_neither_the_content_hash_nor_the_bytes() {
     let (_folder, store) = place();
     let whole = streamed(&store, std::slice::from_ref(&(0..200_000)));
-    let pieces = streamed(&store, &[0..1, 1..70_000, 70_000..70_000, 70_000..199_999, 199_999..200_000]);
+    let pieces = streamed(
+        &store,
+        &[
+            0..1,
+            1..70_000,
+            70_000..70_000,
+            70_000..199_999,
+            199_999..200_000,
+        ],
+    );
     assert_eq!(whole, pieces);
     assert_eq!(whole.table_hash, split(0..200_000).table_hash());
     assert_ne!(whole.table_hash, split(0..199_999).table_hash());
@@ -83,19 +114,33 @@ fn the_content_hash_sees_a_moved_border_between_texts_and_a_null() {
     let hash = |texts: [&str; 2], sigma: Option<f64>| {
         let mut frame = FrameBuilder::new("parameters");
         for name in ["name", "effect", "place", "unit", "step"] {
-            let (first, second) = if name == "name" { ("a", "b") } else { (texts[0], texts[1]) };
-            frame.push(name, Arc::new(StringArray::from(vec![first, second])) as ArrayRef);
+            let (first, second) = if name == "name" {
+                ("a", "b")
+            } else {
+                (texts[0], texts[1])
+            };
+            frame.push(
+                name,
+                Arc::new(StringArray::from(vec![first, second])) as ArrayRef,
+            );
         }
         frame.push("status", Arc::new(StringArray::from(vec!["free", "held"])));
         frame.push("remark", Arc::new(StringArray::from(vec![None, Some("")])));
-        frame.push("form", Arc::new(StringArray::from(vec![None::<&str>, None])));
+        frame.push(
+            "form",
+            Arc::new(StringArray::from(vec![None::<&str>, None])),
+        );
         frame.push("nominal", Arc::new(Float64Array::from(vec![0.0, 0.0])));
         frame.push("value", Arc::new(Float64Array::from(vec![0.0, 1.0])));
         frame.push("change", Arc::new(Float64Array::from(vec![0.0, 1.0])));
         frame.push("sigma", Arc::new(Float64Array::from(vec![sigma, None])));
         frame.finish().unwrap().table_hash()
     };
-    let hashes: Vec<TableHash> = vec![hash(["ab", "c"], None), hash(["a", "bc"], None), hash(["ab", "c"], Some(0.0))];
+    let hashes: Vec<TableHash> = vec![
+        hash(["ab", "c"], None),
+        hash(["a", "bc"], None),
+        hash(["ab", "c"], Some(0.0)),
+    ];
     assert!(hashes[0] != hashes[1] && hashes[0] != hashes[2] && hashes[1] != hashes[2]);
 }
 
@@ -110,15 +155,26 @@ fn a_frame_that_breaks_its_schema_is_refused_with_column_and_key() {
     };
     assert!(refused(|_| (), &[1, 2, 2]).contains("table split: key sequence 2 twice"));
     assert!(
-        refused(|frame| frame.push("extra", Arc::new(Int64Array::from(vec![1]))), &[1])
-            .contains("column extra is not in the schema")
+        refused(
+            |frame| frame.push("extra", Arc::new(Int64Array::from(vec![1]))),
+            &[1]
+        )
+        .contains("column extra is not in the schema")
     );
-    assert!(refused(|frame| *frame = FrameBuilder::new("split"), &[1]).contains("column sequence is missing"));
+    assert!(
+        refused(|frame| *frame = FrameBuilder::new("split"), &[1])
+            .contains("column sequence is missing")
+    );
     assert!(refused(|frame| *frame = FrameBuilder::new("splitt"), &[1]).contains("splitt"));
     let float = |values: Vec<Option<f64>>| {
         let mut frame = FrameBuilder::new("truth");
         for name in ["name", "effect", "place", "unit"] {
-            frame.push(name, Arc::new(StringArray::from_iter_values((0..values.len()).map(|row| format!("n{row}")))) as ArrayRef);
+            frame.push(
+                name,
+                Arc::new(StringArray::from_iter_values(
+                    (0..values.len()).map(|row| format!("n{row}")),
+                )) as ArrayRef,
+            );
         }
         frame.push("value", Arc::new(Float64Array::from(values)));
         frame.finish().unwrap_err().to_string()
@@ -142,10 +198,23 @@ fn looking_leaves_no_trace_and_publishing_makes_a_stage_done() {
     let (_folder, store) = place();
     assert_eq!(store.action(&key("split", 1)).unwrap(), Lookup::Absent);
     assert!(!store.root().exists());
-    let account = Account { notes: vec!["rank 27".into()], wall_seconds: 0.5, ..Account::default() };
+    let account = Account {
+        notes: vec!["rank 27".into()],
+        wall_seconds: 0.5,
+        ..Account::default()
+    };
     let products = vec![("out".to_string(), PendingTable::Frame(split(0..9)))];
-    let record = store.publish(&key("split", 1), products, account.clone()).unwrap().record;
-    let Lookup::Done(found) = Store::open(store.root()).unwrap().action(&key("split", 1)).unwrap() else { panic!("not done") };
+    let record = store
+        .publish(&key("split", 1), products, account.clone())
+        .unwrap()
+        .record;
+    let Lookup::Done(found) = Store::open(store.root())
+        .unwrap()
+        .action(&key("split", 1))
+        .unwrap()
+    else {
+        panic!("not done")
+    };
     assert_eq!((&*found, &found.account), (&record, &account));
     assert_eq!(store.load(&record.tables["out"]).unwrap(), split(0..9));
     assert_eq!(store.action(&key("split", 2)).unwrap(), Lookup::Absent);
@@ -153,8 +222,17 @@ fn looking_leaves_no_trace_and_publishing_makes_a_stage_done() {
 
 #[test]
 fn a_key_does_not_depend_on_the_order_of_its_settings() {
-    let with = |text: &str| StageKey { settings: serde_json::from_str(text).unwrap(), ..key("split", 1) }.id();
-    assert_eq!(with(r#"{"a": {"x": 0.1, "y": [1, 2]}, "b": null}"#), with(r#"{"b": null, "a": {"y": [1, 2], "x": 0.1}}"#));
+    let with = |text: &str| {
+        StageKey {
+            settings: serde_json::from_str(text).unwrap(),
+            ..key("split", 1)
+        }
+        .id()
+    };
+    assert_eq!(
+        with(r#"{"a": {"x": 0.1, "y": [1, 2]}, "b": null}"#),
+        with(r#"{"b": null, "a": {"y": [1, 2], "x": 0.1}}"#)
+    );
     assert_ne!(with(r#"{"a": 1}"#), with(r#"{"a": 1.0}"#));
     assert_ne!(with(r#"{"a": [1, 2]}"#), with(r#"{"a": [2, 1]}"#));
 }
@@ -182,13 +260,37 @@ fn rivals_publish_one_object_and_one_record() {
     let rivals: Vec<_> = (0..8)
         .map(|_| {
             let root = store.root().to_owned();
-            std::thread::spawn(move || publish(&Store::open(root).unwrap(), &key("split", 1), &split(0..100)).unwrap())
+            std::thread::spawn(move || {
+                publish(
+                    &Store::open(root).unwrap(),
+                    &key("split", 1),
+                    &split(0..100),
+                )
+                .unwrap()
+            })
         })
         .collect();
-    let published: Vec<Published> = rivals.into_iter().map(|rival| rival.join().unwrap()).collect();
-    assert!(published.iter().all(|one| one == &published[0] && one.conflict.is_none()));
-    assert_eq!((files(&store.root().join("objects")), files(&store.root().join("actions"))), (1, 1));
-    assert_eq!(files(&store.root().join("tmp")), 0, "nobody leaves unfinished files");
+    let published: Vec<Published> = rivals
+        .into_iter()
+        .map(|rival| rival.join().unwrap())
+        .collect();
+    assert!(
+        published
+            .iter()
+            .all(|one| one == &published[0] && one.conflict.is_none())
+    );
+    assert_eq!(
+        (
+            files(&store.root().join("objects")),
+            files(&store.root().join("actions"))
+        ),
+        (1, 1)
+    );
+    assert_eq!(
+        files(&store.root().join("tmp")),
+        0,
+        "nobody leaves unfinished files"
+    );
 }
 
 #[test]
@@ -198,15 +300,24 @@ fn the_first_record_stands_and_another_content_is_reported() {
     let second = publish(&store, &key("split", 1), &split(0..8)).unwrap();
     assert_eq!(second.record, first.record);
     let conflict = second.conflict.unwrap();
-    assert!(conflict.contains("stage split is not deterministic") && conflict.contains("out"), "{conflict}");
+    assert!(
+        conflict.contains("stage split is not deterministic") && conflict.contains("out"),
+        "{conflict}"
+    );
 }
 
 #[test]
 fn a_torn_record_or_a_damaged_object_is_as_good_as_absent_and_healed_by_publishing() {
     let (_folder, store) = place();
-    let record = publish(&store, &key("split", 1), &split(0..900)).unwrap().record;
+    let record = publish(&store, &key("split", 1), &split(0..900))
+        .unwrap()
+        .record;
     let id = record.id.as_str();
-    let record_path = store.root().join("actions").join(&id[..2]).join(format!("{id}.json"));
+    let record_path = store
+        .root()
+        .join("actions")
+        .join(&id[..2])
+        .join(format!("{id}.json"));
     let object = store.object_path(&record.tables["out"]);
     let whole = (fs::read(&record_path).unwrap(), fs::read(&object).unwrap());
     let overwrite = |path: &Path, bytes: &[u8]| {
@@ -221,18 +332,33 @@ fn a_torn_record_or_a_damaged_object_is_as_good_as_absent_and_healed_by_publishi
     ];
     for tear in torn {
         tear();
-        let Lookup::Damaged(why) = store.action(&key("split", 1)).unwrap() else { panic!("damage not seen") };
+        let Lookup::Damaged(why) = store.action(&key("split", 1)).unwrap() else {
+            panic!("damage not seen")
+        };
         assert!(why.contains("the stage runs again"), "{why}");
-        assert_eq!(publish(&store, &key("split", 1), &split(0..900)).unwrap().conflict, None);
-        assert_eq!(store.action(&key("split", 1)).unwrap(), Lookup::Done(Box::new(record.clone())));
-        assert_eq!((fs::read(&record_path).unwrap(), fs::read(&object).unwrap()), whole);
+        assert_eq!(
+            publish(&store, &key("split", 1), &split(0..900))
+                .unwrap()
+                .conflict,
+            None
+        );
+        assert_eq!(
+            store.action(&key("split", 1)).unwrap(),
+            Lookup::Done(Box::new(record.clone()))
+        );
+        assert_eq!(
+            (fs::read(&record_path).unwrap(), fs::read(&object).unwrap()),
+            whole
+        );
     }
 }
 
 #[test]
 fn a_flipped_byte_is_found_on_reading_and_the_object_is_set_aside() {
     let (_folder, store) = place();
-    let record = publish(&store, &key("split", 1), &split(0..900)).unwrap().record;
+    let record = publish(&store, &key("split", 1), &split(0..900))
+        .unwrap()
+        .record;
     let object = store.object_path(&record.tables["out"]);
     let mut bytes = fs::read(&object).unwrap();
     bytes[100] ^= 1;
@@ -240,22 +366,47 @@ fn a_flipped_byte_is_found_on_reading_and_the_object_is_set_aside() {
     fs::write(&object, bytes).unwrap();
     let error = store.load(&record.tables["out"]).unwrap_err();
     assert_eq!(error.exit_code(), 75);
-    assert!(error.to_string().contains("`calib run` of its pipeline writes it anew"), "{error}");
-    assert!(matches!(store.action(&key("split", 1)).unwrap(), Lookup::Damaged(_)));
+    assert!(
+        error
+            .to_string()
+            .contains("`calib run` of its pipeline writes it anew"),
+        "{error}"
+    );
+    assert!(matches!(
+        store.action(&key("split", 1)).unwrap(),
+        Lookup::Damaged(_)
+    ));
 }
 
 #[test]
 fn a_store_of_a_newer_calib_and_a_folder_that_is_no_store_are_left_alone() {
     let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("format.json"), r#"{"calib_store": 2, "new": true}"#).unwrap();
+    fs::write(
+        folder.path().join("format.json"),
+        r#"{"calib_store": 2, "new": true}"#,
+    )
+    .unwrap();
     let error = Store::open(folder.path()).unwrap_err();
     assert_eq!(error.exit_code(), 2);
-    assert!(error.to_string().contains("newer calib (format 2, this one knows 1)"), "{error}");
+    assert!(
+        error
+            .to_string()
+            .contains("newer calib (format 2, this one knows 1)"),
+        "{error}"
+    );
     fs::write(folder.path().join("format.json"), "{").unwrap();
     assert_eq!(Store::open(folder.path()).unwrap_err().exit_code(), 75);
-    fs::rename(folder.path().join("format.json"), folder.path().join("holiday.jpg")).unwrap();
+    fs::rename(
+        folder.path().join("format.json"),
+        folder.path().join("holiday.jpg"),
+    )
+    .unwrap();
     let error = Store::open(folder.path()).unwrap_err();
-    assert!(error.to_string().contains("not a calib store") && error.to_string().contains("holiday.jpg"), "{error}");
+    assert!(
+        error.to_string().contains("not a calib store")
+            && error.to_string().contains("holiday.jpg"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -277,19 +428,31 @@ fn a_read_only_store_can_be_read_and_refuses_to_be_written() {
     use std::os::unix::fs::PermissionsExt;
     let (_folder, store) = place();
     let root = store.root().to_owned();
-    let record = publish(&store, &key("split", 1), &split(0..9)).unwrap().record;
+    let record = publish(&store, &key("split", 1), &split(0..9))
+        .unwrap()
+        .record;
     drop(store);
     let folders = [root.join("tmp"), root.clone()];
-    let mode = |mode| folders.iter().for_each(|dir| fs::set_permissions(dir, fs::Permissions::from_mode(mode)).unwrap());
+    let mode = |mode| {
+        folders
+            .iter()
+            .for_each(|dir| fs::set_permissions(dir, fs::Permissions::from_mode(mode)).unwrap())
+    };
     mode(0o555);
     let store = Store::open(&root).unwrap();
-    assert_eq!(store.action(&key("split", 1)).unwrap(), Lookup::Done(Box::new(record)));
+    assert_eq!(
+        store.action(&key("split", 1)).unwrap(),
+        Lookup::Done(Box::new(record))
+    );
     if fs::write(root.join("probe"), "").is_ok() {
         crate::desk::skipped("this user may write into read-only folders");
     } else {
         let error = publish(&store, &key("split", 2), &split(0..9)).unwrap_err();
         assert_eq!(error.exit_code(), 75);
-        assert!(error.to_string().contains("make the folder writable"), "{error}");
+        assert!(
+            error.to_string().contains("make the folder writable"),
+            "{error}"
+        );
     }
     mode(0o755);
 }
@@ -297,21 +460,44 @@ fn a_read_only_store_can_be_read_and_refuses_to_be_written() {
 #[test]
 fn the_human_path_follows_the_latest_table_and_reads_without_the_store() {
     let (_folder, store) = place();
-    let first = publish(&store, &key("split", 1), &split(0..9)).unwrap().record;
-    let second = publish(&store, &key("split", 2), &split(0..5)).unwrap().record;
-    let path = store.expose("cell 7", "split", "out", &first.tables["out"]).unwrap();
+    let first = publish(&store, &key("split", 1), &split(0..9))
+        .unwrap()
+        .record;
+    let second = publish(&store, &key("split", 2), &split(0..5))
+        .unwrap()
+        .record;
+    let path = store
+        .expose("cell 7", "split", "out", &first.tables["out"])
+        .unwrap();
     assert_eq!(path, store.root().join("tables/cell 7/split.out.parquet"));
     for record in [&first, &second, &second, &first] {
         let table = &record.tables["out"];
         store.expose("cell 7", "split", "out", table).unwrap();
-        assert_eq!(fs::read(&path).unwrap(), fs::read(store.object_path(table)).unwrap());
+        assert_eq!(
+            fs::read(&path).unwrap(),
+            fs::read(store.object_path(table)).unwrap()
+        );
     }
     assert!(fs::metadata(&path).unwrap().permissions().readonly());
-    let document = store.expose_document("cell 7", "report.html", b"<p>").unwrap();
+    let document = store
+        .expose_document("cell 7", "report.html", b"<p>")
+        .unwrap();
     assert_eq!(fs::read(document).unwrap(), b"<p>");
     for hostile in ["..", "../x", "a/b", "", ".hidden", "a\\b", "nul\0"] {
-        assert!(matches!(store.expose(hostile, "s", "p", &first.tables["out"]), Err(Error::Spec(_))), "{hostile:?}");
-        assert!(matches!(store.expose_document("cell 7", hostile, b""), Err(Error::Spec(_))), "{hostile:?}");
+        assert!(
+            matches!(
+                store.expose(hostile, "s", "p", &first.tables["out"]),
+                Err(Error::Spec(_))
+            ),
+            "{hostile:?}"
+        );
+        assert!(
+            matches!(
+                store.expose_document("cell 7", hostile, b""),
+                Err(Error::Spec(_))
+            ),
+            "{hostile:?}"
+        );
     }
 }
 
@@ -319,16 +505,31 @@ fn the_human_path_follows_the_latest_table_and_reads_without_the_store() {
 fn a_run_leaves_a_manifest_from_its_first_moment_and_events_line_by_line() {
     let (_folder, store) = place();
     let id = "01J00000000000000000000000";
-    let mut run = store.begin_run(id, &serde_json::json!({"status": "running"})).unwrap();
+    let mut run = store
+        .begin_run(id, &serde_json::json!({"status": "running"}))
+        .unwrap();
     assert_eq!(store.manifest(id).unwrap()["status"], "running");
-    run.append_event(&serde_json::json!({"stage": "ingest"})).unwrap();
-    run.append_event(&serde_json::json!({"stage": "split\n"})).unwrap();
+    run.append_event(&serde_json::json!({"stage": "ingest"}))
+        .unwrap();
+    run.append_event(&serde_json::json!({"stage": "split\n"}))
+        .unwrap();
     let dir = run.dir().to_owned();
-    store.finish_run(run, &serde_json::json!({"status": "done"})).unwrap();
+    store
+        .finish_run(run, &serde_json::json!({"status": "done"}))
+        .unwrap();
     assert_eq!(store.manifest(id).unwrap()["status"], "done");
-    assert_eq!(fs::read_to_string(dir.join("events.jsonl")).unwrap().lines().count(), 2);
+    assert_eq!(
+        fs::read_to_string(dir.join("events.jsonl"))
+            .unwrap()
+            .lines()
+            .count(),
+        2
+    );
     assert_eq!(store.runs().unwrap(), [id]);
-    assert!(store.begin_run(id, &serde_json::json!({})).is_err(), "a run is begun once");
+    assert!(
+        store.begin_run(id, &serde_json::json!({})).is_err(),
+        "a run is begun once"
+    );
 }
 
 #[test]
@@ -341,7 +542,12 @@ fn what_a_dead_process_left_is_swept_and_what_a_living_one_uses_stays() {
     fs::create_dir(tmp.join("4000000.0")).unwrap();
     fs::write(tmp.join("4000000.0/0"), "half a table").unwrap();
     fs::write(tmp.join("4000000.0.lock"), "").unwrap();
-    publish(&Store::open(store.root()).unwrap(), &key("split", 2), &split(0..9)).unwrap();
+    publish(
+        &Store::open(store.root()).unwrap(),
+        &key("split", 2),
+        &split(0..9),
+    )
+    .unwrap();
     assert!(!tmp.join("4000000.0").exists() && !tmp.join("4000000.0.lock").exists());
     assert_eq!(writer.finish().unwrap().table().rows, 9);
 }
@@ -358,7 +564,13 @@ fn a_million_rows_stream_in_bounded_memory() {
     let (_folder, store) = place();
     let mut writer = store.writer("prediction").unwrap();
     let resident = || -> u64 {
-        let pages: u64 = fs::read_to_string("/proc/self/statm").unwrap().split(' ').nth(1).unwrap().parse().unwrap();
+        let pages: u64 = fs::read_to_string("/proc/self/statm")
+            .unwrap()
+            .split(' ')
+            .nth(1)
+            .unwrap()
+            .parse()
+            .unwrap();
         pages * 4096
     };
     let (mut settled, mut most) = (0, 0);
@@ -366,15 +578,33 @@ fn a_million_rows_stream_in_bounded_memory() {
         let keys: Vec<i64> = (start..start + CHUNK).collect();
         let text = |text: &str| Arc::new(StringArray::from(vec![text; keys.len()])) as ArrayRef;
         let mut frame = FrameBuilder::new("prediction");
-        frame.push("point_id", Arc::new(StringArray::from_iter_values(keys.iter().map(|key| format!("P{key}")))) as ArrayRef);
+        frame.push(
+            "point_id",
+            Arc::new(StringArray::from_iter_values(
+                keys.iter().map(|key| format!("P{key}")),
+            )) as ArrayRef,
+        );
         frame.push("set", text("fit"));
         frame.push("step", text("geometry"));
         for name in ["held_out", "suspect"] {
-            frame.push(name, Arc::new(arrow::array::BooleanArray::from(vec![false; keys.len()])));
+            frame.push(
+                name,
+                Arc::new(arrow::array::BooleanArray::from(vec![false; keys.len()])),
+            );
         }
-        let numbers = ["x_mm", "y_mm", "z_mm", "dx_mm", "dy_mm", "dz_mm", "error_mm", "noise_mm", "sigma_mm"];
-        for name in numbers.into_iter().chain(["fold_error_mm", "block_error_mm"]) {
-            frame.push(name, Arc::new(Float64Array::from_iter_values(keys.iter().map(|key| (*key as f64 * 0.7371).fract()))));
+        let numbers = [
+            "x_mm", "y_mm", "z_mm", "dx_mm", "dy_mm", "dz_mm", "error_mm", "noise_mm", "sigma_mm",
+        ];
+        for name in numbers
+            .into_iter()
+            .chain(["fold_error_mm", "block_error_mm"])
+        {
+            frame.push(
+                name,
+                Arc::new(Float64Array::from_iter_values(
+                    keys.iter().map(|key| (*key as f64 * 0.7371).fract()),
+                )),
+            );
         }
         frame.push("sequence", Arc::new(Int64Array::from(keys)));
         writer.push(&frame.finish().unwrap()).unwrap();
@@ -387,5 +617,8 @@ fn a_million_rows_stream_in_bounded_memory() {
     assert_eq!(file.table().rows, ROWS as u64);
     // The columns are over 100 MB in memory.
     let grown = most.saturating_sub(settled);
-    assert!(grown < 60_000_000, "grew by {grown} bytes after the first fifth of the rows");
+    assert!(
+        grown < 60_000_000,
+        "grew by {grown} bytes after the first fifth of the rows"
+    );
 }

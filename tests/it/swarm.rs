@@ -2,7 +2,8 @@
 
 use crate::desk::Desk;
 use calib::estimate::swarm::{
-    Algorithm, BeetleAntennae, BeetleSwarm, Budget, Landscape, Method, SearchBox, SearchStop, SwarmResult, minimise,
+    Algorithm, BeetleAntennae, BeetleSwarm, Budget, Landscape, Method, SearchBox, SearchStop,
+    SwarmResult, minimise,
 };
 use calib::stage::{Context, Optimise, OptimiseReads, Stage};
 use serde_json::json;
@@ -16,8 +17,20 @@ fn sphere(x: &[f64]) -> f64 {
     x.iter().map(|x| x * x).sum()
 }
 
-fn search<M: Method>(method: &M, f: fn(&[f64]) -> f64, bounds: &SearchBox, seed: u64, jobs: usize) -> SwarmResult {
-    let budget = Budget { generations: 200, evaluations: None, target: None, seed, jobs };
+fn search<M: Method>(
+    method: &M,
+    f: fn(&[f64]) -> f64,
+    bounds: &SearchBox,
+    seed: u64,
+    jobs: usize,
+) -> SwarmResult {
+    let budget = Budget {
+        generations: 200,
+        evaluations: None,
+        target: None,
+        seed,
+        jobs,
+    };
     minimise(method, &f, bounds, &budget, |_, _| {})
 }
 
@@ -26,21 +39,42 @@ fn the_paper_s_table_2_over_seeds_shows_who_gets_there_and_who_gets_stuck() {
     let stage: Optimise = serde_json::from_value(json!({"seeds": 200})).unwrap();
     let of = |jobs: usize| {
         let desk = Desk::default();
-        let context = Context { id: "table2", seed: 3, jobs, services: &desk };
+        let context = Context {
+            id: "table2",
+            seed: 3,
+            jobs,
+            services: &desk,
+        };
         stage.run(OptimiseReads {}, &context).unwrap()
     };
     let tables = of(2);
-    let row = |method: &str| tables.searches.0.iter().find(|row| row.method == method).unwrap();
+    let row = |method: &str| {
+        tables
+            .searches
+            .0
+            .iter()
+            .find(|row| row.method == method)
+            .unwrap()
+    };
     for method in ["bso", "pso", "ga", "abc"] {
         let row = row(method);
         assert!(row.found >= 198, "{row:?}");
-        assert!((150.0..15_000.0).contains(&row.evaluations_median.unwrap()), "{row:?}");
+        assert!(
+            (150.0..15_000.0).contains(&row.evaluations_median.unwrap()),
+            "{row:?}"
+        );
     }
     // A lone beetle gets there from about one seed in six: the paper's table shows the time of a run that did.
     let lone = row("bas");
-    assert!((15..60).contains(&lone.found) && lone.found + lone.stuck == 200, "{lone:?}");
+    assert!(
+        (15..60).contains(&lone.found) && lone.found + lone.stuck == 200,
+        "{lone:?}"
+    );
     let one = of(1);
-    assert_eq!((&one.searches, &one.search_course), (&tables.searches, &tables.search_course));
+    assert_eq!(
+        (&one.searches, &one.search_course),
+        (&tables.searches, &tables.search_course)
+    );
 }
 
 #[test]
@@ -52,7 +86,17 @@ fn settings_of_a_comparison_that_make_no_sense_are_named() {
     }))
     .unwrap();
     let places: Vec<String> = stage.check().into_iter().map(|fault| fault.place).collect();
-    assert_eq!(places, ["population", "seeds", "evaluations", "problems[0].dimensions", "problems[0].tolerance", "problems[2]"]);
+    assert_eq!(
+        places,
+        [
+            "population",
+            "seeds",
+            "evaluations",
+            "problems[0].dimensions",
+            "problems[0].tolerance",
+            "problems[2]"
+        ]
+    );
     assert!(Optimise::default().check().is_empty());
 }
 
@@ -61,19 +105,45 @@ fn every_optimiser_keeps_within_its_budget_and_on_any_number_of_threads() {
     let bounds = SearchBox::cube(6, -1.0, 1.5);
     for method in Algorithm::ALL {
         let generations = method.generations(20, 3000);
-        assert!(method.evaluations(20, generations) <= 3000 && method.evaluations(20, generations + 1) > 3000, "{method:?}");
+        assert!(
+            method.evaluations(20, generations) <= 3000
+                && method.evaluations(20, generations + 1) > 3000,
+            "{method:?}"
+        );
         let run = |jobs: usize| {
-            let budget = Budget { generations, evaluations: None, target: None, seed: 4, jobs };
+            let budget = Budget {
+                generations,
+                evaluations: None,
+                target: None,
+                seed: 4,
+                jobs,
+            };
             method.minimise(20, &sphere, &bounds, &budget, |_, _| {})
         };
         let one = run(1);
         assert_eq!(one, run(3), "{method:?}");
         // A colony's scouts come on top, at most one a generation.
-        let most = 3000 + if method == Algorithm::Abc { generations as u64 } else { 0 };
+        let most = 3000
+            + if method == Algorithm::Abc {
+                generations as u64
+            } else {
+                0
+            };
         assert!(one.evaluations <= most, "{method:?} {}", one.evaluations);
-        assert!(one.value < if method == Algorithm::Bas { 2.0 } else { 0.02 }, "{method:?} {}", one.value);
-        assert!(one.elite[0].0 == one.value && one.elite.windows(2).all(|pair| pair[0].0 <= pair[1].0), "{method:?}");
-        assert!(one.history.windows(2).all(|pair| pair[1].best <= pair[0].best));
+        assert!(
+            one.value < if method == Algorithm::Bas { 2.0 } else { 0.02 },
+            "{method:?} {}",
+            one.value
+        );
+        assert!(
+            one.elite[0].0 == one.value && one.elite.windows(2).all(|pair| pair[0].0 <= pair[1].0),
+            "{method:?}"
+        );
+        assert!(
+            one.history
+                .windows(2)
+                .all(|pair| pair[1].best <= pair[0].best)
+        );
     }
 }
 
@@ -86,7 +156,11 @@ fn the_landscapes_have_their_minima_where_the_literature_says() {
         (Landscape::Ackley, vec![0.0; 4]),
     ] {
         let minimum = function.minimum(x.len()).unwrap();
-        assert!((function.value(&x) - minimum).abs() < 1e-8, "{function:?} {}", function.value(&x));
+        assert!(
+            (function.value(&x) - minimum).abs() < 1e-8,
+            "{function:?} {}",
+            function.value(&x)
+        );
         let beside: Vec<f64> = x.iter().map(|x| x + 0.01).collect();
         assert!(function.value(&beside) > minimum);
     }
@@ -94,9 +168,19 @@ fn the_landscapes_have_their_minima_where_the_literature_says() {
 
 #[test]
 fn the_minimum_lies_where_the_paper_says() {
-    let outcome = search(&BeetleSwarm::default(), michalewicz, &SearchBox::cube(2, 0.0, PI), 1, 1);
+    let outcome = search(
+        &BeetleSwarm::default(),
+        michalewicz,
+        &SearchBox::cube(2, 0.0, PI),
+        1,
+        1,
+    );
     assert!((outcome.value - -1.8013).abs() < 1e-4, "{}", outcome.value);
-    assert!((outcome.position[0] - 2.20).abs() < 0.01 && (outcome.position[1] - 1.57).abs() < 0.01, "{:?}", outcome.position);
+    assert!(
+        (outcome.position[0] - 2.20).abs() < 0.01 && (outcome.position[1] - 1.57).abs() < 0.01,
+        "{:?}",
+        outcome.position
+    );
 }
 
 #[test]
@@ -107,46 +191,107 @@ fn the_sphere_is_descended_to_its_bottom() {
         assert!(outcome.value < 1e-6, "seed {seed}: {}", outcome.value);
     }
     // One beetle's steps sum to at most 10 and die out: it comes near, not there.
-    let outcome = search(&BeetleAntennae::default(), sphere, &SearchBox::cube(2, -3.0, 4.0), 3, 1);
-    assert!(outcome.value < 0.05 && outcome.value > 0.0, "{}", outcome.value);
+    let outcome = search(
+        &BeetleAntennae::default(),
+        sphere,
+        &SearchBox::cube(2, -3.0, 4.0),
+        3,
+        1,
+    );
+    assert!(
+        outcome.value < 0.05 && outcome.value > 0.0,
+        "{}",
+        outcome.value
+    );
 }
 
 #[test]
 fn two_threads_give_the_bits_of_one_and_a_seed_gives_its_search_again() {
     let bounds = SearchBox::cube(6, -1.0, 1.0);
-    let method = BeetleSwarm { beetles: 17, ..BeetleSwarm::default() };
+    let method = BeetleSwarm {
+        beetles: 17,
+        ..BeetleSwarm::default()
+    };
     let one = search(&method, sphere, &bounds, 5, 1);
     for jobs in [1, 2, 3, 64] {
-        assert_eq!(one, search(&method, sphere, &bounds, 5, jobs), "{jobs} threads");
+        assert_eq!(
+            one,
+            search(&method, sphere, &bounds, 5, jobs),
+            "{jobs} threads"
+        );
     }
-    assert_ne!(one.position, search(&method, sphere, &bounds, 6, 1).position);
+    assert_ne!(
+        one.position,
+        search(&method, sphere, &bounds, 6, 1).position
+    );
 }
 
 #[test]
 fn the_history_falls_counts_every_evaluation_and_is_observed() {
-    let method = BeetleSwarm { beetles: 10, ..BeetleSwarm::default() };
+    let method = BeetleSwarm {
+        beetles: 10,
+        ..BeetleSwarm::default()
+    };
     let mut seen = Vec::new();
-    let budget = Budget { generations: 40, evaluations: Some(910), target: None, seed: 2, jobs: 2 };
-    let outcome = minimise(&method, &michalewicz, &SearchBox::cube(2, 0.0, PI), &budget, |generation, best| {
-        assert_eq!(michalewicz(best), generation.best);
-        seen.push(generation.clone());
-    });
+    let budget = Budget {
+        generations: 40,
+        evaluations: Some(910),
+        target: None,
+        seed: 2,
+        jobs: 2,
+    };
+    let outcome = minimise(
+        &method,
+        &michalewicz,
+        &SearchBox::cube(2, 0.0, PI),
+        &budget,
+        |generation, best| {
+            assert_eq!(michalewicz(best), generation.best);
+            seen.push(generation.clone());
+        },
+    );
     assert_eq!(seen, outcome.history);
-    assert!(seen.windows(2).all(|pair| pair[1].best <= pair[0].best && pair[1].evaluations == pair[0].evaluations + 30));
-    assert!(seen.iter().all(|generation| generation.mean >= generation.best));
-    assert_eq!((outcome.stop, outcome.evaluations), (SearchStop::Evaluations, 910));
-    assert!(outcome.elite.windows(2).all(|pair| pair[0].0 <= pair[1].0) && outcome.elite[0].0 == outcome.value);
+    assert!(seen.windows(2).all(
+        |pair| pair[1].best <= pair[0].best && pair[1].evaluations == pair[0].evaluations + 30
+    ));
+    assert!(
+        seen.iter()
+            .all(|generation| generation.mean >= generation.best)
+    );
+    assert_eq!(
+        (outcome.stop, outcome.evaluations),
+        (SearchStop::Evaluations, 910)
+    );
+    assert!(
+        outcome.elite.windows(2).all(|pair| pair[0].0 <= pair[1].0)
+            && outcome.elite[0].0 == outcome.value
+    );
 }
 
 #[test]
 fn the_bounds_hold_and_a_value_that_is_no_number_is_never_best() {
     let f = |x: &[f64]| {
         assert!(x.iter().all(|x| (-1.0..=2.0).contains(x)), "{x:?}");
-        if x[0] < 0.0 { f64::NAN } else { (x[0] - 2.0).abs() + x[1].abs() }
+        if x[0] < 0.0 {
+            f64::NAN
+        } else {
+            (x[0] - 2.0).abs() + x[1].abs()
+        }
     };
-    let budget = Budget { generations: 100, evaluations: None, target: None, seed: 9, jobs: 2 };
+    let budget = Budget {
+        generations: 100,
+        evaluations: None,
+        target: None,
+        seed: 9,
+        jobs: 2,
+    };
     let bounds = SearchBox::cube(2, -1.0, 2.0);
     let swarm = minimise(&BeetleSwarm::default(), &f, &bounds, &budget, |_, _| {});
     let beetle = minimise(&BeetleAntennae::default(), &f, &bounds, &budget, |_, _| {});
-    assert!(swarm.value < 1e-3 && beetle.value.is_finite(), "{} {}", swarm.value, beetle.value);
+    assert!(
+        swarm.value < 1e-3 && beetle.value.is_finite(),
+        "{} {}",
+        swarm.value,
+        beetle.value
+    );
 }

@@ -33,7 +33,10 @@ fn cell(
         Extreme::Least => f64::from_bits(1).max(low),
     };
     let whole = match extreme {
-        _ if key => range.min.map_or(i64::MIN + 1, |low| low as i64).saturating_add(row as i64),
+        _ if key => range
+            .min
+            .map_or(i64::MIN + 1, |low| low as i64)
+            .saturating_add(row as i64),
         Extreme::Lowest => range.min.map_or(i64::MIN, |low| low as i64),
         Extreme::Highest => range.max.map_or(i64::MAX, |high| high as i64),
         Extreme::Least => range.min.map_or(0, |low| low as i64),
@@ -46,7 +49,12 @@ fn cell(
         ([first, ..], _) => first.clone(),
     };
     let truth = matches!(extreme, Extreme::Highest);
-    ((!none).then_some(number), (!none).then_some(whole), (!none).then_some(text), (!none).then_some(truth))
+    (
+        (!none).then_some(number),
+        (!none).then_some(whole),
+        (!none).then_some(text),
+        (!none).then_some(truth),
+    )
 }
 
 fn frame(kind: &str, rows: &[Extreme]) -> Frame {
@@ -58,15 +66,34 @@ fn frame(kind: &str, rows: &[Extreme]) -> Frame {
             continue;
         }
         either.push(&field.either);
-        let joints: Vec<Option<usize>> = if field.per_joint { (1..=7).map(Some).collect() } else { vec![None] };
+        let joints: Vec<Option<usize>> = if field.per_joint {
+            (1..=7).map(Some).collect()
+        } else {
+            vec![None]
+        };
         for joint in joints {
             let key = schema.primary_key.contains(&field.name);
-            let cells: Vec<_> = rows.iter().enumerate().map(|(row, extreme)| cell(field, *extreme, row, key)).collect();
+            let cells: Vec<_> = rows
+                .iter()
+                .enumerate()
+                .map(|(row, extreme)| cell(field, *extreme, row, key))
+                .collect();
             let array: ArrayRef = match field.column_type {
-                ColumnType::Float64 => Arc::new(cells.iter().map(|cell| cell.0).collect::<Float64Array>()),
-                ColumnType::Int64 => Arc::new(cells.iter().map(|cell| cell.1).collect::<Int64Array>()),
-                ColumnType::Utf8 => Arc::new(cells.iter().map(|cell| cell.2.clone()).collect::<StringArray>()),
-                ColumnType::Boolean => Arc::new(cells.iter().map(|cell| cell.3).collect::<BooleanArray>()),
+                ColumnType::Float64 => {
+                    Arc::new(cells.iter().map(|cell| cell.0).collect::<Float64Array>())
+                }
+                ColumnType::Int64 => {
+                    Arc::new(cells.iter().map(|cell| cell.1).collect::<Int64Array>())
+                }
+                ColumnType::Utf8 => Arc::new(
+                    cells
+                        .iter()
+                        .map(|cell| cell.2.clone())
+                        .collect::<StringArray>(),
+                ),
+                ColumnType::Boolean => {
+                    Arc::new(cells.iter().map(|cell| cell.3).collect::<BooleanArray>())
+                }
             };
             // Lists of rows leave an optional column out that has no value.
             if !field.optional || kind == "recording" || array.null_count() < array.len() {
@@ -80,19 +107,34 @@ fn frame(kind: &str, rows: &[Extreme]) -> Frame {
 fn round_trip<T: Table>() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).unwrap();
-    let cases: [&[Extreme]; 4] = [&[], &[Extreme::Lowest], &[Extreme::Highest], &[Extreme::Least]];
+    let cases: [&[Extreme]; 4] = [
+        &[],
+        &[Extreme::Lowest],
+        &[Extreme::Highest],
+        &[Extreme::Least],
+    ];
     for (case, rows) in cases.into_iter().enumerate() {
         let written = frame(T::KIND, rows);
         let products = vec![("out".to_string(), PendingTable::Frame(written.clone()))];
-        let record = store.publish(&key(T::KIND, case as u64), products, Account::default()).unwrap().record;
+        let record = store
+            .publish(&key(T::KIND, case as u64), products, Account::default())
+            .unwrap()
+            .record;
         let table = &record.tables["out"];
         let read = store.load(table).unwrap();
         assert_eq!(read, written, "{} with {rows:?}", T::KIND);
-        assert_eq!((table.rows, &table.table_hash), (rows.len() as u64, &read.table_hash()));
+        assert_eq!(
+            (table.rows, &table.table_hash),
+            (rows.len() as u64, &read.table_hash())
+        );
         let values = T::from_frame(&read).unwrap();
         // The recording converts units, which rounds in the last digit; for it the names of the columns have to do.
         let back = values.to_frame().unwrap();
-        assert!(back.column_names().eq(written.column_names()), "{}", T::KIND);
+        assert!(
+            back.column_names().eq(written.column_names()),
+            "{}",
+            T::KIND
+        );
         if T::KIND != "recording" {
             assert_eq!(back, written, "{}", T::KIND);
         }
@@ -115,13 +157,25 @@ Statistics Suspects TorqueChangeTable TorqueCourse TorqueCovariance TorqueFindin
 fn every_table_is_tested_and_has_exactly_one_schema() {
     assert_eq!(KINDS, table::TABLES);
     let embedded: Vec<&str> = schema::all().map(|schema| schema.name.as_str()).collect();
-    assert_eq!(embedded, table::TABLES, "SCHEMAS of src/store/schema.rs and TABLES of src/table/mod.rs, by name");
+    assert_eq!(
+        embedded,
+        table::TABLES,
+        "SCHEMAS of src/store/schema.rs and TABLES of src/table/mod.rs, by name"
+    );
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("schemas");
-    let mut files: Vec<String> =
-        std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    let mut files: Vec<String> = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
     files.retain(|name| name.ends_with(".json") && !name.ends_with(".schema.json"));
     files.sort();
-    assert_eq!(files, table::TABLES.iter().map(|kind| format!("{kind}.json")).collect::<Vec<_>>());
+    assert_eq!(
+        files,
+        table::TABLES
+            .iter()
+            .map(|kind| format!("{kind}.json"))
+            .collect::<Vec<_>>()
+    );
 }
 
 #[test]
@@ -145,10 +199,19 @@ fn a_recording_keeps_its_quantities_its_gaps_and_its_prismatic_joint() {
     };
     let frame = recording.to_frame().unwrap();
     let names: Vec<&str> = frame.column_names().collect();
-    assert_eq!(names.join(" "), "sequence point_id usage q1_mm q2_rad x_mm y_mm z_mm time_s payload_kg i1_a i2_a dir1 dir2");
+    assert_eq!(
+        names.join(" "),
+        "sequence point_id usage q1_mm q2_rad x_mm y_mm z_mm time_s payload_kg i1_a i2_a dir1 dir2"
+    );
     assert_eq!(frame.read::<f64>("q1_mm").unwrap(), [1250.0, 2500.0]);
-    assert_eq!(frame.read::<Option<f64>>("time_s").unwrap(), [Some(0.0), None]);
-    assert_eq!(frame.read::<Option<f64>>("i2_a").unwrap(), [None, Some(0.0)]);
+    assert_eq!(
+        frame.read::<Option<f64>>("time_s").unwrap(),
+        [Some(0.0), None]
+    );
+    assert_eq!(
+        frame.read::<Option<f64>>("i2_a").unwrap(),
+        [None, Some(0.0)]
+    );
     let back = table::Recording::from_frame(&frame).unwrap();
     // NaN is not equal to itself, so the two are compared as text.
     assert_eq!(format!("{back:?}"), format!("{recording:?}"));
@@ -157,7 +220,10 @@ fn a_recording_keeps_its_quantities_its_gaps_and_its_prismatic_joint() {
 #[test]
 fn a_recording_without_joints_or_with_degrees_for_radians_is_refused() {
     let none = table::Recording::default().to_frame().unwrap_err();
-    assert!(none.to_string().contains("no column of any joint"), "{none}");
+    assert!(
+        none.to_string().contains("no column of any joint"),
+        "{none}"
+    );
     let degrees = table::Recording {
         joints: 1,
         prismatic: vec![false],
@@ -180,24 +246,50 @@ fn a_recording_without_joints_or_with_degrees_for_radians_is_refused() {
 #[test]
 fn duckdb_pandas_pyarrow_and_polars_read_every_table_with_its_units_and_key() {
     let python = std::env::var("CALIB_PYTHON").unwrap_or_else(|_| "python3".into());
-    let run = |arguments: &[&std::ffi::OsStr]| std::process::Command::new(&python).args(arguments).output();
+    let run = |arguments: &[&std::ffi::OsStr]| {
+        std::process::Command::new(&python).args(arguments).output()
+    };
     let import = "import duckdb, pandas, polars, pyarrow";
     if !run(&["-c".as_ref(), import.as_ref()]).is_ok_and(|output| output.status.success()) {
-        crate::desk::skipped(&format!("{python} has not all of duckdb, pandas, pyarrow and polars"));
+        crate::desk::skipped(&format!(
+            "{python} has not all of duckdb, pandas, pyarrow and polars"
+        ));
         return;
     }
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).unwrap();
-    for (case, rows) in [("empty", &[][..]), ("extreme", &[Extreme::Lowest, Extreme::Highest, Extreme::Least])].into_iter() {
+    for (case, rows) in [
+        ("empty", &[][..]),
+        (
+            "extreme",
+            &[Extreme::Lowest, Extreme::Highest, Extreme::Least],
+        ),
+    ]
+    .into_iter()
+    {
         for kind in KINDS {
             let products = vec![("out".to_string(), PendingTable::Frame(frame(kind, rows)))];
-            let record = store.publish(&key(&format!("{case} {kind}"), 0), products, Account::default()).unwrap().record;
-            store.expose(case, kind, "out", &record.tables["out"]).unwrap();
+            let record = store
+                .publish(
+                    &key(&format!("{case} {kind}"), 0),
+                    products,
+                    Account::default(),
+                )
+                .unwrap()
+                .record;
+            store
+                .expose(case, kind, "out", &record.tables["out"])
+                .unwrap();
         }
     }
-    let script = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference/read_tables.py");
+    let script =
+        std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference/read_tables.py");
     let output = run(&[script.as_os_str(), folder.path().as_os_str()]).unwrap();
-    let said = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    let said = String::from_utf8_lossy(&output.stdout).into_owned()
+        + &String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{said}");
-    assert!(said.contains(&format!("{} tables read alike", 2 * KINDS.len())), "{said}");
+    assert!(
+        said.contains(&format!("{} tables read alike", 2 * KINDS.len())),
+        "{said}"
+    );
 }

@@ -11,7 +11,9 @@ mod results;
 mod rigid;
 
 use crate::desk::shared;
-use calib::dynamics::{DynamicArm, INERTIAL_NUMBERS, InertialTolerance, InverseDynamics, MotionRow};
+use calib::dynamics::{
+    DynamicArm, INERTIAL_NUMBERS, InertialTolerance, InverseDynamics, MotionRow,
+};
 use calib::twin::torque::{TorqueCase, TorqueDesign, TorqueFile};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -22,7 +24,16 @@ type Named = (String, String);
 
 /// Recordings without an effect.
 fn nothing(seed: u64) -> TorqueDesign {
-    TorqueDesign { seed, cases: 20, nulls: 1.0, pairs: 0.0, open: 0.0, other_forms: 0.0, seconds: 32.0, rate: 50.0 }
+    TorqueDesign {
+        seed,
+        cases: 20,
+        nulls: 1.0,
+        pairs: 0.0,
+        open: 0.0,
+        other_forms: 0.0,
+        seconds: 32.0,
+        rate: 50.0,
+    }
 }
 
 fn named(entry: &Value) -> Named {
@@ -34,14 +45,21 @@ fn named(entry: &Value) -> Named {
 fn diagnose(case: &Path, store: &Path, more: &[&str]) -> Output {
     let pipeline = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/dynamics/pipeline.yaml");
     let mut command = Command::new(env!("CARGO_BIN_EXE_calib"));
-    command.args(["diagnose", "--quiet", "--set"]).arg(format!("case={}", case.display())).arg("--store").arg(store);
+    command
+        .args(["diagnose", "--quiet", "--set"])
+        .arg(format!("case={}", case.display()))
+        .arg("--store")
+        .arg(store);
     command.args(more).arg(pipeline).output().expect("calib")
 }
 
 /// The document of a diagnosis that succeeds.
 fn document(case: &Path, store: &Path) -> Value {
     let output = diagnose(case, store, &["--json"]);
-    let (out, told) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    let (out, told) = (
+        String::from_utf8_lossy(&output.stdout),
+        String::from_utf8_lossy(&output.stderr),
+    );
     assert!(output.status.success(), "{}: {out}{told}", case.display());
     serde_json::from_str(&out).expect("one JSON document")
 }
@@ -53,16 +71,39 @@ struct Marks {
 }
 
 fn mark(want: &Value, told: &Value) -> Marks {
-    let all: Vec<Named> = told["findings"].as_array().expect("findings").iter().map(named).collect();
-    let mut marks = Marks { missed: Vec::new(), beside: all.clone() };
+    let all: Vec<Named> = told["findings"]
+        .as_array()
+        .expect("findings")
+        .iter()
+        .map(named)
+        .collect();
+    let mut marks = Marks {
+        missed: Vec::new(),
+        beside: all.clone(),
+    };
     for entry in want["effects"].as_array().expect("effects") {
-        let pair = |pair: &Value| (pair[0].as_str().expect("a name").to_string(), pair[1].as_str().expect("a place").to_string());
-        let accepted: Vec<Named> = entry["accept"].as_array().expect("names").iter().map(pair).collect();
+        let pair = |pair: &Value| {
+            (
+                pair[0].as_str().expect("a name").to_string(),
+                pair[1].as_str().expect("a place").to_string(),
+            )
+        };
+        let accepted: Vec<Named> = entry["accept"]
+            .as_array()
+            .expect("names")
+            .iter()
+            .map(pair)
+            .collect();
         // One name may stand for two effects that the data cannot separate.
         let hit = all.iter().any(|one| accepted.contains(one));
         marks.beside.retain(|one| !accepted.contains(one));
         if !hit && entry["optional"].as_bool() != Some(true) {
-            marks.missed.push(format!("{} at {} (L {:.0})", accepted[0].0, accepted[0].1, entry["L"].as_f64().unwrap_or(0.0)));
+            marks.missed.push(format!(
+                "{} at {} (L {:.0})",
+                accepted[0].0,
+                accepted[0].1,
+                entry["L"].as_f64().unwrap_or(0.0)
+            ));
         }
     }
     marks
@@ -70,7 +111,9 @@ fn mark(want: &Value, told: &Value) -> Marks {
 
 fn write(folder: &Path, files: &[TorqueFile]) {
     std::fs::create_dir_all(folder).expect("a folder");
-    files.iter().for_each(|(name, text)| std::fs::write(folder.join(name), text).expect("a file"));
+    files
+        .iter()
+        .for_each(|(name, text)| std::fs::write(folder.join(name), text).expect("a file"));
 }
 
 fn json(path: PathBuf) -> Value {
@@ -79,28 +122,49 @@ fn json(path: PathBuf) -> Value {
 
 #[test]
 fn the_practice_recordings_of_torques_are_solved() {
-    let Some(folder) = shared("practice_dynamics") else { return };
+    let Some(folder) = shared("practice_dynamics") else {
+        return;
+    };
     let store = tempfile::tempdir().expect("a folder");
     let mut wrong = Vec::new();
-    let mut cases: Vec<PathBuf> =
-        std::fs::read_dir(&folder).expect("the folder").map(|entry| entry.expect("one").path()).collect();
+    let mut cases: Vec<PathBuf> = std::fs::read_dir(&folder)
+        .expect("the folder")
+        .map(|entry| entry.expect("one").path())
+        .collect();
     cases.sort();
     for case in cases.iter().filter(|case| case.join("want.json").is_file()) {
         let told = document(case, store.path());
         let want = json(case.join("want.json"));
         let marks = mark(&want, &told);
         if !(marks.missed.is_empty() && marks.beside.is_empty()) {
-            wrong.push(format!("{}: missed {:?}, named beside {:?}", case.display(), marks.missed, marks.beside));
+            wrong.push(format!(
+                "{}: missed {:?}, named beside {:?}",
+                case.display(),
+                marks.missed,
+                marks.beside
+            ));
         }
         // A push begins within 0.3 s of when it did.
-        for entry in want["effects"].as_array().expect("effects").iter().filter(|entry| entry["window"].is_array()) {
+        for entry in want["effects"]
+            .as_array()
+            .expect("effects")
+            .iter()
+            .filter(|entry| entry["window"].is_array())
+        {
             let began = entry["window"][0].as_f64().expect("s");
             let findings = told["findings"].as_array().expect("findings");
-            let contact = findings.iter().filter(|finding| finding["effect"] == "contact");
-            let starts = contact.flat_map(|finding| finding["parameters"].as_array().expect("numbers"));
+            let contact = findings
+                .iter()
+                .filter(|finding| finding["effect"] == "contact");
+            let starts =
+                contact.flat_map(|finding| finding["parameters"].as_array().expect("numbers"));
             let near = starts
                 .filter(|number| number["name"] == "start")
-                .any(|number| number["value"].as_f64().is_some_and(|start| (start - began).abs() < 0.3));
+                .any(|number| {
+                    number["value"]
+                        .as_f64()
+                        .is_some_and(|start| (start - began).abs() < 0.3)
+                });
             assert!(near, "{}: no contact starts near {began} s", case.display());
         }
     }
@@ -113,21 +177,42 @@ fn the_example_of_torques_is_solved_and_reported() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let example = root.join("pipelines/dynamics/example");
     let told = document(&example, store.path());
-    let found: Vec<Named> = told["findings"].as_array().expect("findings").iter().map(named).collect();
+    let found: Vec<Named> = told["findings"]
+        .as_array()
+        .expect("findings")
+        .iter()
+        .map(named)
+        .collect();
     let hidden = json(example.join("truth.json"));
-    let mut wanted: Vec<Named> = hidden["effects"].as_array().expect("effects").iter().map(named).collect();
+    let mut wanted: Vec<Named> = hidden["effects"]
+        .as_array()
+        .expect("effects")
+        .iter()
+        .map(named)
+        .collect();
     wanted.retain(|one| !found.contains(one));
     assert_eq!(wanted, Vec::<Named>::new(), "hidden and not found");
     let mut command = Command::new(env!("CARGO_BIN_EXE_calib"));
-    let run = command.args(["run", "--quiet", "--store"]).arg(store.path()).arg(root.join("pipelines/dynamics/pipeline.yaml"));
+    let run = command
+        .args(["run", "--quiet", "--store"])
+        .arg(store.path())
+        .arg(root.join("pipelines/dynamics/pipeline.yaml"));
     let run = run.output().expect("calib");
-    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    assert!(
+        run.status.success(),
+        "{}",
+        String::from_utf8_lossy(&run.stderr)
+    );
 }
 
 /// Two mathematics that share nothing: sums over the bodies beyond each joint, and the estimator's recursion.
 #[test]
 fn torques_of_the_twin_are_those_of_the_estimators_inverse_dynamics() {
-    let design = TorqueDesign { seconds: 16.0, rate: 20.0, ..nothing(3) };
+    let design = TorqueDesign {
+        seconds: 16.0,
+        rate: 20.0,
+        ..nothing(3)
+    };
     for number in 0..6 {
         let case = TorqueCase::draw(&design, number);
         let (arm, theta) = declared(&case);
@@ -135,11 +220,20 @@ fn torques_of_the_twin_are_those_of_the_estimators_inverse_dynamics() {
         let gravity = arm.gravity;
         for (state, torque) in case.rigid() {
             let mut own = vec![0.0; torque.len()];
-            let motion = MotionRow { position: &state.q, velocity: &state.v, acceleration: &state.a };
+            let motion = MotionRow {
+                position: &state.q,
+                velocity: &state.v,
+                acceleration: &state.a,
+            };
             dynamics.torque(motion, &gravity, &theta, &mut own);
             let largest = torque.iter().fold(1.0, |most: f64, x| most.max(x.abs()));
             for (one, other) in own.iter().zip(&torque) {
-                assert!((one - other).abs() < 1e-9 * largest, "{} Nm and {} Nm", one, other);
+                assert!(
+                    (one - other).abs() < 1e-9 * largest,
+                    "{} Nm and {} Nm",
+                    one,
+                    other
+                );
             }
         }
     }
@@ -155,18 +249,40 @@ fn declared(case: &TorqueCase) -> (DynamicArm, Vec<f64>) {
         let r = [0, 1, 2].map(|k| centre[k] - point[k]);
         let square = r.iter().map(|x| x * x).sum::<f64>();
         let mut ten = vec![mass, mass * r[0], mass * r[1], mass * r[2]];
-        for ((row, column), moment) in [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].into_iter().zip(moments) {
-            ten.push(moment + mass * (if row == column { square } else { 0.0 } - r[row] * r[column]));
+        for ((row, column), moment) in [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]
+            .into_iter()
+            .zip(moments)
+        {
+            ten.push(
+                moment + mass * (if row == column { square } else { 0.0 } - r[row] * r[column]),
+            );
         }
-        theta[INERTIAL_NUMBERS * link..].iter_mut().zip(ten).for_each(|(sum, value)| *sum += value);
+        theta[INERTIAL_NUMBERS * link..]
+            .iter_mut()
+            .zip(ten)
+            .for_each(|(sum, value)| *sum += value);
     };
     for (link, (joint, moments)) in robot.joints.iter().zip(&robot.inertias.links).enumerate() {
-        add(link, joint.mass.expect("a mass"), joint.centre.expect("a centre"), moments.expect("an inertia"));
+        add(
+            link,
+            joint.mass.expect("a mass"),
+            joint.centre.expect("a centre"),
+            moments.expect("an inertia"),
+        );
     }
-    add(last, robot.payload_mass, robot.payload_centre, robot.inertias.payload.expect("an inertia"));
+    add(
+        last,
+        robot.payload_mass,
+        robot.payload_centre,
+        robot.inertias.payload.expect("an inertia"),
+    );
     let arm = DynamicArm {
         axes: robot.joints.iter().map(|joint| joint.axis.into()).collect(),
-        points: robot.joints.iter().map(|joint| joint.point.into()).collect(),
+        points: robot
+            .joints
+            .iter()
+            .map(|joint| joint.point.into())
+            .collect(),
         prismatic: vec![false; robot.joints.len()],
         tool: robot.tool.into(),
         links: None,
@@ -174,7 +290,11 @@ fn declared(case: &TorqueCase) -> (DynamicArm, Vec<f64>) {
         gravity: robot.gravity.into(),
         ratio: vec![1.0; robot.joints.len()],
         coupled: Vec::new(),
-        tolerance: InertialTolerance { mass_relative: 0.01, centre: 0.004, inertia_relative: 0.05 },
+        tolerance: InertialTolerance {
+            mass_relative: 0.01,
+            centre: 0.004,
+            inertia_relative: 0.05,
+        },
     };
     (arm, theta)
 }

@@ -9,11 +9,19 @@ fn pipeline() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/it/resume/pipeline.yaml")
 }
 fn calib(store: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_calib")).args(arguments).arg("--store").arg(store).output().unwrap()
+    Command::new(env!("CARGO_BIN_EXE_calib"))
+        .args(arguments)
+        .arg("--store")
+        .arg(store)
+        .output()
+        .unwrap()
 }
 fn run(store: &Path, arguments: &[&str]) {
     let pipeline = pipeline();
-    let output = calib(store, &[&["run", pipeline.to_str().unwrap(), "--quiet"], arguments].concat());
+    let output = calib(
+        store,
+        &[&["run", pipeline.to_str().unwrap(), "--quiet"], arguments].concat(),
+    );
     assert!(output.status.success(), "{}", text(&output));
 }
 fn text(output: &Output) -> String {
@@ -30,8 +38,15 @@ fn json(store: &Path, arguments: &[&str]) -> Value {
 /// All files of a store but its locks.
 fn files(folder: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
-    for path in std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
-        if path.is_dir() { found.extend(files(&path)) } else { found.push(path) }
+    for path in std::fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+    {
+        if path.is_dir() {
+            found.extend(files(&path))
+        } else {
+            found.push(path)
+        }
     }
     found.sort();
     found
@@ -52,26 +67,60 @@ fn a_changed_setting_is_told_with_its_stage_and_by_how_much() {
     let folder = tempfile::tempdir().unwrap();
     let store = folder.path();
     run(store, &[]);
-    run(store, &["--set", "geometry.effects=[base_frame, tool_offset, joint_offset]"]);
+    run(
+        store,
+        &[
+            "--set",
+            "geometry.effects=[base_frame, tool_offset, joint_offset]",
+        ],
+    );
     let output = calib(store, &["diff", "HEAD~1", "HEAD"]);
     let told = text(&output);
     assert_eq!(output.status.code(), Some(1), "{told}");
     assert!(told.lines().count() < 20, "{told}");
     assert!(told.contains("settings geometry.effects: "), "{told}");
-    assert!(told.contains("geometry.parameters") && told.contains("geometry.prediction"), "{told}");
     assert!(
-        told.contains("error_mm by ") && told.contains(" mm rms, at most ") && told.contains(" mm (") && told.contains(" sigma)"),
+        told.contains("geometry.parameters") && told.contains("geometry.prediction"),
         "{told}"
     );
-    assert!(!told.contains("nominal."), "what is the same is not told: {told}");
+    assert!(
+        told.contains("error_mm by ")
+            && told.contains(" mm rms, at most ")
+            && told.contains(" mm (")
+            && told.contains(" sigma)"),
+        "{told}"
+    );
+    assert!(
+        !told.contains("nominal."),
+        "what is the same is not told: {told}"
+    );
     let explained = said(store, &["explain", "geometry"]);
-    assert!(explained.contains("executed, because: settings changed: geometry.effects"), "{explained}");
+    assert!(
+        explained.contains("executed, because: settings changed: geometry.effects"),
+        "{explained}"
+    );
     let explained = said(store, &["explain", "validate"]);
-    assert!(explained.contains("input prediction (geometry): ") && !explained.contains("(nominal)"), "{explained}");
+    assert!(
+        explained.contains("input prediction (geometry): ") && !explained.contains("(nominal)"),
+        "{explained}"
+    );
     assert!(said(store, &["explain", "nominal"]).contains("nothing that it depends on changed"));
-    assert_eq!(calib(store, &["diff", "HEAD", "HEAD"]).status.code(), Some(0));
-    let table = json(store, &["diff", "HEAD~1/geometry/prediction", "HEAD/geometry/prediction"]);
-    assert_eq!((&table["rows"]["changed"], &table["key"][0]), (&80.into(), &"sequence".into()));
+    assert_eq!(
+        calib(store, &["diff", "HEAD", "HEAD"]).status.code(),
+        Some(0)
+    );
+    let table = json(
+        store,
+        &[
+            "diff",
+            "HEAD~1/geometry/prediction",
+            "HEAD/geometry/prediction",
+        ],
+    );
+    assert_eq!(
+        (&table["rows"]["changed"], &table["key"][0]),
+        (&80.into(), &"sequence".into())
+    );
 }
 
 #[test]
@@ -80,23 +129,62 @@ fn of_two_runs_tolerances_hold_in_every_table_that_has_the_column() {
     let store = folder.path();
     run(store, &[]);
     run(store, &["--set", "seed=12"]);
-    let with = |more: &[&str]| calib(store, &[&["diff", "HEAD~1/validate", "HEAD/validate"], more].concat());
+    let with = |more: &[&str]| {
+        calib(
+            store,
+            &[&["diff", "HEAD~1/validate", "HEAD/validate"], more].concat(),
+        )
+    };
     assert_eq!(with(&[]).status.code(), Some(1));
     let within = with(&["--atol", "1e6"]);
     assert_eq!(within.status.code(), Some(0), "{}", text(&within));
-    assert!(text(&within).contains("within tolerance"), "{}", text(&within));
-    assert_eq!(with(&["--atol", "mean_mm=1m", "--rtol", "1e-9"]).status.code(), Some(1), "the other columns differ");
+    assert!(
+        text(&within).contains("within tolerance"),
+        "{}",
+        text(&within)
+    );
+    assert_eq!(
+        with(&["--atol", "mean_mm=1m", "--rtol", "1e-9"])
+            .status
+            .code(),
+        Some(1),
+        "the other columns differ"
+    );
     // Of the run's tables few have the column.
-    assert_eq!(calib(store, &["diff", "HEAD~1", "HEAD", "--ignore", "mean_mm"]).status.code(), Some(1));
+    assert_eq!(
+        calib(store, &["diff", "HEAD~1", "HEAD", "--ignore", "mean_mm"])
+            .status
+            .code(),
+        Some(1)
+    );
     let refused = |flag: &str, value: &str, why: &str| {
         let output = calib(store, &["diff", "HEAD~1", "HEAD", flag, value]);
         let said = text(&output);
-        assert!(output.status.code() == Some(2) && said.contains(why), "{said}");
+        assert!(
+            output.status.code() == Some(2) && said.contains(why),
+            "{said}"
+        );
     };
-    refused("--ignore", "meen_mm", "--ignore: no column `meen_mm` in any table that both runs have; did you mean `mean_mm`?");
-    refused("--atol", "nowhere_mm=1", "--atol: no column `nowhere_mm` in any table that both runs have");
-    refused("--key", "step", "--key: is for two tables: name them as RUN/STAGE/PORT");
-    refused("--quaternion", "a,b,c,d", "--quaternion: is for two tables: name them as RUN/STAGE/PORT");
+    refused(
+        "--ignore",
+        "meen_mm",
+        "--ignore: no column `meen_mm` in any table that both runs have; did you mean `mean_mm`?",
+    );
+    refused(
+        "--atol",
+        "nowhere_mm=1",
+        "--atol: no column `nowhere_mm` in any table that both runs have",
+    );
+    refused(
+        "--key",
+        "step",
+        "--key: is for two tables: name them as RUN/STAGE/PORT",
+    );
+    refused(
+        "--quaternion",
+        "a,b,c,d",
+        "--quaternion: is for two tables: name them as RUN/STAGE/PORT",
+    );
 }
 
 #[test]
@@ -106,30 +194,56 @@ fn a_limit_that_is_exceeded_is_said_and_ends_with_code_1() {
     let file = pipeline();
     let with = |limits: &str, more: &[&str]| {
         let set = format!("report.limits={limits}");
-        calib(store, &[&["run", file.to_str().unwrap(), "--quiet", "--set", &set], more].concat())
+        calib(
+            store,
+            &[
+                &["run", file.to_str().unwrap(), "--quiet", "--set", &set],
+                more,
+            ]
+            .concat(),
+        )
     };
     for _ in 0..2 {
         let beyond = with("{mean_mm: 0.000001, max_mm: 500}", &[]);
         let said = text(&beyond);
         assert_eq!(beyond.status.code(), Some(1), "{said}");
-        let line = said.lines().find(|line| line.starts_with("limits    ")).unwrap_or_else(|| panic!("{said}"));
+        let line = said
+            .lines()
+            .find(|line| line.starts_with("limits    "))
+            .unwrap_or_else(|| panic!("{said}"));
         assert!(
             line.starts_with("limits    not accepted: beyond the limits at 20 held-out points of set validate, step geometry")
         );
         assert!(
-            line.contains("mean 0.") && line.contains("mm, at most 0.000001 mm allowed") && !line.contains("largest"),
+            line.contains("mean 0.")
+                && line.contains("mm, at most 0.000001 mm allowed")
+                && !line.contains("largest"),
             "{line}"
         );
     }
     let document = with("{mean_mm: 0.000001}", &["--json"]);
     let read: Value = serde_json::from_slice(&document.stdout).unwrap();
-    assert_eq!((document.status.code(), &read["status"], &read["accepted"]), (Some(1), &"done".into(), &false.into()));
-    assert_eq!((&read["limits"][0]["stage"], &read["limits"][0]["kept"]), (&"report".into(), &false.into()));
+    assert_eq!(
+        (document.status.code(), &read["status"], &read["accepted"]),
+        (Some(1), &"done".into(), &false.into())
+    );
+    assert_eq!(
+        (&read["limits"][0]["stage"], &read["limits"][0]["kept"]),
+        (&"report".into(), &false.into())
+    );
     let kept = with("{mean_mm: 500}", &[]);
     let said = text(&kept);
-    assert!(kept.status.success() && said.contains("limits    accepted: within the limits at 20 held-out points"), "{said}");
+    assert!(
+        kept.status.success()
+            && said.contains("limits    accepted: within the limits at 20 held-out points"),
+        "{said}"
+    );
     let none = calib(store, &["run", file.to_str().unwrap(), "--quiet"]);
-    assert!(none.status.success() && text(&none).lines().all(|line| !line.starts_with("limits")), "{}", text(&none));
+    assert!(
+        none.status.success() && text(&none).lines().all(|line| !line.starts_with("limits")),
+        "{}",
+        text(&none)
+    );
 }
 
 #[test]
@@ -141,20 +255,47 @@ fn runs_are_listed_shown_tagged_and_their_tables_traced() {
     assert!(said(store, &["tag", "HEAD~1", "first"]).starts_with("first is run "));
     let log = said(store, &["log"]);
     assert_eq!(log.lines().count(), 2, "{log}");
-    assert!(log.lines().next().unwrap().contains("resume  done, 7 run, 0 cached") && log.contains("[first]"), "{log}");
+    assert!(
+        log.lines()
+            .next()
+            .unwrap()
+            .contains("resume  done, 7 run, 0 cached")
+            && log.contains("[first]"),
+        "{log}"
+    );
     let shown = said(store, &["show", "first"]);
-    assert!(shown.contains("set on the command line: seed = 12") && shown.contains("because: never run"), "{shown}");
-    assert!(said(store, &["show", "first/geometry"]).contains("reads   recording <- simulate.recording, 80 rows"));
-    assert_eq!(said(store, &["show", "HEAD", "--yaml"]), std::fs::read_to_string(pipeline()).unwrap());
+    assert!(
+        shown.contains("set on the command line: seed = 12")
+            && shown.contains("because: never run"),
+        "{shown}"
+    );
+    assert!(
+        said(store, &["show", "first/geometry"])
+            .contains("reads   recording <- simulate.recording, 80 rows")
+    );
+    assert_eq!(
+        said(store, &["show", "HEAD", "--yaml"]),
+        std::fs::read_to_string(pipeline()).unwrap()
+    );
     let manifest = json(store, &["show", "HEAD"]);
-    assert_eq!(manifest["previous"]["run"], json(store, &["show", "first"])["run_id"]);
+    assert_eq!(
+        manifest["previous"]["run"],
+        json(store, &["show", "first"])["run_id"]
+    );
     let traced = said(store, &["lineage", "HEAD/validate/statistics"]);
-    assert!(traced.contains("recording <- simulate.recording") && traced.contains("file robot.yaml"), "{traced}");
+    assert!(
+        traced.contains("recording <- simulate.recording") && traced.contains("file robot.yaml"),
+        "{traced}"
+    );
     let table = store.join("tables/resume/validate.statistics.parquet");
     assert_eq!(said(store, &["lineage", table.to_str().unwrap()]), traced);
     let refused = calib(store, &["show", "fisrt"]);
     assert_eq!(refused.status.code(), Some(2));
-    assert!(text(&refused).contains("did you mean the tag `first`?"), "{}", text(&refused));
+    assert!(
+        text(&refused).contains("did you mean the tag `first`?"),
+        "{}",
+        text(&refused)
+    );
     assert_eq!(said(store, &["tag", "--delete", "first"]), "");
     assert_eq!(said(store, &["tag"]), "");
 }
@@ -165,16 +306,38 @@ fn a_tag_has_not_the_form_of_an_id_and_says_which_run_it_left() {
     let store = folder.path();
     run(store, &["--set", "seed=12"]);
     run(store, &[]);
-    let [old, new] = ["HEAD~1", "HEAD"].map(|name| json(store, &["show", name])["run_id"].as_str().unwrap().to_string());
-    for name in [old.clone(), old.to_lowercase(), ulid::Ulid::from_parts(1 << 45, 7).to_string()] {
+    let [old, new] = ["HEAD~1", "HEAD"].map(|name| {
+        json(store, &["show", name])["run_id"]
+            .as_str()
+            .unwrap()
+            .to_string()
+    });
+    for name in [
+        old.clone(),
+        old.to_lowercase(),
+        ulid::Ulid::from_parts(1 << 45, 7).to_string(),
+    ] {
         let refused = calib(store, &["tag", "HEAD", &name]);
         assert_eq!(refused.status.code(), Some(2), "{}", text(&refused));
-        assert!(text(&refused).contains(&format!("tag {name}: has the form of a run's id")), "{}", text(&refused));
+        assert!(
+            text(&refused).contains(&format!("tag {name}: has the form of a run's id")),
+            "{}",
+            text(&refused)
+        );
     }
     assert_eq!(json(store, &["show", &old])["run_id"], old.as_str());
-    assert_eq!(said(store, &["tag", "HEAD~1", "first"]), format!("first is run {old}\n"));
-    assert_eq!(said(store, &["tag", "HEAD", "first"]), format!("first is run {new}, was run {old}\n"));
-    assert_eq!(said(store, &["tag", "HEAD", "first"]), format!("first is run {new}\n"));
+    assert_eq!(
+        said(store, &["tag", "HEAD~1", "first"]),
+        format!("first is run {old}\n")
+    );
+    assert_eq!(
+        said(store, &["tag", "HEAD", "first"]),
+        format!("first is run {new}, was run {old}\n")
+    );
+    assert_eq!(
+        said(store, &["tag", "HEAD", "first"]),
+        format!("first is run {new}\n")
+    );
 }
 
 #[cfg(target_os = "linux")]
@@ -187,13 +350,27 @@ fn folders_whose_names_are_no_text_are_used_all_the_same() {
     std::fs::create_dir(&cell).unwrap();
     let robot = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sr210d/robot.yaml");
     std::fs::copy(robot, cell.join("robot.yaml")).unwrap();
-    let yaml = std::fs::read_to_string(pipeline()).unwrap().replace("../../../pipelines/sr210d/robot.yaml", "robot.yaml");
+    let yaml = std::fs::read_to_string(pipeline())
+        .unwrap()
+        .replace("../../../pipelines/sr210d/robot.yaml", "robot.yaml");
     std::fs::write(cell.join("p.yaml"), yaml).unwrap();
     let mut run = Command::new(env!("CARGO_BIN_EXE_calib"));
-    let output = run.arg("run").arg(cell.join("p.yaml")).args(["-q", "--json", "--store"]).arg(&store).output().unwrap();
+    let output = run
+        .arg("run")
+        .arg(cell.join("p.yaml"))
+        .args(["-q", "--json", "--store"])
+        .arg(&store)
+        .output()
+        .unwrap();
     assert!(output.status.success(), "{}", text(&output));
     let document: Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert!(document["report"].as_str().unwrap().contains("/store\u{fffd}/documents/"), "{document}");
+    assert!(
+        document["report"]
+            .as_str()
+            .unwrap()
+            .contains("/store\u{fffd}/documents/"),
+        "{document}"
+    );
     let manifest = json(&store, &["show", "HEAD"]);
     let path = manifest["stages"][0]["files"][0]["path"].as_str().unwrap();
     assert!(path.ends_with("/cell\u{fffd}\u{fffd}/robot.yaml"), "{path}");
@@ -208,9 +385,15 @@ fn one_flipped_bit_in_any_file_is_found() {
     run(store, &["--set", "split.by=every", "--set", "split.n=4"]);
     said(store, &["tag", "HEAD", "kept"]);
     let clean = said(store, &["verify"]);
-    assert!(clean.contains("2 runs, 1 tag,") && clean.ends_with("all as they were written\n"), "{clean}");
+    assert!(
+        clean.contains("2 runs, 1 tag,") && clean.ends_with("all as they were written\n"),
+        "{clean}"
+    );
     let mut random = ChaCha8Rng::seed_from_u64(6);
-    let files: Vec<PathBuf> = files(store).into_iter().filter(|path| !path.starts_with(store.join("locks"))).collect();
+    let files: Vec<PathBuf> = files(store)
+        .into_iter()
+        .filter(|path| !path.starts_with(store.join("locks")))
+        .collect();
     assert!(files.len() > 50, "{}", files.len());
     for path in files {
         let whole = std::fs::read(&path).unwrap();
@@ -219,20 +402,39 @@ fn one_flipped_bit_in_any_file_is_found() {
         flipped[bit / 8] ^= 1 << (bit % 8);
         overwrite(&path, &flipped);
         let output = calib(store, &["verify"]);
-        assert_eq!(output.status.code(), Some(1), "bit {bit} of {}: {}", path.display(), text(&output));
+        assert_eq!(
+            output.status.code(),
+            Some(1),
+            "bit {bit} of {}: {}",
+            path.display(),
+            text(&output)
+        );
         overwrite(&path, &whole);
     }
     assert_eq!(said(store, &["verify"]), clean);
     // A manifest that was written anew, seal and all, is not the one that the next run saw.
-    let runs: Vec<PathBuf> =
-        self::files(&store.join("runs")).into_iter().filter(|path| path.ends_with("manifest.json")).collect();
+    let runs: Vec<PathBuf> = self::files(&store.join("runs"))
+        .into_iter()
+        .filter(|path| path.ends_with("manifest.json"))
+        .collect();
     let manifest = std::fs::read_to_string(&runs[0]).unwrap();
-    let body = manifest.split(",\n  \"sealed\"").next().unwrap().replacen("\"seed\": 11", "\"seed\": 12", 1);
-    let forged = format!("{body},\n  \"sealed\": \"{}\"\n}}\n", blake3::hash(body.as_bytes()).to_hex());
+    let body = manifest.split(",\n  \"sealed\"").next().unwrap().replacen(
+        "\"seed\": 11",
+        "\"seed\": 12",
+        1,
+    );
+    let forged = format!(
+        "{body},\n  \"sealed\": \"{}\"\n}}\n",
+        blake3::hash(body.as_bytes()).to_hex()
+    );
     overwrite(&runs[0], forged.as_bytes());
     let output = calib(store, &["verify"]);
     assert_eq!(output.status.code(), Some(1));
-    assert!(text(&output).contains("has changed since this run began"), "{}", text(&output));
+    assert!(
+        text(&output).contains("has changed since this run began"),
+        "{}",
+        text(&output)
+    );
 }
 
 #[test]
@@ -244,17 +446,38 @@ fn a_sweep_leaves_what_tags_and_the_last_runs_need() {
     }
     said(store, &["tag", "HEAD~2", "released"]);
     let sweep = ["gc", "--keep-runs", "1", "--grace-hours", "0"];
-    assert_eq!(json(store, &["gc", "--keep-runs", "1"])["actions"], 0, "what is young stays");
+    assert_eq!(
+        json(store, &["gc", "--keep-runs", "1"])["actions"],
+        0,
+        "what is young stays"
+    );
     let would = json(store, &[&sweep[..], &["--dry-run"]].concat());
     let before = files(&store.join("objects")).len();
     let swept = json(store, &sweep);
     assert_eq!(would, swept);
-    assert_eq!(files(&store.join("objects")).len() as u64, before as u64 - swept["objects"].as_u64().unwrap());
+    assert_eq!(
+        files(&store.join("objects")).len() as u64,
+        before as u64 - swept["objects"].as_u64().unwrap()
+    );
     assert_eq!(swept["actions"], 7, "the stages of the run between");
     let executed = |seed: &str| {
         let pipeline = pipeline();
-        let result = json(store, &["run", pipeline.to_str().unwrap(), "--quiet", "--set", &format!("seed={seed}")]);
-        result["stages"].as_array().unwrap().iter().filter(|stage| stage["status"] == "executed").count()
+        let result = json(
+            store,
+            &[
+                "run",
+                pipeline.to_str().unwrap(),
+                "--quiet",
+                "--set",
+                &format!("seed={seed}"),
+            ],
+        );
+        result["stages"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .filter(|stage| stage["status"] == "executed")
+            .count()
     };
     said(store, &["verify"]);
     assert_eq!((executed("1"), executed("3"), executed("2")), (0, 0, 7));
@@ -267,10 +490,21 @@ fn the_last_run_is_the_last_also_where_the_clock_went_backwards() {
     run(store, &[]);
     // A run of the far future, as a clock that was wrong leaves it.
     let runs = store.join("runs");
-    let real = std::fs::read_dir(&runs).unwrap().next().unwrap().unwrap().path();
+    let real = std::fs::read_dir(&runs)
+        .unwrap()
+        .next()
+        .unwrap()
+        .unwrap()
+        .path();
     let future = ulid::Ulid::from_parts(1 << 45, 7).to_string();
     std::fs::rename(real, runs.join(&future)).unwrap();
     run(store, &["--set", "seed=5"]);
     let manifest = json(store, &["show", "HEAD"]);
-    assert_eq!((&manifest["seed"], manifest["run_id"].as_str().unwrap() > future.as_str()), (&5.into(), true));
+    assert_eq!(
+        (
+            &manifest["seed"],
+            manifest["run_id"].as_str().unwrap() > future.as_str()
+        ),
+        (&5.into(), true)
+    );
 }

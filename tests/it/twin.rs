@@ -3,10 +3,15 @@
 use calib::description::{JointDescription, JointKind, RobotDescription};
 use calib::error::Result;
 use calib::robot::import::{RobotFileText, read_calib};
-use calib::stage::{Context, OpenedInput, RawFile, Remainder, Services, Simulate, SimulateReads, SimulateWrites, Sink, Stage};
+use calib::stage::{
+    Context, OpenedInput, RawFile, Remainder, Services, Simulate, SimulateReads, SimulateWrites,
+    Sink, Stage,
+};
 use calib::table::Robot;
 use calib::twin::arm::Arm;
-use calib::twin::effect::{Backlash, BaseCompliance, GearCyclic, JointCompliance, LinkCompliance, Physical};
+use calib::twin::effect::{
+    Backlash, BaseCompliance, GearCyclic, JointCompliance, LinkCompliance, Physical,
+};
 use calib::twin::equilibrium::{Equilibrium, settle};
 use calib::twin::motion::Motion;
 use calib::twin::statics::Row;
@@ -20,7 +25,15 @@ const ARCSEC: f64 = PI / 648_000.0;
 pub fn sr210d() -> RobotDescription {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sr210d/robot.yaml");
     let text = std::fs::read_to_string(&path).expect("the pipeline's robot file");
-    read_calib(RobotFileText { label: "robot.yaml", text: &text }, None).expect("a good robot file").robot
+    read_calib(
+        RobotFileText {
+            label: "robot.yaml",
+            text: &text,
+        },
+        None,
+    )
+    .expect("a good robot file")
+    .robot
 }
 
 /// One joint with axis -y at the origin and 2 m of massless arm along x, 100 kg at its end: a weight turns it by -m g r cos q.
@@ -52,20 +65,37 @@ fn lever() -> RobotDescription {
 fn row(q: &[f64], payload_kg: f64) -> Row {
     let direction = vec![1.0; q.len()];
     let (velocity, memory) = (Vec::new(), Vec::new());
-    Row { command: q.to_vec(), drive: q.to_vec(), direction, time_s: 0.0, temperature_c: 20.0, payload_kg, velocity, memory }
+    Row {
+        command: q.to_vec(),
+        drive: q.to_vec(),
+        direction,
+        time_s: 0.0,
+        temperature_c: 20.0,
+        payload_kg,
+        velocity,
+        memory,
+    }
 }
 
 fn rest(robot: &RobotDescription, effects: &[Physical], q: &[f64], payload_kg: f64) -> Equilibrium {
-    settle(&Arm::new(robot, &TrueRobot::default()), &row(q, payload_kg), effects)
+    settle(
+        &Arm::new(robot, &TrueRobot::default()),
+        &row(q, payload_kg),
+        effects,
+    )
 }
 
 fn tool_mm(robot: &RobotDescription, truth: &TrueRobot, q: &[f64]) -> [f64; 3] {
     let arm = Arm::new(robot, truth);
-    arm.posture(&truth.drive(robot, q), &Motion::none(q.len())).tool.map(|x| 1e3 * x)
+    arm.posture(&truth.drive(robot, q), &Motion::none(q.len()))
+        .tool
+        .map(|x| 1e3 * x)
 }
 
 fn assert_near(found: [f64; 3], expected: [f64; 3], within: f64) {
-    let apart = (0..3).map(|i| (found[i] - expected[i]).abs()).fold(0.0, f64::max);
+    let apart = (0..3)
+        .map(|i| (found[i] - expected[i]).abs())
+        .fold(0.0, f64::max);
     assert!(apart <= within, "{found:?} is {apart} from {expected:?}");
 }
 
@@ -74,7 +104,15 @@ fn assert_near(found: [f64; 3], expected: [f64; 3], within: f64) {
 fn quarter_turns_put_the_tool_where_paper_and_pencil_do() {
     let robot = sr210d();
     let turned = |joints: &[usize]| {
-        let q: Vec<f64> = (1..=6).map(|joint| if joints.contains(&joint) { FRAC_PI_2 } else { 0.0 }).collect();
+        let q: Vec<f64> = (1..=6)
+            .map(|joint| {
+                if joints.contains(&joint) {
+                    FRAC_PI_2
+                } else {
+                    0.0
+                }
+            })
+            .collect();
         tool_mm(&robot, &TrueRobot::default(), &q)
     };
     assert_near(turned(&[]), [1854.0, 50.0, 1340.0], 1e-9);
@@ -90,21 +128,51 @@ fn quarter_turns_put_the_tool_where_paper_and_pencil_do() {
 #[test]
 fn errors_of_lengths_gears_and_couplings_move_the_tool_as_they_should() {
     let robot = sr210d();
-    let longer = LinkError { link: 2, shift_mm: [0.0, 0.0, 0.5], tilt_arcsec: [0.0; 3] };
-    let truth = TrueRobot { links: vec![longer], ..TrueRobot::default() };
-    assert_near(tool_mm(&robot, &truth, &[0.0; 6]), [1854.0, 50.0, 1340.5], 1e-9);
+    let longer = LinkError {
+        link: 2,
+        shift_mm: [0.0, 0.0, 0.5],
+        tilt_arcsec: [0.0; 3],
+    };
+    let truth = TrueRobot {
+        links: vec![longer],
+        ..TrueRobot::default()
+    };
+    assert_near(
+        tool_mm(&robot, &truth, &[0.0; 6]),
+        [1854.0, 50.0, 1340.5],
+        1e-9,
+    );
     // The half millimetre lies on the upper arm, which joint 2 lays back along -x.
-    assert_near(tool_mm(&robot, &truth, &[0.0, FRAC_PI_2, 0.0, 0.0, 0.0, 0.0]), [311.5 - 1340.0, 50.0, 1542.0], 1e-9);
+    assert_near(
+        tool_mm(&robot, &truth, &[0.0, FRAC_PI_2, 0.0, 0.0, 0.0, 0.0]),
+        [311.5 - 1340.0, 50.0, 1542.0],
+        1e-9,
+    );
 
-    let tilted = LinkError { link: 1, shift_mm: [0.0; 3], tilt_arcsec: [0.0, 0.0, 10.0] };
-    let truth = TrueRobot { links: vec![tilted], ..TrueRobot::default() };
+    let tilted = LinkError {
+        link: 1,
+        shift_mm: [0.0; 3],
+        tilt_arcsec: [0.0, 0.0, 10.0],
+    };
+    let truth = TrueRobot {
+        links: vec![tilted],
+        ..TrueRobot::default()
+    };
     let a = 10.0 * ARCSEC;
-    let expected = [312.0 + 1542.0 * a.cos() - 50.0 * a.sin(), 50.0 * a.cos() + 1542.0 * a.sin(), 1340.0];
+    let expected = [
+        312.0 + 1542.0 * a.cos() - 50.0 * a.sin(),
+        50.0 * a.cos() + 1542.0 * a.sin(),
+        1340.0,
+    ];
     assert_near(tool_mm(&robot, &truth, &[0.0; 6]), expected, 1e-9);
 
     let truth = TrueRobot {
         ratio: vec![1.0, 1.0, 1.0, 1.0, 1.01, 1.02],
-        couplings: vec![CouplingError { moved: 6, by: 5, error: 0.1 }],
+        couplings: vec![CouplingError {
+            moved: 6,
+            by: 5,
+            error: 0.1,
+        }],
         offset_deg: vec![0.0, 0.0, 0.0, 0.0, 0.0, 3.0],
         ..TrueRobot::default()
     };
@@ -115,7 +183,10 @@ fn errors_of_lengths_gears_and_couplings_move_the_tool_as_they_should() {
 
 #[test]
 fn a_mass_on_a_compliant_joint_sags_until_torque_and_wind_up_agree() {
-    let spring = Physical::JointCompliance(JointCompliance { joint: 1, rad_per_nm: 1e-5 });
+    let spring = Physical::JointCompliance(JointCompliance {
+        joint: 1,
+        rad_per_nm: 1e-5,
+    });
     let found = rest(&lever(), &[spring], &[0.0], 100.0);
     // 100 kg, 10 m/s2, 2 m: sag = 0.02 rad cos(sag); the first two terms of its series leave 2e-9.
     let mut sag: f64 = 0.0;
@@ -123,13 +194,21 @@ fn a_mass_on_a_compliant_joint_sags_until_torque_and_wind_up_agree() {
         sag = 0.02 * sag.cos();
     }
     assert!((sag - (0.02 - 0.02f64.powi(3) / 2.0)).abs() < 1e-8);
-    assert_near(found.posture.tool, [2.0 * sag.cos(), 0.0, -2.0 * sag.sin()], 1e-13);
+    assert_near(
+        found.posture.tool,
+        [2.0 * sag.cos(), 0.0, -2.0 * sag.sin()],
+        1e-13,
+    );
     assert!((found.torque[0] + 2000.0 * sag.cos()).abs() < 1e-9);
 }
 
 #[test]
 fn a_beam_bends_by_the_cantilever_formula() {
-    let beam = Physical::LinkCompliance(LinkCompliance { link: 1, bending_rad_per_nm: 3e-7, torsion_rad_per_nm: 0.0 });
+    let beam = Physical::LinkCompliance(LinkCompliance {
+        link: 1,
+        bending_rad_per_nm: 3e-7,
+        torsion_rad_per_nm: 0.0,
+    });
     let found = rest(&lever(), &[beam], &[0.0], 100.0);
     // F L^3 / (3 EI) with L/EI = 3e-7: 1000 N * 4 m2 * 3e-7 / 3.
     assert_near(found.posture.tool, [2.0, 0.0, -4e-4], 1e-9);
@@ -137,7 +216,10 @@ fn a_beam_bends_by_the_cantilever_formula() {
 
 #[test]
 fn a_foundation_tilts_towards_the_load() {
-    let base = BaseCompliance { rad_per_nm: [1e-8, 1e-8], pivot_mm: [0.0, 0.0, -1000.0] };
+    let base = BaseCompliance {
+        rad_per_nm: [1e-8, 1e-8],
+        pivot_mm: [0.0, 0.0, -1000.0],
+    };
     let found = rest(&lever(), &[Physical::BaseCompliance(base)], &[0.0], 100.0);
     // 2000 Nm tilt by 2e-5 rad about 1 m below: the tool goes down by 2 m of it and forwards by 1 m of it.
     assert_near(found.posture.tool, [2.0 + 2e-5, 0.0, -4e-5], 1e-8);
@@ -146,40 +228,78 @@ fn a_foundation_tilts_towards_the_load() {
 #[test]
 fn a_joint_trails_by_half_its_gap_and_more_under_load() {
     let gap = |arcsec_per_nm| {
-        [Physical::Backlash(Backlash { joint: 1, gap_arcsec: 20.0, arcsec_per_nm, closing_nm: 0.0, soft_nm: 0.0 })]
+        [Physical::Backlash(Backlash {
+            joint: 1,
+            gap_arcsec: 20.0,
+            arcsec_per_nm,
+            closing_nm: 0.0,
+            soft_nm: 0.0,
+        })]
     };
-    let turned = |effects: &[Physical]| rest(&lever(), effects, &[0.0], 100.0).motion.joint[0] / ARCSEC;
+    let turned =
+        |effects: &[Physical]| rest(&lever(), effects, &[0.0], 100.0).motion.joint[0] / ARCSEC;
     assert!((turned(&gap(0.0)) + 10.0).abs() < 1e-9);
     assert!((turned(&gap(0.01)) + 20.0).abs() < 1e-6);
-    let closed = Backlash { joint: 1, gap_arcsec: 20.0, arcsec_per_nm: 0.0, closing_nm: 500.0, soft_nm: 0.0 };
+    let closed = Backlash {
+        joint: 1,
+        gap_arcsec: 20.0,
+        arcsec_per_nm: 0.0,
+        closing_nm: 500.0,
+        soft_nm: 0.0,
+    };
     assert!((turned(&[Physical::Backlash(closed)]) + 10.0).abs() < 1e-9);
 }
 
 #[test]
 fn a_gear_ripple_follows_the_reported_angle() {
-    let ripple = GearCyclic { joint: 1, order: 3.0, amplitude_arcsec: 12.0, arcsec_per_nm: 0.0, phase_deg: 30.0 };
+    let ripple = GearCyclic {
+        joint: 1,
+        order: 3.0,
+        amplitude_arcsec: 12.0,
+        arcsec_per_nm: 0.0,
+        phase_deg: 30.0,
+    };
     let found = rest(&lever(), &[Physical::GearCyclic(ripple)], &[PI / 9.0], 0.0);
-    assert!((found.motion.joint[0] - 12.0 * ARCSEC).abs() < 1e-15, "sin(3 * 20 deg + 30 deg) = 1");
+    assert!(
+        (found.motion.joint[0] - 12.0 * ARCSEC).abs() < 1e-15,
+        "sin(3 * 20 deg + 30 deg) = 1"
+    );
 }
 
 #[test]
 fn tracker_noise_has_the_stated_size() {
-    let tracker = Tracker { noise_um: 10.0, noise_um_per_m: 2.5, coverage: 2.0, ..Tracker::default() };
+    let tracker = Tracker {
+        noise_um: 10.0,
+        noise_um_per_m: 2.5,
+        coverage: 2.0,
+        ..Tracker::default()
+    };
     let point = [0.0, 4.0, 3.0];
     // (10 + 2.5 * 5) / 2.
     assert!((tracker.sigma(point) - 11.25e-6).abs() < 1e-18);
     let mut beam = Beam::new(7);
-    let draws: Vec<f64> = (0..20_000).map(|_| tracker.measure(point, &mut beam)[1] - 4.0).collect();
+    let draws: Vec<f64> = (0..20_000)
+        .map(|_| tracker.measure(point, &mut beam)[1] - 4.0)
+        .collect();
     let mean = draws.iter().sum::<f64>() / draws.len() as f64;
     let sigma = (draws.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / draws.len() as f64).sqrt();
     // Four standard errors of a mean and of a standard deviation of 20,000 draws.
-    assert!(mean.abs() < 4.0 * 11.25e-6 / 20_000f64.sqrt(), "mean {mean}");
-    assert!((sigma / 11.25e-6 - 1.0).abs() < 4.0 / 40_000f64.sqrt(), "sigma {sigma}");
+    assert!(
+        mean.abs() < 4.0 * 11.25e-6 / 20_000f64.sqrt(),
+        "mean {mean}"
+    );
+    assert!(
+        (sigma / 11.25e-6 - 1.0).abs() < 4.0 / 40_000f64.sqrt(),
+        "sigma {sigma}"
+    );
 }
 
 /// Errors (in standard deviations) of a tracker that looks along z 20,000 times.
 fn errors_along_z(scatter: Scatter) -> Vec<[f64; 3]> {
-    let tracker = Tracker { scatter, ..Tracker::default() };
+    let tracker = Tracker {
+        scatter,
+        ..Tracker::default()
+    };
     let point = [0.0, 0.0, 4.0];
     let (sigma, mut beam) = (tracker.sigma(point), Beam::new(11));
     let mut error = || {
@@ -190,7 +310,11 @@ fn errors_along_z(scatter: Scatter) -> Vec<[f64; 3]> {
 }
 
 fn mean_product(errors: &[[f64; 3]], of: impl Fn(&[f64; 3], &[f64; 3]) -> f64) -> f64 {
-    errors.windows(2).map(|pair| of(&pair[0], &pair[1])).sum::<f64>() / (errors.len() - 1) as f64
+    errors
+        .windows(2)
+        .map(|pair| of(&pair[0], &pair[1]))
+        .sum::<f64>()
+        / (errors.len() - 1) as f64
 }
 
 #[test]
@@ -208,9 +332,15 @@ fn a_wandering_tracker_keeps_nine_tenths_of_its_error_from_point_to_point() {
 fn a_directional_tracker_errs_across_the_beam_more_than_along_it() {
     let errors = errors_along_z(Scatter::Directional);
     let sigma = [0, 1, 2].map(|axis| mean_product(&errors, |a, _| a[axis] * a[axis]).sqrt());
-    assert!((sigma[0] / sigma[2] - 2.5).abs() < 0.08 && (sigma[1] / sigma[2] - 2.5).abs() < 0.08, "{sigma:?}");
+    assert!(
+        (sigma[0] / sigma[2] - 2.5).abs() < 0.08 && (sigma[1] / sigma[2] - 2.5).abs() < 0.08,
+        "{sigma:?}"
+    );
     let square: f64 = sigma.iter().map(|sigma| sigma * sigma).sum();
-    assert!((square - 3.0).abs() < 0.1, "as much in all as the stated noise: {square}");
+    assert!(
+        (square - 3.0).abs() < 0.1,
+        "as much in all as the stated noise: {square}"
+    );
 }
 
 struct Quiet;
@@ -229,7 +359,15 @@ impl Services for Quiet {
 
 fn simulate(settings: &Simulate, seed: u64) -> Result<SimulateWrites> {
     let robot = Robot::from_description(&sr210d());
-    settings.clone().run(SimulateReads { robot }, &Context { id: "simulate", seed, jobs: 1, services: &Quiet })
+    settings.clone().run(
+        SimulateReads { robot },
+        &Context {
+            id: "simulate",
+            seed,
+            jobs: 1,
+            services: &Quiet,
+        },
+    )
 }
 
 fn settings() -> Simulate {
@@ -247,8 +385,16 @@ blocks: [{usage: fit, points: 12}, {usage: check, points: 8, payload_kg: 210}]
 
 #[test]
 fn a_seed_gives_one_recording_and_another_seed_another() {
-    let (first, again, other) = (simulate(&settings(), 5), simulate(&settings(), 5), simulate(&settings(), 6));
-    let (first, again, other) = (first.expect("runs"), again.expect("runs"), other.expect("runs"));
+    let (first, again, other) = (
+        simulate(&settings(), 5),
+        simulate(&settings(), 5),
+        simulate(&settings(), 6),
+    );
+    let (first, again, other) = (
+        first.expect("runs"),
+        again.expect("runs"),
+        other.expect("runs"),
+    );
     assert_eq!(first.recording, again.recording);
     assert_eq!(first.truth, again.truth);
     assert_ne!(first.recording.q, other.recording.q);
@@ -256,17 +402,53 @@ fn a_seed_gives_one_recording_and_another_seed_another() {
 
 #[test]
 fn without_its_remainder_a_twin_is_its_parameters() {
-    let without = Simulate { remainder: Remainder::None, ..settings() };
-    let bare = Simulate { effects: vec![], ..settings() };
-    let (all, without, bare) = (simulate(&settings(), 5), simulate(&without, 5), simulate(&bare, 5));
-    let (all, without, bare) = (all.expect("runs"), without.expect("runs"), bare.expect("runs"));
+    let without = Simulate {
+        remainder: Remainder::None,
+        ..settings()
+    };
+    let bare = Simulate {
+        effects: vec![],
+        ..settings()
+    };
+    let (all, without, bare) = (
+        simulate(&settings(), 5),
+        simulate(&without, 5),
+        simulate(&bare, 5),
+    );
+    let (all, without, bare) = (
+        all.expect("runs"),
+        without.expect("runs"),
+        bare.expect("runs"),
+    );
     assert_eq!(without.recording, bare.recording);
-    assert_eq!(all.recording.q, without.recording.q, "the plan does not depend on the effects");
+    assert_eq!(
+        all.recording.q, without.recording.q,
+        "the plan does not depend on the effects"
+    );
     assert_ne!(all.recording.position, without.recording.position);
-    let effects = |table: &calib::table::Truth| table.0.iter().map(|row| row.effect.clone()).collect::<Vec<_>>();
-    assert!(effects(&all.truth).iter().any(|effect| effect == "gear_cyclic"));
-    assert!(!effects(&without.truth).iter().any(|effect| effect == "gear_cyclic" || effect == "holding_friction"));
-    let ratio = without.truth.0.iter().find(|row| row.name == "reduction_ratio.j2").expect("a true ratio");
+    let effects = |table: &calib::table::Truth| {
+        table
+            .0
+            .iter()
+            .map(|row| row.effect.clone())
+            .collect::<Vec<_>>()
+    };
+    assert!(
+        effects(&all.truth)
+            .iter()
+            .any(|effect| effect == "gear_cyclic")
+    );
+    assert!(
+        !effects(&without.truth)
+            .iter()
+            .any(|effect| effect == "gear_cyclic" || effect == "holding_friction")
+    );
+    let ratio = without
+        .truth
+        .0
+        .iter()
+        .find(|row| row.name == "reduction_ratio.j2")
+        .expect("a true ratio");
     assert!((ratio.value - 0.0013).abs() < 1e-12);
 }
 
@@ -282,7 +464,10 @@ fn a_plan_keeps_to_limits_floor_and_blocks() {
             assert!((range[0]..=range[1]).contains(&angle.to_degrees()));
         }
         let tool = tool_mm(&robot, &settings.truth, q);
-        assert!(tool[2] >= 295.0 && tool[0].hypot(tool[1]) >= 995.0, "{tool:?}");
+        assert!(
+            tool[2] >= 295.0 && tool[0].hypot(tool[1]) >= 995.0,
+            "{tool:?}"
+        );
     }
     let payload = recording.payload.expect("a payload");
     assert_eq!((payload[11], payload[12]), (0.0, 210.0));
@@ -295,14 +480,20 @@ fn a_plan_keeps_to_limits_floor_and_blocks() {
 /// Wind-up is the factor times the current (Eq. 28), and the current is the holding torque through gear and motor.
 #[test]
 fn currents_carry_the_load_in_the_controllers_sign() {
-    let settings = Simulate { remainder: Remainder::None, ..settings() };
+    let settings = Simulate {
+        remainder: Remainder::None,
+        ..settings()
+    };
     let recording = simulate(&settings, 5).expect("runs").recording;
     let current = recording.current.clone().expect("currents");
     let robot = sr210d();
     let arm = Arm::new(&robot, &settings.truth);
     let spring = |joint: usize, factor: f64| {
         let link = &arm.links[joint - 1];
-        Physical::JointCompliance(JointCompliance { joint, rad_per_nm: factor / (link.gear * link.motor_constant) })
+        Physical::JointCompliance(JointCompliance {
+            joint,
+            rad_per_nm: factor / (link.gear * link.motor_constant),
+        })
     };
     for index in 0..recording.rows() {
         let q = recording.q(index);
@@ -312,7 +503,10 @@ fn currents_carry_the_load_in_the_controllers_sign() {
         let found = settle(&arm, &row, &[spring(2, 1.89e-5), spring(3, 2.49e-5)]);
         for (joint, factor) in [(1, 1.89e-5), (2, -2.49e-5)] {
             let wind_up = found.motion.joint[joint];
-            assert!((factor * current[index * 6 + joint] - wind_up).abs() < 1e-12, "row {index}");
+            assert!(
+                (factor * current[index * 6 + joint] - wind_up).abs() < 1e-12,
+                "row {index}"
+            );
         }
     }
 }
@@ -326,10 +520,20 @@ motors: {sign: [1, -1, 1, 1, 1, 1]}
 blocks: [{usage: fit, points: 5}]
 ";
     let settings: Simulate = serde_saphyr::from_str(text).expect("well formed");
-    let Err(error) = simulate(&settings, 1) else { panic!("must not run") };
+    let Err(error) = simulate(&settings, 1) else {
+        panic!("must not run")
+    };
     let message = error.to_string();
-    for place in ["truth.ratio", "truth.links[0].link", "truth.compliance_rad_a[1]", "effects[0]"] {
-        assert!(message.contains(&format!("simulate.with.{place}: ")), "{place} is missing in\n{message}");
+    for place in [
+        "truth.ratio",
+        "truth.links[0].link",
+        "truth.compliance_rad_a[1]",
+        "effects[0]",
+    ] {
+        assert!(
+            message.contains(&format!("simulate.with.{place}: ")),
+            "{place} is missing in\n{message}"
+        );
     }
     assert_eq!(error.exit_code(), 2);
 }
@@ -338,7 +542,9 @@ blocks: [{usage: fit, points: 5}]
 fn a_workspace_without_a_pose_is_refused_with_what_to_widen() {
     let mut settings = settings();
     settings.poses.floor_mm = 9000.0;
-    let Err(error) = simulate(&settings, 1) else { panic!("must not run") };
+    let Err(error) = simulate(&settings, 1) else {
+        panic!("must not run")
+    };
     assert!(error.to_string().contains("poses.floor_mm"), "{error}");
 }
 
@@ -364,19 +570,40 @@ blocks:
     assert!(settings.check().is_empty());
     let recording = simulate(&settings, 3).expect("runs").recording;
     assert_eq!(recording.rows(), 5);
-    let side = |row: usize| recording.direction.as_ref().expect("directions")[6 * row..6 * row + 6].to_vec();
+    let side = |row: usize| {
+        recording.direction.as_ref().expect("directions")[6 * row..6 * row + 6].to_vec()
+    };
     assert_eq!(side(0), [-1.0, 1.0, 1.0, 0.0, 1.0, 1.0]);
     assert_eq!(side(1), [-1.0, -1.0, 1.0, 0.0, 1.0, 1.0]);
     // Straight from the pose before.
     assert_eq!(side(2), [1.0, -1.0, 0.0, 0.0, 0.0, 1.0]);
-    assert_eq!(recording.payload.as_ref().expect("loads")[..4], [210.0, 0.0, 210.0, 210.0]);
-    assert!((recording.q(0)[0] - 10f64.to_radians()).abs() < 1e-15 && recording.point_id[2] == "fit-0003");
-    assert!(recording.time.as_ref().expect("a clock").iter().all(|time| *time > 7200.0));
+    assert_eq!(
+        recording.payload.as_ref().expect("loads")[..4],
+        [210.0, 0.0, 210.0, 210.0]
+    );
+    assert!(
+        (recording.q(0)[0] - 10f64.to_radians()).abs() < 1e-15
+            && recording.point_id[2] == "fit-0003"
+    );
+    assert!(
+        recording
+            .time
+            .as_ref()
+            .expect("a clock")
+            .iter()
+            .all(|time| *time > 7200.0)
+    );
     // Joint 2 trails by 10 arcsec on either side; the tool is 1542 mm before its axis and 1340 mm above it.
     let [up, down] = [0, 1].map(|row| recording.position[row]);
-    let moved = (0..3).map(|axis| (up[axis] - down[axis]).powi(2)).sum::<f64>().sqrt();
+    let moved = (0..3)
+        .map(|axis| (up[axis] - down[axis]).powi(2))
+        .sum::<f64>()
+        .sqrt();
     let expected = 20.0 * ARCSEC * 1.542f64.hypot(1.340);
-    assert!((moved / expected - 1.0).abs() < 1e-6, "{moved} m instead of {expected} m");
+    assert!(
+        (moved / expected - 1.0).abs() < 1e-6,
+        "{moved} m instead of {expected} m"
+    );
 }
 
 #[test]
@@ -392,14 +619,25 @@ blocks:
       - {joints_deg: [0, 0, 0, 0, 0, 0], direction: [2, 0, 0, 0, 0, 0], payload_kg: -1}
 ";
     let settings: Simulate = serde_saphyr::from_str(text).expect("well formed");
-    let places: Vec<String> = settings.check().into_iter().map(|fault| fault.place).collect();
+    let places: Vec<String> = settings
+        .check()
+        .into_iter()
+        .map(|fault| fault.place)
+        .collect();
     let at = |pose: usize, what: &str| format!("blocks[1].given[{pose}].{what}");
-    let expected =
-        [at(0, "joints_deg"), at(1, "direction"), at(1, "payload_kg"), "blocks[1].given".into(), "climate.begin_s".into()];
+    let expected = [
+        at(0, "joints_deg"),
+        at(1, "direction"),
+        at(1, "payload_kg"),
+        "blocks[1].given".into(),
+        "climate.begin_s".into(),
+    ];
     assert_eq!(places, expected);
     let text = "blocks: [{usage: fit, given: [{joints_deg: [0, 500, 0, 0, 0, 0], direction: [1]}, {joints_deg: [0, 0]}]}]";
     let settings: Simulate = serde_saphyr::from_str(text).expect("well formed");
-    let Err(error) = simulate(&settings, 1) else { panic!("must not run") };
+    let Err(error) = simulate(&settings, 1) else {
+        panic!("must not run")
+    };
     let message = error.to_string();
     for said in [
         "simulate.with.blocks[0].given[0].direction: has 1 numbers, the robot 6 joints",

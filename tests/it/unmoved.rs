@@ -28,45 +28,93 @@ stages:
 ";
 
 /// The cell's arm at joints of a row (deg), each point displaced along x by a creep, mm.
-fn told(folder: &Path, uses: &str, joints: impl Fn(usize) -> [f64; 6], creep: impl Fn(usize) -> f64) -> (Option<i32>, String) {
-    let arm = RobotModel::new(read_calib(RobotFileText { label: "robot.yaml", text: ROBOT }, None).expect("a robot").robot);
+fn told(
+    folder: &Path,
+    uses: &str,
+    joints: impl Fn(usize) -> [f64; 6],
+    creep: impl Fn(usize) -> f64,
+) -> (Option<i32>, String) {
+    let arm = RobotModel::new(
+        read_calib(
+            RobotFileText {
+                label: "robot.yaml",
+                text: ROBOT,
+            },
+            None,
+        )
+        .expect("a robot")
+        .robot,
+    );
     let mut text = String::from("q1,q2,q3,q4,q5,q6,x,y,z\n");
     for row in 0..50 {
         let q = joints(row);
         let p = arm.forward(&q.map(f64::to_radians)).translation * 1e3;
         let noise = |k: usize| 0.003 * ((row * 7 + k * 13) as f64).sin();
-        let cells = q.into_iter().chain([p.x + creep(row) + noise(0), p.y + noise(1), p.z + noise(2)]);
-        text.push_str(&(cells.map(|x| format!("{x:.6}")).collect::<Vec<_>>().join(",") + "\n"));
+        let cells =
+            q.into_iter()
+                .chain([p.x + creep(row) + noise(0), p.y + noise(1), p.z + noise(2)]);
+        text.push_str(
+            &(cells
+                .map(|x| format!("{x:.6}"))
+                .collect::<Vec<_>>()
+                .join(",")
+                + "\n"),
+        );
     }
     std::fs::write(folder.join("poses.csv"), text).expect("a file");
     std::fs::write(folder.join("robot.yaml"), ROBOT).expect("a file");
-    std::fs::write(folder.join("pipeline.yaml"), PIPELINE.replace("USES", uses).replace("STEP", uses)).expect("a file");
+    std::fs::write(
+        folder.join("pipeline.yaml"),
+        PIPELINE.replace("USES", uses).replace("STEP", uses),
+    )
+    .expect("a file");
     let output = calib(folder, &["run", "pipeline.yaml"], "");
-    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    (
+        output.status.code(),
+        String::from_utf8_lossy(&output.stderr).into_owned(),
+    )
 }
 
 #[test]
 fn one_pose_measured_fifty_times_is_no_geometry_and_its_creep_is_told() {
     for uses in ["identify", "diagnose"] {
         let folder = tempfile::tempdir().expect("a folder");
-        let (code, said) = told(folder.path(), uses, |_| [10.0, 20.0, -30.0, 40.0, 50.0, 60.0], |row| 0.2 * row as f64 / 49.0);
+        let (code, said) = told(
+            folder.path(),
+            uses,
+            |_| [10.0, 20.0, -30.0, 40.0, 50.0, 60.0],
+            |row| 0.2 * row as f64 / 49.0,
+        );
         assert_eq!(code, Some(10), "{said}");
         assert!(said.contains("all 40 rows to fit are of one pose: geometry needs poses in which every joint moves"), "{said}");
-        let drift = said.split("the point drifts by ").nth(1).and_then(|text| text.split(" mm").next());
-        let drift = drift.and_then(|mm| mm.parse::<f64>().ok()).unwrap_or_else(|| panic!("{said}"));
+        let drift = said
+            .split("the point drifts by ")
+            .nth(1)
+            .and_then(|text| text.split(" mm").next());
+        let drift = drift
+            .and_then(|mm| mm.parse::<f64>().ok())
+            .unwrap_or_else(|| panic!("{said}"));
         assert!((drift - 0.2).abs() < 0.01, "{said}");
     }
     let folder = tempfile::tempdir().expect("a folder");
     let (code, said) = told(folder.path(), "identify", |_| [10.0; 6], |_| 0.0);
-    assert!(code == Some(10) && said.contains("the point does not drift beyond noise"), "{said}");
+    assert!(
+        code == Some(10) && said.contains("the point does not drift beyond noise"),
+        "{said}"
+    );
 }
 
 #[test]
 fn a_joint_that_never_moves_is_said() {
     let folder = tempfile::tempdir().expect("a folder");
     let swing = |row: usize, joint: usize| 50.0 * ((1.3 * row as f64 + 0.9 * joint as f64).sin());
-    let joints = |row: usize| [0, 1, 2, 3, 4, 5].map(|joint| if joint == 3 { 12.5 } else { swing(row, joint) });
+    let joints = |row: usize| {
+        [0, 1, 2, 3, 4, 5].map(|joint| if joint == 3 { 12.5 } else { swing(row, joint) })
+    };
     let (code, said) = told(folder.path(), "identify", joints, |_| 0.0);
     assert_eq!(code, Some(0), "{said}");
-    assert!(said.contains("never moves in the 40 rows to fit: joint 4 (at 12.500 deg)"), "{said}");
+    assert!(
+        said.contains("never moves in the 40 rows to fit: joint 4 (at 12.500 deg)"),
+        "{said}"
+    );
 }

@@ -6,7 +6,11 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 fn help(verb: &[String]) -> String {
-    let output = Command::new(env!("CARGO_BIN_EXE_calib")).args(verb).arg("--help").output().unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_calib"))
+        .args(verb)
+        .arg("--help")
+        .output()
+        .unwrap();
     assert!(output.status.success(), "{verb:?}");
     String::from_utf8(output.stdout).unwrap()
 }
@@ -17,7 +21,10 @@ fn verbs(above: &[String]) -> Vec<Vec<String>> {
     // The verbs of calib itself stand in groups, before its options.
     let list = match above {
         [] => text.split("\nOptions:\n").next(),
-        _ => text.split("\nCommands:\n").nth(1).and_then(|rest| rest.split("\n\n").next()),
+        _ => text
+            .split("\nCommands:\n")
+            .nth(1)
+            .and_then(|rest| rest.split("\n\n").next()),
     };
     let list = list.unwrap_or_default();
     let names = list
@@ -35,8 +42,10 @@ fn verbs(above: &[String]) -> Vec<Vec<String>> {
 
 fn shipped() -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines");
-    let mut pipelines: Vec<PathBuf> =
-        std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path().join("pipeline.yaml")).collect();
+    let mut pipelines: Vec<PathBuf> = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path().join("pipeline.yaml"))
+        .collect();
     pipelines.retain(|path| path.is_file());
     pipelines.sort();
     pipelines
@@ -45,31 +54,46 @@ fn shipped() -> Vec<PathBuf> {
 /// Whether a shipped pipeline takes a setting; its files need not be there.
 fn taken(pipelines: &[PathBuf], set: &str) -> bool {
     let set = Override::parse(set).unwrap();
-    pipelines.iter().any(|path| match Plan::load(path, std::slice::from_ref(&set), STAGES) {
-        Ok(_) => true,
-        Err(error) => !error.to_string().lines().any(|fault| fault.contains("--set") && !fault.contains("no such file")),
-    })
+    pipelines.iter().any(
+        |path| match Plan::load(path, std::slice::from_ref(&set), STAGES) {
+            Ok(_) => true,
+            Err(error) => !error
+                .to_string()
+                .lines()
+                .any(|fault| fault.contains("--set") && !fault.contains("no such file")),
+        },
+    )
 }
 
 #[test]
 fn every_setting_that_a_help_shows_is_one_of_a_shipped_pipeline() {
     let (pipelines, verbs) = (shipped(), verbs(&[]));
-    assert!(pipelines.len() > 3 && verbs.len() > 25, "{pipelines:?} {verbs:?}");
+    assert!(
+        pipelines.len() > 3 && verbs.len() > 25,
+        "{pipelines:?} {verbs:?}"
+    );
     let mut shown = Vec::new();
     for verb in &verbs {
         let text = help(verb);
         let words: Vec<&str> = text.split_whitespace().collect();
-        let sets = words.windows(2).filter(|pair| pair[0] == "--set" && pair[1].contains('=') && !pair[1].contains("VALUE"));
+        let sets = words.windows(2).filter(|pair| {
+            pair[0] == "--set" && pair[1].contains('=') && !pair[1].contains("VALUE")
+        });
         shown.extend(sets.map(|pair| pair[1].to_string()));
     }
     // What is said of a `--set` without `=` names others.
     let refusal = Override::parse("split").unwrap_err();
-    let named = refusal.split([' ', ',']).filter(|word| word.contains('=') && !word.contains("VALUE"));
+    let named = refusal
+        .split([' ', ','])
+        .filter(|word| word.contains('=') && !word.contains("VALUE"));
     shown.extend(named.map(String::from));
     assert!(shown.len() >= 8, "{shown:?}");
     let refused: Vec<&String> = shown.iter().filter(|set| !taken(&pipelines, set)).collect();
     assert!(refused.is_empty(), "no shipped pipeline takes {refused:?}");
-    assert!(!taken(&pipelines, "split.every=5"), "what is no setting is seen as none");
+    assert!(
+        !taken(&pipelines, "split.every=5"),
+        "what is no setting is seen as none"
+    );
 }
 
 #[test]
@@ -85,6 +109,9 @@ fn the_help_has_every_verb_in_a_group_within_a_hundred_columns() {
     ] {
         assert!(text.lines().any(|line| line == group), "{group} in\n{text}");
     }
-    let wide: Vec<&str> = text.lines().filter(|line| line.starts_with("  ") && line.len() > 100).collect();
+    let wide: Vec<&str> = text
+        .lines()
+        .filter(|line| line.starts_with("  ") && line.len() > 100)
+        .collect();
     assert!(wide.is_empty(), "{wide:?}");
 }

@@ -18,13 +18,37 @@ fn what_compensation_achieved_is_measured_against_the_wanted_points() {
         assert!(output.status.success(), "{arguments:?}: {told}");
         String::from_utf8_lossy(&output.stdout).into_owned()
     };
-    std::fs::write(folder.path().join("measured.csv"), recording(&robot, &read.about.coupled)).expect("a file");
-    run(&["init", "cell", "--data", "measured.csv", "--robot", arm.name]);
-    let [file, pipeline] = ["cell/robot.yaml", "cell/pipeline.yaml"].map(|name| folder.path().join(name));
-    std::fs::write(&file, on_flange(&std::fs::read_to_string(&file).expect("a robot file"), arm.name, &robot)).expect("a file");
+    std::fs::write(
+        folder.path().join("measured.csv"),
+        recording(&robot, &read.about.coupled),
+    )
+    .expect("a file");
+    run(&[
+        "init",
+        "cell",
+        "--data",
+        "measured.csv",
+        "--robot",
+        arm.name,
+    ]);
+    let [file, pipeline] =
+        ["cell/robot.yaml", "cell/pipeline.yaml"].map(|name| folder.path().join(name));
+    std::fs::write(
+        &file,
+        on_flange(
+            &std::fs::read_to_string(&file).expect("a robot file"),
+            arm.name,
+            &robot,
+        ),
+    )
+    .expect("a file");
     // Geometry alone: what is compensated is known then.
     let text = std::fs::read_to_string(&pipeline).expect("a pipeline");
-    let text = text.split("  # What else is wrong").next().expect("a beginning").to_string();
+    let text = text
+        .split("  # What else is wrong")
+        .next()
+        .expect("a beginning")
+        .to_string();
     std::fs::write(&pipeline, text).expect("a file");
     // Targets as the controller counts them: joint 3 from the horizontal.
     let mut targets = String::from("name,J1_deg,J2_deg,J3_deg,J4_deg,J5_deg,J6_deg\n");
@@ -35,35 +59,101 @@ fn what_compensation_achieved_is_measured_against_the_wanted_points() {
             [20.0, 10.0, -15.0, 5.0, 40.0, 0.0]
         }
     };
-    (0..42).for_each(|k| writeln!(targets, "T{k},{}", wanted(k).map(|q| q.to_string()).join(",")).expect("text"));
+    (0..42).for_each(|k| {
+        writeln!(
+            targets,
+            "T{k},{}",
+            wanted(k).map(|q| q.to_string()).join(",")
+        )
+        .expect("text")
+    });
     std::fs::write(folder.path().join("targets.csv"), &targets).expect("a file");
-    run(&["compensate", "cell/pipeline.yaml", "targets.csv", "--out", "corrected.csv", "--quiet"]);
+    run(&[
+        "compensate",
+        "cell/pipeline.yaml",
+        "targets.csv",
+        "--out",
+        "corrected.csv",
+        "--quiet",
+    ]);
     let corrected = std::fs::read_to_string(folder.path().join("corrected.csv")).expect("commands");
     let mut second = targets.lines().next().expect("a header").to_string() + ",x_mm,y_mm,z_mm\n";
     for (line, target) in corrected.lines().skip(1).zip(targets.lines().skip(1)) {
-        let shown: Vec<f64> =
-            line.split(',').skip(1).take(6).map(|cell| cell.parse::<f64>().expect("a number").to_radians()).collect();
+        let shown: Vec<f64> = line
+            .split(',')
+            .skip(1)
+            .take(6)
+            .map(|cell| cell.parse::<f64>().expect("a number").to_radians())
+            .collect();
         // The real arm: joint 3 moves with joint 2, and zeros are off.
         let mut q = shown.clone();
         q[2] += shown[1];
         let point = tracker().point(&robot.forward(&real(&q)).point(&REFLECTOR));
-        writeln!(second, "{target},{:.4},{:.4},{:.4}", 1e3 * point.x, 1e3 * point.y, 1e3 * point.z).expect("text");
+        writeln!(
+            second,
+            "{target},{:.4},{:.4},{:.4}",
+            1e3 * point.x,
+            1e3 * point.y,
+            1e3 * point.z
+        )
+        .expect("text");
     }
     std::fs::write(folder.path().join("second.csv"), second).expect("a file");
-    let told: Value = serde_json::from_str(&run(&["verify-robot", "cell/pipeline.yaml", "second.csv", "--json"])).expect("JSON");
+    let told: Value = serde_json::from_str(&run(&[
+        "verify-robot",
+        "cell/pipeline.yaml",
+        "second.csv",
+        "--json",
+    ]))
+    .expect("JSON");
     let figure = |row: &str, name: &str| told[row][name].as_f64().expect("mm");
     assert!(figure("before", "mean_mm") > 0.5, "{told:#}");
     assert!(figure("achieved", "max_mm") < 0.02, "{told:#}");
     assert!(figure("predicted_u95", "mean_mm") < 0.05, "{told:#}");
-    assert_eq!((told["points"].as_u64(), told["iso_9283"][0]["cycles"].as_u64()), (Some(42), Some(30)), "{told:#}");
-    let text = run(&["verify-robot", "cell/pipeline.yaml", "second.csv", "--new-base", "--quiet", "--html", "verified.html"]);
-    assert!(text.contains("achieved  mean 0.00") && text.contains("the tracker's place found anew"), "{text}");
-    assert!(text.contains("ISO 9283  pose 1, 30 cycles: accuracy AP 0.0"), "{text}");
+    assert_eq!(
+        (
+            told["points"].as_u64(),
+            told["iso_9283"][0]["cycles"].as_u64()
+        ),
+        (Some(42), Some(30)),
+        "{told:#}"
+    );
+    let text = run(&[
+        "verify-robot",
+        "cell/pipeline.yaml",
+        "second.csv",
+        "--new-base",
+        "--quiet",
+        "--html",
+        "verified.html",
+    ]);
+    assert!(
+        text.contains("achieved  mean 0.00") && text.contains("the tracker's place found anew"),
+        "{text}"
+    );
+    assert!(
+        text.contains("ISO 9283  pose 1, 30 cycles: accuracy AP 0.0"),
+        "{text}"
+    );
     // The page has the figures of the terminal.
     let page = std::fs::read_to_string(folder.path().join("verified.html")).expect("a page");
-    let line = text.lines().find(|line| line.starts_with("achieved")).expect("a line");
-    let numbers: Vec<&str> = line.split(' ').filter(|word| word.len() > 4 && word.parse::<f64>().is_ok()).collect();
+    let line = text
+        .lines()
+        .find(|line| line.starts_with("achieved"))
+        .expect("a line");
+    let numbers: Vec<&str> = line
+        .split(' ')
+        .filter(|word| word.len() > 4 && word.parse::<f64>().is_ok())
+        .collect();
     assert_eq!(numbers.len(), 3, "{line}");
-    assert!(numbers.iter().all(|number| page.contains(&format!("<td>{number}</td>"))), "{numbers:?}");
-    assert!(page.contains("<th scope=\"row\">1</th><td>30</td>") && page.matches("<svg ").count() == 1, "{page}");
+    assert!(
+        numbers
+            .iter()
+            .all(|number| page.contains(&format!("<td>{number}</td>"))),
+        "{numbers:?}"
+    );
+    assert!(
+        page.contains("<th scope=\"row\">1</th><td>30</td>") && page.matches("<svg ").count() == 1,
+        "{page}"
+    );
 }

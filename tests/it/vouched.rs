@@ -13,7 +13,8 @@ use std::path::{Path, PathBuf};
 
 const PARAMETERS: &str = "identify.parameters.parquet";
 const ROBOT: &str = "robot.robot.parquet";
-const TARGETS: &str = "A1_deg,A2_deg,A3_deg,A4_deg,A5_deg,A6_deg\n10,20,-30,5,40,0\n-10,20.25,30,5,40,1\n";
+const TARGETS: &str =
+    "A1_deg,A2_deg,A3_deg,A4_deg,A5_deg,A6_deg\n10,20,-30,5,40,0\n-10,20.25,30,5,40,1\n";
 
 /// A folder with the two tables of the cell, as somebody takes them along.
 fn taken_along() -> tempfile::TempDir {
@@ -26,14 +27,29 @@ fn taken_along() -> tempfile::TempDir {
 }
 
 fn files(folder: &Path) -> Files {
-    Files { parameters: folder.join(PARAMETERS), robot: folder.join(ROBOT), unchecked: false }
+    Files {
+        parameters: folder.join(PARAMETERS),
+        robot: folder.join(ROBOT),
+        unchecked: false,
+    }
 }
 
 fn compensated(folder: &Path, more: &[&str]) -> (Option<i32>, String, String) {
-    let verb = ["compensate", PARAMETERS, "--robot", ROBOT, "--no-sigma", "--quiet"];
+    let verb = [
+        "compensate",
+        PARAMETERS,
+        "--robot",
+        ROBOT,
+        "--no-sigma",
+        "--quiet",
+    ];
     let output = calib(folder, &[&verb, more].concat(), TARGETS);
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-    (output.status.code(), text(output.stdout), text(output.stderr))
+    (
+        output.status.code(),
+        text(output.stdout),
+        text(output.stderr),
+    )
 }
 
 /// `bits` bits of a file, each as the file with that one changed.
@@ -50,13 +66,18 @@ fn flips(path: &Path, bits: usize, seed: u64) -> impl Iterator<Item = (usize, Ve
 
 /// All that a robot is moved by, digit by digit.
 fn numbers(identified: &IdentifiedModel) -> String {
-    format!("{:?} {:?} {:?}", identified.robot, identified.parameters, identified.model.x)
+    format!(
+        "{:?} {:?} {:?}",
+        identified.robot, identified.parameters, identified.model.x
+    )
 }
 
 #[test]
 fn a_changed_bit_of_a_table_is_refused_or_changes_no_number() {
     let folder = taken_along();
-    let sound = numbers(&IdentifiedModel::of_files(&files(folder.path())).unwrap_or_else(|error| panic!("{error}")));
+    let sound = numbers(
+        &IdentifiedModel::of_files(&files(folder.path())).unwrap_or_else(|error| panic!("{error}")),
+    );
     let mut refused = 0;
     for (name, seed) in [(PARAMETERS, 4), (ROBOT, 5)] {
         let path = folder.path().join(name);
@@ -66,7 +87,11 @@ fn a_changed_bit_of_a_table_is_refused_or_changes_no_number() {
             match IdentifiedModel::of_files(&files(folder.path())) {
                 Ok(found) => assert_eq!(numbers(&found), sound, "bit {bit} of {name}"),
                 Err(error) => {
-                    assert_eq!((error.exit_code(), error.to_string().contains(name)), (10, true), "bit {bit} of {name}: {error}");
+                    assert_eq!(
+                        (error.exit_code(), error.to_string().contains(name)),
+                        (10, true),
+                        "bit {bit} of {name}: {error}"
+                    );
                     refused += 1;
                 }
             }
@@ -97,7 +122,11 @@ fn the_verb_refuses_a_changed_table_with_code_10_and_writes_no_target() {
 /// Writes a table as another program does: the columns alone, with the value of one cell changed by `by`.
 fn written_anew(path: &Path, by: f64, metadata: bool) {
     let builder = ParquetRecordBatchReaderBuilder::try_new(File::open(path).unwrap()).unwrap();
-    let pairs = builder.metadata().file_metadata().key_value_metadata().cloned();
+    let pairs = builder
+        .metadata()
+        .file_metadata()
+        .key_value_metadata()
+        .cloned();
     let batch = builder.build().unwrap().next().unwrap().unwrap();
     let table = from_file::<Parameters>(path).unwrap().table;
     let mut rows = table.0;
@@ -106,12 +135,22 @@ fn written_anew(path: &Path, by: f64, metadata: bool) {
     assert_eq!(changed.num_rows(), batch.num_rows());
     let properties = parquet::file::properties::WriterProperties::builder()
         .set_key_value_metadata(if metadata {
-            pairs.map(|pairs| pairs.into_iter().filter(|pair| pair.key != "ARROW:schema").collect())
+            pairs.map(|pairs| {
+                pairs
+                    .into_iter()
+                    .filter(|pair| pair.key != "ARROW:schema")
+                    .collect()
+            })
         } else {
             None
         })
         .build();
-    let mut writer = ArrowWriter::try_new(File::create(path).unwrap(), changed.schema(), Some(properties)).unwrap();
+    let mut writer = ArrowWriter::try_new(
+        File::create(path).unwrap(),
+        changed.schema(),
+        Some(properties),
+    )
+    .unwrap();
     writer.write(&changed).unwrap();
     writer.close().unwrap();
 }
@@ -122,29 +161,51 @@ fn a_table_of_another_program_is_taken_only_where_that_is_said() {
     let path = folder.path().join(PARAMETERS);
     let (_, sound, _) = compensated(folder.path(), &[]);
     written_anew(&path, 0.0, true);
-    assert_eq!(compensated(folder.path(), &[]), (Some(0), sound.clone(), String::new()), "the same content, written anew");
+    assert_eq!(
+        compensated(folder.path(), &[]),
+        (Some(0), sound.clone(), String::new()),
+        "the same content, written anew"
+    );
     let whole = std::fs::read(&path).unwrap();
     written_anew(&path, 0.0, false);
     let (code, written, said) = compensated(folder.path(), &[]);
     assert_eq!((code, written), (Some(10), String::new()));
-    assert!(said.contains(PARAMETERS) && said.contains("carries no content hash") && said.contains("--unchecked"), "{said}");
+    assert!(
+        said.contains(PARAMETERS)
+            && said.contains("carries no content hash")
+            && said.contains("--unchecked"),
+        "{said}"
+    );
     let (code, written, said) = compensated(folder.path(), &["--unchecked"]);
     assert_eq!((code, written), (Some(0), sound));
-    assert!(said.starts_with("warning: ") && said.contains("its numbers cannot be verified"), "{said}");
+    assert!(
+        said.starts_with("warning: ") && said.contains("its numbers cannot be verified"),
+        "{said}"
+    );
     std::fs::write(&path, whole).unwrap();
     written_anew(&path, 1e-4, true);
     for more in [&[][..], &["--unchecked"]] {
         let (code, written, said) = compensated(folder.path(), more);
         assert_eq!((code, written), (Some(10), String::new()));
-        assert!(said.contains("does not match its numbers") && said.contains("calib run"), "{said}");
+        assert!(
+            said.contains("does not match its numbers") && said.contains("calib run"),
+            "{said}"
+        );
     }
 }
 
 fn copied(from: &Path, to: &Path) {
     std::fs::create_dir_all(to).unwrap();
-    for entry in std::fs::read_dir(from).unwrap().map(|entry| entry.unwrap().path()) {
+    for entry in std::fs::read_dir(from)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+    {
         let place = to.join(entry.file_name().unwrap());
-        if entry.is_dir() { copied(&entry, &place) } else { std::fs::write(&place, std::fs::read(&entry).unwrap()).unwrap() }
+        if entry.is_dir() {
+            copied(&entry, &place)
+        } else {
+            std::fs::write(&place, std::fs::read(&entry).unwrap()).unwrap()
+        }
     }
 }
 
@@ -154,10 +215,18 @@ fn a_changed_bit_in_the_store_is_refused_or_changes_no_number() {
     copied(&cell().join(".calib"), folder.path());
     let store = Store::open(folder.path()).unwrap();
     let manifest = Manifest::of(&store, &find_run(&store, "HEAD").unwrap()).unwrap();
-    let sound = numbers(&IdentifiedModel::of_run(&store, &manifest, None).unwrap_or_else(|error| panic!("{error}")));
+    let sound = numbers(
+        &IdentifiedModel::of_run(&store, &manifest, None).unwrap_or_else(|error| panic!("{error}")),
+    );
     let read = ["parameters", "robot", "recording"];
-    let outputs = manifest.stages.iter().flat_map(|stage| &stage.outputs).filter(|output| read.contains(&output.kind.as_str()));
-    let objects: Vec<PathBuf> = outputs.map(|output| store.object_path(&output.table)).collect();
+    let outputs = manifest
+        .stages
+        .iter()
+        .flat_map(|stage| &stage.outputs)
+        .filter(|output| read.contains(&output.kind.as_str()));
+    let objects: Vec<PathBuf> = outputs
+        .map(|output| store.object_path(&output.table))
+        .collect();
     assert_eq!(objects.len(), read.len());
     for path in objects {
         let whole = std::fs::read(&path).unwrap();
@@ -168,11 +237,18 @@ fn a_changed_bit_in_the_store_is_refused_or_changes_no_number() {
                 Err(error) => {
                     let said = error.to_string();
                     assert_eq!(error.exit_code(), 10, "{said}");
-                    assert!(said.contains(path.to_str().unwrap()) && said.contains("calib run pipeline.yaml"), "{said}");
+                    assert!(
+                        said.contains(path.to_str().unwrap())
+                            && said.contains("calib run pipeline.yaml"),
+                        "{said}"
+                    );
                 }
             }
         }
         std::fs::write(&path, whole).unwrap();
     }
-    assert_eq!(numbers(&IdentifiedModel::of_run(&store, &manifest, None).unwrap()), sound);
+    assert_eq!(
+        numbers(&IdentifiedModel::of_run(&store, &manifest, None).unwrap()),
+        sound
+    );
 }

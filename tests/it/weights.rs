@@ -3,8 +3,8 @@
 use crate::fixture;
 use calib::description::RobotDescription;
 use calib::effect::{
-    Clock, Deflection, Direction, EffectContext, EffectStack, Form, Load, ParameterEstimate, ParameterSpec, Place, Summary,
-    Survey, arm_effect, cause, people,
+    Clock, Deflection, Direction, EffectContext, EffectStack, Form, Load, ParameterEstimate,
+    ParameterSpec, Place, Summary, Survey, arm_effect, cause, people,
 };
 use calib::robot::{Measurements, PointReadings, RobotModel};
 use calib::spatial::Pose;
@@ -23,15 +23,30 @@ fn data(robot: &RobotModel) -> Measurements {
 }
 
 fn stack(robot: &RobotModel) -> EffectStack {
-    let setting = EffectContext { base: Pose::identity(), load: Load::GravityTorque };
-    EffectStack::new(robot, setting.base, vec![arm_effect("joint_compliance", &setting).expect("a cause")])
+    let setting = EffectContext {
+        base: Pose::identity(),
+        load: Load::GravityTorque,
+    };
+    EffectStack::new(
+        robot,
+        setting.base,
+        vec![arm_effect("joint_compliance", &setting).expect("a cause")],
+    )
 }
 
 /// Load torques of every row (Nm), row-major, and what each number of a form turns its joint by.
 fn torques(robot: &RobotModel, data: &Measurements) -> Vec<f64> {
     let stack = stack(robot);
     let (mut scratch, none) = (stack.scratch(robot), vec![0.0; stack.specs().len()]);
-    (0..ROWS).flat_map(|row| stack.point_motion(robot, data, row, &none, &mut scratch).posture.torque.clone()).collect()
+    (0..ROWS)
+        .flat_map(|row| {
+            stack
+                .point_motion(robot, data, row, &none, &mut scratch)
+                .posture
+                .torque
+                .clone()
+        })
+        .collect()
 }
 
 fn turns(robot: &RobotModel, data: &Measurements, form: &Form) -> DMatrix<f64> {
@@ -44,7 +59,9 @@ fn turns(robot: &RobotModel, data: &Measurements, form: &Form) -> DMatrix<f64> {
         let motion = stack.point_motion(robot, data, row, &none, &mut scratch);
         motion.deflect(robot, data, form, &zeros, &mut buffer);
         for (k, direction) in &buffer.partials {
-            let Direction::Joint(_, rate) = direction else { panic!("{direction:?}") };
+            let Direction::Joint(_, rate) = direction else {
+                panic!("{direction:?}")
+            };
             out[(row, *k)] += rate;
         }
     }
@@ -53,17 +70,26 @@ fn turns(robot: &RobotModel, data: &Measurements, form: &Form) -> DMatrix<f64> {
 
 /// A survey of all rows is handed to `tell`.
 fn surveyed<T>(robot: &RobotModel, data: &Measurements, tell: impl FnOnce(&Survey) -> T) -> T {
-    let (rows, torque, compliance) = ((0..ROWS).collect::<Vec<_>>(), torques(robot, data), vec![0.0; robot.joints()]);
+    let (rows, torque, compliance) = (
+        (0..ROWS).collect::<Vec<_>>(),
+        torques(robot, data),
+        vec![0.0; robot.joints()],
+    );
     tell(&Survey::new(robot, data, &rows, &torque, &compliance))
 }
 
 fn windups(robot: &RobotModel, data: &Measurements) -> Vec<Form> {
-    let all = surveyed(robot, data, |survey| cause("joint_compliance").expect("a cause").propose(survey));
+    let all = surveyed(robot, data, |survey| {
+        cause("joint_compliance").expect("a cause").propose(survey)
+    });
     all.into_iter().map(|hypothesis| hypothesis.form).collect()
 }
 
 fn bare(mut description: RobotDescription) -> RobotModel {
-    description.joints.iter_mut().for_each(|joint| (joint.mass, joint.centre) = (None, None));
+    description
+        .joints
+        .iter_mut()
+        .for_each(|joint| (joint.mass, joint.centre) = (None, None));
     RobotModel::new(description)
 }
 
@@ -74,22 +100,46 @@ fn gravity_torques_of_any_masses_are_made_of_the_moments_of_the_bodies_outwards(
         let (weighed, bare) = (RobotModel::new(description.clone()), bare(description));
         let data = data(&weighed);
         let (torque, forms) = (torques(&weighed, &data), windups(&bare, &data));
-        let most = torque.iter().fold(0.0, |most: f64, torque| most.max(torque.abs()));
+        let most = torque
+            .iter()
+            .fold(0.0, |most: f64, torque| most.max(torque.abs()));
         for joint in 0..weighed.joints() {
-            let own = DVector::from_iterator(ROWS, torque.iter().skip(joint).step_by(weighed.joints()).copied());
+            let own = DVector::from_iterator(
+                ROWS,
+                torque.iter().skip(joint).step_by(weighed.joints()).copied(),
+            );
             let size = own.amax();
-            let here = forms.iter().filter(|form| form.place() == Place::Joint(joint));
+            let here = forms
+                .iter()
+                .filter(|form| form.place() == Place::Joint(joint));
             let Some(widest) = here.max_by_key(|form| form.parameters(&bare).len()) else {
-                assert!(!weighed.is_revolute(joint) || size < 0.05 * most, "nothing for joint {} of {size} Nm", joint + 1);
+                assert!(
+                    !weighed.is_revolute(joint) || size < 0.05 * most,
+                    "nothing for joint {} of {size} Nm",
+                    joint + 1
+                );
                 continue;
             };
             let turns = turns(&bare, &data, widest);
-            let solved = turns.clone().svd(true, true).solve(&own, 1e-10).expect("a solution");
+            let solved = turns
+                .clone()
+                .svd(true, true)
+                .solve(&own, 1e-10)
+                .expect("a solution");
             let left = (turns * solved - &own).amax();
-            assert!(left < 1e-9 * most, "joint {}: {left} of {size} Nm", joint + 1);
+            assert!(
+                left < 1e-9 * most,
+                "joint {}: {left} of {size} Nm",
+                joint + 1
+            );
             compared += 1;
         }
-        assert!(windups(&weighed, &data).iter().all(|form| form.parameters(&weighed).len() == 1), "masses are known");
+        assert!(
+            windups(&weighed, &data)
+                .iter()
+                .all(|form| form.parameters(&weighed).len() == 1),
+            "masses are known"
+        );
     }
     assert!(compared > 12, "{compared}");
 }
@@ -100,13 +150,26 @@ fn the_weight_of_the_next_link_alone_is_an_eccentric_gear_by_another_name() {
     let robot = bare(fixture::spherical());
     let data = data(&robot);
     let forms = windups(&robot, &data);
-    let names = |form: &Form| form.parameters(&robot).into_iter().map(|spec| spec.name).collect::<Vec<_>>();
+    let names = |form: &Form| {
+        form.parameters(&robot)
+            .into_iter()
+            .map(|spec| spec.name)
+            .collect::<Vec<_>>()
+    };
     let mut kinds = [0; 3];
     for form in forms.iter().filter(|form| form.place() == Place::Joint(1)) {
         let (names, identities) = (names(form), form.identities("joint_compliance"));
-        let alone = names.iter().all(|name| name.starts_with("joint_compliance.j2.gravity.link2"));
-        let same: &[(&str, Place)] =
-            if alone { &[("gear_cyclic", Place::Joint(1)), ("counterbalance", Place::Joint(1))] } else { &[] };
+        let alone = names
+            .iter()
+            .all(|name| name.starts_with("joint_compliance.j2.gravity.link2"));
+        let same: &[(&str, Place)] = if alone {
+            &[
+                ("gear_cyclic", Place::Joint(1)),
+                ("counterbalance", Place::Joint(1)),
+            ]
+        } else {
+            &[]
+        };
         assert_eq!(identities, same, "{names:?}");
         kinds[if alone { names.len() - 1 } else { 2 }] += 1;
     }
@@ -118,24 +181,48 @@ fn the_weight_of_the_next_link_alone_is_an_eccentric_gear_by_another_name() {
 fn with_a_payload_the_stiffness_is_said_beside_the_weight() {
     let robot = RobotModel::new(fixture::spherical());
     let data = data(&robot);
-    let at = |robot: &RobotModel| windups(robot, &data).into_iter().find(|form| form.place() == Place::Joint(2)).expect("a form");
+    let at = |robot: &RobotModel| {
+        windups(robot, &data)
+            .into_iter()
+            .find(|form| form.place() == Place::Joint(2))
+            .expect("a form")
+    };
     let (weight, load) = (at(&bare(fixture::spherical())), at(&robot));
     let said = |forms: &[Form]| {
         let own = |(form, of): (usize, &Form)| {
             let specs = of.parameters(&robot).into_iter();
             let number = |spec: ParameterSpec| {
                 let (unit, symbol) = people(spec.unit);
-                ParameterEstimate { name: spec.name, form, value: unit.from_si(1e-4), unit: symbol, sigma: None }
+                ParameterEstimate {
+                    name: spec.name,
+                    form,
+                    value: unit.from_si(1e-4),
+                    unit: symbol,
+                    sigma: None,
+                }
             };
             specs.map(number).collect::<Vec<_>>()
         };
         let parameters: Vec<ParameterEstimate> = forms.iter().enumerate().flat_map(own).collect();
-        let summary = Summary { place: Place::Joint(2), forms, parameters: &parameters, clock: Clock::Rows };
+        let summary = Summary {
+            place: Place::Joint(2),
+            forms,
+            parameters: &parameters,
+            clock: Clock::Rows,
+        };
         forms[0].cause().sentence(&summary)
     };
     // 1e-4 rad are 20.6 arcsec.
     let alone = said(std::slice::from_ref(&weight));
-    assert!(alone.contains("by up to 21 arcsec") && alone.contains("cannot be separated from the links' weight"), "{alone}");
+    assert!(
+        alone.contains("by up to 21 arcsec")
+            && alone.contains("cannot be separated from the links' weight"),
+        "{alone}"
+    );
     let both = said(&[weight, load]);
-    assert!(both.contains("1.000e-4 rad/Nm, and under its own weight") && both.contains("by up to 21 arcsec"), "{both}");
+    assert!(
+        both.contains("1.000e-4 rad/Nm, and under its own weight")
+            && both.contains("by up to 21 arcsec"),
+        "{both}"
+    );
 }

@@ -18,28 +18,62 @@ const TARGETS: &str = "A1_deg,A2_deg,A3_deg,A4_deg,A5_deg,A6_deg\n10,20,-30,5,40
 fn said(folder: &Path, verb: &[&str]) -> (Option<i32>, String, String) {
     let output = calib(folder, verb, TARGETS);
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-    (output.status.code(), text(&output.stdout), text(&output.stderr))
+    (
+        output.status.code(),
+        text(&output.stdout),
+        text(&output.stderr),
+    )
 }
 
 #[test]
 fn a_model_is_refused_for_another_robot_and_so_is_a_table_that_does_not_say_whose_it_is() {
     let folder = tempfile::tempdir().expect("a folder");
     let here = folder.path();
-    std::fs::copy(cell().join(".calib/tables/small").join(PARAMETERS), here.join(PARAMETERS)).expect("a table");
-    std::fs::write(here.join("own.yaml"), ROBOT.replace("limits: [-120, 120]", "limits: [-121, 120]")).expect("a file");
-    std::fs::write(here.join("renamed.yaml"), ROBOT.replace("name: small", "name: large")).expect("a file");
-    std::fs::write(here.join("longer.yaml"), ROBOT.replace("[0, 0, 900]", "[0, 0, 901]")).expect("a file");
-    let other = ROBOT.replace("name: small", "name: large").replace("[0, 0, 900]", "[0, 0, 901]");
+    std::fs::copy(
+        cell().join(".calib/tables/small").join(PARAMETERS),
+        here.join(PARAMETERS),
+    )
+    .expect("a table");
+    std::fs::write(
+        here.join("own.yaml"),
+        ROBOT.replace("limits: [-120, 120]", "limits: [-121, 120]"),
+    )
+    .expect("a file");
+    std::fs::write(
+        here.join("renamed.yaml"),
+        ROBOT.replace("name: small", "name: large"),
+    )
+    .expect("a file");
+    std::fs::write(
+        here.join("longer.yaml"),
+        ROBOT.replace("[0, 0, 900]", "[0, 0, 901]"),
+    )
+    .expect("a file");
+    let other = ROBOT
+        .replace("name: small", "name: large")
+        .replace("[0, 0, 900]", "[0, 0, 901]");
     std::fs::write(here.join("other.yaml"), other).expect("a file");
-    let verbs = [&["compensate", PARAMETERS][..], &["export", PARAMETERS, "--format", "urdf"]];
+    let verbs = [
+        &["compensate", PARAMETERS][..],
+        &["export", PARAMETERS, "--format", "urdf"],
+    ];
     for verb in verbs {
         // Limits are no part of what a model is of.
         let (code, _, told) = said(here, &[verb, &["--robot", "own.yaml"]].concat());
         assert_eq!(code, Some(0), "{told}");
         for (robot, sentence) in [
-            ("other.yaml", "table parameters: is the model of another robot, `small`, whose axes are not those of `large`"),
-            ("longer.yaml", "table parameters: is the model of `small` with other axes than this robot file has"),
-            ("renamed.yaml", "is the model of the robot `small`, and this robot file is of `large`, whose axes are the same"),
+            (
+                "other.yaml",
+                "table parameters: is the model of another robot, `small`, whose axes are not those of `large`",
+            ),
+            (
+                "longer.yaml",
+                "table parameters: is the model of `small` with other axes than this robot file has",
+            ),
+            (
+                "renamed.yaml",
+                "is the model of the robot `small`, and this robot file is of `large`, whose axes are the same",
+            ),
         ] {
             let (code, out, told) = said(here, &[verb, &["--robot", robot]].concat());
             assert_eq!((code, out.as_str()), (Some(10), ""), "{robot}: {told}");
@@ -47,8 +81,13 @@ fn a_model_is_refused_for_another_robot_and_so_is_a_table_that_does_not_say_whos
         }
     }
     // As an earlier calib wrote it, without a content hash.
-    let mut table = from_file::<Parameters>(&here.join(PARAMETERS)).expect("a table").table;
-    table.0.iter_mut().for_each(|row| (row.robot, row.kinematics) = (None, None));
+    let mut table = from_file::<Parameters>(&here.join(PARAMETERS))
+        .expect("a table")
+        .table;
+    table
+        .0
+        .iter_mut()
+        .for_each(|row| (row.robot, row.kinematics) = (None, None));
     let frame = table.to_frame().expect("a frame");
     let file = std::fs::File::create(here.join("older.parquet")).expect("a file");
     let mut writer = ArrowWriter::try_new(file, frame.batch().schema(), None).expect("a writer");
@@ -60,22 +99,35 @@ fn a_model_is_refused_for_another_robot_and_so_is_a_table_that_does_not_say_whos
         assert_eq!((code, out.as_str()), (Some(10), ""), "{told}");
         let (code, _, told) = said(here, &[verb, &unchecked].concat());
         assert_eq!(code, Some(0), "{told}");
-        assert!(told.contains("does not say which robot it is the model of"), "{told}");
+        assert!(
+            told.contains("does not say which robot it is the model of"),
+            "{told}"
+        );
     }
 }
 
 #[test]
-fn a_table_that_does_not_say_whose_model_it_is_is_refused_for_either_robot_unless_someone_takes_it() {
-    let Some(fault) = shared("review/faults/two_robots") else { return };
+fn a_table_that_does_not_say_whose_model_it_is_is_refused_for_either_robot_unless_someone_takes_it()
+{
+    let Some(fault) = shared("review/faults/two_robots") else {
+        return;
+    };
     let path = |name: &str| fault.join(name).display().to_string();
     let [table, targets] = ["parameters.parquet", "tg.csv"].map(path);
     for robot in ["irb.yaml", "kr6.yaml"].map(path) {
         let ask = ["compensate", &table, "--robot", &robot, &targets];
         let (code, out, told) = said(&fault, &ask);
         assert_eq!((code, out.as_str()), (Some(10), ""), "{told}");
-        assert!(told.contains("does not say which robot it is the model of") && told.contains("--unchecked"), "{told}");
+        assert!(
+            told.contains("does not say which robot it is the model of")
+                && told.contains("--unchecked"),
+            "{told}"
+        );
         let (code, _, told) = said(&fault, &[&ask[..], &["--unchecked"]].concat());
-        assert!(code == Some(0) && told.contains("does not say which robot it is the model of"), "{told}");
+        assert!(
+            code == Some(0) && told.contains("does not say which robot it is the model of"),
+            "{told}"
+        );
     }
 }
 
@@ -107,27 +159,54 @@ fn inertias_of_no_body_are_named_by_their_links_and_refused_for_torques_alone() 
     let (code, out, told) = said(here, &["check", "pipeline.yaml"]);
     let all = format!("{out}{told}");
     assert_eq!(code, Some(0), "{all}");
-    assert!(all.contains(first) && all.contains(second) && all.contains("positions do not depend on it"), "{all}");
+    assert!(
+        all.contains(first)
+            && all.contains(second)
+            && all.contains("positions do not depend on it"),
+        "{all}"
+    );
     let (code, _, told) = said(here, &["excite", "robot.yaml", "--urdf", "arm.urdf"]);
     assert_eq!(code, Some(10), "{told}");
-    assert!(told.contains("table robot: link 1: no body has a principal moment of inertia of 408.868 times"), "{told}");
+    assert!(
+        told.contains(
+            "table robot: link 1: no body has a principal moment of inertia of 408.868 times"
+        ),
+        "{told}"
+    );
 }
 
 /// Poses of the cell's arm with its tool elsewhere, measured in full; the tool's point is shifted by `shift` (mm), its frame turned by 30 deg.
 fn full_poses(shift: [f64; 3]) -> (String, Vector3<f64>) {
-    let robot = read_calib(RobotFileText { label: "robot.yaml", text: ROBOT }, None).expect("a robot").robot;
+    let robot = read_calib(
+        RobotFileText {
+            label: "robot.yaml",
+            text: ROBOT,
+        },
+        None,
+    )
+    .expect("a robot")
+    .robot;
     let mut moved = robot.clone();
     moved.tool = [0, 1, 2].map(|k| robot.tool[k] + shift[k] * 1e-3);
     let arm = RobotModel::new(moved.clone());
-    let base = Pose::from_rotation_vector(Vector3::new(0.1, -0.2, 0.7), Vector3::new(1.2, -0.8, 0.4));
+    let base =
+        Pose::from_rotation_vector(Vector3::new(0.1, -0.2, 0.7), Vector3::new(1.2, -0.8, 0.4));
     let turned = Rotation3::new(Vector3::new(0.0, 30f64.to_radians(), 0.0)).into_inner();
     let mut text = String::from("q1,q2,q3,q4,q5,q6,x,y,z,qw,qx,qy,qz\n");
     for row in 0..60 {
-        let share = |joint: usize| (0.5 + 0.618_034 * (row as f64) * (1.0 + 0.37 * joint as f64)).fract() * 2.0 - 1.0;
-        let q: Vec<f64> = [110.0, 55.0, 70.0, 150.0, 110.0, 150.0].iter().enumerate().map(|(j, most)| most * share(j)).collect();
+        let share = |joint: usize| {
+            (0.5 + 0.618_034 * (row as f64) * (1.0 + 0.37 * joint as f64)).fract() * 2.0 - 1.0
+        };
+        let q: Vec<f64> = [110.0, 55.0, 70.0, 150.0, 110.0, 150.0]
+            .iter()
+            .enumerate()
+            .map(|(j, most)| most * share(j))
+            .collect();
         let radians: Vec<f64> = q.iter().map(|degrees| degrees.to_radians()).collect();
         let pose = base * arm.forward(&radians);
-        let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(pose.rotation * turned));
+        let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(
+            pose.rotation * turned,
+        ));
         let noise = |k: usize| 0.005 * ((row * 7 + k * 13) as f64).sin();
         let p = pose.translation * 1e3;
         let mut cells: Vec<String> = q.iter().map(|q| format!("{q:.9}")).collect();
@@ -160,8 +239,7 @@ ORIENTATION
     uses: identify
     with: {effects: [base_frame, tool_offset, joint_offset, link_geometry]}
 ";
-const ORIENTATION: &str =
-    "            orientation: {quaternion: [qw, qx, qy, qz]}\n            sigma_orientation: {value: 30, unit: arcsec}";
+const ORIENTATION: &str = "            orientation: {quaternion: [qw, qx, qy, qz]}\n            sigma_orientation: {value: 30, unit: arcsec}";
 
 #[test]
 fn the_identified_tool_goes_out_or_is_refused_whether_orientations_are_measured_or_not() {
@@ -172,26 +250,62 @@ fn the_identified_tool_goes_out_or_is_refused_whether_orientations_are_measured_
             let here = folder.path();
             std::fs::write(here.join("robot.yaml"), ROBOT).expect("a file");
             std::fs::write(here.join("poses.csv"), &poses).expect("a file");
-            std::fs::write(here.join("pipeline.yaml"), MEASURED.replace("ORIENTATION", orientation)).expect("a file");
-            let export = ["export", "pipeline.yaml", "--step", "geometry", "--format", "json"];
+            std::fs::write(
+                here.join("pipeline.yaml"),
+                MEASURED.replace("ORIENTATION", orientation),
+            )
+            .expect("a file");
+            let export = [
+                "export",
+                "pipeline.yaml",
+                "--step",
+                "geometry",
+                "--format",
+                "json",
+            ];
             let (code, out, told) = said(here, &export);
             if is_refused {
-                assert_eq!((code, out.as_str()), (Some(10), ""), "{orientation}: {told}");
+                assert_eq!(
+                    (code, out.as_str()),
+                    (Some(10), ""),
+                    "{orientation}: {told}"
+                );
                 assert!(told.contains("tool is 101."), "{orientation}: {told}");
-                let (code, _, told) = said(here, &["compensate", "pipeline.yaml", "--step", "geometry"]);
-                assert!(code == Some(10) && told.contains("tool is 101."), "{orientation}: {told}");
+                let (code, _, told) =
+                    said(here, &["compensate", "pipeline.yaml", "--step", "geometry"]);
+                assert!(
+                    code == Some(10) && told.contains("tool is 101."),
+                    "{orientation}: {told}"
+                );
             } else {
                 assert_eq!(code, Some(0), "{orientation}: {told}");
             }
             let (code, out, told) = said(here, &[&export[..], &["--force"]].concat());
             assert_eq!(code, Some(0), "{orientation}: {told}");
             let model: Value = serde_json::from_str(&out).expect("JSON");
-            let found = Vector3::from([0, 1, 2].map(|k| model["tool"]["point_m"][k].as_f64().expect("a number")));
+            let found = Vector3::from(
+                [0, 1, 2].map(|k| model["tool"]["point_m"][k].as_f64().expect("a number")),
+            );
             // The last zero turns the tool about its axis, so the point is compared where it is: within what a joint's zero does.
-            assert!((found - tool).norm() < 1e-4, "{orientation}: {found} instead of {tool}");
-            assert_eq!(told.contains("the tool is the identified point"), !orientation.is_empty(), "{told}");
-            let apart = told.split("rigid geometry alone stands ").nth(1).and_then(|text| text.split(" mm").next());
-            assert!(apart.and_then(|mm| mm.parse::<f64>().ok()).is_some_and(|mm| mm < 0.05), "{told}");
+            assert!(
+                (found - tool).norm() < 1e-4,
+                "{orientation}: {found} instead of {tool}"
+            );
+            assert_eq!(
+                told.contains("the tool is the identified point"),
+                !orientation.is_empty(),
+                "{told}"
+            );
+            let apart = told
+                .split("rigid geometry alone stands ")
+                .nth(1)
+                .and_then(|text| text.split(" mm").next());
+            assert!(
+                apart
+                    .and_then(|mm| mm.parse::<f64>().ok())
+                    .is_some_and(|mm| mm < 0.05),
+                "{told}"
+            );
         }
     }
 }
@@ -234,20 +348,38 @@ stages:
 ";
     std::fs::write(here.join("pipeline.yaml"), pipeline).expect("a file");
     let exported = |format: &str| {
-        let (code, out, told) = said(here, &["export", "pipeline.yaml", "--format", format, "--force"]);
+        let (code, out, told) = said(
+            here,
+            &["export", "pipeline.yaml", "--format", format, "--force"],
+        );
         assert_eq!(code, Some(0), "{told}");
         out
     };
     let file = |text: &str, urdf: Option<&str>| {
-        let urdf = urdf.map(|text| RobotFileText { label: "arm.urdf", text });
-        RobotModel::new(read_calib(RobotFileText { label: "robot.yaml", text }, urdf).expect("a robot").robot)
+        let urdf = urdf.map(|text| RobotFileText {
+            label: "arm.urdf",
+            text,
+        });
+        RobotModel::new(
+            read_calib(
+                RobotFileText {
+                    label: "robot.yaml",
+                    text,
+                },
+                urdf,
+            )
+            .expect("a robot")
+            .robot,
+        )
     };
     let beside = "calib_robot: 1\nunits: {length: mm, angle: deg}\nkinematics:\n  urdf: {base: base_link, tip: tool0}\n";
     let urdf = file(beside, Some(&exported("urdf")));
     for format in ["dh", "mdh"] {
         let table = file(&exported(format), None);
         for k in 0..200 {
-            let q: Vec<f64> = (0..6).map(|j| 2.0 * (1.3 * k as f64 + 0.7 * j as f64).sin()).collect();
+            let q: Vec<f64> = (0..6)
+                .map(|j| 2.0 * (1.3 * k as f64 + 0.7 * j as f64).sin())
+                .collect();
             let apart = (table.forward(&q).translation - urdf.forward(&q).translation).norm();
             // A double holds a kilometre to 1e-13 m; URDF is written to nanometres.
             assert!(apart < 1e-8, "{format}: {apart} m");
@@ -259,5 +391,10 @@ stages:
 fn a_run_knows_its_robot() {
     let (code, out, told) = said(cell(), &["compensate", "HEAD", "--robot", "other.yaml"]);
     assert_eq!((code, out.as_str()), (Some(2), ""), "{told}");
-    assert!(told.contains("--robot: is of tables of parameters alone; a run or a pipeline knows its robot"), "{told}");
+    assert!(
+        told.contains(
+            "--robot: is of tables of parameters alone; a run or a pipeline knows its robot"
+        ),
+        "{told}"
+    );
 }

@@ -17,7 +17,9 @@ pub type SheetText<'a> = (&'a str, &'a str);
 pub fn archive(parts: &[(&str, &[u8])]) -> Vec<u8> {
     let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
     for (name, content) in parts {
-        archive.start_file(*name, SimpleFileOptions::default()).expect("a part");
+        archive
+            .start_file(*name, SimpleFileOptions::default())
+            .expect("a part");
         archive.write_all(content).expect("a part's content");
     }
     archive.finish().expect("an archive").into_inner()
@@ -25,24 +27,46 @@ pub fn archive(parts: &[(&str, &[u8])]) -> Vec<u8> {
 
 pub fn workbook(sheets: &[SheetText]) -> Vec<u8> {
     let texts = std::cell::RefCell::new(Vec::new());
-    let bodies: Vec<String> = sheets.iter().map(|(_, text)| sheet(text, &mut texts.borrow_mut())).collect();
+    let bodies: Vec<String> = sheets
+        .iter()
+        .map(|(_, text)| sheet(text, &mut texts.borrow_mut()))
+        .collect();
     let texts = texts.into_inner();
-    with_texts(sheets, &bodies, &format!(r#"<sst uniqueCount="{}">{}</sst>"#, texts.len(), texts.concat()))
+    with_texts(
+        sheets,
+        &bodies,
+        &format!(
+            r#"<sst uniqueCount="{}">{}</sst>"#,
+            texts.len(),
+            texts.concat()
+        ),
+    )
 }
 
 /// A workbook with these parts of its sheets and of its texts.
 pub fn with_texts(sheets: &[SheetText], bodies: &[String], texts: &str) -> Vec<u8> {
     let (mut listed, mut related, mut parts) = (String::new(), String::new(), Vec::new());
     for (k, ((name, _), body)) in sheets.iter().zip(bodies).enumerate() {
-        let hidden = if name.starts_with('_') { r#" state="hidden""# } else { "" };
-        listed += &format!(r#"<sheet name="{name}" sheetId="{}" r:id="rId{k}"{hidden}/>"#, k + 1);
+        let hidden = if name.starts_with('_') {
+            r#" state="hidden""#
+        } else {
+            ""
+        };
+        listed += &format!(
+            r#"<sheet name="{name}" sheetId="{}" r:id="rId{k}"{hidden}/>"#,
+            k + 1
+        );
         let kind = "http://schemas.openxmlformats.org/officeDocument/2006/relationships/worksheet";
-        related += &format!(r#"<Relationship Id="rId{k}" Type="{kind}" Target="worksheets/sheet{k}.xml"/>"#);
+        related += &format!(
+            r#"<Relationship Id="rId{k}" Type="{kind}" Target="worksheets/sheet{k}.xml"/>"#
+        );
         parts.push((format!("xl/worksheets/sheet{k}.xml"), body.clone()));
     }
     let main = "http://schemas.openxmlformats.org/spreadsheetml/2006/main";
     let relations = "http://schemas.openxmlformats.org/officeDocument/2006/relationships";
-    let book = format!(r#"<workbook xmlns="{main}" xmlns:r="{relations}"><sheets>{listed}</sheets></workbook>"#);
+    let book = format!(
+        r#"<workbook xmlns="{main}" xmlns:r="{relations}"><sheets>{listed}</sheets></workbook>"#
+    );
     let related = format!(
         r#"<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">{related}</Relationships>"#
     );
@@ -53,14 +77,21 @@ pub fn with_texts(sheets: &[SheetText], bodies: &[String], texts: &str) -> Vec<u
         ("xl/styles.xml".into(), STYLES.into()),
         ("xl/sharedStrings.xml".into(), texts.into()),
     ]);
-    archive(&parts.iter().map(|(name, content)| (name.as_str(), content.as_bytes())).collect::<Vec<_>>())
+    archive(
+        &parts
+            .iter()
+            .map(|(name, content)| (name.as_str(), content.as_bytes()))
+            .collect::<Vec<_>>(),
+    )
 }
 
 fn sheet(text: &str, texts: &mut Vec<String>) -> String {
     let mut rows = String::new();
     for (line, row) in (1..).zip(text.lines()).filter(|(_, row)| !row.is_empty()) {
-        let cells: String =
-            ('A'..).zip(row.split('|')).map(|(column, text)| cell(&format!("{column}{line}"), text, texts)).collect();
+        let cells: String = ('A'..)
+            .zip(row.split('|'))
+            .map(|(column, text)| cell(&format!("{column}{line}"), text, texts))
+            .collect();
         rows += &format!(r#"<row r="{line}">{cells}</row>"#);
     }
     format!("<worksheet><sheetData>{rows}</sheetData></worksheet>")

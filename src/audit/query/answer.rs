@@ -39,18 +39,26 @@ impl QueryResult {
 
     /// The values of a row, counted from 0, in the order of the names.
     pub fn row(&self, row: usize) -> impl Iterator<Item = QueryValue<'_>> {
-        self.0.columns().iter().map(move |column| value(column, row))
+        self.0
+            .columns()
+            .iter()
+            .map(move |column| value(column, row))
     }
 
     /// The first `rows` values of every column.
     pub fn columns(&self, rows: usize) -> impl Iterator<Item = Vec<QueryValue<'_>>> {
         let rows = rows.min(self.rows());
-        self.0.columns().iter().map(move |column| (0..rows).map(|row| value(column, row)).collect())
+        self.0
+            .columns()
+            .iter()
+            .map(move |column| (0..rows).map(|row| value(column, row)).collect())
     }
 }
 
 fn value(column: &Column, row: usize) -> QueryValue<'_> {
-    let Ok(value) = column.get(row) else { return QueryValue::Null };
+    let Ok(value) = column.get(row) else {
+        return QueryValue::Null;
+    };
     match value {
         AnyValue::Null => QueryValue::Null,
         AnyValue::Boolean(truth) => QueryValue::Boolean(truth),

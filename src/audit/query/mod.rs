@@ -27,13 +27,19 @@ pub fn query(store: &Store, tables: &QueryTables, sql: &str) -> Result<QueryResu
     let mut columns = Vec::new();
     for (name, table) in &statement.tables {
         let mut frame = scan(store, table)?;
-        columns.push((name.as_str(), names(&mut frame).map_err(|error| fault::of(&error, &[]))?));
+        columns.push((
+            name.as_str(),
+            names(&mut frame).map_err(|error| fault::of(&error, &[]))?,
+        ));
         context.register(name, frame);
     }
     // What a parser lets through may still be more than polars is ready for.
     let answer = catch_unwind(AssertUnwindSafe(|| collect(context, &statement.text)));
-    let frame = answer.map_err(|_| Error::spec("SQL", "polars cannot answer this; put it in other words"))?;
-    Ok(QueryResult::new(frame.map_err(|error| fault::of(&error, &columns))?))
+    let frame = answer
+        .map_err(|_| Error::spec("SQL", "polars cannot answer this; put it in other words"))?;
+    Ok(QueryResult::new(
+        frame.map_err(|error| fault::of(&error, &columns))?,
+    ))
 }
 
 fn collect(mut context: SQLContext, sql: &str) -> PolarsResult<DataFrame> {
@@ -45,11 +51,19 @@ fn collect(mut context: SQLContext, sql: &str) -> PolarsResult<DataFrame> {
 fn scan(store: &Store, table: &QueryTable) -> Result<LazyFrame> {
     let file = table.file(store)?;
     // An object's name is a hash: what looks like a pattern is part of the folder's name.
-    let options = ScanArgsParquet { glob: false, ..ScanArgsParquet::default() };
-    let frame = PlRefPath::try_from_path(&file).and_then(|path| LazyFrame::scan_parquet(path, options));
+    let options = ScanArgsParquet {
+        glob: false,
+        ..ScanArgsParquet::default()
+    };
+    let frame =
+        PlRefPath::try_from_path(&file).and_then(|path| LazyFrame::scan_parquet(path, options));
     frame.map_err(|error| table.fault(&file, format!("cannot be read: {error}")))
 }
 
 fn names(frame: &mut LazyFrame) -> PolarsResult<Vec<String>> {
-    Ok(frame.collect_schema()?.iter_names().map(ToString::to_string).collect())
+    Ok(frame
+        .collect_schema()?
+        .iter_names()
+        .map(ToString::to_string)
+        .collect())
 }

@@ -1,6 +1,8 @@
 //! How many rows joins without a condition would make, before anything is computed: memory that runs out ends the process.
 
-use sqlparser::ast::{Ident, JoinOperator, ObjectName, ObjectNamePart, Query, SetExpr, TableFactor, TableWithJoins};
+use sqlparser::ast::{
+    Ident, JoinOperator, ObjectName, ObjectNamePart, Query, SetExpr, TableFactor, TableWithJoins,
+};
 use std::collections::BTreeMap;
 
 use crate::audit::tables::QueryTables;
@@ -31,7 +33,9 @@ fn of_set<'q>(set: &'q SetExpr, tables: &QueryTables, given: &Given<'q>) -> Resu
     match set {
         SetExpr::Select(select) => product(&select.from, tables, given),
         SetExpr::Query(query) => rows(query, tables, given),
-        SetExpr::SetOperation { left, right, .. } => Ok(of_set(left, tables, given)? + of_set(right, tables, given)?),
+        SetExpr::SetOperation { left, right, .. } => {
+            Ok(of_set(left, tables, given)? + of_set(right, tables, given)?)
+        }
         _ => Ok(1.0),
     }
 }
@@ -42,7 +46,11 @@ fn product<'q>(from: &'q [TableWithJoins], tables: &QueryTables, given: &Given<'
         let mut count = of_table(&table.relation, tables, given)?;
         for join in &table.joins {
             let other = of_table(&join.relation, tables, given)?;
-            count = if matches!(join.join_operator, JoinOperator::CrossJoin(_)) { count * other } else { count.max(other) };
+            count = if matches!(join.join_operator, JoinOperator::CrossJoin(_)) {
+                count * other
+            } else {
+                count.max(other)
+            };
         }
         all *= count;
     }
@@ -60,7 +68,9 @@ fn of_table<'q>(table: &'q TableFactor, tables: &QueryTables, given: &Given<'q>)
     match table {
         TableFactor::Table { name, .. } => Ok(of_name(name, tables, given)),
         TableFactor::Derived { subquery, .. } => rows(subquery, tables, given),
-        TableFactor::NestedJoin { table_with_joins, .. } => product(std::slice::from_ref(table_with_joins), tables, given),
+        TableFactor::NestedJoin {
+            table_with_joins, ..
+        } => product(std::slice::from_ref(table_with_joins), tables, given),
         _ => Ok(1.0),
     }
 }
@@ -68,7 +78,13 @@ fn of_table<'q>(table: &'q TableFactor, tables: &QueryTables, given: &Given<'q>)
 /// A name that is not known is a fault of its own.
 fn of_name(name: &ObjectName, tables: &QueryTables, given: &Given) -> f64 {
     let parts: Vec<&Ident> = name.0.iter().filter_map(ObjectNamePart::as_ident).collect();
-    let name = parts.iter().map(|part| part.value.as_str()).collect::<Vec<_>>().join(".");
+    let name = parts
+        .iter()
+        .map(|part| part.value.as_str())
+        .collect::<Vec<_>>()
+        .join(".");
     let known = given.get(name.as_str()).copied();
-    known.or_else(|| tables.find(&name).ok().map(|table| table.table.rows as f64)).unwrap_or(1.0)
+    known
+        .or_else(|| tables.find(&name).ok().map(|table| table.table.rows as f64))
+        .unwrap_or(1.0)
 }

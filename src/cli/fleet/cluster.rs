@@ -27,7 +27,12 @@ pub(super) struct ClusterArguments {
     #[arg(long, value_name = "TIME", help_heading = "Cluster")]
     time: Option<String>,
     /// Another option of sbatch, e.g. --sbatch-arg=--account=robots; may be given several times
-    #[arg(long, value_name = "ARG", allow_hyphen_values = true, help_heading = "Cluster")]
+    #[arg(
+        long,
+        value_name = "ARG",
+        allow_hyphen_values = true,
+        help_heading = "Cluster"
+    )]
     sbatch_arg: Vec<String>,
     /// Times that robots whose tasks were lost are submitted again
     #[arg(long, value_name = "N", default_value_t = 3, help_heading = "Cluster")]
@@ -55,7 +60,10 @@ impl ClusterArguments {
 
     /// Robots by task.
     pub(super) fn tasks(&self, robots: &[usize]) -> Vec<Vec<usize>> {
-        robots.chunks(self.robots_per_task as usize).map(<[usize]>::to_vec).collect()
+        robots
+            .chunks(self.robots_per_task as usize)
+            .map(<[usize]>::to_vec)
+            .collect()
     }
 }
 
@@ -70,9 +78,16 @@ pub(super) fn on_slurm(
     let options = arguments.options(workshop.ledger.store.root())?;
     let robots = &workshop.fleet.roster.0;
     // What may work now is tried again.
-    let keys: Vec<(usize, String)> = chosen.iter().map(|index| (*index, workshop.key(&robots[*index]))).collect();
+    let keys: Vec<(usize, String)> = chosen
+        .iter()
+        .map(|index| (*index, workshop.key(&robots[*index])))
+        .collect();
     for (_, key) in &keys {
-        if workshop.ledger.find(key)?.is_some_and(|record| record.exit_code == crate::fleet::ledger::LATER) {
+        if workshop
+            .ledger
+            .find(key)?
+            .is_some_and(|record| record.exit_code == crate::fleet::ledger::LATER)
+        {
             workshop.ledger.forget(key)?;
         }
     }
@@ -128,7 +143,10 @@ pub(super) fn on_slurm(
                 round += 1;
                 // Tasks of a new array need numbers of their own.
                 note.run = (workshop.surroundings)().run_id;
-                progress.say(&format!("submitted again, having no record and no task: {}", counted(left.len(), "robot")));
+                progress.say(&format!(
+                    "submitted again, having no record and no task: {}",
+                    counted(left.len(), "robot")
+                ));
             }
         }
     }
@@ -136,5 +154,7 @@ pub(super) fn on_slurm(
 }
 
 fn log_folder(options: &ClusterOptions, note: &RunNote) -> String {
-    crate::fleet::cluster::logs(&options.store, &note.fleet).display().to_string()
+    crate::fleet::cluster::logs(&options.store, &note.fleet)
+        .display()
+        .to_string()
 }

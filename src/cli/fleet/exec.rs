@@ -27,14 +27,26 @@ pub(super) fn main(arguments: &ExecArguments, command_line: &[OsString]) -> Resu
     let store = super::folder(&arguments.store)?;
     let ledger = run::ledger(&store, &arguments.fleet);
     let note = ledger.run(Some(&arguments.run))?;
-    let note = note.ok_or_else(|| Error::store(&arguments.run, "no such run in the store, or not yet visible here"))?;
+    let note = note.ok_or_else(|| {
+        Error::store(
+            &arguments.run,
+            "no such run in the store, or not yet visible here",
+        )
+    })?;
     let tasks = note.tasks.len();
-    let robots =
-        note.tasks.get(arguments.task).ok_or_else(|| Error::spec("--task", format!("the run has {}", counted(tasks, "task"))))?;
+    let robots = note
+        .tasks
+        .get(arguments.task)
+        .ok_or_else(|| Error::spec("--task", format!("the run has {}", counted(tasks, "task"))))?;
     let fleet = Fleet::load(&note.file, &store)?;
     // By name: the roster may have grown since.
-    let names = robots.iter().filter_map(|index| note.robots.get(*index)).map(|member| member.name.as_str());
-    let chosen: Vec<usize> = names.filter_map(|name| fleet.roster.position(name)).collect();
+    let names = robots
+        .iter()
+        .filter_map(|index| note.robots.get(*index))
+        .map(|member| member.name.as_str());
+    let chosen: Vec<usize> = names
+        .filter_map(|name| fleet.roster.position(name))
+        .collect();
     let fresh = || surroundings(command_line);
     let mut workshop = workshop(&fleet, &store, &fresh);
     let told = |name: &str| std::env::var(name).ok();
@@ -43,11 +55,27 @@ pub(super) fn main(arguments: &ExecArguments, command_line: &[OsString]) -> Resu
     workshop.log = task.map(|(job, task)| format!("{job}_{task}.out"));
     let progress = FleetProgress::new(Verbosity::Normal, 1, chosen.len());
     let stop = || workshop.ledger.cancelled(&note.run);
-    let worked = local::work(&workshop, &chosen, &local::WorkerOptions { workers: 1, fail_fast: false, stop: &stop }, &progress)?;
+    let worked = local::work(
+        &workshop,
+        &chosen,
+        &local::WorkerOptions {
+            workers: 1,
+            fail_fast: false,
+            stop: &stop,
+        },
+        &progress,
+    )?;
     let recorded = worked.records.iter().flatten().count();
-    emit(&format!("{recorded} of {} recorded, {} computed here\n", counted(robots.len(), "robot"), worked.computed))?;
+    emit(&format!(
+        "{recorded} of {} recorded, {} computed here\n",
+        counted(robots.len(), "robot"),
+        worked.computed
+    ))?;
     if recorded < robots.len() {
-        return Err(Error::store(&arguments.run, "not all robots of this task are recorded"));
+        return Err(Error::store(
+            &arguments.run,
+            "not all robots of this task are recorded",
+        ));
     }
     Ok(())
 }

@@ -54,8 +54,7 @@ impl FleetLocation {
 /// Opens the folder that all workers of a fleet share.
 fn folder(store: &Path) -> Result<Store> {
     if bucket(store).is_some() {
-        let message =
-            "a fleet needs a folder that all its workers see; a robot alone runs with calib run --store s3://BUCKET/PREFIX";
+        let message = "a fleet needs a folder that all its workers see; a robot alone runs with calib run --store s3://BUCKET/PREFIX";
         return Err(Error::spec("--store", message));
     }
     Store::open(store)
@@ -72,14 +71,31 @@ pub(super) fn main(arguments: &FleetArguments, command_line: &[OsString]) -> Res
     }
 }
 
-fn workshop<'a>(fleet: &'a Fleet, store: &'a Store, surroundings: &'a (dyn Fn() -> Surroundings + Sync)) -> Workshop<'a> {
+fn workshop<'a>(
+    fleet: &'a Fleet,
+    store: &'a Store,
+    surroundings: &'a (dyn Fn() -> Surroundings + Sync),
+) -> Workshop<'a> {
     let name = surroundings().host.name;
-    Workshop { fleet, ledger: Ledger::new(store, fleet.name()), surroundings, name, log: None, threads: 1 }
+    Workshop {
+        fleet,
+        ledger: Ledger::new(store, fleet.name()),
+        surroundings,
+        name,
+        log: None,
+        threads: 1,
+    }
 }
 
 /// The records of all robots as they are; none where a robot has none for its settings and data.
 fn records(workshop: &Workshop) -> Result<Vec<Option<RobotRecord>>> {
-    workshop.fleet.roster.0.par_iter().map(|robot| workshop.record(robot)).collect()
+    workshop
+        .fleet
+        .roster
+        .0
+        .par_iter()
+        .map(|robot| workshop.record(robot))
+        .collect()
 }
 
 /// Robots named in an error; the table has all.
@@ -87,26 +103,61 @@ const NAMED: usize = 20;
 
 /// Nothing where all robots are done; else the worst of how they ended, with reasons.
 fn verdict(fleet: &Fleet, records: &[Option<RobotRecord>]) -> Result<()> {
-    let bad = |ending: Ending| records.iter().flatten().filter(move |record| record.ending == ending);
-    let line = |record: &RobotRecord| {
-        let reason = record.reason.as_deref().and_then(|reason| reason.lines().next()).unwrap_or_default();
-        Fault::new(visible(&record.robot), format!("{}: {}", record.ending.name(), visible(reason)))
+    let bad = |ending: Ending| {
+        records
+            .iter()
+            .flatten()
+            .filter(move |record| record.ending == ending)
     };
-    let mut faults: Vec<Fault> = bad(Ending::Failed).chain(bad(Ending::Rejected)).take(NAMED).map(line).collect();
+    let line = |record: &RobotRecord| {
+        let reason = record
+            .reason
+            .as_deref()
+            .and_then(|reason| reason.lines().next())
+            .unwrap_or_default();
+        Fault::new(
+            visible(&record.robot),
+            format!("{}: {}", record.ending.name(), visible(reason)),
+        )
+    };
+    let mut faults: Vec<Fault> = bad(Ending::Failed)
+        .chain(bad(Ending::Rejected))
+        .take(NAMED)
+        .map(line)
+        .collect();
     let count = bad(Ending::Failed).count() + bad(Ending::Rejected).count();
     if count > NAMED {
-        faults.push(Fault::new("", format!("and {} more: see `calib fleet status`", count - NAMED)));
+        faults.push(Fault::new(
+            "",
+            format!("and {} more: see `calib fleet status`", count - NAMED),
+        ));
     }
-    let list = |faults: &[Fault]| faults.iter().map(Fault::to_string).collect::<Vec<_>>().join("\n");
+    let list = |faults: &[Fault]| {
+        faults
+            .iter()
+            .map(Fault::to_string)
+            .collect::<Vec<_>>()
+            .join("\n")
+    };
     if bad(Ending::Failed).any(|record| record.exit_code == 70) {
         return Err(Error::Bug(list(&faults)));
     }
     let missing = records.iter().filter(|record| record.is_none()).count();
     if missing > 0 {
-        faults.push(Fault::new("", format!("not computed yet: {missing} of {}; run again", counted(records.len(), "robot"))));
+        faults.push(Fault::new(
+            "",
+            format!(
+                "not computed yet: {missing} of {}; run again",
+                counted(records.len(), "robot")
+            ),
+        ));
     }
     if missing > 0 || bad(Ending::Failed).next().is_some() {
         return Err(Error::store(fleet.name(), list(&faults)));
     }
-    if faults.is_empty() { Ok(()) } else { Err(Error::Data(faults)) }
+    if faults.is_empty() {
+        Ok(())
+    } else {
+        Err(Error::Data(faults))
+    }
 }

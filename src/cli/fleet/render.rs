@@ -22,10 +22,20 @@ pub(super) struct RenderArguments {
     #[command(flatten)]
     cluster: ClusterArguments,
     /// Container image of calib
-    #[arg(long, value_name = "IMAGE", default_value = "calib", help_heading = "Cluster")]
+    #[arg(
+        long,
+        value_name = "IMAGE",
+        default_value = "calib",
+        help_heading = "Cluster"
+    )]
     image: String,
     /// Persistent volume claim that holds the store and the recordings
-    #[arg(long, value_name = "NAME", default_value = "calib", help_heading = "Cluster")]
+    #[arg(
+        long,
+        value_name = "NAME",
+        default_value = "calib",
+        help_heading = "Cluster"
+    )]
     claim: String,
 }
 
@@ -43,16 +53,26 @@ pub(super) fn main(arguments: &RenderArguments, command_line: &[OsString]) -> Re
     let fresh = || surroundings(command_line);
     let workshop = workshop(&fleet, &store, &fresh);
     let mut note = run::note(&fleet, &arguments.place, &fresh().run_id)?;
-    let missing: Vec<usize> = (0..).zip(records(&workshop)?).filter(|(_, record)| record.is_none()).map(|(k, _)| k).collect();
+    let missing: Vec<usize> = (0..)
+        .zip(records(&workshop)?)
+        .filter(|(_, record)| record.is_none())
+        .map(|(k, _)| k)
+        .collect();
     if missing.is_empty() {
-        return Err(Error::spec(fleet.name(), "every robot is recorded: nothing to submit"));
+        return Err(Error::spec(
+            fleet.name(),
+            "every robot is recorded: nothing to submit",
+        ));
     }
     note.tasks = arguments.cluster.tasks(&missing);
     let options = arguments.cluster.options(store.root())?;
     let text: String = match arguments.engine {
         Scheduler::Slurm => {
             note.engine = "slurm".into();
-            cluster::slurm(&note, &options)?.into_iter().map(|script| script.text).collect()
+            cluster::slurm(&note, &options)?
+                .into_iter()
+                .map(|script| script.text)
+                .collect()
         }
         Scheduler::K8s => {
             note.engine = "k8s".into();
@@ -62,6 +82,7 @@ pub(super) fn main(arguments: &RenderArguments, command_line: &[OsString]) -> Re
     // The tasks find their robots there.
     workshop.ledger.put_run(&note)?;
     let folder = cluster::logs(&options.store, fleet.name());
-    std::fs::create_dir_all(&folder).map_err(|error| Error::store(folder.display().to_string(), error.to_string()))?;
+    std::fs::create_dir_all(&folder)
+        .map_err(|error| Error::store(folder.display().to_string(), error.to_string()))?;
     emit(&text)
 }

@@ -80,7 +80,13 @@ const EXAMPLES: &str = "Examples:
 pub(super) fn main(arguments: &FleetRunArguments, command_line: &[OsString]) -> Result<()> {
     let store = arguments.place.store()?;
     let fleet = Fleet::load(&arguments.place.fleet, &store)?;
-    run(&fleet, &store, &arguments.place, &arguments.how, command_line)
+    run(
+        &fleet,
+        &store,
+        &arguments.place,
+        &arguments.how,
+        command_line,
+    )
 }
 
 pub(super) fn retry(arguments: &RetryArguments, command_line: &[OsString]) -> Result<()> {
@@ -91,29 +97,53 @@ pub(super) fn retry(arguments: &RetryArguments, command_line: &[OsString]) -> Re
     let fleet = Fleet::load(&arguments.place.fleet, &store)?;
     let fresh = || surroundings(command_line);
     let workshop = workshop(&fleet, &store, &fresh);
-    for record in records(&workshop)?.into_iter().flatten().filter(|record| record.ending != Ending::Done) {
+    for record in records(&workshop)?
+        .into_iter()
+        .flatten()
+        .filter(|record| record.ending != Ending::Done)
+    {
         if arguments.how.robot.is_empty() || arguments.how.robot.contains(&record.robot) {
             workshop.ledger.forget(&record.key)?;
         }
     }
-    run(&fleet, &store, &arguments.place, &arguments.how, command_line)
+    run(
+        &fleet,
+        &store,
+        &arguments.place,
+        &arguments.how,
+        command_line,
+    )
 }
 
-fn run(fleet: &Fleet, store: &Store, place: &FleetLocation, how: &FleetRunOptions, command_line: &[OsString]) -> Result<()> {
+fn run(
+    fleet: &Fleet,
+    store: &Store,
+    place: &FleetLocation,
+    how: &FleetRunOptions,
+    command_line: &[OsString],
+) -> Result<()> {
     let begun = Instant::now();
     let fresh = || surroundings(command_line);
     let workshop = workshop(fleet, store, &fresh);
     sound(&workshop)?;
     let chosen = chosen(fleet, &how.robot)?;
     let mut note = note(fleet, place, &fresh().run_id)?;
-    let verbosity = if how.quiet { Verbosity::Quiet } else { Verbosity::Normal };
+    let verbosity = if how.quiet {
+        Verbosity::Quiet
+    } else {
+        Verbosity::Normal
+    };
     let (fresh_records, computed) = match how.engine {
         Engine::Local => {
             workshop.ledger.put_run(&note)?;
             let workers = how.jobs.map_or_else(cores, usize::from);
             let progress = FleetProgress::new(verbosity, workers, chosen.len());
             let stop = || workshop.ledger.cancelled(&note.run);
-            let options = local::WorkerOptions { workers, fail_fast: how.fail_fast, stop: &stop };
+            let options = local::WorkerOptions {
+                workers,
+                fail_fast: how.fail_fast,
+                stop: &stop,
+            };
             let worked = local::work(&workshop, &chosen, &options, &progress);
             progress.finish();
             let worked = worked?;
@@ -126,13 +156,22 @@ fn run(fleet: &Fleet, store: &Store, place: &FleetLocation, how: &FleetRunOption
             progress.finish();
             match waited? {
                 Some(computed) => (Vec::new(), computed),
-                None => return emit(&format!("submitted: jobs {} of run {}\n", note.jobs.join(", "), note.run)),
+                None => {
+                    return emit(&format!(
+                        "submitted: jobs {} of run {}\n",
+                        note.jobs.join(", "),
+                        note.run
+                    ));
+                }
             }
         }
     };
     // Of robots outside of what was asked for, what is known stays known.
-    let all =
-        if fresh_records.iter().all(Option::is_some) && !fresh_records.is_empty() { fresh_records } else { records(&workshop)? };
+    let all = if fresh_records.iter().all(Option::is_some) && !fresh_records.is_empty() {
+        fresh_records
+    } else {
+        records(&workshop)?
+    };
     for (member, record) in note.robots.iter_mut().zip(&all) {
         member.key = record.as_ref().map(|record| record.key.clone());
     }
@@ -167,8 +206,17 @@ fn chosen(fleet: &Fleet, names: &[String]) -> Result<Vec<usize>> {
     }
     let find = |name: &String| {
         let known = fleet.roster.0.iter().map(|robot| robot.name.as_str());
-        let hint = || crate::error::nearest(name, known).map(|near| format!("; did you mean {near:?}?")).unwrap_or_default();
-        fleet.roster.position(name).ok_or_else(|| Error::spec("--robot", format!("no robot {name:?} in the fleet{}", hint())))
+        let hint = || {
+            crate::error::nearest(name, known)
+                .map(|near| format!("; did you mean {near:?}?"))
+                .unwrap_or_default()
+        };
+        fleet.roster.position(name).ok_or_else(|| {
+            Error::spec(
+                "--robot",
+                format!("no robot {name:?} in the fleet{}", hint()),
+            )
+        })
     };
     names.iter().map(find).collect()
 }
@@ -176,12 +224,17 @@ fn chosen(fleet: &Fleet, names: &[String]) -> Result<Vec<usize>> {
 /// The run as engines and later campaigns find it.
 pub(super) fn note(fleet: &Fleet, place: &FleetLocation, run: &str) -> Result<RunNote> {
     let file = std::path::absolute(&place.fleet);
-    let file = file.map_err(|error| Error::store(place.fleet.display().to_string(), error.to_string()))?;
+    let file =
+        file.map_err(|error| Error::store(place.fleet.display().to_string(), error.to_string()))?;
     if file.to_str().is_none() {
         let message = "its path is not UTF-8, so that no record can name it for other hosts: move or rename the file";
         return Err(Error::spec(file.display().to_string(), message));
     }
-    let member = |robot: &crate::fleet::FleetRobot| Member { name: robot.name.clone(), groups: robot.groups.clone(), key: None };
+    let member = |robot: &crate::fleet::FleetRobot| Member {
+        name: robot.name.clone(),
+        groups: robot.groups.clone(),
+        key: None,
+    };
     Ok(RunNote {
         run: run.into(),
         fleet: fleet.name().into(),
@@ -194,19 +247,36 @@ pub(super) fn note(fleet: &Fleet, place: &FleetLocation, run: &str) -> Result<Ru
 }
 
 pub(super) fn count(records: &[Option<RobotRecord>], ending: Ending) -> usize {
-    records.iter().flatten().filter(|record| record.ending == ending).count()
+    records
+        .iter()
+        .flatten()
+        .filter(|record| record.ending == ending)
+        .count()
 }
 
-fn text(records: &[Option<RobotRecord>], computed: usize, seconds: f64, told: &tables::FleetSummary) -> String {
+fn text(
+    records: &[Option<RobotRecord>],
+    computed: usize,
+    seconds: f64,
+    told: &tables::FleetSummary,
+) -> String {
     let mut text = String::new();
     for row in told.fleet.0.iter().filter(|row| row.flags.is_some()) {
-        text.push_str(&format!("{}: {}\n", visible(&row.robot), visible(row.flags.as_deref().unwrap_or_default())));
+        text.push_str(&format!(
+            "{}: {}\n",
+            visible(&row.robot),
+            visible(row.flags.as_deref().unwrap_or_default())
+        ));
     }
     for path in &told.tables {
         text.push_str(&format!("table: {}\n", path.display()));
     }
     text.push_str(&format!("page: {}\n", told.page.display()));
-    let rate = if computed > 0 { format!(", {:.0} a minute", computed as f64 / seconds * 60.0) } else { String::new() };
+    let rate = if computed > 0 {
+        format!(", {:.0} a minute", computed as f64 / seconds * 60.0)
+    } else {
+        String::new()
+    };
     text + &format!(
         "{} of {} done, {} rejected, {} failed; {computed} computed now ({seconds:.1} s{rate})\n",
         count(records, Ending::Done),
@@ -231,7 +301,11 @@ fn document(
             "verdict": row.verdict, "causes": row.causes, "flags": row.flags, "run": record.as_ref().and_then(|r| r.run.clone()),
         })
     });
-    let tables: Vec<_> = told.tables.iter().map(|path| path.to_string_lossy()).collect();
+    let tables: Vec<_> = told
+        .tables
+        .iter()
+        .map(|path| path.to_string_lossy())
+        .collect();
     json!({
         "fleet": fleet.name(), "run": run, "robots": robots.collect::<Vec<_>>(), "computed": computed, "wall_seconds": seconds,
         "done": count(records, Ending::Done), "rejected": count(records, Ending::Rejected), "failed": count(records, Ending::Failed),

@@ -39,19 +39,25 @@ pub(super) fn main(arguments: &StatusArguments, command_line: &[OsString]) -> Re
     let fresh = || surroundings(command_line);
     let workshop = workshop(&fleet, &store, &fresh);
     if let Some(name) = &arguments.robot {
-        let position =
-            fleet.roster.position(name).ok_or_else(|| Error::spec("--robot", format!("no robot {name:?} in the fleet")))?;
+        let position = fleet
+            .roster
+            .position(name)
+            .ok_or_else(|| Error::spec("--robot", format!("no robot {name:?} in the fleet")))?;
         let record = workshop.record(&fleet.roster.0[position])?;
         return match (record, arguments.json) {
             (Some(record), true) => emit_json(&json!(record)),
             (Some(record), false) => emit(&detail(&record, &store, fleet.name())),
             (None, true) => emit_json(&json!({ "robot": name, "ending": "missing" })),
-            (None, false) => emit(&format!("{}: not computed yet for its settings and data as they are\n", visible(name))),
+            (None, false) => emit(&format!(
+                "{}: not computed yet for its settings and data as they are\n",
+                visible(name)
+            )),
         };
     }
     let records = records(&workshop)?;
     let missing = records.iter().filter(|record| record.is_none()).count();
-    let [done, rejected, failed] = [Ending::Done, Ending::Rejected, Ending::Failed].map(|ending| count(&records, ending));
+    let [done, rejected, failed] =
+        [Ending::Done, Ending::Rejected, Ending::Failed].map(|ending| count(&records, ending));
     if arguments.json {
         let robots = fleet.roster.0.iter().zip(&records).map(|(robot, record)| {
             let ending = record.as_ref().map_or("missing", |record| record.ending.name());
@@ -63,8 +69,17 @@ pub(super) fn main(arguments: &StatusArguments, command_line: &[OsString]) -> Re
         }));
     }
     let mut text = String::new();
-    for record in records.iter().flatten().filter(|record| record.ending != Ending::Done) {
-        text.push_str(&format!("{}: {}: {}\n", visible(&record.robot), record.ending.name(), first_line(record)));
+    for record in records
+        .iter()
+        .flatten()
+        .filter(|record| record.ending != Ending::Done)
+    {
+        text.push_str(&format!(
+            "{}: {}: {}\n",
+            visible(&record.robot),
+            record.ending.name(),
+            first_line(record)
+        ));
     }
     text.push_str(&format!(
         "fleet {}: {done} of {} done, {rejected} rejected, {failed} failed, {missing} not computed yet\n",
@@ -75,7 +90,13 @@ pub(super) fn main(arguments: &StatusArguments, command_line: &[OsString]) -> Re
 }
 
 fn first_line(record: &RobotRecord) -> String {
-    visible(record.reason.as_deref().and_then(|reason| reason.lines().next()).unwrap_or_default())
+    visible(
+        record
+            .reason
+            .as_deref()
+            .and_then(|reason| reason.lines().next())
+            .unwrap_or_default(),
+    )
 }
 
 fn detail(record: &RobotRecord, store: &crate::store::Store, fleet: &str) -> String {
@@ -83,15 +104,46 @@ fn detail(record: &RobotRecord, store: &crate::store::Store, fleet: &str) -> Str
     for line in record.reason.iter().flat_map(|reason| reason.lines()) {
         text.push_str(&format!("  {}\n", visible(line)));
     }
-    text.push_str(&format!("  by {}, {:.1} s, ended {}\n", record.worker, record.wall_seconds, record.ended));
+    text.push_str(&format!(
+        "  by {}, {:.1} s, ended {}\n",
+        record.worker, record.wall_seconds, record.ended
+    ));
     if let Some(log) = &record.log {
-        text.push_str(&format!("  task's log: {}\n", crate::fleet::cluster::logs(store.root(), fleet).join(log).display()));
+        text.push_str(&format!(
+            "  task's log: {}\n",
+            crate::fleet::cluster::logs(store.root(), fleet)
+                .join(log)
+                .display()
+        ));
     }
     if let Some(run) = &record.run {
-        text.push_str(&format!("  log: {}\n", store.root().join("runs").join(run).join("manifest.json").display()));
-        for stage in store.manifest(run).ok().iter().filter_map(|manifest| manifest["stages"].as_array()).flatten() {
-            for warning in stage["warnings"].as_array().into_iter().flatten().filter_map(|line| line.as_str()) {
-                text.push_str(&format!("  {}: warning: {}\n", stage["id"].as_str().unwrap_or_default(), visible(warning)));
+        text.push_str(&format!(
+            "  log: {}\n",
+            store
+                .root()
+                .join("runs")
+                .join(run)
+                .join("manifest.json")
+                .display()
+        ));
+        for stage in store
+            .manifest(run)
+            .ok()
+            .iter()
+            .filter_map(|manifest| manifest["stages"].as_array())
+            .flatten()
+        {
+            for warning in stage["warnings"]
+                .as_array()
+                .into_iter()
+                .flatten()
+                .filter_map(|line| line.as_str())
+            {
+                text.push_str(&format!(
+                    "  {}: warning: {}\n",
+                    stage["id"].as_str().unwrap_or_default(),
+                    visible(warning)
+                ));
             }
         }
     }
@@ -111,10 +163,15 @@ pub(super) fn cancel(arguments: &CancelArguments) -> Result<()> {
     let store = arguments.place.store()?;
     let (file, _) = FleetFile::load(&arguments.place.fleet)?;
     let ledger = ledger(&store, &file.name);
-    let note = ledger.run(None)?.ok_or_else(|| Error::spec(&file.name, "the fleet has no run in this store"))?;
+    let note = ledger
+        .run(None)?
+        .ok_or_else(|| Error::spec(&file.name, "the fleet has no run in this store"))?;
     ledger.cancel(&note.run)?;
     if note.engine == "slurm" {
         slurm::cancel(&note.jobs)?;
     }
-    emit(&format!("run {} stops after the robots in hand; `calib fleet run` goes on where it stood\n", note.run))
+    emit(&format!(
+        "run {} stops after the robots in hand; `calib fleet run` goes on where it stood\n",
+        note.run
+    ))
 }

@@ -47,7 +47,12 @@ pub(super) struct ConcealArguments {
     #[arg(long, value_name = "S", default_value_t = 48.0, requires = "dynamics")]
     seconds: f64,
     /// Rows a second of a recording of torques
-    #[arg(long, value_name = "HZ", default_value_t = 100.0, requires = "dynamics")]
+    #[arg(
+        long,
+        value_name = "HZ",
+        default_value_t = 100.0,
+        requires = "dynamics"
+    )]
     rate: f64,
     /// The list that effects are drawn from
     #[arg(long, value_enum, value_name = "LIST", default_value_t = Families::Library)]
@@ -108,8 +113,10 @@ pub(super) struct ConcealArguments {
 }
 
 /// Options that only recordings of points have.
-const OF_POINTS: [&str; 10] =
-    ["families", "family", "robot", "points", "natural", "faulty", "scatter", "bare", "log_step", "layout"];
+const OF_POINTS: [&str; 10] = [
+    "families", "family", "robot", "points", "natural", "faulty", "scatter", "bare", "log_step",
+    "layout",
+];
 
 /// The lists of effects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -133,7 +140,9 @@ pub(super) fn main(arguments: &ConcealArguments) -> Result<()> {
     let row = if arguments.dynamics { "row" } else { "point" };
     let (recordings, seal) = (arguments.out.join(RECORDINGS), arguments.out.join(SEAL));
     if arguments.json {
-        return emit_json(&json!({ "cases": design.cases(), (format!("{row}s")): rows, "recordings": recordings, "seal": seal }));
+        return emit_json(
+            &json!({ "cases": design.cases(), (format!("{row}s")): rows, "recordings": recordings, "seal": seal }),
+        );
     }
     emit(&format!(
         "{}, {}: {}\nseal: {}\n",
@@ -146,7 +155,11 @@ pub(super) fn main(arguments: &ConcealArguments) -> Result<()> {
 
 /// The design that the options state; fails with every fault of them.
 pub(super) fn design(arguments: &ConcealArguments) -> Result<ConcealedSet> {
-    if arguments.dynamics { torques(arguments) } else { points(arguments) }
+    if arguments.dynamics {
+        torques(arguments)
+    } else {
+        points(arguments)
+    }
 }
 
 /// Faults of the shares that both kinds of recordings have.
@@ -160,26 +173,39 @@ fn shares(arguments: &ConcealArguments) -> Vec<Fault> {
         ("--natural", arguments.natural),
         ("--faulty", arguments.faulty),
     ];
-    let wrong = shares.into_iter().filter(|(_, share)| !(0.0..=1.0).contains(share));
-    let mut faults: Vec<Fault> =
-        wrong.map(|(option, share)| Fault::new(option, format!("{share} is no share; allowed: 0 to 1"))).collect();
+    let wrong = shares
+        .into_iter()
+        .filter(|(_, share)| !(0.0..=1.0).contains(share));
+    let mut faults: Vec<Fault> = wrong
+        .map(|(option, share)| Fault::new(option, format!("{share} is no share; allowed: 0 to 1")))
+        .collect();
     if arguments.nulls + arguments.pairs + arguments.open + arguments.foreign > 1.0 + 1e-9 {
-        faults.push(Fault::new("--nulls, --pairs, --open, --foreign", "add up to more than 1"));
+        faults.push(Fault::new(
+            "--nulls, --pairs, --open, --foreign",
+            "add up to more than 1",
+        ));
     }
     faults
 }
 
 fn torques(arguments: &ConcealArguments) -> Result<ConcealedSet> {
     let mut faults = shares(arguments);
-    for (option, value, [least, most]) in
-        [("--seconds", arguments.seconds, [16.0, 3600.0]), ("--rate", arguments.rate, [20.0, 5000.0])]
-    {
+    for (option, value, [least, most]) in [
+        ("--seconds", arguments.seconds, [16.0, 3600.0]),
+        ("--rate", arguments.rate, [20.0, 5000.0]),
+    ] {
         if !(least..=most).contains(&value) {
-            faults.push(Fault::new(option, format!("{value}; allowed: {least} to {most}")));
+            faults.push(Fault::new(
+                option,
+                format!("{value}; allowed: {least} to {most}"),
+            ));
         }
     }
     if arguments.foreign > 0.0 {
-        faults.push(Fault::new("--foreign", "foreign effects move points; torques have none"));
+        faults.push(Fault::new(
+            "--foreign",
+            "foreign effects move points; torques have none",
+        ));
     }
     if !faults.is_empty() {
         return Err(Error::Spec(faults));
@@ -202,7 +228,9 @@ fn points(arguments: &ConcealArguments) -> Result<ConcealedSet> {
         Families::Library => Collection::Library,
         Families::Beyond => Collection::Beyond,
     };
-    if collection == Collection::Beyond && arguments.pairs + arguments.open + arguments.foreign > 0.0 {
+    if collection == Collection::Beyond
+        && arguments.pairs + arguments.open + arguments.foreign > 0.0
+    {
         faults.push(Fault::new(
             "--pairs, --open, --foreign",
             "need `--families library`; with `--families beyond` every recording has one cause",
@@ -214,11 +242,19 @@ fn points(arguments: &ConcealArguments) -> Result<ConcealedSet> {
             allowed.push(family.name);
         }
     }
-    for name in arguments.family.iter().filter(|name| !allowed.contains(&name.as_str())) {
+    for name in arguments
+        .family
+        .iter()
+        .filter(|name| !allowed.contains(&name.as_str()))
+    {
         faults.push(unknown("--family", name, &allowed));
     }
     let kinds: Vec<&str> = ALL_KINDS.iter().map(|kind| kind.name()).collect();
-    for name in arguments.robot.iter().filter(|name| !kinds.contains(&name.as_str())) {
+    for name in arguments
+        .robot
+        .iter()
+        .filter(|name| !kinds.contains(&name.as_str()))
+    {
         faults.push(unknown("--robot", name, &kinds));
     }
     let scatter = arguments.scatter.as_deref().map(|name| {
@@ -232,14 +268,33 @@ fn points(arguments: &ConcealArguments) -> Result<ConcealedSet> {
         None
     });
     if !(0.0..=500.0).contains(&arguments.tool_mass) {
-        faults.push(Fault::new("--tool-mass", format!("{} is no mass of a tool; allowed: 0 to 500 kg", arguments.tool_mass)));
+        faults.push(Fault::new(
+            "--tool-mass",
+            format!(
+                "{} is no mass of a tool; allowed: 0 to 500 kg",
+                arguments.tool_mass
+            ),
+        ));
     }
-    let layout = LAYOUTS.into_iter().find(|layout| layout.name() == arguments.layout).unwrap_or_else(|| {
-        faults.push(unknown("--layout", &arguments.layout, &LAYOUTS.map(Layout::name)));
-        Layout::default()
-    });
+    let layout = LAYOUTS
+        .into_iter()
+        .find(|layout| layout.name() == arguments.layout)
+        .unwrap_or_else(|| {
+            faults.push(unknown(
+                "--layout",
+                &arguments.layout,
+                &LAYOUTS.map(Layout::name),
+            ));
+            Layout::default()
+        });
     if !(0.0..=1.0).contains(&arguments.log_step) {
-        faults.push(Fault::new("--log-step", format!("{} is no step of a log; allowed: 0 to 1 deg", arguments.log_step)));
+        faults.push(Fault::new(
+            "--log-step",
+            format!(
+                "{} is no step of a log; allowed: 0 to 1 deg",
+                arguments.log_step
+            ),
+        ));
     }
     if !faults.is_empty() {
         return Err(Error::Spec(faults));
@@ -249,7 +304,10 @@ fn points(arguments: &ConcealArguments) -> Result<ConcealedSet> {
         cases: arguments.cases as usize,
         collection,
         families: arguments.family.clone(),
-        robots: ALL_KINDS.into_iter().filter(|kind| arguments.robot.iter().any(|name| name == kind.name())).collect(),
+        robots: ALL_KINDS
+            .into_iter()
+            .filter(|kind| arguments.robot.iter().any(|name| name == kind.name()))
+            .collect(),
         points: arguments.points.map(|points| points as usize),
         nulls: arguments.nulls,
         pairs: arguments.pairs,
@@ -267,6 +325,14 @@ fn points(arguments: &ConcealArguments) -> Result<ConcealedSet> {
 }
 
 fn unknown(option: &str, name: &str, allowed: &[&str]) -> Fault {
-    let hint = nearest(name, allowed.iter().copied()).map(|near| format!("; did you mean `{near}`?"));
-    Fault::new(option, format!("no `{name}`{} Allowed: {}", hint.unwrap_or_else(|| ".".into()), allowed.join(", ")))
+    let hint =
+        nearest(name, allowed.iter().copied()).map(|near| format!("; did you mean `{near}`?"));
+    Fault::new(
+        option,
+        format!(
+            "no `{name}`{} Allowed: {}",
+            hint.unwrap_or_else(|| ".".into()),
+            allowed.join(", ")
+        ),
+    )
 }

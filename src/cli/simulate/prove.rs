@@ -54,7 +54,10 @@ pub(super) fn main(arguments: &ProveArguments) -> Result<()> {
     let (design, folder) = (conceal::design(&arguments.conceal)?, &arguments.conceal.out);
     let pipeline = pipeline(arguments, &design);
     if !pipeline.is_file() {
-        return Err(Error::spec("--pipeline", format!("no such file: {}", pipeline.display())));
+        return Err(Error::spec(
+            "--pipeline",
+            format!("no such file: {}", pipeline.display()),
+        ));
     }
     if folder.join(SEAL).is_file() {
         if !Seal::read(folder)?.is_of(&design) {
@@ -68,35 +71,60 @@ pub(super) fn main(arguments: &ProveArguments) -> Result<()> {
         proof::conceal(folder, &design, arguments.conceal.threads())?;
     }
     // Before anything is diagnosed, and again before anything is revealed: a diagnosis must not have touched the truth.
-    let names: Vec<String> = Seal::check(folder)?.iter().filter_map(|name| case(name)).collect();
-    let store = |error: std::io::Error| Error::store(folder.join(VERDICTS).display().to_string(), error.to_string());
+    let names: Vec<String> = Seal::check(folder)?
+        .iter()
+        .filter_map(|name| case(name))
+        .collect();
+    let store = |error: std::io::Error| {
+        Error::store(
+            folder.join(VERDICTS).display().to_string(),
+            error.to_string(),
+        )
+    };
     let verdicts = folder.join(VERDICTS);
     std::fs::create_dir_all(&verdicts).map_err(store)?;
     let program = std::env::current_exe().map_err(store)?;
-    let blind = BlindDiagnosis { program: &program, pipeline: &pipeline, folder };
-    let told = in_order(arguments.conceal.threads(), names.len(), |number| -> Result<()> {
-        let name = &names[number];
-        let tell = |said: &str| {
-            if !arguments.quiet {
-                let _ = writeln!(std::io::stderr(), "{name}: {said}");
+    let blind = BlindDiagnosis {
+        program: &program,
+        pipeline: &pipeline,
+        folder,
+    };
+    let told = in_order(
+        arguments.conceal.threads(),
+        names.len(),
+        |number| -> Result<()> {
+            let name = &names[number];
+            let tell = |said: &str| {
+                if !arguments.quiet {
+                    let _ = writeln!(std::io::stderr(), "{name}: {said}");
+                }
+            };
+            tell(&blind.diagnose(name, &verdicts, None)?);
+            let left_out = arguments
+                .left_out
+                .then(|| proof::single_cause(&folder.join(SEALED).join(format!("{name}.json"))));
+            if let Some(cause) = left_out.transpose()?.flatten() {
+                let verdicts = verdicts.join(LEFT_OUT);
+                std::fs::create_dir_all(&verdicts).map_err(store)?;
+                tell(&format!(
+                    "without its cause: {}",
+                    blind.diagnose(name, &verdicts, Some(&cause))?
+                ));
             }
-        };
-        tell(&blind.diagnose(name, &verdicts, None)?);
-        let left_out = arguments.left_out.then(|| proof::single_cause(&folder.join(SEALED).join(format!("{name}.json"))));
-        if let Some(cause) = left_out.transpose()?.flatten() {
-            let verdicts = verdicts.join(LEFT_OUT);
-            std::fs::create_dir_all(&verdicts).map_err(store)?;
-            tell(&format!("without its cause: {}", blind.diagnose(name, &verdicts, Some(&cause))?));
-        }
-        Ok(())
-    });
+            Ok(())
+        },
+    );
     told.into_iter().collect::<Result<()>>()?;
     let sealed = Seal::check(folder)?;
     let board = proof::board(folder, &sealed, &verdicts)?;
     if arguments.conceal.json {
         return emit_json(&board.document());
     }
-    emit(&format!("the seal holds: {}, all as they were\n{}", counted(sealed.len(), "file"), board.text()))
+    emit(&format!(
+        "the seal holds: {}, all as they were\n{}",
+        counted(sealed.len(), "file"),
+        board.text()
+    ))
 }
 
 /// The case that a sealed truth is of.
@@ -121,27 +149,46 @@ impl BlindDiagnosis<'_> {
         if verdict.is_file() {
             return Ok("diagnosed before".into());
         }
-        let fault = |error: std::io::Error| Error::store(verdict.display().to_string(), error.to_string());
+        let fault =
+            |error: std::io::Error| Error::store(verdict.display().to_string(), error.to_string());
         // A variable of a pipeline is relative to its file.
-        let recording = std::path::absolute(self.folder.join(RECORDINGS).join(name)).map_err(fault)?;
+        let recording =
+            std::path::absolute(self.folder.join(RECORDINGS).join(name)).map_err(fault)?;
         let tables = verdicts.join(name).with_extension("store");
         let mut command = Command::new(self.program);
-        command.arg("diagnose").arg(self.pipeline).arg("--set").arg(format!("case={}", recording.display()));
+        command
+            .arg("diagnose")
+            .arg(self.pipeline)
+            .arg("--set")
+            .arg(format!("case={}", recording.display()));
         if let Some(cause) = without {
-            command.arg("--set").arg(format!("diagnose.without=[{cause}]"));
+            command
+                .arg("--set")
+                .arg(format!("diagnose.without=[{cause}]"));
         }
-        command.args(["--json", "--quiet", "--jobs", "1", "--store"]).arg(&tables).stdin(Stdio::null());
+        command
+            .args(["--json", "--quiet", "--jobs", "1", "--store"])
+            .arg(&tables)
+            .stdin(Stdio::null());
         let done = command.output().map_err(fault)?;
         let _ = std::fs::remove_dir_all(&tables);
         if !done.status.success() {
             let why = String::from_utf8_lossy(&done.stderr);
-            return Ok(format!("no verdict: {}", why.lines().next().unwrap_or("the process failed")));
+            return Ok(format!(
+                "no verdict: {}",
+                why.lines().next().unwrap_or("the process failed")
+            ));
         }
         // Renamed when whole: an interruption leaves no half verdict.
         let part = verdict.with_extension("part");
-        std::fs::write(&part, &done.stdout).and_then(|()| std::fs::rename(&part, &verdict)).map_err(fault)?;
+        std::fs::write(&part, &done.stdout)
+            .and_then(|()| std::fs::rename(&part, &verdict))
+            .map_err(fault)?;
         let answer: Option<serde_json::Value> = serde_json::from_slice(&done.stdout).ok();
-        let said = answer.as_ref().and_then(|answer| answer.get("verdict")?.as_str()).unwrap_or("a verdict that is no JSON");
+        let said = answer
+            .as_ref()
+            .and_then(|answer| answer.get("verdict")?.as_str())
+            .unwrap_or("a verdict that is no JSON");
         Ok(said.chars().filter(|c| !c.is_control()).collect())
     }
 }

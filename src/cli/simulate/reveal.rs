@@ -39,5 +39,9 @@ pub(super) fn main(arguments: &RevealArguments) -> Result<()> {
     if arguments.json {
         return emit_json(&board.document());
     }
-    emit(&format!("the seal holds: {}, all as they were\n{}", counted(sealed.len(), "file"), board.text()))
+    emit(&format!(
+        "the seal holds: {}, all as they were\n{}",
+        counted(sealed.len(), "file"),
+        board.text()
+    ))
 }

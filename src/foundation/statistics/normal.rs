@@ -1,6 +1,9 @@
 //! The inverse of the standard normal distribution: Wichura's algorithm AS 241 (PPND16), Applied Statistics 37 (1988), pp. 477-484.
 
-#![expect(clippy::excessive_precision, reason = "the figures as they were published")]
+#![expect(
+    clippy::excessive_precision,
+    reason = "the figures as they were published"
+)]
 
 /// Numerators and denominators of three rational functions, from the constant term on: of the middle, of the tails, of the far tails.
 const MIDDLE: [[f64; 8]; 2] = [
@@ -77,7 +80,11 @@ pub fn normal_quantile(tail: f64) -> f64 {
         return from_middle * ratio(&MIDDLE, 0.180_625 - from_middle * from_middle);
     }
     let far = (-tail.min(1.0 - tail).ln()).sqrt();
-    let size = if far <= 5.0 { ratio(&TAIL, far - 1.6) } else { ratio(&FAR_TAIL, far - 5.0) };
+    let size = if far <= 5.0 {
+        ratio(&TAIL, far - 1.6)
+    } else {
+        ratio(&FAR_TAIL, far - 5.0)
+    };
     size.copysign(from_middle)
 }
 
@@ -97,14 +104,23 @@ mod tests {
             let (mut low, mut high) = (-40.0, 40.0);
             for _ in 0..90 {
                 let middle: f64 = 0.5 * (low + high);
-                if 0.5 * libm::erfc(middle / std::f64::consts::SQRT_2) > tail { low = middle } else { high = middle }
+                if 0.5 * libm::erfc(middle / std::f64::consts::SQRT_2) > tail {
+                    low = middle
+                } else {
+                    high = middle
+                }
             }
             0.5 * (low + high)
         };
-        let tails = (1..=300).map(|k| 10f64.powf(-f64::from(k))).chain((1..500).map(|k| f64::from(k) / 1000.0));
+        let tails = (1..=300)
+            .map(|k| 10f64.powf(-f64::from(k)))
+            .chain((1..500).map(|k| f64::from(k) / 1000.0));
         for tail in tails {
             let (found, expected) = (normal_quantile(tail), bisected(tail));
-            assert!((found - expected).abs() < 1e-12 * expected.abs().max(1.0), "{tail:e}: {found} for {expected}");
+            assert!(
+                (found - expected).abs() < 1e-12 * expected.abs().max(1.0),
+                "{tail:e}: {found} for {expected}"
+            );
         }
         // The other half is the mirror image.
         assert_eq!(normal_quantile(0.75), -normal_quantile(0.25));
@@ -114,8 +130,15 @@ mod tests {
     #[test]
     fn the_usual_ones_are_those_of_the_tables() {
         // scipy.stats.norm.isf.
-        for (tail, expected) in [(0.025, 1.959_963_984_540_054), (0.005, 2.575_829_303_548_901), (1e-9, 5.997_807_015_007_687)] {
-            assert!((normal_quantile(tail) - expected).abs() < 1e-14 * 10.0 * expected, "{tail}");
+        for (tail, expected) in [
+            (0.025, 1.959_963_984_540_054),
+            (0.005, 2.575_829_303_548_901),
+            (1e-9, 5.997_807_015_007_687),
+        ] {
+            assert!(
+                (normal_quantile(tail) - expected).abs() < 1e-14 * 10.0 * expected,
+                "{tail}"
+            );
         }
     }
 }

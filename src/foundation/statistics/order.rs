@@ -4,7 +4,10 @@
 /// R and polars' `linear`); none of none.
 pub fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
     let place = share * sorted.len().checked_sub(1)? as f64;
-    let (below, above) = (sorted.get(place.floor() as usize)?, sorted.get(place.ceil() as usize)?);
+    let (below, above) = (
+        sorted.get(place.floor() as usize)?,
+        sorted.get(place.ceil() as usize)?,
+    );
     Some(below + (above - below) * place.fract())
 }
 
@@ -23,10 +26,16 @@ mod tests {
         // numpy.quantile([1, 2, 4, 8], q) and [1, 2, 4, 8, 16].
         let four = [1.0, 2.0, 4.0, 8.0];
         for (share, expected) in [(0.0, 1.0), (0.25, 1.75), (0.5, 3.0), (0.9, 6.8), (1.0, 8.0)] {
-            assert!((quantile(&four, share).unwrap() - expected).abs() < 1e-12, "{share}");
+            assert!(
+                (quantile(&four, share).unwrap() - expected).abs() < 1e-12,
+                "{share}"
+            );
         }
         assert_eq!(quantile(&[1.0, 2.0, 4.0, 8.0, 16.0], 0.5), Some(4.0));
-        assert_eq!((quantile(&[], 0.5), quantile(&[7.0], 0.9)), (None, Some(7.0)));
+        assert_eq!(
+            (quantile(&[], 0.5), quantile(&[7.0], 0.9)),
+            (None, Some(7.0))
+        );
     }
 
     #[test]
@@ -36,7 +45,11 @@ mod tests {
             let mut values: Vec<f64> = (0..count).map(|k| (k * 7919 % 101) as f64).collect();
             let mut sorted = values.clone();
             sorted.sort_by(f64::total_cmp);
-            assert_eq!(nearest(&mut values, 0.5), Some(sorted[count / 2]), "{count}");
+            assert_eq!(
+                nearest(&mut values, 0.5),
+                Some(sorted[count / 2]),
+                "{count}"
+            );
             assert_eq!(nearest(&mut values, 1.0), sorted.last().copied());
             assert_eq!(nearest(&mut values, 0.0), sorted.first().copied());
         }

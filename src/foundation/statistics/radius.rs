@@ -36,13 +36,19 @@ mod tests {
     /// 300,000 draws of each by another program: the 95 % quantile of their lengths.
     #[test]
     fn unequal_axes_agree_with_draws() {
-        for (sigma, drawn) in
-            [([1.0, 0.5, 0.25], 2.053_f64), ([1.0, 1.0, 0.3], 2.466), ([1.0, 0.2, 0.2], 1.978), ([1.0, 0.8, 0.6], 2.333)]
-        {
+        for (sigma, drawn) in [
+            ([1.0, 0.5, 0.25], 2.053_f64),
+            ([1.0, 1.0, 0.3], 2.466),
+            ([1.0, 0.2, 0.2], 1.978),
+            ([1.0, 0.8, 0.6], 2.333),
+        ] {
             let trace: f64 = sigma.iter().map(|s: &f64| s * s).sum();
             let square: f64 = sigma.iter().map(|s| s.powi(4)).sum();
             let radius = radius_95(trace, square);
-            assert!((radius / drawn - 1.0).abs() < 0.01, "{sigma:?}: {radius} {drawn}");
+            assert!(
+                (radius / drawn - 1.0).abs() < 0.01,
+                "{sigma:?}: {radius} {drawn}"
+            );
         }
     }
 }

@@ -39,7 +39,10 @@ const WRITTEN: [(&str, Unit); 31] = [
 
 /// The unit that a text in small letters stands for.
 pub fn written(text: &str) -> Option<Unit> {
-    WRITTEN.iter().find(|(written, _)| *written == text.trim()).map(|(_, unit)| *unit)
+    WRITTEN
+        .iter()
+        .find(|(written, _)| *written == text.trim())
+        .map(|(_, unit)| *unit)
 }
 
 /// The name of a column taken apart.
@@ -57,11 +60,17 @@ impl<'a> Header<'a> {
     /// The parts of a name in small letters: `x [mm]`, `q1_deg`, `load kg`, `x/mm`, `x in mm`.
     pub fn of(lower: &'a str) -> Self {
         for (open, close) in [('[', ']'), ('(', ')')] {
-            if let Some((stem, inside)) = lower.strip_suffix(close).and_then(|text| text.rsplit_once(open))
+            if let Some((stem, inside)) = lower
+                .strip_suffix(close)
+                .and_then(|text| text.rsplit_once(open))
                 && !stem.trim().is_empty()
                 && let Some(unit) = written(inside)
             {
-                return Self { stem: stem.trim(), unit: Some(unit), ending: None };
+                return Self {
+                    stem: stem.trim(),
+                    unit: Some(unit),
+                    ending: None,
+                };
             }
         }
         for separator in ["_", " ", "/", "."] {
@@ -69,9 +78,17 @@ impl<'a> Header<'a> {
                 && !stem.trim().is_empty()
                 && let Some(unit) = written(ending)
             {
-                return Self { stem: stem.trim().trim_end_matches(" in"), unit: Some(unit), ending: Some(ending.trim()) };
+                return Self {
+                    stem: stem.trim().trim_end_matches(" in"),
+                    unit: Some(unit),
+                    ending: Some(ending.trim()),
+                };
             }
         }
-        Self { stem: lower, unit: None, ending: None }
+        Self {
+            stem: lower,
+            unit: None,
+            ending: None,
+        }
     }
 }

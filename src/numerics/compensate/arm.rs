@@ -27,7 +27,13 @@ pub struct Circumstance {
 impl Circumstance {
     /// No payload, warm, nothing known of the approach.
     pub fn unknown(joints: usize) -> Self {
-        Self { payload: 0.0, temperature: None, time: RowTime::LongAfter, direction: vec![0.0; joints], current: None }
+        Self {
+            payload: 0.0,
+            temperature: None,
+            time: RowTime::LongAfter,
+            direction: vec![0.0; joints],
+            current: None,
+        }
     }
 
     /// Those under which a row was measured.
@@ -36,7 +42,9 @@ impl Circumstance {
             payload: data.payload[row],
             temperature: data.temperature(row),
             time: data.row_time(row),
-            direction: (0..data.joints).map(|joint| data.direction(row, joint)).collect(),
+            direction: (0..data.joints)
+                .map(|joint| data.direction(row, joint))
+                .collect(),
             current: data.current(row).map(<[f64]>::to_vec),
         }
     }
@@ -55,13 +63,21 @@ impl IdentifiedArm {
     /// The arm of a model; effects of the measurement itself are taken out.
     pub fn new(mut model: Model, correction: Option<Correction>) -> Self {
         let of_it = |form: &Form| form.is_of_the_measurement();
-        let effects = model.stack.effects().filter(|(effect, _)| effect.form().is_some_and(of_it));
+        let effects = model
+            .stack
+            .effects()
+            .filter(|(effect, _)| effect.form().is_some_and(of_it));
         let quiet: Vec<usize> = effects.flat_map(|(_, range)| range).collect();
         for parameter in &quiet {
             model.x[*parameter] = 0.0;
         }
         let base = model.base();
-        Self { model, base, correction, quiet }
+        Self {
+            model,
+            base,
+            correction,
+            quiet,
+        }
     }
 
     /// Nominal arm, effects and their values.
@@ -77,7 +93,11 @@ impl IdentifiedArm {
     /// The effect and place that depends on motor currents, where one does: without them it is nothing.
     pub(super) fn by_current(&self) -> Option<String> {
         let (specs, x) = (self.model.stack.specs(), &self.model.x);
-        let mut effects = self.model.stack.effects().filter(|(effect, _)| effect.needs_current());
+        let mut effects = self
+            .model
+            .stack
+            .effects()
+            .filter(|(effect, _)| effect.needs_current());
         effects.find_map(|(effect, mut range)| {
             let k = range.find(|k| x[*k] != 0.0)?;
             Some(format!("{} at {}", effect.name(), specs[k].place))
@@ -89,9 +109,19 @@ impl IdentifiedArm {
     pub fn by_what_is_not_stated(&self) -> Vec<String> {
         let (specs, x) = (self.model.stack.specs(), &self.model.x);
         let follows = |form: &Form| form.variables().into_iter().any(Variable::is_no_targets);
-        let effects = self.model.stack.effects().filter(|(effect, _)| effect.form().is_some_and(follows));
-        let moved = effects.filter_map(|(effect, mut range)| range.find(|k| x[*k] != 0.0).map(|k| (effect.name(), k)));
-        moved.map(|(name, k)| format!("{name} at {}", specs[k].place)).collect::<BTreeSet<String>>().into_iter().collect()
+        let effects = self
+            .model
+            .stack
+            .effects()
+            .filter(|(effect, _)| effect.form().is_some_and(follows));
+        let moved = effects.filter_map(|(effect, mut range)| {
+            range.find(|k| x[*k] != 0.0).map(|k| (effect.name(), k))
+        });
+        moved
+            .map(|(name, k)| format!("{name} at {}", specs[k].place))
+            .collect::<BTreeSet<String>>()
+            .into_iter()
+            .collect()
     }
 
     /// The base in the tracker's frame.
@@ -115,10 +145,18 @@ impl IdentifiedArm {
             direction: Some(vec![0.0; joints]),
             ..Measurements::default()
         };
-        let Model { robot, stack, x, .. } = &self.model;
+        let Model {
+            robot, stack, x, ..
+        } = &self.model;
         let mut scratch = stack.scratch(robot);
         stack.only_points(robot, &data, x, &mut scratch);
-        Reach { arm: self, scratch, data, velocities: vec![Twist::zeros(); joints], sources: Vec::new() }
+        Reach {
+            arm: self,
+            scratch,
+            data,
+            velocities: vec![Twist::zeros(); joints],
+            sources: Vec::new(),
+        }
     }
 }
 
@@ -152,14 +190,23 @@ pub struct Reach<'a> {
 impl Reach<'_> {
     /// Takes load, temperature, time and directions of a target from here on.
     pub fn under(&mut self, circumstance: &Circumstance) {
-        let Circumstance { payload, temperature, time, direction, current } = circumstance;
+        let Circumstance {
+            payload,
+            temperature,
+            time,
+            direction,
+            current,
+        } = circumstance;
         self.data.payload[0] = *payload;
         self.data.temperature = temperature.map(|value| vec![value]);
         (self.data.time, self.data.long_after) = match time {
             RowTime::At(time) => (Some(vec![*time]), false),
             RowTime::LongAfter => (None, true),
         };
-        self.data.direction.get_or_insert_default().clone_from(direction);
+        self.data
+            .direction
+            .get_or_insert_default()
+            .clone_from(direction);
         self.data.current.clone_from(current);
         self.data.memories = Memories::default();
         // What is computed for one target must not depend on the one before.
@@ -168,7 +215,9 @@ impl Reach<'_> {
 
     /// How much of the learned correction applies at the command placed last: 1 inside its range, 0 far outside; 1 without one.
     pub fn share(&mut self) -> f64 {
-        let Some(correction) = self.arm.correction() else { return 1.0 };
+        let Some(correction) = self.arm.correction() else {
+            return 1.0;
+        };
         self.fill_sources();
         correction.at(&self.sources).share
     }
@@ -176,7 +225,9 @@ impl Reach<'_> {
     /// The derivative of the point (m, tracker frame) at command `q` by every parameter of the model.
     pub(super) fn derivatives(&mut self, q: &[f64], emit: impl FnMut(usize, Vector3<f64>)) {
         self.data.q.copy_from_slice(q);
-        let Model { robot, stack, x, .. } = &self.arm.model;
+        let Model {
+            robot, stack, x, ..
+        } = &self.arm.model;
         self.scratch.points_and_partials();
         stack.derivatives(robot, &self.data, 0, x, &mut self.scratch, emit);
         stack.only_points(robot, &self.data, x, &mut self.scratch);
@@ -185,13 +236,19 @@ impl Reach<'_> {
     /// Laws that command `q` takes beyond the rows that they were fitted to.
     pub(super) fn beyond_fitted(&mut self, q: &[f64]) -> Vec<BeyondFitted> {
         self.data.q.copy_from_slice(q);
-        let Model { robot, stack, x, .. } = &self.arm.model;
+        let Model {
+            robot, stack, x, ..
+        } = &self.arm.model;
         let motion = stack.point_motion(robot, &self.data, 0, x, &mut self.scratch);
         let beyond = stack.beyond(robot, &self.data, x, &motion).into_iter();
         // What belonged to the measurement moves no arm.
         beyond
             .filter(|(_, _, covariance)| covariance.trace() > 0.0)
-            .map(|(parameter, variable, covariance)| BeyondFitted { parameter, variable, covariance })
+            .map(|(parameter, variable, covariance)| BeyondFitted {
+                parameter,
+                variable,
+                covariance,
+            })
             .collect()
     }
 
@@ -199,8 +256,15 @@ impl Reach<'_> {
     pub(super) fn joint_scatter(&mut self, q: &[f64]) -> Matrix3<f64> {
         self.place(q);
         let robot = &self.arm.model.robot;
-        let revolute = self.velocities.iter().enumerate().filter(|(joint, _)| robot.is_revolute(*joint));
-        revolute.map(|(_, velocity)| velocity.fixed_rows::<3>(0).into_owned()).map(|v| v * v.transpose()).sum()
+        let revolute = self
+            .velocities
+            .iter()
+            .enumerate()
+            .filter(|(joint, _)| robot.is_revolute(*joint));
+        revolute
+            .map(|(_, velocity)| velocity.fixed_rows::<3>(0).into_owned())
+            .map(|v| v * v.transpose())
+            .sum()
     }
 
     fn fill_sources(&mut self) {
@@ -213,8 +277,12 @@ impl Reach<'_> {
 impl Chain for Reach<'_> {
     fn place(&mut self, q: &[f64]) -> Pose {
         self.data.q.copy_from_slice(q);
-        let Model { robot, stack, x, .. } = &self.arm.model;
-        let mut pose = stack.place(robot, &self.data, 0, x, &mut self.scratch).tool(&mut self.velocities);
+        let Model {
+            robot, stack, x, ..
+        } = &self.arm.model;
+        let mut pose = stack
+            .place(robot, &self.data, 0, x, &mut self.scratch)
+            .tool(&mut self.velocities);
         self.scratch.near(true);
         let base = &self.arm.base;
         if let Some(correction) = &self.arm.correction {
@@ -222,11 +290,17 @@ impl Chain for Reach<'_> {
             pose.translation += Vector3::from(correction.at(&self.sources).delta);
         }
         for velocity in &mut self.velocities {
-            let (v, w): (Vector3<f64>, Vector3<f64>) = (velocity.fixed_rows::<3>(0).into(), velocity.fixed_rows::<3>(3).into());
+            let (v, w): (Vector3<f64>, Vector3<f64>) = (
+                velocity.fixed_rows::<3>(0).into(),
+                velocity.fixed_rows::<3>(3).into(),
+            );
             let (v, w) = (base.rotation.tr_mul(&v), base.rotation.tr_mul(&w));
             *velocity = Twist::new(v.x, v.y, v.z, w.x, w.y, w.z);
         }
-        Pose::new(base.rotation.tr_mul(&pose.rotation), base.inverse_point(&pose.translation))
+        Pose::new(
+            base.rotation.tr_mul(&pose.rotation),
+            base.inverse_point(&pose.translation),
+        )
     }
 
     fn velocities(&self) -> &[Twist] {

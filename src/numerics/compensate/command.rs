@@ -26,6 +26,10 @@ pub struct CorrectedCommand {
 impl CorrectedCommand {
     /// What is wrong with it, in words; empty if nothing.
     pub fn remark(&self) -> String {
-        self.remarks.iter().map(Remark::to_string).collect::<Vec<_>>().join("; ")
+        self.remarks
+            .iter()
+            .map(Remark::to_string)
+            .collect::<Vec<_>>()
+            .join("; ")
     }
 }

@@ -1,8 +1,9 @@
 //! Targets in, commands out: what precedes goes one after another, the solving in parallel, the order stays.
 
 use super::{
-    ArmSides, Chain, Circumstance, CommandSolution, CorrectedCommand, Coverage, Gate, IdentifiedArm, Nominal, Reach, Remark,
-    StatedPosture, ToolGoal, Uncertainty, beyond_limits, inverse, least_change, one_step,
+    ArmSides, Chain, Circumstance, CommandSolution, CorrectedCommand, Coverage, Gate,
+    IdentifiedArm, Nominal, Reach, Remark, StatedPosture, ToolGoal, Uncertainty, beyond_limits,
+    inverse, least_change, one_step,
     posture::{CountedArm, inverse_in},
 };
 use crate::error::counted;
@@ -153,16 +154,51 @@ impl CorrectionTotals {
     /// What is wrong with some of them, a sentence a line.
     pub fn warnings(&self) -> impl Iterator<Item = String> {
         let all = [
-            (self.not_reached, "could not be reached and has", "could not be reached and have", "no joints"),
-            (self.refused, "is", "are", "beyond the limits of corrections and refused; --force writes them all the same"),
-            (self.insisted, "is", "are", "beyond the limits of corrections and written because of --force"),
-            (self.turned, "is", "are", "reached in position but not in orientation: the wrist is singular there"),
+            (
+                self.not_reached,
+                "could not be reached and has",
+                "could not be reached and have",
+                "no joints",
+            ),
+            (
+                self.refused,
+                "is",
+                "are",
+                "beyond the limits of corrections and refused; --force writes them all the same",
+            ),
+            (
+                self.insisted,
+                "is",
+                "are",
+                "beyond the limits of corrections and written because of --force",
+            ),
+            (
+                self.turned,
+                "is",
+                "are",
+                "reached in position but not in orientation: the wrist is singular there",
+            ),
             (self.beyond_limits, "leaves", "leave", "the joint limits"),
-            (self.uncertain, "has", "have", "a correction that is uncertain by more than half of itself"),
-            (self.beyond_measured, "is", "are", "outside of what was measured: the model extrapolates there"),
+            (
+                self.uncertain,
+                "has",
+                "have",
+                "a correction that is uncertain by more than half of itself",
+            ),
+            (
+                self.beyond_measured,
+                "is",
+                "are",
+                "outside of what was measured: the model extrapolates there",
+            ),
         ];
         let said = all.into_iter().filter(|(count, ..)| *count > 0);
-        said.map(|(count, one, several, what)| format!("{count} of them {} {what}", if count == 1 { one } else { several }))
+        said.map(|(count, one, several, what)| {
+            format!(
+                "{count} of them {} {what}",
+                if count == 1 { one } else { several }
+            )
+        })
     }
 }
 
@@ -187,7 +223,18 @@ impl<'a> Corrector<'a> {
         let by_what_is_not_stated = arm.by_what_is_not_stated();
         let (direction, tally) = (vec![0.0; joints], CorrectionTotals::default());
         let sides = ArmSides::of(&arm.model().robot, &manner.convention);
-        Self { arm, coverage, uncertainty, manner, sides, by_current, by_what_is_not_stated, last: None, direction, tally }
+        Self {
+            arm,
+            coverage,
+            uncertainty,
+            manner,
+            sides,
+            by_current,
+            by_what_is_not_stated,
+            last: None,
+            direction,
+            tally,
+        }
     }
 
     /// Whether targets get an uncertainty.
@@ -207,7 +254,10 @@ impl<'a> Corrector<'a> {
 
     /// Answers in the order of the targets, which follow those of the batch before; their joints are as the controller counts them.
     pub fn batch(&mut self, targets: Vec<CommandTarget>) -> Vec<CorrectedCommand> {
-        let jobs: Vec<Job> = targets.into_iter().map(|target| self.prepare(target)).collect();
+        let jobs: Vec<Job> = targets
+            .into_iter()
+            .map(|target| self.prepare(target))
+            .collect();
         let this: &Self = self;
         let mut answers: Vec<CorrectedCommand> = jobs
             .par_iter()
@@ -234,16 +284,30 @@ impl<'a> Corrector<'a> {
         let (wanted, home) = match (target.q.map(of_robot), target.point) {
             (Some(q), point) if !(self.manner.cartesian && point.is_some()) => (None, q),
             (q, point) => {
-                let seed = q.or_else(|| self.last.clone()).or_else(|| self.manner.start.clone().map(of_robot));
+                let seed = q
+                    .or_else(|| self.last.clone())
+                    .or_else(|| self.manner.start.clone().map(of_robot));
                 let oriented = target.rotation.is_some();
-                let pose = Pose::new(target.rotation.unwrap_or_else(Matrix3::identity), point.unwrap_or_else(Vector3::zeros));
+                let pose = Pose::new(
+                    target.rotation.unwrap_or_else(Matrix3::identity),
+                    point.unwrap_or_else(Vector3::zeros),
+                );
                 let wanted = ToolGoal { pose, oriented };
                 let seed = seed.unwrap_or_else(|| vec![0.0; n]);
                 let stated = target.posture.as_ref();
-                let counted = CountedArm { robot, convention, sides: self.sides.as_ref() };
+                let counted = CountedArm {
+                    robot,
+                    convention,
+                    sides: self.sides.as_ref(),
+                };
                 let stated = stated.map(|posture| inverse_in(&counted, &wanted, &seed, posture));
                 other_posture = matches!(stated, Some(None));
-                (Some(wanted), stated.flatten().unwrap_or_else(|| inverse(robot, &wanted, &seed)))
+                (
+                    Some(wanted),
+                    stated
+                        .flatten()
+                        .unwrap_or_else(|| inverse(robot, &wanted, &seed)),
+                )
             }
         };
         if let Some(last) = &self.last {
@@ -255,8 +319,14 @@ impl<'a> Corrector<'a> {
         }
         self.last.get_or_insert_default().clone_from(&home);
         let fixed = self.manner.direction.map(|direction| vec![direction; n]);
-        let stated = target.direction.or(fixed).map(|sides| changed(sides, |sides| self.manner.convention.turn_sides(sides)));
-        let stated_time = target.time.or(self.manner.time).filter(|_| self.manner.clock);
+        let stated = target
+            .direction
+            .or(fixed)
+            .map(|sides| changed(sides, |sides| self.manner.convention.turn_sides(sides)));
+        let stated_time = target
+            .time
+            .or(self.manner.time)
+            .filter(|_| self.manner.clock);
         let circumstance = Circumstance {
             payload: target.payload.unwrap_or(self.manner.payload),
             temperature: target.temperature.or(self.manner.temperature),
@@ -264,25 +334,45 @@ impl<'a> Corrector<'a> {
             direction: stated.unwrap_or_else(|| self.direction.clone()),
             current: target.current,
         };
-        Job { wanted, home, other_posture, circumstance }
+        Job {
+            wanted,
+            home,
+            other_posture,
+            circumstance,
+        }
     }
 
     fn solve(&self, reach: &mut Reach, nominal: &mut Nominal, job: &Job) -> CorrectedCommand {
         reach.under(&job.circumstance);
-        let wanted = job.wanted.unwrap_or_else(|| ToolGoal { pose: nominal.place(&job.home), oriented: self.manner.oriented });
+        let wanted = job.wanted.unwrap_or_else(|| ToolGoal {
+            pose: nominal.place(&job.home),
+            oriented: self.manner.oriented,
+        });
         let found: CommandSolution = if self.manner.one_step {
             one_step(reach, nominal, &wanted, &job.home)
         } else {
             Self::reached(reach, &wanted, &job.home)
         };
         let turned = wanted.oriented && (found.turn > REACHED || found.turn.is_nan());
-        let uncertainty = self.uncertainty.as_ref().map(|uncertainty| uncertainty.at(reach, &found.q));
-        let correction = self.arm.base().rotation * (reach.place(&job.home).translation - wanted.pose.translation);
-        let certainty = self.uncertainty.as_ref().map(|uncertainty| uncertainty.of_correction(reach, &found.q, &correction));
+        let uncertainty = self
+            .uncertainty
+            .as_ref()
+            .map(|uncertainty| uncertainty.at(reach, &found.q));
+        let correction = self.arm.base().rotation
+            * (reach.place(&job.home).translation - wanted.pose.translation);
+        let certainty = self
+            .uncertainty
+            .as_ref()
+            .map(|uncertainty| uncertainty.of_correction(reach, &found.q, &correction));
         let mut remarks = Vec::new();
-        let off = if self.manner.one_step { left_by_nominal(nominal, job) } else { found.residual };
+        let off = if self.manner.one_step {
+            left_by_nominal(nominal, job)
+        } else {
+            found.residual
+        };
         let faces = !turned || found.turn <= TURNED_AWAY;
-        let reached = !job.other_posture && off < REACHED && faces && found.q.iter().all(|q| q.is_finite());
+        let reached =
+            !job.other_posture && off < REACHED && faces && found.q.iter().all(|q| q.is_finite());
         if job.other_posture {
             remarks.push(Remark::OtherPosture);
         } else if !reached {
@@ -294,7 +384,10 @@ impl<'a> Corrector<'a> {
         if reached {
             let limits = beyond_limits(self.arm.model().robot.description(), &found.q);
             remarks.extend((!limits.is_empty()).then_some(Remark::BeyondLimits(limits)));
-            let unmeasured = self.coverage.iter().flat_map(|coverage| coverage.beyond(&found.q, &job.circumstance));
+            let unmeasured = self
+                .coverage
+                .iter()
+                .flat_map(|coverage| coverage.beyond(&found.q, &job.circumstance));
             remarks.extend(unmeasured.map(Remark::BeyondMeasured));
             remarks.extend(certainty.iter().filter_map(Remark::of_certainty));
             remarks.extend(certainty.iter().flat_map(Remark::beyond));
@@ -306,7 +399,11 @@ impl<'a> Corrector<'a> {
             }
         }
         let nominal_pose = nominal.place(&job.home);
-        let turn = ToolGoal { pose: nominal_pose, oriented: true }.turn_left(&reach.place(&job.home));
+        let turn = ToolGoal {
+            pose: nominal_pose,
+            oriented: true,
+        }
+        .turn_left(&reach.place(&job.home));
         let mut command = CorrectedCommand {
             q: reached.then_some(found.q),
             uncorrected: found.before,
@@ -317,7 +414,10 @@ impl<'a> Corrector<'a> {
             certainty,
             remarks,
         };
-        let unstated = self.by_current.as_ref().filter(|_| job.circumstance.current.is_none());
+        let unstated = self
+            .by_current
+            .as_ref()
+            .filter(|_| job.circumstance.current.is_none());
         let unstated = unstated.map(|finding| {
             format!("{finding} depends on the motor current, which the target does not state (columns i1_a, i2_a, ...)")
         });
@@ -333,10 +433,25 @@ impl Corrector<'_> {
         if !wanted.oriented || (found.residual < REACHED && found.turn < REACHED) {
             return found;
         }
-        let point = ToolGoal { oriented: false, ..*wanted };
-        let CommandSolution { q, residual, before, iterations, .. } = least_change(reach, &point, home, home);
+        let point = ToolGoal {
+            oriented: false,
+            ..*wanted
+        };
+        let CommandSolution {
+            q,
+            residual,
+            before,
+            iterations,
+            ..
+        } = least_change(reach, &point, home, home);
         let turn = wanted.turn_left(&reach.place(&q));
-        CommandSolution { q, residual, turn, before, iterations: iterations + found.iterations }
+        CommandSolution {
+            q,
+            residual,
+            turn,
+            before,
+            iterations: iterations + found.iterations,
+        }
     }
 }
 
@@ -353,10 +468,15 @@ impl CorrectionTotals {
         self.refused += refused;
         self.insisted += any(|remark| matches!(remark, Remark::Insisted(_)));
         self.not_reached += u64::from(answer.q.is_none()) - refused;
-        self.turned += if answer.q.is_some() { any(|remark| matches!(remark, Remark::Turned(_))) } else { 0 };
+        self.turned += if answer.q.is_some() {
+            any(|remark| matches!(remark, Remark::Turned(_)))
+        } else {
+            0
+        };
         self.beyond_limits += any(|remark| matches!(remark, Remark::BeyondLimits(_)));
         self.uncertain += any(|remark| matches!(remark, Remark::Uncertain(..)));
-        self.beyond_measured += any(|remark| matches!(remark, Remark::BeyondMeasured(_) | Remark::BeyondFitted(..)));
+        self.beyond_measured +=
+            any(|remark| matches!(remark, Remark::BeyondMeasured(_) | Remark::BeyondFitted(..)));
     }
 }
 
@@ -367,7 +487,9 @@ fn changed(mut values: Vec<f64>, change: impl Fn(&mut [f64])) -> Vec<f64> {
 
 /// How far (m) the nominal robot stays away from a Cartesian target: one step does not say whether there is a way.
 fn left_by_nominal(nominal: &mut Nominal, job: &Job) -> f64 {
-    job.wanted.map_or(0.0, |wanted| (nominal.place(&job.home).translation - wanted.pose.translation).norm())
+    job.wanted.map_or(0.0, |wanted| {
+        (nominal.place(&job.home).translation - wanted.pose.translation).norm()
+    })
 }
 
 /// A about z, then B about the new y, then C about the new x (rad): KUKA's A, B, C.

@@ -56,7 +56,8 @@ impl Uncertainty {
         let mut reach = arm.reach();
         let stride = data.rows().div_ceil(POSES).max(1);
         let rows = (0..data.rows()).step_by(stride);
-        let along = |row| COVERAGE * (self.of_parameters(&mut reach, data.q(row)).trace() / 3.0).sqrt();
+        let along =
+            |row| COVERAGE * (self.of_parameters(&mut reach, data.q(row)).trace() / 3.0).sqrt();
         let all: Vec<f64> = rows.map(along).filter(|value| value.is_finite()).collect();
         if all.is_empty() { 0.0 } else { median(all) }
     }
@@ -64,26 +65,45 @@ impl Uncertainty {
     /// Length (m) of one standard deviation of the instrument, rms over the rows of a recording.
     pub(super) fn instrument(data: &Measurements) -> f64 {
         let rows = data.rows();
-        let squares: f64 = (0..rows).map(|row| data.noise(row).powi(2)).filter(|square| square.is_finite()).sum();
+        let squares: f64 = (0..rows)
+            .map(|row| data.noise(row).powi(2))
+            .filter(|square| square.is_finite())
+            .sum();
         (squares / rows.max(1) as f64).sqrt()
     }
 
     /// How certain the correction (m, tracker frame) is that brought the command to `q`, under the circumstances that `reach` is set to.
-    pub fn of_correction(&self, reach: &mut Reach, q: &[f64], correction: &Vector3<f64>) -> CorrectionUncertainty {
+    pub fn of_correction(
+        &self,
+        reach: &mut Reach,
+        q: &[f64],
+        correction: &Vector3<f64>,
+    ) -> CorrectionUncertainty {
         let beyond: Vec<BeyondFitted> = reach.beyond_fitted(q);
         let size = correction.norm();
-        let along = if size > NOTHING { correction / size } else { Vector3::zeros() };
+        let along = if size > NOTHING {
+            correction / size
+        } else {
+            Vector3::zeros()
+        };
         let jacobian = self.along(reach, q, &along);
-        let variance = self.variance(&jacobian) + beyond.iter().map(BeyondFitted::square).sum::<f64>();
+        let variance =
+            self.variance(&jacobian) + beyond.iter().map(BeyondFitted::square).sum::<f64>();
         let seen = |one: &&BeyondFitted| COVERAGE * one.square().sqrt() > self.instrument;
         let named = |one: &BeyondFitted| (self.name(one.parameter), one.variable.to_string());
         let u95 = COVERAGE * variance.sqrt();
         let mut finding = None;
         if u95 > DOUBTFUL * size {
             let mut shares = self.by_effect(&jacobian);
-            shares.extend(beyond.iter().map(|one| (self.name(one.parameter), one.square())));
+            shares.extend(
+                beyond
+                    .iter()
+                    .map(|one| (self.name(one.parameter), one.square())),
+            );
             let most = shares.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
-            finding = most.filter(|(_, own)| *own >= NAMED * variance).map(|(name, _)| name);
+            finding = most
+                .filter(|(_, own)| *own >= NAMED * variance)
+                .map(|(name, _)| name);
         }
         CorrectionUncertainty {
             correction: size,
@@ -110,7 +130,8 @@ mod tests {
             usual: 400e-6,
             instrument: 18e-6,
         };
-        let doubtful = [(1000.0, 600.0), (1000.0, 400.0), (20.0, 53.0), (20.0, 55.0)].map(|(c, u)| um(c, u).is_doubtful());
+        let doubtful = [(1000.0, 600.0), (1000.0, 400.0), (20.0, 53.0), (20.0, 55.0)]
+            .map(|(c, u)| um(c, u).is_doubtful());
         assert_eq!(doubtful, [true, false, false, true]);
     }
 }

@@ -16,13 +16,20 @@ impl Coverage {
 
     /// What of a command was never measured; empty inside.
     pub fn beyond(&self, q: &[f64], circumstance: &Circumstance) -> Vec<Unmeasured> {
-        self.0.beyond(q, circumstance.payload, circumstance.temperature)
+        self.0
+            .beyond(q, circumstance.payload, circumstance.temperature)
     }
 }
 
 /// The joints, from 0, that a command takes out of their limits.
 pub(crate) fn beyond_limits(robot: &RobotDescription, q: &[f64]) -> Vec<usize> {
     let limits = robot.joints.iter().map(|joint| joint.limits);
-    let outside = |q: f64, limits: Option<[f64; 2]>| limits.is_some_and(|[lower, upper]| q < lower || q > upper);
-    (0..).zip(q.iter().zip(limits)).filter(|(_, (q, limits))| outside(**q, *limits)).map(|(joint, _)| joint).collect()
+    let outside = |q: f64, limits: Option<[f64; 2]>| {
+        limits.is_some_and(|[lower, upper]| q < lower || q > upper)
+    };
+    (0..)
+        .zip(q.iter().zip(limits))
+        .filter(|(_, (q, limits))| outside(**q, *limits))
+        .map(|(joint, _)| joint)
+        .collect()
 }

@@ -28,7 +28,13 @@ pub struct GateLimits {
 impl Default for GateLimits {
     fn default() -> Self {
         let deg = std::f64::consts::PI / 180.0;
-        Self { correction: 20e-3, turn: 2.0 * deg, uncertainty: None, shift: 50e-3, tilt: 5.0 * deg }
+        Self {
+            correction: 20e-3,
+            turn: 2.0 * deg,
+            uncertainty: None,
+            shift: 50e-3,
+            tilt: 5.0 * deg,
+        }
     }
 }
 
@@ -48,9 +54,17 @@ impl Gate {
     /// insisted.
     pub(super) fn judge(&self, command: &mut CorrectedCommand, unstated: Option<String>) {
         if command.q.is_some() {
-            command.remarks.extend(self.model.iter().cloned().map(Remark::Insisted));
+            command
+                .remarks
+                .extend(self.model.iter().cloned().map(Remark::Insisted));
         }
-        let Some(reason) = command.q.as_ref().and_then(|_| unstated.or_else(|| self.reason(command))) else { return };
+        let Some(reason) = command
+            .q
+            .as_ref()
+            .and_then(|_| unstated.or_else(|| self.reason(command)))
+        else {
+            return;
+        };
         if self.insisted {
             command.remarks.push(Remark::Insisted(reason));
         } else {
@@ -62,15 +76,26 @@ impl Gate {
     /// Why a command is refused; none where it is within the limits. What is no number is not.
     fn reason(&self, command: &CorrectedCommand) -> Option<String> {
         let beyond = |by: f64, most: f64| by.is_nan() || by > most;
-        let GateLimits { correction, turn, uncertainty, .. } = self.limits;
+        let GateLimits {
+            correction,
+            turn,
+            uncertainty,
+            ..
+        } = self.limits;
         if beyond(command.uncorrected, correction) {
             let (by, most) = (command.uncorrected * 1e3, round(correction * 1e3));
-            return Some(format!("corrected by {by:.3} mm, at most {most} mm allowed (--max-correction)"));
+            return Some(format!(
+                "corrected by {by:.3} mm, at most {most} mm allowed (--max-correction)"
+            ));
         }
         if let Some(certainty) = &command.certainty {
             let limit = uncertainty.unwrap_or_else(|| certainty.limit());
             if beyond(certainty.u95, limit) {
-                let by = certainty.finding.as_ref().map(|finding| format!(", most of it by {finding}")).unwrap_or_default();
+                let by = certainty
+                    .finding
+                    .as_ref()
+                    .map(|finding| format!(", most of it by {finding}"))
+                    .unwrap_or_default();
                 let (u95, size) = (certainty.u95 * 1e3, certainty.correction * 1e3);
                 return Some(format!(
                     "the correction of {size:.3} mm is uncertain by {u95:.3} mm{by}, at most {:.3} mm allowed (--max-uncertainty)",
@@ -79,13 +104,18 @@ impl Gate {
             }
         }
         let (by, most) = (command.turn.to_degrees(), round(turn.to_degrees()));
-        beyond(command.turn, turn).then(|| format!("turned by {by:.3} deg, at most {most} deg allowed (--max-turn)"))
+        beyond(command.turn, turn)
+            .then(|| format!("turned by {by:.3} deg, at most {most} deg allowed (--max-turn)"))
     }
 
     /// What of a model is further from the robot file than allowed, a sentence each. Targets with a name of their own are of the
     /// measurement, and free; the one without is the robot's tool, whether its orientation was measured or not.
     pub fn beyond(&self, model: &Model) -> Vec<String> {
-        const BY_FILE: [&str; 3] = [names::TOOL_OFFSET, names::JOINT_OFFSET, names::LINK_GEOMETRY];
+        const BY_FILE: [&str; 3] = [
+            names::TOOL_OFFSET,
+            names::JOINT_OFFSET,
+            names::LINK_GEOMETRY,
+        ];
         let (robot, specs) = (&model.robot, model.stack.specs());
         let placed = !robot.setup().targets.is_empty();
         let held = |name: &str| BY_FILE.contains(&name) && !(name == names::TOOL_OFFSET && placed);
@@ -94,26 +124,55 @@ impl Gate {
             let off = robot.mounting(Some(target)).translation - robot.home().translation;
             distances.insert("tool".into(), (off.norm_squared(), 0.0));
         }
-        for (effect, range) in model.stack.effects().filter(|(effect, _)| held(effect.name())) {
+        for (effect, range) in model
+            .stack
+            .effects()
+            .filter(|(effect, _)| held(effect.name()))
+        {
             for k in range {
                 let place = specs[k].place;
-                let what = if place == Place::Tool { "tool".into() } else { format!("{} at {place}", effect.name()) };
+                let what = if place == Place::Tool {
+                    "tool".into()
+                } else {
+                    format!("{} at {place}", effect.name())
+                };
                 let (shift, tilt) = distances.entry(what).or_default();
-                *if specs[k].unit.quantity() == Quantity::Angle { tilt } else { shift } += model.x[k] * model.x[k];
+                *if specs[k].unit.quantity() == Quantity::Angle {
+                    tilt
+                } else {
+                    shift
+                } += model.x[k] * model.x[k];
             }
         }
-        distances.iter().filter_map(|(what, (shift, tilt))| self.too_far(what, shift.sqrt(), tilt.sqrt())).collect()
+        distances
+            .iter()
+            .filter_map(|(what, (shift, tilt))| self.too_far(what, shift.sqrt(), tilt.sqrt()))
+            .collect()
     }
 
     fn too_far(&self, what: &str, shift: f64, tilt: f64) -> Option<String> {
         let far = |by: f64, most: f64, unit: &str, option: &str| {
-            let said =
-                || format!("{what} is {by:.1} {unit} from the robot file's, at most {} {unit} allowed ({option})", round(most));
+            let said = || {
+                format!(
+                    "{what} is {by:.1} {unit} from the robot file's, at most {} {unit} allowed ({option})",
+                    round(most)
+                )
+            };
             (by.is_nan() || by > most).then(said)
         };
-        let GateLimits { shift: most, tilt: most_tilt, .. } = self.limits;
-        far(shift * 1e3, most * 1e3, "mm", "--max-shift")
-            .or_else(|| far(tilt.to_degrees(), most_tilt.to_degrees(), "deg", "--max-tilt"))
+        let GateLimits {
+            shift: most,
+            tilt: most_tilt,
+            ..
+        } = self.limits;
+        far(shift * 1e3, most * 1e3, "mm", "--max-shift").or_else(|| {
+            far(
+                tilt.to_degrees(),
+                most_tilt.to_degrees(),
+                "deg",
+                "--max-tilt",
+            )
+        })
     }
 }
 

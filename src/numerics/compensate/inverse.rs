@@ -15,12 +15,28 @@ const POSTURES: u32 = 60;
 pub fn inverse(robot: &RobotModel, wanted: &ToolGoal, from: &[f64]) -> Vec<f64> {
     let mut best: Option<(f64, Vec<f64>)> = None;
     for number in 0..=POSTURES {
-        let start = if number == 0 { from.to_vec() } else { spread(robot, number) };
+        let start = if number == 0 {
+            from.to_vec()
+        } else {
+            spread(robot, number)
+        };
         let found = least_change(&mut Nominal::new(robot), wanted, &start, &start);
-        let q: Vec<f64> = found.q.iter().enumerate().map(|(joint, q)| into_limits(robot, joint, *q)).collect();
-        let outside: f64 = q.iter().enumerate().map(|(joint, q)| excess(robot, joint, *q)).sum();
-        let cost =
-            if found.residual + found.turn < REACHED { outside } else { 1e3 * (1.0 + found.residual + found.turn) + outside };
+        let q: Vec<f64> = found
+            .q
+            .iter()
+            .enumerate()
+            .map(|(joint, q)| into_limits(robot, joint, *q))
+            .collect();
+        let outside: f64 = q
+            .iter()
+            .enumerate()
+            .map(|(joint, q)| excess(robot, joint, *q))
+            .sum();
+        let cost = if found.residual + found.turn < REACHED {
+            outside
+        } else {
+            1e3 * (1.0 + found.residual + found.turn) + outside
+        };
         if best.as_ref().is_none_or(|(least, _)| cost < *least) {
             best = Some((cost, q));
         }
@@ -33,7 +49,10 @@ pub fn inverse(robot: &RobotModel, wanted: &ToolGoal, from: &[f64]) -> Vec<f64> 
 
 fn limits(robot: &RobotModel, joint: usize) -> [f64; 2] {
     let half = if robot.is_revolute(joint) { PI } else { 1.0 };
-    robot.description().joints[joint].limits.filter(|[a, b]| a.is_finite() && b.is_finite()).unwrap_or([-half, half])
+    robot.description().joints[joint]
+        .limits
+        .filter(|[a, b]| a.is_finite() && b.is_finite())
+        .unwrap_or([-half, half])
 }
 
 /// Halton's sequence over the limits: the same postures everywhere.
@@ -64,5 +83,7 @@ pub(super) fn into_limits(robot: &RobotModel, joint: usize, q: f64) -> f64 {
 }
 
 pub(super) fn excess(robot: &RobotModel, joint: usize, q: f64) -> f64 {
-    robot.description().joints[joint].limits.map_or(0.0, |[lower, upper]| (lower - q).max(q - upper).max(0.0))
+    robot.description().joints[joint]
+        .limits
+        .map_or(0.0, |[lower, upper]| (lower - q).max(q - upper).max(0.0))
 }

@@ -14,7 +14,10 @@ pub fn load_matters(arm: &IdentifiedArm, heaviest: f64) -> bool {
     let robot = &arm.model().robot;
     let poses = spread(robot, POSES);
     let bare = Circumstance::unknown(robot.joints());
-    let loaded = Circumstance { payload: heaviest, ..bare.clone() };
+    let loaded = Circumstance {
+        payload: heaviest,
+        ..bare.clone()
+    };
     let mut reach = arm.reach();
     (0..poses.rows()).any(|row| {
         reach.under(&bare);

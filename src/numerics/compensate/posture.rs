@@ -37,14 +37,20 @@ pub(super) struct CountedArm<'a> {
 impl StatedPosture {
     /// That of any posture.
     fn free(joints: usize) -> Self {
-        Self { ranges: vec![None; joints], sides: [None; 3] }
+        Self {
+            ranges: vec![None; joints],
+            sides: [None; 3],
+        }
     }
 
     /// A posture of so many joints; `quadrants` are joints, from 0, with their quarter turns: 0 from 0 to 90 deg, -1 from -90 to 0 deg.
     pub fn of_quadrants(joints: usize, quadrants: &[(usize, i32)]) -> Self {
         let mut out = Self::free(joints);
         for (joint, quadrant) in quadrants {
-            out.ranges[*joint] = Some([f64::from(*quadrant) * FRAC_PI_2, (f64::from(*quadrant) + 1.0) * FRAC_PI_2]);
+            out.ranges[*joint] = Some([
+                f64::from(*quadrant) * FRAC_PI_2,
+                (f64::from(*quadrant) + 1.0) * FRAC_PI_2,
+            ]);
         }
         out
     }
@@ -60,13 +66,25 @@ impl StatedPosture {
 
     /// A posture near these joints.
     pub fn near(q: &[f64]) -> Self {
-        Self { ranges: q.iter().map(|q| Some([q - NEAR, q + NEAR])).collect(), ..Self::free(q.len()) }
+        Self {
+            ranges: q.iter().map(|q| Some([q - NEAR, q + NEAR])).collect(),
+            ..Self::free(q.len())
+        }
     }
 
     /// By the sign of every joint: whether it is below 0.
     pub fn of_signs(below: &[bool]) -> Self {
-        let range = |below: &bool| Some(if *below { [f64::NEG_INFINITY, 0.0] } else { [0.0, f64::INFINITY] });
-        Self { ranges: below.iter().map(range).collect(), ..Self::free(below.len()) }
+        let range = |below: &bool| {
+            Some(if *below {
+                [f64::NEG_INFINITY, 0.0]
+            } else {
+                [0.0, f64::INFINITY]
+            })
+        };
+        Self {
+            ranges: below.iter().map(range).collect(),
+            ..Self::free(below.len())
+        }
     }
 
     /// A posture of so many joints, on these sides.
@@ -81,17 +99,20 @@ impl StatedPosture {
 
     /// Whether joints (rad or m, of the robot file) are in this posture.
     fn holds(&self, arm: &CountedArm, q: &[f64]) -> bool {
-        (0..q.len()).all(|joint| self.holds_joint(arm, q, joint)) && self.is_on_sides(arm, q, &self.sides)
+        (0..q.len()).all(|joint| self.holds_joint(arm, q, joint))
+            && self.is_on_sides(arm, q, &self.sides)
     }
 
     fn is_on_sides(&self, arm: &CountedArm, q: &[f64], stated: &StatedSides) -> bool {
-        arm.sides.is_none_or(|sides| sides.hold(arm.robot, q, stated))
+        arm.sides
+            .is_none_or(|sides| sides.hold(arm.robot, q, stated))
     }
 
     fn holds_joint(&self, arm: &CountedArm, q: &[f64], joint: usize) -> bool {
         let mut numbers = q.to_vec();
         arm.convention.to_controller(&mut numbers);
-        self.ranges[joint].is_none_or(|[low, high]| (low - BORDER..=high + BORDER).contains(&numbers[joint]))
+        self.ranges[joint]
+            .is_none_or(|[low, high]| (low - BORDER..=high + BORDER).contains(&numbers[joint]))
     }
 
     /// Joints of the robot file by whole turns in their ranges and limits, of several the nearest to `from`; none where that is not in the
@@ -103,11 +124,20 @@ impl StatedPosture {
                 q[joint] += turns * TAU;
                 q
             };
-            let fits = |q: &Vec<f64>| self.holds_joint(arm, q, joint) && excess(arm.robot, joint, q[joint]) == 0.0;
+            let fits = |q: &Vec<f64>| {
+                self.holds_joint(arm, q, joint) && excess(arm.robot, joint, q[joint]) == 0.0
+            };
             let apart = |q: &Vec<f64>| (q[joint] - from[joint]).abs();
-            q = [0.0, 1.0, -1.0].map(by).into_iter().filter(fits).min_by(|a, b| apart(a).total_cmp(&apart(b)))?;
+            q = [0.0, 1.0, -1.0]
+                .map(by)
+                .into_iter()
+                .filter(fits)
+                .min_by(|a, b| apart(a).total_cmp(&apart(b)))?;
         }
-        let inside = q.iter().enumerate().all(|(joint, q)| excess(arm.robot, joint, *q) == 0.0);
+        let inside = q
+            .iter()
+            .enumerate()
+            .all(|(joint, q)| excess(arm.robot, joint, *q) == 0.0);
         (inside && self.holds(arm, &q)).then_some(q)
     }
 
@@ -116,8 +146,12 @@ impl StatedPosture {
         let mut numbers = q.to_vec();
         arm.convention.to_controller(&mut numbers);
         for (joint, number) in numbers.iter_mut().enumerate() {
-            let Some([low, high]) = self.ranges[joint] else { continue };
-            let [lower, upper] = arm.robot.description().joints[joint].limits.unwrap_or([-PI, PI]);
+            let Some([low, high]) = self.ranges[joint] else {
+                continue;
+            };
+            let [lower, upper] = arm.robot.description().joints[joint]
+                .limits
+                .unwrap_or([-PI, PI]);
             let share = ((q[joint] - lower) / (upper - lower)).clamp(0.0, 1.0);
             // An open range is searched over half a turn.
             let low = if low.is_finite() { low } else { high - PI };
@@ -129,29 +163,52 @@ impl StatedPosture {
     }
 
     /// Starts of a search: `from`, then others on the stated sides of shoulder and elbow.
-    fn starts<'a>(&'a self, arm: &'a CountedArm, from: &'a [f64]) -> impl Iterator<Item = Vec<f64>> + 'a {
+    fn starts<'a>(
+        &'a self,
+        arm: &'a CountedArm,
+        from: &'a [f64],
+    ) -> impl Iterator<Item = Vec<f64>> + 'a {
         let [shoulder, elbow, _] = self.sides;
         let others = (0..=SPREAD).map(move |number| match number {
             0 => self.start(arm, from),
             number => self.start(arm, &spread(arm.robot, number)),
         });
-        let beside = others.filter(move |start| self.is_on_sides(arm, start, &[shoulder, elbow, None]));
+        let beside =
+            others.filter(move |start| self.is_on_sides(arm, start, &[shoulder, elbow, None]));
         std::iter::once(from.to_vec()).chain(beside.take(STARTS))
     }
 }
 
 /// Joint positions (rad or m) at which the nominal robot is where it is wanted, in a posture and within its limits, near to `from`
 /// where that leads there; none where none was found.
-pub(super) fn inverse_in(arm: &CountedArm, wanted: &ToolGoal, from: &[f64], posture: &StatedPosture) -> Option<Vec<f64>> {
+pub(super) fn inverse_in(
+    arm: &CountedArm,
+    wanted: &ToolGoal,
+    from: &[f64],
+    posture: &StatedPosture,
+) -> Option<Vec<f64>> {
     let robot = arm.robot;
     let solved = |start: &[f64]| {
         let found = least_change(&mut Nominal::new(robot), wanted, start, start);
         let reached = found.residual + found.turn < REACHED;
-        reached.then(|| found.q.iter().enumerate().map(|(joint, q)| into_limits(robot, joint, *q)).collect::<Vec<f64>>())
+        reached.then(|| {
+            found
+                .q
+                .iter()
+                .enumerate()
+                .map(|(joint, q)| into_limits(robot, joint, *q))
+                .collect::<Vec<f64>>()
+        })
     };
     let in_posture = |q: &Vec<f64>| posture.turned(arm, q.clone(), from);
-    posture.starts(arm, from).filter_map(|start| solved(&start)).find_map(|q| {
-        let turned_over = || arm.sides.and_then(|sides| solved(&sides.turned_over(robot, &q)));
-        in_posture(&q).or_else(|| turned_over().as_ref().and_then(in_posture))
-    })
+    posture
+        .starts(arm, from)
+        .filter_map(|start| solved(&start))
+        .find_map(|q| {
+            let turned_over = || {
+                arm.sides
+                    .and_then(|sides| solved(&sides.turned_over(robot, &q)))
+            };
+            in_posture(&q).or_else(|| turned_over().as_ref().and_then(in_posture))
+        })
 }

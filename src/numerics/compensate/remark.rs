@@ -34,13 +34,22 @@ pub enum Remark {
 impl Remark {
     /// That a correction is doubtful, where it is.
     pub(super) fn of_certainty(certainty: &CorrectionUncertainty) -> Option<Self> {
-        let uncertain = || Self::Uncertain(certainty.correction, certainty.u95, certainty.finding.clone());
+        let uncertain = || {
+            Self::Uncertain(
+                certainty.correction,
+                certainty.u95,
+                certainty.finding.clone(),
+            )
+        };
         certainty.is_doubtful().then(uncertain)
     }
 
     /// Which findings a target uses beyond what was fitted.
     pub(super) fn beyond(certainty: &CorrectionUncertainty) -> impl Iterator<Item = Self> {
-        certainty.beyond.iter().map(|(finding, variable)| Self::BeyondFitted(finding.clone(), variable.clone()))
+        certainty
+            .beyond
+            .iter()
+            .map(|(finding, variable)| Self::BeyondFitted(finding.clone(), variable.clone()))
     }
 }
 
@@ -54,12 +63,25 @@ impl fmt::Display for Remark {
             Self::BeyondLimits(joints) => write!(f, "joint {} beyond its limits", numbered(joints)),
             Self::BeyondMeasured(what) => what.fmt(f),
             Self::Uncertain(correction, u95, finding) => {
-                write!(f, "the correction of {:.3} mm is uncertain by {:.3} mm", correction * 1e3, u95 * 1e3)?;
-                finding.as_ref().map_or(Ok(()), |finding| write!(f, ", most of it by {finding}"))
+                write!(
+                    f,
+                    "the correction of {:.3} mm is uncertain by {:.3} mm",
+                    correction * 1e3,
+                    u95 * 1e3
+                )?;
+                finding
+                    .as_ref()
+                    .map_or(Ok(()), |finding| write!(f, ", most of it by {finding}"))
             }
-            Self::BeyondFitted(finding, variable) => write!(f, "{finding} beyond the {variable} that was fitted"),
+            Self::BeyondFitted(finding, variable) => {
+                write!(f, "{finding} beyond the {variable} that was fitted")
+            }
             Self::NotStated(findings) => {
-                write!(f, "{} without what no target states (moves before it, other circumstances)", findings.join(", "))
+                write!(
+                    f,
+                    "{} without what no target states (moves before it, other circumstances)",
+                    findings.join(", ")
+                )
             }
             Self::Faded(share) => write!(f, "learned correction applies by {:.0} %", 100.0 * share),
             Self::Refused(reason) => write!(f, "refused: {reason}"),

@@ -12,7 +12,12 @@ use crate::spatial::Twist;
 use nalgebra::{Matrix3, Vector3};
 
 /// Effects that a description holds.
-const RIGID: [&str; 4] = [names::BASE_FRAME, names::TOOL_OFFSET, names::LINK_GEOMETRY, names::JOINT_OFFSET];
+const RIGID: [&str; 4] = [
+    names::BASE_FRAME,
+    names::TOOL_OFFSET,
+    names::LINK_GEOMETRY,
+    names::JOINT_OFFSET,
+];
 
 /// What a rigid description leaves out.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,7 +58,10 @@ pub fn rigid(model: &Model) -> RobotDescription {
 }
 
 fn parts(twist: &Twist) -> (Vector3<f64>, Vector3<f64>) {
-    (twist.fixed_rows::<3>(0).into(), twist.fixed_rows::<3>(3).into())
+    (
+        twist.fixed_rows::<3>(0).into(),
+        twist.fixed_rows::<3>(3).into(),
+    )
 }
 
 /// The model with the parameters that `keep` refuses (by effect and place) at zero.
@@ -73,7 +81,11 @@ pub fn left_out(model: &Model, data: &Measurements) -> Vec<LeftOut> {
     let whole = model.predict(data);
     let specs = model.stack.specs();
     let mut places: Vec<(String, Place)> = Vec::new();
-    for (effect, range) in model.stack.effects().filter(|(effect, _)| !RIGID.contains(&effect.name())) {
+    for (effect, range) in model
+        .stack
+        .effects()
+        .filter(|(effect, _)| !RIGID.contains(&effect.name()))
+    {
         for k in range.filter(|k| model.x[*k] != 0.0) {
             let key = (effect.name().to_string(), specs[k].place);
             if !places.contains(&key) {
@@ -85,7 +97,12 @@ pub fn left_out(model: &Model, data: &Measurements) -> Vec<LeftOut> {
         .map(|(effect, place)| {
             let without = only(model, |e, p| e != effect || p != place).predict(data);
             let (rms, most) = apart(whole.iter().zip(&without).map(|(a, b)| (a - b).norm()));
-            LeftOut { effect, place, rms, most }
+            LeftOut {
+                effect,
+                place,
+                rms,
+                most,
+            }
         })
         .collect();
     out.sort_by(|a, b| b.rms.total_cmp(&a.rms));
@@ -111,5 +128,12 @@ fn apart(lengths: impl Iterator<Item = f64>) -> (f64, f64) {
     for length in lengths {
         (sum, count, most) = (sum + length * length, count + 1.0, most.max(length));
     }
-    (if count > 0.0 { f64::sqrt(sum / count) } else { 0.0 }, most)
+    (
+        if count > 0.0 {
+            f64::sqrt(sum / count)
+        } else {
+            0.0
+        },
+        most,
+    )
 }

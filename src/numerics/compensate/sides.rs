@@ -39,19 +39,29 @@ pub type StatedSides = [Option<bool>; 3];
 impl ArmSides {
     /// The sides of an arm as a controller counts its joints; none where the arm has no such sides.
     pub fn of(robot: &RobotModel, convention: &JointConvention) -> Option<Self> {
-        let elbowed = robot.joints() == 6 && (0..6).all(|joint| robot.is_revolute(joint)) && robot.is_parallel(1, 2);
+        let elbowed = robot.joints() == 6
+            && (0..6).all(|joint| robot.is_revolute(joint))
+            && robot.is_parallel(1, 2);
         if !elbowed || robot.is_parallel(0, 1) {
             return None;
         }
         let wrist_centre = meeting(robot, [3, 4, 5])?;
         let mut zero = vec![0.0; 6];
         convention.to_robot(&mut zero);
-        let plain = Self { wrist_centre, signs: [1.0; 3], in_line: 1.0 };
+        let plain = Self {
+            wrist_centre,
+            signs: [1.0; 3],
+            in_line: 1.0,
+        };
         let [front, ..] = plain.at(robot, &zero);
         let (_, in_line) = plain.wrist(robot, &zero);
         let sign = convention.sign();
         let clear = front.abs() > CLEAR && in_line.abs() > CLEAR;
-        clear.then_some(Self { wrist_centre, signs: [front.signum(), sign[2], sign[4]], in_line: in_line.signum() })
+        clear.then_some(Self {
+            wrist_centre,
+            signs: [front.signum(), sign[2], sign[4]],
+            in_line: in_line.signum(),
+        })
     }
 
     /// Where joints (rad, of the robot file) stand: above zero in front of axis 1, beyond the line from axis 2 to 3, with joint 5 turned upwards.
@@ -61,21 +71,28 @@ impl ArmSides {
         let third = second * robot.motion(2, &Travel::new(q[2]));
         let centre = third.point(&self.wrist_centre);
         let out = centre - robot.point(0);
-        let forward = (first.rotation * robot.axis(1)).cross(robot.axis(0)).normalize();
+        let forward = (first.rotation * robot.axis(1))
+            .cross(robot.axis(0))
+            .normalize();
         let (shoulder, elbow) = (first.point(robot.point(1)), second.point(robot.point(2)));
         let axis = second.rotation * robot.axis(2);
         let across = |v: Vector3<f64>| (v - axis * axis.dot(&v)).normalize();
-        let beyond = across(elbow - shoulder).cross(&across(centre - elbow)).dot(&axis);
-        [self.signs[0] * out.dot(&forward) / out.norm(), self.signs[1] * beyond, self.signs[2] * self.wrist(robot, q).0]
+        let beyond = across(elbow - shoulder)
+            .cross(&across(centre - elbow))
+            .dot(&axis);
+        [
+            self.signs[0] * out.dot(&forward) / out.norm(),
+            self.signs[1] * beyond,
+            self.signs[2] * self.wrist(robot, q).0,
+        ]
     }
 
     /// Whether joints stand on these sides; at a border both hold.
     pub fn hold(&self, robot: &RobotModel, q: &[f64], stated: &StatedSides) -> bool {
         let shares = self.at(robot, q);
-        shares
-            .iter()
-            .zip(stated)
-            .all(|(share, stated)| stated.is_none_or(|above| (*share > 0.0) == above || share.abs() < BORDER))
+        shares.iter().zip(stated).all(|(share, stated)| {
+            stated.is_none_or(|above| (*share > 0.0) == above || share.abs() < BORDER)
+        })
     }
 
     /// The joints at which the same pose is reached with the wrist turned over.
@@ -93,7 +110,10 @@ impl ArmSides {
         let forearm = robot.axis(3);
         let fourth = robot.motion(3, &Travel::new(q[3]));
         let fifth = fourth * robot.motion(4, &Travel::new(q[4]));
-        let (bend, last) = (fourth.rotation * robot.axis(4), fifth.rotation * robot.axis(5) * self.in_line);
+        let (bend, last) = (
+            fourth.rotation * robot.axis(4),
+            fifth.rotation * robot.axis(5) * self.in_line,
+        );
         (forearm.cross(&last).dot(&bend), forearm.dot(&last))
     }
 }
@@ -101,11 +121,15 @@ impl ArmSides {
 /// The point in which axes meet at the zero pose, if they do.
 fn meeting(robot: &RobotModel, joints: [usize; 3]) -> Option<Vector3<f64>> {
     let (mut normal, mut side) = (Matrix3::zeros(), Vector3::zeros());
-    let across = |joint: usize| Matrix3::identity() - robot.axis(joint) * robot.axis(joint).transpose();
+    let across =
+        |joint: usize| Matrix3::identity() - robot.axis(joint) * robot.axis(joint).transpose();
     for joint in joints {
         normal += across(joint);
         side += across(joint) * robot.point(joint);
     }
     let point = normal.try_inverse()? * side;
-    joints.iter().all(|joint| (across(*joint) * (point - robot.point(*joint))).norm() < MEET).then_some(point)
+    joints
+        .iter()
+        .all(|joint| (across(*joint) * (point - robot.point(*joint))).norm() < MEET)
+        .then_some(point)
 }

@@ -32,7 +32,11 @@ impl<'a> Nominal<'a> {
     /// The solver of an arm.
     pub fn new(robot: &'a RobotModel) -> Self {
         let joints = robot.joints();
-        Self { robot, before: vec![Pose::identity(); joints], velocities: vec![Twist::zeros(); joints] }
+        Self {
+            robot,
+            before: vec![Pose::identity(); joints],
+            velocities: vec![Twist::zeros(); joints],
+        }
     }
 }
 
@@ -44,7 +48,8 @@ impl Chain for Nominal<'_> {
             pose = pose * self.robot.motion(joint, &Travel::new(*travel));
         }
         let tool = pose * *self.robot.home();
-        for (joint, (velocity, before)) in self.velocities.iter_mut().zip(&self.before).enumerate() {
+        for (joint, (velocity, before)) in self.velocities.iter_mut().zip(&self.before).enumerate()
+        {
             *velocity = self.robot.velocity(joint, before, &tool.translation);
         }
         tool
@@ -101,7 +106,13 @@ pub struct CommandSolution {
 impl CommandSolution {
     fn of(q: Vec<f64>, before: &Twist, error: &Twist, iterations: usize) -> Self {
         let [before, residual] = [before, error].map(|error| error.fixed_rows::<3>(0).norm());
-        Self { q, residual, turn: error.fixed_rows::<3>(3).norm(), before, iterations }
+        Self {
+            q,
+            residual,
+            turn: error.fixed_rows::<3>(3).norm(),
+            before,
+            iterations,
+        }
     }
 }
 
@@ -109,7 +120,12 @@ impl CommandSolution {
 ///
 /// Redundant joints change least from `home`, in the sum of squares (1 rad counts as 1 m). Steps are damped where the arm
 /// is singular; what cannot be reached is approached, and the residual says so.
-pub fn least_change(chain: &mut impl Chain, wanted: &ToolGoal, start: &[f64], home: &[f64]) -> CommandSolution {
+pub fn least_change(
+    chain: &mut impl Chain,
+    wanted: &ToolGoal,
+    start: &[f64],
+    home: &[f64],
+) -> CommandSolution {
     let mut q = start.to_vec();
     let before = wanted.error(&chain.place(&q));
     let mut error = before;
@@ -159,7 +175,9 @@ fn solved(jacobian: &[Twist], damping: f64, rest: &Twist, oriented: bool) -> Opt
             normal += column * column.transpose();
         }
         let damping = damping * normal.trace() / 6.0;
-        (normal + Matrix6::identity() * damping).cholesky()?.solve(rest)
+        (normal + Matrix6::identity() * damping)
+            .cholesky()?
+            .solve(rest)
     } else {
         let mut normal = Matrix3::zeros();
         for column in jacobian {
@@ -168,10 +186,15 @@ fn solved(jacobian: &[Twist], damping: f64, rest: &Twist, oriented: bool) -> Opt
         }
         let damping = damping * normal.trace() / 3.0;
         let rest: Vector3<f64> = rest.fixed_rows::<3>(0).into();
-        let v = (normal + Matrix3::identity() * damping).cholesky()?.solve(&rest);
+        let v = (normal + Matrix3::identity() * damping)
+            .cholesky()?
+            .solve(&rest);
         Vector6::new(v.x, v.y, v.z, 0.0, 0.0, 0.0)
     };
-    solved.iter().all(|value| value.is_finite()).then_some(solved)
+    solved
+        .iter()
+        .all(|value| value.is_finite())
+        .then_some(solved)
 }
 
 /// d + J^T (J J^T + damping)^-1 (e - J d), d the way back to `home`; none where the arm is singular.
@@ -191,17 +214,38 @@ fn step<'a>(
     }
     let solved = solved(jacobian, damping, &rest, oriented)?;
     let raw = move |(column, d): (&Twist, f64)| d + column.dot(&solved);
-    let largest = jacobian.iter().zip(q.iter().zip(home).map(back)).map(raw).fold(0.0, |most: f64, by| most.max(by.abs()));
-    let share = if largest > STRIDE { STRIDE / largest } else { 1.0 };
-    Some(jacobian.iter().zip(q.iter().zip(home).map(back)).map(raw).map(move |by| by * share))
+    let largest = jacobian
+        .iter()
+        .zip(q.iter().zip(home).map(back))
+        .map(raw)
+        .fold(0.0, |most: f64, by| most.max(by.abs()));
+    let share = if largest > STRIDE {
+        STRIDE / largest
+    } else {
+        1.0
+    };
+    Some(
+        jacobian
+            .iter()
+            .zip(q.iter().zip(home).map(back))
+            .map(raw)
+            .map(move |by| by * share),
+    )
 }
 
 /// The paper's mapping: the predicted error at `home`, taken back once by the nominal Jacobian.
-pub fn one_step(real: &mut impl Chain, nominal: &mut Nominal, wanted: &ToolGoal, home: &[f64]) -> CommandSolution {
+pub fn one_step(
+    real: &mut impl Chain,
+    nominal: &mut Nominal,
+    wanted: &ToolGoal,
+    home: &[f64],
+) -> CommandSolution {
     let error = wanted.error(&real.place(home));
     nominal.place(home);
     let jacobian = nominal.velocities();
-    let damped = [0.0, 1e-9, 1e-6].into_iter().find_map(|damping| step(jacobian, damping, (&error, wanted.oriented), home, home));
+    let damped = [0.0, 1e-9, 1e-6]
+        .into_iter()
+        .find_map(|damping| step(jacobian, damping, (&error, wanted.oriented), home, home));
     let q: Vec<f64> = match damped {
         Some(step) => home.iter().zip(step).map(|(from, by)| from + by).collect(),
         None => home.to_vec(),

@@ -51,8 +51,14 @@ impl Uncertainty {
     /// The uncertainty that the parameters of `arm` have; what belonged to the measurement alone does not blur the arm.
     pub fn new(arm: &IdentifiedArm, covariance: Covariance, scatter: Scatter) -> Self {
         let mut row = vec![None; arm.model().x.len()];
-        covariance.parameters().iter().enumerate().for_each(|(k, parameter)| row[*parameter] = Some(k));
-        arm.of_the_measurement().iter().for_each(|parameter| row[*parameter] = None);
+        covariance
+            .parameters()
+            .iter()
+            .enumerate()
+            .for_each(|(k, parameter)| row[*parameter] = Some(k));
+        arm.of_the_measurement()
+            .iter()
+            .for_each(|parameter| row[*parameter] = None);
         let specs = arm.model().stack.specs();
         let mut names = vec![String::new(); specs.len()];
         let mut sources: Vec<Source> = Vec::new();
@@ -62,11 +68,22 @@ impl Uncertainty {
                 let Some(row) = row[k] else { continue };
                 match sources.iter_mut().find(|source| source.name == names[k]) {
                     Some(source) => source.parameters.push(row),
-                    None => sources.push(Source { name: names[k].clone(), parameters: vec![row] }),
+                    None => sources.push(Source {
+                        name: names[k].clone(),
+                        parameters: vec![row],
+                    }),
                 }
             }
         }
-        Self { covariance, scatter, row, sources, names, usual: 0.0, instrument: 0.0 }
+        Self {
+            covariance,
+            scatter,
+            row,
+            sources,
+            names,
+            usual: 0.0,
+            instrument: 0.0,
+        }
     }
 
     /// The same, beside what is usual at the poses of a recording and what its instrument leaves open.
@@ -98,7 +115,10 @@ impl Uncertainty {
 
     /// Derivatives (m per unit) of the point at command `q` along a direction, by the parameters of the covariance.
     pub(super) fn along(&self, reach: &mut Reach, q: &[f64], along: &Vector3<f64>) -> Vec<f64> {
-        self.jacobian(reach, q).iter().map(|derivative| derivative.dot(along)).collect()
+        self.jacobian(reach, q)
+            .iter()
+            .map(|derivative| derivative.dot(along))
+            .collect()
     }
 
     /// Variance (m2) along the direction of these derivatives.
@@ -108,14 +128,21 @@ impl Uncertainty {
 
     /// The same by each effect at a place alone.
     pub(super) fn by_effect(&self, derivatives: &[f64]) -> Vec<(String, f64)> {
-        let variance = |source: &Source| self.covariance.along_rows(derivatives, &source.parameters);
-        self.sources.iter().map(|source| (source.name.clone(), variance(source))).collect()
+        let variance =
+            |source: &Source| self.covariance.along_rows(derivatives, &source.parameters);
+        self.sources
+            .iter()
+            .map(|source| (source.name.clone(), variance(source)))
+            .collect()
     }
 
     /// At command `q`, under the circumstances that `reach` is set to.
     pub fn at(&self, reach: &mut Reach, q: &[f64]) -> PositionUncertainty {
         let parameters = self.of_parameters(reach, q);
-        let Scatter { unexplained, repeatability } = self.scatter;
+        let Scatter {
+            unexplained,
+            repeatability,
+        } = self.scatter;
         let mut all = parameters + Matrix3::from_diagonal_element(unexplained * unexplained);
         for law in reach.beyond_fitted(q) {
             all += law.covariance;
@@ -123,6 +150,9 @@ impl Uncertainty {
         if repeatability > 0.0 {
             all += reach.joint_scatter(q) * (repeatability * repeatability);
         }
-        PositionUncertainty { sigma: parameters.trace().sqrt(), u95: radius_95(all.trace(), all.norm_squared()) }
+        PositionUncertainty {
+            sigma: parameters.trace().sqrt(),
+            u95: radius_95(all.trace(), all.norm_squared()),
+        }
     }
 }

@@ -48,17 +48,22 @@ pub const TABLES: &[&[CriterionRow]] = &[
 /// Whether something came by a criterion since the last call, by the names of rooms and criteria.
 #[cfg(feature = "ablate")]
 pub fn reached() -> Vec<String> {
-    all().filter(|(_, criterion)| criterion.was_reached()).map(|(name, _)| name.to_string()).collect()
+    all()
+        .filter(|(_, criterion)| criterion.was_reached())
+        .map(|(name, _)| name.to_string())
+        .collect()
 }
 
 /// Scales one criterion (`room::NAME`) and leaves all others as they are; `false` where there is none of that name.
 #[cfg(feature = "ablate")]
 pub fn scale(name: &str, factor: CriterionFactor) -> bool {
     all().for_each(|(_, criterion)| criterion.scale(CriterionFactor::One));
-    all().find(|(own, _)| *own == name).is_some_and(|(_, criterion)| {
-        criterion.scale(factor);
-        true
-    })
+    all()
+        .find(|(own, _)| *own == name)
+        .is_some_and(|(_, criterion)| {
+            criterion.scale(factor);
+            true
+        })
 }
 
 #[cfg(feature = "ablate")]

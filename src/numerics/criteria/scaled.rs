@@ -25,7 +25,12 @@ pub(super) struct CriterionScaling<T: 'static> {
 
 impl<T> CriterionScaling<T> {
     pub(super) const fn new() -> Self {
-        Self { half: OnceLock::new(), double: OnceLock::new(), factor: AtomicU8::new(0), reached: AtomicBool::new(false) }
+        Self {
+            half: OnceLock::new(),
+            double: OnceLock::new(),
+            factor: AtomicU8::new(0),
+            reached: AtomicBool::new(false),
+        }
     }
 
     pub(super) fn scale(&self, factor: CriterionFactor) {
@@ -57,7 +62,11 @@ pub trait Scaled: Send + Sync + 'static {
 
 impl Scaled for f64 {
     fn scaled(&self, factor: f64) -> Self {
-        if (0.5..2.0).contains(self) && *self != 0.5 && *self != 1.0 { 1.0 + (self - 1.0) * factor } else { self * factor }
+        if (0.5..2.0).contains(self) && *self != 0.5 && *self != 1.0 {
+            1.0 + (self - 1.0) * factor
+        } else {
+            self * factor
+        }
     }
 }
 

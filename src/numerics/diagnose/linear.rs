@@ -7,7 +7,9 @@ use faer::{Accum, Mat, MatMut, MatRef, Par};
 pub(crate) fn orthonormal(matrix: &Mat<f64>) -> Mat<f64> {
     let norm = |j: usize| matrix.col(j).norm_l2().max(1e-300);
     let scale: Vec<f64> = (0..matrix.ncols()).map(norm).collect();
-    let scaled = Mat::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)] / scale[j]);
+    let scaled = Mat::from_fn(matrix.nrows(), matrix.ncols(), |i, j| {
+        matrix[(i, j)] / scale[j]
+    });
     scaled.qr().compute_thin_Q()
 }
 
@@ -20,8 +22,22 @@ pub(crate) fn project(basis: MatRef<'_, f64>, columns: &mut [f64]) {
     }
     let mut share = Mat::zeros(basis.ncols(), count);
     let mut columns = MatMut::from_column_major_slice_mut(columns, rows, count);
-    matmul(share.as_mut(), Accum::Replace, basis.transpose(), columns.as_ref(), 1.0, Par::Seq);
-    matmul(columns.as_mut(), Accum::Add, basis, share.as_ref(), -1.0, Par::Seq);
+    matmul(
+        share.as_mut(),
+        Accum::Replace,
+        basis.transpose(),
+        columns.as_ref(),
+        1.0,
+        Par::Seq,
+    );
+    matmul(
+        columns.as_mut(),
+        Accum::Add,
+        basis,
+        share.as_ref(),
+        -1.0,
+        Par::Seq,
+    );
 }
 
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {

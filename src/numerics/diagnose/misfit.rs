@@ -47,9 +47,19 @@ struct RowMisfit {
 fn left(model: &Model, data: &Measurements, of: Dimension) -> Vec<RowMisfit> {
     let kinds = kinds(data);
     let one = |scratch: &mut PlacementBuffers, row: usize| {
-        let placed = model.stack.place(&model.robot, data, row, &model.x, scratch);
-        let mut left = RowMisfit { size: None, whitened: 0.0, stated: 0.0, values: 0 };
-        for residual in kinds.iter().filter_map(|kind| Residual::of(*kind, data, row, &placed)) {
+        let placed = model
+            .stack
+            .place(&model.robot, data, row, &model.x, scratch);
+        let mut left = RowMisfit {
+            size: None,
+            whitened: 0.0,
+            stated: 0.0,
+            values: 0,
+        };
+        for residual in kinds
+            .iter()
+            .filter_map(|kind| Residual::of(*kind, data, row, &placed))
+        {
             if residual.dimension() == of {
                 left.size.get_or_insert(residual.error.norm());
             }
@@ -59,21 +69,42 @@ fn left(model: &Model, data: &Measurements, of: Dimension) -> Vec<RowMisfit> {
         }
         left
     };
-    (0..data.rows()).into_par_iter().map_init(|| model.stack.scratch(&model.robot), one).collect()
+    (0..data.rows())
+        .into_par_iter()
+        .map_init(|| model.stack.scratch(&model.robot), one)
+        .collect()
 }
 
 fn rms(values: impl Iterator<Item = Option<f64>>) -> f64 {
-    let (sum, count) = values.flatten().fold((0.0, 0usize), |(sum, count), value| (sum + value.powi(2), count + 1));
+    let (sum, count) = values.flatten().fold((0.0, 0usize), |(sum, count), value| {
+        (sum + value.powi(2), count + 1)
+    });
     (sum / count.max(1) as f64).sqrt()
 }
 
 impl Misfit {
     /// The misfit of a model, of which so many parameters were estimated.
-    pub fn of(question: &Question, data: &Measurements, screening: &Screening, model: &Model, parameters: usize) -> Self {
+    pub fn of(
+        question: &Question,
+        data: &Measurements,
+        screening: &Screening,
+        model: &Model,
+        parameters: usize,
+    ) -> Self {
         let dimension = dimension(data, question.fit);
         let left = left(model, data, dimension);
-        let aside: Vec<usize> = screening.suspects.iter().filter(|s| !s.used()).map(|s| s.row).collect();
-        let judges: Vec<usize> = question.validate.iter().copied().filter(|row| !aside.contains(row)).collect();
+        let aside: Vec<usize> = screening
+            .suspects
+            .iter()
+            .filter(|s| !s.used())
+            .map(|s| s.row)
+            .collect();
+        let judges: Vec<usize> = question
+            .validate
+            .iter()
+            .copied()
+            .filter(|row| !aside.contains(row))
+            .collect();
         let held_out = !judges.is_empty();
         let kept = &screening.kept;
         let size = |rows: &[usize]| rms(rows.iter().map(|row| left[*row].size));
@@ -89,16 +120,26 @@ impl Misfit {
         let not_carried = not_carried.then(|| size(&judges));
         let rows = if held_out { judges } else { kept.clone() };
         let stated: f64 = kept.iter().map(|row| left[*row].stated).sum();
-        let of_dimension = || KINDS.iter().filter(|kind| kind.about().dimension == dimension);
+        let of_dimension = || {
+            KINDS
+                .iter()
+                .filter(|kind| kind.about().dimension == dimension)
+        };
         Self {
             dimension,
             held_out,
             noise_floor: rms(rows.iter().map(|row| noise(data, *row, dimension))),
-            instrument: rms(rows.iter().map(|row| of_dimension().find_map(|kind| kind.instrument(data, *row)))),
+            instrument: rms(rows
+                .iter()
+                .map(|row| of_dimension().find_map(|kind| kind.instrument(data, *row)))),
             leftover_rms: size(kept),
             chi_square: whitened(kept) / freedom,
             beyond_stated: stated / freedom,
-            figures: if held_out { question.validate.to_vec() } else { rows.clone() },
+            figures: if held_out {
+                question.validate.to_vec()
+            } else {
+                rows.clone()
+            },
             left_here: size(&rows),
             not_carried,
             rows,
@@ -115,7 +156,13 @@ impl Misfit {
     }
 
     /// What a verdict on it rests on; `nameless` where something was found that has no name.
-    pub fn ground(&self, data: &Measurements, basis: NoiseBasis, repeats: usize, nameless: bool) -> Ground {
+    pub fn ground(
+        &self,
+        data: &Measurements,
+        basis: NoiseBasis,
+        repeats: usize,
+        nameless: bool,
+    ) -> Ground {
         Ground {
             dimension: self.dimension,
             agrees: self.chi_square <= *MAX_CHI_SQUARE_OF_STRUCTURE,

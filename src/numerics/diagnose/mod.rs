@@ -31,8 +31,9 @@ pub use round::BASE;
 pub use separate::{DiagnosedModel, discrimination_problem};
 pub use setup::wrong_setup;
 pub use types::{
-    ClosedForm, Diagnosis, ErrorLengths, Evidence, ExplainedCell, ExplainedShare, Finding, JointRepeatability, Located,
-    Probabilities, Question, RivalCause, SETUP, SpectrumLine, VerdictKind,
+    ClosedForm, Diagnosis, ErrorLengths, Evidence, ExplainedCell, ExplainedShare, Finding,
+    JointRepeatability, Located, Probabilities, Question, RivalCause, SETUP, SpectrumLine,
+    VerdictKind,
 };
 pub use verdict::other_means;
 
@@ -52,13 +53,19 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
     if let Some(wrong) = setup::wrong_when_identified(question, &now) {
         return wrong;
     }
-    let before = now.model.error_sizes(&fitter.data, fitter.scale.dimension());
+    let before = now
+        .model
+        .error_sizes(&fitter.data, fitter.scale.dimension());
     tell(words::of_the_base(&now, &fitter));
     let mut rounds = Rounds::default();
     loop {
         let view = RoundView::of(&now, &fitter);
         let round = rounds.search(&view, &now, &fitter);
-        tell(words::of_a_round(rounds.count(), round.cells, round.causes.iter().map(|cause| &cause.form)));
+        tell(words::of_a_round(
+            rounds.count(),
+            round.cells,
+            round.causes.iter().map(|cause| &cause.form),
+        ));
         let next = fitter.fit(&now.model, round.causes);
         let Some(answer) = round.answer else {
             now = next;
@@ -69,7 +76,10 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         // time may be that noise.
         let settled = answer.nothing_last > *SETTLED;
         let asked = settled || fitter.data.in_motion(&next.screening.kept) || next.follows_time();
-        if let Some(change) = asked.then(|| correlation_left_by(&next, &answer, &fitter)).flatten() {
+        if let Some(change) = asked
+            .then(|| correlation_left_by(&next, &answer, &fitter))
+            .flatten()
+        {
             let kept = fitter.take_correlation(&change, &next);
             tell(words::of_the_correlation(&fitter));
             now = fitter.fit(&next.model, kept);
@@ -89,22 +99,41 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         let (next, answer) = without_empty(fitter.held_to_a_common_size(next), answer, &fitter);
         tell(words::of_the_conclusions(&next));
         let survey = view.survey();
-        let last =
-            LastRound { view: &view, survey: &survey, state: next, answer, scale: fitter.scale, without: question.without };
+        let last = LastRound {
+            view: &view,
+            survey: &survey,
+            state: next,
+            answer,
+            scale: fitter.scale,
+            without: question.without,
+        };
         return conclude(last, &fitter, &before);
     }
 }
 
 /// The model without findings that are smaller than their own uncertainty in the whole model: the search saw a linear picture of each.
 fn without_empty(state: FitState, mut answer: Answer, fitter: &Fitter) -> (FitState, Answer) {
-    let is_empty = |found: &FoundCell| state.square_size(&found.members).is_some_and(|size| size < 1.0);
-    let gone: Vec<usize> = answer.found.iter().filter(|found| is_empty(found)).flat_map(|found| found.members.clone()).collect();
+    let is_empty = |found: &FoundCell| {
+        state
+            .square_size(&found.members)
+            .is_some_and(|size| size < 1.0)
+    };
+    let gone: Vec<usize> = answer
+        .found
+        .iter()
+        .filter(|found| is_empty(found))
+        .flat_map(|found| found.members.clone())
+        .collect();
     if gone.is_empty() || state.screening.apart.is_some() {
         return (state, answer);
     }
-    let kept: Vec<usize> = (0..state.causes.len()).filter(|i| !gone.contains(i)).collect();
+    let kept: Vec<usize> = (0..state.causes.len())
+        .filter(|i| !gone.contains(i))
+        .collect();
     let causes = kept.iter().map(|i| state.causes[*i].clone()).collect();
-    answer.found.retain(|found| !found.members.iter().any(|i| gone.contains(i)));
+    answer
+        .found
+        .retain(|found| !found.members.iter().any(|i| gone.contains(i)));
     for member in answer.found.iter_mut().flat_map(|found| &mut found.members) {
         *member = kept.iter().position(|i| i == member).unwrap_or(*member);
     }

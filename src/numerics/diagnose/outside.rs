@@ -15,8 +15,16 @@ pub fn against_simulation(
     simulated: &[[f64; 3]],
     rows: &[usize],
 ) -> Option<Measurements> {
-    let there = |row: &usize| simulated.get(*row).is_some_and(|point| point.iter().all(|axis| axis.is_finite()));
-    let used: Vec<usize> = rows.iter().copied().filter(|row| there(row) && data.has_point(*row)).collect();
+    let there = |row: &usize| {
+        simulated
+            .get(*row)
+            .is_some_and(|point| point.iter().all(|axis| axis.is_finite()))
+    };
+    let used: Vec<usize> = rows
+        .iter()
+        .copied()
+        .filter(|row| there(row) && data.has_point(*row))
+        .collect();
     if used.len() < 3 {
         return None;
     }
@@ -31,7 +39,8 @@ pub fn against_simulation(
     for row in 0..data.rows() {
         if there(&row) {
             let rigid = (robot.last_body(data.q(row)) * *robot.mounting_at(data, row)).translation;
-            out.points.shift(row, base.point(&rigid) - frame.point(&point(row)));
+            out.points
+                .shift(row, base.point(&rigid) - frame.point(&point(row)));
         } else {
             out.points.forget(row);
         }

@@ -44,12 +44,24 @@ pub(super) struct Solution {
 
 impl<'p, 'a> FormRegression<'p, 'a> {
     /// `jacobian` is that of the model, which has `forms` besides; `residual` is what it leaves without these.
-    pub fn new(problem: &'p WhitenedProblem<'a>, jacobian: &Mat<f64>, forms: &[&Form], residual: &[f64]) -> Self {
+    pub fn new(
+        problem: &'p WhitenedProblem<'a>,
+        jacobian: &Mat<f64>,
+        forms: &[&Form],
+        residual: &[f64],
+    ) -> Self {
         let base = orthonormal(jacobian);
         let mut residual = residual.to_vec();
         project(base.as_ref(), &mut residual);
-        let mut basis: Vec<Vec<f64>> = (0..base.ncols()).map(|j| base.col_as_slice(j).to_vec()).collect();
-        for column in forms.iter().flat_map(|form| problem.columns(form)).collect::<Vec<f64>>().chunks(residual.len().max(1)) {
+        let mut basis: Vec<Vec<f64>> = (0..base.ncols())
+            .map(|j| base.col_as_slice(j).to_vec())
+            .collect();
+        for column in forms
+            .iter()
+            .flat_map(|form| problem.columns(form))
+            .collect::<Vec<f64>>()
+            .chunks(residual.len().max(1))
+        {
             let mut column = column.to_vec();
             scale(&mut column);
             // Twice: what rounding leaves of a long basis.
@@ -59,9 +71,20 @@ impl<'p, 'a> FormRegression<'p, 'a> {
                 basis.push(column);
             }
         }
-        let travels = (0..problem.robot.joints()).map(|_| OnceLock::new()).collect();
+        let travels = (0..problem.robot.joints())
+            .map(|_| OnceLock::new())
+            .collect();
         let square = dot(&residual, &residual);
-        Self { problem, rows: ModelledRows { basis, residual, square: None }, travels, square }
+        Self {
+            problem,
+            rows: ModelledRows {
+                basis,
+                residual,
+                square: None,
+            },
+            travels,
+            square,
+        }
     }
 
     /// How many numbers the rows measured.
@@ -72,7 +95,9 @@ impl<'p, 'a> FormRegression<'p, 'a> {
     /// The fit of one form.
     pub fn solve(&self, form: &Form) -> Solution {
         match self.problem.plain_travel(form) {
-            Some((joint, values)) => self.travels[joint].get_or_init(|| self.along(joint)).solve(values),
+            Some((joint, values)) => self.travels[joint]
+                .get_or_init(|| self.along(joint))
+                .solve(values),
             None => self.rows.solve(self.problem.columns(form)),
         }
     }
@@ -89,7 +114,11 @@ impl<'p, 'a> FormRegression<'p, 'a> {
         for level in 0..*LEVELS {
             let near = form.near(survey, level);
             let gains = self.gains(&near);
-            match gains.into_iter().zip(near).max_by(|a, b| a.0.total_cmp(&b.0)) {
+            match gains
+                .into_iter()
+                .zip(near)
+                .max_by(|a, b| a.0.total_cmp(&b.0))
+            {
                 Some((gain, other)) if gain > most * (1.0 + 1e-9) => (most, form) = (gain, other),
                 _ => idle += 1,
             }
@@ -115,7 +144,11 @@ impl ModelledRows {
     fn solve(&self, mut own: Vec<f64>) -> Solution {
         let rows = self.residual.len().max(1);
         let weighed = |column: &[f64]| match &self.square {
-            Some(square) => column.iter().zip(square).map(|(value, square)| value * square).collect(),
+            Some(square) => column
+                .iter()
+                .zip(square)
+                .map(|(value, square)| value * square)
+                .collect(),
             None => column.to_vec(),
         };
         let scales: Vec<f64> = own
@@ -127,8 +160,10 @@ impl ModelledRows {
             })
             .collect();
         let columns: Vec<&[f64]> = own.chunks(rows).collect();
-        let absorbed: Vec<Vec<f64>> =
-            columns.iter().map(|column| self.basis.iter().map(|other| dot(other, column)).collect()).collect();
+        let absorbed: Vec<Vec<f64>> = columns
+            .iter()
+            .map(|column| self.basis.iter().map(|other| dot(other, column)).collect())
+            .collect();
         let mut gram = DMatrix::zeros(columns.len(), columns.len());
         for (i, column) in columns.iter().enumerate() {
             let weighed = weighed(column);
@@ -137,13 +172,28 @@ impl ModelledRows {
                 gram[(j, i)] = gram[(i, j)];
             }
         }
-        let along = DVector::from_iterator(columns.len(), columns.iter().map(|column| dot(column, &self.residual)));
-        let SymmetricEigen { eigenvectors, eigenvalues } = gram.symmetric_eigen();
+        let along = DVector::from_iterator(
+            columns.len(),
+            columns.iter().map(|column| dot(column, &self.residual)),
+        );
+        let SymmetricEigen {
+            eigenvectors,
+            eigenvalues,
+        } = gram.symmetric_eigen();
         let along = eigenvectors.tr_mul(&along);
-        let seen: Vec<usize> = (0..columns.len()).filter(|k| eigenvalues[*k] > INVISIBLE).collect();
-        let of = |k: usize| seen.iter().map(|i| eigenvectors[(k, *i)] * along[*i] / eigenvalues[*i]).sum::<f64>();
+        let seen: Vec<usize> = (0..columns.len())
+            .filter(|k| eigenvalues[*k] > INVISIBLE)
+            .collect();
+        let of = |k: usize| {
+            seen.iter()
+                .map(|i| eigenvectors[(k, *i)] * along[*i] / eigenvalues[*i])
+                .sum::<f64>()
+        };
         Solution {
-            gain: seen.iter().map(|i| along[*i].powi(2) / eigenvalues[*i]).sum(),
+            gain: seen
+                .iter()
+                .map(|i| along[*i].powi(2) / eigenvalues[*i])
+                .sum(),
             rank: seen.len(),
             coefficients: (0..columns.len()).map(|k| of(k) / scales[k]).collect(),
         }
@@ -153,13 +203,18 @@ impl ModelledRows {
 /// Takes off a column what it has of another one of unit length.
 fn subtract(column: &mut [f64], other: &[f64]) {
     let share = dot(column, other);
-    column.iter_mut().zip(other).for_each(|(value, other)| *value -= share * other);
+    column
+        .iter_mut()
+        .zip(other)
+        .for_each(|(value, other)| *value -= share * other);
 }
 
 /// Scales a column to unit length; returns the length that it had.
 fn scale(column: &mut [f64]) -> f64 {
     let length = dot(column, column).sqrt();
-    column.iter_mut().for_each(|value| *value /= length.max(1e-300));
+    column
+        .iter_mut()
+        .for_each(|value| *value /= length.max(1e-300));
     length
 }
 
@@ -170,19 +225,35 @@ mod tests {
     #[test]
     fn a_fit_beside_a_model_is_the_joint_one_and_what_is_invisible_is_left_out() {
         // y = 3 a - 2 b + 0.5 c, where the model absorbs a, and d = b + c is not seen given b and c.
-        let column =
-            |k: usize| -> Vec<f64> { (0..9).map(|i| ((3 * i + 5 * k * k + 2 * i * k) % 7) as f64 / 7.0 - 0.4).collect() };
+        let column = |k: usize| -> Vec<f64> {
+            (0..9)
+                .map(|i| ((3 * i + 5 * k * k + 2 * i * k) % 7) as f64 / 7.0 - 0.4)
+                .collect()
+        };
         let (mut a, b, c) = (column(0), column(1), column(2));
-        let y: Vec<f64> = (0..9).map(|i| 3.0 * a[i] - 2.0 * b[i] + 0.5 * c[i]).collect();
+        let y: Vec<f64> = (0..9)
+            .map(|i| 3.0 * a[i] - 2.0 * b[i] + 0.5 * c[i])
+            .collect();
         scale(&mut a);
         let mut residual = y.clone();
         subtract(&mut residual, &a);
-        let rows = ModelledRows { basis: vec![a], residual: residual.clone(), square: None };
+        let rows = ModelledRows {
+            basis: vec![a],
+            residual: residual.clone(),
+            square: None,
+        };
         let found = rows.solve([b.clone(), c.clone()].concat());
-        assert!((found.coefficients[0] + 2.0).abs() < 1e-9 && (found.coefficients[1] - 0.5).abs() < 1e-9);
+        assert!(
+            (found.coefficients[0] + 2.0).abs() < 1e-9
+                && (found.coefficients[1] - 0.5).abs() < 1e-9
+        );
         assert!(found.rank == 2 && (found.gain - dot(&residual, &residual)).abs() < 1e-9);
         let d: Vec<f64> = b.iter().zip(&c).map(|(b, c)| b + c).collect();
         let again = rows.solve([b, c, d].concat());
-        assert!(again.rank == 2 && (again.gain - found.gain).abs() < 1e-9, "{}", again.rank);
+        assert!(
+            again.rank == 2 && (again.gain - found.gain).abs() < 1e-9,
+            "{}",
+            again.rank
+        );
     }
 }

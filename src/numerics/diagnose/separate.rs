@@ -6,7 +6,9 @@ use super::table::forms_of;
 use super::types::Question;
 use super::whitened::WhitenedProblem;
 use crate::criteria::cells::USUAL;
-use crate::effect::{DeclaredCause, Effect, EffectContext, EffectStack, Form, Load, Place, Survey, arm_effect};
+use crate::effect::{
+    DeclaredCause, Effect, EffectContext, EffectStack, Form, Load, Place, Survey, arm_effect,
+};
 use crate::estimate::Model;
 use crate::estimate::choose::{Alternative, DiscriminationProblem};
 use crate::robot::Measurements;
@@ -30,43 +32,88 @@ pub fn discrimination_problem(
     finding: &[Form],
     (effect, place): (&str, Place),
 ) -> Result<(DiscriminationProblem, Form), String> {
-    let DiagnosedModel { model, data, rows, free } = *diagnosed;
+    let DiagnosedModel {
+        model,
+        data,
+        rows,
+        free,
+    } = *diagnosed;
     let problem = WhitenedProblem::new(model, data, rows.to_vec());
     let (torque, compliance) = (problem.torques(), compliance(model));
     let survey = Survey::new(&model.robot, data, rows, &torque, &compliance);
     let is = |form: &&Form| finding.contains(*form);
-    let of = |(other, range): (&dyn Effect, std::ops::Range<usize>)| other.form().filter(is).map(|_| range);
+    let of = |(other, range): (&dyn Effect, std::ops::Range<usize>)| {
+        other.form().filter(is).map(|_| range)
+    };
     let own: Vec<usize> = model.stack.effects().filter_map(of).flatten().collect();
     let mut caused = vec![0.0; problem.residual_rows()];
-    for (form, range) in model.stack.effects().filter_map(|(other, range)| Some((other.form().filter(is)?, range))) {
-        for (column, size) in problem.columns(form).chunks(problem.residual_rows()).zip(&model.x[range]) {
-            caused.iter_mut().zip(column).for_each(|(sum, value)| *sum += value * size);
+    for (form, range) in model
+        .stack
+        .effects()
+        .filter_map(|(other, range)| Some((other.form().filter(is)?, range)))
+    {
+        for (column, size) in problem
+            .columns(form)
+            .chunks(problem.residual_rows())
+            .zip(&model.x[range])
+        {
+            caused
+                .iter_mut()
+                .zip(column)
+                .for_each(|(sum, value)| *sum += value * size);
         }
     }
     let nuisances: Vec<usize> = free.iter().copied().filter(|k| !own.contains(k)).collect();
     let jacobian = problem.jacobian(&nuisances);
-    let open: Vec<f64> = problem.residual.iter().zip(&caused).map(|(left, own)| left + own).collect();
+    let open: Vec<f64> = problem
+        .residual
+        .iter()
+        .zip(&caused)
+        .map(|(left, own)| left + own)
+        .collect();
     // As diagnosis names rivals: by what fits in place of the finding.
     let beside = FormRegression::new(&problem, &jacobian, &[], &open);
-    let others =
-        rivals(&survey, &problem, model, (effect, place))?.into_iter().filter(|form| finding != std::slice::from_ref(form));
+    let others = rivals(&survey, &problem, model, (effect, place))?
+        .into_iter()
+        .filter(|form| finding != std::slice::from_ref(form));
     let fitted = others.map(|form| (beside.solve(&form), form));
     let best = fitted.min_by(|a, b| score(&beside, &a.0).total_cmp(&score(&beside, &b.0)));
-    let Some((_, form)) = best else { return Err(format!("no form of {effect} at {place} can be tried")) };
+    let Some((_, form)) = best else {
+        return Err(format!("no form of {effect} at {place} can be tried"));
+    };
     let rival = beside.refined(form, &survey);
     let both = with(model, &rival);
-    let held = both.stack.effects().find(|(other, _)| other.form() == Some(&rival));
+    let held = both
+        .stack
+        .effects()
+        .find(|(other, _)| other.form() == Some(&rival));
     let of_rival: Vec<usize> = held.map(|(_, range)| range.collect()).unwrap_or_default();
     let sizes = own.iter().map(|k| model.x[*k]).collect();
-    let sides =
-        [Alternative { parameters: own, sizes }, Alternative { parameters: of_rival, sizes: beside.solve(&rival).coefficients }];
-    Ok((DiscriminationProblem { model: both, nuisances, sides }, rival))
+    let sides = [
+        Alternative {
+            parameters: own,
+            sizes,
+        },
+        Alternative {
+            parameters: of_rival,
+            sizes: beside.solve(&rival).coefficients,
+        },
+    ];
+    Ok((
+        DiscriminationProblem {
+            model: both,
+            nuisances,
+            sides,
+        },
+        rival,
+    ))
 }
 
 /// How well one form fits, with a penalty for every parameter (Schwarz, 1978).
 fn score(beside: &FormRegression, of: &Solution) -> f64 {
     let rows = beside.rows() as f64;
-    rows * ((beside.square - of.gain).max(f64::MIN_POSITIVE) / rows).ln() + rows.ln() * of.rank as f64
+    rows * ((beside.square - of.gain).max(f64::MIN_POSITIVE) / rows).ln()
+        + rows.ln() * of.rank as f64
 }
 
 /// The forms of this name at this place, as diagnosis has them.
@@ -76,7 +123,9 @@ fn rivals(
     model: &Model,
     (effect, place): (&str, Place),
 ) -> Result<Vec<Form>, String> {
-    let declared = |(other, _): (&dyn Effect, std::ops::Range<usize>)| Some(other.form()?.declared()?.declaration());
+    let declared = |(other, _): (&dyn Effect, std::ops::Range<usize>)| {
+        Some(other.form()?.declared()?.declaration())
+    };
     let mut own: Vec<&'static DeclaredCause> = model.stack.effects().filter_map(declared).collect();
     own.dedup_by_key(|cause| &cause.declaration().name);
     let question = Question {
@@ -97,25 +146,42 @@ fn rivals(
             return format!("{effect} cannot be tried on this robot and recording");
         }
         let allowed: Vec<String> = places.iter().map(Place::to_string).collect();
-        format!("{effect} has no place `{place}` here; allowed: {}", allowed.join(", "))
+        format!(
+            "{effect} has no place `{place}` here; allowed: {}",
+            allowed.join(", ")
+        )
     })
 }
 
 /// The model with one form more, at zero, where it has it not.
 fn with(model: &Model, form: &Form) -> Model {
-    if model.stack.effects().any(|(other, _)| other.form() == Some(form)) {
+    if model
+        .stack
+        .effects()
+        .any(|(other, _)| other.form() == Some(form))
+    {
         return model.clone();
     }
-    let setting = EffectContext { base: *model.stack.base(), load: Load::GravityTorque };
+    let setting = EffectContext {
+        base: *model.stack.base(),
+        load: Load::GravityTorque,
+    };
     let again = |effect: &dyn Effect| -> Option<Box<dyn Effect>> {
         match effect.form() {
             Some(form) => Some(Box::new(form.clone())),
             None => arm_effect(effect.name(), &setting),
         }
     };
-    let mut effects: Vec<Box<dyn Effect>> = model.stack.effects().filter_map(|(effect, _)| again(effect)).collect();
+    let mut effects: Vec<Box<dyn Effect>> = model
+        .stack
+        .effects()
+        .filter_map(|(effect, _)| again(effect))
+        .collect();
     effects.push(Box::new(form.clone()));
-    let mut both = Model::nominal(model.robot.clone(), EffectStack::new(&model.robot, setting.base, effects));
+    let mut both = Model::nominal(
+        model.robot.clone(),
+        EffectStack::new(&model.robot, setting.base, effects),
+    );
     both.x[..model.x.len()].copy_from_slice(&model.x);
     both
 }

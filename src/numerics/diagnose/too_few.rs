@@ -8,12 +8,23 @@ use crate::estimate::{FitOptions, fit_screened};
 /// The nominal robot with its base where the rows to fit have it.
 pub(crate) fn not_asked(question: &Question) -> Diagnosis {
     let (start, candidates) = on_its_base(question);
-    let options = FitOptions { rows: question.fit, candidates: &candidates };
-    let diagnosis = unasked(question, VerdictKind::NotAsked, fit_screened(&start, question.data, &options, question.set));
+    let options = FitOptions {
+        rows: question.fit,
+        candidates: &candidates,
+    };
+    let diagnosis = unasked(
+        question,
+        VerdictKind::NotAsked,
+        fit_screened(&start, question.data, &options, question.set),
+    );
     let rows = question.fit.len();
     let too_few = format!(
         "what the simulation lacks: {rows} rows were fitted, at least {} are needed to separate it from geometry",
         *FEWEST
     );
-    Diagnosis { after: diagnosis.before, not_observable: vec![too_few], ..diagnosis }
+    Diagnosis {
+        after: diagnosis.before,
+        not_observable: vec![too_few],
+        ..diagnosis
+    }
 }

@@ -236,7 +236,12 @@ pub struct ErrorLengths {
 impl ErrorLengths {
     /// The errors of some rows; `None` where none of them has any.
     pub(crate) fn of(sizes: &[Option<f64>], rows: &[usize]) -> Option<Self> {
-        Self::of_lengths(&rows.iter().filter_map(|row| sizes[*row]).collect::<Vec<_>>())
+        Self::of_lengths(
+            &rows
+                .iter()
+                .filter_map(|row| sizes[*row])
+                .collect::<Vec<_>>(),
+        )
     }
 
     /// The errors of lengths, m, or of angles, rad; `None` where there are none.

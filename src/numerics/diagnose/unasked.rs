@@ -8,7 +8,9 @@ use crate::estimate::{Fitted, Model, Screening, align};
 
 /// The nominal robot on its base, and the parameters of that base.
 pub(super) fn on_its_base(question: &Question) -> (Model, Vec<usize>) {
-    let Question { robot, data, fit, .. } = *question;
+    let Question {
+        robot, data, fit, ..
+    } = *question;
     let base = align(robot, data, fit);
     let effect: Box<dyn Effect> = Box::new(BasePlacement::new(base));
     let start = Model::nominal(robot.clone(), EffectStack::new(robot, base, vec![effect]));
@@ -44,7 +46,10 @@ pub(super) fn unasked(
         gate_first: None,
         formulas: Vec::new(),
         gate_last: None,
-        repeatability: JointRepeatability { sigma: 0.0, repeats: 0 },
+        repeatability: JointRepeatability {
+            sigma: 0.0,
+            repeats: 0,
+        },
         located_before: Located::default(),
         located_after: Located::default(),
         kept: screening.kept.clone(),

@@ -16,13 +16,22 @@ pub(super) fn base_parameters(regressor: &ReducedRegressor) -> Vec<usize> {
         let mut column = Vec::with_capacity(n * rows);
         for joint in 0..n {
             let course = regressor.course(joint, number);
-            if course.is_empty() { column.resize(column.len() + rows, 0.0) } else { column.extend_from_slice(course) }
+            if course.is_empty() {
+                column.resize(column.len() + rows, 0.0)
+            } else {
+                column.extend_from_slice(course)
+            }
         }
         column
     };
-    let mut columns: Vec<(usize, Vec<f64>)> = (0..INERTIAL_NUMBERS * n).map(|number| (number, stacked(number))).collect();
+    let mut columns: Vec<(usize, Vec<f64>)> = (0..INERTIAL_NUMBERS * n)
+        .map(|number| (number, stacked(number)))
+        .collect();
     let size = |column: &[f64]| column.iter().map(|value| value * value).sum::<f64>().sqrt();
-    let largest = columns.iter().map(|(_, column)| size(column)).fold(0.0, f64::max);
+    let largest = columns
+        .iter()
+        .map(|(_, column)| size(column))
+        .fold(0.0, f64::max);
     columns.retain(|(_, column)| size(column) > IDLE * largest);
     for (_, column) in &mut columns {
         let scale = size(column);
@@ -30,7 +39,9 @@ pub(super) fn base_parameters(regressor: &ReducedRegressor) -> Vec<usize> {
     }
     let mut kept = Vec::new();
     // Modified Gram-Schmidt, largest remainder first: the diagonal of R falls as in Householder's.
-    while let Some(next) = (0..columns.len()).max_by(|a, b| size(&columns[*a].1).total_cmp(&size(&columns[*b].1))) {
+    while let Some(next) =
+        (0..columns.len()).max_by(|a, b| size(&columns[*a].1).total_cmp(&size(&columns[*b].1)))
+    {
         let (number, mut direction) = columns.swap_remove(next);
         let left = size(&direction);
         if left <= DEPENDENT {
@@ -39,7 +50,10 @@ pub(super) fn base_parameters(regressor: &ReducedRegressor) -> Vec<usize> {
         direction.iter_mut().for_each(|value| *value /= left);
         for (_, column) in &mut columns {
             let share: f64 = column.iter().zip(&direction).map(|(a, b)| a * b).sum();
-            column.iter_mut().zip(&direction).for_each(|(value, along)| *value -= share * along);
+            column
+                .iter_mut()
+                .zip(&direction)
+                .for_each(|(value, along)| *value -= share * along);
         }
         kept.push(number);
     }
@@ -59,11 +73,26 @@ mod tests {
 
     /// Base parameters of six turning joints that have nothing in common, the first one along `first`.
     fn count(first: Vector3<f64>) -> usize {
-        let axes = [[0.2, -1.0, 0.3], [0.1, -0.9, 0.5], [1.0, 0.2, -0.4], [0.3, 1.0, 0.6], [0.9, -0.1, 0.7]];
+        let axes = [
+            [0.2, -1.0, 0.3],
+            [0.1, -0.9, 0.5],
+            [1.0, 0.2, -0.4],
+            [0.3, 1.0, 0.6],
+            [0.9, -0.1, 0.7],
+        ];
         let arm = DynamicArm {
-            axes: [first.normalize()].into_iter().chain(axes.map(|axis| Vector3::from(axis).normalize())).collect(),
+            axes: [first.normalize()]
+                .into_iter()
+                .chain(axes.map(|axis| Vector3::from(axis).normalize()))
+                .collect(),
             points: (0..6)
-                .map(|joint| Point3::new(0.3 * f64::from(joint), 0.1 * f64::from(joint % 3), 0.4 - 0.05 * f64::from(joint)))
+                .map(|joint| {
+                    Point3::new(
+                        0.3 * f64::from(joint),
+                        0.1 * f64::from(joint % 3),
+                        0.4 - 0.05 * f64::from(joint),
+                    )
+                })
                 .collect(),
             prismatic: vec![false; 6],
             tool: Point3::new(2.0, 0.0, 0.3),
@@ -72,7 +101,11 @@ mod tests {
             gravity: Vector3::new(0.0, 0.0, -9.81),
             ratio: vec![100.0; 6],
             coupled: Vec::new(),
-            tolerance: InertialTolerance { mass_relative: 0.01, centre: 0.001, inertia_relative: 0.05 },
+            tolerance: InertialTolerance {
+                mass_relative: 0.01,
+                centre: 0.001,
+                inertia_relative: 0.05,
+            },
         };
         let rows = 1500;
         let angle = |row: usize, joint: usize| {
@@ -82,7 +115,9 @@ mod tests {
         let recording = TorqueRecording {
             joints: 6,
             time: (0..rows).map(|row| row as f64 / 100.0).collect(),
-            position: (0..rows).flat_map(|row| (0..6).map(move |joint| angle(row, joint))).collect(),
+            position: (0..rows)
+                .flat_map(|row| (0..6).map(move |joint| angle(row, joint)))
+                .collect(),
             velocity: None,
             torque: vec![0.0; 6 * rows],
             temperature: None,

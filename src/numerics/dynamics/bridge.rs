@@ -28,9 +28,13 @@ impl Bridged {
         let lost = lost(&recording, usual);
         let rows = recording.rows();
         if lost.is_empty() {
-            return Self { recording, origin: (0..rows).collect() };
+            return Self {
+                recording,
+                origin: (0..rows).collect(),
+            };
         }
-        let mut origin = Vec::with_capacity(rows + lost.iter().map(|(_, count)| count).sum::<usize>());
+        let mut origin =
+            Vec::with_capacity(rows + lost.iter().map(|(_, count)| count).sum::<usize>());
         // How far each row is from its origin to the next recorded row, as a share, and steps of the clock between these.
         let mut shares = Vec::with_capacity(origin.capacity());
         let mut next = lost.iter().peekable();
@@ -46,7 +50,12 @@ impl Bridged {
         let between = |values: &[f64], width: usize| -> Vec<f64> {
             let row = |(row, (share, steps)): (&usize, &(f64, f64))| {
                 let weights = weights(&recording, *row, *share, *steps);
-                (0..width).map(move |entry| weights.iter().map(|(at, weight)| weight * values[at * width + entry]).sum())
+                (0..width).map(move |entry| {
+                    weights
+                        .iter()
+                        .map(|(at, weight)| weight * values[at * width + entry])
+                        .sum()
+                })
             };
             origin.iter().zip(&shares).flat_map(row).collect()
         };
@@ -55,20 +64,37 @@ impl Bridged {
             joints: n,
             time: between(&recording.time, 1),
             position: between(&recording.position, n),
-            velocity: recording.velocity.as_ref().map(|velocity| between(velocity, n)),
+            velocity: recording
+                .velocity
+                .as_ref()
+                .map(|velocity| between(velocity, n)),
             torque: between(&recording.torque, n),
-            temperature: recording.temperature.as_ref().map(|temperature| between(temperature, 1)),
-            trajectory: origin.iter().map(|row| recording.trajectory[*row]).collect(),
+            temperature: recording
+                .temperature
+                .as_ref()
+                .map(|temperature| between(temperature, 1)),
+            trajectory: origin
+                .iter()
+                .map(|row| recording.trajectory[*row])
+                .collect(),
             held_out: origin.iter().map(|row| recording.held_out[*row]).collect(),
             from_current: recording.from_current,
         };
-        Self { recording: whole, origin }
+        Self {
+            recording: whole,
+            origin,
+        }
     }
 }
 
 /// A sentence where rows are made up.
 pub(super) fn remark(made_up: usize) -> Option<String> {
-    (made_up > 0).then(|| format!("bridged between their neighbours: {} of the clock without a row", counted(made_up, "step")))
+    (made_up > 0).then(|| {
+        format!(
+            "bridged between their neighbours: {} of the clock without a row",
+            counted(made_up, "step")
+        )
+    })
 }
 
 /// Recorded rows with their weights of a row that is so far from one to the next: of the cubic through two on either side, since a straight
@@ -78,24 +104,40 @@ fn weights(recording: &TorqueRecording, row: usize, share: f64, steps: f64) -> V
         return vec![(row, 1.0)];
     }
     let trajectory = &recording.trajectory;
-    let goes_on = row >= 1 && row + 2 < trajectory.len() && trajectory[row - 1] == trajectory[row + 2];
+    let goes_on =
+        row >= 1 && row + 2 < trajectory.len() && trajectory[row - 1] == trajectory[row + 2];
     let nodes: Vec<(usize, f64)> = if goes_on {
-        vec![(row - 1, -1.0), (row, 0.0), (row + 1, steps), (row + 2, steps + 1.0)]
+        vec![
+            (row - 1, -1.0),
+            (row, 0.0),
+            (row + 1, steps),
+            (row + 2, steps + 1.0),
+        ]
     } else {
         vec![(row, 0.0), (row + 1, steps)]
     };
     let at = share * steps;
     let weight = |own: f64| -> f64 {
-        nodes.iter().filter(|(_, other)| *other != own).map(|(_, other)| (at - other) / (own - other)).product()
+        nodes
+            .iter()
+            .filter(|(_, other)| *other != own)
+            .map(|(_, other)| (at - other) / (own - other))
+            .product()
     };
-    nodes.iter().map(|(row, own)| (*row, weight(*own))).collect()
+    nodes
+        .iter()
+        .map(|(row, own)| (*row, weight(*own)))
+        .collect()
 }
 
 /// Rows after which some are lost, and how many.
 fn lost(recording: &TorqueRecording, usual: f64) -> Vec<(usize, usize)> {
     let time = &recording.time;
     let after = |row: usize| {
-        let (first, last) = (row.saturating_sub(AROUND), (row + 1 + AROUND).min(time.len() - 1));
+        let (first, last) = (
+            row.saturating_sub(AROUND),
+            (row + 1 + AROUND).min(time.len() - 1),
+        );
         if recording.trajectory[first] != recording.trajectory[last] {
             return None;
         }
@@ -104,5 +146,7 @@ fn lost(recording: &TorqueRecording, usual: f64) -> Vec<(usize, usize)> {
         let count = here.min(around);
         (count >= 1.0 && count <= MOST as f64).then_some((row, count as usize))
     };
-    (0..time.len().saturating_sub(1)).filter_map(after).collect()
+    (0..time.len().saturating_sub(1))
+        .filter_map(after)
+        .collect()
 }

@@ -17,19 +17,43 @@ pub(super) fn arm() -> DynamicArm {
     let rod = |mass: f64, x: f64, length: f64| {
         let across = mass * length * length / 12.0;
         let inertia = Matrix3::from_diagonal(&Vector3::new(0.1 * across, across, across));
-        Inertial { mass, centre: Point3::new(x, 0.02, 0.4), inertia }
+        Inertial {
+            mass,
+            centre: Point3::new(x, 0.02, 0.4),
+            inertia,
+        }
     };
     DynamicArm {
         axes: vec![Vector3::z(), Vector3::y(), Vector3::y(), Vector3::x()],
-        points: [[0.0, 0.0, 0.0], [0.1, 0.0, 0.4], [0.6, 0.0, 0.4], [0.8, 0.0, 0.4]].map(Point3::from).to_vec(),
+        points: [
+            [0.0, 0.0, 0.0],
+            [0.1, 0.0, 0.4],
+            [0.6, 0.0, 0.4],
+            [0.8, 0.0, 0.4],
+        ]
+        .map(Point3::from)
+        .to_vec(),
         prismatic: vec![false; 4],
         tool: Point3::new(1.1, 0.0, 0.4),
-        links: Some(vec![rod(20.0, 0.05, 0.2), rod(12.0, 0.35, 0.5), rod(6.0, 0.7, 0.2), rod(3.0, 0.95, 0.3)]),
-        payload: Some(Inertial { mass: 2.0, centre: Point3::new(1.15, 0.05, 0.42), inertia: Matrix3::identity() * 0.01 }),
+        links: Some(vec![
+            rod(20.0, 0.05, 0.2),
+            rod(12.0, 0.35, 0.5),
+            rod(6.0, 0.7, 0.2),
+            rod(3.0, 0.95, 0.3),
+        ]),
+        payload: Some(Inertial {
+            mass: 2.0,
+            centre: Point3::new(1.15, 0.05, 0.42),
+            inertia: Matrix3::identity() * 0.01,
+        }),
         gravity: Vector3::new(0.0, 0.0, -9.81),
         ratio: vec![100.0; 4],
         coupled: Vec::new(),
-        tolerance: InertialTolerance { mass_relative: 0.01, centre: 0.0015, inertia_relative: 0.05 },
+        tolerance: InertialTolerance {
+            mass_relative: 0.01,
+            centre: 0.0015,
+            inertia_relative: 0.05,
+        },
     }
 }
 
@@ -59,7 +83,11 @@ fn moved(joint: usize, time: f64) -> (f64, f64, f64) {
     for (number, size) in [0.5, 0.25, 0.12].into_iter().enumerate() {
         let pace = 0.45 * (1.0 + 0.31 * joint as f64) * (1.0 + 1.37 * number as f64);
         let (sine, cosine) = (pace * time + number as f64 + joint as f64).sin_cos();
-        sum = (sum.0 + size * sine, sum.1 + size * pace * cosine, sum.2 - size * pace * pace * sine);
+        sum = (
+            sum.0 + size * sine,
+            sum.1 + size * pace * cosine,
+            sum.2 - size * pace * pace * sine,
+        );
     }
     sum
 }
@@ -68,12 +96,21 @@ fn moved(joint: usize, time: f64) -> (f64, f64, f64) {
 type Row = (usize, f64, f64, f64, f64, f64);
 
 /// A recording of `real` with a torque added at each joint; torques come `latency` s late.
-pub(super) fn record(real: &DynamicArm, latency: f64, extra: &dyn Fn(Row) -> f64) -> TorqueRecording {
+pub(super) fn record(
+    real: &DynamicArm,
+    latency: f64,
+    extra: &dyn Fn(Row) -> f64,
+) -> TorqueRecording {
     record_at(real, RATE, latency, extra)
 }
 
 /// The same at a rate, Hz.
-pub(super) fn record_at(real: &DynamicArm, rate: f64, latency: f64, extra: &dyn Fn(Row) -> f64) -> TorqueRecording {
+pub(super) fn record_at(
+    real: &DynamicArm,
+    rate: f64,
+    latency: f64,
+    extra: &dyn Fn(Row) -> f64,
+) -> TorqueRecording {
     let n = real.joints();
     let theta = inertials::DeclaredInertials::of(real, real.links.as_deref().unwrap()).theta;
     let mut dynamics = InverseDynamics::new(real);
@@ -93,17 +130,35 @@ pub(super) fn record_at(real: &DynamicArm, rate: f64, latency: f64, extra: &dyn 
     let mut torque = vec![0.0; n];
     for row in 0..rows {
         let time = row as f64 / rate;
-        recording.position.extend((0..n).map(|joint| moved(joint, time).0));
+        recording
+            .position
+            .extend((0..n).map(|joint| moved(joint, time).0));
         let then = time - latency;
         let motion: Vec<(f64, f64, f64)> = (0..n).map(|joint| moved(joint, then)).collect();
-        let [q, dq, ddq] = [0, 1, 2].map(|part| motion.iter().map(|m| [m.0, m.1, m.2][part]).collect::<Vec<f64>>());
-        dynamics.torque(MotionRow { position: &q, velocity: &dq, acceleration: &ddq }, &real.gravity, &theta, &mut torque);
+        let [q, dq, ddq] = [0, 1, 2].map(|part| {
+            motion
+                .iter()
+                .map(|m| [m.0, m.1, m.2][part])
+                .collect::<Vec<f64>>()
+        });
+        dynamics.torque(
+            MotionRow {
+                position: &q,
+                velocity: &dq,
+                acceleration: &ddq,
+            },
+            &real.gravity,
+            &theta,
+            &mut torque,
+        );
         for joint in 0..n {
             // Nearly normal.
             let noise: f64 = (0..12).map(|_| dice.random::<f64>() - 0.5).sum();
-            recording
-                .torque
-                .push(torque[joint] + extra((joint, then, q[joint], dq[joint], ddq[joint], torque[joint])) + NOISE * noise);
+            recording.torque.push(
+                torque[joint]
+                    + extra((joint, then, q[joint], dq[joint], ddq[joint], torque[joint]))
+                    + NOISE * noise,
+            );
         }
     }
     recording
@@ -111,7 +166,11 @@ pub(super) fn record_at(real: &DynamicArm, rate: f64, latency: f64, extra: &dyn 
 
 /// Names with places, sorted.
 pub(super) fn found(diagnosis: &TorqueDiagnosis) -> Vec<String> {
-    let mut names: Vec<String> = diagnosis.findings.iter().map(|f| format!("{} {}", f.effect, f.place)).collect();
+    let mut names: Vec<String> = diagnosis
+        .findings
+        .iter()
+        .map(|f| format!("{} {}", f.effect, f.place))
+        .collect();
     names.sort();
     names
 }
@@ -122,38 +181,69 @@ fn diagnosed(recording: &TorqueRecording) -> TorqueDiagnosis {
 
 /// The value of a parameter of the only finding of a name.
 fn number(diagnosis: &TorqueDiagnosis, effect: &str, name: &str) -> f64 {
-    let finding = diagnosis.findings.iter().find(|f| f.effect == effect).unwrap();
-    finding.parameters.iter().find(|parameter| parameter.name == name).unwrap().value
+    let finding = diagnosis
+        .findings
+        .iter()
+        .find(|f| f.effect == effect)
+        .unwrap();
+    finding
+        .parameters
+        .iter()
+        .find(|parameter| parameter.name == name)
+        .unwrap()
+        .value
 }
 
 #[test]
 fn nothing_is_found_in_the_torques_of_the_declared_arm() {
     let diagnosis = diagnosed(&record(&arm(), 0.0, &|_| 0.0));
-    assert_eq!((found(&diagnosis), diagnosis.verdict.name()), (Vec::new(), "nothing_missing"));
+    assert_eq!(
+        (found(&diagnosis), diagnosis.verdict.name()),
+        (Vec::new(), "nothing_missing")
+    );
     // White noise of 0.3 Nm, of which a low-pass at 10 of 50 Hz leaves about a fifth of the variance.
     for noise in &diagnosis.noise {
-        assert!((noise.sigma / (NOISE * 0.2f64.sqrt()) - 1.0).abs() < 0.2, "{noise:?}");
+        assert!(
+            (noise.sigma / (NOISE * 0.2f64.sqrt()) - 1.0).abs() < 0.2,
+            "{noise:?}"
+        );
     }
 }
 
 #[test]
 fn the_same_recording_gets_the_same_answer() {
-    let recording = record(&arm(), 0.0, &|row| if row.0 == 2 { 0.4 * (row.3 / 0.003).tanh() } else { 0.0 });
+    let recording = record(&arm(), 0.0, &|row| {
+        if row.0 == 2 {
+            0.4 * (row.3 / 0.003).tanh()
+        } else {
+            0.0
+        }
+    });
     assert_eq!(diagnosed(&recording), diagnosed(&recording));
 }
 
 #[test]
 fn friction_of_a_joint_is_found_within_a_hundredth() {
     let rough = record(&arm(), 0.0, &|(joint, _, _, velocity, ..)| {
-        if joint == 1 { 6.0 * velocity + 5.0 * (velocity / 0.003).tanh() } else { 0.0 }
+        if joint == 1 {
+            6.0 * velocity + 5.0 * (velocity / 0.003).tanh()
+        } else {
+            0.0
+        }
     });
     let diagnosis = diagnosed(&rough);
-    assert_eq!(found(&diagnosis), ["coulomb_friction joint 2", "viscous_friction joint 2"]);
+    assert_eq!(
+        found(&diagnosis),
+        ["coulomb_friction joint 2", "viscous_friction joint 2"]
+    );
     assert!((number(&diagnosis, "viscous_friction", "viscous") / 6.0 - 1.0).abs() < 0.02);
     assert!((number(&diagnosis, "coulomb_friction", "coulomb") / 5.0 - 1.0).abs() < 0.01);
     let curve = &diagnosis.friction[0];
     let fastest = curve.velocity.len() - 1;
-    assert!((curve.torque[fastest] - 5.0 - 6.0 * curve.velocity[fastest]).abs() < 4.0 * curve.sigma[fastest]);
+    assert!(
+        (curve.torque[fastest] - 5.0 - 6.0 * curve.velocity[fastest]).abs()
+            < 4.0 * curve.sigma[fastest]
+    );
 }
 
 #[test]
@@ -166,12 +256,29 @@ fn each_cause_of_one_joint_is_called_by_its_name() {
         Box::new(move |row| friction(row.3) + if row.0 == joint { law(row) } else { 0.0 })
     };
     let cases: Vec<Case> = vec![
-        ("asymmetric_friction joint 1", at(0, &|row| 1.5 * (row.3 / 0.003).tanh().max(0.0))),
-        ("stribeck_friction joint 3", at(2, &|row| 4.0 * (row.3 / 0.003).tanh() * (-row.3.abs() / 0.1).exp())),
-        ("load_friction joint 2", at(1, &|row| 0.1 * (row.3 / 0.003).tanh() * row.5.abs())),
-        ("warmup_friction joint 3", at(2, &|row| (-row.1 / 8.0).exp() * friction(row.3))),
+        (
+            "asymmetric_friction joint 1",
+            at(0, &|row| 1.5 * (row.3 / 0.003).tanh().max(0.0)),
+        ),
+        (
+            "stribeck_friction joint 3",
+            at(2, &|row| {
+                4.0 * (row.3 / 0.003).tanh() * (-row.3.abs() / 0.1).exp()
+            }),
+        ),
+        (
+            "load_friction joint 2",
+            at(1, &|row| 0.1 * (row.3 / 0.003).tanh() * row.5.abs()),
+        ),
+        (
+            "warmup_friction joint 3",
+            at(2, &|row| (-row.1 / 8.0).exp() * friction(row.3)),
+        ),
         ("current_offset joint 4", at(3, &|_| 1.0)),
-        ("torque_ripple joint 1", at(0, &|row| 1.0 * (5.0 * row.2 + 0.4).cos())),
+        (
+            "torque_ripple joint 1",
+            at(0, &|row| 1.0 * (5.0 * row.2 + 0.4).cos()),
+        ),
         ("cable_stiffness joint 4", at(3, &|row| 2.0 * row.2)),
         ("rotor_inertia joint 3", at(2, &|row| 3.0 * row.4)),
     ];
@@ -179,7 +286,9 @@ fn each_cause_of_one_joint_is_called_by_its_name() {
         let diagnosis = diagnosed(&record(&arm(), 0.0, &*law));
         let others: Vec<String> = found(&diagnosis)
             .into_iter()
-            .filter(|name| !name.starts_with("viscous_friction") && !name.starts_with("coulomb_friction"))
+            .filter(|name| {
+                !name.starts_with("viscous_friction") && !name.starts_with("coulomb_friction")
+            })
             .collect();
         assert_eq!(others, [name], "{:#?}", diagnosis.withdrawn);
     }
@@ -188,31 +297,72 @@ fn each_cause_of_one_joint_is_called_by_its_name() {
 #[test]
 fn a_payload_that_was_not_declared_is_found_with_its_mass() {
     let mut real = arm();
-    real.payload = Some(Inertial { mass: 3.5, ..real.payload.unwrap() });
+    real.payload = Some(Inertial {
+        mass: 3.5,
+        ..real.payload.unwrap()
+    });
     let diagnosis = diagnosed(&record(&real, 0.0, &|_| 0.0));
     assert_eq!(found(&diagnosis), ["payload_error tool"]);
     assert!((number(&diagnosis, "payload_error", "mass") - 1.5).abs() < 0.03 * 3.5);
-    assert!(!diagnosis.not_observable.iter().any(|said| said.contains("payload")), "{:?}", diagnosis.not_observable);
+    assert!(
+        !diagnosis
+            .not_observable
+            .iter()
+            .any(|said| said.contains("payload")),
+        "{:?}",
+        diagnosis.not_observable
+    );
 }
 
 #[test]
 fn rows_that_are_lost_now_and_then_change_no_finding_and_are_told() {
-    let mut holed = record(&arm(), 0.0, &|row| if row.0 == 2 { 4.0 * (row.3 / 0.003).tanh() } else { 0.0 });
+    let mut holed = record(&arm(), 0.0, &|row| {
+        if row.0 == 2 {
+            4.0 * (row.3 / 0.003).tanh()
+        } else {
+            0.0
+        }
+    });
     let whole = holed.clone();
     // Two rows of each 60: every stretch between would be too short to be filtered.
     let kept = |row: usize| row % 60 < 58;
     let of = |values: &[f64], width: usize| -> Vec<f64> {
-        values.chunks_exact(width).enumerate().filter(|(row, _)| kept(*row)).flat_map(|(_, values)| values.to_vec()).collect()
+        values
+            .chunks_exact(width)
+            .enumerate()
+            .filter(|(row, _)| kept(*row))
+            .flat_map(|(_, values)| values.to_vec())
+            .collect()
     };
-    (holed.time, holed.position, holed.torque) = (of(&whole.time, 1), of(&whole.position, 4), of(&whole.torque, 4));
-    holed.held_out = (0..whole.rows()).filter(|row| kept(*row)).map(|row| whole.held_out[row]).collect();
+    (holed.time, holed.position, holed.torque) = (
+        of(&whole.time, 1),
+        of(&whole.position, 4),
+        of(&whole.torque, 4),
+    );
+    holed.held_out = (0..whole.rows())
+        .filter(|row| kept(*row))
+        .map(|row| whole.held_out[row])
+        .collect();
     holed.trajectory.truncate(holed.rows());
     let diagnosis = diagnosed(&holed);
     assert_eq!(found(&diagnosis), ["coulomb_friction joint 3"]);
     assert!((number(&diagnosis, "coulomb_friction", "coulomb") / 4.0 - 1.0).abs() < 0.02);
-    assert!(diagnosis.remarks.iter().any(|said| said.contains("steps of the clock without a row")), "{:?}", diagnosis.remarks);
+    assert!(
+        diagnosis
+            .remarks
+            .iter()
+            .any(|said| said.contains("steps of the clock without a row")),
+        "{:?}",
+        diagnosis.remarks
+    );
     let courses = &diagnosis.courses;
-    assert!(courses.row.iter().zip(&courses.time).all(|(row, time)| (holed.time[*row] - time).abs() < 0.03));
+    assert!(
+        courses
+            .row
+            .iter()
+            .zip(&courses.time)
+            .all(|(row, time)| (holed.time[*row] - time).abs() < 0.03)
+    );
 }
 
 #[test]
@@ -248,15 +398,23 @@ fn lever(joint: usize, time: f64) -> Vector3<f64> {
 
 #[test]
 fn a_push_is_found_with_its_time_and_costs_no_friction() {
-    let push =
-        |time: f64| if (12.0..13.3).contains(&time) { (std::f64::consts::PI * (time - 12.0) / 1.3).sin().powi(2) } else { 0.0 };
+    let push = |time: f64| {
+        if (12.0..13.3).contains(&time) {
+            (std::f64::consts::PI * (time - 12.0) / 1.3).sin().powi(2)
+        } else {
+            0.0
+        }
+    };
     let force = Vector3::new(20.0, -30.0, 25.0);
     let pushed = record(&arm(), 0.0, &|(joint, time, _, velocity, ..)| {
         5.0 * (velocity / 0.003).tanh() - push(time) * lever(joint, time).dot(&force)
     });
     let diagnosis = diagnosed(&pushed);
     let frictions = (1..=4).map(|joint| format!("coulomb_friction joint {joint}"));
-    let expected: Vec<String> = ["contact arm".into()].into_iter().chain(frictions).collect();
+    let expected: Vec<String> = ["contact arm".into()]
+        .into_iter()
+        .chain(frictions)
+        .collect();
     assert_eq!(found(&diagnosis), expected);
     for (found, axis) in [0, 1, 2].map(|axis| (diagnosis.events[0].force[axis], axis)) {
         assert!((found - force[axis]).abs() < 5.0, "{:?}", diagnosis.events);
@@ -267,11 +425,27 @@ fn a_push_is_found_with_its_time_and_costs_no_friction() {
 #[test]
 fn masses_that_are_not_declared_are_identified_and_it_is_said() {
     let recording = record(&arm(), 0.0, &|row| 5.0 * (row.3 / 0.003).tanh());
-    let bare = DynamicArm { links: None, payload: None, ..arm() };
+    let bare = DynamicArm {
+        links: None,
+        payload: None,
+        ..arm()
+    };
     let diagnosis = diagnose(&bare, &recording, &TorqueQuestion::default(), &mut |_| ()).unwrap();
-    assert!(matches!(diagnosis.basis, InertialBasis::Free(count) if count < 30), "{:?}", diagnosis.basis);
-    assert_eq!(found(&diagnosis), [1, 2, 3, 4].map(|joint| format!("coulomb_friction joint {joint}")));
-    assert!(diagnosis.not_observable.iter().any(|sentence| sentence.starts_with("masses are identified")));
+    assert!(
+        matches!(diagnosis.basis, InertialBasis::Free(count) if count < 30),
+        "{:?}",
+        diagnosis.basis
+    );
+    assert_eq!(
+        found(&diagnosis),
+        [1, 2, 3, 4].map(|joint| format!("coulomb_friction joint {joint}"))
+    );
+    assert!(
+        diagnosis
+            .not_observable
+            .iter()
+            .any(|sentence| sentence.starts_with("masses are identified"))
+    );
 }
 
 #[test]
@@ -280,12 +454,26 @@ fn a_recording_that_cannot_be_used_is_refused_with_its_reason() {
     let said = |change: &dyn Fn(&mut TorqueRecording)| {
         let mut bad = good.clone();
         change(&mut bad);
-        diagnose(&arm(), &bad, &TorqueQuestion::default(), &mut |_| ()).unwrap_err().to_string()
+        diagnose(&arm(), &bad, &TorqueQuestion::default(), &mut |_| ())
+            .unwrap_err()
+            .to_string()
     };
-    let least = good.torque.iter().skip(1).step_by(4).copied().fold(0.0, f64::min);
+    let least = good
+        .torque
+        .iter()
+        .skip(1)
+        .step_by(4)
+        .copied()
+        .fold(0.0, f64::min);
     let answers = [
-        (said(&|r| r.torque.iter_mut().for_each(|torque| *torque *= 1e3)), "by 1,000?"),
-        (said(&|r| r.torque.iter_mut().for_each(|torque| *torque *= 0.08)), "map them as `current`"),
+        (
+            said(&|r| r.torque.iter_mut().for_each(|torque| *torque *= 1e3)),
+            "by 1,000?",
+        ),
+        (
+            said(&|r| r.torque.iter_mut().for_each(|torque| *torque *= 0.08)),
+            "map them as `current`",
+        ),
         (
             said(&|r| {
                 r.torque.iter_mut().for_each(|torque| *torque *= 12.0);
@@ -293,13 +481,50 @@ fn a_recording_that_cannot_be_used_is_refused_with_its_reason() {
             }),
             "map them as `torque`",
         ),
-        (said(&|r| r.position.iter_mut().for_each(|angle| *angle = angle.to_degrees())), "degrees?"),
-        (said(&|r| r.torque.chunks_exact_mut(4).for_each(|row| row.swap(1, 2))), "joint 2 and joint 3 look exchanged"),
-        (said(&|r| r.time[700] = r.time[600]), "row 701: the clock goes"),
-        (said(&|r| r.torque.iter_mut().skip(3).step_by(4).for_each(|torque| *torque = 1.0)), "joint 4: torque is 1 in every row"),
-        (said(&|r| r.torque.iter_mut().skip(1).step_by(4).for_each(|torque| *torque = torque.max(0.8 * least))), "is cut off"),
-        (said(&|r| r.position.iter_mut().for_each(|angle| *angle *= 1e-3)), "hardly moves"),
-        (said(&|r| r.torque[17] = f64::NAN), "row 5: not a finite number"),
+        (
+            said(&|r| {
+                r.position
+                    .iter_mut()
+                    .for_each(|angle| *angle = angle.to_degrees())
+            }),
+            "degrees?",
+        ),
+        (
+            said(&|r| r.torque.chunks_exact_mut(4).for_each(|row| row.swap(1, 2))),
+            "joint 2 and joint 3 look exchanged",
+        ),
+        (
+            said(&|r| r.time[700] = r.time[600]),
+            "row 701: the clock goes",
+        ),
+        (
+            said(&|r| {
+                r.torque
+                    .iter_mut()
+                    .skip(3)
+                    .step_by(4)
+                    .for_each(|torque| *torque = 1.0)
+            }),
+            "joint 4: torque is 1 in every row",
+        ),
+        (
+            said(&|r| {
+                r.torque
+                    .iter_mut()
+                    .skip(1)
+                    .step_by(4)
+                    .for_each(|torque| *torque = torque.max(0.8 * least))
+            }),
+            "is cut off",
+        ),
+        (
+            said(&|r| r.position.iter_mut().for_each(|angle| *angle *= 1e-3)),
+            "hardly moves",
+        ),
+        (
+            said(&|r| r.torque[17] = f64::NAN),
+            "row 5: not a finite number",
+        ),
     ];
     for (answer, reason) in answers {
         assert!(answer.contains(reason), "{answer}");

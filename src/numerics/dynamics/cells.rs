@@ -5,7 +5,9 @@ use super::cause::TORQUE_CONSTANT;
 use super::choice::CauseChoice;
 use crate::criteria::cells::{COMMON, NU, SWAPS};
 use crate::criteria::torque::{APART, COMPONENTS, EXCHANGES, LEAST_NOISE, PER_METRE, USUAL};
-use crate::diagnose::table::{AMPLITUDES, ComponentSearch, EvidenceRows, KnownState, evidence, log_sum};
+use crate::diagnose::table::{
+    AMPLITUDES, ComponentSearch, EvidenceRows, KnownState, evidence, log_sum,
+};
 use crate::effect::Place;
 use nalgebra::{DMatrix, DVector};
 use std::cell::RefCell;
@@ -95,19 +97,39 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
     /// The cells of the listed forms.
     pub fn new(choice: &'b CauseChoice<'a>) -> Self {
         let all = &choice.problem.all;
-        let mut keys: BTreeMap<(&'static str, &'static str, Place, [usize; 2]), Vec<usize>> = BTreeMap::new();
+        let mut keys: BTreeMap<(&'static str, &'static str, Place, [usize; 2]), Vec<usize>> =
+            BTreeMap::new();
         for number in 0..all.forms.len() {
             let form = choice.form(number);
-            let kind = form.cause.about().coefficients.first().map_or("", |(name, _)| *name);
-            keys.entry((form.cause.name(), kind, form.place, form.cause.cell(form))).or_default().push(number);
+            let kind = form
+                .cause
+                .about()
+                .coefficients
+                .first()
+                .map_or("", |(name, _)| *name);
+            keys.entry((form.cause.name(), kind, form.place, form.cause.cell(form)))
+                .or_default()
+                .push(number);
         }
-        let cell = |((name, _, place, _), forms): (&(&'static str, &'static str, Place, [usize; 2]), &Vec<usize>)| {
+        let cell = |((name, _, place, _), forms): (
+            &(&'static str, &'static str, Place, [usize; 2]),
+            &Vec<usize>,
+        )| {
             let price = |form: &usize| choice.form(*form).cause.price(choice.form(*form));
             let least = forms.iter().map(price).fold(f64::INFINITY, f64::min);
-            TorqueCell { name, place: *place, log_prior: COMMON.ln() - 0.5 * least, forms: forms.clone() }
+            TorqueCell {
+                name,
+                place: *place,
+                log_prior: COMMON.ln() - 0.5 * least,
+                forms: forms.clone(),
+            }
         };
         let cells: Vec<TorqueCell> = keys.iter().map(cell).collect();
-        let cell_of = cells.iter().enumerate().flat_map(|(k, cell)| cell.forms.iter().map(move |form| (*form, k))).collect();
+        let cell_of = cells
+            .iter()
+            .enumerate()
+            .flat_map(|(k, cell)| cell.forms.iter().map(move |form| (*form, k)))
+            .collect();
         let unit = |column: usize| {
             let size = all.size(column);
             if size > 0.0 { *PER_METRE / size } else { 0.0 }
@@ -125,16 +147,39 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
         // Trial forms that are in no set have no products.
         let none = || (DMatrix::zeros(0, 0), DVector::zeros(0));
         let has_products = |number: &usize| choice.weighted.has(all.of(*number).start);
-        let forms = (0..all.forms.len()).map(|number| if has_products(&number) { products(number) } else { none() }).collect();
+        let forms = (0..all.forms.len())
+            .map(|number| {
+                if has_products(&number) {
+                    products(number)
+                } else {
+                    none()
+                }
+            })
+            .collect();
         let freedom = choice.weighted.measured.iter().map(Vec::len).sum::<usize>() as f64;
-        let rows = EvidenceRows { freedom, square: choice.base.square };
-        Self { choice, cells, cell_of, rows, forms, unit, left: RefCell::default() }
+        let rows = EvidenceRows {
+            freedom,
+            square: choice.base.square,
+        };
+        Self {
+            choice,
+            cells,
+            cell_of,
+            rows,
+            forms,
+            unit,
+            left: RefCell::default(),
+        }
     }
 
     /// What the base leaves of the products of a column with all others.
     fn left_of(&self, column: usize) -> Rc<Vec<f64>> {
         let fresh = || Rc::new(self.choice.base.left_of(column));
-        self.left.borrow_mut().entry(column).or_insert_with(fresh).clone()
+        self.left
+            .borrow_mut()
+            .entry(column)
+            .or_insert_with(fresh)
+            .clone()
     }
 
     /// Components in the covariance, with the noise that fits them or a stated one.
@@ -143,23 +188,42 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
         let own = |own: &TorqueComponent| {
             let columns = all.of(own.form);
             let root = own.amplitude / (columns.len() as f64).sqrt();
-            columns.map(|column| (column, self.unit[column] * root)).collect::<Vec<_>>()
+            columns
+                .map(|column| (column, self.unit[column] * root))
+                .collect::<Vec<_>>()
         };
         let columns: Vec<(usize, f64)> = components.iter().flat_map(own).collect();
-        let left: Vec<Rc<Vec<f64>>> = columns.iter().map(|(column, _)| self.left_of(*column)).collect();
+        let left: Vec<Rc<Vec<f64>>> = columns
+            .iter()
+            .map(|(column, _)| self.left_of(*column))
+            .collect();
         let count = columns.len();
-        let gram = DMatrix::from_fn(count, count, |a, b| left[a][columns[b].0] * columns[a].1 * columns[b].1);
-        let along = DVector::from_fn(count, |a, _| self.choice.base.right_of(columns[a].0) * columns[a].1);
+        let gram = DMatrix::from_fn(count, count, |a, b| {
+            left[a][columns[b].0] * columns[a].1 * columns[b].1
+        });
+        let along = DVector::from_fn(count, |a, _| {
+            self.choice.base.right_of(columns[a].0) * columns[a].1
+        });
         let known = KnownState::new(&gram, along, self.rows, *LEAST_NOISE, kappa);
-        TorqueState { known, columns, set: forms(components) }
+        TorqueState {
+            known,
+            columns,
+            set: forms(components),
+        }
     }
 
     /// A form's products seen through the covariance.
     fn seen(&self, number: usize, state: &TorqueState) -> FormProducts {
         let own: Vec<usize> = self.choice.problem.all.of(number).collect();
-        let left: Vec<Rc<Vec<f64>>> = state.columns.iter().map(|(column, _)| self.left_of(*column)).collect();
+        let left: Vec<Rc<Vec<f64>>> = state
+            .columns
+            .iter()
+            .map(|(column, _)| self.left_of(*column))
+            .collect();
         let product = |a: usize, b: usize| left[a][own[b]] * state.columns[a].1 * self.unit[own[b]];
-        let across = state.known.solved(DMatrix::from_fn(state.columns.len(), own.len(), product));
+        let across = state
+            .known
+            .solved(DMatrix::from_fn(state.columns.len(), own.len(), product));
         let (gram, along) = &self.forms[number];
         state.known.see((gram, along), &across, 0)
     }
@@ -173,11 +237,19 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
         let values = || {
             let least = 1e-9 * gram.trace();
             let factor = (&gram + DMatrix::identity(gram.nrows(), gram.nrows()) * least).cholesky();
-            let solved = factor.map_or_else(|| vec![0.0; columns.len()], |factor| factor.solve(&along).as_slice().to_vec());
-            solved.iter().zip(&columns).map(|(value, column)| value * self.unit[*column]).collect()
+            let solved = factor.map_or_else(
+                || vec![0.0; columns.len()],
+                |factor| factor.solve(&along).as_slice().to_vec(),
+            );
+            solved
+                .iter()
+                .zip(&columns)
+                .map(|(value, column)| value * self.unit[*column])
+                .collect()
         };
         let rises = || along.iter().all(|value| *value > 0.0);
-        let may_be = found.amplitude > 0.0 && (found.log < 0.0 || self.choice.may_be(number, &state.set, rises, values));
+        let may_be = found.amplitude > 0.0
+            && (found.log < 0.0 || self.choice.may_be(number, &state.set, rises, values));
         may_be.then_some((found.log, found.amplitude))
     }
 
@@ -185,18 +257,38 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
     fn cell(&self, cell: usize, state: &TorqueState) -> Option<CellPosterior> {
         let own = &self.cells[cell];
         let open = self.choice.open;
-        let asked = own.forms.iter().filter(|form| **form < open && self.choice.may_join(**form, &state.set));
+        let asked = own
+            .forms
+            .iter()
+            .filter(|form| **form < open && self.choice.may_join(**form, &state.set));
         let all: Vec<(f64, TorqueComponent)> = asked
-            .filter_map(|form| self.form(*form, state).map(|(log, amplitude)| (log, TorqueComponent { form: *form, amplitude })))
+            .filter_map(|form| {
+                self.form(*form, state).map(|(log, amplitude)| {
+                    (
+                        log,
+                        TorqueComponent {
+                            form: *form,
+                            amplitude,
+                        },
+                    )
+                })
+            })
             .collect();
         let best = all.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
         let count = own.forms.iter().filter(|form| **form < open).count().max(1) as f64;
         let log = log_sum(&all.iter().map(|(log, _)| *log).collect::<Vec<_>>()) - count.ln();
-        Some(CellPosterior { log_odds: own.log_prior + log, best: best.1 })
+        Some(CellPosterior {
+            log_odds: own.log_prior + log,
+            best: best.1,
+        })
     }
 
     /// The most probable of some cells given a state.
-    fn strongest(&self, cells: impl IntoIterator<Item = usize>, state: &TorqueState) -> Option<CellPosterior> {
+    fn strongest(
+        &self,
+        cells: impl IntoIterator<Item = usize>,
+        state: &TorqueState,
+    ) -> Option<CellPosterior> {
         let all = cells.into_iter().filter_map(|cell| self.cell(cell, state));
         all.max_by(|a, b| a.log_odds.total_cmp(&b.log_odds))
     }
@@ -206,13 +298,21 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
         let state = self.state(&without(components, place), Some(kappa));
         let own = components[place];
         let cell = self.cell_of[&own.form];
-        let count = self.cells[cell].forms.iter().filter(|form| **form < self.choice.open).count().max(1) as f64;
+        let count = self.cells[cell]
+            .forms
+            .iter()
+            .filter(|form| **form < self.choice.open)
+            .count()
+            .max(1) as f64;
         let grid = self.cell(cell, &state);
         let prior = self.cells[cell].log_prior;
         let of_itself = self.form(own.form, &state);
         let log = of_itself.map_or(f64::NEG_INFINITY, |(log, _)| prior + log - count.ln());
         let best = of_itself.map_or(own, |(_, amplitude)| TorqueComponent { amplitude, ..own });
-        CellPosterior { log_odds: grid.map_or(log, |grid| grid.log_odds.max(log)), best }
+        CellPosterior {
+            log_odds: grid.map_or(log, |grid| grid.log_odds.max(log)),
+            best,
+        }
     }
 
     /// Amplitudes anew, each given all others.
@@ -240,7 +340,12 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
         let mut log = -state.log_determinant();
         for own in components {
             let cell = &self.cells[self.cell_of[&own.form]];
-            let count = cell.forms.iter().filter(|form| **form < self.choice.open).count().max(1) as f64;
+            let count = cell
+                .forms
+                .iter()
+                .filter(|form| **form < self.choice.open)
+                .count()
+                .max(1) as f64;
             log += cell.log_prior - count.ln() - (AMPLITUDES as f64).ln();
         }
         log - 0.5 * (self.rows.freedom + *NU) * (*NU + state.rows.square).ln()
@@ -259,12 +364,16 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
                     let form = self.cells[*cell].forms[0];
                     self.choice.compete(form, own)
                 };
-                let Some(best) = self.strongest((0..self.cells.len()).filter(may), &state) else { continue };
+                let Some(best) = self.strongest((0..self.cells.len()).filter(may), &state) else {
+                    continue;
+                };
                 let is_same = self.cell_of[&best.best.form] == self.cell_of[&own];
                 let gain = if is_same {
                     // Another shape of the same cell: by itself, against the present one.
-                    let [one, other] =
-                        [best.best.form, own].map(|form| self.form(form, &state).map_or(f64::NEG_INFINITY, |found| found.0));
+                    let [one, other] = [best.best.form, own].map(|form| {
+                        self.form(form, &state)
+                            .map_or(f64::NEG_INFINITY, |found| found.0)
+                    });
                     one - other
                 } else {
                     best.log_odds - stays
@@ -288,29 +397,50 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
     /// One wrong mass, drive or mounting instead of several; one curve over a joint's angle instead of two.
     fn merge(&self, components: Vec<TorqueComponent>) -> Vec<TorqueComponent> {
         let about = |own: &TorqueComponent| self.choice.form(own.form).cause.about();
-        let inertial: Vec<usize> = (0..components.len()).filter(|place| about(&components[*place]).inertial).collect();
+        let inertial: Vec<usize> = (0..components.len())
+            .filter(|place| about(&components[*place]).inertial)
+            .collect();
         let mut groups = pairs(&inertial);
         if inertial.len() > 2 {
             groups.push(inertial);
         }
-        let mut best = self.merged(&components, &groups, &|form| self.choice.form(form).cause.about().inertial);
-        let of_angle: Vec<usize> = (0..best.len()).filter(|place| about(&best[*place]).of_angle).collect();
+        let mut best = self.merged(&components, &groups, &|form| {
+            self.choice.form(form).cause.about().inertial
+        });
+        let of_angle: Vec<usize> = (0..best.len())
+            .filter(|place| about(&best[*place]).of_angle)
+            .collect();
         let same = |group: &Vec<usize>, best: &[TorqueComponent]| {
-            self.choice.form(best[group[0]].form).place == self.choice.form(best[group[1]].form).place
+            self.choice.form(best[group[0]].form).place
+                == self.choice.form(best[group[1]].form).place
         };
-        let groups: Vec<Vec<usize>> = pairs(&of_angle).into_iter().filter(|group| same(group, &best)).collect();
-        best = self.merged(&best, &groups, &|form| self.choice.form(form).cause.about().of_angle);
+        let groups: Vec<Vec<usize>> = pairs(&of_angle)
+            .into_iter()
+            .filter(|group| same(group, &best))
+            .collect();
+        best = self.merged(&best, &groups, &|form| {
+            self.choice.form(form).cause.about().of_angle
+        });
         best
     }
 
-    fn merged(&self, components: &[TorqueComponent], groups: &[Vec<usize>], may: &dyn Fn(usize) -> bool) -> Vec<TorqueComponent> {
+    fn merged(
+        &self,
+        components: &[TorqueComponent],
+        groups: &[Vec<usize>],
+        may: &dyn Fn(usize) -> bool,
+    ) -> Vec<TorqueComponent> {
         let mut best = (self.total(components), components.to_vec());
         for group in groups {
-            let rest: Vec<TorqueComponent> =
-                (0..components.len()).filter(|place| !group.contains(place)).map(|place| components[place]).collect();
+            let rest: Vec<TorqueComponent> = (0..components.len())
+                .filter(|place| !group.contains(place))
+                .map(|place| components[place])
+                .collect();
             let state = self.state(&rest, None);
             let cells = (0..self.cells.len()).filter(|cell| may(self.cells[*cell].forms[0]));
-            let Some(one) = self.strongest(cells, &state) else { continue };
+            let Some(one) = self.strongest(cells, &state) else {
+                continue;
+            };
             let next = self.backfit(rest.into_iter().chain([one.best]).collect());
             let total = self.total(&next);
             if total > best.0 {
@@ -322,7 +452,14 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
 
     /// Components of given forms.
     pub fn components(&self, set: &[usize]) -> Vec<TorqueComponent> {
-        self.backfit(set.iter().map(|form| TorqueComponent { form: *form, amplitude: *USUAL }).collect())
+        self.backfit(
+            set.iter()
+                .map(|form| TorqueComponent {
+                    form: *form,
+                    amplitude: *USUAL,
+                })
+                .collect(),
+        )
     }
 
     /// The best components that steps from a start lead to.
@@ -344,7 +481,10 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
     pub fn odds_in_place(&self, components: &[TorqueComponent], form: usize) -> CellOdds {
         let kappa = self.state(components, None).known.kappa;
         let Some(place) = components.iter().position(|own| own.form == form) else {
-            return CellOdds { own: 0.0, rivals: Vec::new() };
+            return CellOdds {
+                own: 0.0,
+                rivals: Vec::new(),
+            };
         };
         let own = self.odds_of(components, place, kappa).log_odds;
         let state = self.state(&without(components, place), Some(kappa));
@@ -352,9 +492,15 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
         let competing = others.filter(|cell| self.choice.compete(self.cells[*cell].forms[0], form));
         let rival = |cell: usize| {
             let posterior = self.cell(cell, &state)?;
-            Some(((self.cells[cell].name, self.cells[cell].place), posterior.log_odds))
+            Some((
+                (self.cells[cell].name, self.cells[cell].place),
+                posterior.log_odds,
+            ))
         };
-        CellOdds { own, rivals: competing.filter_map(rival).collect() }
+        CellOdds {
+            own,
+            rivals: competing.filter_map(rival).collect(),
+        }
     }
 }
 
@@ -376,7 +522,15 @@ impl OtherInertials {
     /// They share the odds that one of them would have as the rival of a finding.
     pub fn rivals(&self, choice: &CauseChoice, own: f64) -> Vec<((&'static str, Place), f64)> {
         let log = own - self.worse - (self.forms.len().max(1) as f64).ln();
-        self.forms.iter().map(|form| ((choice.form(*form).cause.name(), choice.form(*form).place), log)).collect()
+        self.forms
+            .iter()
+            .map(|form| {
+                (
+                    (choice.form(*form).cause.name(), choice.form(*form).place),
+                    log,
+                )
+            })
+            .collect()
     }
 }
 
@@ -386,21 +540,45 @@ pub(super) fn from_common(choice: &CauseChoice) -> (Vec<usize>, Option<OtherIner
     let mut table = TorqueTable::new(choice);
     let is_drive = |number: &usize| choice.form(*number).cause.name() == TORQUE_CONSTANT;
     let inertial = |set: &[TorqueComponent]| -> Vec<usize> {
-        forms(set).into_iter().filter(|number| choice.form(*number).cause.about().inertial).collect()
+        forms(set)
+            .into_iter()
+            .filter(|number| choice.form(*number).cause.about().inertial)
+            .collect()
     };
     let masses = table.searched(&choice.common());
-    let drives: Vec<usize> =
-        (0..choice.open).filter(|number| is_drive(number) && choice.form(*number).shape.is_empty()).collect();
+    let drives: Vec<usize> = (0..choice.open)
+        .filter(|number| is_drive(number) && choice.form(*number).shape.is_empty())
+        .collect();
     if drives.is_empty() || inertial(&masses).is_empty() {
         return (forms(&masses), None);
     }
-    let scaled = table.searched(&choice.common().into_iter().chain(drives).collect::<Vec<_>>());
+    let scaled = table.searched(
+        &choice
+            .common()
+            .into_iter()
+            .chain(drives)
+            .collect::<Vec<_>>(),
+    );
     let worse = table.total(&masses) - table.total(&scaled);
-    let most = if inertial(&scaled).iter().all(is_drive) { 0.5 * *APART } else { 0.0 };
-    let (chosen, other, worse) = if worse <= most { (scaled, masses, -worse) } else { (masses, scaled, worse) };
+    let most = if inertial(&scaled).iter().all(is_drive) {
+        0.5 * *APART
+    } else {
+        0.0
+    };
+    let (chosen, other, worse) = if worse <= most {
+        (scaled, masses, -worse)
+    } else {
+        (masses, scaled, worse)
+    };
     let chosen = forms(&chosen);
-    let others: Vec<usize> = inertial(&other).into_iter().filter(|number| !chosen.contains(number)).collect();
-    let other = (!others.is_empty()).then_some(OtherInertials { forms: others, worse: worse.max(0.0) });
+    let others: Vec<usize> = inertial(&other)
+        .into_iter()
+        .filter(|number| !chosen.contains(number))
+        .collect();
+    let other = (!others.is_empty()).then_some(OtherInertials {
+        forms: others,
+        worse: worse.max(0.0),
+    });
     (chosen, other)
 }
 
@@ -421,11 +599,21 @@ fn forms(components: &[TorqueComponent]) -> Vec<usize> {
 }
 
 fn without(components: &[TorqueComponent], place: usize) -> Vec<TorqueComponent> {
-    components.iter().enumerate().filter(|(other, _)| *other != place).map(|(_, own)| *own).collect()
+    components
+        .iter()
+        .enumerate()
+        .filter(|(other, _)| *other != place)
+        .map(|(_, own)| *own)
+        .collect()
 }
 
 /// Two of some.
 fn pairs(of: &[usize]) -> Vec<Vec<usize>> {
-    let with = |(place, first): (usize, &usize)| of[place + 1..].iter().map(|second| vec![*first, *second]).collect::<Vec<_>>();
+    let with = |(place, first): (usize, &usize)| {
+        of[place + 1..]
+            .iter()
+            .map(|second| vec![*first, *second])
+            .collect::<Vec<_>>()
+    };
     of.iter().enumerate().flat_map(with).collect()
 }

@@ -70,19 +70,34 @@ pub struct TorqueChanges {
 ///
 /// # Errors
 /// [`crate::error::Error::Data`] where models and arm differ in joints, a model has causes that are not known, or a recording cannot be used.
-pub fn changes(arm: &DynamicArm, first: &DiagnosedRecording, second: &DiagnosedRecording) -> Result<TorqueChanges> {
+pub fn changes(
+    arm: &DynamicArm,
+    first: &DiagnosedRecording,
+    second: &DiagnosedRecording,
+) -> Result<TorqueChanges> {
     let n = arm.joints();
-    if [first, second].iter().any(|one| one.model.joints() != n || one.recording.joints() != n) {
-        return Err(Error::data("models", format!("the arm has {n} joints, models or recordings others")));
+    if [first, second]
+        .iter()
+        .any(|one| one.model.joints() != n || one.recording.joints() != n)
+    {
+        return Err(Error::data(
+            "models",
+            format!("the arm has {n} joints, models or recordings others"),
+        ));
     }
     let shared = shared_forms(first.model, second.model)?;
     let candidates = candidate_forms(&shared, n);
-    let mut problems = [prepared(arm, first, first.model)?, prepared(arm, second, first.model)?];
+    let mut problems = [
+        prepared(arm, first, first.model)?,
+        prepared(arm, second, first.model)?,
+    ];
     let base = problems[0].all.base_changes.clone();
     problems
         .iter_mut()
         .zip([first, second])
-        .for_each(|(problem, one)| take_columns(problem, &base, &candidates, one.model, first.model));
+        .for_each(|(problem, one)| {
+            take_columns(problem, &base, &candidates, one.model, first.model)
+        });
     let normal = StackedNormal::new(&problems, &candidates_columns(&problems[1], shared.len()));
     let (set, fit) = normal.search();
     let mut changes = Vec::new();
@@ -96,7 +111,14 @@ pub fn changes(arm: &DynamicArm, first: &DiagnosedRecording, second: &DiagnosedR
         changes.extend(told(&problems[1], &normal, &with, group, None));
     }
     let [before, after] = [normal.fit(&[]), fit].map(|fit| normal.residual_rms(&problems[1], &fit));
-    Ok(TorqueChanges { changes, rms: before.into_iter().zip(after).map(|(before, after)| [before, after]).collect() })
+    Ok(TorqueChanges {
+        changes,
+        rms: before
+            .into_iter()
+            .zip(after)
+            .map(|(before, after)| [before, after])
+            .collect(),
+    })
 }
 
 /// Causes of either model, those of the first in its shapes.
@@ -104,7 +126,11 @@ fn shared_forms(first: &TorqueModel, second: &TorqueModel) -> Result<Vec<TorqueF
     let mut forms: Vec<TorqueForm> = Vec::new();
     for term in first.terms.iter().chain(&second.terms) {
         let form = term.form()?;
-        if !forms.iter().any(|known| known.is_called_as(&form) && known.with == form.with && known.cause.has_shape(&form.shape)) {
+        if !forms.iter().any(|known| {
+            known.is_called_as(&form)
+                && known.with == form.with
+                && known.cause.has_shape(&form.shape)
+        }) {
             forms.push(form);
         }
     }
@@ -115,7 +141,9 @@ fn shared_forms(first: &TorqueModel, second: &TorqueModel) -> Result<Vec<TorqueF
 fn candidate_forms(shared: &[TorqueForm], joints: usize) -> Vec<TorqueForm> {
     let mut forms = shared.to_vec();
     for name in [VISCOUS, COULOMB, OFFSET] {
-        let Some(cause) = TORQUE_CAUSES.into_iter().find(|cause| cause.name() == name) else { continue };
+        let Some(cause) = TORQUE_CAUSES.into_iter().find(|cause| cause.name() == name) else {
+            continue;
+        };
         for joint in 0..joints {
             let form = TorqueForm::at_joint(cause, joint, 1);
             if !forms.iter().any(|known| known.is_called_as(&form)) {
@@ -127,17 +155,33 @@ fn candidate_forms(shared: &[TorqueForm], joints: usize) -> Vec<TorqueForm> {
 }
 
 /// A recording about the first model's masses, with the base alone as columns.
-fn prepared<'a>(arm: &'a DynamicArm, one: &DiagnosedRecording, about: &TorqueModel) -> Result<TorqueProblem<'a>> {
-    let UsedRecording { mut recording, clock, .. } = UsedRecording::of(arm, one.recording, Some(about.cutoff))?;
+fn prepared<'a>(
+    arm: &'a DynamicArm,
+    one: &DiagnosedRecording,
+    about: &TorqueModel,
+) -> Result<TorqueProblem<'a>> {
+    let UsedRecording {
+        mut recording,
+        clock,
+        ..
+    } = UsedRecording::of(arm, one.recording, Some(about.cutoff))?;
     recording.held_out.fill(false);
-    let question = TorqueQuestion { free_inertials: arm.links.is_none(), ..TorqueQuestion::default() };
+    let question = TorqueQuestion {
+        free_inertials: arm.links.is_none(),
+        ..TorqueQuestion::default()
+    };
     let mut problem = TorqueProblem::new(arm, recording, &question, &clock, about.cutoff);
     problem.scene.turn_over(about.sign_width);
-    problem.scene.turn_each_over(about.range.iter().map(|range| range.sign_width));
+    problem
+        .scene
+        .turn_each_over(about.range.iter().map(|range| range.sign_width));
     problem.scene.friction_lead = about.friction_lead;
     problem.events = one.events.to_vec();
     problem.scene.believe(&about.inertials);
-    let all: Vec<String> = TORQUE_CAUSES.iter().map(|cause| cause.name().to_string()).collect();
+    let all: Vec<String> = TORQUE_CAUSES
+        .iter()
+        .map(|cause| cause.name().to_string())
+        .collect();
     problem.form(&all);
     Ok(problem)
 }
@@ -151,11 +195,21 @@ fn take_columns(
     about: &TorqueModel,
 ) {
     let prior = problem.all.prior.first().copied().unwrap_or(0.0);
-    problem.all.columns = base.iter().map(|(link, ten)| problem.regressor.column(*link, ten)).collect();
+    problem.all.columns = base
+        .iter()
+        .map(|(link, ten)| problem.regressor.column(*link, ten))
+        .collect();
     problem.all.base = base.len();
     problem.all.base_changes = base.to_vec();
     // Declared numbers have one prior; where base parameters are identified, nothing is known of them beforehand.
-    problem.all.prior = vec![if problem.scene.declared.is_some() { prior } else { 0.0 }; base.len()];
+    problem.all.prior = vec![
+        if problem.scene.declared.is_some() {
+            prior
+        } else {
+            0.0
+        };
+        base.len()
+    ];
     for form in candidates {
         problem.push(form.clone());
     }
@@ -169,7 +223,12 @@ fn take_columns(
 }
 
 fn candidates_columns(problem: &TorqueProblem, shared: usize) -> Vec<CandidateColumns> {
-    (0..problem.all.forms.len()).map(|form| CandidateColumns { columns: problem.all.of(form), shared: form < shared }).collect()
+    (0..problem.all.forms.len())
+        .map(|form| CandidateColumns {
+            columns: problem.all.of(form),
+            shared: form < shared,
+        })
+        .collect()
 }
 
 /// A group's numbers.
@@ -185,22 +244,32 @@ fn told(
     let count = values.len();
     let p_value = tail(gain / count.max(1) as f64, count.max(1) as f64, FREEDOM);
     let probability = 1.0 / (1.0 + (-(gain - normal.penalty(group)) / (2.0 * TEMPERATURE)).exp());
-    let number = |name: String, effect: &str, place: Place, unit: &'static str, change: f64, sigma: f64| TorqueChange {
-        name,
-        effect: effect.into(),
-        place,
-        unit,
-        change,
-        sigma,
-        p_value,
-        probability,
-        rank,
-    };
+    let number =
+        |name: String, effect: &str, place: Place, unit: &'static str, change: f64, sigma: f64| {
+            TorqueChange {
+                name,
+                effect: effect.into(),
+                place,
+                unit,
+                change,
+                sigma,
+                p_value,
+                probability,
+                rank,
+            }
+        };
     let Some(form) = normal.form_of(group) else {
         let point = problem.scene.arm.points[problem.joints() - 1].coords;
         let mass = values[0];
         let sigma = |number: usize| covariance[number * (count + 1)].max(0.0).sqrt();
-        let mut all = vec![number(format!("{PAYLOAD}.mass"), PAYLOAD, Place::Tool, "kg", mass, sigma(0))];
+        let mut all = vec![number(
+            format!("{PAYLOAD}.mass"),
+            PAYLOAD,
+            Place::Tool,
+            "kg",
+            mass,
+            sigma(0),
+        )];
         if mass.abs() > LIGHTEST && count == INERTIAL_NUMBERS {
             for (axis, name) in ["centre_x", "centre_y", "centre_z"].iter().enumerate() {
                 let (moment, place) = (values[1 + axis], 1 + axis);
@@ -211,7 +280,14 @@ fn told(
                     + 2.0 * slope[0] * slope[1] * entry(0, place)
                     + slope[1] * slope[1] * entry(place, place);
                 let centre = point[axis] + moment / mass;
-                all.push(number(format!("{PAYLOAD}.{name}"), PAYLOAD, Place::Tool, "m", centre, variance.max(0.0).sqrt()));
+                all.push(number(
+                    format!("{PAYLOAD}.{name}"),
+                    PAYLOAD,
+                    Place::Tool,
+                    "m",
+                    centre,
+                    variance.max(0.0).sqrt(),
+                ));
             }
         }
         return all;
@@ -220,7 +296,14 @@ fn told(
     let names = form.coefficient_names();
     let of = |(place, (quantity, unit)): (usize, (String, &'static str))| {
         let name = format!("{}.{}.{quantity}", form.cause.name(), form.place.tag());
-        number(name, form.cause.name(), form.place, unit, values[place], covariance[place * (count + 1)].max(0.0).sqrt())
+        number(
+            name,
+            form.cause.name(),
+            form.place,
+            unit,
+            values[place],
+            covariance[place * (count + 1)].max(0.0).sqrt(),
+        )
     };
     names.into_iter().enumerate().map(of).collect()
 }

@@ -32,7 +32,11 @@ pub(super) fn check(arm: &DynamicArm, recording: &TorqueRecording) -> Result<()>
     if faults.is_empty() {
         faults.extend(numbers(arm, recording));
     }
-    if faults.is_empty() { Ok(()) } else { Err(Error::Data(faults)) }
+    if faults.is_empty() {
+        Ok(())
+    } else {
+        Err(Error::Data(faults))
+    }
 }
 
 fn fault(place: impl Into<String>, message: impl Into<String>) -> Fault {
@@ -43,15 +47,25 @@ fn sizes(arm: &DynamicArm, recording: &TorqueRecording) -> Vec<Fault> {
     let (n, rows) = (recording.joints, recording.rows());
     let mut faults = Vec::new();
     if n == 0 || arm.joints() != n {
-        faults.push(fault("torques", format!("{n} joints are recorded, the arm has {}", arm.joints())));
+        faults.push(fault(
+            "torques",
+            format!("{n} joints are recorded, the arm has {}", arm.joints()),
+        ));
     }
     if rows < FEWEST {
-        faults.push(fault("torques", format!("{rows} rows; at least {FEWEST} are needed")));
+        faults.push(fault(
+            "torques",
+            format!("{rows} rows; at least {FEWEST} are needed"),
+        ));
     }
     let lengths = [
         ("position", recording.position.len(), n * rows),
         ("torque", recording.torque.len(), n * rows),
-        ("velocity", recording.velocity.as_ref().map_or(n * rows, Vec::len), n * rows),
+        (
+            "velocity",
+            recording.velocity.as_ref().map_or(n * rows, Vec::len),
+            n * rows,
+        ),
         ("trajectory", recording.trajectory.len(), rows),
         ("held_out", recording.held_out.len(), rows),
     ];
@@ -60,10 +74,20 @@ fn sizes(arm: &DynamicArm, recording: &TorqueRecording) -> Vec<Fault> {
             faults.push(fault(name, format!("{found} numbers instead of {wanted}")));
         }
     }
-    let of_arm = [("points", arm.points.len()), ("prismatic", arm.prismatic.len()), ("ratio", arm.ratio.len())];
-    for (name, found) in of_arm.into_iter().chain(arm.links.as_ref().map(|links| ("links", links.len()))) {
+    let of_arm = [
+        ("points", arm.points.len()),
+        ("prismatic", arm.prismatic.len()),
+        ("ratio", arm.ratio.len()),
+    ];
+    for (name, found) in of_arm
+        .into_iter()
+        .chain(arm.links.as_ref().map(|links| ("links", links.len())))
+    {
         if found != arm.joints() {
-            faults.push(fault(name, format!("{found} entries for {} joints", arm.joints())));
+            faults.push(fault(
+                name,
+                format!("{found} entries for {} joints", arm.joints()),
+            ));
         }
     }
     faults
@@ -76,20 +100,38 @@ fn numbers(arm: &DynamicArm, recording: &TorqueRecording) -> Vec<Fault> {
     if !faults.is_empty() {
         return faults;
     }
-    let mut steps: Vec<f64> = recording.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let mut steps: Vec<f64> = recording
+        .time
+        .windows(2)
+        .map(|pair| pair[1] - pair[0])
+        .collect();
     let usual = nearest(&mut steps, 0.5).unwrap_or(0.0);
     if !(FASTEST..=SLOWEST).contains(&usual) {
         let [most, least] = [1.0 / SLOWEST, 1.0 / FASTEST];
-        let message =
-            format!("rows come at {:.3} Hz, {most:.0} to {least:.0} Hz are allowed: times are in s (milliseconds?)", 1.0 / usual);
+        let message = format!(
+            "rows come at {:.3} Hz, {most:.0} to {least:.0} Hz are allowed: times are in s (milliseconds?)",
+            1.0 / usual
+        );
         faults.push(fault("time", message));
         return faults;
     }
     if recording.held_out.iter().all(|held| *held) {
-        faults.push(fault("held_out", "all rows are held out; some must be fitted"));
+        faults.push(fault(
+            "held_out",
+            "all rows are held out; some must be fitted",
+        ));
     }
-    if let Some(far) = arm.points.iter().chain([&arm.tool]).map(|point| point.coords.norm()).find(|far| *far > FARTHEST) {
-        faults.push(fault("points", format!("{far:.0} m from the base: lengths are in m (millimetres?)")));
+    if let Some(far) = arm
+        .points
+        .iter()
+        .chain([&arm.tool])
+        .map(|point| point.coords.norm())
+        .find(|far| *far > FARTHEST)
+    {
+        faults.push(fault(
+            "points",
+            format!("{far:.0} m from the base: lengths are in m (millimetres?)"),
+        ));
     }
     let ranges: Vec<f64> = (0..n).map(|joint| range(recording, joint)).collect();
     let mut extremes = TorqueExtremes::new(n);
@@ -97,16 +139,27 @@ fn numbers(arm: &DynamicArm, recording: &TorqueRecording) -> Vec<Fault> {
     for (joint, range) in ranges.iter().enumerate() {
         faults.extend(joint_faults(arm, recording, &extremes, joint, *range));
     }
-    let moving = ranges.iter().filter(|range| **range > 0.2 * LEAST_RANGE).count();
+    let moving = ranges
+        .iter()
+        .filter(|range| **range > 0.2 * LEAST_RANGE)
+        .count();
     let widest = ranges.iter().copied().fold(0.0, f64::max);
     if widest < LEAST_RANGE || 2 * moving < n {
-        let radians = if widest > LEAST_RANGE * DEGREE { "; or radians were read as degrees" } else { "" };
+        let radians = if widest > LEAST_RANGE * DEGREE {
+            "; or radians were read as degrees"
+        } else {
+            ""
+        };
         faults.push(fault(
             "position",
             format!("the arm hardly moves (its widest joint over {widest:.3} rad, {moving} of {n} joints at all): masses and friction cannot be seen; at least half of the joints must move, one over {LEAST_RANGE} rad{radians}"),
         ));
     }
-    let turned = ranges.iter().zip(&arm.prismatic).filter(|(range, slides)| **range > TWO_TURNS && !**slides).count();
+    let turned = ranges
+        .iter()
+        .zip(&arm.prismatic)
+        .filter(|(range, slides)| **range > TWO_TURNS && !**slides)
+        .count();
     if faults.is_empty() && 2 * turned > n {
         faults.push(fault(
             "position",
@@ -124,30 +177,57 @@ type Stamp = (f64, u32);
 
 /// Numbers that are none, and a clock that does not ascend, in rows that begin at row `first` of the recording, after one of this time and
 /// trajectory.
-pub(super) fn row_faults(rows: &TorqueRecording, first: usize, before: Option<Stamp>) -> Vec<Fault> {
+pub(super) fn row_faults(
+    rows: &TorqueRecording,
+    first: usize,
+    before: Option<Stamp>,
+) -> Vec<Fault> {
     let n = rows.joints.max(1);
     let not_a_number = |(name, values, each): (&'static str, &Vec<f64>, usize)| {
         let at = values.iter().position(|value| !value.is_finite())?;
-        Some(fault(name, format!("row {}: not a finite number", first + at / each + 1)))
+        Some(fault(
+            name,
+            format!("row {}: not a finite number", first + at / each + 1),
+        ))
     };
-    let columns = [("time", &rows.time, 1), ("position", &rows.position, n), ("torque", &rows.torque, n)];
+    let columns = [
+        ("time", &rows.time, 1),
+        ("position", &rows.position, n),
+        ("torque", &rows.torque, n),
+    ];
     let faults: Vec<Fault> = columns.into_iter().filter_map(not_a_number).collect();
     if !faults.is_empty() {
         return faults;
     }
-    let all = || rows.time.iter().copied().zip(rows.trajectory.iter().copied());
-    let pairs = before.into_iter().chain(all()).zip(all().skip(usize::from(before.is_none())));
+    let all = || {
+        rows.time
+            .iter()
+            .copied()
+            .zip(rows.trajectory.iter().copied())
+    };
+    let pairs = before
+        .into_iter()
+        .chain(all())
+        .zip(all().skip(usize::from(before.is_none())));
     let row = first + usize::from(before.is_none()) + 1;
     let back = |(row, ((then, from), (now, to))): (usize, (Stamp, Stamp))| {
-        let message = || format!("row {row}: the clock goes from {then} s to {now} s; it must ascend");
+        let message =
+            || format!("row {row}: the clock goes from {then} s to {now} s; it must ascend");
         (now <= then && from == to).then(|| fault("time", message()))
     };
     (row..).zip(pairs).find_map(back).into_iter().collect()
 }
 
 fn range(recording: &TorqueRecording, joint: usize) -> f64 {
-    let positions = || recording.position.iter().skip(joint).step_by(recording.joints);
-    positions().copied().fold(f64::NEG_INFINITY, f64::max) - positions().copied().fold(f64::INFINITY, f64::min)
+    let positions = || {
+        recording
+            .position
+            .iter()
+            .skip(joint)
+            .step_by(recording.joints)
+    };
+    positions().copied().fold(f64::NEG_INFINITY, f64::max)
+        - positions().copied().fold(f64::INFINITY, f64::min)
 }
 
 fn joint_faults(
@@ -160,7 +240,10 @@ fn joint_faults(
     let name = format!("joint {}", joint + 1);
     let mut faults = Vec::new();
     if range > WIDEST && !arm.prismatic[joint] {
-        faults.push(fault(&name, format!("positions span {range:.0} rad: angles are in rad (degrees?)")));
+        faults.push(fault(
+            &name,
+            format!("positions span {range:.0} rad: angles are in rad (degrees?)"),
+        ));
     }
     if let Some(constant) = extremes.constant(joint) {
         faults.push(constant);
@@ -179,7 +262,8 @@ fn velocity_fault(recording: &TorqueRecording, velocity: &[f64], joint: usize) -
     let (mut product, mut own, mut other) = (0.0, 0.0, 0.0);
     for row in 1..recording.rows() - 1 {
         let lasted = recording.time[row + 1] - recording.time[row - 1];
-        let moved = recording.position[(row + 1) * n + joint] - recording.position[(row - 1) * n + joint];
+        let moved =
+            recording.position[(row + 1) * n + joint] - recording.position[(row - 1) * n + joint];
         if lasted > 0.0 && recording.trajectory[row + 1] == recording.trajectory[row - 1] {
             let (a, b) = (moved / lasted, velocity[row * n + joint]);
             product += a * b;
@@ -189,7 +273,8 @@ fn velocity_fault(recording: &TorqueRecording, velocity: &[f64], joint: usize) -
     }
     let correlation = product / (own * other).sqrt().max(f64::MIN_POSITIVE);
     let ratio = (other / own.max(f64::MIN_POSITIVE)).sqrt();
-    let wrong = own > 0.0 && other > 0.0 && (correlation < SAME_VELOCITY || !(0.2..5.0).contains(&ratio));
+    let wrong =
+        own > 0.0 && other > 0.0 && (correlation < SAME_VELOCITY || !(0.2..5.0).contains(&ratio));
     wrong.then(|| {
         fault(
             format!("joint {}", joint + 1),
@@ -199,13 +284,20 @@ fn velocity_fault(recording: &TorqueRecording, velocity: &[f64], joint: usize) -
 }
 
 /// What is odd about a recording that can be used, a sentence each.
-pub(super) fn remarks(recording: &TorqueRecording, origin: &[usize], clock: &RecordingClock) -> Vec<String> {
+pub(super) fn remarks(
+    recording: &TorqueRecording,
+    origin: &[usize],
+    clock: &RecordingClock,
+) -> Vec<String> {
     let usual = 1.0 / clock.rate;
     let torn = |stretch: &std::ops::Range<usize>| {
         let lasted = recording.time[stretch.start] - recording.time[stretch.start - 1];
         torn_at(origin[stretch.start], lasted, usual)
     };
-    few(clock.stretches[1..].iter().map(torn)).into_iter().chain(of_sets(recording)).collect()
+    few(clock.stretches[1..].iter().map(torn))
+        .into_iter()
+        .chain(of_sets(recording))
+        .collect()
 }
 
 /// The first sentences of many that are alike, and how many more there are.
@@ -221,11 +313,16 @@ pub(super) fn few(all: impl Iterator<Item = String>) -> Vec<String> {
 
 /// A sentence on a row before which clock or joints jump: `lasted` s after the row before, where `usual` s are usual.
 pub(super) fn torn_at(row: usize, lasted: f64, usual: f64) -> String {
-    let what = if lasted > 1.5 * usual { format!("the clock jumps by {lasted:.3} s") } else { "a joint jumps".into() };
+    let what = if lasted > 1.5 * usual {
+        format!("the clock jumps by {lasted:.3} s")
+    } else {
+        "a joint jumps".into()
+    };
     format!("row {}: {what}; nothing is filtered across it", row + 1)
 }
 
 /// A sentence where no rows judge.
 pub(super) fn of_sets(recording: &TorqueRecording) -> Option<String> {
-    (!recording.held_out.contains(&true)).then(|| "no rows are held out: errors are of the rows that were fitted".into())
+    (!recording.held_out.contains(&true))
+        .then(|| "no rows are held out: errors are of the rows that were fitted".into())
 }

@@ -22,10 +22,16 @@ const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
 /// All of them; none where no masses are declared.
 pub(super) fn gravity_faults(arm: &DynamicArm, recording: &TorqueRecording) -> Vec<Fault> {
-    let Some(links) = &arm.links else { return Vec::new() };
+    let Some(links) = &arm.links else {
+        return Vec::new();
+    };
     let theta = DeclaredInertials::of(arm, links).theta;
     let faults = torque_faults(arm, recording, &theta);
-    if faults.is_empty() { angle_fault(arm, recording, &theta).into_iter().collect() } else { faults }
+    if faults.is_empty() {
+        angle_fault(arm, recording, &theta).into_iter().collect()
+    } else {
+        faults
+    }
 }
 
 /// Torques beside those of the declared arm standing still: units, signs, joints.
@@ -37,34 +43,61 @@ fn torque_faults(arm: &DynamicArm, recording: &TorqueRecording, theta: &[f64]) -
     let mut products = vec![vec![0.0; n]; n];
     for row in 0..recording.rows() {
         let position = &recording.position[row * n..(row + 1) * n];
-        dynamics.torque(MotionRow { position, velocity: &still, acceleration: &still }, &arm.gravity, theta, &mut gravity);
+        dynamics.torque(
+            MotionRow {
+                position,
+                velocity: &still,
+                acceleration: &still,
+            },
+            &arm.gravity,
+            theta,
+            &mut gravity,
+        );
         for joint in 0..n {
             let torque = recording.torque[row * n + joint];
             measured_square[joint] += torque * torque;
             gravity_square[joint] += gravity[joint] * gravity[joint];
-            gravity.iter().enumerate().for_each(|(other, value)| products[joint][other] += torque * value);
+            gravity
+                .iter()
+                .enumerate()
+                .for_each(|(other, value)| products[joint][other] += torque * value);
         }
     }
-    let weighty: Vec<usize> =
-        (0..n).filter(|joint| (gravity_square[*joint] / recording.rows() as f64).sqrt() > SMALL_TORQUE).collect();
-    let mut ratios: Vec<f64> = weighty.iter().map(|joint| (measured_square[*joint] / gravity_square[*joint]).sqrt()).collect();
+    let weighty: Vec<usize> = (0..n)
+        .filter(|joint| (gravity_square[*joint] / recording.rows() as f64).sqrt() > SMALL_TORQUE)
+        .collect();
+    let mut ratios: Vec<f64> = weighty
+        .iter()
+        .map(|joint| (measured_square[*joint] / gravity_square[*joint]).sqrt())
+        .collect();
     let mut faults = Vec::new();
-    let heaviest = weighty.iter().copied().max_by(|a, b| gravity_square[*a].total_cmp(&gravity_square[*b]));
+    let heaviest = weighty
+        .iter()
+        .copied()
+        .max_by(|a, b| gravity_square[*a].total_cmp(&gravity_square[*b]));
     if let (Some(usual), Some(heaviest)) = (nearest(&mut ratios, 0.5), heaviest) {
         let own = (measured_square[heaviest] / gravity_square[heaviest]).sqrt();
         let share = |joint: &usize| products[*joint][*joint] / gravity_square[*joint];
         let wrong = |times: f64, most: f64| !(1.0 / most..=most).contains(&times.abs());
         let weighs = |joint: &&usize| {
-            let explained = products[**joint][**joint].powi(2) / (measured_square[**joint] * gravity_square[**joint]);
-            gravity_square[**joint] > WEIGHTY.powi(2) * gravity_square[heaviest] && explained > *WEIGHS
+            let explained = products[**joint][**joint].powi(2)
+                / (measured_square[**joint] * gravity_square[**joint]);
+            gravity_square[**joint] > WEIGHTY.powi(2) * gravity_square[heaviest]
+                && explained > *WEIGHS
         };
         let heavy = || weighty.iter().filter(weighs);
         // Friction and acceleration are in the rms of a torque, not in its share along gravity.
         // Beyond on one side alone: joints that are exchanged are on both.
-        let beyond = |more: bool| heavy().all(|joint| wrong(share(joint), *UNIT) && (share(joint).abs() > 1.0) == more);
+        let beyond = |more: bool| {
+            heavy().all(|joint| wrong(share(joint), *UNIT) && (share(joint).abs() > 1.0) == more)
+        };
         let of_gravity = heavy().any(|joint| *joint == heaviest) && (beyond(true) || beyond(false));
         if of_gravity || wrong(own, UNIT_RATIO) {
-            let times = if of_gravity { share(&heaviest).abs() } else { own };
+            let times = if of_gravity {
+                share(&heaviest).abs()
+            } else {
+                own
+            };
             faults.push(Fault::new(
                 "torque",
                 format!(
@@ -77,18 +110,28 @@ fn torque_faults(arm: &DynamicArm, recording: &TorqueRecording, theta: &[f64]) -
             return faults;
         }
     }
-    let left = |joint: usize, other: usize| measured_square[joint] - 2.0 * products[joint][other] + gravity_square[other];
+    let left = |joint: usize, other: usize| {
+        measured_square[joint] - 2.0 * products[joint][other] + gravity_square[other]
+    };
     for (place, joint) in weighty.iter().enumerate() {
-        if products[*joint][*joint] < -0.8 * (measured_square[*joint] * gravity_square[*joint]).sqrt() {
-            faults
-                .push(Fault::new(format!("joint {}", joint + 1), "torques are those of the declared masses with the other sign"));
+        if products[*joint][*joint]
+            < -0.8 * (measured_square[*joint] * gravity_square[*joint]).sqrt()
+        {
+            faults.push(Fault::new(
+                format!("joint {}", joint + 1),
+                "torques are those of the declared masses with the other sign",
+            ));
         }
         for other in &weighty[place + 1..] {
             let straight = left(*joint, *joint) + left(*other, *other);
             if left(*joint, *other) + left(*other, *joint) < EXCHANGED * straight {
                 faults.push(Fault::new(
                     "torque",
-                    format!("the columns of joint {} and joint {} look exchanged", joint + 1, other + 1),
+                    format!(
+                        "the columns of joint {} and joint {} look exchanged",
+                        joint + 1,
+                        other + 1
+                    ),
                 ));
             }
         }
@@ -99,7 +142,11 @@ fn torque_faults(arm: &DynamicArm, recording: &TorqueRecording, theta: &[f64]) -
 /// What is likely wrong where torques are so many times those of the declared masses, and what to do.
 fn remedy(from_current: bool, times: f64) -> String {
     const THOUSAND: f64 = 100.0;
-    let thousand = if (1.0 / THOUSAND..=THOUSAND).contains(&times) { "" } else { " (by 1,000?)" };
+    let thousand = if (1.0 / THOUSAND..=THOUSAND).contains(&times) {
+        ""
+    } else {
+        " (by 1,000?)"
+    };
     let remedy = match (from_current, times > 1.0) {
         (false, false) => {
             "if the columns are motor currents (A), map them as `current` and state `ratio` and `kt` (Nm/A) of each joint in the robot file; \
@@ -108,7 +155,9 @@ fn remedy(from_current: bool, times: f64) -> String {
         (true, true) => {
             "if the columns are joint torques (Nm), map them as `torque`; else correct their unit, `kt` (Nm/A) or `ratio`"
         }
-        _ => "correct the unit of the columns, or masses, `kt` (Nm/A) and `ratio` of the robot file",
+        _ => {
+            "correct the unit of the columns, or masses, `kt` (Nm/A) and `ratio` of the robot file"
+        }
     };
     format!("{thousand}. Remedy: {remedy}")
 }
@@ -130,10 +179,13 @@ fn angle_fault(arm: &DynamicArm, recording: &TorqueRecording, theta: &[f64]) -> 
     let n = recording.joints;
     let straight = unexplained(arm, recording, theta, AngleReading::Straight);
     let pairs = || (0..n).flat_map(|one| (one + 1..n).map(move |other| (one, other)));
-    let others = [AngleReading::Scaled(1.0 / DEGREE), AngleReading::Scaled(DEGREE)]
-        .into_iter()
-        .chain(pairs().map(|(one, other)| AngleReading::Exchanged(one, other)))
-        .chain(pairs().map(|(one, other)| AngleReading::Renamed(one, other)));
+    let others = [
+        AngleReading::Scaled(1.0 / DEGREE),
+        AngleReading::Scaled(DEGREE),
+    ]
+    .into_iter()
+    .chain(pairs().map(|(one, other)| AngleReading::Exchanged(one, other)))
+    .chain(pairs().map(|(one, other)| AngleReading::Renamed(one, other)));
     let left = others.map(|reading| (reading, unexplained(arm, recording, theta, reading)));
     let (best, left) = left.min_by(|a, b| a.1.total_cmp(&b.1))?;
     (left < EXCHANGED * straight).then(|| {
@@ -142,13 +194,24 @@ fn angle_fault(arm: &DynamicArm, recording: &TorqueRecording, theta: &[f64]) -> 
             AngleReading::Scaled(factor) if factor > 1.0 => {
                 "angles were radians already and were converted from degrees once more".into()
             }
-            AngleReading::Straight | AngleReading::Scaled(_) => "angles are degrees where radians are expected".into(),
-            AngleReading::Exchanged(one, other) => {
-                format!("the angles of joint {} and joint {} look exchanged", one + 1, other + 1)
+            AngleReading::Straight | AngleReading::Scaled(_) => {
+                "angles are degrees where radians are expected".into()
             }
-            AngleReading::Renamed(one, other) => format!("joint {} and joint {} look exchanged", one + 1, other + 1),
+            AngleReading::Exchanged(one, other) => {
+                format!(
+                    "the angles of joint {} and joint {} look exchanged",
+                    one + 1,
+                    other + 1
+                )
+            }
+            AngleReading::Renamed(one, other) => {
+                format!("joint {} and joint {} look exchanged", one + 1, other + 1)
+            }
         };
-        Fault::new("position", format!("{said}: the declared masses explain the torques {better:.0} times better so"))
+        Fault::new(
+            "position",
+            format!("{said}: the declared masses explain the torques {better:.0} times better so"),
+        )
     })
 }
 
@@ -177,7 +240,12 @@ impl JointSums {
 }
 
 /// Mean square of what gravity leaves of the torques about their means, Nm^2.
-fn unexplained(arm: &DynamicArm, recording: &TorqueRecording, theta: &[f64], reading: AngleReading) -> f64 {
+fn unexplained(
+    arm: &DynamicArm,
+    recording: &TorqueRecording,
+    theta: &[f64],
+    reading: AngleReading,
+) -> f64 {
     let n = recording.joints;
     let mut dynamics = InverseDynamics::new(arm);
     let (still, mut gravity, mut position) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
@@ -194,7 +262,11 @@ fn unexplained(arm: &DynamicArm, recording: &TorqueRecording, theta: &[f64], rea
                 torque.swap(one, other);
             }
         }
-        let motion = MotionRow { position: &position, velocity: &still, acceleration: &still };
+        let motion = MotionRow {
+            position: &position,
+            velocity: &still,
+            acceleration: &still,
+        };
         dynamics.torque(motion, &arm.gravity, theta, &mut gravity);
         rows += 1.0;
         for (sums, (torque, gravity)) in sums.iter_mut().zip(torque.iter().zip(&gravity)) {
@@ -206,5 +278,9 @@ fn unexplained(arm: &DynamicArm, recording: &TorqueRecording, theta: &[f64], rea
         }
     }
     let scaled = |joint: usize| matches!(reading, AngleReading::Renamed(one, other) if recording.from_current && (joint == one || joint == other));
-    sums.iter().enumerate().map(|(joint, sums)| sums.left(rows, scaled(joint))).sum::<f64>() / rows
+    sums.iter()
+        .enumerate()
+        .map(|(joint, sums)| sums.left(rows, scaled(joint)))
+        .sum::<f64>()
+        / rows
 }

@@ -18,7 +18,12 @@ pub(super) struct CauseChoice<'a> {
 impl<'a> CauseChoice<'a> {
     /// Over all forms of a problem.
     pub fn new(problem: &'a TorqueProblem<'a>, weighted: &'a WeightedColumns) -> Self {
-        Self { problem, weighted, base: SweptColumns::base(&problem.all, weighted), open: problem.all.listed }
+        Self {
+            problem,
+            weighted,
+            base: SweptColumns::base(&problem.all, weighted),
+            open: problem.all.listed,
+        }
     }
 
     pub fn form(&self, number: usize) -> &TorqueForm {
@@ -26,16 +31,26 @@ impl<'a> CauseChoice<'a> {
     }
 
     /// Whether a form with some coefficients, given the forms of a set, is one that its cause can have.
-    pub fn may_be(&self, number: usize, set: &[usize], rises: impl Fn() -> bool, values: impl Fn() -> Vec<f64>) -> bool {
+    pub fn may_be(
+        &self,
+        number: usize,
+        set: &[usize],
+        rises: impl Fn() -> bool,
+        values: impl Fn() -> Vec<f64>,
+    ) -> bool {
         let form = self.form(number);
         let about = form.cause.about();
         let only_positive = about.positive || (about.brakes && !self.is_part_of_curve(form, set));
-        (!only_positive || rises()) && form.cause.is_itself(form, &self.problem.scene) && form.cause.is_possible(form, &values())
+        (!only_positive || rises())
+            && form.cause.is_itself(form, &self.problem.scene)
+            && form.cause.is_possible(form, &values())
     }
 
     /// Whether a curve of speed without a name is at the place of a form, in a set.
     pub fn is_part_of_curve(&self, form: &TorqueForm, set: &[usize]) -> bool {
-        set.iter().map(|other| self.form(*other)).any(|curve| curve.place == form.place && curve.is_nameless_curve())
+        set.iter()
+            .map(|other| self.form(*other))
+            .any(|curve| curve.place == form.place && curve.is_nameless_curve())
     }
 
     /// Whether a form may join a set: once a name and place, and what modifies a friction after it.
@@ -44,25 +59,37 @@ impl<'a> CauseChoice<'a> {
         let taken = |other: &usize| {
             let other_form = self.form(*other);
             *other == number
-                || (form.is_called_as(other_form) && (!form.cause.about().may_repeat || form.with == other_form.with))
+                || (form.is_called_as(other_form)
+                    && (!form.cause.about().may_repeat || form.with == other_form.with))
         };
-        let is_barred = || self.problem.barred.iter().any(|(cause, place)| *cause == form.cause.name() && *place == form.place);
+        let is_barred = || {
+            self.problem
+                .barred
+                .iter()
+                .any(|(cause, place)| *cause == form.cause.name() && *place == form.place)
+        };
         let is_same_curve = |other: &usize| form.is_one_curve_with(self.form(*other));
-        !set.iter().any(taken) && self.has_what_it_modifies(number, set) && !set.iter().any(is_same_curve) && !is_barred()
+        !set.iter().any(taken)
+            && self.has_what_it_modifies(number, set)
+            && !set.iter().any(is_same_curve)
+            && !is_barred()
     }
 
     /// Whether the frictions that a form modifies are in a set.
     fn has_what_it_modifies(&self, number: usize, set: &[usize]) -> bool {
         let form = self.form(number);
         let has = |name: &&str| {
-            set.iter().any(|other| self.form(*other).cause.name() == *name && self.form(*other).place == form.place)
+            set.iter().any(|other| {
+                self.form(*other).cause.name() == *name && self.form(*other).place == form.place
+            })
         };
         form.cause.about().modifies.iter().all(has)
     }
 
     /// Whether all of a set have what they modify.
     pub fn is_whole(&self, set: &[usize]) -> bool {
-        set.iter().all(|number| self.has_what_it_modifies(*number, set))
+        set.iter()
+            .all(|number| self.has_what_it_modifies(*number, set))
     }
 
     /// Viscous and Coulomb friction of every joint: hardly an arm is without.
@@ -74,7 +101,9 @@ impl<'a> CauseChoice<'a> {
     /// The next form of the same cause and place with fewer numbers.
     pub fn plainer(&self, form: &TorqueForm) -> Option<&TorqueForm> {
         let listed = self.problem.all.forms[..self.open].iter();
-        let plainer = listed.filter(|other| other.is_called_as(form) && other.with == form.with && other.width < form.width);
+        let plainer = listed.filter(|other| {
+            other.is_called_as(form) && other.with == form.with && other.width < form.width
+        });
         plainer.max_by_key(|other| other.width)
     }
 
@@ -88,15 +117,25 @@ impl<'a> CauseChoice<'a> {
     /// other without being in its uncertainty.
     pub fn other_friction(&self, set: &[usize]) -> Vec<usize> {
         let is_in = |name: &str, place: Place| {
-            set.iter().any(|number| self.form(*number).cause.name() == name && self.form(*number).place == place)
+            set.iter().any(|number| {
+                self.form(*number).cause.name() == name && self.form(*number).place == place
+            })
         };
         let missing = |number: &usize| {
             let form = self.form(*number);
-            let other = if form.cause.name() == VISCOUS { COULOMB } else { VISCOUS };
+            let other = if form.cause.name() == VISCOUS {
+                COULOMB
+            } else {
+                VISCOUS
+            };
             !is_in(form.cause.name(), form.place) && is_in(other, form.place)
         };
         let sweep = self.base.with(set);
         // Friction that would drive is none.
-        self.common().into_iter().filter(missing).filter(|number| sweep.rises(*number)).collect()
+        self.common()
+            .into_iter()
+            .filter(missing)
+            .filter(|number| sweep.rises(*number))
+            .collect()
     }
 }

@@ -23,7 +23,10 @@ impl RecordingClock {
     pub fn even(time: &[f64]) -> Self {
         let rows = time.len();
         let rate = (rows - 1) as f64 / (time[rows - 1] - time[0]);
-        Self { rate, stretches: std::iter::once(0..rows).collect() }
+        Self {
+            rate,
+            stretches: std::iter::once(0..rows).collect(),
+        }
     }
 
     /// The clock of a checked recording.
@@ -41,7 +44,10 @@ impl RecordingClock {
                 start = row;
             }
         }
-        Self { rate: 1.0 / pace.usual, stretches }
+        Self {
+            rate: 1.0 / pace.usual,
+            stretches,
+        }
     }
 }
 
@@ -58,22 +64,32 @@ impl ClockPace {
     /// The pace of a checked recording.
     pub fn of(recording: &TorqueRecording) -> Self {
         let fastest = |joint: usize| {
-            let mut all: Vec<f64> = (1..recording.rows()).map(|row| step(recording, row, joint)).collect();
+            let mut all: Vec<f64> = (1..recording.rows())
+                .map(|row| step(recording, row, joint))
+                .collect();
             nearest(&mut all, 0.999).unwrap_or(0.0)
         };
-        Self { usual: Self::usual_step(recording), fastest: (0..recording.joints).map(fastest).collect() }
+        Self {
+            usual: Self::usual_step(recording),
+            fastest: (0..recording.joints).map(fastest).collect(),
+        }
     }
 
     /// s from row to row, median.
     pub fn usual_step(recording: &TorqueRecording) -> f64 {
-        let mut steps: Vec<f64> = recording.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        let mut steps: Vec<f64> = recording
+            .time
+            .windows(2)
+            .map(|pair| pair[1] - pair[0])
+            .collect();
         nearest(&mut steps, 0.5).unwrap_or(1.0)
     }
 
     /// Whether clock or joints jump before a row, which is not the first one.
     pub fn is_torn(&self, recording: &TorqueRecording, row: usize) -> bool {
         let lasted = recording.time[row] - recording.time[row - 1];
-        let jumps = |(joint, fastest): (usize, &f64)| step(recording, row, joint) > JUMP * fastest + 1e-12;
+        let jumps =
+            |(joint, fastest): (usize, &f64)| step(recording, row, joint) > JUMP * fastest + 1e-12;
         lasted > GAP * self.usual || lasted <= 0.0 || self.fastest.iter().enumerate().any(jumps)
     }
 }

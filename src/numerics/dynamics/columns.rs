@@ -53,8 +53,17 @@ impl TorqueColumns {
         torque: Vec<f64>,
     ) -> Self {
         let (base_changes, columns, prior) = base_columns(scene, regressor);
-        let mut all = Self { base: columns.len(), base_changes, columns, prior, torque, ..Self::empty() };
-        let causes = TORQUE_CAUSES.iter().filter(|cause| without.iter().all(|name| name != cause.name()));
+        let mut all = Self {
+            base: columns.len(),
+            base_changes,
+            columns,
+            prior,
+            torque,
+            ..Self::empty()
+        };
+        let causes = TORQUE_CAUSES
+            .iter()
+            .filter(|cause| without.iter().all(|name| name != cause.name()));
         for form in causes.flat_map(|cause| cause.forms(scene)) {
             all.push(form, scene, reduction, regressor);
         }
@@ -63,20 +72,34 @@ impl TorqueColumns {
     }
 
     /// Takes another form; its number.
-    pub fn push(&mut self, form: TorqueForm, scene: &DynamicScene, reduction: &Reduction, regressor: &ReducedRegressor) -> usize {
+    pub fn push(
+        &mut self,
+        form: TorqueForm,
+        scene: &DynamicScene,
+        reduction: &Reduction,
+        regressor: &ReducedRegressor,
+    ) -> usize {
         let known = self.forms.iter().position(|known| {
-            form.cause.about().alike_at_joints && known.cause.name() == form.cause.name() && known.with == form.with
+            form.cause.about().alike_at_joints
+                && known.cause.name() == form.cause.name()
+                && known.with == form.with
         });
         let columns = match known {
             Some(known) => {
-                let here = |column: &TorqueColumn| TorqueColumn { joints: vec![form.joint()], ..column.clone() };
+                let here = |column: &TorqueColumn| TorqueColumn {
+                    joints: vec![form.joint()],
+                    ..column.clone()
+                };
                 self.columns[self.of(known)].iter().map(here).collect()
             }
             None => columns_of(&form, scene, reduction, regressor),
         };
         self.first.push(self.columns.len());
         self.prior.resize(self.columns.len(), 0.0);
-        let prior: Vec<f64> = columns.iter().map(|column| self.friction_prior(&form, column)).collect();
+        let prior: Vec<f64> = columns
+            .iter()
+            .map(|column| self.friction_prior(&form, column))
+            .collect();
         self.prior.extend(prior);
         self.columns.extend(columns);
         self.forms.push(form);
@@ -87,13 +110,28 @@ impl TorqueColumns {
     /// do not cancel each other.
     fn friction_prior(&self, form: &TorqueForm, column: &TorqueColumn) -> f64 {
         let about = form.cause.about();
-        let Some(most) = self.torque.get(form.joint()).filter(|_| about.of_sign || about.brakes) else { return 0.0 };
-        let largest = column.courses.iter().flatten().fold(0.0, |largest: f64, value| largest.max(value.abs()));
+        let Some(most) = self
+            .torque
+            .get(form.joint())
+            .filter(|_| about.of_sign || about.brakes)
+        else {
+            return 0.0;
+        };
+        let largest = column
+            .courses
+            .iter()
+            .flatten()
+            .fold(0.0, |largest: f64, value| largest.max(value.abs()));
         (largest / (*FRICTION * most).max(f64::MIN_POSITIVE)).powi(2)
     }
 
     /// Columns of forms that are made of the rigid torque, anew.
-    pub fn renew(&mut self, scene: &DynamicScene, reduction: &Reduction, regressor: &ReducedRegressor) {
+    pub fn renew(
+        &mut self,
+        scene: &DynamicScene,
+        reduction: &Reduction,
+        regressor: &ReducedRegressor,
+    ) {
         for number in 0..self.forms.len() {
             if self.forms[number].cause.about().of_rigid {
                 let fresh = columns_of(&self.forms[number], scene, reduction, regressor);
@@ -104,8 +142,19 @@ impl TorqueColumns {
     }
 
     /// Columns of some forms that are made of the sign of a velocity, anew.
-    pub fn renew_signs(&mut self, forms: &[usize], scene: &DynamicScene, reduction: &Reduction, regressor: &ReducedRegressor) {
-        for number in forms.iter().copied().filter(|number| self.forms[*number].cause.about().of_sign).collect::<Vec<_>>() {
+    pub fn renew_signs(
+        &mut self,
+        forms: &[usize],
+        scene: &DynamicScene,
+        reduction: &Reduction,
+        regressor: &ReducedRegressor,
+    ) {
+        for number in forms
+            .iter()
+            .copied()
+            .filter(|number| self.forms[*number].cause.about().of_sign)
+            .collect::<Vec<_>>()
+        {
             let fresh = columns_of(&self.forms[number], scene, reduction, regressor);
             let range = self.of(number);
             self.columns[range].clone_from_slice(&fresh);
@@ -123,8 +172,17 @@ impl TorqueColumns {
     pub fn size(&self, column: usize) -> f64 {
         let own = &self.columns[column];
         let of = |(joint, course): (&usize, &Vec<f64>)| {
-            let range = self.torque.get(*joint).copied().unwrap_or(1.0).max(f64::MIN_POSITIVE);
-            course.iter().map(|value| (value / range).powi(2)).sum::<f64>() / course.len().max(1) as f64
+            let range = self
+                .torque
+                .get(*joint)
+                .copied()
+                .unwrap_or(1.0)
+                .max(f64::MIN_POSITIVE);
+            course
+                .iter()
+                .map(|value| (value / range).powi(2))
+                .sum::<f64>()
+                / course.len().max(1) as f64
         };
         let squares = own.joints.iter().zip(&own.courses).map(of);
         (squares.sum::<f64>() / own.joints.len().max(1) as f64).sqrt()
@@ -143,8 +201,15 @@ pub(super) fn columns_of(
     reduction: &Reduction,
     regressor: &ReducedRegressor,
 ) -> Vec<TorqueColumn> {
-    if let Some(changes) = scene.declared.as_ref().and_then(|declared| form.cause.inertial(form, declared)) {
-        return changes.iter().map(|(link, ten)| regressor.column(*link, ten)).collect();
+    if let Some(changes) = scene
+        .declared
+        .as_ref()
+        .and_then(|declared| form.cause.inertial(form, declared))
+    {
+        return changes
+            .iter()
+            .map(|(link, ten)| regressor.column(*link, ten))
+            .collect();
     }
     let joints = form.cause.acts_on(form, scene.joints());
     let written = |(number, joint): (usize, usize)| {
@@ -152,27 +217,59 @@ pub(super) fn columns_of(
         form.cause.write(form, scene, joint, number, &mut whole);
         whole
     };
-    let places = (0..form.width).flat_map(|number| joints.iter().map(move |joint| (number, *joint)));
+    let places =
+        (0..form.width).flat_map(|number| joints.iter().map(move |joint| (number, *joint)));
     let mut courses = reduction.reduce(places.map(written).collect()).into_iter();
-    let column = |_| TorqueColumn { courses: courses.by_ref().take(joints.len()).collect(), joints: joints.clone() };
+    let column = |_| TorqueColumn {
+        courses: courses.by_ref().take(joints.len()).collect(),
+        joints: joints.clone(),
+    };
     (0..form.width).map(column).collect()
 }
 
 /// Changes of links' numbers with their columns and 1 / variance beforehand.
-type Base = (Vec<(usize, [f64; INERTIAL_NUMBERS])>, Vec<TorqueColumn>, Vec<f64>);
+type Base = (
+    Vec<(usize, [f64; INERTIAL_NUMBERS])>,
+    Vec<TorqueColumn>,
+    Vec<f64>,
+);
 
 /// One standard deviation of each declared number, or the base parameters where none are declared.
 fn base_columns(scene: &DynamicScene, regressor: &ReducedRegressor) -> Base {
-    let unit = |number: usize| std::array::from_fn(|entry| f64::from(u8::from(entry == number % INERTIAL_NUMBERS)));
-    let changes: Vec<(usize, [f64; INERTIAL_NUMBERS])> = match &scene.declared {
-        Some(declared) => {
-            declared.tolerance.iter().enumerate().flat_map(|(link, all)| all.iter().map(move |ten| (link, *ten))).collect()
-        }
-        None => base_parameters(regressor).into_iter().map(|number| (number / INERTIAL_NUMBERS, unit(number))).collect(),
+    let unit = |number: usize| {
+        std::array::from_fn(|entry| f64::from(u8::from(entry == number % INERTIAL_NUMBERS)))
     };
-    let columns: Vec<TorqueColumn> = changes.iter().map(|(link, ten)| regressor.column(*link, ten)).collect();
-    let square = |column: &TorqueColumn| column.courses.iter().flatten().map(|value| value * value).sum::<f64>();
-    let of = |column: &TorqueColumn| if scene.declared.is_some() { 1.0 } else { UNKNOWN_BEFOREHAND * square(column) };
+    let changes: Vec<(usize, [f64; INERTIAL_NUMBERS])> = match &scene.declared {
+        Some(declared) => declared
+            .tolerance
+            .iter()
+            .enumerate()
+            .flat_map(|(link, all)| all.iter().map(move |ten| (link, *ten)))
+            .collect(),
+        None => base_parameters(regressor)
+            .into_iter()
+            .map(|number| (number / INERTIAL_NUMBERS, unit(number)))
+            .collect(),
+    };
+    let columns: Vec<TorqueColumn> = changes
+        .iter()
+        .map(|(link, ten)| regressor.column(*link, ten))
+        .collect();
+    let square = |column: &TorqueColumn| {
+        column
+            .courses
+            .iter()
+            .flatten()
+            .map(|value| value * value)
+            .sum::<f64>()
+    };
+    let of = |column: &TorqueColumn| {
+        if scene.declared.is_some() {
+            1.0
+        } else {
+            UNKNOWN_BEFOREHAND * square(column)
+        }
+    };
     let prior = columns.iter().map(of).collect();
     (changes, columns, prior)
 }

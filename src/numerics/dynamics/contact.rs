@@ -64,35 +64,69 @@ pub(super) fn contacts(
     noise: &[JointNoise],
     beside: ContactModel,
 ) -> Vec<ContactEvent> {
-    let lasting: Vec<f64> = noise.iter().map(|joint| joint.autocorrelation().max(1.0)).collect();
-    let sigma: Vec<f64> = noise.iter().zip(&lasting).map(|(joint, lasting)| joint.sigma * lasting.sqrt()).collect();
+    let lasting: Vec<f64> = noise
+        .iter()
+        .map(|joint| joint.autocorrelation().max(1.0))
+        .collect();
+    let sigma: Vec<f64> = noise
+        .iter()
+        .zip(&lasting)
+        .map(|(joint, lasting)| joint.sigma * lasting.sqrt())
+        .collect();
     let sigma = &sigma[..];
     let usual: f64 = lasting.iter().map(|lasting| 1.0 / lasting).sum();
     let rows = problem.reduction.rows.len();
     let time: Vec<f64> = (0..rows).map(|row| problem.time(row)).collect();
     let energy: Vec<f64> = (0..rows)
         .map(|row| {
-            residual.iter().zip(sigma).map(|(course, sigma)| (course[row] / sigma).powi(2)).sum::<f64>() / sigma.len() as f64
+            residual
+                .iter()
+                .zip(sigma)
+                .map(|(course, sigma)| (course[row] / sigma).powi(2))
+                .sum::<f64>()
+                / sigma.len() as f64
         })
         .collect();
-    let shown: Vec<usize> = (0..rows).filter(|row| beside == ContactModel::Judged || !problem.is_held_out(*row)).collect();
+    let shown: Vec<usize> = (0..rows)
+        .filter(|row| beside == ContactModel::Judged || !problem.is_held_out(*row))
+        .collect();
     let energy: Vec<f64> = shown.iter().map(|row| energy[*row]).collect();
-    let average = averaged(&energy, ((AVERAGED * problem.reduction.rate) as usize).max(3));
+    let average = averaged(
+        &energy,
+        ((AVERAGED * problem.reduction.rate) as usize).max(3),
+    );
     let median = nearest(&mut average.clone(), 0.5).unwrap_or(0.0);
     let mut apart: Vec<f64> = average.iter().map(|value| (value - median).abs()).collect();
     let spread = 1.4826 * nearest(&mut apart, 0.5).unwrap_or(0.0);
-    let least_share = if beside == ContactModel::Rich { RICH_SHARE } else { SHARE };
+    let least_share = if beside == ContactModel::Rich {
+        RICH_SHARE
+    } else {
+        SHARE
+    };
     let (mut used, mut events) = (vec![false; shown.len()], Vec::new());
     for _ in 0..MOST {
         let free = (0..shown.len()).filter(|row| !used[*row]);
-        let Some(highest) = free.max_by(|a, b| average[*a].total_cmp(&average[*b])) else { break };
-        if average[highest] < median + DEVIATIONS * spread || average[highest] < TIMES_USUAL * median {
+        let Some(highest) = free.max_by(|a, b| average[*a].total_cmp(&average[*b])) else {
+            break;
+        };
+        if average[highest] < median + DEVIATIONS * spread
+            || average[highest] < TIMES_USUAL * median
+        {
             break;
         }
-        let found = best_window(problem, residual, EffectiveNoise { sigma, usual }, &time, time[shown[highest]], least_share);
+        let found = best_window(
+            problem,
+            residual,
+            EffectiveNoise { sigma, usual },
+            &time,
+            time[shown[highest]],
+            least_share,
+        );
         events.extend(found.filter(|event| moves(problem, &time, event)));
         let near = |row: &usize| (time[shown[*row]] - time[shown[highest]]).abs() < APART;
-        (0..shown.len()).filter(near).for_each(|row| used[row] = true);
+        (0..shown.len())
+            .filter(near)
+            .for_each(|row| used[row] = true);
     }
     events.sort_by(|a: &ContactEvent, b| a.start.total_cmp(&b.start));
     events
@@ -112,12 +146,17 @@ fn best_window(
         let first = time.partition_point(|time| *time < start);
         let last = time.partition_point(|time| *time <= start + duration);
         if last >= first + FEWEST {
-            let (event, share) = pushed(problem, residual, noise, time, start, duration, first..last);
-            if best.as_ref().is_none_or(|(known, _)| event.gain > known.gain) {
+            let (event, share) =
+                pushed(problem, residual, noise, time, start, duration, first..last);
+            if best
+                .as_ref()
+                .is_none_or(|(known, _)| event.gain > known.gain)
+            {
                 best = Some((event, share));
             }
         }
-        best.as_ref().map(|(event, _)| (event.start, event.end - event.start))
+        best.as_ref()
+            .map(|(event, _)| (event.start, event.end - event.start))
     };
     let mut now = None;
     for duration in DURATIONS {
@@ -127,12 +166,15 @@ fn best_window(
     }
     for fine in FINE {
         let (start, duration) = now?;
-        for steps in (-FINE_STEPS..=FINE_STEPS).flat_map(|begin| (-FINE_STEPS..=FINE_STEPS).map(move |end| [begin, end])) {
+        for steps in (-FINE_STEPS..=FINE_STEPS)
+            .flat_map(|begin| (-FINE_STEPS..=FINE_STEPS).map(move |end| [begin, end]))
+        {
             let [begin, end] = steps.map(|steps| fine * f64::from(steps));
             now = look(start + begin, duration + end - begin);
         }
     }
-    best.filter(|(event, share)| event.gain > GAIN && *share > least_share).map(|(event, _)| event)
+    best.filter(|(event, share)| event.gain > GAIN && *share > least_share)
+        .map(|(event, _)| event)
 }
 
 /// A push that rises and falls as sin^2 over a window, fitted; and the share that it explains of the squared residual above the noise.
@@ -153,7 +195,10 @@ fn pushed(
         let push = (PI * (time[row] - start) / duration).sin().powi(2);
         let jacobian = problem.scene.tool_jacobian(problem.reduction.rows[row]);
         for (joint, along) in jacobian.iter().enumerate() {
-            let (column, value) = (-along * push / sigma[joint], residual[joint][row] / sigma[joint]);
+            let (column, value) = (
+                -along * push / sigma[joint],
+                residual[joint][row] / sigma[joint],
+            );
             gram += column * column.transpose();
             right += column * value;
             square += value * value;
@@ -163,9 +208,13 @@ fn pushed(
         }
     }
     let ridge = 1e-8 * gram.trace();
-    let inverse = (gram + Matrix3::identity() * ridge).try_inverse().unwrap_or_else(Matrix3::zeros);
+    let inverse = (gram + Matrix3::identity() * ridge)
+        .try_inverse()
+        .unwrap_or_else(Matrix3::zeros);
     let force = inverse * right;
-    let gained = |(gram, right): &(Matrix3<f64>, Vector3<f64>)| 2.0 * force.dot(right) - force.dot(&(gram * force));
+    let gained = |(gram, right): &(Matrix3<f64>, Vector3<f64>)| {
+        2.0 * force.dot(right) - force.dot(&(gram * force))
+    };
     let gain = gained(&(gram, right));
     let most = along_force.iter().map(gained).fold(0.0, f64::max);
     let mut joints: Vec<usize> = (0..sigma.len()).collect();
@@ -179,17 +228,26 @@ fn pushed(
         sigma: [0, 1, 2].map(|axis| inverse[(axis, axis)].max(0.0).sqrt()),
         gain,
     };
-    let share = if gain - most < (OTHERS * gain).max(OTHERS_GAIN) { 0.0 } else { gain / (square - usual).max(gain) };
+    let share = if gain - most < (OTHERS * gain).max(OTHERS_GAIN) {
+        0.0
+    } else {
+        gain / (square - usual).max(gain)
+    };
     (event, share)
 }
 
 /// Whether the arm moves in a good part of an event.
 fn moves(problem: &TorqueProblem, time: &[f64], event: &ContactEvent) -> bool {
-    let rows: Vec<usize> = (0..time.len()).filter(|row| time[*row] >= event.start && time[*row] <= event.end).collect();
+    let rows: Vec<usize> = (0..time.len())
+        .filter(|row| time[*row] >= event.start && time[*row] <= event.end)
+        .collect();
     let scene = &problem.scene;
     let moving = rows.iter().filter(|row| {
         let row = problem.reduction.rows[**row];
-        scene.velocity.iter().any(|course| course[row].abs() > 2.0 * scene.sign_width)
+        scene
+            .velocity
+            .iter()
+            .any(|course| course[row].abs() > 2.0 * scene.sign_width)
     });
     moving.count() as f64 >= MOVING * rows.len() as f64
 }
@@ -197,9 +255,13 @@ fn moves(problem: &TorqueProblem, time: &[f64], event: &ContactEvent) -> bool {
 /// Mean over `width` values about each; beyond the ends there is nothing.
 fn averaged(values: &[f64], width: usize) -> Vec<f64> {
     let mut sums = vec![0.0];
-    values.iter().for_each(|value| sums.push(sums[sums.len() - 1] + value));
+    values
+        .iter()
+        .for_each(|value| sums.push(sums[sums.len() - 1] + value));
     let of = |row: usize| {
-        let first = (row + 1).saturating_sub(width - width / 2).min(values.len());
+        let first = (row + 1)
+            .saturating_sub(width - width / 2)
+            .min(values.len());
         let last = (row + width / 2 + 1).min(values.len());
         (sums[last] - sums[first.min(last)]) / width as f64
     };

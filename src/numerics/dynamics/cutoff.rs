@@ -47,26 +47,46 @@ impl JointPace {
         let mean = angles.iter().sum::<f64>() / rows;
         let away = mean - self.mean;
         let share = rows / (self.rows + rows);
-        self.apart += angles.iter().map(|angle| (angle - mean).powi(2)).sum::<f64>() + away * away * self.rows * share;
+        self.apart += angles
+            .iter()
+            .map(|angle| (angle - mean).powi(2))
+            .sum::<f64>()
+            + away * away * self.rows * share;
         self.mean += away * share;
         self.rows += rows;
         let later = angles.get(step..).unwrap_or_default();
-        self.moved += angles.iter().zip(later).map(|(from, to)| ((to - from) * rate / step as f64).powi(2)).sum::<f64>();
+        self.moved += angles
+            .iter()
+            .zip(later)
+            .map(|(from, to)| ((to - from) * rate / step as f64).powi(2))
+            .sum::<f64>();
         self.moving += later.len() as f64;
     }
 
     fn end_stretch(&mut self) {
         let [moved, apart] = self.ended;
         let known = self.moving > 0.0;
-        let ended = if known { [moved + self.moved / self.moving * self.rows, apart + self.apart] } else { self.ended };
-        *self = Self { ended, ..Self::default() };
+        let ended = if known {
+            [
+                moved + self.moved / self.moving * self.rows,
+                apart + self.apart,
+            ]
+        } else {
+            self.ended
+        };
+        *self = Self {
+            ended,
+            ..Self::default()
+        };
     }
 }
 
 impl MotionPace {
     /// The sums of no rows of n joints.
     pub fn new(joints: usize) -> Self {
-        Self { joints: vec![JointPace::default(); joints] }
+        Self {
+            joints: vec![JointPace::default(); joints],
+        }
     }
 
     /// Takes rows; whether the first stretch of them continues the last one of those before.
@@ -86,7 +106,13 @@ impl MotionPace {
     /// Hz, for a clock of `rate` Hz. A joint comes and goes as often as a sine of the same rms of velocity and of angle.
     pub fn cutoff(mut self, rate: f64) -> f64 {
         self.joints.iter_mut().for_each(JointPace::end_stretch);
-        let often = |[moved, apart]: [f64; 2]| if apart > 0.0 { (moved / apart).sqrt() / (2.0 * PI) } else { 0.0 };
+        let often = |[moved, apart]: [f64; 2]| {
+            if apart > 0.0 {
+                (moved / apart).sqrt() / (2.0 * PI)
+            } else {
+                0.0
+            }
+        };
         let mut paces: Vec<f64> = self.joints.iter().map(|joint| often(joint.ended)).collect();
         let usual = nearest(&mut paces, 0.5).unwrap_or(0.0);
         (HARMONICS * usual).clamp(LEAST, (MOST * rate).max(LEAST))

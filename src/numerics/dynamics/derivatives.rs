@@ -17,12 +17,20 @@ fn at(course: &[f64], row: isize) -> f64 {
 }
 
 /// First and second derivatives of `course` at `rate` Hz.
-pub(super) fn derivatives(course: &[f64], rate: f64, velocity: &mut [f64], acceleration: &mut [f64]) {
+pub(super) fn derivatives(
+    course: &[f64],
+    rate: f64,
+    velocity: &mut [f64],
+    acceleration: &mut [f64],
+) {
     for row in 0..course.len() {
         let here = row as isize;
         let (mut first, mut second) = (0.0, SECOND_MIDDLE * course[row]);
         for step in 0..4 {
-            let (ahead, behind) = (at(course, here + 1 + step as isize), at(course, here - 1 - step as isize));
+            let (ahead, behind) = (
+                at(course, here + 1 + step as isize),
+                at(course, here - 1 - step as isize),
+            );
             first += FIRST[step] * (ahead - behind);
             second += SECOND[step] * (ahead + behind);
         }
@@ -38,7 +46,9 @@ mod tests {
     #[test]
     fn a_motion_of_ten_hertz_keeps_its_velocity_and_acceleration_to_a_thousandth() {
         let (rate, turn) = (100.0, 2.0 * std::f64::consts::PI * 10.0);
-        let course: Vec<f64> = (0..200).map(|row| (turn * f64::from(row) / rate).sin()).collect();
+        let course: Vec<f64> = (0..200)
+            .map(|row| (turn * f64::from(row) / rate).sin())
+            .collect();
         let (mut velocity, mut acceleration) = (vec![0.0; 200], vec![0.0; 200]);
         derivatives(&course, rate, &mut velocity, &mut acceleration);
         for row in 10..190 {

@@ -34,7 +34,10 @@ pub(super) struct NearestBodies {
 
 /// The nearest numbers (10 n) that are bodies', by the covariance of all (row-major, 10 n x 10 n). `None` where they are bodies' already.
 pub(super) fn nearest_bodies(theta: &[f64], covariance: &DMatrix<f64>) -> Option<NearestBodies> {
-    let maps: Vec<ConeMap> = theta.chunks_exact(INERTIAL_NUMBERS).map(ConeMap::of).collect();
+    let maps: Vec<ConeMap> = theta
+        .chunks_exact(INERTIAL_NUMBERS)
+        .map(ConeMap::of)
+        .collect();
     let links: Vec<usize> = maps
         .iter()
         .enumerate()
@@ -48,7 +51,8 @@ pub(super) fn nearest_bodies(theta: &[f64], covariance: &DMatrix<f64>) -> Option
     let mut to = DMatrix::zeros(width, width);
     for (link, map) in maps.iter().enumerate() {
         let first = INERTIAL_NUMBERS * link;
-        to.view_mut((first, first), (INERTIAL_NUMBERS, INERTIAL_NUMBERS)).copy_from(&map.matrix);
+        to.view_mut((first, first), (INERTIAL_NUMBERS, INERTIAL_NUMBERS))
+            .copy_from(&map.matrix);
     }
     let start = &to * DVector::from_column_slice(theta);
     let metric = &to * covariance * to.transpose();
@@ -62,7 +66,12 @@ pub(super) fn nearest_bodies(theta: &[f64], covariance: &DMatrix<f64>) -> Option
     };
     let least = 1e-14 * own.max();
     let along = vectors.transpose() * moved;
-    let cost = along.iter().zip(own.iter()).filter(|(_, size)| **size > least).map(|(value, size)| value * value / size).sum();
+    let cost = along
+        .iter()
+        .zip(own.iter())
+        .filter(|(_, size)| **size > least)
+        .map(|(value, size)| value * value / size)
+        .sum();
     Some(NearestBodies { theta, cost, links })
 }
 
@@ -76,11 +85,15 @@ fn projected(start: &DVector<f64>, metric: &DMatrix<f64>, maps: &[ConeMap]) -> D
     let (mut on, mut pull) = (start.clone(), DVector::zeros(width));
     for step in 0..STEPS {
         let along = eigen.eigenvectors.transpose() * (&on - &pull - start);
-        let shares = DVector::from_fn(width, |k, _| sizes[k] / (sizes[k] + 1.0 / weight) * along[k]);
+        let shares = DVector::from_fn(width, |k, _| {
+            sizes[k] / (sizes[k] + 1.0 / weight) * along[k]
+        });
         let free = start + &eigen.eigenvectors * shares;
         let before = std::mem::replace(&mut on, &free + &pull);
         for (link, map) in maps.iter().enumerate() {
-            map.onto_cone(&mut on.as_mut_slice()[INERTIAL_NUMBERS * link..INERTIAL_NUMBERS * (link + 1)]);
+            map.onto_cone(
+                &mut on.as_mut_slice()[INERTIAL_NUMBERS * link..INERTIAL_NUMBERS * (link + 1)],
+            );
         }
         pull += &free - &on;
         let (apart, moved) = ((&free - &on).norm(), (&on - &before).norm());
@@ -105,20 +118,40 @@ struct ConeMap {
 }
 
 /// Where the ten entries stand.
-const ENTRIES: [(usize, usize); 10] = [(0, 0), (0, 1), (0, 2), (0, 3), (1, 1), (1, 2), (1, 3), (2, 2), (2, 3), (3, 3)];
+const ENTRIES: [(usize, usize); 10] = [
+    (0, 0),
+    (0, 1),
+    (0, 2),
+    (0, 3),
+    (1, 1),
+    (1, 2),
+    (1, 3),
+    (2, 2),
+    (2, 3),
+    (3, 3),
+];
 
 impl ConeMap {
     /// The pseudo-inertia of a link, scaled by its extent, so that masses and second moments have one size.
     fn of(ten: &[f64]) -> Self {
         let second = 0.5 * (ten[4] + ten[7] + ten[9]);
-        let extent = if ten[0] > 0.0 && second > 0.0 { (second / ten[0]).sqrt() } else { EXTENT };
+        let extent = if ten[0] > 0.0 && second > 0.0 {
+            (second / ten[0]).sqrt()
+        } else {
+            EXTENT
+        };
         let mut matrix = DMatrix::zeros(INERTIAL_NUMBERS, INERTIAL_NUMBERS);
         for number in 0..INERTIAL_NUMBERS {
             let mut unit = [0.0; INERTIAL_NUMBERS];
             unit[number] = 1.0;
-            matrix.column_mut(number).copy_from_slice(&entries(&pseudo_inertia(&unit, extent)));
+            matrix
+                .column_mut(number)
+                .copy_from_slice(&entries(&pseudo_inertia(&unit, extent)));
         }
-        Self { matrix, least: LEAST * (ten[0].abs() + second.abs() / (extent * extent)) }
+        Self {
+            matrix,
+            least: LEAST * (ten[0].abs() + second.abs() / (extent * extent)),
+        }
     }
 
     fn is_body(&self, ten: &[f64]) -> bool {
@@ -134,7 +167,9 @@ impl ConeMap {
             return;
         }
         let kept = Matrix4::from_diagonal(&eigen.eigenvalues.map(|size| size.max(self.least)));
-        ten.copy_from_slice(&entries(&(eigen.eigenvectors * kept * eigen.eigenvectors.transpose())));
+        ten.copy_from_slice(&entries(
+            &(eigen.eigenvectors * kept * eigen.eigenvectors.transpose()),
+        ));
     }
 }
 
@@ -156,7 +191,11 @@ fn entries(matrix: &Matrix4<f64>) -> [f64; INERTIAL_NUMBERS] {
 fn of_entries(ten: &[f64]) -> Matrix4<f64> {
     let mut matrix = Matrix4::zeros();
     for ((row, column), value) in ENTRIES.into_iter().zip(ten) {
-        let value = if row == column { *value } else { value / SQRT_2 };
+        let value = if row == column {
+            *value
+        } else {
+            value / SQRT_2
+        };
         (matrix[(row, column)], matrix[(column, row)]) = (value, value);
     }
     matrix
@@ -171,14 +210,27 @@ mod tests {
     /// Two links: a rod whose moment about its own axis is negative, and a ball.
     fn theta() -> Vec<f64> {
         let rod = [3.0, 0.3, 0.0, 0.0, -0.02, 0.0, 0.0, 0.08, 0.0, 0.08];
-        let ball = [2.0, 0.2, -0.1, 0.3, 0.02 + 0.208, 0.04, -0.12, 0.02 + 0.28, 0.06, 0.02 + 0.108];
+        let ball = [
+            2.0,
+            0.2,
+            -0.1,
+            0.3,
+            0.02 + 0.208,
+            0.04,
+            -0.12,
+            0.02 + 0.28,
+            0.06,
+            0.02 + 0.108,
+        ];
         rod.into_iter().chain(ball).collect()
     }
 
     /// A covariance of numbers that have much to do with each other.
     fn covariance() -> DMatrix<f64> {
         let mut dice = ChaCha8Rng::seed_from_u64(7);
-        let sizes: Vec<f64> = (0..20).map(|number| if number % 10 < 4 { 0.02 } else { 0.004 }).collect();
+        let sizes: Vec<f64> = (0..20)
+            .map(|number| if number % 10 < 4 { 0.02 } else { 0.004 })
+            .collect();
         let mix = DMatrix::from_fn(20, 20, |row, column| {
             sizes[row] * (f64::from(u8::from(row == column)) + 0.3 * (dice.random::<f64>() - 0.5))
         });
@@ -187,7 +239,13 @@ mod tests {
 
     fn distance(theta: &[f64], other: &[f64], covariance: &DMatrix<f64>) -> f64 {
         let moved = DVector::from_column_slice(other) - DVector::from_column_slice(theta);
-        moved.dot(&covariance.clone().cholesky().expect("positive").solve(&moved))
+        moved.dot(
+            &covariance
+                .clone()
+                .cholesky()
+                .expect("positive")
+                .solve(&moved),
+        )
     }
 
     #[test]
@@ -195,10 +253,17 @@ mod tests {
         let (theta, covariance) = (theta(), covariance());
         let found = nearest_bodies(&theta, &covariance).expect("one is none");
         assert_eq!(found.links, [0]);
-        let is_body = |all: &[f64]| all.chunks_exact(10).all(|ten| ConeMap::of(ten).is_body(ten));
+        let is_body = |all: &[f64]| {
+            all.chunks_exact(10)
+                .all(|ten| ConeMap::of(ten).is_body(ten))
+        };
         assert!(!is_body(&theta) && is_body(&found.theta));
         let cost = distance(&theta, &found.theta, &covariance);
-        assert!((found.cost - cost).abs() < 1e-6 * cost, "{} {cost}", found.cost);
+        assert!(
+            (found.cost - cost).abs() < 1e-6 * cost,
+            "{} {cost}",
+            found.cost
+        );
         // On the way from it to any body the distance rises.
         let mut dice = ChaCha8Rng::seed_from_u64(8);
         let mut tried = 0;
@@ -207,22 +272,40 @@ mod tests {
                 .theta
                 .iter()
                 .zip(covariance.diagonal().iter())
-                .map(|(value, variance)| value + variance.sqrt() * 3.0 * (dice.random::<f64>() - 0.5))
+                .map(|(value, variance)| {
+                    value + variance.sqrt() * 3.0 * (dice.random::<f64>() - 0.5)
+                })
                 .collect();
             if !is_body(&other) {
                 continue;
             }
             tried += 1;
-            let step: Vec<f64> = found.theta.iter().zip(&other).map(|(a, b)| a + 1e-3 * (b - a)).collect();
+            let step: Vec<f64> = found
+                .theta
+                .iter()
+                .zip(&other)
+                .map(|(a, b)| a + 1e-3 * (b - a))
+                .collect();
             // Up to what is kept off the limit.
             assert!(distance(&theta, &step, &covariance) > cost * (1.0 - 1e-5));
         }
         // Numbers that are correlated with those of the rod move, too.
-        assert!(found.theta[10..].iter().zip(&theta[10..]).any(|(a, b)| (a - b).abs() > 1e-6));
+        assert!(
+            found.theta[10..]
+                .iter()
+                .zip(&theta[10..])
+                .any(|(a, b)| (a - b).abs() > 1e-6)
+        );
     }
 
     #[test]
     fn bodies_stay_as_they_are() {
-        assert!(nearest_bodies(&theta()[10..], &covariance().view((10, 10), (10, 10)).into_owned()).is_none());
+        assert!(
+            nearest_bodies(
+                &theta()[10..],
+                &covariance().view((10, 10), (10, 10)).into_owned()
+            )
+            .is_none()
+        );
     }
 }

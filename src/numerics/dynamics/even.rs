@@ -42,18 +42,28 @@ struct ClockSteps {
 impl<'a> EvenSource<'a> {
     /// The recording by an even clock; none where its steps are even, or a row cannot be used, which others say.
     pub fn of(source: &'a dyn TorqueSource) -> Result<Option<Self>> {
-        let Some(steps) = ClockSteps::of(source)? else { return Ok(None) };
-        let (Some(first), Some(last)) = (steps.sorted.first(), steps.sorted.last()) else { return Ok(None) };
+        let Some(steps) = ClockSteps::of(source)? else {
+            return Ok(None);
+        };
+        let (Some(first), Some(last)) = (steps.sorted.first(), steps.sorted.last()) else {
+            return Ok(None);
+        };
         if (steps.uneven as f64) < *UNEVEN_ROWS * steps.sorted.len() as f64 {
             return Ok(None);
         }
         let period = steps.period();
         let pause = *PAUSE * period;
-        let bridged = steps.sorted.iter().rfind(|step| **step <= pause).unwrap_or(first);
+        let bridged = steps
+            .sorted
+            .iter()
+            .rfind(|step| **step <= pause)
+            .unwrap_or(first);
         let by_stamps = steps.apart[0] <= steps.apart[1];
         let done = match by_stamps {
             true => "rows are interpolated by their stamps to",
-            false => "joints move from row to row as by an even clock, so that the stamps err: rows are taken as",
+            false => {
+                "joints move from row to row as by an even clock, so that the stamps err: rows are taken as"
+            }
         };
         let remark = format!(
             "the clock is uneven, steps of {:.1} to {:.1} ms: {done} even steps of {:.2} ms; the longest gap bridged has {:.1} ms, longer \
@@ -64,7 +74,14 @@ impl<'a> EvenSource<'a> {
             1e3 * bridged,
             1e3 * pause
         );
-        let mut even = Self { source, period, pause, by_stamps, rows: 0, remark };
+        let mut even = Self {
+            source,
+            period,
+            pause,
+            by_stamps,
+            rows: 0,
+            remark,
+        };
         let mut rows = 0;
         even.each(&mut |block, _| {
             rows += block.rows();
@@ -78,12 +95,16 @@ impl<'a> EvenSource<'a> {
     fn each(&self, take: &mut dyn FnMut(&TorqueRecording, &[usize]) -> Result<()>) -> Result<()> {
         let mut resampler: Option<Resampler> = None;
         self.source.blocks(&mut |block| {
-            let resampler = resampler.get_or_insert_with(|| Resampler::new([self.period, self.pause], self.by_stamps, block));
+            let resampler = resampler.get_or_insert_with(|| {
+                Resampler::new([self.period, self.pause], self.by_stamps, block)
+            });
             resampler.held.extend(block, 0..block.rows());
             resampler.advance(false);
             resampler.hand_on(take)
         })?;
-        let Some(mut resampler) = resampler else { return Ok(()) };
+        let Some(mut resampler) = resampler else {
+            return Ok(());
+        };
         resampler.advance(true);
         resampler.hand_on(take)
     }
@@ -123,7 +144,13 @@ impl ClockSteps {
         source.blocks(&mut |block| {
             sound &= is_sound(block, source.joints());
             if sound && all.len() < STEPS {
-                all.extend(block.time.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0));
+                all.extend(
+                    block
+                        .time
+                        .windows(2)
+                        .map(|pair| pair[1] - pair[0])
+                        .filter(|step| *step > 0.0),
+                );
                 gather(block, &mut apart, &mut moved);
             }
             Ok(())
@@ -141,9 +168,23 @@ impl ClockSteps {
         let long = all.iter().filter(|step| **step > 1.5 * usual).count();
         // A clock of few ticks: most steps are some of them.
         let is_coarse = long as f64 > *UNEVEN * all.len() as f64;
-        let uneven = if is_coarse { all.len() } else { all.iter().filter(|step| off(step)).count() };
-        let over = |square: &[f64]| square.iter().zip(&moved).map(|(own, of)| own / f64::max(*of, f64::MIN_POSITIVE)).sum();
-        Ok(Some(Self { uneven, apart: [over(&apart[0]), over(&apart[1])], sorted: all }))
+        let uneven = if is_coarse {
+            all.len()
+        } else {
+            all.iter().filter(|step| off(step)).count()
+        };
+        let over = |square: &[f64]| {
+            square
+                .iter()
+                .zip(&moved)
+                .map(|(own, of)| own / f64::max(*of, f64::MIN_POSITIVE))
+                .sum()
+        };
+        Ok(Some(Self {
+            uneven,
+            apart: [over(&apart[0]), over(&apart[1])],
+            sorted: all,
+        }))
     }
 
     /// s, mean of the steps that are no pauses.
@@ -158,7 +199,9 @@ impl ClockSteps {
 /// Whether lists have their lengths and numbers are numbers that ascend.
 fn is_sound(block: &TorqueRecording, joints: usize) -> bool {
     let (n, rows) = (block.joints, block.rows());
-    let long = |all: &Option<Vec<f64>>, each: usize| all.as_ref().is_none_or(|all| all.len() == each * rows);
+    let long = |all: &Option<Vec<f64>>, each: usize| {
+        all.as_ref().is_none_or(|all| all.len() == each * rows)
+    };
     n == joints
         && [block.position.len(), block.torque.len()] == [n * rows; 2]
         && [block.trajectory.len(), block.held_out.len()] == [rows; 2]
@@ -202,7 +245,11 @@ mod tests {
 
     /// The arm of the other cases, whose masses are not declared.
     fn bare() -> DynamicArm {
-        DynamicArm { links: None, payload: None, ..arm() }
+        DynamicArm {
+            links: None,
+            payload: None,
+            ..arm()
+        }
     }
 
     /// A motion of four joints, rad, with its torque, Nm.
@@ -213,10 +260,18 @@ mod tests {
 
     /// Rows at some times, stamped at others; a blank of 2 s after row 2000.
     fn rows(times: &[f64], stamps: &[f64]) -> TorqueRecording {
-        let all = |part: usize| times.iter().flat_map(|time| (0..4).map(move |joint| moved(*time, joint)[part])).collect();
+        let all = |part: usize| {
+            times
+                .iter()
+                .flat_map(|time| (0..4).map(move |joint| moved(*time, joint)[part]))
+                .collect()
+        };
         let after = |time: &f64| time + if *time > 10.0 { 2.0 } else { 0.0 };
         let stamps = stamps.iter().map(after).collect();
-        TorqueRecording { torque: all(1), ..TorqueRecording::of_motion(4, stamps, all(0)) }
+        TorqueRecording {
+            torque: all(1),
+            ..TorqueRecording::of_motion(4, stamps, all(0))
+        }
     }
 
     /// Steps of 0.7 to 9.3 ms in disorder.
@@ -236,10 +291,15 @@ mod tests {
         let recording = rows(&times, &times);
         let used = UsedRecording::of(&bare(), &recording, None).unwrap();
         assert!(
-            used.remarks[0].starts_with("the clock is uneven, steps of 0.7 to ") && used.remarks[0].contains("by their stamps")
+            used.remarks[0].starts_with("the clock is uneven, steps of 0.7 to ")
+                && used.remarks[0].contains("by their stamps")
         );
         assert_eq!(used.clock.stretches.len(), 2, "{:?}", used.remarks);
-        assert!((used.clock.rate / RATE - 1.0).abs() < 0.02, "{}", used.clock.rate);
+        assert!(
+            (used.clock.rate / RATE - 1.0).abs() < 0.02,
+            "{}",
+            used.clock.rate
+        );
         let mut worst = [0.0_f64; 2];
         for (row, time) in used.recording.time.iter().enumerate() {
             let time = if *time > 11.0 { time - 2.0 } else { *time };
@@ -251,7 +311,12 @@ mod tests {
             // The recorded row that it comes after.
             let origin = used.origin[row];
             assert!(recording.time[origin] <= used.recording.time[row] + 1e-9);
-            assert!(recording.time.get(origin + 1).is_none_or(|next| *next > used.recording.time[row] - 1e-9));
+            assert!(
+                recording
+                    .time
+                    .get(origin + 1)
+                    .is_none_or(|next| *next > used.recording.time[row] - 1e-9)
+            );
         }
         assert!(worst[0] < 1e-5 && worst[1] < 1e-3, "{worst:?}");
     }
@@ -263,7 +328,11 @@ mod tests {
             let source = Blocks(rows(&times, &times), block);
             let even = EvenSource::of(&source).unwrap().expect("uneven");
             // The same steps whatever the blocks: those at their borders are not counted.
-            let even = EvenSource { period: 0.005, pause: 0.03, ..even };
+            let even = EvenSource {
+                period: 0.005,
+                pause: 0.03,
+                ..even
+            };
             let (mut all, mut from) = (TorqueRecording::like(&source.0), Vec::new());
             even.each(&mut |block, origin| {
                 all.extend(block, 0..block.rows());
@@ -272,7 +341,10 @@ mod tests {
             })
             .unwrap();
             let asked: Vec<usize> = (0..from.len()).step_by(97).collect();
-            assert_eq!(even.recorded(&asked).unwrap(), asked.iter().map(|row| from[*row]).collect::<Vec<usize>>());
+            assert_eq!(
+                even.recorded(&asked).unwrap(),
+                asked.iter().map(|row| from[*row]).collect::<Vec<usize>>()
+            );
             (all, from)
         };
         assert_eq!(even(4000), even(7));
@@ -282,11 +354,23 @@ mod tests {
     fn stamps_that_err_over_rows_of_an_even_clock_are_not_believed() {
         let mut dice = ChaCha8Rng::seed_from_u64(9);
         let times: Vec<f64> = (0..4000).map(|row| f64::from(row) / RATE).collect();
-        let stamps: Vec<f64> = times.iter().map(|time| time + 0.004 * dice.random::<f64>()).collect();
+        let stamps: Vec<f64> = times
+            .iter()
+            .map(|time| time + 0.004 * dice.random::<f64>())
+            .collect();
         let used = UsedRecording::of(&bare(), &rows(&times, &stamps), None).unwrap();
-        assert!(used.remarks[0].contains("the stamps err"), "{}", used.remarks[0]);
+        assert!(
+            used.remarks[0].contains("the stamps err"),
+            "{}",
+            used.remarks[0]
+        );
         assert_eq!(used.recording.position, rows(&times, &stamps).position);
         let first = &used.recording.time[..2000];
-        assert!(first.iter().zip(&times).all(|(made, time)| (made - time).abs() < 0.006));
+        assert!(
+            first
+                .iter()
+                .zip(&times)
+                .all(|(made, time)| (made - time).abs() < 0.006)
+        );
     }
 }

@@ -21,7 +21,10 @@ pub(super) struct TorqueExtremes {
 impl TorqueExtremes {
     /// The extremes of no rows of n joints.
     pub fn new(joints: usize) -> Self {
-        Self { rows: 0, joints: vec![[(f64::INFINITY, 0), (f64::NEG_INFINITY, 0)]; joints] }
+        Self {
+            rows: 0,
+            joints: vec![[(f64::INFINITY, 0), (f64::NEG_INFINITY, 0)]; joints],
+        }
     }
 
     /// Takes rows x n torques, Nm.
@@ -45,7 +48,9 @@ impl TorqueExtremes {
     /// Extremes that many rows share.
     pub fn saturated(&self, joint: usize) -> impl Iterator<Item = Fault> {
         let all = self.rows;
-        let shared = move |(_, rows): &Extreme| *rows >= SATURATED_ROWS && *rows as f64 > SATURATED * all as f64;
+        let shared = move |(_, rows): &Extreme| {
+            *rows >= SATURATED_ROWS && *rows as f64 > SATURATED * all as f64
+        };
         self.joints[joint].into_iter().filter(shared).map(move |(extreme, rows)| {
             let message =
                 format!("{rows} of {all} torques are exactly {extreme:.4} Nm, the largest: the current is cut off there");

@@ -64,13 +64,24 @@ impl TorqueModel {
         const LEAST: usize = 10;
         let (n, rows) = (self.joints(), motion.time.len());
         if arm.joints() != n || motion.joints != n || motion.position.len() != n * rows {
-            let message = format!("the model has {n} joints, the arm {}, the motion {}", arm.joints(), motion.joints);
+            let message = format!(
+                "the model has {n} joints, the arm {}, the motion {}",
+                arm.joints(),
+                motion.joints
+            );
             return Err(Error::data("motion", message));
         }
         if rows < LEAST {
-            return Err(Error::data("motion", format!("has {rows} rows; at least {LEAST} are needed")));
+            return Err(Error::data(
+                "motion",
+                format!("has {rows} rows; at least {LEAST} are needed"),
+            ));
         }
-        let forms = self.terms.iter().map(|term| term.form()).collect::<Result<Vec<TorqueForm>>>()?;
+        let forms = self
+            .terms
+            .iter()
+            .map(|term| term.form())
+            .collect::<Result<Vec<TorqueForm>>>()?;
         let mut scene = self.scene(arm, motion);
         let declared = match &scene.declared {
             Some(declared) => scene.torques_of(&declared.theta),
@@ -84,11 +95,21 @@ impl TorqueModel {
         let mut torque: Vec<Vec<f64>> = scene.rigid.clone();
         for one in &courses {
             let value = self.coefficient(one);
-            torque[one.joint].iter_mut().zip(&one.course).for_each(|(sum, part)| *sum += value * part);
+            torque[one.joint]
+                .iter_mut()
+                .zip(&one.course)
+                .for_each(|(sum, part)| *sum += value * part);
         }
-        let differences = torque.iter().zip(&declared).map(|(a, b)| a.iter().zip(b).map(|(a, b)| a - b).collect());
+        let differences = torque
+            .iter()
+            .zip(&declared)
+            .map(|(a, b)| a.iter().zip(b).map(|(a, b)| a - b).collect());
         let correction: Vec<Vec<f64>> = differences.collect();
-        let by_row = |courses: &[Vec<f64>]| (0..rows).flat_map(|row| courses.iter().map(move |course| course[row])).collect();
+        let by_row = |courses: &[Vec<f64>]| {
+            (0..rows)
+                .flat_map(|row| courses.iter().map(move |course| course[row]))
+                .collect()
+        };
         Ok(NeededTorques {
             u95: self.uncertainty(&forms, &mut scene, &courses),
             torque: by_row(&torque),
@@ -108,7 +129,12 @@ impl TorqueModel {
                 for number in 0..form.width {
                     let mut course = vec![0.0; scene.rows()];
                     form.cause.write(form, scene, joint, number, &mut course);
-                    courses.push(TermCourse { term, coefficient: first + number, joint, course });
+                    courses.push(TermCourse {
+                        term,
+                        coefficient: first + number,
+                        joint,
+                        course,
+                    });
                 }
             }
             first += form.width;
@@ -118,7 +144,10 @@ impl TorqueModel {
 
     /// Value of a coefficient.
     pub(super) fn coefficient(&self, of: &TermCourse) -> f64 {
-        let before: usize = self.terms[..of.term].iter().map(|term| term.coefficients.len()).sum();
+        let before: usize = self.terms[..of.term]
+            .iter()
+            .map(|term| term.coefficients.len())
+            .sum();
         self.terms[of.term].coefficients[of.coefficient - before]
     }
 
@@ -134,7 +163,11 @@ impl TorqueModel {
         // A warm arm began to move longer ago than any time constant: what fades has faded.
         let begun = motion.since_start.unwrap_or(f64::INFINITY);
         scene.time.iter_mut().for_each(|time| *time += begun);
-        let columns = |all: &Vec<f64>| (0..n).map(|joint| column(all, n, joint)).collect::<Vec<Vec<f64>>>();
+        let columns = |all: &Vec<f64>| {
+            (0..n)
+                .map(|joint| column(all, n, joint))
+                .collect::<Vec<Vec<f64>>>()
+        };
         if let Some(velocity) = &motion.velocity {
             scene.position = columns(&motion.position);
             scene.velocity = columns(velocity);

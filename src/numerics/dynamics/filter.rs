@@ -24,16 +24,28 @@ impl ZeroPhase {
     /// The filter for a rate and a cut-off, Hz; above 0.45 times the rate it changes nothing.
     pub fn new(rate: f64, cutoff: f64) -> Self {
         if cutoff >= IDLE * rate {
-            return Self { sections: None, padding: 0 };
+            return Self {
+                sections: None,
+                padding: 0,
+            };
         }
         let warped = (PI * cutoff / rate).tan();
         let section = |pole: usize| {
             let damping = 2.0 * (PI * (2 * pole + 1) as f64 / 8.0).sin();
             let scale = 1.0 / (1.0 + damping * warped + warped * warped);
             let b = warped * warped * scale;
-            [b, 2.0 * b, b, 2.0 * (warped * warped - 1.0) * scale, (1.0 - damping * warped + warped * warped) * scale]
+            [
+                b,
+                2.0 * b,
+                b,
+                2.0 * (warped * warped - 1.0) * scale,
+                (1.0 - damping * warped + warped * warped) * scale,
+            ]
         };
-        Self { sections: Some([section(0), section(1)]), padding: (3.0 * rate / cutoff) as usize + 15 }
+        Self {
+            sections: Some([section(0), section(1)]),
+            padding: (3.0 * rate / cutoff) as usize + 15,
+        }
     }
 
     /// Filters courses of one length in place.
@@ -44,18 +56,25 @@ impl ZeroPhase {
                 self.together(several);
             }
         }
-        lanes.into_remainder().iter_mut().for_each(|one| self.together(std::array::from_mut(one)));
+        lanes
+            .into_remainder()
+            .iter_mut()
+            .for_each(|one| self.together(std::array::from_mut(one)));
     }
 
     /// Filters some courses side by side: each value waits for the one before, other courses do not.
     fn together<C: AsMut<[f64]>, const L: usize>(&self, courses: &mut [C; L]) {
         let mut courses = courses.each_mut().map(|course| course.as_mut());
         let rows = courses[0].len();
-        let Some(sections) = self.sections.as_ref().filter(|_| rows >= 3) else { return };
+        let Some(sections) = self.sections.as_ref().filter(|_| rows >= 3) else {
+            return;
+        };
         let padding = self.padding.min(rows - 2);
         let all = |row: usize| -> [f64; L] { std::array::from_fn(|lane| courses[lane][row]) };
         // Continued by a half turn about each end.
-        let beyond = |end: [f64; L], inside: [f64; L]| -> [f64; L] { std::array::from_fn(|lane| 2.0 * end[lane] - inside[lane]) };
+        let beyond = |end: [f64; L], inside: [f64; L]| -> [f64; L] {
+            std::array::from_fn(|lane| 2.0 * end[lane] - inside[lane])
+        };
         let (first, last) = (all(0), all(rows - 1));
         let mut room: Vec<[f64; L]> = Vec::with_capacity(rows + 2 * padding);
         room.extend((1..=padding).rev().map(|back| beyond(first, all(back))));
@@ -64,12 +83,18 @@ impl ZeroPhase {
         Self::run(sections, room.iter_mut());
         Self::run(sections, room.iter_mut().rev());
         for (row, values) in room[padding..padding + rows].iter().enumerate() {
-            courses.iter_mut().zip(values).for_each(|(course, value)| course[row] = *value);
+            courses
+                .iter_mut()
+                .zip(values)
+                .for_each(|(course, value)| course[row] = *value);
         }
     }
 
     /// Both sections over courses side by side.
-    fn run<'a, const L: usize>([slow, quick]: &[Section; 2], mut rows: impl Iterator<Item = &'a mut [f64; L]>) {
+    fn run<'a, const L: usize>(
+        [slow, quick]: &[Section; 2],
+        mut rows: impl Iterator<Item = &'a mut [f64; L]>,
+    ) {
         let Some(first) = rows.next() else { return };
         let mut one = SectionState::standing(slow, first);
         one.step(slow, first);
@@ -92,7 +117,10 @@ impl<const L: usize> SectionState<L> {
     /// As if these values had stood for ever.
     fn standing([_, b1, b2, a1, a2]: &Section, values: &[f64; L]) -> Self {
         let second = values.map(|value| (b2 - a2) * value);
-        Self { first: std::array::from_fn(|lane| (b1 - a1) * values[lane] + second[lane]), second }
+        Self {
+            first: std::array::from_fn(|lane| (b1 - a1) * values[lane] + second[lane]),
+            second,
+        }
     }
 
     /// Makes the next values of them.
@@ -113,7 +141,9 @@ mod tests {
     use super::*;
 
     fn sine(rate: f64, hertz: f64, rows: usize) -> Vec<f64> {
-        (0..rows).map(|row| (2.0 * PI * hertz * row as f64 / rate).sin()).collect()
+        (0..rows)
+            .map(|row| (2.0 * PI * hertz * row as f64 / rate).sin())
+            .collect()
     }
 
     #[test]
@@ -127,7 +157,9 @@ mod tests {
             let ratio = (PI * hertz / rate).tan() / (PI * cutoff / rate).tan();
             let expected = 1.0 / (1.0 + ratio.powi(8));
             let before = sine(rate, hertz, rows);
-            let worst = (400..1600).map(|row| (course[row] - expected * before[row]).abs()).fold(0.0, f64::max);
+            let worst = (400..1600)
+                .map(|row| (course[row] - expected * before[row]).abs())
+                .fold(0.0, f64::max);
             assert!(worst < 2e-4, "{hertz} Hz: {worst}");
         }
     }
@@ -137,14 +169,20 @@ mod tests {
         let filter = ZeroPhase::new(100.0, 10.0);
         let mut course: Vec<f64> = (0..300).map(|row| 3.0 + 0.2 * f64::from(row)).collect();
         filter.apply(&mut [&mut course[..]]);
-        let worst = course.iter().enumerate().map(|(row, value)| (value - 3.0 - 0.2 * row as f64).abs()).fold(0.0, f64::max);
+        let worst = course
+            .iter()
+            .enumerate()
+            .map(|(row, value)| (value - 3.0 - 0.2 * row as f64).abs())
+            .fold(0.0, f64::max);
         assert!(worst < 0.02, "{worst}");
     }
 
     #[test]
     fn a_course_is_filtered_alike_alone_and_beside_others() {
         let filter = ZeroPhase::new(100.0, 10.0);
-        let courses: Vec<Vec<f64>> = (1..=6).map(|hertz| sine(100.0, f64::from(hertz), 400)).collect();
+        let courses: Vec<Vec<f64>> = (1..=6)
+            .map(|hertz| sine(100.0, f64::from(hertz), 400))
+            .collect();
         let mut together = courses.clone();
         filter.apply(&mut together);
         for (mut course, together) in courses.into_iter().zip(together) {

@@ -28,15 +28,33 @@ pub(super) fn findings(
 ) -> Vec<TorqueFinding> {
     let sweep = choice.base.with(set);
     let solution = sweep.solution();
-    let named = set.iter().filter(|number| silent.iter().all(|one| !choice.form(*one).is_called_as(choice.form(**number))));
+    let named = set.iter().filter(|number| {
+        silent
+            .iter()
+            .all(|one| !choice.form(*one).is_called_as(choice.form(**number)))
+    });
     let table = TorqueTable::new(choice);
     let components = table.components(set);
     let mut found: Vec<TorqueFinding> = named
         .map(|number| {
             let mut odds = table.odds_in_place(&components, *number);
             let other = other.filter(|_| choice.form(*number).cause.about().inertial);
-            odds.rivals.extend(other.into_iter().flat_map(|other| other.rivals(choice, odds.own)));
-            weighed(finding(choice, set, (&sweep, &solution), *number, held_out, uncertain), odds)
+            odds.rivals.extend(
+                other
+                    .into_iter()
+                    .flat_map(|other| other.rivals(choice, odds.own)),
+            );
+            weighed(
+                finding(
+                    choice,
+                    set,
+                    (&sweep, &solution),
+                    *number,
+                    held_out,
+                    uncertain,
+                ),
+                odds,
+            )
         })
         .collect();
     found.sort_by(|a, b| b.evidence.gain.total_cmp(&a.evidence.gain));
@@ -53,33 +71,55 @@ fn finding(
 ) -> TorqueFinding {
     let (problem, form) = (choice.problem, choice.form(number));
     let line = number_of_line(choice, set, number, solution, (uncertain, slopes));
-    let fitted = line.map_or_else(|| fitted(problem, uncertain, solution, number), |line| vec![line]);
-    let rest: Vec<usize> = set.iter().copied().filter(|other| *other != number).collect();
+    let fitted = line.map_or_else(
+        || fitted(problem, uncertain, solution, number),
+        |line| vec![line],
+    );
+    let rest: Vec<usize> = set
+        .iter()
+        .copied()
+        .filter(|other| *other != number)
+        .collect();
     let without = choice.base.with(&rest);
     let loss = sweep.loss(number, solution);
     let rank = loss.rank.max(1) as f64;
     let delta_bic = loss.square - rank * (choice.weighted.rows as f64).ln();
-    let own: Vec<(usize, f64)> = solution.iter().copied().filter(|(column, _)| problem.all.of(number).contains(column)).collect();
+    let own: Vec<(usize, f64)> = solution
+        .iter()
+        .copied()
+        .filter(|(column, _)| problem.all.of(number).contains(column))
+        .collect();
     let effect = problem.predicted(&own);
-    let count =
-        effect.iter().filter(|course| course.iter().any(|value| *value != 0.0)).count().max(1) * problem.reduction.rows.len();
+    let count = effect
+        .iter()
+        .filter(|course| course.iter().any(|value| *value != 0.0))
+        .count()
+        .max(1)
+        * problem.reduction.rows.len();
     let square: f64 = effect.iter().flatten().map(|value| value * value).sum();
     // Tolerances bend to take the place of a wrong mass, at their price: its size is what the rest leaves as it is.
     let left_without: Vec<(usize, f64)> = match form.cause.about().inertial {
-        true => solution.iter().copied().filter(|(column, _)| !problem.all.of(number).contains(column)).collect(),
+        true => solution
+            .iter()
+            .copied()
+            .filter(|(column, _)| !problem.all.of(number).contains(column))
+            .collect(),
         false => without.solution(),
     };
     TorqueFinding {
         effect: form.cause.name(),
         place: form.place,
         statement: form.cause.statement(form, &fitted),
-        parameters: with_shapes(form.cause.parameters(form, &fitted), form, |index| slopes.sigma(uncertain, number, index)),
+        parameters: with_shapes(form.cause.parameters(form, &fitted), form, |index| {
+            slopes.sigma(uncertain, number, index)
+        }),
         evidence: Evidence {
             gain: loss.square,
             f_statistic: loss.square / rank,
             p_value: tail(loss.square / rank, rank, FREEDOM),
             delta_bic,
-            heldout_gain: (!held_out.is_empty()).then(|| held_out_gain(problem, &left_without, solution, held_out)),
+            heldout_gain: (!held_out.is_empty())
+                .then(|| held_out_gain(problem, &left_without, solution, held_out)),
             effect_rms: (square / count as f64).sqrt(),
         },
         rivals: Vec::new(),
@@ -89,45 +129,87 @@ fn finding(
 
 /// A finding with its probabilities: those of its name, of all that could stand in its place, and of nothing.
 fn weighed(mut finding: TorqueFinding, CellOdds { own, rivals }: CellOdds) -> TorqueFinding {
-    let whole = log_sum(&rivals.iter().map(|(_, log)| *log).chain([own, 0.0]).collect::<Vec<_>>());
+    let whole = log_sum(
+        &rivals
+            .iter()
+            .map(|(_, log)| *log)
+            .chain([own, 0.0])
+            .collect::<Vec<_>>(),
+    );
     let share = |log: f64| (1.0 - *MISLED) * (log - whole).exp();
     let mut here = share(own);
     for ((effect, place), log) in rivals {
         let probability = share(log);
-        here += if place == finding.place { probability } else { 0.0 };
+        here += if place == finding.place {
+            probability
+        } else {
+            0.0
+        };
         if (effect, place) != (finding.effect, finding.place) && probability > *RIVAL {
-            finding.rivals.push(RivalCause { effect, place, delta_bic: 2.0 * (own - log), probability });
+            finding.rivals.push(RivalCause {
+                effect,
+                place,
+                delta_bic: 2.0 * (own - log),
+                probability,
+            });
         }
     }
-    finding.rivals.sort_by(|a, b| b.probability.total_cmp(&a.probability));
-    finding.probabilities = Probabilities { name: share(own), place: here, none: share(0.0) + *MISLED };
+    finding
+        .rivals
+        .sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    finding.probabilities = Probabilities {
+        name: share(own),
+        place: here,
+        none: share(0.0) + *MISLED,
+    };
     finding
 }
 
 /// Parameters with the standard deviations of shape numbers.
-fn with_shapes(mut all: Vec<TorqueParameter>, form: &TorqueForm, sigma: impl Fn(usize) -> Option<f64>) -> Vec<TorqueParameter> {
+fn with_shapes(
+    mut all: Vec<TorqueParameter>,
+    form: &TorqueForm,
+    sigma: impl Fn(usize) -> Option<f64>,
+) -> Vec<TorqueParameter> {
     for span in form.shape_numbers() {
         let own = all.iter_mut().find(|parameter| parameter.name == span.name);
-        own.into_iter().for_each(|parameter| parameter.sigma = sigma(span.index));
+        own.into_iter()
+            .for_each(|parameter| parameter.sigma = sigma(span.index));
     }
     all
 }
 
 /// Coefficients of a form with their standard deviations.
-fn fitted(problem: &TorqueProblem, sweep: &SweptColumns, solution: &[(usize, f64)], number: usize) -> Vec<FittedNumber> {
+fn fitted(
+    problem: &TorqueProblem,
+    sweep: &SweptColumns,
+    solution: &[(usize, f64)],
+    number: usize,
+) -> Vec<FittedNumber> {
     let columns: Vec<usize> = problem.all.of(number).collect();
     let covariance = sweep.covariance(&columns);
     let of = |(place, column): (usize, &usize)| FittedNumber {
-        value: solution.iter().find(|(pivot, _)| pivot == column).map_or(0.0, |(_, value)| *value),
+        value: solution
+            .iter()
+            .find(|(pivot, _)| pivot == column)
+            .map_or(0.0, |(_, value)| *value),
         sigma: covariance[place * (columns.len() + 1)].max(0.0).sqrt(),
     };
     columns.iter().enumerate().map(of).collect()
 }
 
 /// Fall of the rms of held-out rows, Nm, over all joints.
-fn held_out_gain(problem: &TorqueProblem, without: &[(usize, f64)], solution: &[(usize, f64)], rows: &[usize]) -> f64 {
+fn held_out_gain(
+    problem: &TorqueProblem,
+    without: &[(usize, f64)],
+    solution: &[(usize, f64)],
+    rows: &[usize],
+) -> f64 {
     let rms = |residual: &[Vec<f64>]| {
-        let square: f64 = residual.iter().flat_map(|course| rows.iter().map(|row| course[*row].powi(2))).sum();
+        let square: f64 = residual
+            .iter()
+            .flat_map(|course| rows.iter().map(|row| course[*row].powi(2)))
+            .sum();
         (square / (rows.len() * residual.len()) as f64).sqrt()
     };
     rms(&problem.residual(without)) - rms(&problem.residual(solution))
@@ -158,22 +240,45 @@ pub(super) fn plain_finding(
         rivals: Vec::new(),
         probabilities: Probabilities::default(),
     };
-    weighed(finding, CellOdds { own: 0.5 * gain, rivals: Vec::new() })
+    weighed(
+        finding,
+        CellOdds {
+            own: 0.5 * gain,
+            rivals: Vec::new(),
+        },
+    )
 }
 
 /// A push on the arm.
 pub(super) fn contact(event: &ContactEvent) -> TorqueFinding {
-    let joints: Vec<String> = event.joints.iter().map(|joint| (joint + 1).to_string()).collect();
-    let size = event.force.iter().map(|force| force * force).sum::<f64>().sqrt();
+    let joints: Vec<String> = event
+        .joints
+        .iter()
+        .map(|joint| (joint + 1).to_string())
+        .collect();
+    let size = event
+        .force
+        .iter()
+        .map(|force| force * force)
+        .sum::<f64>()
+        .sqrt();
     let number = |name: &str, value: f64, unit: &'static str, sigma: Option<f64>| TorqueParameter {
         name: name.into(),
         value,
         unit,
         sigma,
     };
-    let mut parameters = vec![number("start", event.start, "s", None), number("end", event.end, "s", None)];
+    let mut parameters = vec![
+        number("start", event.start, "s", None),
+        number("end", event.end, "s", None),
+    ];
     for (axis, name) in ["force_x", "force_y", "force_z"].iter().enumerate() {
-        parameters.push(number(name, event.force[axis], "N", Some(event.sigma[axis])));
+        parameters.push(number(
+            name,
+            event.force[axis],
+            "N",
+            Some(event.sigma[axis]),
+        ));
     }
     let statement = format!(
         "something touches the arm from {:.1} s to {:.1} s, most at joints {}: as {size:.0} N at the tool would",
@@ -181,5 +286,12 @@ pub(super) fn contact(event: &ContactEvent) -> TorqueFinding {
         event.end,
         joints.join(" and ")
     );
-    plain_finding(super::CONTACT, Place::Arm, statement, parameters, event.gain, 3.0)
+    plain_finding(
+        super::CONTACT,
+        Place::Arm,
+        statement,
+        parameters,
+        event.gain,
+        3.0,
+    )
 }

@@ -30,7 +30,9 @@ type Best = (f64, f64, f64);
 fn finer(try_lead: &mut dyn FnMut(f64, f64, &mut Best), best: &mut Best) {
     for step in STEPS {
         let (_, about, moved) = *best;
-        [about - step, about + step].iter().for_each(|lead| try_lead(*lead, moved, best));
+        [about - step, about + step]
+            .iter()
+            .for_each(|lead| try_lead(*lead, moved, best));
     }
 }
 
@@ -54,21 +56,33 @@ pub(super) fn take_friction_lead(problem: &mut TorqueProblem) -> bool {
         }
     };
     let steps = (MOST / STEP).round() as i32;
-    (-steps..=steps).filter(|step| *step != 0).for_each(|step| try_lead(STEP * f64::from(step), 0.0, &mut best));
+    (-steps..=steps)
+        .filter(|step| *step != 0)
+        .for_each(|step| try_lead(STEP * f64::from(step), 0.0, &mut best));
     finer(&mut try_lead, &mut best);
     let alone = best;
-    let moves = (-TOGETHER..=TOGETHER).filter(|step| *step != 0).map(|step| STEP * f64::from(step));
-    moves.filter(|moved| latency + moved >= 0.0).for_each(|moved| try_lead(alone.1 + moved, moved, &mut best));
+    let moves = (-TOGETHER..=TOGETHER)
+        .filter(|step| *step != 0)
+        .map(|step| STEP * f64::from(step));
+    moves
+        .filter(|moved| latency + moved >= 0.0)
+        .for_each(|moved| try_lead(alone.1 + moved, moved, &mut best));
     if (alone.0 - best.0) * rows < MOVED_GAIN {
         best = alone;
     } else {
         finer(&mut try_lead, &mut best);
     }
     let left = left_by(problem, best.1, best.2);
-    let gains: Vec<f64> = unmoved.iter().zip(&left).map(|(unmoved, left)| rows * (unmoved - left)).collect();
+    let gains: Vec<f64> = unmoved
+        .iter()
+        .zip(&left)
+        .map(|(unmoved, left)| rows * (unmoved - left))
+        .collect();
     let agreeing = gains.iter().filter(|gain| **gain > OWN_GAIN).count();
     let needed = ((AGREEING * gains.len() as f64).ceil() as usize).max(2);
-    let is_one = (LEAST..MOST - SAME).contains(&best.1.abs()) && gains.iter().sum::<f64>() > GAIN && agreeing >= needed;
+    let is_one = (LEAST..MOST - SAME).contains(&best.1.abs())
+        && gains.iter().sum::<f64>() > GAIN
+        && agreeing >= needed;
     let found = if is_one { best.1 } else { 0.0 };
     let is_new = (found - before).abs() > SAME;
     problem.scene.friction_lead = if is_new { found } else { before };
@@ -97,13 +111,28 @@ mod tests {
         // As a solver lets it, rad/s.
         let widths = [0.001, 0.002, 0.006, 0.03];
         let soft = |(joint, _, _, velocity, acceleration, _): (usize, f64, f64, f64, f64, f64)| {
-            3.0 * velocity + 8.0 * ((velocity + LEAD * acceleration) / widths[joint]).clamp(-1.0, 1.0)
+            3.0 * velocity
+                + 8.0 * ((velocity + LEAD * acceleration) / widths[joint]).clamp(-1.0, 1.0)
         };
-        let diagnosis = diagnose(&arm(), &record(&arm(), 0.0, &soft), &TorqueQuestion::default(), &mut |_| ()).unwrap();
-        let others =
-            diagnosis.findings.iter().filter(|finding| !["viscous_friction", "coulomb_friction"].contains(&finding.effect));
+        let diagnosis = diagnose(
+            &arm(),
+            &record(&arm(), 0.0, &soft),
+            &TorqueQuestion::default(),
+            &mut |_| (),
+        )
+        .unwrap();
+        let others = diagnosis
+            .findings
+            .iter()
+            .filter(|finding| !["viscous_friction", "coulomb_friction"].contains(&finding.effect));
         let others = others.map(|finding| finding.statement.clone());
-        let (lead, others) = (diagnosis.model.friction_lead, others.collect::<Vec<String>>());
-        assert!((lead - LEAD).abs() < 0.001 && others.is_empty(), "{lead}: {others:?}");
+        let (lead, others) = (
+            diagnosis.model.friction_lead,
+            others.collect::<Vec<String>>(),
+        );
+        assert!(
+            (lead - LEAD).abs() < 0.001 && others.is_empty(),
+            "{lead}: {others:?}"
+        );
     }
 }

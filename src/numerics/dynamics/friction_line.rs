@@ -17,23 +17,43 @@ pub(super) fn number_of_line(
     if !form.cause.about().brakes {
         return None;
     }
-    let is_power = |own: &TorqueForm| own.place == form.place && own.cause.name() == VISCOUS && !own.shape_numbers().is_empty();
+    let is_power = |own: &TorqueForm| {
+        own.place == form.place && own.cause.name() == VISCOUS && !own.shape_numbers().is_empty()
+    };
     let power = *set.iter().find(|own| is_power(choice.form(**own)))?;
     let exponent = choice.form(power).shape[0];
-    let fastest = choice.problem.scene.velocity[form.joint()].iter().fold(0.0, |most: f64, velocity| most.max(velocity.abs()));
-    let value = |column: usize| solution.iter().find(|(pivot, _)| *pivot == column).map_or(0.0, |(_, value)| *value);
+    let fastest = choice.problem.scene.velocity[form.joint()]
+        .iter()
+        .fold(0.0, |most: f64, velocity| most.max(velocity.abs()));
+    let value = |column: usize| {
+        solution
+            .iter()
+            .find(|(pivot, _)| *pivot == column)
+            .map_or(0.0, |(_, value)| *value)
+    };
     let (column, is_viscous) = (all.of(power).start, form.cause.name() == VISCOUS);
     let of = |exponent: f64| line_of_power(exponent, fastest)[usize::from(is_viscous)];
     let mut along = vec![(column, of(exponent))];
     if !is_viscous {
         along.push((all.of(number).start, 1.0));
     }
-    let shape = slopes.0.iter().find(|(known, _)| *known == ShapeNumber::Of(power, 0));
-    let line = along.iter().map(|(column, share)| share * value(*column)).sum();
+    let shape = slopes
+        .0
+        .iter()
+        .find(|(known, _)| *known == ShapeNumber::Of(power, 0));
+    let line = along
+        .iter()
+        .map(|(column, share)| share * value(*column))
+        .sum();
     along.extend(shape.map(|(_, own)| (*own, value(column) * slope(exponent, of))));
     let columns: Vec<usize> = along.iter().map(|(column, _)| *column).collect();
     let covariance = uncertain.covariance(&columns);
     let pairs = (0..along.len()).flat_map(|a| (0..along.len()).map(move |b| (a, b)));
-    let variance: f64 = pairs.map(|(a, b)| along[a].1 * along[b].1 * covariance[a * along.len() + b]).sum();
-    Some(FittedNumber { value: line, sigma: variance.max(0.0).sqrt() })
+    let variance: f64 = pairs
+        .map(|(a, b)| along[a].1 * along[b].1 * covariance[a * along.len() + b])
+        .sum();
+    Some(FittedNumber {
+        value: line,
+        sigma: variance.max(0.0).sqrt(),
+    })
 }

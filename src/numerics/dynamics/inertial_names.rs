@@ -18,7 +18,11 @@ pub const INERTIAL_NAMES: [&str; INERTIAL_NUMBERS] = [
 
 /// `rigid_body.l3.mass`; `number` counts 10 a link.
 pub(super) fn inertial_name(number: usize) -> String {
-    format!("rigid_body.l{}.{}", number / INERTIAL_NUMBERS + 1, INERTIAL_NAMES[number % INERTIAL_NUMBERS])
+    format!(
+        "rigid_body.l{}.{}",
+        number / INERTIAL_NUMBERS + 1,
+        INERTIAL_NAMES[number % INERTIAL_NUMBERS]
+    )
 }
 
 /// kg, kg m or kg m2.

@@ -8,7 +8,18 @@ use nalgebra::{Matrix3, Vector3};
 pub(super) fn numbers(body: &Inertial, point: &Vector3<f64>) -> [f64; INERTIAL_NUMBERS] {
     let arm = body.centre.coords - point;
     let about = body.inertia + steiner(body.mass, &arm);
-    let mut ten = [body.mass, body.mass * arm.x, body.mass * arm.y, body.mass * arm.z, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+    let mut ten = [
+        body.mass,
+        body.mass * arm.x,
+        body.mass * arm.y,
+        body.mass * arm.z,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+    ];
     for (number, (row, column)) in INERTIA_ENTRIES.into_iter().enumerate() {
         ten[4 + number] = about[(row, column)];
     }
@@ -25,7 +36,11 @@ fn joined(a: &Inertial, b: &Inertial) -> Inertial {
     let mass = a.mass + b.mass;
     let centre = ((a.centre.coords * a.mass + b.centre.coords * b.mass) / mass.max(1e-9)).into();
     let of = |body: &Inertial| body.inertia + steiner(body.mass, &(body.centre - centre));
-    Inertial { mass, centre, inertia: of(a) + of(b) }
+    Inertial {
+        mass,
+        centre,
+        inertia: of(a) + of(b),
+    }
 }
 
 /// Inertial numbers of the whole arm, payload included, and their tolerance.
@@ -50,11 +65,18 @@ impl DeclaredInertials {
     pub fn of(arm: &DynamicArm, bodies: &[Inertial]) -> Self {
         let last = bodies.len() - 1;
         let point = |link: usize| arm.points[link].coords;
-        let links: Vec<f64> = bodies.iter().enumerate().flat_map(|(link, body)| numbers(body, &point(link))).collect();
+        let links: Vec<f64> = bodies
+            .iter()
+            .enumerate()
+            .flat_map(|(link, body)| numbers(body, &point(link)))
+            .collect();
         let mut theta = links.clone();
         if let Some(payload) = &arm.payload {
             let own = numbers(payload, &point(last));
-            theta[INERTIAL_NUMBERS * last..].iter_mut().zip(own).for_each(|(sum, value)| *sum += value);
+            theta[INERTIAL_NUMBERS * last..]
+                .iter_mut()
+                .zip(own)
+                .for_each(|(sum, value)| *sum += value);
         }
         let tolerance = (0..bodies.len()).map(|link| {
             let whole = match &arm.payload {
@@ -68,7 +90,11 @@ impl DeclaredInertials {
             tolerance: tolerance.collect(),
             payload: numbers(&payload, &point(last)),
             payload_shift: shifts(&payload, &point(last)),
-            centre_shift: bodies.iter().enumerate().map(|(link, body)| shifts(body, &point(link))).collect(),
+            centre_shift: bodies
+                .iter()
+                .enumerate()
+                .map(|(link, body)| shifts(body, &point(link)))
+                .collect(),
             links,
             theta,
         }
@@ -78,8 +104,16 @@ impl DeclaredInertials {
 /// A payload of 1 kg.
 fn unit_payload(arm: &DynamicArm) -> Inertial {
     match &arm.payload {
-        Some(payload) if payload.mass > 0.0 => Inertial { mass: 1.0, inertia: payload.inertia / payload.mass, ..*payload },
-        _ => Inertial { mass: 1.0, centre: arm.tool, inertia: Matrix3::zeros() },
+        Some(payload) if payload.mass > 0.0 => Inertial {
+            mass: 1.0,
+            inertia: payload.inertia / payload.mass,
+            ..*payload
+        },
+        _ => Inertial {
+            mass: 1.0,
+            centre: arm.tool,
+            inertia: Matrix3::zeros(),
+        },
     }
 }
 
@@ -88,7 +122,9 @@ fn shifts(body: &Inertial, point: &Vector3<f64>) -> [[f64; INERTIAL_NUMBERS]; 3]
     let arm = body.centre.coords - point;
     std::array::from_fn(|axis| {
         let along = Vector3::ith(axis, body.mass);
-        let inertia = Matrix3::identity() * (2.0 * arm.dot(&along)) - arm * along.transpose() - along * arm.transpose();
+        let inertia = Matrix3::identity() * (2.0 * arm.dot(&along))
+            - arm * along.transpose()
+            - along * arm.transpose();
         let mut ten = [0.0, along.x, along.y, along.z, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
         for (number, (row, column)) in INERTIA_ENTRIES.into_iter().enumerate() {
             ten[4 + number] = inertia[(row, column)];
@@ -98,11 +134,17 @@ fn shifts(body: &Inertial, point: &Vector3<f64>) -> [[f64; INERTIAL_NUMBERS]; 3]
 }
 
 /// Change of a body's numbers by one standard deviation of each of its own.
-fn tolerance(arm: &DynamicArm, body: &Inertial, point: &Vector3<f64>) -> [[f64; INERTIAL_NUMBERS]; INERTIAL_NUMBERS] {
+fn tolerance(
+    arm: &DynamicArm,
+    body: &Inertial,
+    point: &Vector3<f64>,
+) -> [[f64; INERTIAL_NUMBERS]; INERTIAL_NUMBERS] {
     /// Step of a coordinate of the centre: small against its tolerance, as an inertia is quadratic in it.
     const STEP: f64 = 1e-2;
     let base = numbers(body, point);
-    let largest = (0..3).map(|axis| body.inertia[(axis, axis)]).fold(0.0, f64::max);
+    let largest = (0..3)
+        .map(|axis| body.inertia[(axis, axis)])
+        .fold(0.0, f64::max);
     std::array::from_fn(|number| {
         let (mut moved, mut step) = (*body, 1.0);
         match number {
@@ -117,7 +159,9 @@ fn tolerance(arm: &DynamicArm, body: &Inertial, point: &Vector3<f64>) -> [[f64; 
             _ => {
                 let (row, column) = INERTIA_ENTRIES[number - 4];
                 let mut six = [0.0; 6];
-                six[number - 4] = arm.tolerance.inertia_relative * largest * if row == column { 1.0 } else { 0.5 };
+                six[number - 4] = arm.tolerance.inertia_relative
+                    * largest
+                    * if row == column { 1.0 } else { 0.5 };
                 moved.inertia += inertia_matrix(&six);
             }
         }

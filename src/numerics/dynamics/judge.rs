@@ -9,10 +9,20 @@ use super::weighted::Weighing;
 use crate::criteria::torque::{CONFIRMED, NAMED};
 
 /// Whitened errors of held-out rows of a solution, and what tolerances are stretched by.
-fn held_out_errors(problem: &TorqueProblem, weighing: Weighing, sweep: &SweptColumns) -> (Vec<f64>, f64) {
+fn held_out_errors(
+    problem: &TorqueProblem,
+    weighing: Weighing,
+    sweep: &SweptColumns,
+) -> (Vec<f64>, f64) {
     let solution = sweep.solution();
-    let stretched = solution.iter().filter_map(|(column, value)| Some(problem.all.prior.get(*column)? * value * value)).sum();
-    (weighing.measured(&problem.residual(&solution)).concat(), stretched)
+    let stretched = solution
+        .iter()
+        .filter_map(|(column, value)| Some(problem.all.prior.get(*column)? * value * value))
+        .sum();
+    (
+        weighing.measured(&problem.residual(&solution)).concat(),
+        stretched,
+    )
 }
 
 /// What held-out rows gain by each of a set, and what they must.
@@ -21,14 +31,29 @@ fn gains(choice: &CauseChoice, set: &[usize]) -> Vec<(f64, f64)> {
     let weighing = choice.problem.weighing(&runs);
     let (whole, stretched) = held_out_errors(choice.problem, weighing, &choice.base.with(set));
     let without = |place: usize| {
-        let rest: Vec<usize> = (0..set.len()).filter(|other| *other != place).map(|other| set[other]).collect();
-        let (errors, rest_stretched) = held_out_errors(choice.problem, weighing, &choice.base.with(&rest));
+        let rest: Vec<usize> = (0..set.len())
+            .filter(|other| *other != place)
+            .map(|other| set[other])
+            .collect();
+        let (errors, rest_stretched) =
+            held_out_errors(choice.problem, weighing, &choice.base.with(&rest));
         let pairs = || errors.iter().zip(&whole);
-        let gain = pairs().map(|(without, with)| without * without - with * with).sum::<f64>() + rest_stretched - stretched;
-        let foretold = pairs().map(|(without, with)| (without - with).powi(2)).sum::<f64>() + rest_stretched - stretched;
+        let gain = pairs()
+            .map(|(without, with)| without * without - with * with)
+            .sum::<f64>()
+            + rest_stretched
+            - stretched;
+        let foretold = pairs()
+            .map(|(without, with)| (without - with).powi(2))
+            .sum::<f64>()
+            + rest_stretched
+            - stretched;
         // The gain of a right finding scatters about its own square by twice its root.
         let least = foretold - *NAMED * 2.0 * foretold.max(0.0).sqrt();
-        (gain, least.min(*CONFIRMED * choice.form(set[place]).width as f64))
+        (
+            gain,
+            least.min(*CONFIRMED * choice.form(set[place]).width as f64),
+        )
     };
     (0..set.len()).map(without).collect()
 }
@@ -37,7 +62,11 @@ fn gains(choice: &CauseChoice, set: &[usize]) -> Vec<(f64, f64)> {
 pub(super) fn judge(choice: &CauseChoice, mut set: Vec<usize>) -> JudgedSet {
     let mut withdrawn = Vec::new();
     if choice.problem.runs(true).is_empty() {
-        return JudgedSet { set, silent: Vec::new(), withdrawn };
+        return JudgedSet {
+            set,
+            silent: Vec::new(),
+            withdrawn,
+        };
     }
     loop {
         let gains = gains(choice, &set);
@@ -47,8 +76,14 @@ pub(super) fn judge(choice: &CauseChoice, mut set: Vec<usize>) -> JudgedSet {
             set.iter().any(|other| choice.form(*other).modifies(form))
         };
         let worst = (0..set.len()).filter(|place| short(place) < 0.0 && !needed(place));
-        let Some(worst) = worst.min_by(|a, b| short(a).total_cmp(&short(b))) else { break };
+        let Some(worst) = worst.min_by(|a, b| short(a).total_cmp(&short(b))) else {
+            break;
+        };
         withdrawn.push((set.remove(worst), gains[worst].0));
     }
-    JudgedSet { set, silent: Vec::new(), withdrawn }
+    JudgedSet {
+        set,
+        silent: Vec::new(),
+        withdrawn,
+    }
 }

@@ -33,23 +33,37 @@ pub(super) fn latency(problem: &TorqueProblem) -> Option<Latency> {
     let basic: Vec<usize> = (0..problem.all.forms.len())
         .filter(|form| {
             problem.all.forms[*form].width == 1
-                && [VISCOUS, COULOMB, OFFSET, ROTOR].contains(&problem.all.forms[*form].cause.name())
+                && [VISCOUS, COULOMB, OFFSET, ROTOR]
+                    .contains(&problem.all.forms[*form].cause.name())
         })
         .collect();
     let (noise, _) = noise_beside(problem, &basic);
     let runs = problem.runs(false);
-    let weighing = Weighing { noise: &noise, runs: &runs };
-    let mut chosen: Vec<usize> = (0..problem.all.base).chain(basic.iter().flat_map(|form| problem.all.of(*form))).collect();
+    let weighing = Weighing {
+        noise: &noise,
+        runs: &runs,
+    };
+    let mut chosen: Vec<usize> = (0..problem.all.base)
+        .chain(basic.iter().flat_map(|form| problem.all.of(*form)))
+        .collect();
     chosen.sort_unstable();
     let weighted = WeightedColumns::new(&problem.all, &problem.measured, weighing, &chosen);
     let left_at = |shift: f64| {
         let mut weighted = weighted.with_measured(weighing.measured(&problem.difference(shift)));
-        let solution = SweptColumns::base(&problem.all, &weighted).with(&basic).solution();
+        let solution = SweptColumns::base(&problem.all, &weighted)
+            .with(&basic)
+            .solution();
         weighted.subtract(&solution);
-        weighted.measured.iter().map(|course| course.iter().map(|value| value * value).sum()).collect::<Vec<f64>>()
+        weighted
+            .measured
+            .iter()
+            .map(|course| course.iter().map(|value| value * value).sum())
+            .collect::<Vec<f64>>()
     };
     let steps = ((SHIFTS[1] - SHIFTS[0]) / SHIFTS[2]).round() as usize;
-    let shifts: Vec<f64> = (0..=steps).map(|step| SHIFTS[0] + SHIFTS[2] * step as f64).collect();
+    let shifts: Vec<f64> = (0..=steps)
+        .map(|step| SHIFTS[0] + SHIFTS[2] * step as f64)
+        .collect();
     let left: Vec<Vec<f64>> = shifts.iter().map(|shift| left_at(*shift)).collect();
     let total: Vec<f64> = left.iter().map(|joints| joints.iter().sum()).collect();
     let least = (0..total.len()).min_by(|a, b| total[*a].total_cmp(&total[*b]))?;
@@ -59,11 +73,21 @@ pub(super) fn latency(problem: &TorqueProblem) -> Option<Latency> {
     }
     let unmoved = (0..shifts.len()).min_by(|a, b| shifts[*a].abs().total_cmp(&shifts[*b].abs()))?;
     let curvature = total[least + 1] - 2.0 * total[least] + total[least - 1];
-    let aside = if curvature > 0.0 { 0.5 * (total[least - 1] - total[least + 1]) / curvature } else { 0.0 };
+    let aside = if curvature > 0.0 {
+        0.5 * (total[least - 1] - total[least + 1]) / curvature
+    } else {
+        0.0
+    };
     let seconds = shifts[least] + SHIFTS[2] * aside.clamp(-1.0, 1.0);
     let gain = total[unmoved] - total[least];
-    let agreeing = (0..problem.joints()).filter(|joint| left[unmoved][*joint] - left[least][*joint] > OWN_GAIN).count();
+    let agreeing = (0..problem.joints())
+        .filter(|joint| left[unmoved][*joint] - left[least][*joint] > OWN_GAIN)
+        .count();
     let needed = ((AGREEING * problem.joints() as f64).ceil() as usize).max(2);
     let sigma = SHIFTS[2] * (2.0 / curvature.max(f64::MIN_POSITIVE)).sqrt();
-    (gain > GAIN && agreeing >= needed && seconds > LEAST).then_some(Latency { seconds, sigma, gain })
+    (gain > GAIN && agreeing >= needed && seconds > LEAST).then_some(Latency {
+        seconds,
+        sigma,
+        gain,
+    })
 }

@@ -31,7 +31,10 @@ impl TorqueModel {
         let mut theta = self.inertials.clone();
         if let Some(payload) = &arm.payload {
             let own = numbers(payload, &point(n - 1));
-            theta[INERTIAL_NUMBERS * (n - 1)..].iter_mut().zip(own).for_each(|(sum, value)| *sum -= value);
+            theta[INERTIAL_NUMBERS * (n - 1)..]
+                .iter_mut()
+                .zip(own)
+                .for_each(|(sum, value)| *sum -= value);
         }
         let mut links = Vec::with_capacity(n);
         for link in (0..n).rev() {
@@ -42,14 +45,25 @@ impl TorqueModel {
                 own[0] = masses[link];
                 if let Some(first) = link.checked_sub(1) {
                     // A point mass at this joint, seen from the joint before.
-                    let there = Inertial { mass: moved, centre: Point3::from(point(link)), inertia: Matrix3::zeros() };
+                    let there = Inertial {
+                        mass: moved,
+                        centre: Point3::from(point(link)),
+                        inertia: Matrix3::zeros(),
+                    };
                     let ten = numbers(&there, &point(first));
-                    before[INERTIAL_NUMBERS * first..].iter_mut().zip(ten).for_each(|(sum, value)| *sum -= value);
+                    before[INERTIAL_NUMBERS * first..]
+                        .iter_mut()
+                        .zip(ten)
+                        .for_each(|(sum, value)| *sum -= value);
                 }
             }
             let ten = &own[..INERTIAL_NUMBERS];
             let centre = Point3::from(point(link) + Vector3::new(ten[1], ten[2], ten[3]) / ten[0]);
-            links.push(LinkFromTorques { mass: ten[0], centre, inertia: whole.then(|| nearest(ten).0.inertia) });
+            links.push(LinkFromTorques {
+                mass: ten[0],
+                centre,
+                inertia: whole.then(|| nearest(ten).0.inertia),
+            });
         }
         links.reverse();
         links
@@ -92,7 +106,11 @@ mod tests {
     fn gravity(arm: &DynamicArm, links: &[Inertial], position: &[f64]) -> Vec<f64> {
         let theta = DeclaredInertials::of(arm, links).theta;
         let (still, mut torque) = (vec![0.0; position.len()], vec![0.0; position.len()]);
-        let motion = MotionRow { position, velocity: &still, acceleration: &still };
+        let motion = MotionRow {
+            position,
+            velocity: &still,
+            acceleration: &still,
+        };
         InverseDynamics::new(arm).torque(motion, &arm.gravity, &theta, &mut torque);
         torque
     }
@@ -104,18 +122,40 @@ mod tests {
         let mut theta = DeclaredInertials::of(&arm, &bodies).theta;
         // Base parameters: no link has a mass of its own, the links before carry what the masses did at their joints.
         for link in (1..4).rev() {
-            let point = Inertial { mass: theta[10 * link], centre: arm.points[link], inertia: Matrix3::zeros() };
+            let point = Inertial {
+                mass: theta[10 * link],
+                centre: arm.points[link],
+                inertia: Matrix3::zeros(),
+            };
             let ten = numbers(&point, &arm.points[link - 1].coords);
-            theta[10 * link - 10..10 * link].iter_mut().zip(ten).for_each(|(sum, value)| *sum += value);
+            theta[10 * link - 10..10 * link]
+                .iter_mut()
+                .zip(ten)
+                .for_each(|(sum, value)| *sum += value);
             theta[10 * link] = 0.0;
         }
         let links = model(theta, vec![false; 40]).links(&arm, &[15.0, 9.0, 7.0, 1.0]);
-        assert_eq!(links.iter().map(|link| link.mass).collect::<Vec<_>>(), [15.0, 9.0, 7.0, 1.0]);
-        let found: Vec<Inertial> =
-            links.iter().map(|link| Inertial { mass: link.mass, centre: link.centre, inertia: Matrix3::zeros() }).collect();
+        assert_eq!(
+            links.iter().map(|link| link.mass).collect::<Vec<_>>(),
+            [15.0, 9.0, 7.0, 1.0]
+        );
+        let found: Vec<Inertial> = links
+            .iter()
+            .map(|link| Inertial {
+                mass: link.mass,
+                centre: link.centre,
+                inertia: Matrix3::zeros(),
+            })
+            .collect();
         for position in [[0.0; 4], [0.3, -0.7, 1.1, 0.4], [-1.0, 0.9, -0.5, 2.0]] {
-            let (own, truth) = (gravity(&arm, &found, &position), gravity(&arm, &bodies, &position));
-            assert!(own.iter().zip(&truth).all(|(a, b)| (a - b).abs() < 1e-10), "{own:?} {truth:?}");
+            let (own, truth) = (
+                gravity(&arm, &found, &position),
+                gravity(&arm, &bodies, &position),
+            );
+            assert!(
+                own.iter().zip(&truth).all(|(a, b)| (a - b).abs() < 1e-10),
+                "{own:?} {truth:?}"
+            );
         }
     }
 
@@ -126,7 +166,9 @@ mod tests {
         let theta = DeclaredInertials::of(&arm, &bodies).theta;
         let links = model(theta, vec![true; 40]).links(&arm, &[1.0; 4]);
         for (link, body) in links.iter().zip(&bodies) {
-            assert!((link.mass - body.mass).abs() < 1e-12 && (link.centre - body.centre).norm() < 1e-12);
+            assert!(
+                (link.mass - body.mass).abs() < 1e-12 && (link.centre - body.centre).norm() < 1e-12
+            );
             assert!((link.inertia.expect("whole") - body.inertia).norm() < 1e-10);
         }
     }

@@ -83,8 +83,9 @@ pub use newton_euler::{INERTIAL_NUMBERS, InverseDynamics, MotionRow};
 pub use recording::TorqueRecording;
 pub use source::TorqueSource;
 pub use types::{
-    ContactEvent, EnforcedBodies, FrictionCurve, InertialBasis, InertialEstimate, TorqueCourses, TorqueDiagnosis, TorqueErrors,
-    TorqueFinding, TorqueLeftover, TorqueNoise, TorqueParameter, TorqueQuestion,
+    ContactEvent, EnforcedBodies, FrictionCurve, InertialBasis, InertialEstimate, TorqueCourses,
+    TorqueDiagnosis, TorqueErrors, TorqueFinding, TorqueLeftover, TorqueNoise, TorqueParameter,
+    TorqueQuestion,
 };
 
 use crate::error::{Error, Result};
@@ -111,7 +112,12 @@ pub fn diagnose(
     question: &TorqueQuestion,
     tell: &mut dyn FnMut(String),
 ) -> Result<TorqueDiagnosis> {
-    diagnose_used(arm, UsedRecording::of(arm, recording, question.cutoff)?, question, tell)
+    diagnose_used(
+        arm,
+        UsedRecording::of(arm, recording, question.cutoff)?,
+        question,
+        tell,
+    )
 }
 
 fn diagnose_used(
@@ -120,16 +126,34 @@ fn diagnose_used(
     question: &TorqueQuestion,
     tell: &mut dyn FnMut(String),
 ) -> Result<TorqueDiagnosis> {
-    let UsedRecording { recording, clock, origin, remarks } = used;
-    if clock.stretches.iter().all(|stretch| stretch.len() < LEAST_STRETCH) {
+    let UsedRecording {
+        recording,
+        clock,
+        origin,
+        remarks,
+    } = used;
+    if clock
+        .stretches
+        .iter()
+        .all(|stretch| stretch.len() < LEAST_STRETCH)
+    {
         return Err(Error::data(
             "time",
-            format!("the clock or a joint jumps in every {LEAST_STRETCH} rows: nothing can be filtered"),
+            format!(
+                "the clock or a joint jumps in every {LEAST_STRETCH} rows: nothing can be filtered"
+            ),
         ));
     }
-    let cutoff = question.cutoff.unwrap_or_else(|| cutoff::cutoff(&recording, &clock)).min(HIGHEST_CUTOFF * clock.rate);
+    let cutoff = question
+        .cutoff
+        .unwrap_or_else(|| cutoff::cutoff(&recording, &clock))
+        .min(HIGHEST_CUTOFF * clock.rate);
     let solved = solve::solve(arm, recording, question, &clock, cutoff, tell);
     let mut diagnosis = outcome::outcome(&solved, question, remarks);
-    diagnosis.courses.row.iter_mut().for_each(|row| *row = origin[*row]);
+    diagnosis
+        .courses
+        .row
+        .iter_mut()
+        .for_each(|row| *row = origin[*row]);
     Ok(diagnosis)
 }

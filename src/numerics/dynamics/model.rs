@@ -85,6 +85,8 @@ impl TorqueModel {
 
     /// Whether every inertial number of a link is identified, not only what base parameters stand for.
     pub fn is_whole(&self, link: usize) -> bool {
-        self.identified[INERTIAL_NUMBERS * link..INERTIAL_NUMBERS * (link + 1)].iter().all(|known| *known)
+        self.identified[INERTIAL_NUMBERS * link..INERTIAL_NUMBERS * (link + 1)]
+            .iter()
+            .all(|known| *known)
     }
 }

@@ -24,10 +24,19 @@ impl TorqueModel {
         let problem = choice.problem;
         let adds = |number: &usize| {
             let form = choice.form(*number);
-            problem.scene.declared.as_ref().is_none_or(|declared| form.cause.inertial(form, declared).is_none())
+            problem
+                .scene
+                .declared
+                .as_ref()
+                .is_none_or(|declared| form.cause.inertial(form, declared).is_none())
         };
         let adding: Vec<usize> = set.iter().copied().filter(adds).collect();
-        let value = |column: usize| solution.iter().find(|(pivot, _)| *pivot == column).map_or(0.0, |(_, value)| *value);
+        let value = |column: usize| {
+            solution
+                .iter()
+                .find(|(pivot, _)| *pivot == column)
+                .map_or(0.0, |(_, value)| *value)
+        };
         let term = |number: &usize| {
             let form = choice.form(*number);
             TorqueTerm {
@@ -36,12 +45,23 @@ impl TorqueModel {
                 with: form.with,
                 shape: form.shape.clone(),
                 coefficients: problem.all.of(*number).map(value).collect(),
-                rms: rms(problem, problem.all.of(*number).map(|column| (column, value(column))).collect()),
+                rms: rms(
+                    problem,
+                    problem
+                        .all
+                        .of(*number)
+                        .map(|column| (column, value(column)))
+                        .collect(),
+                ),
             }
         };
         let (identified, covariance) = covariance(problem, set, &adding, (uncertain, slopes));
         let mut inertials = problem.inertials(set, solution);
-        inertials.iter_mut().zip(&identified).filter(|(_, known)| !**known).for_each(|(number, _)| *number = 0.0);
+        inertials
+            .iter_mut()
+            .zip(&identified)
+            .filter(|(_, known)| !**known)
+            .for_each(|(number, _)| *number = 0.0);
         let certainty = certainty(problem, set, (uncertain, slopes), solution);
         Self {
             inertials,
@@ -65,9 +85,18 @@ impl TorqueModel {
 /// Rms of the torque of coefficients over the joints that have some, Nm.
 fn rms(problem: &TorqueProblem, own: Vec<(usize, f64)>) -> f64 {
     let torque = problem.predicted(&own);
-    let acting: Vec<&Vec<f64>> = torque.iter().filter(|course| course.iter().any(|value| *value != 0.0)).collect();
+    let acting: Vec<&Vec<f64>> = torque
+        .iter()
+        .filter(|course| course.iter().any(|value| *value != 0.0))
+        .collect();
     let count = (acting.len() * problem.reduction.rows.len()).max(1) as f64;
-    (acting.into_iter().flatten().map(|value| value * value).sum::<f64>() / count).sqrt()
+    (acting
+        .into_iter()
+        .flatten()
+        .map(|value| value * value)
+        .sum::<f64>()
+        / count)
+        .sqrt()
 }
 
 /// What held-out rows (fitted ones where none are) of each joint leave beyond noise and the covariance of the numbers, Nm, one standard
@@ -80,11 +109,18 @@ fn certainty(
 ) -> Vec<[f64; 2]> {
     let of_forms = set.iter().flat_map(|number| problem.all.of(*number));
     let of_shapes = slopes.0.iter().map(|(_, column)| *column);
-    let columns: Vec<usize> = (0..problem.all.base).chain(of_forms).chain(of_shapes).collect();
+    let columns: Vec<usize> = (0..problem.all.base)
+        .chain(of_forms)
+        .chain(of_shapes)
+        .collect();
     let (all, width) = (uncertain.covariance(&columns), columns.len());
     let residual = problem.residual(solution);
     let held: Vec<usize> = problem.runs(true).into_iter().flatten().collect();
-    let rows = if held.is_empty() { problem.runs(false).into_iter().flatten().collect() } else { held };
+    let rows = if held.is_empty() {
+        problem.runs(false).into_iter().flatten().collect()
+    } else {
+        held
+    };
     let of = |joint: usize| {
         let course = |(place, column): (usize, &usize)| {
             let column = &problem.all.columns[*column];
@@ -94,29 +130,49 @@ fn certainty(
         let acting: Vec<(usize, &[f64])> = columns.iter().enumerate().filter_map(course).collect();
         let variance = |row: &usize| {
             let each = |(a, first): &(usize, &[f64])| {
-                let with = acting.iter().map(|(b, second)| all[a * width + b] * second[*row]).sum::<f64>();
+                let with = acting
+                    .iter()
+                    .map(|(b, second)| all[a * width + b] * second[*row])
+                    .sum::<f64>();
                 first[*row] * with
             };
             acting.iter().map(each).sum::<f64>().max(0.0)
         };
-        let asked: Vec<f64> = rows.iter().step_by(rows.len().div_ceil(ASKED).max(1)).map(variance).collect();
-        let mean = |values: &mut dyn Iterator<Item = f64>, count: usize| values.sum::<f64>() / count.max(1) as f64;
-        let left = mean(&mut rows.iter().map(|row| residual[joint][*row].powi(2)), rows.len());
+        let asked: Vec<f64> = rows
+            .iter()
+            .step_by(rows.len().div_ceil(ASKED).max(1))
+            .map(variance)
+            .collect();
+        let mean = |values: &mut dyn Iterator<Item = f64>, count: usize| {
+            values.sum::<f64>() / count.max(1) as f64
+        };
+        let left = mean(
+            &mut rows.iter().map(|row| residual[joint][*row].powi(2)),
+            rows.len(),
+        );
         let by_numbers = mean(&mut asked.iter().copied(), asked.len());
         let misfit = (left - problem.noise[joint].sigma.powi(2) - by_numbers).max(0.0);
-        let mut usual: Vec<f64> = asked.iter().map(|variance| COVERAGE * (variance + misfit).sqrt()).collect();
+        let mut usual: Vec<f64> = asked
+            .iter()
+            .map(|variance| COVERAGE * (variance + misfit).sqrt())
+            .collect();
         [misfit.sqrt(), nearest(&mut usual, 0.5).unwrap_or(0.0)]
     };
     (0..problem.joints()).map(of).collect()
 }
 
 fn range(problem: &TorqueProblem, joint: usize, misfit: f64, usual: f64) -> JointRange {
-    let rows = || (0..problem.reduction.rows.len()).filter(|row| !problem.in_event(*row)).map(|row| problem.reduction.rows[row]);
+    let rows = || {
+        (0..problem.reduction.rows.len())
+            .filter(|row| !problem.in_event(*row))
+            .map(|row| problem.reduction.rows[row])
+    };
     let most = |course: &[f64]| rows().map(|row| course[row].abs()).fold(0.0, f64::max);
     let position = &problem.scene.position[joint];
-    let ends = rows()
-        .map(|row| position[row])
-        .fold([f64::INFINITY, f64::NEG_INFINITY], |[least, greatest], value| [least.min(value), greatest.max(value)]);
+    let ends = rows().map(|row| position[row]).fold(
+        [f64::INFINITY, f64::NEG_INFINITY],
+        |[least, greatest], value| [least.min(value), greatest.max(value)],
+    );
     JointRange {
         position: ends,
         speed: most(&problem.scene.velocity[joint]),
@@ -144,7 +200,10 @@ fn covariance(
         let first = columns.len();
         columns.extend(changes.iter().map(|(column, _)| *column));
         for number in 0..INERTIAL_NUMBERS {
-            let own = changes.iter().enumerate().map(|(place, (_, ten))| (first + place, ten[number]));
+            let own = changes
+                .iter()
+                .enumerate()
+                .map(|(place, (_, ten))| (first + place, ten[number]));
             let own: Vec<(usize, f64)> = own.filter(|(_, share)| *share != 0.0).collect();
             let known = problem.scene.declared.is_some() || !own.is_empty();
             identified.push(known);
@@ -153,14 +212,28 @@ fn covariance(
             }
         }
     }
-    for column in adding.iter().flat_map(|number| problem.all.of(*number)).chain(slopes.0.iter().map(|(_, column)| *column)) {
+    for column in adding
+        .iter()
+        .flat_map(|number| problem.all.of(*number))
+        .chain(slopes.0.iter().map(|(_, column)| *column))
+    {
         sums.push(vec![(columns.len(), 1.0)]);
         columns.push(column);
     }
     let (all, width) = (uncertain.covariance(&columns), columns.len());
     let entry = |a: &[(usize, f64)], b: &[(usize, f64)]| -> f64 {
-        a.iter().map(|(row, left)| left * b.iter().map(|(column, right)| right * all[row * width + column]).sum::<f64>()).sum()
+        a.iter()
+            .map(|(row, left)| {
+                left * b
+                    .iter()
+                    .map(|(column, right)| right * all[row * width + column])
+                    .sum::<f64>()
+            })
+            .sum()
     };
-    let covariance = sums.iter().flat_map(|a| sums.iter().map(move |b| entry(a, b))).collect();
+    let covariance = sums
+        .iter()
+        .flat_map(|a| sums.iter().map(move |b| entry(a, b)))
+        .collect();
     (identified, covariance)
 }

@@ -33,7 +33,11 @@ enum NotNamed {
 }
 
 /// Takes forms with a number at an end of its search out of a set, and their causes out of the search at their places; tells whether any was.
-pub(super) fn take_out_ends(problem: &mut TorqueProblem, weighted: &mut WeightedColumns, set: &mut Vec<usize>) -> bool {
+pub(super) fn take_out_ends(
+    problem: &mut TorqueProblem,
+    weighted: &mut WeightedColumns,
+    set: &mut Vec<usize>,
+) -> bool {
     let mut changed = false;
     while let Some(one) = at_end(problem, set) {
         changed = true;
@@ -61,10 +65,15 @@ fn at_end(problem: &TorqueProblem, set: &[usize]) -> Option<NotNamed> {
 }
 
 /// Takes names off until all that are left are right.
-pub(super) fn settle_names(problem: &mut TorqueProblem, weighted: &mut WeightedColumns, judged: &mut JudgedSet) {
+pub(super) fn settle_names(
+    problem: &mut TorqueProblem,
+    weighted: &mut WeightedColumns,
+    judged: &mut JudgedSet,
+) {
     for _ in 0..ROUNDS {
         let slopes = ShapeSlopes::of(problem, weighted, &judged.set);
-        let next = at_end(problem, &judged.set).or_else(|| next(&CauseChoice::new(problem, weighted), judged, &slopes));
+        let next = at_end(problem, &judged.set)
+            .or_else(|| next(&CauseChoice::new(problem, weighted), judged, &slopes));
         match next {
             None => return,
             Some(NotNamed::Silent(place)) => {
@@ -72,7 +81,9 @@ pub(super) fn settle_names(problem: &mut TorqueProblem, weighted: &mut WeightedC
                 continue;
             }
             Some(NotNamed::Out(place)) => _ = judged.set.remove(place),
-            Some(NotNamed::Within(place, form)) => judged.set[place] = push(problem, weighted, form),
+            Some(NotNamed::Within(place, form)) => {
+                judged.set[place] = push(problem, weighted, form)
+            }
         }
         polish(problem, weighted, &mut judged.set);
     }
@@ -82,7 +93,10 @@ pub(super) fn settle_names(problem: &mut TorqueProblem, weighted: &mut WeightedC
 fn push(problem: &mut TorqueProblem, weighted: &mut WeightedColumns, form: TorqueForm) -> usize {
     let number = problem.push(form);
     let runs = problem.runs(false);
-    problem.all.of(number).for_each(|column| weighted.push(&problem.all.columns[column], problem.weighing(&runs)));
+    problem
+        .all
+        .of(number)
+        .for_each(|column| weighted.push(&problem.all.columns[column], problem.weighing(&runs)));
     number
 }
 
@@ -94,29 +108,49 @@ fn next(choice: &CauseChoice, judged: &JudgedSet, slopes: &ShapeSlopes) -> Optio
     let uncertain = slopes.beside(&sweep);
     let named = |place: &usize| {
         let form = choice.form(set[*place]);
-        form.cause.name() != UNKNOWN && !judged.silent.iter().any(|silent| choice.form(*silent).is_called_as(form))
+        form.cause.name() != UNKNOWN
+            && !judged
+                .silent
+                .iter()
+                .any(|silent| choice.form(*silent).is_called_as(form))
     };
     // The largest of its numbers in standard deviations, with its sign.
     let sure = |place: usize| {
-        if let Some(line) = number_of_line(choice, set, set[place], &solution, (&uncertain, slopes)) {
+        if let Some(line) = number_of_line(choice, set, set[place], &solution, (&uncertain, slopes))
+        {
             return line.value / line.sigma.max(f64::MIN_POSITIVE);
         }
         let columns: Vec<usize> = all.of(set[place]).collect();
         let covariance = uncertain.covariance(&columns);
         let of = |(k, column): (usize, &usize)| {
-            let value = solution.iter().find(|(pivot, _)| pivot == column).map_or(0.0, |(_, value)| *value);
-            value / covariance[k * (columns.len() + 1)].max(f64::MIN_POSITIVE).sqrt()
+            let value = solution
+                .iter()
+                .find(|(pivot, _)| pivot == column)
+                .map_or(0.0, |(_, value)| *value);
+            value
+                / covariance[k * (columns.len() + 1)]
+                    .max(f64::MIN_POSITIVE)
+                    .sqrt()
         };
-        columns.iter().enumerate().map(of).max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0)
+        columns
+            .iter()
+            .enumerate()
+            .map(of)
+            .max_by(|a, b| a.abs().total_cmp(&b.abs()))
+            .unwrap_or(0.0)
     };
-    let wrong = |place: usize, sure: f64| choice.form(set[place]).cause.about().brakes && sure <= 0.0;
-    let weak = (0..set.len()).filter(named).map(|place| (place, sure(place)));
+    let wrong =
+        |place: usize, sure: f64| choice.form(set[place]).cause.about().brakes && sure <= 0.0;
+    let weak = (0..set.len())
+        .filter(named)
+        .map(|place| (place, sure(place)));
     let weak = weak.filter(|(place, sure)| sure.abs() < *NAMED || wrong(*place, *sure));
     let (place, sure) = weak.min_by(|a, b| a.1.total_cmp(&b.1))?;
     let form = choice.form(set[place]);
     // Numbers of many waves are uncertain one by one where few of them are not.
-    if let Some(plainer) =
-        choice.plainer(form).filter(|_| sweep.loss(set[place], &solution).square > NAMED.powi(2) * form.width as f64)
+    if let Some(plainer) = choice
+        .plainer(form)
+        .filter(|_| sweep.loss(set[place], &solution).square > NAMED.powi(2) * form.width as f64)
     {
         return Some(NotNamed::Within(place, plainer.clone()));
     }

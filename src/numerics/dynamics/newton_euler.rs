@@ -60,10 +60,18 @@ impl InverseDynamics {
             spin_change: Vector3::zeros(),
             acceleration: Vector3::zeros(),
         };
-        let before = |joint: usize| if joint == 0 { Vector3::zeros() } else { arm.points[joint - 1].coords };
+        let before = |joint: usize| {
+            if joint == 0 {
+                Vector3::zeros()
+            } else {
+                arm.points[joint - 1].coords
+            }
+        };
         Self {
             axes: arm.axes.clone(),
-            steps: (0..arm.joints()).map(|joint| arm.points[joint].coords - before(joint)).collect(),
+            steps: (0..arm.joints())
+                .map(|joint| arm.points[joint].coords - before(joint))
+                .collect(),
             prismatic: arm.prismatic.clone(),
             links: vec![still; arm.joints()],
         }
@@ -76,12 +84,21 @@ impl InverseDynamics {
 
     /// Moves the links.
     fn advance(&mut self, motion: MotionRow, gravity: &Vector3<f64>) {
-        let (mut spin, mut spin_change, mut acceleration) = (Vector3::zeros(), Vector3::zeros(), -gravity);
+        let (mut spin, mut spin_change, mut acceleration) =
+            (Vector3::zeros(), Vector3::zeros(), -gravity);
         for joint in 0..self.joints() {
             let axis = self.axes[joint];
-            let (q, dq, ddq) = (motion.position[joint], motion.velocity[joint], motion.acceleration[joint]);
+            let (q, dq, ddq) = (
+                motion.position[joint],
+                motion.velocity[joint],
+                motion.acceleration[joint],
+            );
             let slides = self.prismatic[joint];
-            let rotation = if slides { Matrix3::identity() } else { turn(&axis, q) };
+            let rotation = if slides {
+                Matrix3::identity()
+            } else {
+                turn(&axis, q)
+            };
             let arm = self.steps[joint] + if slides { axis * q } else { Vector3::zeros() };
             acceleration += spin_change.cross(&arm) + spin.cross(&spin.cross(&arm));
             if slides {
@@ -95,7 +112,13 @@ impl InverseDynamics {
                 spin_change += spin.cross(&(axis * dq)) + axis * ddq;
                 spin += axis * dq;
             }
-            self.links[joint] = LinkMotion { rotation, arm, spin, spin_change, acceleration };
+            self.links[joint] = LinkMotion {
+                rotation,
+                arm,
+                spin,
+                spin_change,
+                acceleration,
+            };
         }
     }
 
@@ -111,8 +134,13 @@ impl InverseDynamics {
             let mut wrenches = unit_wrenches(&self.links[link]);
             for joint in (0..=link).rev() {
                 let axis = &self.axes[joint];
-                let torque =
-                    |wrench: &Wrench| if self.prismatic[joint] { axis.dot(&wrench.force) } else { axis.dot(&wrench.moment) };
+                let torque = |wrench: &Wrench| {
+                    if self.prismatic[joint] {
+                        axis.dot(&wrench.force)
+                    } else {
+                        axis.dot(&wrench.moment)
+                    }
+                };
                 write(joint, link, &wrenches.each_ref().map(torque));
                 let LinkMotion { rotation, arm, .. } = &self.links[joint];
                 for wrench in &mut wrenches {
@@ -124,15 +152,28 @@ impl InverseDynamics {
     }
 
     /// Joint torques (n) of inertial numbers `theta` (10 n) in a row.
-    pub fn torque(&mut self, motion: MotionRow, gravity: &Vector3<f64>, theta: &[f64], torque: &mut [f64]) {
+    pub fn torque(
+        &mut self,
+        motion: MotionRow,
+        gravity: &Vector3<f64>,
+        theta: &[f64],
+        torque: &mut [f64],
+    ) {
         self.advance(motion, gravity);
         let (mut force, mut moment) = (Vector3::zeros(), Vector3::zeros());
         for joint in (0..self.joints()).rev() {
             let link = &self.links[joint];
-            let own = wrench_of(link, &theta[INERTIAL_NUMBERS * joint..INERTIAL_NUMBERS * (joint + 1)]);
+            let own = wrench_of(
+                link,
+                &theta[INERTIAL_NUMBERS * joint..INERTIAL_NUMBERS * (joint + 1)],
+            );
             force += own.force;
             moment += own.moment;
-            torque[joint] = self.axes[joint].dot(if self.prismatic[joint] { &force } else { &moment });
+            torque[joint] = self.axes[joint].dot(if self.prismatic[joint] {
+                &force
+            } else {
+                &moment
+            });
             force = link.rotation * force;
             moment = link.rotation * moment + link.arm.cross(&force);
         }
@@ -147,7 +188,10 @@ pub fn turn(axis: &Vector3<f64>, angle: f64) -> Matrix3<f64> {
 /// What each inertial number asks of the joint's point for the motion of its link.
 fn unit_wrenches(link: &LinkMotion) -> [Wrench; INERTIAL_NUMBERS] {
     let (w, dw, a) = (&link.spin, &link.spin_change, &link.acceleration);
-    let none = Wrench { force: Vector3::zeros(), moment: Vector3::zeros() };
+    let none = Wrench {
+        force: Vector3::zeros(),
+        moment: Vector3::zeros(),
+    };
     let mut all = [none; INERTIAL_NUMBERS];
     all[0].force = *a;
     for axis in 0..3 {
@@ -203,8 +247,11 @@ mod tests {
     /// An arm of links whose numbers have nothing in common; the third joint slides.
     fn arm() -> (DynamicArm, Vec<Inertial>) {
         let axis = |x: f64, y: f64, z: f64| Vector3::new(x, y, z).normalize();
-        let body =
-            |mass: f64, at: [f64; 3], six: [f64; 6]| Inertial { mass, centre: Point3::from(at), inertia: inertia_matrix(&six) };
+        let body = |mass: f64, at: [f64; 3], six: [f64; 6]| Inertial {
+            mass,
+            centre: Point3::from(at),
+            inertia: inertia_matrix(&six),
+        };
         let links = vec![
             body(8.0, [0.1, -0.05, 0.2], [0.3, 0.02, -0.01, 0.4, 0.03, 0.2]),
             body(5.0, [0.4, 0.1, 0.5], [0.2, -0.03, 0.02, 0.15, 0.01, 0.1]),
@@ -212,8 +259,20 @@ mod tests {
             body(2.0, [0.9, 0.1, 0.7], [0.02, 0.0, 0.005, 0.03, 0.002, 0.01]),
         ];
         let arm = DynamicArm {
-            axes: vec![axis(0.1, 0.2, 1.0), axis(0.3, -1.0, 0.1), axis(1.0, 0.2, 0.0), axis(0.2, 1.0, 0.5)],
-            points: [[0.0, 0.0, 0.1], [0.2, 0.0, 0.4], [0.5, 0.1, 0.6], [0.8, 0.0, 0.6]].map(Point3::from).to_vec(),
+            axes: vec![
+                axis(0.1, 0.2, 1.0),
+                axis(0.3, -1.0, 0.1),
+                axis(1.0, 0.2, 0.0),
+                axis(0.2, 1.0, 0.5),
+            ],
+            points: [
+                [0.0, 0.0, 0.1],
+                [0.2, 0.0, 0.4],
+                [0.5, 0.1, 0.6],
+                [0.8, 0.0, 0.6],
+            ]
+            .map(Point3::from)
+            .to_vec(),
             prismatic: vec![false, false, true, false],
             tool: Point3::new(1.0, 0.1, 0.8),
             links: Some(links.clone()),
@@ -221,13 +280,21 @@ mod tests {
             gravity: Vector3::new(1.0, -2.0, -9.0),
             ratio: vec![100.0; 4],
             coupled: Vec::new(),
-            tolerance: InertialTolerance { mass_relative: 0.01, centre: 0.001, inertia_relative: 0.05 },
+            tolerance: InertialTolerance {
+                mass_relative: 0.01,
+                centre: 0.001,
+                inertia_relative: 0.05,
+            },
         };
         (arm, links)
     }
 
     /// Centre and rotation of each link, by plain products of motions from the base.
-    fn placed(arm: &DynamicArm, links: &[Inertial], q: &[f64]) -> Vec<(Vector3<f64>, Matrix3<f64>)> {
+    fn placed(
+        arm: &DynamicArm,
+        links: &[Inertial],
+        q: &[f64],
+    ) -> Vec<(Vector3<f64>, Matrix3<f64>)> {
         let (mut rotation, mut shift) = (Matrix3::identity(), Vector3::zeros());
         (0..q.len())
             .map(|joint| {
@@ -248,18 +315,25 @@ mod tests {
     fn lagrangian(arm: &DynamicArm, links: &[Inertial], q: &[f64], dq: &[f64]) -> f64 {
         const STEP: f64 = 1e-5;
         let at = |sign: f64| {
-            let moved: Vec<f64> = q.iter().zip(dq).map(|(q, dq)| q + sign * STEP * dq).collect();
+            let moved: Vec<f64> = q
+                .iter()
+                .zip(dq)
+                .map(|(q, dq)| q + sign * STEP * dq)
+                .collect();
             placed(arm, links, &moved)
         };
         let (here, before, after) = (placed(arm, links, q), at(-1.0), at(1.0));
         (0..q.len())
             .map(|link| {
                 let velocity = (after[link].0 - before[link].0) / (2.0 * STEP);
-                let turning = (after[link].1 - before[link].1) / (2.0 * STEP) * here[link].1.transpose();
+                let turning =
+                    (after[link].1 - before[link].1) / (2.0 * STEP) * here[link].1.transpose();
                 let spin = Vector3::new(turning[(2, 1)], turning[(0, 2)], turning[(1, 0)]);
                 let inertia = here[link].1 * links[link].inertia * here[link].1.transpose();
                 let mass = links[link].mass;
-                0.5 * mass * velocity.norm_squared() + 0.5 * spin.dot(&(inertia * spin)) + mass * arm.gravity.dot(&here[link].0)
+                0.5 * mass * velocity.norm_squared()
+                    + 0.5 * spin.dot(&(inertia * spin))
+                    + mass * arm.gravity.dot(&here[link].0)
             })
             .sum()
     }
@@ -268,15 +342,31 @@ mod tests {
     fn torques_are_those_of_lagrange_and_the_regressor_says_the_same() {
         const STEP: f64 = 1e-3;
         let (arm, links) = arm();
-        let (q, dq, ddq) = ([0.3, -0.5, 0.2, 0.7], [0.8, -0.4, 0.3, 1.1], [1.5, 0.7, -0.9, 2.0]);
-        let theta: Vec<f64> = links.iter().zip(&arm.points).flat_map(|(link, point)| numbers(link, &point.coords)).collect();
+        let (q, dq, ddq) = (
+            [0.3, -0.5, 0.2, 0.7],
+            [0.8, -0.4, 0.3, 1.1],
+            [1.5, 0.7, -0.9, 2.0],
+        );
+        let theta: Vec<f64> = links
+            .iter()
+            .zip(&arm.points)
+            .flat_map(|(link, point)| numbers(link, &point.coords))
+            .collect();
         let mut dynamics = InverseDynamics::new(&arm);
         let mut torque = [0.0; 4];
-        let motion = MotionRow { position: &q, velocity: &dq, acceleration: &ddq };
+        let motion = MotionRow {
+            position: &q,
+            velocity: &dq,
+            acceleration: &ddq,
+        };
         dynamics.torque(motion, &arm.gravity, &theta, &mut torque);
         let mut by_regressor = [0.0; 4];
         dynamics.regressor(motion, &arm.gravity, |joint, link, numbers| {
-            by_regressor[joint] += numbers.iter().zip(&theta[10 * link..]).map(|(a, b)| a * b).sum::<f64>();
+            by_regressor[joint] += numbers
+                .iter()
+                .zip(&theta[10 * link..])
+                .map(|(a, b)| a * b)
+                .sum::<f64>();
         });
         // d/dt dL/d(dq) - dL/dq along the motion, by central differences.
         let shifted = |values: &[f64; 4], joint: usize, by: f64| {
@@ -286,7 +376,8 @@ mod tests {
         };
         for joint in 0..4 {
             let momentum = |time: f64| {
-                let q: [f64; 4] = std::array::from_fn(|k| q[k] + time * dq[k] + 0.5 * time * time * ddq[k]);
+                let q: [f64; 4] =
+                    std::array::from_fn(|k| q[k] + time * dq[k] + 0.5 * time * time * ddq[k]);
                 let dq: [f64; 4] = std::array::from_fn(|k| dq[k] + time * ddq[k]);
                 let l = |by: f64| lagrangian(&arm, &links, &q, &shifted(&dq, joint, by));
                 (l(STEP) - l(-STEP)) / (2.0 * STEP)
@@ -308,27 +399,46 @@ mod tests {
     fn a_planar_arm_of_two_point_masses_has_the_torques_of_the_textbook() {
         // Craig, section 6.7: masses at the ends of two links, gravity along -y.
         let (m1, m2, l1, l2, g) = (2.0, 1.5, 0.7, 0.4, 9.81);
-        let point = |mass: f64, x: f64| Inertial { mass, centre: Point3::new(x, 0.0, 0.0), inertia: Matrix3::zeros() };
+        let point = |mass: f64, x: f64| Inertial {
+            mass,
+            centre: Point3::new(x, 0.0, 0.0),
+            inertia: Matrix3::zeros(),
+        };
         let (mut arm, _) = arm();
         arm.axes = vec![Vector3::z(); 2];
         arm.points = vec![Point3::origin(), Point3::new(l1, 0.0, 0.0)];
         arm.prismatic = vec![false; 2];
         arm.gravity = Vector3::new(0.0, -g, 0.0);
         let links = [point(m1, l1), point(m2, l1 + l2)];
-        let theta: Vec<f64> = links.iter().zip(&arm.points).flat_map(|(link, point)| numbers(link, &point.coords)).collect();
+        let theta: Vec<f64> = links
+            .iter()
+            .zip(&arm.points)
+            .flat_map(|(link, point)| numbers(link, &point.coords))
+            .collect();
         let (q, dq, ddq) = ([0.4, -0.9], [1.2, 0.5], [-0.8, 2.1]);
         let mut torque = [0.0; 2];
-        let motion = MotionRow { position: &q, velocity: &dq, acceleration: &ddq };
+        let motion = MotionRow {
+            position: &q,
+            velocity: &dq,
+            acceleration: &ddq,
+        };
         InverseDynamics::new(&arm).torque(motion, &arm.gravity, &theta, &mut torque);
         let (s2, c2) = q[1].sin_cos();
         let (c1, c12) = (q[0].cos(), (q[0] + q[1]).cos());
-        let second =
-            m2 * l1 * l2 * c2 * ddq[0] + m2 * l1 * l2 * s2 * dq[0] * dq[0] + m2 * l2 * g * c12 + m2 * l2 * l2 * (ddq[0] + ddq[1]);
-        let first = m2 * l2 * l2 * (ddq[0] + ddq[1]) + m2 * l1 * l2 * c2 * (2.0 * ddq[0] + ddq[1]) + (m1 + m2) * l1 * l1 * ddq[0]
+        let second = m2 * l1 * l2 * c2 * ddq[0]
+            + m2 * l1 * l2 * s2 * dq[0] * dq[0]
+            + m2 * l2 * g * c12
+            + m2 * l2 * l2 * (ddq[0] + ddq[1]);
+        let first = m2 * l2 * l2 * (ddq[0] + ddq[1])
+            + m2 * l1 * l2 * c2 * (2.0 * ddq[0] + ddq[1])
+            + (m1 + m2) * l1 * l1 * ddq[0]
             - m2 * l1 * l2 * s2 * dq[1] * dq[1]
             - 2.0 * m2 * l1 * l2 * s2 * dq[0] * dq[1]
             + m2 * l2 * g * c12
             + (m1 + m2) * l1 * g * c1;
-        assert!((torque[0] - first).abs() < 1e-12 && (torque[1] - second).abs() < 1e-12, "{torque:?} {first} {second}");
+        assert!(
+            (torque[0] - first).abs() < 1e-12 && (torque[1] - second).abs() < 1e-12,
+            "{torque:?} {first} {second}"
+        );
     }
 }

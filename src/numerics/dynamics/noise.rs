@@ -19,7 +19,11 @@ pub(super) struct JointNoise {
 impl JointNoise {
     /// White noise.
     pub fn white(sigma: f64) -> Self {
-        Self { sigma, innovation: sigma, memory: Vec::new() }
+        Self {
+            sigma,
+            innovation: sigma,
+            memory: Vec::new(),
+        }
     }
 
     /// The noise of a residual over runs of rows, `spent` of whose freedoms a fit has taken: Yule and Walker's equations by Levinson, the order by
@@ -30,7 +34,10 @@ impl JointNoise {
             .map(|lag| {
                 let product = |run: &Range<usize>| {
                     let run = &residual[run.clone()];
-                    run.iter().zip(run.get(lag..).unwrap_or_default()).map(|(a, b)| a * b).sum::<f64>()
+                    run.iter()
+                        .zip(run.get(lag..).unwrap_or_default())
+                        .map(|(a, b)| a * b)
+                        .sum::<f64>()
                 };
                 runs.iter().map(product).sum::<f64>() / rows.max(1) as f64
             })
@@ -40,10 +47,17 @@ impl JointNoise {
         let mut left = correlation[0].max(f64::MIN_POSITIVE);
         let mut best = (rows as f64 * left.ln(), left, memory.clone());
         for order in 1..=ORDER {
-            let ahead: f64 = memory.iter().enumerate().map(|(lag, share)| share * correlation[order - 1 - lag]).sum();
+            let ahead: f64 = memory
+                .iter()
+                .enumerate()
+                .map(|(lag, share)| share * correlation[order - 1 - lag])
+                .sum();
             let reflection = (correlation[order] - ahead) / left;
             let turned: Vec<f64> = memory.iter().rev().copied().collect();
-            memory.iter_mut().zip(turned).for_each(|(share, back)| *share -= reflection * back);
+            memory
+                .iter_mut()
+                .zip(turned)
+                .for_each(|(share, back)| *share -= reflection * back);
             memory.push(reflection);
             left *= 1.0 - reflection * reflection;
             let criterion = rows as f64 * left.max(f64::MIN_POSITIVE).ln() + 2.0 * order as f64;
@@ -51,7 +65,11 @@ impl JointNoise {
                 best = (criterion, left, memory.clone());
             }
         }
-        Self { sigma: (correlation[0] * freedom).sqrt(), innovation: (best.1 * freedom).sqrt(), memory: best.2 }
+        Self {
+            sigma: (correlation[0] * freedom).sqrt(),
+            innovation: (best.1 * freedom).sqrt(),
+            memory: best.2,
+        }
     }
 
     /// How many rows in a row count as one for what is slow.
@@ -66,7 +84,12 @@ impl JointNoise {
         for run in runs {
             let rows = &course[run.clone()];
             for now in self.memory.len()..rows.len() {
-                let known: f64 = self.memory.iter().enumerate().map(|(back, share)| share * rows[now - 1 - back]).sum();
+                let known: f64 = self
+                    .memory
+                    .iter()
+                    .enumerate()
+                    .map(|(back, share)| share * rows[now - 1 - back])
+                    .sum();
                 out.push((rows[now] - known) * scale);
             }
         }
@@ -92,9 +115,16 @@ mod tests {
         let whole = 0..course.len();
         let runs = std::slice::from_ref(&whole);
         let noise = JointNoise::of(&course, runs, 0.0);
-        assert!((noise.memory[0] - 0.8).abs() < 0.03 && (noise.innovation - 1.0).abs() < 0.02, "{noise:?}");
+        assert!(
+            (noise.memory[0] - 0.8).abs() < 0.03 && (noise.innovation - 1.0).abs() < 0.02,
+            "{noise:?}"
+        );
         // (1 + 0.8) / (1 - 0.8).
-        assert!((noise.autocorrelation() / 9.0 - 1.0).abs() < 0.15, "{}", noise.autocorrelation());
+        assert!(
+            (noise.autocorrelation() / 9.0 - 1.0).abs() < 0.15,
+            "{}",
+            noise.autocorrelation()
+        );
         let mut white = Vec::new();
         noise.whiten(&course, runs, &mut white);
         let lag = white.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / white.len() as f64;

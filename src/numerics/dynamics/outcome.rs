@@ -12,8 +12,8 @@ use super::problem::TorqueProblem;
 use super::solve::SolvedTorques;
 use super::sweep::SweptColumns;
 use super::types::{
-    EnforcedBodies, InertialBasis, InertialEstimate, TorqueCourses, TorqueDiagnosis, TorqueErrors, TorqueFinding, TorqueLeftover,
-    TorqueNoise, TorqueParameter, TorqueQuestion,
+    EnforcedBodies, InertialBasis, InertialEstimate, TorqueCourses, TorqueDiagnosis, TorqueErrors,
+    TorqueFinding, TorqueLeftover, TorqueNoise, TorqueParameter, TorqueQuestion,
 };
 use super::unseen::not_observable;
 use crate::diagnose::VerdictKind;
@@ -26,31 +26,74 @@ const UNEXPLAINED: f64 = 1.5;
 const LASTING: f64 = 8.0;
 
 /// All of it.
-pub(super) fn outcome(solved: &SolvedTorques, question: &TorqueQuestion, mut remarks: Vec<String>) -> TorqueDiagnosis {
+pub(super) fn outcome(
+    solved: &SolvedTorques,
+    question: &TorqueQuestion,
+    mut remarks: Vec<String>,
+) -> TorqueDiagnosis {
     let problem = &solved.problem;
     let choice = CauseChoice::new(problem, &solved.weighted);
     let set = &solved.judged.set;
     let sweep = choice.base.with(set);
     let free = sweep.solution();
     let uncertain = solved.slopes.beside(&sweep);
-    let bodies = if question.enforce_bodies { with_bodies(problem, set, &sweep, &free) } else { None };
-    let (solution, enforced) = bodies.map_or_else(|| (free.clone(), None), |(solution, enforced)| (solution, Some(enforced)));
+    let bodies = if question.enforce_bodies {
+        with_bodies(problem, set, &sweep, &free)
+    } else {
+        None
+    };
+    let (solution, enforced) = bodies.map_or_else(
+        || (free.clone(), None),
+        |(solution, enforced)| (solution, Some(enforced)),
+    );
     // As the arm is simulated today: as declared, else with identified masses alone.
-    let today = if problem.scene.declared.is_some() { Vec::new() } else { choice.base.solution() };
+    let today = if problem.scene.declared.is_some() {
+        Vec::new()
+    } else {
+        choice.base.solution()
+    };
     let (first, last) = (problem.residual(&today), problem.residual(&solution));
-    let counted_rows = |held_out: bool| problem.runs(held_out).into_iter().flatten().collect::<Vec<usize>>();
+    let counted_rows = |held_out: bool| {
+        problem
+            .runs(held_out)
+            .into_iter()
+            .flatten()
+            .collect::<Vec<usize>>()
+    };
     let held = counted_rows(true);
-    let judging = if held.is_empty() { counted_rows(false) } else { held.clone() };
-    let (before, after) = (errors(problem, &first, &judging), errors(problem, &last, &judging));
+    let judging = if held.is_empty() {
+        counted_rows(false)
+    } else {
+        held.clone()
+    };
+    let (before, after) = (
+        errors(problem, &first, &judging),
+        errors(problem, &last, &judging),
+    );
     if let Some(enforced) = &enforced {
-        remarks.push(said_of_bodies(enforced, &errors(problem, &problem.residual(&free), &judging), &after));
+        remarks.push(said_of_bodies(
+            enforced,
+            &errors(problem, &problem.residual(&free), &judging),
+            &after,
+        ));
     }
-    let mut found = findings(&choice, &solved.judged, &held, (&uncertain, &solved.slopes), solved.other.as_ref());
+    let mut found = findings(
+        &choice,
+        &solved.judged,
+        &held,
+        (&uncertain, &solved.slopes),
+        solved.other.as_ref(),
+    );
     found.extend(problem.events.iter().map(contact));
     found.extend(solved.latency.as_ref().map(late));
     found.sort_by(|a, b| b.evidence.gain.total_cmp(&a.evidence.gain));
     let leftover = leftover(problem, &last);
-    let over = after.rms.iter().zip(&problem.noise).map(|(rms, noise)| rms / noise.sigma).fold(0.0, f64::max);
+    let over = after
+        .rms
+        .iter()
+        .zip(&problem.noise)
+        .map(|(rms, noise)| rms / noise.sigma)
+        .fold(0.0, f64::max);
     let verdict = match over > UNEXPLAINED {
         true => VerdictKind::Unexplained,
         false if found.is_empty() => VerdictKind::NothingMissing,
@@ -60,14 +103,24 @@ pub(super) fn outcome(solved: &SolvedTorques, question: &TorqueQuestion, mut rem
     TorqueDiagnosis {
         verdict,
         statement: statement(verdict, &found, [before.nrmse_mean, after.nrmse_mean], over),
-        remarks: remarks.into_iter().chain([said_of_filters(problem)]).collect(),
+        remarks: remarks
+            .into_iter()
+            .chain([said_of_filters(problem)])
+            .collect(),
         basis: match problem.scene.declared {
             Some(_) => InertialBasis::Declared,
             None => InertialBasis::Free(problem.all.base),
         },
         cutoff: problem.reduction.cutoff,
         rate: problem.reduction.rate,
-        noise: problem.noise.iter().map(|n| TorqueNoise { sigma: n.sigma, autocorrelation: n.autocorrelation() }).collect(),
+        noise: problem
+            .noise
+            .iter()
+            .map(|n| TorqueNoise {
+                sigma: n.sigma,
+                autocorrelation: n.autocorrelation(),
+            })
+            .collect(),
         before,
         after,
         held_out: !held.is_empty(),
@@ -85,8 +138,16 @@ pub(super) fn outcome(solved: &SolvedTorques, question: &TorqueQuestion, mut rem
 }
 
 /// What it costs that links are bodies.
-fn said_of_bodies(enforced: &EnforcedBodies, before: &TorqueErrors, after: &TorqueErrors) -> String {
-    let links: Vec<String> = enforced.links.iter().map(|link| (link + 1).to_string()).collect();
+fn said_of_bodies(
+    enforced: &EnforcedBodies,
+    before: &TorqueErrors,
+    after: &TorqueErrors,
+) -> String {
+    let links: Vec<String> = enforced
+        .links
+        .iter()
+        .map(|link| (link + 1).to_string())
+        .collect();
     format!(
         "no body has the numbers of link {}: all links are bodies now, at the price of {:.1} of the whitened squared residual; mean NRMSE of \
          judged rows {:.4} before, {:.4} after; sigmas are those of before",
@@ -113,26 +174,54 @@ fn said_of_filters(problem: &TorqueProblem) -> String {
 
 fn late(latency: &super::latency::Latency) -> TorqueFinding {
     let milliseconds = 1e3 * latency.seconds;
-    let parameter = TorqueParameter { name: "latency".into(), value: milliseconds, unit: "ms", sigma: Some(1e3 * latency.sigma) };
-    let statement = format!("torques come {milliseconds:.1} ms later than the positions beside them");
-    plain_finding(super::LATENCY, Place::Recording, statement, vec![parameter], latency.gain, 1.0)
+    let parameter = TorqueParameter {
+        name: "latency".into(),
+        value: milliseconds,
+        unit: "ms",
+        sigma: Some(1e3 * latency.sigma),
+    };
+    let statement =
+        format!("torques come {milliseconds:.1} ms later than the positions beside them");
+    plain_finding(
+        super::LATENCY,
+        Place::Recording,
+        statement,
+        vec![parameter],
+        latency.gain,
+        1.0,
+    )
 }
 
 fn statement(verdict: VerdictKind, found: &[TorqueFinding], nrmse: [f64; 2], over: f64) -> String {
-    let falls = format!("mean NRMSE of judged rows {:.3} before, {:.3} after", nrmse[0], nrmse[1]);
+    let falls = format!(
+        "mean NRMSE of judged rows {:.3} before, {:.3} after",
+        nrmse[0], nrmse[1]
+    );
     match verdict {
-        VerdictKind::NothingMissing => format!("the rigid arm explains the torques down to their noise ({falls})"),
-        VerdictKind::Explained => {
-            format!("with {} the torques are explained down to their noise ({falls})", counted(found.len(), "finding"))
+        VerdictKind::NothingMissing => {
+            format!("the rigid arm explains the torques down to their noise ({falls})")
         }
-        _ => format!("with {} up to {over:.1} times the noise is left ({falls})", counted(found.len(), "finding")),
+        VerdictKind::Explained => {
+            format!(
+                "with {} the torques are explained down to their noise ({falls})",
+                counted(found.len(), "finding")
+            )
+        }
+        _ => format!(
+            "with {} up to {over:.1} times the noise is left ({falls})",
+            counted(found.len(), "finding")
+        ),
     }
 }
 
 fn withdrawn(choice: &CauseChoice, withdrawn: &[(usize, f64)]) -> Vec<String> {
     let sentence = |(number, gain): &(usize, f64)| {
         let form = choice.form(*number);
-        let squares = if *gain < 0.0 { format!("grows by {:.1}", -gain) } else { format!("falls by {gain:.1} only") };
+        let squares = if *gain < 0.0 {
+            format!("grows by {:.1}", -gain)
+        } else {
+            format!("falls by {gain:.1} only")
+        };
         format!(
             "{} at {}: held-out rows do not confirm it (with it their squared error over the noise {squares})",
             form.cause.name(),
@@ -148,24 +237,40 @@ fn leftover(problem: &TorqueProblem, residual: &[Vec<f64>]) -> Vec<TorqueLeftove
     let of = |(joint, course): (usize, &Vec<f64>)| {
         let noise = JointNoise::of(course, &runs, 0.0);
         let lasting = noise.autocorrelation();
-        let signature = (lasting > LASTING).then(|| format!("correlated over {lasting:.0} rows: not white noise"));
-        TorqueLeftover { rms: noise.sigma, over_noise: noise.sigma / problem.noise[joint].sigma, signature }
+        let signature = (lasting > LASTING)
+            .then(|| format!("correlated over {lasting:.0} rows: not white noise"));
+        TorqueLeftover {
+            rms: noise.sigma,
+            over_noise: noise.sigma / problem.noise[joint].sigma,
+            signature,
+        }
     };
     residual.iter().enumerate().map(of).collect()
 }
 
 fn courses(problem: &TorqueProblem, first: &[Vec<f64>], last: &[Vec<f64>]) -> TorqueCourses {
     let (n, rows) = (problem.joints(), problem.reduction.rows.len());
-    let torque: Vec<Vec<f64>> = (0..n).map(|joint| problem.torque_at(joint, problem.latency)).collect();
+    let torque: Vec<Vec<f64>> = (0..n)
+        .map(|joint| problem.torque_at(joint, problem.latency))
+        .collect();
     let each = |value: &dyn Fn(usize, usize) -> f64| {
-        (0..rows).flat_map(|row| (0..n).map(move |joint| value(joint, row))).collect::<Vec<f64>>()
+        (0..rows)
+            .flat_map(|row| (0..n).map(move |joint| value(joint, row)))
+            .collect::<Vec<f64>>()
     };
     TorqueCourses {
         row: problem.reduction.rows.clone(),
-        time: problem.reduction.rows.iter().map(|row| problem.start + problem.scene.time[*row]).collect(),
+        time: problem
+            .reduction
+            .rows
+            .iter()
+            .map(|row| problem.start + problem.scene.time[*row])
+            .collect(),
         held_out: (0..rows).map(|row| problem.is_held_out(row)).collect(),
         in_event: (0..rows).map(|row| problem.in_event(row)).collect(),
-        at_rest: (0..rows).flat_map(|row| (0..n).map(move |joint| rests(problem, joint, row))).collect(),
+        at_rest: (0..rows)
+            .flat_map(|row| (0..n).map(move |joint| rests(problem, joint, row)))
+            .collect(),
         velocity: each(&|joint, row| problem.scene.velocity[joint][problem.reduction.rows[row]]),
         measured: each(&|joint, row| torque[joint][row]),
         simulated: each(&|joint, row| torque[joint][row] - first[joint][row]),
@@ -173,7 +278,12 @@ fn courses(problem: &TorqueProblem, first: &[Vec<f64>], last: &[Vec<f64>]) -> To
     }
 }
 
-fn inertials(problem: &TorqueProblem, set: &[usize], sweep: &SweptColumns, solution: &[(usize, f64)]) -> Vec<InertialEstimate> {
+fn inertials(
+    problem: &TorqueProblem,
+    set: &[usize],
+    sweep: &SweptColumns,
+    solution: &[(usize, f64)],
+) -> Vec<InertialEstimate> {
     let theta = problem.inertials(set, solution);
     let mut estimates = Vec::new();
     for link in 0..problem.joints() {
@@ -182,13 +292,18 @@ fn inertials(problem: &TorqueProblem, set: &[usize], sweep: &SweptColumns, solut
         let covariance = sweep.covariance(&columns);
         for number in 0..INERTIAL_NUMBERS {
             let along: Vec<f64> = changes.iter().map(|(_, ten)| ten[number]).collect();
-            let declared = problem.scene.declared.as_ref().map(|all| all.theta[INERTIAL_NUMBERS * link + number]);
+            let declared = problem
+                .scene
+                .declared
+                .as_ref()
+                .map(|all| all.theta[INERTIAL_NUMBERS * link + number]);
             if declared.is_none() && along.iter().all(|share| *share == 0.0) {
                 continue;
             }
             let count = along.len();
-            let variance: f64 =
-                (0..count * count).map(|entry| along[entry / count] * along[entry % count] * covariance[entry]).sum();
+            let variance: f64 = (0..count * count)
+                .map(|entry| along[entry / count] * along[entry % count] * covariance[entry])
+                .sum();
             estimates.push(InertialEstimate {
                 link,
                 quantity: INERTIAL_NAMES[number],

@@ -17,7 +17,11 @@ const BETTER: f64 = 0.05;
 const WIDTHS: [f64; 2] = [5e-4, 0.2];
 
 /// Moves the numbers of a set to where the residual is least.
-pub(super) fn polish(problem: &mut TorqueProblem, weighted: &mut WeightedColumns, set: &mut [usize]) {
+pub(super) fn polish(
+    problem: &mut TorqueProblem,
+    weighted: &mut WeightedColumns,
+    set: &mut [usize],
+) {
     for _ in 0..STEPS {
         if !step(problem, weighted, set) {
             break;
@@ -35,14 +39,27 @@ fn step(problem: &mut TorqueProblem, weighted: &mut WeightedColumns, set: &mut [
     };
     let width = problem.scene.sign_width;
     for (number, column) in &slopes.0 {
-        let Some((_, change)) = solution.iter().find(|(pivot, _)| pivot == column) else { continue };
+        let Some((_, change)) = solution.iter().find(|(pivot, _)| pivot == column) else {
+            continue;
+        };
         match number {
             ShapeNumber::SignWidth => problem.scene.sign_width = moved(width, *change, WIDTHS),
             ShapeNumber::Of(form, index) => {
-                let Some(place) = before.iter().position(|known| known == form) else { continue };
+                let Some(place) = before.iter().position(|known| known == form) else {
+                    continue;
+                };
                 let form = problem.all.forms[set[place]].clone();
-                let Some(span) = form.shape_numbers().into_iter().find(|span| span.index == *index) else { continue };
-                set[place] = problem.push(form.with_shape(*index, moved(form.shape[*index], *change, [span.least, span.most])));
+                let Some(span) = form
+                    .shape_numbers()
+                    .into_iter()
+                    .find(|span| span.index == *index)
+                else {
+                    continue;
+                };
+                set[place] = problem.push(form.with_shape(
+                    *index,
+                    moved(form.shape[*index], *change, [span.least, span.most]),
+                ));
             }
         }
     }

@@ -58,12 +58,20 @@ impl<'a> TorqueProblem<'a> {
         let scene = DynamicScene::new(arm, &recording, clock, cutoff, question.free_inertials);
         let reduction = Reduction::new(clock, cutoff);
         let regressor = ReducedRegressor::of(&scene, &reduction);
-        let mut torque: Vec<Vec<f64>> =
-            (0..recording.joints).map(|joint| column(&recording.torque, recording.joints, joint)).collect();
+        let mut torque: Vec<Vec<f64>> = (0..recording.joints)
+            .map(|joint| column(&recording.torque, recording.joints, joint))
+            .collect();
         reduction.filter(&mut torque);
-        let theta = scene.declared.as_ref().map_or_else(|| vec![0.0; 10 * recording.joints], |declared| declared.theta.clone());
+        let theta = scene.declared.as_ref().map_or_else(
+            || vec![0.0; 10 * recording.joints],
+            |declared| declared.theta.clone(),
+        );
         let mut problem = Self {
-            held_out: reduction.rows.iter().map(|row| recording.held_out[*row]).collect(),
+            held_out: reduction
+                .rows
+                .iter()
+                .map(|row| recording.held_out[*row])
+                .collect(),
             all: TorqueColumns::empty(),
             scene,
             start: recording.time[0],
@@ -90,17 +98,25 @@ impl<'a> TorqueProblem<'a> {
             0.5 * (most - least)
         };
         let torque = (0..self.joints()).map(half_range).collect();
-        self.all = TorqueColumns::new(&self.scene, &self.reduction, &self.regressor, without, torque);
+        self.all = TorqueColumns::new(
+            &self.scene,
+            &self.reduction,
+            &self.regressor,
+            without,
+            torque,
+        );
     }
 
     /// Takes a trial form; its number.
     pub fn push(&mut self, form: TorqueForm) -> usize {
-        self.all.push(form, &self.scene, &self.reduction, &self.regressor)
+        self.all
+            .push(form, &self.scene, &self.reduction, &self.regressor)
     }
 
     /// Makes columns of a set of the sign of a velocity anew, after its width has changed; those of others wait.
     pub fn renew_signs(&mut self, set: &[usize]) {
-        self.all.renew_signs(set, &self.scene, &self.reduction, &self.regressor);
+        self.all
+            .renew_signs(set, &self.scene, &self.reduction, &self.regressor);
         self.is_stale = true;
     }
 
@@ -108,7 +124,8 @@ impl<'a> TorqueProblem<'a> {
     pub fn refresh(&mut self) {
         if std::mem::take(&mut self.is_stale) {
             let listed: Vec<usize> = (0..self.all.listed).collect();
-            self.all.renew_signs(&listed, &self.scene, &self.reduction, &self.regressor);
+            self.all
+                .renew_signs(&listed, &self.scene, &self.reduction, &self.regressor);
         }
     }
 
@@ -118,14 +135,29 @@ impl<'a> TorqueProblem<'a> {
     }
 
     /// Columns that change a link's inertial numbers, and by what: of the base, and of the forms of a set.
-    pub fn inertial_changes(&self, set: &[usize], link: usize) -> Vec<(usize, [f64; INERTIAL_NUMBERS])> {
+    pub fn inertial_changes(
+        &self,
+        set: &[usize],
+        link: usize,
+    ) -> Vec<(usize, [f64; INERTIAL_NUMBERS])> {
         let base = self.all.base_changes.iter().enumerate();
-        let mut changes: Vec<_> = base.filter(|(_, (own, _))| *own == link).map(|(column, (_, ten))| (column, *ten)).collect();
+        let mut changes: Vec<_> = base
+            .filter(|(_, (own, _))| *own == link)
+            .map(|(column, (_, ten))| (column, *ten))
+            .collect();
         for number in set {
             let form = &self.all.forms[*number];
-            let of_form = self.scene.declared.as_ref().and_then(|declared| form.cause.inertial(form, declared));
+            let of_form = self
+                .scene
+                .declared
+                .as_ref()
+                .and_then(|declared| form.cause.inertial(form, declared));
             let columns = self.all.of(*number).zip(of_form.into_iter().flatten());
-            changes.extend(columns.filter(|(_, (own, _))| *own == link).map(|(column, (_, ten))| (column, ten)));
+            changes.extend(
+                columns
+                    .filter(|(_, (own, _))| *own == link)
+                    .map(|(column, (_, ten))| (column, ten)),
+            );
         }
         changes
     }
@@ -137,7 +169,9 @@ impl<'a> TorqueProblem<'a> {
             let own = &mut theta[INERTIAL_NUMBERS * link..INERTIAL_NUMBERS * (link + 1)];
             for (column, ten) in self.inertial_changes(set, link) {
                 if let Some((_, value)) = solution.iter().find(|(pivot, _)| *pivot == column) {
-                    own.iter_mut().zip(ten).for_each(|(sum, part)| *sum += value * part);
+                    own.iter_mut()
+                        .zip(ten)
+                        .for_each(|(sum, part)| *sum += value * part);
                 }
             }
         }
@@ -148,10 +182,14 @@ impl<'a> TorqueProblem<'a> {
     pub fn believe(&mut self, theta: &[f64], set: &[usize]) {
         self.scene.believe(theta);
         // A tilt times what is wrong of the masses looks like offsets.
-        if set.iter().any(|number| self.all.forms[*number].place == Place::Base) {
+        if set
+            .iter()
+            .any(|number| self.all.forms[*number].place == Place::Base)
+        {
             self.scene.tilt(theta);
         }
-        self.all.renew(&self.scene, &self.reduction, &self.regressor);
+        self.all
+            .renew(&self.scene, &self.reduction, &self.regressor);
     }
 
     /// Number of joints.
@@ -167,10 +205,18 @@ impl<'a> TorqueProblem<'a> {
     /// Measured torque of judged rows, as it was `latency` s later.
     pub fn torque_at(&self, joint: usize, latency: f64) -> Vec<f64> {
         let course = &self.torque[joint];
-        let stretch_of = |row: usize| self.scene.stretches.iter().find(|stretch| stretch.contains(&row));
+        let stretch_of = |row: usize| {
+            self.scene
+                .stretches
+                .iter()
+                .find(|stretch| stretch.contains(&row))
+        };
         let at = |row: &usize| {
             let stretch = stretch_of(*row).cloned().unwrap_or(*row..*row + 1);
-            interpolated(&course[stretch.clone()], (row - stretch.start) as f64 + latency * self.scene.rate)
+            interpolated(
+                &course[stretch.clone()],
+                (row - stretch.start) as f64 + latency * self.scene.rate,
+            )
         };
         self.reduction.rows.iter().map(at).collect()
     }
@@ -180,7 +226,10 @@ impl<'a> TorqueProblem<'a> {
         let of = |joint: usize| {
             let mut course = self.torque_at(joint, latency);
             let rigid = self.regressor.torque(joint, &self.theta);
-            course.iter_mut().zip(rigid).for_each(|(value, rigid)| *value -= rigid);
+            course
+                .iter_mut()
+                .zip(rigid)
+                .for_each(|(value, rigid)| *value -= rigid);
             course
         };
         (0..self.torque.len()).map(of).collect()
@@ -198,7 +247,8 @@ impl<'a> TorqueProblem<'a> {
         let of = |joint: usize| {
             let courses = (10 * joint..numbers).map(|number| self.regressor.course(joint, number));
             let used = courses.filter(|course| course.iter().any(|value| *value != 0.0));
-            used.map(|course| rows.iter().map(|row| course[*row]).collect()).collect()
+            used.map(|course| rows.iter().map(|row| course[*row]).collect())
+                .collect()
         };
         (0..self.joints()).map(of).collect()
     }
@@ -206,7 +256,9 @@ impl<'a> TorqueProblem<'a> {
     /// Whether a judged row lies in an event.
     pub fn in_event(&self, row: usize) -> bool {
         let time = self.time(row);
-        self.events.iter().any(|event| time > event.start - EVENT_MARGIN && time < event.end + EVENT_MARGIN)
+        self.events
+            .iter()
+            .any(|event| time > event.start - EVENT_MARGIN && time < event.end + EVENT_MARGIN)
     }
 
     /// Whether a judged row is held out.
@@ -243,20 +295,33 @@ impl<'a> TorqueProblem<'a> {
     pub fn weighted(&mut self, set: &[usize]) -> WeightedColumns {
         self.refresh();
         let listed = 0..self.all.listed;
-        let forms: Vec<usize> = listed.clone().chain(set.iter().copied().filter(|form| !listed.contains(form))).collect();
+        let forms: Vec<usize> = listed
+            .clone()
+            .chain(set.iter().copied().filter(|form| !listed.contains(form)))
+            .collect();
         self.weighted_of(&forms)
     }
 
     /// The same of the base and some forms.
     pub fn weighted_of(&self, forms: &[usize]) -> WeightedColumns {
-        let mut chosen: Vec<usize> = (0..self.all.base).chain(forms.iter().flat_map(|form| self.all.of(*form))).collect();
+        let mut chosen: Vec<usize> = (0..self.all.base)
+            .chain(forms.iter().flat_map(|form| self.all.of(*form)))
+            .collect();
         chosen.sort_unstable();
-        WeightedColumns::new(&self.all, &self.measured, self.weighing(&self.runs(false)), &chosen)
+        WeightedColumns::new(
+            &self.all,
+            &self.measured,
+            self.weighing(&self.runs(false)),
+            &chosen,
+        )
     }
 
     /// The weighing of some runs under the present noise.
     pub fn weighing<'b>(&'b self, runs: &'b [Range<usize>]) -> Weighing<'b> {
-        Weighing { noise: &self.noise, runs }
+        Weighing {
+            noise: &self.noise,
+            runs,
+        }
     }
 
     /// Torques (`[joint][judged row]`) of coefficients.
@@ -265,7 +330,10 @@ impl<'a> TorqueProblem<'a> {
         for (column, value) in solution {
             let column = &self.all.columns[*column];
             for (joint, course) in column.joints.iter().zip(&column.courses) {
-                torques[*joint].iter_mut().zip(course).for_each(|(sum, part)| *sum += value * part);
+                torques[*joint]
+                    .iter_mut()
+                    .zip(course)
+                    .for_each(|(sum, part)| *sum += value * part);
             }
         }
         torques
@@ -275,7 +343,10 @@ impl<'a> TorqueProblem<'a> {
     pub fn residual(&self, solution: &[(usize, f64)]) -> Vec<Vec<f64>> {
         let mut left = self.measured.clone();
         for (course, predicted) in left.iter_mut().zip(self.predicted(solution)) {
-            course.iter_mut().zip(predicted).for_each(|(value, predicted)| *value -= predicted);
+            course
+                .iter_mut()
+                .zip(predicted)
+                .for_each(|(value, predicted)| *value -= predicted);
         }
         left
     }
@@ -303,7 +374,9 @@ fn interpolated(course: &[f64], at: f64) -> f64 {
     (0..4)
         .map(|node: usize| {
             let others = (0..4).filter(|other| *other != node);
-            let weight: f64 = others.map(|other| (x - other as f64) / (node as f64 - other as f64)).product();
+            let weight: f64 = others
+                .map(|other| (x - other as f64) / (node as f64 - other as f64))
+                .product();
             weight * course[first + node]
         })
         .sum()

@@ -63,14 +63,18 @@ impl TorqueRecording {
     pub(super) fn extend(&mut self, other: &Self, rows: Range<usize>) {
         let wide = rows.start * self.joints..rows.end * self.joints;
         let both = |own: &mut Option<Vec<f64>>, other: &Option<Vec<f64>>, rows: Range<usize>| {
-            own.iter_mut().zip(other).for_each(|(own, other)| own.extend_from_slice(&other[rows.clone()]));
+            own.iter_mut()
+                .zip(other)
+                .for_each(|(own, other)| own.extend_from_slice(&other[rows.clone()]));
         };
         self.time.extend_from_slice(&other.time[rows.clone()]);
-        self.position.extend_from_slice(&other.position[wide.clone()]);
+        self.position
+            .extend_from_slice(&other.position[wide.clone()]);
         both(&mut self.velocity, &other.velocity, wide.clone());
         self.torque.extend_from_slice(&other.torque[wide]);
         both(&mut self.temperature, &other.temperature, rows.clone());
-        self.trajectory.extend_from_slice(&other.trajectory[rows.clone()]);
+        self.trajectory
+            .extend_from_slice(&other.trajectory[rows.clone()]);
         self.held_out.extend_from_slice(&other.held_out[rows]);
     }
 
@@ -79,9 +83,13 @@ impl TorqueRecording {
         let wide = rows * self.joints;
         self.time.drain(..rows);
         self.position.drain(..wide);
-        self.velocity.iter_mut().for_each(|all| drop(all.drain(..wide)));
+        self.velocity
+            .iter_mut()
+            .for_each(|all| drop(all.drain(..wide)));
         self.torque.drain(..wide);
-        self.temperature.iter_mut().for_each(|all| drop(all.drain(..rows)));
+        self.temperature
+            .iter_mut()
+            .for_each(|all| drop(all.drain(..rows)));
         self.trajectory.drain(..rows);
         self.held_out.drain(..rows);
     }

@@ -34,12 +34,16 @@ impl Reduction {
     /// The reduction by a clock and a cut-off (Hz).
     pub fn new(clock: &RecordingClock, cutoff: f64) -> Self {
         let recorded: usize = clock.stretches.iter().map(Range::len).sum();
-        let every = ((clock.rate / (RATE_OVER_CUTOFF * cutoff)).round() as usize).max(recorded.div_ceil(MOST)).max(1);
+        let every = ((clock.rate / (RATE_OVER_CUTOFF * cutoff)).round() as usize)
+            .max(recorded.div_ceil(MOST))
+            .max(1);
         let settling = (SETTLING * clock.rate) as usize;
         let (mut rows, mut runs) = (Vec::new(), Vec::new());
         for stretch in &clock.stretches {
             let first = rows.len();
-            rows.extend((stretch.start + settling..stretch.end.saturating_sub(settling)).step_by(every));
+            rows.extend(
+                (stretch.start + settling..stretch.end.saturating_sub(settling)).step_by(every),
+            );
             runs.push(first..rows.len());
         }
         runs.retain(|run| !run.is_empty());
@@ -57,7 +61,10 @@ impl Reduction {
     /// Filters whole courses (as long as the recording) in place.
     pub fn filter(&self, courses: &mut [Vec<f64>]) {
         for stretch in &self.stretches {
-            let mut own: Vec<&mut [f64]> = courses.iter_mut().map(|course| &mut course[stretch.clone()]).collect();
+            let mut own: Vec<&mut [f64]> = courses
+                .iter_mut()
+                .map(|course| &mut course[stretch.clone()])
+                .collect();
             self.filter.apply(&mut own);
         }
     }
@@ -65,18 +72,26 @@ impl Reduction {
     /// The kept rows of courses as they were recorded.
     pub fn reduce(&self, mut courses: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
         self.filter(&mut courses);
-        courses.into_iter().map(|course| self.rows.iter().map(|row| course[*row]).collect()).collect()
+        courses
+            .into_iter()
+            .map(|course| self.rows.iter().map(|row| course[*row]).collect())
+            .collect()
     }
 
     /// Kept rows of `width` courses that `write` makes for a range of rows, column after column (each as long as the range): the memory
     /// is that of a block.
-    pub fn reduce_blocks(&self, width: usize, mut write: impl FnMut(Range<usize>, &mut [f64])) -> Vec<Vec<f64>> {
+    pub fn reduce_blocks(
+        &self,
+        width: usize,
+        mut write: impl FnMut(Range<usize>, &mut [f64]),
+    ) -> Vec<Vec<f64>> {
         let mut kept = vec![Vec::with_capacity(self.rows.len()); width];
         let (mut block, mut next) = (Vec::new(), 0);
         for stretch in &self.stretches {
             for start in stretch.clone().step_by(BLOCK) {
                 let end = (start + BLOCK).min(stretch.end);
-                let wide = start.saturating_sub(self.margin).max(stretch.start)..(end + self.margin).min(stretch.end);
+                let wide = start.saturating_sub(self.margin).max(stretch.start)
+                    ..(end + self.margin).min(stretch.end);
                 let long = wide.len();
                 block.clear();
                 block.resize(width * long, 0.0);
@@ -85,7 +100,11 @@ impl Reduction {
                 let mut courses: Vec<&mut [f64]> = block.chunks_exact_mut(long).collect();
                 self.filter.apply(&mut courses);
                 for (course, kept) in courses.iter().zip(&mut kept) {
-                    kept.extend(self.rows[next..last].iter().map(|row| course[row - wide.start]));
+                    kept.extend(
+                        self.rows[next..last]
+                            .iter()
+                            .map(|row| course[row - wide.start]),
+                    );
                 }
                 next = last;
             }

@@ -15,7 +15,11 @@ const UNUSUAL: f64 = 4.0;
 const BETTER: f64 = 0.05;
 
 /// Replaces forms of a set by better shaped ones; tells whether any was.
-pub(super) fn refine(problem: &mut TorqueProblem, weighted: &mut WeightedColumns, set: &mut [usize]) -> bool {
+pub(super) fn refine(
+    problem: &mut TorqueProblem,
+    weighted: &mut WeightedColumns,
+    set: &mut [usize],
+) -> bool {
     let before = set.to_vec();
     for place in 0..set.len() {
         refine_one(problem, weighted, set, place);
@@ -24,7 +28,12 @@ pub(super) fn refine(problem: &mut TorqueProblem, weighted: &mut WeightedColumns
 }
 
 /// Replaces one form of a set.
-pub(super) fn refine_one(problem: &mut TorqueProblem, weighted: &mut WeightedColumns, set: &mut [usize], place: usize) {
+pub(super) fn refine_one(
+    problem: &mut TorqueProblem,
+    weighted: &mut WeightedColumns,
+    set: &mut [usize],
+    place: usize,
+) {
     let form = &problem.all.forms[set[place]];
     for span in form.cause.spans(form) {
         for half in HALVES {
@@ -50,9 +59,19 @@ fn try_grid(
     let now = form.shape[span.index];
     let mut trials = vec![set[place]];
     let is_usual = span.usual == Some(now);
-    for point in (-POINTS..=POINTS).filter(|point| if is_usual { point.abs() == POINTS } else { *point != 0 }) {
+    for point in (-POINTS..=POINTS).filter(|point| {
+        if is_usual {
+            point.abs() == POINTS
+        } else {
+            *point != 0
+        }
+    }) {
         let step = half * f64::from(point) / f64::from(POINTS);
-        let moved = if span.by_ratio { now * step.exp() } else { now + step };
+        let moved = if span.by_ratio {
+            now * step.exp()
+        } else {
+            now + step
+        };
         if moved < span.least || moved > span.most {
             continue;
         }
@@ -65,11 +84,22 @@ fn try_grid(
         });
         trials.push(number);
     }
-    let rest: Vec<usize> = (0..set.len()).filter(|other| *other != place).map(|other| set[other]).collect();
+    let rest: Vec<usize> = (0..set.len())
+        .filter(|other| *other != place)
+        .map(|other| set[other])
+        .collect();
     let sweep = SweptColumns::base(&problem.all, weighted).with(&rest);
     let gain = |number: usize| sweep.gain(number);
-    let best = trials.iter().copied().max_by(|a, b| gain(*a).total_cmp(&gain(*b))).unwrap_or(set[place]);
-    let asked = if is_usual { UNUSUAL + (weighted.rows as f64).ln() } else { BETTER };
+    let best = trials
+        .iter()
+        .copied()
+        .max_by(|a, b| gain(*a).total_cmp(&gain(*b)))
+        .unwrap_or(set[place]);
+    let asked = if is_usual {
+        UNUSUAL + (weighted.rows as f64).ln()
+    } else {
+        BETTER
+    };
     if gain(best) > gain(set[place]) + asked {
         set[place] = best;
     }

@@ -22,26 +22,33 @@ impl ReducedRegressor {
         let n = scene.joints();
         let mut dynamics = InverseDynamics::new(scene.arm);
         // Courses of joint j begin where those of the joints before end.
-        let first: Vec<usize> =
-            (0..n).map(|joint| INERTIAL_NUMBERS * (joint * n - joint * joint.saturating_sub(1) / 2)).collect();
+        let first: Vec<usize> = (0..n)
+            .map(|joint| INERTIAL_NUMBERS * (joint * n - joint * joint.saturating_sub(1) / 2))
+            .collect();
         let width = INERTIAL_NUMBERS * n * (n + 1) / 2;
         let mut motion = vec![0.0; 3 * n];
         let courses = reduction.reduce_blocks(width, |rows, block| {
             let long = rows.len();
             for row in rows.clone() {
                 scene.motion_into(row, &mut motion);
-                dynamics.regressor(split(&motion, n), &scene.arm.gravity, |joint, link, numbers| {
-                    let course = first[joint] + INERTIAL_NUMBERS * (link - joint);
-                    for (number, value) in numbers.iter().enumerate() {
-                        block[(course + number) * long + row - rows.start] = *value;
-                    }
-                });
+                dynamics.regressor(
+                    split(&motion, n),
+                    &scene.arm.gravity,
+                    |joint, link, numbers| {
+                        let course = first[joint] + INERTIAL_NUMBERS * (link - joint);
+                        for (number, value) in numbers.iter().enumerate() {
+                            block[(course + number) * long + row - rows.start] = *value;
+                        }
+                    },
+                );
             }
         });
         let mut courses = courses.into_iter();
         let of = |joint: usize| {
             let before = (0..INERTIAL_NUMBERS * joint).map(|_| Vec::new());
-            before.chain(courses.by_ref().take(INERTIAL_NUMBERS * (n - joint))).collect()
+            before
+                .chain(courses.by_ref().take(INERTIAL_NUMBERS * (n - joint)))
+                .collect()
         };
         Self((0..n).map(of).collect())
     }
@@ -63,18 +70,29 @@ impl ReducedRegressor {
             let own = &self.0[*joint][INERTIAL_NUMBERS * link..INERTIAL_NUMBERS * (link + 1)];
             let mut sum = vec![0.0; own[0].len()];
             for (course, share) in own.iter().zip(ten).filter(|(_, share)| **share != 0.0) {
-                sum.iter_mut().zip(course).for_each(|(sum, value)| *sum += share * value);
+                sum.iter_mut()
+                    .zip(course)
+                    .for_each(|(sum, value)| *sum += share * value);
             }
             sum
         };
-        TorqueColumn { courses: joints.iter().map(course).collect(), joints }
+        TorqueColumn {
+            courses: joints.iter().map(course).collect(),
+            joints,
+        }
     }
 
     /// Torque of 10 n numbers at a joint.
     pub fn torque(&self, joint: usize, theta: &[f64]) -> Vec<f64> {
         let mut sum = vec![0.0; self.0[joint].last().map_or(0, Vec::len)];
-        for (course, share) in self.0[joint].iter().zip(theta).skip(INERTIAL_NUMBERS * joint) {
-            sum.iter_mut().zip(course).for_each(|(sum, value)| *sum += share * value);
+        for (course, share) in self.0[joint]
+            .iter()
+            .zip(theta)
+            .skip(INERTIAL_NUMBERS * joint)
+        {
+            sum.iter_mut()
+                .zip(course)
+                .for_each(|(sum, value)| *sum += share * value);
         }
         sum
     }

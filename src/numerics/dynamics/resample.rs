@@ -41,7 +41,10 @@ impl Resampler {
     }
 
     /// Hands on what was made, each row with the recorded one that it is or comes after.
-    pub fn hand_on(&mut self, take: &mut dyn FnMut(&TorqueRecording, &[usize]) -> Result<()>) -> Result<()> {
+    pub fn hand_on(
+        &mut self,
+        take: &mut dyn FnMut(&TorqueRecording, &[usize]) -> Result<()>,
+    ) -> Result<()> {
         if !self.origin.is_empty() {
             take(&self.out, &self.origin)?;
         }
@@ -114,15 +117,21 @@ impl Resampler {
         let (from, step) = (stamps[row], stamps[row + 1] - stamps[row]);
         let share = (time - from) / step;
         let before = (row > 0 && !self.is_torn(row)).then(|| stamps[row] - stamps[row - 1]);
-        let after = (row + 2 < stamps.len() && !self.is_torn(row + 2)).then(|| stamps[row + 2] - stamps[row + 1]);
+        let after = (row + 2 < stamps.len() && !self.is_torn(row + 2))
+            .then(|| stamps[row + 2] - stamps[row + 1]);
         let left = share * share;
-        let [start, end] = [1.0 - 3.0 * left + 2.0 * left * share, 3.0 * left - 2.0 * left * share];
+        let [start, end] = [
+            1.0 - 3.0 * left + 2.0 * left * share,
+            3.0 * left - 2.0 * left * share,
+        ];
         let [leaving, arriving] = [share - 2.0 * left + left * share, left * share - left];
         // Weights of the rows before, here, next and after it.
         let mut weights = [0.0, start, end, 0.0];
         // Slopes times the step: of what this step alone has, and of what the one beside it has.
         let mut slope = |weight: f64, own: [usize; 2], beside: Option<(f64, [usize; 2])>| {
-            let (mine, other) = beside.map_or((1.0, 0.0), |(length, _)| (length / (step + length), step / (step + length)));
+            let (mine, other) = beside.map_or((1.0, 0.0), |(length, _)| {
+                (length / (step + length), step / (step + length))
+            });
             weights[own[0]] -= weight * mine;
             weights[own[1]] += weight * mine;
             if let Some((length, places)) = beside {
@@ -135,7 +144,9 @@ impl Resampler {
         self.out.extend(&self.held, row..row + 1);
         let at = |values: &[f64], width: usize, entry: usize| -> f64 {
             let places = (0..4).filter(|place| weights[*place] != 0.0);
-            places.map(|place| weights[place] * values[(row + place - 1) * width + entry]).sum()
+            places
+                .map(|place| weights[place] * values[(row + place - 1) * width + entry])
+                .sum()
         };
         let n = self.held.joints;
         let rewrite = |out: &mut Vec<f64>, values: &[f64], width: usize| {
@@ -144,10 +155,13 @@ impl Resampler {
         };
         rewrite(&mut self.out.position, &self.held.position, n);
         rewrite(&mut self.out.torque, &self.held.torque, n);
-        for (out, held, width) in
-            [(&mut self.out.velocity, &self.held.velocity, n), (&mut self.out.temperature, &self.held.temperature, 1)]
-        {
-            out.iter_mut().zip(held).for_each(|(out, held)| rewrite(out, held, width));
+        for (out, held, width) in [
+            (&mut self.out.velocity, &self.held.velocity, n),
+            (&mut self.out.temperature, &self.held.temperature, 1),
+        ] {
+            out.iter_mut()
+                .zip(held)
+                .for_each(|(out, held)| rewrite(out, held, width));
         }
         self.came(row, time);
     }

@@ -18,27 +18,50 @@ const MEDIAN: f64 = 1.4826;
 pub(super) fn rich_forms(problem: &TorqueProblem, set: &[usize]) -> Vec<usize> {
     let forms = &problem.all.forms;
     let mut rich = set.to_vec();
-    rich.extend((0..forms.len()).filter(|form| forms[*form].cause.is_rich(&forms[*form]) && !set.contains(form)));
+    rich.extend(
+        (0..forms.len())
+            .filter(|form| forms[*form].cause.is_rich(&forms[*form]) && !set.contains(form)),
+    );
     rich
 }
 
 /// Noise of each joint and the residual of a fit of the base and some forms to the fitted rows.
-pub(super) fn noise_beside(problem: &TorqueProblem, forms: &[usize]) -> (Vec<JointNoise>, Vec<Vec<f64>>) {
+pub(super) fn noise_beside(
+    problem: &TorqueProblem,
+    forms: &[usize],
+) -> (Vec<JointNoise>, Vec<Vec<f64>>) {
     let runs = problem.runs(false);
-    let mut chosen: Vec<usize> = (0..problem.all.base).chain(forms.iter().flat_map(|form| problem.all.of(*form))).collect();
+    let mut chosen: Vec<usize> = (0..problem.all.base)
+        .chain(forms.iter().flat_map(|form| problem.all.of(*form)))
+        .collect();
     chosen.sort_unstable();
-    let mut noise: Vec<JointNoise> =
-        problem.measured.iter().map(|course| JointNoise::white(robust_sigma(course, &runs))).collect();
+    let mut noise: Vec<JointNoise> = problem
+        .measured
+        .iter()
+        .map(|course| JointNoise::white(robust_sigma(course, &runs)))
+        .collect();
     let mut residual = Vec::new();
     for _ in 0..ROUNDS {
-        let weighing = Weighing { noise: &noise, runs: &runs };
+        let weighing = Weighing {
+            noise: &noise,
+            runs: &runs,
+        };
         let weighted = WeightedColumns::new(&problem.all, &problem.measured, weighing, &chosen);
         let sweep = SweptColumns::base(&problem.all, &weighted).with(forms);
         residual = problem.residual(&sweep.solution());
-        noise = residual.iter().map(|course| JointNoise::white(robust_sigma(course, &runs))).collect();
+        noise = residual
+            .iter()
+            .map(|course| JointNoise::white(robust_sigma(course, &runs)))
+            .collect();
     }
     let spent = chosen.len() as f64 / problem.joints() as f64;
-    (residual.iter().map(|course| JointNoise::of(course, &runs, spent)).collect(), residual)
+    (
+        residual
+            .iter()
+            .map(|course| JointNoise::of(course, &runs, spent))
+            .collect(),
+        residual,
+    )
 }
 
 /// Half of the mean square, half of the median: neither outliers alone nor their absence decides.

@@ -45,16 +45,27 @@ pub(super) struct DynamicScene<'a> {
 
 impl<'a> DynamicScene<'a> {
     /// The scene of a checked recording; the final low-pass will be at `cutoff` (Hz).
-    pub fn new(arm: &'a DynamicArm, recording: &TorqueRecording, clock: &RecordingClock, cutoff: f64, free: bool) -> Self {
+    pub fn new(
+        arm: &'a DynamicArm,
+        recording: &TorqueRecording,
+        clock: &RecordingClock,
+        cutoff: f64,
+        free: bool,
+    ) -> Self {
         let n = recording.joints;
         let (rows, first) = (recording.rows(), recording.time[0]);
-        let filter = ZeroPhase::new(clock.rate, (MOTION_BAND * cutoff).min(HIGHEST_BAND * clock.rate));
+        let filter = ZeroPhase::new(
+            clock.rate,
+            (MOTION_BAND * cutoff).min(HIGHEST_BAND * clock.rate),
+        );
         let mut scene = Self {
             arm,
             rate: clock.rate,
             time: recording.time.iter().map(|time| time - first).collect(),
             stretches: clock.stretches.clone(),
-            position: (0..n).map(|joint| column(&recording.position, n, joint)).collect(),
+            position: (0..n)
+                .map(|joint| column(&recording.position, n, joint))
+                .collect(),
             velocity: vec![vec![0.0; rows]; n],
             acceleration: vec![vec![0.0; rows]; n],
             rigid: vec![vec![0.0; rows]; n],
@@ -62,15 +73,28 @@ impl<'a> DynamicScene<'a> {
             sign_width: SIGN_WIDTHS[1],
             sign_shares: vec![1.0; n],
             friction_lead: 0.0,
-            declared: arm.links.as_ref().filter(|_| !free).map(|links| DeclaredInertials::of(arm, links)),
+            declared: arm
+                .links
+                .as_ref()
+                .filter(|_| !free)
+                .map(|links| DeclaredInertials::of(arm, links)),
         };
         for stretch in &clock.stretches {
-            let mut courses: Vec<&mut [f64]> = scene.position.iter_mut().map(|course| &mut course[stretch.clone()]).collect();
+            let mut courses: Vec<&mut [f64]> = scene
+                .position
+                .iter_mut()
+                .map(|course| &mut course[stretch.clone()])
+                .collect();
             filter.apply(&mut courses);
             for joint in 0..n {
                 let course = &scene.position[joint][stretch.clone()];
                 let velocity = &mut scene.velocity[joint][stretch.clone()];
-                derivatives(course, clock.rate, velocity, &mut scene.acceleration[joint][stretch.clone()]);
+                derivatives(
+                    course,
+                    clock.rate,
+                    velocity,
+                    &mut scene.acceleration[joint][stretch.clone()],
+                );
             }
         }
         if let Some(declared) = &scene.declared {
@@ -109,7 +133,10 @@ impl<'a> DynamicScene<'a> {
 
     /// Takes a width of each joint's own, rad/s.
     pub fn turn_each_over(&mut self, widths: impl IntoIterator<Item = f64>) {
-        self.sign_shares = widths.into_iter().map(|width| width / self.sign_width).collect();
+        self.sign_shares = widths
+            .into_iter()
+            .map(|width| width / self.sign_width)
+            .collect();
     }
 
     /// Takes a width of one joint's own, rad/s.
@@ -119,7 +146,10 @@ impl<'a> DynamicScene<'a> {
 
     /// Smoothed sign of a joint's velocity in a row, as friction has it.
     pub fn direction(&self, joint: usize, row: usize) -> f64 {
-        self.sign_at(joint, self.velocity[joint][row] + self.friction_lead * self.acceleration[joint][row])
+        self.sign_at(
+            joint,
+            self.velocity[joint][row] + self.friction_lead * self.acceleration[joint][row],
+        )
     }
 
     /// Smoothed sign of a velocity of a joint.
@@ -144,7 +174,8 @@ impl<'a> DynamicScene<'a> {
 
     /// Takes 10 n inertial numbers for the torques of a gravity from the side.
     pub fn tilt(&mut self, theta: &[f64]) {
-        self.sideways = [Vector3::x(), Vector3::y()].map(|side| self.torques(theta, &(side * GRAVITY), false));
+        self.sideways =
+            [Vector3::x(), Vector3::y()].map(|side| self.torques(theta, &(side * GRAVITY), false));
     }
 
     fn torques(&self, theta: &[f64], gravity: &Vector3<f64>, moving: bool) -> Vec<Vec<f64>> {
@@ -157,7 +188,10 @@ impl<'a> DynamicScene<'a> {
                 motion[n..].fill(0.0);
             }
             dynamics.torque(split(&motion, n), gravity, theta, &mut torque);
-            torques.iter_mut().zip(&torque).for_each(|(course, value)| course[row] = *value);
+            torques
+                .iter_mut()
+                .zip(&torque)
+                .for_each(|(course, value)| course[row] = *value);
         }
         torques
     }
@@ -174,7 +208,8 @@ impl<'a> DynamicScene<'a> {
 
     /// Jacobian of the tool point in a row: per joint the velocity of the point per velocity of the joint.
     pub fn tool_jacobian(&self, row: usize) -> Vec<Vector3<f64>> {
-        let (mut rotation, mut origin, mut before) = (Matrix3::identity(), Vector3::zeros(), Vector3::zeros());
+        let (mut rotation, mut origin, mut before) =
+            (Matrix3::identity(), Vector3::zeros(), Vector3::zeros());
         let mut axes = Vec::with_capacity(self.joints());
         for joint in 0..self.joints() {
             origin += rotation * (self.arm.points[joint].coords - before);
@@ -187,7 +222,10 @@ impl<'a> DynamicScene<'a> {
             }
         }
         let tip = origin + rotation * (self.arm.tool.coords - before);
-        let moves = |(joint, (axis, origin)): (usize, &(Vector3<f64>, Vector3<f64>))| match self.arm.prismatic[joint] {
+        let moves = |(joint, (axis, origin)): (usize, &(Vector3<f64>, Vector3<f64>))| match self
+            .arm
+            .prismatic[joint]
+        {
             true => *axis,
             false => axis.cross(&(tip - origin)),
         };
@@ -202,7 +240,11 @@ pub(super) const SIGN_WIDTHS: [f64; 6] = [0.003, 0.006, 0.012, 0.025, 0.05, 0.1]
 
 /// The parts of 3 n numbers.
 pub(super) fn split(motion: &[f64], n: usize) -> MotionRow<'_> {
-    MotionRow { position: &motion[..n], velocity: &motion[n..2 * n], acceleration: &motion[2 * n..] }
+    MotionRow {
+        position: &motion[..n],
+        velocity: &motion[n..2 * n],
+        acceleration: &motion[2 * n..],
+    }
 }
 
 /// One column of row-major values.

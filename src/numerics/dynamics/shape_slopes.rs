@@ -30,7 +30,9 @@ pub(super) struct ShapeSlopes(pub Vec<(ShapeNumber, usize)>);
 impl ShapeSlopes {
     /// The slopes of a set at its solution; the columns join those of the problem.
     pub fn of(problem: &mut TorqueProblem, weighted: &mut WeightedColumns, set: &[usize]) -> Self {
-        let solution = SweptColumns::base(&problem.all, weighted).with(set).solution();
+        let solution = SweptColumns::base(&problem.all, weighted)
+            .with(set)
+            .solution();
         let mut slopes = Vec::new();
         for number in set {
             for span in problem.all.forms[*number].shape_numbers() {
@@ -40,7 +42,11 @@ impl ShapeSlopes {
             }
         }
         let width = problem.scene.sign_width;
-        slopes.push((ShapeNumber::SignWidth, width_slope(problem, set, &solution), width));
+        slopes.push((
+            ShapeNumber::SignWidth,
+            width_slope(problem, set, &solution),
+            width,
+        ));
         let runs = problem.runs(false);
         let mut numbers = Vec::new();
         for (number, slope, size) in slopes {
@@ -61,33 +67,59 @@ impl ShapeSlopes {
 
     /// Standard deviation of a shape number of a form, by a fit with the columns of all of them.
     pub fn sigma(&self, uncertain: &SweptColumns, form: usize, index: usize) -> Option<f64> {
-        let (_, column) = self.0.iter().find(|(known, _)| *known == ShapeNumber::Of(form, index))?;
+        let (_, column) = self
+            .0
+            .iter()
+            .find(|(known, _)| *known == ShapeNumber::Of(form, index))?;
         Some(uncertain.covariance(&[*column])[0].max(0.0).sqrt())
     }
 }
 
 /// The slope by a shape number at its form's coefficients.
-fn shape_slope(problem: &TorqueProblem, number: usize, index: usize, solution: &[(usize, f64)]) -> TorqueColumn {
+fn shape_slope(
+    problem: &TorqueProblem,
+    number: usize,
+    index: usize,
+    solution: &[(usize, f64)],
+) -> TorqueColumn {
     let form = &problem.all.forms[number];
     let size = form.shape[index];
-    let [less, more] = [size * (1.0 - STEP), size * (1.0 + STEP)].map(|moved| problem.columns_of(&form.with_shape(index, moved)));
+    let [less, more] = [size * (1.0 - STEP), size * (1.0 + STEP)]
+        .map(|moved| problem.columns_of(&form.with_shape(index, moved)));
     let mut slope = nothing(&less[0]);
-    add_difference(&mut slope, [&less, &more], &values(problem, number, solution), 2.0 * STEP * size);
+    add_difference(
+        &mut slope,
+        [&less, &more],
+        &values(problem, number, solution),
+        2.0 * STEP * size,
+    );
     slope
 }
 
 /// The slope by the width of a sign, over all forms of a set.
-fn width_slope(problem: &mut TorqueProblem, set: &[usize], solution: &[(usize, f64)]) -> TorqueColumn {
+fn width_slope(
+    problem: &mut TorqueProblem,
+    set: &[usize],
+    solution: &[(usize, f64)],
+) -> TorqueColumn {
     let (joints, width) = (problem.joints(), problem.scene.sign_width);
     let rows = problem.reduction.rows.len();
-    let mut slope = TorqueColumn { joints: (0..joints).collect(), courses: vec![vec![0.0; rows]; joints] };
+    let mut slope = TorqueColumn {
+        joints: (0..joints).collect(),
+        courses: vec![vec![0.0; rows]; joints],
+    };
     for number in set {
         let form = problem.all.forms[*number].clone();
         let [less, more] = [1.0 - STEP, 1.0 + STEP].map(|share| {
             problem.scene.sign_width = share * width;
             problem.columns_of(&form)
         });
-        add_difference(&mut slope, [&less, &more], &values(problem, *number, solution), 2.0 * STEP * width);
+        add_difference(
+            &mut slope,
+            [&less, &more],
+            &values(problem, *number, solution),
+            2.0 * STEP * width,
+        );
     }
     problem.scene.sign_width = width;
     slope
@@ -95,19 +127,42 @@ fn width_slope(problem: &mut TorqueProblem, set: &[usize], solution: &[(usize, f
 
 /// Coefficients of a form; of columns that are not seen, 0.
 fn values(problem: &TorqueProblem, number: usize, solution: &[(usize, f64)]) -> Vec<f64> {
-    let value = |column: usize| solution.iter().find(|(pivot, _)| *pivot == column).map_or(0.0, |(_, value)| *value);
+    let value = |column: usize| {
+        solution
+            .iter()
+            .find(|(pivot, _)| *pivot == column)
+            .map_or(0.0, |(_, value)| *value)
+    };
     problem.all.of(number).map(value).collect()
 }
 
 fn nothing(like: &TorqueColumn) -> TorqueColumn {
-    TorqueColumn { joints: like.joints.clone(), courses: like.courses.iter().map(|course| vec![0.0; course.len()]).collect() }
+    TorqueColumn {
+        joints: like.joints.clone(),
+        courses: like
+            .courses
+            .iter()
+            .map(|course| vec![0.0; course.len()])
+            .collect(),
+    }
 }
 
 /// Adds the difference of columns, each by its coefficient, over a step.
-fn add_difference(slope: &mut TorqueColumn, [less, more]: [&[TorqueColumn]; 2], values: &[f64], step: f64) {
+fn add_difference(
+    slope: &mut TorqueColumn,
+    [less, more]: [&[TorqueColumn]; 2],
+    values: &[f64],
+    step: f64,
+) {
     for ((less, more), value) in less.iter().zip(more).zip(values) {
-        for (joint, (less, more)) in less.joints.iter().zip(less.courses.iter().zip(&more.courses)) {
-            let Some(place) = slope.joints.iter().position(|one| one == joint) else { continue };
+        for (joint, (less, more)) in less
+            .joints
+            .iter()
+            .zip(less.courses.iter().zip(&more.courses))
+        {
+            let Some(place) = slope.joints.iter().position(|one| one == joint) else {
+                continue;
+            };
             let own = slope.courses[place].iter_mut().zip(less.iter().zip(more));
             own.for_each(|(sum, (less, more))| *sum += value * (more - less) / step);
         }
@@ -127,8 +182,14 @@ pub(super) fn planned_slopes(
         for span in form.shape_numbers() {
             let size = form.shape[span.index];
             for joint in form.cause.acts_on(form, scene.joints()) {
-                let [less, more] = [1.0 - STEP, 1.0 + STEP]
-                    .map(|share| torque_at(&form.with_shape(span.index, share * size), values, scene, joint));
+                let [less, more] = [1.0 - STEP, 1.0 + STEP].map(|share| {
+                    torque_at(
+                        &form.with_shape(span.index, share * size),
+                        values,
+                        scene,
+                        joint,
+                    )
+                });
                 slopes.push((next, joint, difference(less, &more, 2.0 * STEP * size)));
             }
             next += 1;
@@ -136,14 +197,20 @@ pub(super) fn planned_slopes(
     }
     let width = scene.sign_width;
     for joint in 0..scene.joints() {
-        let acting =
-            || forms.iter().zip(coefficients).filter(|(form, _)| form.cause.acts_on(form, scene.joints()).contains(&joint));
+        let acting = || {
+            forms
+                .iter()
+                .zip(coefficients)
+                .filter(|(form, _)| form.cause.acts_on(form, scene.joints()).contains(&joint))
+        };
         let own: Vec<_> = acting().collect();
         let [less, more] = [1.0 - STEP, 1.0 + STEP].map(|share| {
             scene.sign_width = share * width;
             let mut sum = vec![0.0; scene.rows()];
             for (form, values) in &own {
-                sum.iter_mut().zip(torque_at(form, values, scene, joint)).for_each(|(sum, value)| *sum += value);
+                sum.iter_mut()
+                    .zip(torque_at(form, values, scene, joint))
+                    .for_each(|(sum, value)| *sum += value);
             }
             sum
         });
@@ -163,12 +230,16 @@ fn torque_at(form: &TorqueForm, values: &[f64], scene: &DynamicScene, joint: usi
     let (mut sum, mut course) = (vec![0.0; scene.rows()], vec![0.0; scene.rows()]);
     for (number, value) in values.iter().enumerate() {
         form.cause.write(form, scene, joint, number, &mut course);
-        sum.iter_mut().zip(&course).for_each(|(sum, part)| *sum += value * part);
+        sum.iter_mut()
+            .zip(&course)
+            .for_each(|(sum, part)| *sum += value * part);
     }
     sum
 }
 
 fn difference(mut less: Vec<f64>, more: &[f64], step: f64) -> Vec<f64> {
-    less.iter_mut().zip(more).for_each(|(less, more)| *less = (more - *less) / step);
+    less.iter_mut()
+        .zip(more)
+        .for_each(|(less, more)| *less = (more - *less) / step);
     less
 }

@@ -41,10 +41,14 @@ fn best_width(left_by: &mut dyn FnMut(f64) -> f64) -> f64 {
             *best = (left, width);
         }
     };
-    SIGN_WIDTHS.iter().for_each(|width| try_width(*width, &mut best));
+    SIGN_WIDTHS
+        .iter()
+        .for_each(|width| try_width(*width, &mut best));
     for step in STEPS {
         let about = best.1;
-        [about * (-step).exp(), about * step.exp()].iter().for_each(|width| try_width(*width, &mut best));
+        [about * (-step).exp(), about * step.exp()]
+            .iter()
+            .for_each(|width| try_width(*width, &mut best));
     }
     best.1
 }
@@ -71,10 +75,18 @@ impl FrictionFit {
         let velocities = problem.reduction.reduce(problem.scene.velocity.clone());
         let of = |(joint, inertial): (usize, Vec<Vec<f64>>)| {
             let velocity = rows.iter().map(|row| velocities[joint][*row]).collect();
-            let columns: Vec<Vec<f64>> = inertial.into_iter().chain([velocity, vec![1.0; rows.len()]]).collect();
+            let columns: Vec<Vec<f64>> = inertial
+                .into_iter()
+                .chain([velocity, vec![1.0; rows.len()]])
+                .collect();
             JointFit::new(&columns)
         };
-        let joints = problem.base_courses(&rows).into_iter().enumerate().map(of).collect();
+        let joints = problem
+            .base_courses(&rows)
+            .into_iter()
+            .enumerate()
+            .map(of)
+            .collect();
         let mut fit = Self { rows, joints };
         fit.take(&problem.measured);
         fit
@@ -83,7 +95,10 @@ impl FrictionFit {
     /// Takes measured minus rigid torques, `[joint][judged row]`.
     pub fn take(&mut self, measured: &[Vec<f64>]) {
         for (fit, course) in self.joints.iter_mut().zip(measured) {
-            fit.left = fit.apart(&DVector::from_iterator(self.rows.len(), self.rows.iter().map(|row| course[*row])));
+            fit.left = fit.apart(&DVector::from_iterator(
+                self.rows.len(),
+                self.rows.iter().map(|row| course[*row]),
+            ));
         }
     }
 
@@ -94,8 +109,16 @@ impl FrictionFit {
 
     /// Logarithm of the mean square that is left at each joint as friction turns at present.
     pub fn left(&self, problem: &TorqueProblem) -> Vec<f64> {
-        let signs = problem.reduction.reduce((0..self.joints.len()).map(|joint| signs(problem, joint)).collect());
-        self.joints.iter().zip(&signs).map(|(fit, sign)| self.left_by(fit, sign)).collect()
+        let signs = problem.reduction.reduce(
+            (0..self.joints.len())
+                .map(|joint| signs(problem, joint))
+                .collect(),
+        );
+        self.joints
+            .iter()
+            .zip(&signs)
+            .map(|(fit, sign)| self.left_by(fit, sign))
+            .collect()
     }
 
     /// At one joint.
@@ -107,25 +130,35 @@ impl FrictionFit {
     fn left_by(&self, fit: &JointFit, sign: &[f64]) -> f64 {
         let own = DVector::from_iterator(self.rows.len(), self.rows.iter().map(|row| sign[*row]));
         let apart = fit.apart(&own);
-        let gain = apart.dot(&fit.left).powi(2) / (apart.norm_squared() + RIDGE * own.norm_squared() + f64::MIN_POSITIVE);
+        let gain = apart.dot(&fit.left).powi(2)
+            / (apart.norm_squared() + RIDGE * own.norm_squared() + f64::MIN_POSITIVE);
         ((fit.left.norm_squared() - gain) / self.rows.len().max(1) as f64 + f64::MIN_POSITIVE).ln()
     }
 }
 
 /// How friction turns at a joint at present, all recorded rows.
 fn signs(problem: &TorqueProblem, joint: usize) -> Vec<f64> {
-    (0..problem.scene.rows()).map(|row| problem.scene.direction(joint, row)).collect()
+    (0..problem.scene.rows())
+        .map(|row| problem.scene.direction(joint, row))
+        .collect()
 }
 
 impl JointFit {
     fn new(columns: &[Vec<f64>]) -> Self {
-        let norm = |column: &[f64]| column.iter().map(|value| value * value).sum::<f64>().sqrt() + 1e-12;
+        let norm =
+            |column: &[f64]| column.iter().map(|value| value * value).sum::<f64>().sqrt() + 1e-12;
         let rows = columns.last().map_or(0, Vec::len);
         let scales: Vec<f64> = columns.iter().map(|column| norm(column)).collect();
-        let columns = DMatrix::from_fn(rows, columns.len(), |row, column| columns[column][row] / scales[column]);
+        let columns = DMatrix::from_fn(rows, columns.len(), |row, column| {
+            columns[column][row] / scales[column]
+        });
         let mut gram = columns.tr_mul(&columns);
         (0..gram.nrows()).for_each(|k| gram[(k, k)] += RIDGE);
-        Self { factor: gram.cholesky(), columns, left: DVector::zeros(rows) }
+        Self {
+            factor: gram.cholesky(),
+            columns,
+            left: DVector::zeros(rows),
+        }
     }
 
     /// What the columns leave of a course.

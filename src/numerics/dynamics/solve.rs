@@ -56,7 +56,10 @@ pub(super) fn solve<'a>(
     let touched = asked(super::CONTACT);
     let found = clocked(&mut problem, question, asked(super::LATENCY));
     if let Some(latency) = &found {
-        tell(format!("torques come {:.1} ms after the positions", 1e3 * latency.seconds));
+        tell(format!(
+            "torques come {:.1} ms after the positions",
+            1e3 * latency.seconds
+        ));
     }
     let (noise, residual) = noise_beside(&problem, &rich_forms(&problem, &[]));
     if touched {
@@ -105,11 +108,22 @@ pub(super) fn solve<'a>(
     settle_names(&mut problem, &mut weighted, &mut judged);
     weighted = problem.weighted(&judged.set);
     let slopes = ShapeSlopes::of(&mut problem, &mut weighted, &judged.set);
-    SolvedTorques { problem, weighted, judged, slopes, latency: found, other }
+    SolvedTorques {
+        problem,
+        weighted,
+        judged,
+        slopes,
+        latency: found,
+        other,
+    }
 }
 
 /// Finds by how much torques come late and by how much friction turns before the velocity, each given the other, and takes both.
-fn clocked(problem: &mut TorqueProblem, question: &TorqueQuestion, is_asked: bool) -> Option<Latency> {
+fn clocked(
+    problem: &mut TorqueProblem,
+    question: &TorqueQuestion,
+    is_asked: bool,
+) -> Option<Latency> {
     let mut found = None;
     for _ in 0..CLOCK_ROUNDS {
         found = latency(problem).filter(|_| is_asked);
@@ -123,20 +137,37 @@ fn clocked(problem: &mut TorqueProblem, question: &TorqueQuestion, is_asked: boo
 }
 
 /// Sets rows aside in which the residual of a set looks like a push.
-fn look_for_contacts(problem: &mut TorqueProblem, weighted: &WeightedColumns, set: &[usize], beside: ContactModel) {
-    let solution = SweptColumns::base(&problem.all, weighted).with(set).solution();
-    problem.events = contacts(problem, &problem.residual(&solution), &problem.noise, beside);
+fn look_for_contacts(
+    problem: &mut TorqueProblem,
+    weighted: &WeightedColumns,
+    set: &[usize],
+    beside: ContactModel,
+) {
+    let solution = SweptColumns::base(&problem.all, weighted)
+        .with(set)
+        .solution();
+    problem.events = contacts(
+        problem,
+        &problem.residual(&solution),
+        &problem.noise,
+        beside,
+    );
 }
 
 /// Whether the same rows are set aside, to a tenth of a second.
 fn alike(before: &[ContactEvent], after: &[ContactEvent]) -> bool {
-    let near =
-        |(a, b): (&ContactEvent, &ContactEvent)| (a.start - b.start).abs() < SAME_TIME && (a.end - b.end).abs() < SAME_TIME;
+    let near = |(a, b): (&ContactEvent, &ContactEvent)| {
+        (a.start - b.start).abs() < SAME_TIME && (a.end - b.end).abs() < SAME_TIME
+    };
     before.len() == after.len() && before.iter().zip(after).all(near)
 }
 
 /// From the fitted rigid torque and noise: searches on from a set and refines it.
-fn again(problem: &mut TorqueProblem, weighted: &mut WeightedColumns, set: Vec<usize>) -> Vec<usize> {
+fn again(
+    problem: &mut TorqueProblem,
+    weighted: &mut WeightedColumns,
+    set: Vec<usize>,
+) -> Vec<usize> {
     let theta = {
         let sweep = CauseChoice::new(problem, weighted).base.with(&set);
         problem.inertials(&set, &sweep.solution())

@@ -52,35 +52,75 @@ pub(super) struct StackedFit {
 impl StackedNormal {
     /// Stacks both problems, whose columns are alike.
     pub fn new(problems: &[TorqueProblem; 2], candidates: &[CandidateColumns]) -> Self {
-        let weighted = problems.each_ref().map(|problem| problem.weighted_of(&(0..problem.all.forms.len()).collect::<Vec<_>>()));
+        let weighted = problems
+            .each_ref()
+            .map(|problem| problem.weighted_of(&(0..problem.all.forms.len()).collect::<Vec<_>>()));
         let base = problems[0].all.base;
-        let shared = candidates.iter().filter(|one| one.shared).map(|one| one.columns.end).max().unwrap_or(base);
+        let shared = candidates
+            .iter()
+            .filter(|one| one.shared)
+            .map(|one| one.columns.end)
+            .max()
+            .unwrap_or(base);
         let payload = payload_columns(&problems[1]);
-        let mut groups = vec![ChangeGroup { form: None, columns: shared..shared + payload.len() }];
+        let mut groups = vec![ChangeGroup {
+            form: None,
+            columns: shared..shared + payload.len(),
+        }];
         let mut width = shared + payload.len();
         for (form, one) in candidates.iter().enumerate() {
-            groups.push(ChangeGroup { form: Some(form), columns: width..width + one.columns.len() });
+            groups.push(ChangeGroup {
+                form: Some(form),
+                columns: width..width + one.columns.len(),
+            });
             width += one.columns.len();
         }
         // Whitened columns of each number in the second recording; of the first only common ones.
         let runs = problems[1].runs(false);
         let weighing = problems[1].weighing(&runs);
-        let own = |column: usize| (weighted[1].columns[column].clone(), problems[1].all.columns[column].clone());
+        let own = |column: usize| {
+            (
+                weighted[1].columns[column].clone(),
+                problems[1].all.columns[column].clone(),
+            )
+        };
         let mut second: Vec<(TorqueColumn, TorqueColumn)> = (0..shared).map(own).collect();
-        second.extend(payload.into_iter().map(|column| (weighing.column(&column), column)));
-        second.extend(candidates.iter().flat_map(|one| one.columns.clone()).map(own));
+        second.extend(
+            payload
+                .into_iter()
+                .map(|column| (weighing.column(&column), column)),
+        );
+        second.extend(
+            candidates
+                .iter()
+                .flat_map(|one| one.columns.clone())
+                .map(own),
+        );
         let mut matrix = DMatrix::zeros(width, width);
         let mut right = DVector::zeros(width);
         for a in 0..width {
-            right[a] = along(&second[a].0, &weighted[1]) + if a < shared { weighted[0].right[a] } else { 0.0 };
+            right[a] = along(&second[a].0, &weighted[1])
+                + if a < shared {
+                    weighted[0].right[a]
+                } else {
+                    0.0
+                };
             for b in 0..=a {
-                let first = if a < shared { weighted[0].gram[a][b] } else { 0.0 };
+                let first = if a < shared {
+                    weighted[0].gram[a][b]
+                } else {
+                    0.0
+                };
                 let value = first + product(&second[a].0, &second[b].0);
                 (matrix[(a, b)], matrix[(b, a)]) = (value, value);
             }
         }
         for number in 0..width {
-            let prior = if number < base { problems[0].all.prior[number] } else { 0.0 };
+            let prior = if number < base {
+                problems[0].all.prior[number]
+            } else {
+                0.0
+            };
             let own: f64 = matrix[(number, number)];
             matrix[(number, number)] += prior + UNKNOWN * own + f64::MIN_POSITIVE;
         }
@@ -107,7 +147,9 @@ impl StackedNormal {
 
     /// What a group must gain.
     pub fn penalty(&self, group: usize) -> f64 {
-        PRICE + self.groups[group].columns.len() as f64 * (self.rows as f64).ln() + 2.0 * (self.groups.len() as f64).ln()
+        PRICE
+            + self.groups[group].columns.len() as f64 * (self.rows as f64).ln()
+            + 2.0 * (self.groups.len() as f64).ln()
     }
 
     /// Common numbers and some groups.
@@ -119,9 +161,13 @@ impl StackedNormal {
             pivots.extend(self.groups[*group].columns.clone());
             groups.push((*group, first..pivots.len()));
         }
-        let scale: Vec<f64> = pivots.iter().map(|number| self.matrix[(*number, *number)].sqrt()).collect();
-        let mut matrix =
-            DMatrix::from_fn(pivots.len(), pivots.len(), |a, b| self.matrix[(pivots[a], pivots[b])] / (scale[a] * scale[b]));
+        let scale: Vec<f64> = pivots
+            .iter()
+            .map(|number| self.matrix[(*number, *number)].sqrt())
+            .collect();
+        let mut matrix = DMatrix::from_fn(pivots.len(), pivots.len(), |a, b| {
+            self.matrix[(pivots[a], pivots[b])] / (scale[a] * scale[b])
+        });
         let factor = loop {
             match matrix.clone().cholesky() {
                 Some(factor) => break factor,
@@ -129,13 +175,26 @@ impl StackedNormal {
                 None => (0..pivots.len()).for_each(|place| matrix[(place, place)] *= 1.0 + UNKNOWN),
             }
         };
-        let right = DVector::from_fn(pivots.len(), |place, _| self.right[pivots[place]] / scale[place]);
+        let right = DVector::from_fn(pivots.len(), |place, _| {
+            self.right[pivots[place]] / scale[place]
+        });
         let mut solution = factor.solve(&right);
         let square = self.square - right.dot(&solution);
-        solution.iter_mut().zip(&scale).for_each(|(value, scale)| *value /= scale);
+        solution
+            .iter_mut()
+            .zip(&scale)
+            .for_each(|(value, scale)| *value /= scale);
         // Unscaled again, so that a group's covariance is that of its numbers.
-        let unscaled = DMatrix::from_fn(pivots.len(), pivots.len(), |a, b| factor.l()[(a, b)] * scale[a]);
-        StackedFit { factor: Cholesky::pack_dirty(unscaled), solution, pivots, square, groups }
+        let unscaled = DMatrix::from_fn(pivots.len(), pivots.len(), |a, b| {
+            factor.l()[(a, b)] * scale[a]
+        });
+        StackedFit {
+            factor: Cholesky::pack_dirty(unscaled),
+            solution,
+            pivots,
+            square,
+            groups,
+        }
     }
 
     /// Adds the best group while it is worth its penalty, then removes what is not.
@@ -148,13 +207,18 @@ impl StackedNormal {
                 now.square - with.square - self.penalty(group)
             };
             let others = (0..self.groups.len()).filter(|group| !set.contains(group));
-            let best = others.map(|group| (group, worth(group))).max_by(|a, b| a.1.total_cmp(&b.1));
+            let best = others
+                .map(|group| (group, worth(group)))
+                .max_by(|a, b| a.1.total_cmp(&b.1));
             match best {
                 Some((group, worth)) if worth > 0.0 => set.push(group),
                 _ => break,
             }
             now = self.fit(&set);
-            while let Some(place) = set.iter().position(|group| now.gain(*group) < self.penalty(*group)) {
+            while let Some(place) = set
+                .iter()
+                .position(|group| now.gain(*group) < self.penalty(*group))
+            {
                 set.remove(place);
                 now = self.fit(&set);
             }
@@ -168,12 +232,17 @@ impl StackedNormal {
         for (place, number) in fit.pivots.iter().enumerate() {
             let column = &self.columns[*number];
             for (joint, course) in column.joints.iter().zip(&column.courses) {
-                left[*joint].iter_mut().zip(course).for_each(|(value, part)| *value -= fit.solution[place] * part);
+                left[*joint]
+                    .iter_mut()
+                    .zip(course)
+                    .for_each(|(value, part)| *value -= fit.solution[place] * part);
             }
         }
         let rows: Vec<usize> = problem.runs(false).into_iter().flatten().collect();
-        let rms =
-            |course: &Vec<f64>| (rows.iter().map(|row| course[*row].powi(2)).sum::<f64>() / rows.len().max(1) as f64).sqrt();
+        let rms = |course: &Vec<f64>| {
+            (rows.iter().map(|row| course[*row].powi(2)).sum::<f64>() / rows.len().max(1) as f64)
+                .sqrt()
+        };
         left.iter().map(rms).collect()
     }
 }
@@ -181,7 +250,9 @@ impl StackedNormal {
 impl StackedFit {
     /// Values of a group with their covariance, row-major; empty where it is not in the fit.
     pub fn of_group(&self, group: usize) -> (Vec<f64>, Vec<f64>) {
-        let Some((_, places)) = self.groups.iter().find(|(own, _)| *own == group) else { return Default::default() };
+        let Some((_, places)) = self.groups.iter().find(|(own, _)| *own == group) else {
+            return Default::default();
+        };
         let values = places.clone().map(|place| self.solution[place]).collect();
         let unit = |place: usize| {
             let mut unit = DVector::zeros(self.solution.len());
@@ -189,7 +260,10 @@ impl StackedFit {
             self.factor.solve(&unit)
         };
         let columns: Vec<DVector<f64>> = places.clone().map(unit).collect();
-        let covariance = places.clone().flat_map(|row| columns.iter().map(move |column| column[row])).collect();
+        let covariance = places
+            .clone()
+            .flat_map(|row| columns.iter().map(move |column| column[row]))
+            .collect();
         (values, covariance)
     }
 
@@ -198,24 +272,40 @@ impl StackedFit {
         let (values, covariance) = self.of_group(group);
         let covariance = DMatrix::from_row_slice(values.len(), values.len(), &covariance);
         let values = DVector::from_vec(values);
-        covariance.cholesky().map_or(0.0, |factor| values.dot(&factor.solve(&values)))
+        covariance
+            .cholesky()
+            .map_or(0.0, |factor| values.dot(&factor.solve(&values)))
     }
 }
 
 /// The last link's inertial numbers that torques can determine: all where masses are declared.
 fn payload_columns(problem: &TorqueProblem) -> Vec<TorqueColumn> {
     let last = problem.joints() - 1;
-    let unit = |number: usize| std::array::from_fn::<f64, INERTIAL_NUMBERS, _>(|entry| f64::from(u8::from(entry == number)));
-    (0..INERTIAL_NUMBERS).map(|number| problem.regressor.column(last, &unit(number))).collect()
+    let unit = |number: usize| {
+        std::array::from_fn::<f64, INERTIAL_NUMBERS, _>(|entry| {
+            f64::from(u8::from(entry == number))
+        })
+    };
+    (0..INERTIAL_NUMBERS)
+        .map(|number| problem.regressor.column(last, &unit(number)))
+        .collect()
 }
 
 fn product(a: &TorqueColumn, b: &TorqueColumn) -> f64 {
     let with = |(joint, course): (&usize, &Vec<f64>)| {
-        b.joints.iter().position(|one| one == joint).map_or(0.0, |place| dot(course, &b.courses[place]))
+        b.joints
+            .iter()
+            .position(|one| one == joint)
+            .map_or(0.0, |place| dot(course, &b.courses[place]))
     };
     a.joints.iter().zip(&a.courses).map(with).sum()
 }
 
 fn along(column: &TorqueColumn, weighted: &WeightedColumns) -> f64 {
-    column.joints.iter().zip(&column.courses).map(|(joint, course)| dot(course, &weighted.measured[*joint])).sum()
+    column
+        .joints
+        .iter()
+        .zip(&column.courses)
+        .map(|(joint, course)| dot(course, &weighted.measured[*joint]))
+        .sum()
 }

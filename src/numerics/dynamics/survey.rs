@@ -32,7 +32,12 @@ impl RecordingSurvey {
                 return Err(Error::Data(faults));
             }
             first += block.rows();
-            before = block.time.last().copied().zip(block.trajectory.last().copied()).or(before);
+            before = block
+                .time
+                .last()
+                .copied()
+                .zip(block.trajectory.last().copied())
+                .or(before);
             extremes.push(&block.torque);
             if block.rows() > 1 {
                 let pace = ClockPace::of(block);
@@ -43,7 +48,10 @@ impl RecordingSurvey {
                 motion.push(block, &RecordingClock::paced(block, &pace), continues);
                 last = TorqueRecording::like(block);
                 last.extend(block, block.rows() - 1..block.rows());
-                fastest.iter_mut().zip(&pace.fastest).for_each(|(most, own)| *most = most.max(*own));
+                fastest
+                    .iter_mut()
+                    .zip(&pace.fastest)
+                    .for_each(|(most, own)| *most = most.max(*own));
                 usual.push(pace.usual);
             }
             Ok(())
@@ -53,6 +61,9 @@ impl RecordingSurvey {
             return Err(Error::Data(faults));
         }
         let usual = nearest(&mut usual, 0.5).unwrap_or(1.0);
-        Ok(Self { pace: ClockPace { usual, fastest }, cutoff: motion.cutoff(1.0 / usual) })
+        Ok(Self {
+            pace: ClockPace { usual, fastest },
+            cutoff: motion.cutoff(1.0 / usual),
+        })
     }
 }

@@ -70,7 +70,9 @@ impl<'a> SweptColumns<'a> {
         for known in &self.rows {
             let share = known[column];
             if share != 0.0 {
-                row.iter_mut().zip(known).for_each(|(value, other)| *value -= share * other);
+                row.iter_mut()
+                    .zip(known)
+                    .for_each(|(value, other)| *value -= share * other);
             }
         }
         let left = row[column] + prior;
@@ -81,7 +83,10 @@ impl<'a> SweptColumns<'a> {
         row[column] = left;
         row.iter_mut().for_each(|value| *value /= root);
         let along = self.right[column] / root;
-        self.right.iter_mut().zip(&row).for_each(|(right, value)| *right -= along * value);
+        self.right
+            .iter_mut()
+            .zip(&row)
+            .for_each(|(right, value)| *right -= along * value);
         self.square -= along * along;
         self.pivots.push(column);
         self.rows.push(row);
@@ -97,12 +102,23 @@ impl<'a> SweptColumns<'a> {
     pub fn gain(&self, form: usize) -> f64 {
         let (gram, right) = self.left_among(form);
         let first = self.all.of(form).start;
-        let scale: Vec<f64> =
-            (0..right.len()).map(|a| self.weighted.gram[first + a][first + a].max(f64::MIN_POSITIVE).sqrt()).collect();
-        let mut block = DMatrix::from_fn(right.len(), right.len(), |a, b| gram[(a, b)] / (scale[a] * scale[b]));
-        (0..right.len()).for_each(|a| block[(a, a)] += INVISIBLE + self.prior(first + a) / (scale[a] * scale[a]));
+        let scale: Vec<f64> = (0..right.len())
+            .map(|a| {
+                self.weighted.gram[first + a][first + a]
+                    .max(f64::MIN_POSITIVE)
+                    .sqrt()
+            })
+            .collect();
+        let mut block = DMatrix::from_fn(right.len(), right.len(), |a, b| {
+            gram[(a, b)] / (scale[a] * scale[b])
+        });
+        (0..right.len()).for_each(|a| {
+            block[(a, a)] += INVISIBLE + self.prior(first + a) / (scale[a] * scale[a])
+        });
         let along = DVector::from_fn(right.len(), |a, _| right[a] / scale[a]);
-        block.cholesky().map_or(0.0, |factor| along.dot(&factor.solve(&along)))
+        block
+            .cholesky()
+            .map_or(0.0, |factor| along.dot(&factor.solve(&along)))
     }
 
     /// What the present ones leave of the inner products of a column with all others.
@@ -111,7 +127,9 @@ impl<'a> SweptColumns<'a> {
         for known in &self.rows {
             let share = known[column];
             if share != 0.0 {
-                left.iter_mut().zip(known).for_each(|(value, other)| *value -= share * other);
+                left.iter_mut()
+                    .zip(known)
+                    .for_each(|(value, other)| *value -= share * other);
             }
         }
         left
@@ -121,9 +139,17 @@ impl<'a> SweptColumns<'a> {
     pub fn left_among(&self, form: usize) -> (DMatrix<f64>, DVector<f64>) {
         let columns = self.all.of(form);
         let (first, width) = (columns.start, columns.len());
-        let swept = |a: usize, b: usize| self.rows.iter().map(|row| row[first + a] * row[first + b]).sum::<f64>();
+        let swept = |a: usize, b: usize| {
+            self.rows
+                .iter()
+                .map(|row| row[first + a] * row[first + b])
+                .sum::<f64>()
+        };
         let gram = |a: usize, b: usize| self.weighted.gram[first + a][first + b] - swept(a, b);
-        (DMatrix::from_fn(width, width, gram), DVector::from_fn(width, |a, _| self.right[first + a]))
+        (
+            DMatrix::from_fn(width, width, gram),
+            DVector::from_fn(width, |a, _| self.right[first + a]),
+        )
     }
 
     /// What is left of the inner product of a column with the measured torque.
@@ -140,10 +166,16 @@ impl<'a> SweptColumns<'a> {
     pub fn loss(&self, form: usize, solution: &[(usize, f64)]) -> Gain {
         let of = |column: usize| solution.iter().find(|(pivot, _)| *pivot == column).copied();
         let (columns, values): (Vec<usize>, Vec<f64>) = self.all.of(form).filter_map(of).unzip();
-        let covariance = DMatrix::from_row_slice(columns.len(), columns.len(), &self.covariance(&columns));
+        let covariance =
+            DMatrix::from_row_slice(columns.len(), columns.len(), &self.covariance(&columns));
         let values = DVector::from_vec(values);
-        let square = covariance.cholesky().map_or(0.0, |factor| values.dot(&factor.solve(&values)));
-        Gain { square, rank: columns.len() }
+        let square = covariance
+            .cholesky()
+            .map_or(0.0, |factor| values.dot(&factor.solve(&values)));
+        Gain {
+            square,
+            rank: columns.len(),
+        }
     }
 
     /// Coefficients of the pivots.
@@ -151,7 +183,9 @@ impl<'a> SweptColumns<'a> {
         let count = self.pivots.len();
         let mut values = self.along.clone();
         for i in (0..count).rev() {
-            let sum: f64 = (i + 1..count).map(|m| self.rows[i][self.pivots[m]] * values[m]).sum();
+            let sum: f64 = (i + 1..count)
+                .map(|m| self.rows[i][self.pivots[m]] * values[m])
+                .sum();
             values[i] = (values[i] - sum) / self.rows[i][self.pivots[i]];
         }
         self.pivots.iter().copied().zip(values).collect()
@@ -184,6 +218,9 @@ impl<'a> SweptColumns<'a> {
             }
         }
         let product = |a: &Vec<f64>, b: &Vec<f64>| a.iter().zip(b).map(|(x, y)| x * y).sum();
-        halves.iter().flat_map(|a| halves.iter().map(move |b| product(a, b))).collect()
+        halves
+            .iter()
+            .flat_map(|a| halves.iter().map(move |b| product(a, b)))
+            .collect()
     }
 }

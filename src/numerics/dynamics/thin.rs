@@ -36,10 +36,20 @@ pub(super) struct ThinningPlan {
 impl ThinningPlan {
     /// For at most `most` rows (and some more where rows were lost), with a cut-off that will be at `cutoff` Hz.
     pub fn new(rows: usize, rate: f64, cutoff: f64, most: usize) -> Self {
-        let every = rows.div_ceil(most).min((rate / (RATE_OVER_CUTOFF * cutoff)) as usize).max(1);
+        let every = rows
+            .div_ceil(most)
+            .min((rate / (RATE_OVER_CUTOFF * cutoff)) as usize)
+            .max(1);
         let all = rows.div_ceil(SPAN);
-        let kept = if rows.div_ceil(every) > most { (most * every / SPAN).clamp(1, all) } else { all };
-        Self { every, spans: [all, kept] }
+        let kept = if rows.div_ceil(every) > most {
+            (most * every / SPAN).clamp(1, all)
+        } else {
+            all
+        };
+        Self {
+            every,
+            spans: [all, kept],
+        }
     }
 
     /// Whether a recorded row lies in a span that is kept.
@@ -64,10 +74,16 @@ pub(super) struct ThinnedRecording {
 
 impl ThinnedRecording {
     /// Reads all rows once more.
-    pub fn of(source: &dyn TorqueSource, survey: &RecordingSurvey, plan: &ThinningPlan) -> Result<Self> {
+    pub fn of(
+        source: &dyn TorqueSource,
+        survey: &RecordingSurvey,
+        plan: &ThinningPlan,
+    ) -> Result<Self> {
         let mut thinner: Option<Thinner> = None;
         source.blocks(&mut |block| {
-            thinner.get_or_insert_with(|| Thinner::new(block, survey.pace.clone(), plan.clone())).push(block);
+            thinner
+                .get_or_insert_with(|| Thinner::new(block, survey.pace.clone(), plan.clone()))
+                .push(block);
             Ok(())
         })?;
         let mut thinner = thinner.unwrap_or_else(|| {
@@ -78,7 +94,10 @@ impl ThinnedRecording {
         thinner.end_stretch();
         let rate = 1.0 / (survey.pace.usual * plan.every as f64);
         Ok(Self {
-            clock: RecordingClock { rate, stretches: thinner.stretches },
+            clock: RecordingClock {
+                rate,
+                stretches: thinner.stretches,
+            },
             recording: thinner.kept,
             origin: thinner.origin,
             made_up: thinner.made_up,
@@ -118,7 +137,11 @@ impl Thinner {
         let filter = ZeroPhase::new(rate, if plan.every > 1 { BAND } else { rate });
         let nothing = || TorqueRecording::like(like);
         Self {
-            margin: if plan.every > 1 { (MEMORY * rate / BAND) as usize } else { 0 },
+            margin: if plan.every > 1 {
+                (MEMORY * rate / BAND) as usize
+            } else {
+                0
+            },
             filter,
             plan,
             pace,
@@ -145,9 +168,14 @@ impl Thinner {
 
     /// Passes recorded rows on to the stretch, but the last `waiting` ones, with those that were lost between them.
     fn pass_on(&mut self, waiting: usize) {
-        let end = self.recorded.rows().saturating_sub(waiting).max(self.passed);
+        let end = self
+            .recorded
+            .rows()
+            .saturating_sub(waiting)
+            .max(self.passed);
         let like = TorqueRecording::like(&self.recorded);
-        let bridged = Bridged::by_steps(std::mem::replace(&mut self.recorded, like), self.pace.usual);
+        let bridged =
+            Bridged::by_steps(std::mem::replace(&mut self.recorded, like), self.pace.usual);
         let mut now = bridged.origin.partition_point(|row| *row < self.passed);
         let last = bridged.origin.partition_point(|row| *row < end);
         self.made_up += (last - now) - (end - self.passed);
@@ -169,7 +197,11 @@ impl Thinner {
             let until = (now + 1..last).take_while(goes_on).last().unwrap_or(now) + 1;
             if self.plan.keeps(row) {
                 self.stretch.extend(&bridged.recording, now..until);
-                self.origins.extend(bridged.origin[now..until].iter().map(|row| self.first + row));
+                self.origins.extend(
+                    bridged.origin[now..until]
+                        .iter()
+                        .map(|row| self.first + row),
+                );
             }
             now = until;
         }
@@ -178,7 +210,8 @@ impl Thinner {
         let mut tail = TorqueRecording::like(&bridged.recording);
         let recorded = |at: &usize| *at == 0 || bridged.origin[*at] != bridged.origin[*at - 1];
         let all = bridged.origin.partition_point(|row| *row < from)..bridged.origin.len();
-        all.filter(recorded).for_each(|at| tail.extend(&bridged.recording, at..at + 1));
+        all.filter(recorded)
+            .for_each(|at| tail.extend(&bridged.recording, at..at + 1));
         self.recorded = tail;
         self.first += from;
         self.passed = end - from;
@@ -187,15 +220,25 @@ impl Thinner {
     /// Keeps every k-th row of the stretch, as far as the filter knows it.
     fn keep(&mut self, ends: bool) {
         let rows = self.stretch.rows();
-        let known = if ends { rows } else { rows.saturating_sub(self.margin) };
-        let chosen: Vec<usize> = (self.next - self.begun..known).step_by(self.plan.every).collect();
+        let known = if ends {
+            rows
+        } else {
+            rows.saturating_sub(self.margin)
+        };
+        let chosen: Vec<usize> = (self.next - self.begun..known)
+            .step_by(self.plan.every)
+            .collect();
         if !chosen.is_empty() {
             let number = self.stretches.len() as u32 + 1;
             let n = self.stretch.joints;
             let thinned = |values: &[f64]| -> Vec<f64> {
-                let mut courses: Vec<Vec<f64>> = (0..n).map(|joint| column(values, n, joint)).collect();
+                let mut courses: Vec<Vec<f64>> =
+                    (0..n).map(|joint| column(values, n, joint)).collect();
                 self.filter.apply(&mut courses);
-                chosen.iter().flat_map(|row| courses.iter().map(|course| course[*row])).collect()
+                chosen
+                    .iter()
+                    .flat_map(|row| courses.iter().map(|course| course[*row]))
+                    .collect()
             };
             let stretch = &self.stretch;
             let block = TorqueRecording {
@@ -203,16 +246,22 @@ impl Thinner {
                 position: thinned(&stretch.position),
                 velocity: stretch.velocity.as_deref().map(thinned),
                 torque: thinned(&stretch.torque),
-                temperature: stretch.temperature.as_ref().map(|all| chosen.iter().map(|row| all[*row]).collect()),
+                temperature: stretch
+                    .temperature
+                    .as_ref()
+                    .map(|all| chosen.iter().map(|row| all[*row]).collect()),
                 trajectory: vec![number; chosen.len()],
                 held_out: chosen.iter().map(|row| stretch.held_out[*row]).collect(),
                 ..TorqueRecording::like(stretch)
             };
             self.kept.extend(&block, 0..chosen.len());
-            self.origin.extend(chosen.iter().map(|row| self.origins[*row]));
+            self.origin
+                .extend(chosen.iter().map(|row| self.origins[*row]));
             self.next += chosen.len() * self.plan.every;
         }
-        let spent = (self.next - self.begun).saturating_sub(self.margin).min(rows);
+        let spent = (self.next - self.begun)
+            .saturating_sub(self.margin)
+            .min(rows);
         self.stretch.forget(spent);
         self.origins.drain(..spent);
         self.begun += spent;

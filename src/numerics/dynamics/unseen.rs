@@ -9,7 +9,11 @@ const SMALL_RANGE: f64 = 0.2;
 const UNSEEN: f64 = 0.5;
 
 /// Sentences on a set's problem.
-pub(super) fn not_observable(choice: &CauseChoice, set: &[usize], sweep: &SweptColumns) -> Vec<String> {
+pub(super) fn not_observable(
+    choice: &CauseChoice,
+    set: &[usize],
+    sweep: &SweptColumns,
+) -> Vec<String> {
     let scene = &choice.problem.scene;
     let mut sentences = Vec::new();
     if scene.declared.is_none() {
@@ -33,9 +37,19 @@ pub(super) fn not_observable(choice: &CauseChoice, set: &[usize], sweep: &SweptC
     }
     for number in 0..choice.open {
         let form = choice.form(number);
-        let found = set.iter().any(|other| choice.form(*other).is_called_as(form));
-        if !found && form.width == 1 && form.cause.about().inertial && is_unseen(choice, sweep, number) {
-            sentences.push(format!("{} {}: these motions do not show it", form.place, form.cause.name().replace('_', " ")));
+        let found = set
+            .iter()
+            .any(|other| choice.form(*other).is_called_as(form));
+        if !found
+            && form.width == 1
+            && form.cause.about().inertial
+            && is_unseen(choice, sweep, number)
+        {
+            sentences.push(format!(
+                "{} {}: these motions do not show it",
+                form.place,
+                form.cause.name().replace('_', " ")
+            ));
         }
     }
     sentences
@@ -43,12 +57,19 @@ pub(super) fn not_observable(choice: &CauseChoice, set: &[usize], sweep: &SweptC
 
 /// Least and most.
 fn range(course: &[f64]) -> (f64, f64) {
-    course.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), value| (least.min(*value), most.max(*value)))
+    course.iter().fold(
+        (f64::INFINITY, f64::NEG_INFINITY),
+        |(least, most), value| (least.min(*value), most.max(*value)),
+    )
 }
 
 /// Speeds below and above which a tenth of the moving rows are.
 fn speeds(velocity: &[f64], width: f64) -> (f64, f64) {
-    let mut moving: Vec<f64> = velocity.iter().map(|value| value.abs()).filter(|speed| *speed > 2.0 * width).collect();
+    let mut moving: Vec<f64> = velocity
+        .iter()
+        .map(|value| value.abs())
+        .filter(|speed| *speed > 2.0 * width)
+        .collect();
     moving.sort_by(f64::total_cmp);
     let at = |share: f64| crate::statistics::quantile(&moving, share).unwrap_or(0.0);
     (at(0.1), at(0.9))
@@ -58,10 +79,22 @@ fn speeds(velocity: &[f64], width: f64) -> (f64, f64) {
 fn is_unseen(choice: &CauseChoice, sweep: &SweptColumns, number: usize) -> bool {
     let problem = choice.problem;
     let column = &problem.all.columns[problem.all.of(number).start];
-    let largest = column.courses.iter().flatten().map(|value| value.abs()).fold(0.0, f64::max);
-    let torque = column.joints.iter().flat_map(|joint| &problem.measured[*joint]).map(|value| value.abs()).fold(0.0, f64::max);
+    let largest = column
+        .courses
+        .iter()
+        .flatten()
+        .map(|value| value.abs())
+        .fold(0.0, f64::max);
+    let torque = column
+        .joints
+        .iter()
+        .flat_map(|joint| &problem.measured[*joint])
+        .map(|value| value.abs())
+        .fold(0.0, f64::max);
     let mut with = sweep.clone();
     with.add(number);
-    let sigma = with.covariance(&[problem.all.of(number).start])[0].max(0.0).sqrt();
+    let sigma = with.covariance(&[problem.all.of(number).start])[0]
+        .max(0.0)
+        .sqrt();
     sigma == 0.0 || sigma * largest > UNSEEN * torque
 }

@@ -31,16 +31,32 @@ impl UsedRecording {
     }
 
     /// The same with room for another number of rows.
-    pub fn within(arm: &DynamicArm, source: &dyn TorqueSource, cutoff: Option<f64>, most: usize) -> Result<Self> {
-        let Some(even) = EvenSource::of(source)? else { return Self::of_even(arm, source, cutoff, most) };
+    pub fn within(
+        arm: &DynamicArm,
+        source: &dyn TorqueSource,
+        cutoff: Option<f64>,
+        most: usize,
+    ) -> Result<Self> {
+        let Some(even) = EvenSource::of(source)? else {
+            return Self::of_even(arm, source, cutoff, most);
+        };
         let mut used = Self::of_even(arm, &even, cutoff, most)?;
         used.remarks.insert(0, even.remark);
         Ok(used)
     }
 
     /// Of a recording whose clock goes in even steps.
-    fn of_even(arm: &DynamicArm, source: &dyn TorqueSource, cutoff: Option<f64>, most: usize) -> Result<Self> {
-        if source.rows() > most { Self::thinned(arm, source, cutoff, most) } else { Self::whole(arm, source) }
+    fn of_even(
+        arm: &DynamicArm,
+        source: &dyn TorqueSource,
+        cutoff: Option<f64>,
+        most: usize,
+    ) -> Result<Self> {
+        if source.rows() > most {
+            Self::thinned(arm, source, cutoff, most)
+        } else {
+            Self::whole(arm, source)
+        }
     }
 
     fn whole(arm: &DynamicArm, source: &dyn TorqueSource) -> Result<Self> {
@@ -52,38 +68,69 @@ impl UsedRecording {
             }
             Ok(())
         })?;
-        let whole = whole.unwrap_or_else(|| TorqueRecording::of_motion(source.joints(), Vec::new(), Vec::new()));
+        let whole = whole
+            .unwrap_or_else(|| TorqueRecording::of_motion(source.joints(), Vec::new(), Vec::new()));
         check::check(arm, &whole)?;
         let recorded = whole.rows();
         let Bridged { recording, origin } = Bridged::of(whole);
         let origin = source.recorded(&origin)?;
         let clock = RecordingClock::of(&recording);
         let odd = check::remarks(&recording, &origin, &clock);
-        let remarks = odd.into_iter().chain(bridge::remark(recording.rows() - recorded)).collect();
-        Ok(Self { recording, clock, origin, remarks })
+        let remarks = odd
+            .into_iter()
+            .chain(bridge::remark(recording.rows() - recorded))
+            .collect();
+        Ok(Self {
+            recording,
+            clock,
+            origin,
+            remarks,
+        })
     }
 
-    fn thinned(arm: &DynamicArm, source: &dyn TorqueSource, cutoff: Option<f64>, most: usize) -> Result<Self> {
+    fn thinned(
+        arm: &DynamicArm,
+        source: &dyn TorqueSource,
+        cutoff: Option<f64>,
+        most: usize,
+    ) -> Result<Self> {
         let survey = RecordingSurvey::of(source)?;
         let rate = 1.0 / survey.pace.usual;
         let plan = ThinningPlan::new(source.rows(), rate, cutoff.unwrap_or(survey.cutoff), most);
-        let ThinnedRecording { recording, clock, origin, made_up, tears } = ThinnedRecording::of(source, &survey, &plan)?;
+        let ThinnedRecording {
+            recording,
+            clock,
+            origin,
+            made_up,
+            tears,
+        } = ThinnedRecording::of(source, &survey, &plan)?;
         check::check(arm, &recording)?;
         let mut remarks = vec![said(source.rows(), &recording, &plan, clock.rate)];
         let (rows, lasted): (Vec<usize>, Vec<f64>) = tears.into_iter().unzip();
         let tears = source.recorded(&rows)?.into_iter().zip(lasted);
-        remarks.extend(check::few(tears.map(|(row, lasted)| check::torn_at(row, lasted, survey.pace.usual))));
+        remarks.extend(check::few(
+            tears.map(|(row, lasted)| check::torn_at(row, lasted, survey.pace.usual)),
+        ));
         remarks.extend(check::of_sets(&recording));
         let origin = source.recorded(&origin)?;
         remarks.extend(bridge::remark(made_up));
-        Ok(Self { recording, clock, origin, remarks })
+        Ok(Self {
+            recording,
+            clock,
+            origin,
+            remarks,
+        })
     }
 }
 
 /// What was kept of a long recording.
 fn said(rows: usize, kept: &TorqueRecording, plan: &ThinningPlan, rate: f64) -> String {
     let [all, used] = plan.spans;
-    let spans = if used < all { format!(" of {used} of {all} equal spans") } else { String::new() };
+    let spans = if used < all {
+        format!(" of {used} of {all} equal spans")
+    } else {
+        String::new()
+    };
     format!(
         "{rows} rows are more than are held at once: {} are used, every {}th{spans} after a low-pass without delay, {rate:.1} Hz",
         kept.rows(),
@@ -99,15 +146,24 @@ mod tests {
 
     /// 40 s at 2 kHz with friction in two joints.
     fn long() -> TorqueRecording {
-        record_at(&arm(), 2000.0, 0.0, &|(joint, _, _, velocity, _, _)| match joint {
-            1 => 6.0 * (velocity / 0.01).tanh() + 9.0 * velocity,
-            2 => 3.0 * (velocity / 0.01).tanh(),
-            _ => 0.0,
-        })
+        record_at(
+            &arm(),
+            2000.0,
+            0.0,
+            &|(joint, _, _, velocity, _, _)| match joint {
+                1 => 6.0 * (velocity / 0.01).tanh() + 9.0 * velocity,
+                2 => 3.0 * (velocity / 0.01).tanh(),
+                _ => 0.0,
+            },
+        )
     }
 
     fn names(diagnosis: &TorqueDiagnosis) -> Vec<String> {
-        let mut names: Vec<String> = diagnosis.findings.iter().map(|one| format!("{} {}", one.effect, one.place)).collect();
+        let mut names: Vec<String> = diagnosis
+            .findings
+            .iter()
+            .map(|one| format!("{} {}", one.effect, one.place))
+            .collect();
         names.sort();
         names
     }
@@ -118,7 +174,11 @@ mod tests {
         let diagnosed = |most: usize| {
             let used = UsedRecording::within(&arm(), &recording, None, most).unwrap();
             let rows = used.recording.rows();
-            (rows, super::super::diagnose_used(&arm(), used, &TorqueQuestion::default(), &mut |_| ()).unwrap())
+            (
+                rows,
+                super::super::diagnose_used(&arm(), used, &TorqueQuestion::default(), &mut |_| ())
+                    .unwrap(),
+            )
         };
         let ((all, whole), (few, thinned)) = (diagnosed(usize::MAX), diagnosed(10_000));
         assert!(all == 80_000 && few == 10_000, "{all} {few}");
@@ -126,20 +186,41 @@ mod tests {
         for (one, other) in whole.findings.iter().zip(&thinned.findings) {
             for (a, b) in one.parameters.iter().zip(&other.parameters) {
                 let sigma = a.sigma.unwrap_or(0.0);
-                assert!((a.value - b.value).abs() < 0.5 * sigma, "{} {}: {} {} {sigma}", one.effect, a.name, a.value, b.value);
+                assert!(
+                    (a.value - b.value).abs() < 0.5 * sigma,
+                    "{} {}: {} {} {sigma}",
+                    one.effect,
+                    a.name,
+                    a.value,
+                    b.value
+                );
             }
         }
         assert!((whole.after.nrmse_mean / thinned.after.nrmse_mean - 1.0).abs() < 0.05);
-        assert!(thinned.remarks[0].starts_with("80000 rows are more than are held at once: 10000 are used, every 8th"));
+        assert!(
+            thinned.remarks[0].starts_with(
+                "80000 rows are more than are held at once: 10000 are used, every 8th"
+            )
+        );
     }
 
     #[test]
     fn it_does_not_matter_where_blocks_end() {
         let recording = long();
-        let thinned = |block: usize| UsedRecording::within(&arm(), &Blocks(recording.clone(), block), None, 10_000).unwrap();
+        let thinned = |block: usize| {
+            UsedRecording::within(&arm(), &Blocks(recording.clone(), block), None, 10_000).unwrap()
+        };
         let (one, other) = (thinned(80_000), thinned(1500));
-        assert_eq!((one.origin, one.recording.time), (other.origin, other.recording.time));
-        let apart = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert_eq!(
+            (one.origin, one.recording.time),
+            (other.origin, other.recording.time)
+        );
+        let apart = |a: &[f64], b: &[f64]| {
+            a.iter()
+                .zip(b)
+                .map(|(a, b)| (a - b).abs())
+                .fold(0.0, f64::max)
+        };
         let far = apart(&one.recording.position, &other.recording.position);
         let torque = apart(&one.recording.torque, &other.recording.torque);
         assert!(far < 1e-9 && torque < 1e-6, "{far} {torque}");
@@ -150,7 +231,9 @@ mod tests {
         let plan = ThinningPlan::new(10_000_000, 500.0, 10.0, MOST);
         assert_eq!((plan.every, plan.spans), (5, [306, 20]));
         let mut recording = long();
-        recording.time[30_001..].iter_mut().for_each(|time| *time += 0.5);
+        recording.time[30_001..]
+            .iter_mut()
+            .for_each(|time| *time += 0.5);
         // Three rows are lost.
         let mut lost = TorqueRecording::like(&recording);
         lost.extend(&recording, 0..50_000);
@@ -159,7 +242,11 @@ mod tests {
         assert_eq!(used.clock.stretches.len(), 2);
         assert_eq!(used.origin[used.clock.stretches[1].start], 30_001);
         let said = used.remarks.join("; ");
-        assert!(said.contains("row 30002: the clock jumps by 0.501 s") && said.contains("3 steps of the clock"), "{said}");
+        assert!(
+            said.contains("row 30002: the clock jumps by 0.501 s")
+                && said.contains("3 steps of the clock"),
+            "{said}"
+        );
         assert!((used.recording.time.last().unwrap() - 40.5).abs() < 0.005);
     }
 
@@ -169,19 +256,39 @@ mod tests {
             let mut recording = long();
             spoilt(&mut recording);
             let used = UsedRecording::within(&arm(), &Blocks(recording, 9000), None, 10_000);
-            used.err().map(|error| error.to_string()).unwrap_or_default()
+            used.err()
+                .map(|error| error.to_string())
+                .unwrap_or_default()
         };
         let saturated = refused(&|recording| {
-            let of_joint =
-                |recording: &TorqueRecording| -> Vec<f64> { recording.torque.iter().skip(1).step_by(4).copied().collect() };
+            let of_joint = |recording: &TorqueRecording| -> Vec<f64> {
+                recording
+                    .torque
+                    .iter()
+                    .skip(1)
+                    .step_by(4)
+                    .copied()
+                    .collect()
+            };
             let mut sorted = of_joint(recording);
             sorted.sort_by(f64::total_cmp);
             let most = sorted[70_000];
-            recording.torque.iter_mut().skip(1).step_by(4).for_each(|torque| *torque = torque.min(most));
+            recording
+                .torque
+                .iter_mut()
+                .skip(1)
+                .step_by(4)
+                .for_each(|torque| *torque = torque.min(most));
         });
-        assert!(saturated.contains("joint 2") && saturated.contains("cut off"), "{saturated}");
+        assert!(
+            saturated.contains("joint 2") && saturated.contains("cut off"),
+            "{saturated}"
+        );
         let back = refused(&|recording| recording.time[18_000] = 1.0);
         assert!(back.contains("row 18001: the clock goes from"), "{back}");
-        assert!(refused(&|recording| recording.torque[4 * 20_000] = f64::NAN).contains("row 20001: not a finite number"));
+        assert!(
+            refused(&|recording| recording.torque[4 * 20_000] = f64::NAN)
+                .contains("row 20001: not a finite number")
+        );
     }
 }

@@ -24,13 +24,24 @@ impl Weighing<'_> {
 
     /// A column, joint after joint.
     pub fn column(&self, column: &TorqueColumn) -> TorqueColumn {
-        let courses = column.joints.iter().zip(&column.courses).map(|(joint, course)| self.course(*joint, course));
-        TorqueColumn { courses: courses.collect(), joints: column.joints.clone() }
+        let courses = column
+            .joints
+            .iter()
+            .zip(&column.courses)
+            .map(|(joint, course)| self.course(*joint, course));
+        TorqueColumn {
+            courses: courses.collect(),
+            joints: column.joints.clone(),
+        }
     }
 
     /// Measured minus rigid, of all joints.
     pub fn measured(&self, measured: &[Vec<f64>]) -> Vec<Vec<f64>> {
-        measured.iter().enumerate().map(|(joint, course)| self.course(joint, course)).collect()
+        measured
+            .iter()
+            .enumerate()
+            .map(|(joint, course)| self.course(joint, course))
+            .collect()
     }
 }
 
@@ -51,11 +62,21 @@ pub(super) struct WeightedColumns {
 
 impl WeightedColumns {
     /// Products of the columns whose numbers are `chosen`, ascending.
-    pub fn new(columns: &TorqueColumns, measured: &[Vec<f64>], weighing: Weighing, chosen: &[usize]) -> Self {
+    pub fn new(
+        columns: &TorqueColumns,
+        measured: &[Vec<f64>],
+        weighing: Weighing,
+        chosen: &[usize],
+    ) -> Self {
         let count = columns.columns.len();
-        let nothing = || TorqueColumn { joints: Vec::new(), courses: Vec::new() };
+        let nothing = || TorqueColumn {
+            joints: Vec::new(),
+            courses: Vec::new(),
+        };
         let mut white: Vec<TorqueColumn> = (0..count).map(|_| nothing()).collect();
-        chosen.iter().for_each(|number| white[*number] = weighing.column(&columns.columns[*number]));
+        chosen
+            .iter()
+            .for_each(|number| white[*number] = weighing.column(&columns.columns[*number]));
         let measured = weighing.measured(measured);
         let mut all = Self {
             columns: white,
@@ -65,7 +86,9 @@ impl WeightedColumns {
             gram: vec![Vec::new(); count],
             right: vec![0.0; count],
         };
-        chosen.iter().for_each(|number| all.gram[*number] = vec![0.0; count]);
+        chosen
+            .iter()
+            .for_each(|number| all.gram[*number] = vec![0.0; count]);
         (0..all.measured.len()).for_each(|joint| all.take_joint(joint, chosen));
         all
     }
@@ -83,18 +106,32 @@ impl WeightedColumns {
         let measured = &self.measured[joint];
         let rows = Mat::from_fn(measured.len(), own.len(), |row, column| own[column].1[row]);
         let mut products = Mat::<f64>::zeros(own.len(), own.len());
-        matmul(products.as_mut(), Accum::Replace, rows.transpose(), rows.as_ref(), 1.0, Par::Seq);
+        matmul(
+            products.as_mut(),
+            Accum::Replace,
+            rows.transpose(),
+            rows.as_ref(),
+            1.0,
+            Par::Seq,
+        );
         for (a, (number, course)) in own.iter().enumerate() {
             self.right[*number] += dot(course, measured);
             let row = &mut self.gram[*number];
-            own.iter().enumerate().for_each(|(b, (other, _))| row[*other] += products[(b, a)]);
+            own.iter()
+                .enumerate()
+                .for_each(|(b, (other, _))| row[*other] += products[(b, a)]);
         }
     }
 
     /// The same columns with another measured torque (whitened, `[joint]`).
     pub fn with_measured(&self, measured: Vec<Vec<f64>>) -> Self {
         let along = |column: &TorqueColumn| {
-            column.joints.iter().zip(&column.courses).map(|(joint, course)| dot(course, &measured[*joint])).sum()
+            column
+                .joints
+                .iter()
+                .zip(&column.courses)
+                .map(|(joint, course)| dot(course, &measured[*joint]))
+                .sum()
         };
         Self {
             right: self.columns.iter().map(along).collect(),
@@ -116,7 +153,10 @@ impl WeightedColumns {
         for (column, value) in solution {
             let column = &self.columns[*column];
             for (joint, course) in column.joints.iter().zip(&column.courses) {
-                self.measured[*joint].iter_mut().zip(course).for_each(|(left, part)| *left -= value * part);
+                self.measured[*joint]
+                    .iter_mut()
+                    .zip(course)
+                    .for_each(|(left, part)| *left -= value * part);
             }
         }
     }
@@ -127,14 +167,27 @@ impl WeightedColumns {
         let product = |other: &TorqueColumn| {
             let pairs = white.joints.iter().zip(&white.courses);
             let with = |(joint, course): (&usize, &Vec<f64>)| {
-                other.joints.iter().position(|one| one == joint).map(|place| dot(course, &other.courses[place]))
+                other
+                    .joints
+                    .iter()
+                    .position(|one| one == joint)
+                    .map(|place| dot(course, &other.courses[place]))
             };
             pairs.filter_map(with).sum::<f64>()
         };
         let mut row: Vec<f64> = self.columns.iter().map(&product).collect();
         row.push(product(&white));
-        let right = white.joints.iter().zip(&white.courses).map(|(joint, course)| dot(course, &self.measured[*joint])).sum();
-        self.gram.iter_mut().zip(&row).filter(|(old, _)| !old.is_empty()).for_each(|(old, value)| old.push(*value));
+        let right = white
+            .joints
+            .iter()
+            .zip(&white.courses)
+            .map(|(joint, course)| dot(course, &self.measured[*joint]))
+            .sum();
+        self.gram
+            .iter_mut()
+            .zip(&row)
+            .filter(|(old, _)| !old.is_empty())
+            .for_each(|(old, value)| old.push(*value));
         self.gram.push(row);
         self.right.push(right);
         self.columns.push(white);
@@ -146,7 +199,12 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     // Four sums at once: one would wait for itself.
     let mut sums = [0.0; 4];
     let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
-    let rest: f64 = a4.remainder().iter().zip(b4.remainder()).map(|(x, y)| x * y).sum();
+    let rest: f64 = a4
+        .remainder()
+        .iter()
+        .zip(b4.remainder())
+        .map(|(x, y)| x * y)
+        .sum();
     for (x, y) in a4.zip(b4) {
         for lane in 0..4 {
             sums[lane] += x[lane] * y[lane];

@@ -15,7 +15,11 @@ pub struct AnchorShift;
 impl AnchorShift {
     /// What the names of an anchor's parameters begin with, dot included.
     pub fn prefix(anchor: &str) -> String {
-        if anchor.is_empty() { format!("{}.", names::ANCHOR) } else { format!("{}.{anchor}.", names::ANCHOR) }
+        if anchor.is_empty() {
+            format!("{}.", names::ANCHOR)
+        } else {
+            format!("{}.{anchor}.", names::ANCHOR)
+        }
     }
 
     /// Endings of the names of an anchor's parameters.
@@ -36,19 +40,28 @@ impl Effect for AnchorShift {
     fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
         let anchors = robot.setup().anchors.iter();
         let all = anchors.flat_map(|anchor| {
-            Self::endings(&anchor.shape).iter().map(move |ending| ParameterSpec {
-                name: format!("{}{ending}", Self::prefix(&anchor.name)),
-                place: Place::Anchor,
-                unit: if matches!(*ending, "rx" | "ry") { Unit::Radian } else { Unit::Millimetre },
-                prior_sigma: 1.0,
-            })
+            Self::endings(&anchor.shape)
+                .iter()
+                .map(move |ending| ParameterSpec {
+                    name: format!("{}{ending}", Self::prefix(&anchor.name)),
+                    place: Place::Anchor,
+                    unit: if matches!(*ending, "rx" | "ry") {
+                        Unit::Radian
+                    } else {
+                        Unit::Millimetre
+                    },
+                    prior_sigma: 1.0,
+                })
         });
         all.collect()
     }
 
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
         let setup = robot.setup();
-        let Some((number, anchor)) = state.anchor(robot).and_then(|number| Some((number, setup.anchors.get(number)?))) else {
+        let Some((number, anchor)) = state
+            .anchor(robot)
+            .and_then(|number| Some((number, setup.anchors.get(number)?)))
+        else {
             return;
         };
         let first = setup.first_of_anchor(number);

@@ -1,7 +1,10 @@
 //! `base_compliance`: the foundation tilts about the base origin, or a point below it, under the arm's overturning moment; rad/Nm.
 
 use super::form::placed;
-use super::{ArmState, Cause, Deflection, Form, Hypothesis, NumberSpec, OwnMotion, Place, Placed, Survey, Variable, names};
+use super::{
+    ArmState, Cause, Deflection, Form, Hypothesis, NumberSpec, OwnMotion, Place, Placed, Survey,
+    Variable, names,
+};
 use crate::criteria::effect::STIFFNESS_BEYOND;
 use crate::robot::RobotModel;
 use crate::spatial::screw;
@@ -31,14 +34,23 @@ pub(super) static CAUSE: Cause = Cause {
     confounded: "joint_compliance of joint 2, link_compliance of link 1",
     needs: "link masses",
     sentence: "the base tilts under the arm's weight by {value}",
-    motion: Some(OwnMotion { propose, sentence: None, read: Form::kept::<TiltingBase> }),
+    motion: Some(OwnMotion {
+        propose,
+        sentence: None,
+        read: Form::kept::<TiltingBase>,
+    }),
     ..Cause::PLAIN
 };
 
 fn propose(survey: &Survey) -> Vec<Hypothesis> {
     let loaded = (0..survey.joints()).any(|joint| survey.is_loaded(joint));
-    let forms = DEPTHS.into_iter().filter(|_| loaded).flat_map(|below| [false, true].map(|two| TiltingBase { two, below }));
-    forms.map(|form| Hypothesis::new(form, 2 * DEPTHS.len()).positive()).collect()
+    let forms = DEPTHS
+        .into_iter()
+        .filter(|_| loaded)
+        .flat_map(|below| [false, true].map(|two| TiltingBase { two, below }));
+    forms
+        .map(|form| Hypothesis::new(form, 2 * DEPTHS.len()).positive())
+        .collect()
 }
 
 impl TiltingBase {
@@ -60,7 +72,10 @@ impl Placed for TiltingBase {
 
     fn numbers(&self, _robot: &RobotModel) -> Vec<NumberSpec> {
         let names: &[&str] = if self.two { &["x", "y"] } else { &[""] };
-        names.iter().map(|name| (name.to_string(), Unit::RadianPerNewtonMetre, 1e-3)).collect()
+        names
+            .iter()
+            .map(|name| (name.to_string(), Unit::RadianPerNewtonMetre, 1e-3))
+            .collect()
     }
 
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
@@ -68,7 +83,10 @@ impl Placed for TiltingBase {
         let (pivot, moment) = self.moment(robot, state);
         let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
         // The two base axes that gravity has least of.
-        let vertical = axes.iter().enumerate().max_by(|a, b| down.dot(a.1).abs().total_cmp(&down.dot(b.1).abs()));
+        let vertical = axes
+            .iter()
+            .enumerate()
+            .max_by(|a, b| down.dot(a.1).abs().total_cmp(&down.dot(b.1).abs()));
         let vertical = vertical.map_or(2, |(axis, _)| axis);
         for (k, axis) in (0..3).filter(|axis| *axis != vertical).enumerate() {
             let tilt = screw(&(axes[axis] * moment[axis]), &pivot);
@@ -91,6 +109,16 @@ impl Placed for TiltingBase {
     fn near(&self, _survey: &Survey, level: i32) -> Vec<Form> {
         let step = STEP * libm::exp2(-0.7 * f64::from(level));
         let depths = [self.below - step, self.below + step].map(|below| below.clamp(0.0, DEEPEST));
-        depths.into_iter().filter(|below| *below != self.below).map(|below| Self { two: self.two, below }.into()).collect()
+        depths
+            .into_iter()
+            .filter(|below| *below != self.below)
+            .map(|below| {
+                Self {
+                    two: self.two,
+                    below,
+                }
+                .into()
+            })
+            .collect()
     }
 }

@@ -32,7 +32,9 @@ impl BasePlacement {
     fn direction(&self, parameter: usize) -> Twist {
         let local: Vector3<f64> = self.start.rotation.row(parameter % 3).transpose();
         let mut twist = Twist::zeros();
-        twist.fixed_rows_mut::<3>(if parameter < 3 { 0 } else { 3 }).copy_from(&local);
+        twist
+            .fixed_rows_mut::<3>(if parameter < 3 { 0 } else { 3 })
+            .copy_from(&local);
         twist
     }
 }
@@ -48,7 +50,11 @@ impl Effect for BasePlacement {
             .map(|(k, axis)| ParameterSpec {
                 name: format!("base_frame.{axis}"),
                 place: Place::Base,
-                unit: if k < 3 { Unit::Millimetre } else { Unit::Radian },
+                unit: if k < 3 {
+                    Unit::Millimetre
+                } else {
+                    Unit::Radian
+                },
                 prior_sigma: if k < 3 { 10.0 } else { 1.0 },
             })
             .collect()

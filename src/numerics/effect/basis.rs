@@ -97,7 +97,10 @@ const CREEPING: f64 = 2.0;
 
 impl Basis {
     /// The variable itself.
-    pub const PROPORTIONAL: Self = Self::Linear { zero: 0.0, per: 1.0 };
+    pub const PROPORTIONAL: Self = Self::Linear {
+        zero: 0.0,
+        per: 1.0,
+    };
 
     /// How many functions it has.
     pub fn count(&self) -> usize {
@@ -151,26 +154,48 @@ impl Basis {
                 each(0, sine);
                 each(1, cosine);
             }
-            Self::Cosines { low, high, count } => {
-                cosines(u, [low, high], count).enumerate().for_each(|(k, value)| each(k, value))
-            }
+            Self::Cosines { low, high, count } => cosines(u, [low, high], count)
+                .enumerate()
+                .for_each(|(k, value)| each(k, value)),
             Self::Series { low, high, count } => {
                 each(0, 1.0);
-                cosines(u, [low, high], count.saturating_sub(1)).enumerate().for_each(|(k, value)| each(k + 1, value));
+                cosines(u, [low, high], count.saturating_sub(1))
+                    .enumerate()
+                    .for_each(|(k, value)| each(k + 1, value));
             }
             Self::Rise { centre, width } => each(0, libm::tanh((u - centre) / width)),
             Self::After { at } => each(0, f64::from(u > at)),
             Self::Sign => each(0, u.signum()),
-            Self::Power { start, end, exponent } => {
+            Self::Power {
+                start,
+                end,
+                exponent,
+            } => {
                 let share = (u - start) / (end - start);
                 each(0, libm::copysign(libm::pow(share.abs(), exponent), share));
             }
-            Self::Creep { start, end, exponent } => {
+            Self::Creep {
+                start,
+                end,
+                exponent,
+            } => {
                 let share = (u - start) / (end - start);
                 // Long after the recording what was seen last holds.
-                each(0, libm::pow(if share > CREEPING { 1.0 } else { share.max(0.0) }, exponent));
+                each(
+                    0,
+                    libm::pow(
+                        if share > CREEPING {
+                            1.0
+                        } else {
+                            share.max(0.0)
+                        },
+                        exponent,
+                    ),
+                );
             }
-            Self::Settling { start, constant } => each(0, 1.0 - libm::exp(-(u - start).max(0.0) / constant)),
+            Self::Settling { start, constant } => {
+                each(0, 1.0 - libm::exp(-(u - start).max(0.0) / constant))
+            }
         }
     }
 }
@@ -189,14 +214,25 @@ pub(super) fn cosines(u: f64, [low, high]: [f64; 2], count: usize) -> impl Itera
     // Turned on by the phase each time: rounding grows in proportion to the order.
     let (sine, cosine) = libm::sincos(phase);
     let turned = move |(c, s): &(f64, f64)| Some((c * cosine - s * sine, s * cosine + c * sine));
-    std::iter::successors(Some((cosine, sine)), turned).take(count).map(|(c, _)| c)
+    std::iter::successors(Some((cosine, sine)), turned)
+        .take(count)
+        .map(|(c, _)| c)
 }
 
 /// A number divided and multiplied by a step that shrinks from `first` towards 1 with the level, kept within bounds; the number
 /// itself is none of them.
-pub(super) fn around(value: f64, first: f64, pace: f64, level: i32, [low, high]: [f64; 2]) -> impl Iterator<Item = f64> {
+pub(super) fn around(
+    value: f64,
+    first: f64,
+    pace: f64,
+    level: i32,
+    [low, high]: [f64; 2],
+) -> impl Iterator<Item = f64> {
     let step = libm::pow(first, libm::exp2(-pace * f64::from(level)));
-    [value * step, value / step].map(|other| other.clamp(low, high)).into_iter().filter(move |other| *other != value)
+    [value * step, value / step]
+        .map(|other| other.clamp(low, high))
+        .into_iter()
+        .filter(move |other| *other != value)
 }
 
 #[cfg(test)]
@@ -207,22 +243,60 @@ mod tests {
     fn cosines_of_high_orders_are_those_of_the_library() {
         for (u, order) in [(0.3, 1), (1.7, 40), (2.9, 180), (3.0, 200)] {
             let value = cosines(u, [0.0, PI], order).last().expect("one");
-            assert!((value - libm::cos(order as f64 * u)).abs() < 1e-13, "{u} {order}");
+            assert!(
+                (value - libm::cos(order as f64 * u)).abs() < 1e-13,
+                "{u} {order}"
+            );
         }
     }
 
     #[test]
     fn beyond_its_range_a_rough_curve_knows_nothing_soon_and_a_smooth_one_later() {
-        let curve = Basis::Cosines { low: 0.0, high: 2.0, count: 6 };
-        let off = |basis: Basis, k: usize, value: f64, off: f64| basis.off(k, value, off, 0.5 * off);
+        let curve = Basis::Cosines {
+            low: 0.0,
+            high: 2.0,
+            count: 6,
+        };
+        let off =
+            |basis: Basis, k: usize, value: f64, off: f64| basis.off(k, value, off, 0.5 * off);
         // A quarter of the support: sqrt(1 - cos 45 deg); the fourth cosine is at a right angle already.
         assert!((off(curve, 0, 0.3, 0.5) - 0.541_196_1).abs() < 1e-7);
-        let near =
-            |values: &[f64], wanted: &[f64]| values.iter().zip(wanted).all(|(value, wanted)| (value - wanted).abs() < 1e-12);
-        assert!(near(&[off(curve, 3, 0.3, 0.5), off(curve, 5, 0.0, 9.0), off(curve, 0, 0.3, 0.0)], &[1.0, 1.0, 0.0]));
-        let series = Basis::Series { low: 0.0, high: 2.0, count: 6 };
-        assert!(near(&[off(series, 0, 1.0, 9.0), off(series, 4, 0.0, 0.5)], &[0.0, 1.0]));
-        assert!((off(Basis::Wave { order: 3, overtone: false }, 1, 0.0, 1.0) - 0.5 * FRAC_1_SQRT_2).abs() < 1e-12);
+        let near = |values: &[f64], wanted: &[f64]| {
+            values
+                .iter()
+                .zip(wanted)
+                .all(|(value, wanted)| (value - wanted).abs() < 1e-12)
+        };
+        assert!(near(
+            &[
+                off(curve, 3, 0.3, 0.5),
+                off(curve, 5, 0.0, 9.0),
+                off(curve, 0, 0.3, 0.0)
+            ],
+            &[1.0, 1.0, 0.0]
+        ));
+        let series = Basis::Series {
+            low: 0.0,
+            high: 2.0,
+            count: 6,
+        };
+        assert!(near(
+            &[off(series, 0, 1.0, 9.0), off(series, 4, 0.0, 0.5)],
+            &[0.0, 1.0]
+        ));
+        assert!(
+            (off(
+                Basis::Wave {
+                    order: 3,
+                    overtone: false
+                },
+                1,
+                0.0,
+                1.0
+            ) - 0.5 * FRAC_1_SQRT_2)
+                .abs()
+                < 1e-12
+        );
         assert!((off(Basis::PROPORTIONAL, 0, -2.0, 0.6) - 0.6).abs() < 1e-12);
     }
 }

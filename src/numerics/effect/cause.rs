@@ -2,7 +2,8 @@
 
 use super::law_row::LawRow;
 use super::{
-    CAUSES, Effect, EffectContext, Form, HiddenSize, Hypothesis, NumberSpec, Place, Summary, Survey, Term, Variable, names,
+    CAUSES, Effect, EffectContext, Form, HiddenSize, Hypothesis, NumberSpec, Place, Summary,
+    Survey, Term, Variable, names,
 };
 use super::{law_row, sentence, unknown};
 use crate::robot::RobotModel;
@@ -98,7 +99,13 @@ impl Cause {
     /// Every hypothesis that the recording can speak of; those of one place are the shapes of one cell of a diagnosis.
     pub fn propose(&'static self, survey: &Survey) -> Vec<Hypothesis> {
         let of_laws = self.laws.iter().flat_map(|law| law.propose(self, survey));
-        of_laws.chain(self.motion.iter().flat_map(|motion| (motion.propose)(survey))).collect()
+        of_laws
+            .chain(
+                self.motion
+                    .iter()
+                    .flat_map(|motion| (motion.propose)(survey)),
+            )
+            .collect()
     }
 
     /// What a mechanic is told of a finding, without its size at the tool.
@@ -117,7 +124,10 @@ impl Cause {
     /// How large a form that was not found may be where geometry takes up most of what it does: of what follows the speed of joints that
     /// turn, or of all.
     pub fn hidden(&self, form: &Form, robot: &RobotModel) -> Option<HiddenSize> {
-        let of_speed = form.variables().iter().all(|of| matches!(of, Variable::Speed | Variable::Velocity { .. }));
+        let of_speed = form
+            .variables()
+            .iter()
+            .all(|of| matches!(of, Variable::Speed | Variable::Velocity { .. }));
         let turns = !matches!(form.place(), Place::Joint(joint) if !robot.is_revolute(joint));
         self.hidden.filter(|_| of_speed && turns).map(|size| size())
     }
@@ -129,22 +139,34 @@ impl Cause {
 
     /// The coefficients of a term of this cause.
     pub(super) fn numbers(&self, term: &Term, robot: &RobotModel) -> Vec<NumberSpec> {
-        self.law(term).map_or_else(|| unknown::numbers(term, robot), |law| law.numbers(term, robot))
+        self.law(term).map_or_else(
+            || unknown::numbers(term, robot),
+            |law| law.numbers(term, robot),
+        )
     }
 
     /// See [`Placed::variant`](super::Placed::variant).
     pub(super) fn variant(&self, term: &Term) -> String {
-        self.law(term).map_or_else(|| unknown::variant(term), |law| law.variant(term))
+        self.law(term)
+            .map_or_else(|| unknown::variant(term), |law| law.variant(term))
     }
 
     /// See [`Placed::near`](super::Placed::near); the shapes of a curve without a name are those of its cell.
     pub(super) fn near(&self, term: &Term, survey: &Survey, level: i32) -> Vec<Term> {
-        if self.is_nameless() { Vec::new() } else { law_row::near(term, survey, level) }
+        if self.is_nameless() {
+            Vec::new()
+        } else {
+            law_row::near(term, survey, level)
+        }
     }
 
     /// See [`Placed::identities`](super::Placed::identities).
     pub(super) fn identities(&self, term: &Term, called: &str) -> Vec<(&'static str, Place)> {
-        if self.is_nameless() { unknown::identities(term, called) } else { (self.same)(term).into_iter().collect() }
+        if self.is_nameless() {
+            unknown::identities(term, called)
+        } else {
+            (self.same)(term).into_iter().collect()
+        }
     }
 }
 
@@ -160,5 +182,8 @@ pub fn arm_effect(name: &str, setting: &EffectContext) -> Option<Box<dyn Effect>
 
 /// Causes that are effects of the whole arm, which are identified; all others are searched for.
 pub fn identified() -> impl Iterator<Item = &'static Cause> {
-    CAUSES.iter().copied().filter(|cause| cause.arm_effect.is_some())
+    CAUSES
+        .iter()
+        .copied()
+        .filter(|cause| cause.arm_effect.is_some())
 }

@@ -56,7 +56,10 @@ pub struct BeyondRange {
 
 impl BeyondRange {
     pub(super) fn new(joints: usize) -> Self {
-        Self { motions: Deflection::new(joints), ends: Vec::new() }
+        Self {
+            motions: Deflection::new(joints),
+            ends: Vec::new(),
+        }
     }
 
     pub(super) fn clear(&mut self) {
@@ -72,7 +75,9 @@ impl BeyondRange {
     /// The groups: factor, and (parameter, direction) of each motion.
     pub(super) fn groups(&self) -> impl Iterator<Item = (f64, &[(usize, Direction)])> {
         let starts = std::iter::once(0).chain(self.ends.iter().map(|(end, _)| *end));
-        starts.zip(&self.ends).map(|(start, (end, factor))| (*factor, &self.motions.partials[start..*end]))
+        starts
+            .zip(&self.ends)
+            .map(|(start, (end, factor))| (*factor, &self.motions.partials[start..*end]))
     }
 }
 
@@ -164,12 +169,21 @@ impl Deflection {
     }
 
     /// Tilts the row's plane by `p[first]` and `p[first + 1]` (rad) along `across`, from the unit normal that was believed.
-    pub fn tilt_anchor(&mut self, first: usize, p: &[f64], normal: &Vector3<f64>, across: &[Vector3<f64>; 2]) {
+    pub fn tilt_anchor(
+        &mut self,
+        first: usize,
+        p: &[f64],
+        normal: &Vector3<f64>,
+        across: &[Vector3<f64>; 2],
+    ) {
         self.anchor_tilt = across[0] * p[first] + across[1] * p[first + 1];
         let tilted = normal + self.anchor_tilt;
         let (length, now) = (tilted.norm(), tilted.normalize());
         for (k, direction) in across.iter().enumerate() {
-            self.partial(first + k, Direction::AnchorTilt(now, (direction - now * now.dot(direction)) / length));
+            self.partial(
+                first + k,
+                Direction::AnchorTilt(now, (direction - now * now.dot(direction)) / length),
+            );
         }
     }
 
@@ -187,10 +201,12 @@ impl Deflection {
 
     /// What each parameter loads each joint with, Nm per unit: (parameter, joint, rate).
     pub(crate) fn loads(&self) -> impl Iterator<Item = (usize, usize, f64)> + '_ {
-        self.partials.iter().filter_map(|(parameter, direction)| match direction {
-            Direction::Torque(joint, rate) => Some((*parameter, *joint, *rate)),
-            _ => None,
-        })
+        self.partials
+            .iter()
+            .filter_map(|(parameter, direction)| match direction {
+                Direction::Torque(joint, rate) => Some((*parameter, *joint, *rate)),
+                _ => None,
+            })
     }
 
     /// Says that a unit of the parameter loads a joint with `rate` Nm more; the load itself is a correction of the load.

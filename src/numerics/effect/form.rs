@@ -3,8 +3,8 @@
 //! A form is what diagnosis tries, what a model is refitted with, and what a table of parameters keeps as JSON: `{"<cause>": <body>}`.
 
 use super::{
-    ArmState, BeyondRange, Cause, DeclaredForm, Deflection, Effect, ParameterEstimate, ParameterSpec, Place, Survey, Term,
-    Variable, cause,
+    ArmState, BeyondRange, Cause, DeclaredForm, Deflection, Effect, ParameterEstimate,
+    ParameterSpec, Place, Survey, Term, Variable, cause,
 };
 use crate::robot::{LoadCorrection, Measurements, RobotModel};
 use crate::units::Unit;
@@ -60,7 +60,12 @@ pub trait Placed: Send + Sync {
     }
     /// Why coefficients `p` (SI) cannot be its cause's, as a clause: a number beyond what physics allows, or beyond what the recording holds.
     /// Beyond `error` (SI, by coefficient) a coefficient is firmly on its side of zero.
-    fn impossible(&self, _p: &[f64], _error: &dyn Fn(usize) -> f64, _survey: &Survey) -> Option<String> {
+    fn impossible(
+        &self,
+        _p: &[f64],
+        _error: &dyn Fn(usize) -> f64,
+        _survey: &Survey,
+    ) -> Option<String> {
         None
     }
     /// Other causes that do the same in a finding of the name `called`, in whatever data: identities of kinematics and statics.
@@ -77,7 +82,10 @@ pub trait Placed: Send + Sync {
     }
     /// The numbers of a row that its variables are, in their order; none of what is no single number, or is not known.
     fn sizes(&self, robot: &RobotModel, state: &ArmState) -> Vec<Option<f64>> {
-        self.variables().into_iter().map(|of| of.value(0, robot, state).filter(|_| of.is_single())).collect()
+        self.variables()
+            .into_iter()
+            .map(|of| of.value(0, robot, state).filter(|_| of.is_single()))
+            .collect()
     }
     /// The same with its laws held at the ends of what the fitted rows have of its variables, in their order; none where they go on.
     fn held_within(&self, _ranges: &[Option<[f64; 2]>]) -> Option<Form> {
@@ -99,10 +107,22 @@ pub trait Placed: Send + Sync {
         Some(of)
     }
     /// The variable that a row takes furthest beyond its fitted range, and the share of that, at most 1; none inside.
-    fn most_beyond(&self, robot: &RobotModel, state: &ArmState, within: &[Option<[f64; 2]>]) -> Option<(Variable, f64)> {
-        let sizes = self.variables().into_iter().zip(self.sizes(robot, state)).zip(within);
-        let shares = sizes.filter_map(|((of, size), range)| Some((of, of.share_beyond(size?, (*range)?))));
-        shares.filter(|(_, share)| *share > 0.0).max_by(|a, b| a.1.total_cmp(&b.1))
+    fn most_beyond(
+        &self,
+        robot: &RobotModel,
+        state: &ArmState,
+        within: &[Option<[f64; 2]>],
+    ) -> Option<(Variable, f64)> {
+        let sizes = self
+            .variables()
+            .into_iter()
+            .zip(self.sizes(robot, state))
+            .zip(within);
+        let shares =
+            sizes.filter_map(|((of, size), range)| Some((of, of.share_beyond(size?, (*range)?))));
+        shares
+            .filter(|(_, share)| *share > 0.0)
+            .max_by(|a, b| a.1.total_cmp(&b.1))
     }
     /// Standard deviation of what it does where its variables are one range beyond the fitted one, as a share of that.
     fn doubt(&self) -> f64 {
@@ -163,7 +183,10 @@ pub struct Form {
 
 impl<T: Placed + 'static> From<T> for Form {
     fn from(form: T) -> Self {
-        Self { placed: Arc::new(form), within: Vec::new() }
+        Self {
+            placed: Arc::new(form),
+            within: Vec::new(),
+        }
     }
 }
 
@@ -172,9 +195,14 @@ impl PartialEq for Form {
         if Arc::ptr_eq(&self.placed, &other.placed) {
             return true;
         }
-        match ((self.term(), other.term()), (self.declared(), other.declared())) {
+        match (
+            (self.term(), other.term()),
+            (self.declared(), other.declared()),
+        ) {
             ((None, None), (None, None)) => {
-                self.name() == other.name() && self.place() == other.place() && self.body() == other.body()
+                self.name() == other.name()
+                    && self.place() == other.place()
+                    && self.body() == other.body()
             }
             (terms, declared) => terms.0 == terms.1 && declared.0 == declared.1,
         }
@@ -198,7 +226,9 @@ impl std::ops::Deref for Form {
 impl Form {
     /// The column of the table of causes that it is in, of something at a place: that of its first variable, `constant` without one.
     pub fn follows(&self, place: Place) -> &'static str {
-        self.variables().first().map_or("constant", |of| of.kind(place))
+        self.variables()
+            .first()
+            .map_or("constant", |of| of.kind(place))
     }
 
     /// The name of its cause.
@@ -209,9 +239,17 @@ impl Form {
     /// Its coefficients as parameters: `cause.place.number`.
     pub fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
         let (name, place, variant) = (self.name(), self.place(), self.variant());
-        let middle = if variant.is_empty() { place.tag() } else { format!("{}.{variant}", place.tag()) };
+        let middle = if variant.is_empty() {
+            place.tag()
+        } else {
+            format!("{}.{variant}", place.tag())
+        };
         let spec = |(number, unit, prior_sigma): NumberSpec| ParameterSpec {
-            name: if number.is_empty() { format!("{name}.{middle}") } else { format!("{name}.{middle}.{number}") },
+            name: if number.is_empty() {
+                format!("{name}.{middle}")
+            } else {
+                format!("{name}.{middle}.{number}")
+            },
             place,
             unit,
             prior_sigma,
@@ -220,18 +258,29 @@ impl Form {
     }
 
     /// Reads a form that keeps all that it is in its body.
-    pub(super) fn kept<T: Placed + DeserializeOwned + 'static>(body: &serde_json::Value) -> serde_json::Result<Self> {
+    pub(super) fn kept<T: Placed + DeserializeOwned + 'static>(
+        body: &serde_json::Value,
+    ) -> serde_json::Result<Self> {
         T::deserialize(body).map(Self::from)
     }
 
     /// The same, fitted to rows that have these ranges of its variables.
     pub(super) fn fitted_within(&self, ranges: Vec<Option<[f64; 2]>>) -> Self {
         let held = self.held_within(&ranges);
-        held.unwrap_or_else(|| Self { placed: self.placed.clone(), within: ranges })
+        held.unwrap_or_else(|| Self {
+            placed: self.placed.clone(),
+            within: ranges,
+        })
     }
 
     /// See [`Placed::beyond`].
-    pub(super) fn beyond(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut BeyondRange) -> Option<Variable> {
+    pub(super) fn beyond(
+        &self,
+        robot: &RobotModel,
+        state: &ArmState,
+        p: &[f64],
+        out: &mut BeyondRange,
+    ) -> Option<Variable> {
         self.placed.beyond(robot, state, p, &self.within, out)
     }
 
@@ -245,7 +294,8 @@ impl Form {
     pub fn is_of_the_measurement(&self) -> bool {
         let passing = || self.place() == Place::Base && self.variables() == [Variable::Time];
         let instrument = || self.place() == Place::Tracker;
-        self.cause().of_the_measurement || (self.cause().is_nameless() && (passing() || instrument()))
+        self.cause().of_the_measurement
+            || (self.cause().is_nameless() && (passing() || instrument()))
     }
 }
 
@@ -255,7 +305,10 @@ const WITHIN: &str = "within";
 impl Serialize for Form {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut body = self.body();
-        if let Some(body) = body.as_object_mut().filter(|_| self.within.iter().any(Option::is_some)) {
+        if let Some(body) = body
+            .as_object_mut()
+            .filter(|_| self.within.iter().any(Option::is_some))
+        {
             body.insert(WITHIN.into(), serde_json::json!(self.within));
         }
         BTreeMap::from([(self.cause().name(), body)]).serialize(serializer)
@@ -265,10 +318,12 @@ impl Serialize for Form {
 impl<'de> Deserialize<'de> for Form {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let stored = BTreeMap::<String, serde_json::Value>::deserialize(deserializer)?;
-        let [(name, mut body)] =
-            <[_; 1]>::try_from(Vec::from_iter(stored)).map_err(|_| D::Error::custom("expected one cause"))?;
+        let [(name, mut body)] = <[_; 1]>::try_from(Vec::from_iter(stored))
+            .map_err(|_| D::Error::custom("expected one cause"))?;
         let within = body.as_object_mut().and_then(|body| body.remove(WITHIN));
-        let within = within.map_or(Ok(Vec::new()), serde_json::from_value).map_err(D::Error::custom)?;
+        let within = within
+            .map_or(Ok(Vec::new()), serde_json::from_value)
+            .map_err(D::Error::custom)?;
         let form = match cause(&name) {
             Some(cause) => match &cause.motion {
                 Some(motion) => (motion.read)(&body),
@@ -276,7 +331,10 @@ impl<'de> Deserialize<'de> for Form {
             },
             None => DeclaredForm::read(&name, body),
         };
-        Ok(Self { within, ..form.map_err(D::Error::custom)? })
+        Ok(Self {
+            within,
+            ..form.map_err(D::Error::custom)?
+        })
     }
 }
 
@@ -294,7 +352,11 @@ impl Effect for Form {
         self.placed.needs_torque()
     }
     fn needs_current(&self) -> bool {
-        self.placed.needs_current() || self.variables().iter().any(|variable| matches!(variable, Variable::Current { .. }))
+        self.placed.needs_current()
+            || self
+                .variables()
+                .iter()
+                .any(|variable| matches!(variable, Variable::Current { .. }))
     }
     fn needs_sight(&self) -> bool {
         self.placed.needs_sight()

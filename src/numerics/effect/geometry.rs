@@ -18,7 +18,11 @@ impl Effect for JointOffset {
             .map(|j| ParameterSpec {
                 name: format!("joint_offset.j{}", j + 1),
                 place: Place::Joint(j),
-                unit: if robot.is_revolute(j) { Unit::Radian } else { Unit::Millimetre },
+                unit: if robot.is_revolute(j) {
+                    Unit::Radian
+                } else {
+                    Unit::Millimetre
+                },
                 prior_sigma: 0.02,
             })
             .collect()
@@ -60,11 +64,20 @@ impl Effect for ReductionRatio {
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
         let couplings = &robot.description().couplings;
         for joint in 0..robot.joints() {
-            let coupled: f64 = couplings.iter().filter(|c| c.moved == joint).map(|c| c.ratio * state.q[c.by]).sum();
+            let coupled: f64 = couplings
+                .iter()
+                .filter(|c| c.moved == joint)
+                .map(|c| c.ratio * state.q[c.by])
+                .sum();
             out.turn(joint, p, joint, state.q[joint] - coupled);
         }
         for coupling in couplings.iter().filter(|c| c.ratio != 0.0) {
-            out.turn(coupling.by, p, coupling.moved, coupling.ratio * state.q[coupling.by]);
+            out.turn(
+                coupling.by,
+                p,
+                coupling.moved,
+                coupling.ratio * state.q[coupling.by],
+            );
         }
     }
 }
@@ -86,7 +99,9 @@ impl Effect for DeclaredCouplings {
             unit: Unit::One,
             prior_sigma: 0.01,
         };
-        couplings.map(|coupling| spec(Place::Coupled(coupling.by, coupling.moved))).collect()
+        couplings
+            .map(|coupling| spec(Place::Coupled(coupling.by, coupling.moved)))
+            .collect()
     }
 
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
@@ -96,7 +111,11 @@ impl Effect for DeclaredCouplings {
     }
 
     fn missing(&self, robot: &RobotModel, _data: &Measurements) -> Option<String> {
-        robot.description().couplings.is_empty().then(|| "the robot file declares no couplings".to_string())
+        robot
+            .description()
+            .couplings
+            .is_empty()
+            .then(|| "the robot file declares no couplings".to_string())
     }
 }
 
@@ -108,9 +127,18 @@ pub(super) struct LinkGeometry;
 
 /// The parameters of link `link` (from 1): base axis (from 0), whether it is a tilt, twist.
 fn directions(robot: &RobotModel, link: usize) -> impl Iterator<Item = (usize, bool, Twist)> {
-    let shifts = robot.is_revolute(link).then(|| robot.normals(link)).into_iter().flatten();
+    let shifts = robot
+        .is_revolute(link)
+        .then(|| robot.normals(link))
+        .into_iter()
+        .flatten();
     let shifts = shifts.map(|(axis, d)| (*axis, false, Twist::new(d.x, d.y, d.z, 0.0, 0.0, 0.0)));
-    shifts.chain(robot.normals(link).iter().map(move |(axis, d)| (*axis, true, screw(d, robot.point(link)))))
+    shifts.chain(
+        robot
+            .normals(link)
+            .iter()
+            .map(move |(axis, d)| (*axis, true, screw(d, robot.point(link)))),
+    )
 }
 
 impl Effect for LinkGeometry {
@@ -124,7 +152,10 @@ impl Effect for LinkGeometry {
             for (axis, tilt, _) in directions(robot, link) {
                 let letter = ['x', 'y', 'z'][axis];
                 out.push(ParameterSpec {
-                    name: format!("link_geometry.l{link}.{}{letter}", if tilt { "r" } else { "" }),
+                    name: format!(
+                        "link_geometry.l{link}.{}{letter}",
+                        if tilt { "r" } else { "" }
+                    ),
                     place: Place::Links(link - 1, link - 1),
                     unit: if tilt { Unit::Radian } else { Unit::Millimetre },
                     prior_sigma: 5e-3, // 5 mm, 5 mrad

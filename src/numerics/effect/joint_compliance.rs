@@ -6,8 +6,8 @@
 use super::form::placed;
 use super::unweighed_windup::UnweighedWindup;
 use super::{
-    ArmState, Cause, Deflection, Effect, EffectContext, Form, Hypothesis, Load, NumberSpec, OwnMotion, ParameterSpec, Place,
-    Placed, Summary, Survey, Variable, names,
+    ArmState, Cause, Deflection, Effect, EffectContext, Form, Hypothesis, Load, NumberSpec,
+    OwnMotion, ParameterSpec, Place, Placed, Summary, Survey, Variable, names,
 };
 use crate::criteria::effect::STIFFNESS_BEYOND;
 use crate::robot::{Measurements, RobotModel};
@@ -24,7 +24,9 @@ pub(super) static CAUSE: Cause = Cause {
     motion: Some(OwnMotion {
         propose,
         sentence: Some(sentence),
-        read: |body| UnweighedWindup::read(&CAUSE, body).unwrap_or_else(|| Form::kept::<Windup>(body)),
+        read: |body| {
+            UnweighedWindup::read(&CAUSE, body).unwrap_or_else(|| Form::kept::<Windup>(body))
+        },
     }),
     ..Cause::PLAIN
 };
@@ -32,12 +34,32 @@ pub(super) static CAUSE: Cause = Cause {
 /// Every joint that gravity loads; where the robot file has no masses to make a torque from, by motor currents and by gravity alone.
 fn propose(survey: &Survey) -> Vec<Hypothesis> {
     let by_gravity = survey.revolute().filter(|joint| survey.is_loaded(*joint));
-    let by_gravity = by_gravity.map(|joint| Hypothesis::new(Windup { joint, load: Load::GravityTorque }, 1).positive());
+    let by_gravity = by_gravity.map(|joint| {
+        Hypothesis::new(
+            Windup {
+                joint,
+                load: Load::GravityTorque,
+            },
+            1,
+        )
+        .positive()
+    });
     let by_current = !survey.robot.has_masses() && survey.data.current.is_some();
     // The sign of a current is the controller's.
     let currents = survey.revolute().filter(|_| by_current);
-    let currents = currents.map(|joint| Hypothesis::new(Windup { joint, load: Load::MotorCurrent }, 2));
-    by_gravity.chain(currents).chain(UnweighedWindup::propose(&CAUSE, survey)).collect()
+    let currents = currents.map(|joint| {
+        Hypothesis::new(
+            Windup {
+                joint,
+                load: Load::MotorCurrent,
+            },
+            2,
+        )
+    });
+    by_gravity
+        .chain(currents)
+        .chain(UnweighedWindup::propose(&CAUSE, survey))
+        .collect()
 }
 
 fn sentence(summary: &Summary) -> String {
@@ -100,8 +122,12 @@ impl Placed for Windup {
 
     fn missing(&self, robot: &RobotModel, data: &Measurements) -> Option<String> {
         match self.load {
-            Load::MotorCurrent if data.current.is_none() => Some("the recording has no motor currents".into()),
-            Load::GravityTorque if !robot.has_masses() && data.payload.iter().all(|mass| *mass == 0.0) => {
+            Load::MotorCurrent if data.current.is_none() => {
+                Some("the recording has no motor currents".into())
+            }
+            Load::GravityTorque
+                if !robot.has_masses() && data.payload.iter().all(|mass| *mass == 0.0) =>
+            {
                 Some("the robot file gives no link masses and no row carries a payload".into())
             }
             _ => None,
@@ -144,7 +170,9 @@ fn of_all_joints(setting: &EffectContext) -> Box<dyn Effect> {
 impl Windups {
     fn each(&self, robot: &RobotModel) -> impl Iterator<Item = Windup> {
         let load = self.0;
-        (0..robot.joints()).filter(|joint| robot.is_revolute(*joint)).map(move |joint| Windup { load, joint })
+        (0..robot.joints())
+            .filter(|joint| robot.is_revolute(*joint))
+            .map(move |joint| Windup { load, joint })
     }
 }
 
@@ -154,11 +182,15 @@ impl Effect for Windups {
     }
 
     fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
-        self.each(robot).flat_map(|windup| Form::from(windup).parameters(robot)).collect()
+        self.each(robot)
+            .flat_map(|windup| Form::from(windup).parameters(robot))
+            .collect()
     }
 
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
-        self.each(robot).enumerate().for_each(|(parameter, windup)| windup.wind_up(parameter, state, p, out));
+        self.each(robot)
+            .enumerate()
+            .for_each(|(parameter, windup)| windup.wind_up(parameter, state, p, out));
     }
 
     fn needs_torque(&self) -> bool {
@@ -170,6 +202,10 @@ impl Effect for Windups {
     }
 
     fn missing(&self, robot: &RobotModel, data: &Measurements) -> Option<String> {
-        Windup { load: self.0, joint: 0 }.missing(robot, data)
+        Windup {
+            load: self.0,
+            joint: 0,
+        }
+        .missing(robot, data)
     }
 }

@@ -3,8 +3,8 @@
 use super::form::placed;
 use super::unknown::PLAUSIBLE;
 use super::{
-    ArmState, BeyondRange, Cause, Deflection, Form, Hypothesis, Measure, NumberSpec, OwnMotion, ParameterEstimate, Place, Placed,
-    Summary, Survey, Variable, figure, names,
+    ArmState, BeyondRange, Cause, Deflection, Form, Hypothesis, Measure, NumberSpec, OwnMotion,
+    ParameterEstimate, Place, Placed, Summary, Survey, Variable, figure, names,
 };
 use crate::criteria::effect::{self, RARE};
 use crate::robot::RobotModel;
@@ -52,7 +52,11 @@ pub(super) static CAUSE: Cause = Cause {
         rank: 7,
         advice: "measure with a third payload between none and full, and with joints near their largest load",
     }),
-    motion: Some(OwnMotion { propose, sentence: Some(sentence), read: Form::kept::<BentWindup> }),
+    motion: Some(OwnMotion {
+        propose,
+        sentence: Some(sentence),
+        read: Form::kept::<BentWindup>,
+    }),
     ..Cause::PLAIN
 };
 
@@ -64,20 +68,50 @@ fn propose(survey: &Survey) -> Vec<Hypothesis> {
         let least = least_bend(survey, joint);
         let seen = move |share: &f64| share * most >= least;
         let shares = [0.05, 0.15, 0.5, BENDS[1]].into_iter().filter(seen);
-        let laws = shares.map(|share| HardeningLaw::Saturating { at_nm: share * most });
-        let laws = laws.chain([0.2].into_iter().filter(seen).map(|share| HardeningLaw::SoftZone { at_nm: share * most }));
-        let laws = laws.chain([0.1, 0.3, 0.6].into_iter().filter(seen).map(|share| HardeningLaw::Knee { at_nm: share * most }));
-        let laws = laws.chain([2.0, 3.0].map(|exponent| HardeningLaw::Power { exponent, at_nm: most }));
-        out.extend(laws.map(|law| Hypothesis::new(BentWindup { joint, law }, *effect::BENDS).penalised(*RARE)));
-        let curve = BentWindup { joint, law: HardeningLaw::Curve { most_nm: most } };
+        let laws = shares.map(|share| HardeningLaw::Saturating {
+            at_nm: share * most,
+        });
+        let laws = laws.chain(
+            [0.2]
+                .into_iter()
+                .filter(seen)
+                .map(|share| HardeningLaw::SoftZone {
+                    at_nm: share * most,
+                }),
+        );
+        let laws =
+            laws.chain(
+                [0.1, 0.3, 0.6]
+                    .into_iter()
+                    .filter(seen)
+                    .map(|share| HardeningLaw::Knee {
+                        at_nm: share * most,
+                    }),
+            );
+        let laws = laws.chain([2.0, 3.0].map(|exponent| HardeningLaw::Power {
+            exponent,
+            at_nm: most,
+        }));
+        out.extend(laws.map(|law| {
+            Hypothesis::new(BentWindup { joint, law }, *effect::BENDS).penalised(*RARE)
+        }));
+        let curve = BentWindup {
+            joint,
+            law: HardeningLaw::Curve { most_nm: most },
+        };
         out.push(Hypothesis::new(curve, 1).penalised(*RARE));
     }
     out
 }
 
 fn sentence(summary: &Summary) -> String {
-    let shape = summary.words(names::JOINT_HARDENING).unwrap_or_else(|| "its shape is a free curve of the load".into());
-    format!("{} winds up under its load, but not in proportion: {shape}", summary.place)
+    let shape = summary
+        .words(names::JOINT_HARDENING)
+        .unwrap_or_else(|| "its shape is a free curve of the load".into());
+    format!(
+        "{} winds up under its load, but not in proportion: {shape}",
+        summary.place
+    )
 }
 
 /// Smallest torque of a bend that the loads of a joint show, Nm. Where they pull to both sides, any that is more than a step;
@@ -119,10 +153,15 @@ impl BentWindup {
                 let t = libm::tanh(torque / at_nm);
                 (at_nm * t, 1.0 - t * t)
             }
-            HardeningLaw::Knee { at_nm } => (torque.clamp(-at_nm, at_nm), f64::from(torque.abs() < at_nm)),
+            HardeningLaw::Knee { at_nm } => {
+                (torque.clamp(-at_nm, at_nm), f64::from(torque.abs() < at_nm))
+            }
             HardeningLaw::Power { exponent, at_nm } => {
                 let share = torque.abs() / at_nm;
-                (at_nm * libm::pow(share, exponent) * torque.signum(), exponent * libm::pow(share, exponent - 1.0))
+                (
+                    at_nm * libm::pow(share, exponent) * torque.signum(),
+                    exponent * libm::pow(share, exponent - 1.0),
+                )
             }
             HardeningLaw::Curve { .. } => (0.0, 0.0),
         }
@@ -135,7 +174,9 @@ impl Placed for BentWindup {
     fn numbers(&self, _robot: &RobotModel) -> Vec<NumberSpec> {
         let mut numbers = vec![("linear".into(), Unit::RadianPerNewtonMetre, 1e-3)];
         match self.law {
-            HardeningLaw::Curve { .. } => numbers.extend((1..=CURVE).map(|k| (format!("sin{k}"), Unit::Radian, PLAUSIBLE))),
+            HardeningLaw::Curve { .. } => {
+                numbers.extend((1..=CURVE).map(|k| (format!("sin{k}"), Unit::Radian, PLAUSIBLE)))
+            }
             _ => numbers.push(("bend".into(), Unit::RadianPerNewtonMetre, 1e-3)),
         }
         numbers
@@ -143,8 +184,15 @@ impl Placed for BentWindup {
 
     fn deflect(&self, _robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
         let torque = state.torque()[self.joint];
-        self.rates(torque).into_iter().enumerate().for_each(|(k, rate)| out.turn(k, p, self.joint, rate));
-        let bend = if let HardeningLaw::Curve { .. } = self.law { 0.0 } else { p[1] * self.bend(torque).1 };
+        self.rates(torque)
+            .into_iter()
+            .enumerate()
+            .for_each(|(k, rate)| out.turn(k, p, self.joint, rate));
+        let bend = if let HardeningLaw::Curve { .. } = self.law {
+            0.0
+        } else {
+            p[1] * self.bend(torque).1
+        };
         out.yields(self.joint, p[0] + bend);
     }
 
@@ -158,13 +206,23 @@ impl Placed for BentWindup {
         out: &mut BeyondRange,
     ) -> Option<Variable> {
         let (of, share) = self.most_beyond(robot, state, within)?;
-        let (torque, [low, high]) = (state.torque()[self.joint], within.first().copied().flatten()?);
-        let [end, now] = [torque.clamp(low.min(0.0), high.max(0.0)), torque].map(|torque| self.rates(torque));
+        let (torque, [low, high]) = (
+            state.torque()[self.joint],
+            within.first().copied().flatten()?,
+        );
+        let [end, now] =
+            [torque.clamp(low.min(0.0), high.max(0.0)), torque].map(|torque| self.rates(torque));
         let mut add = |rates: Vec<f64>, factor: f64| {
-            rates.into_iter().enumerate().for_each(|(k, rate)| out.motions.turn(k, p, self.joint, rate));
+            rates
+                .into_iter()
+                .enumerate()
+                .for_each(|(k, rate)| out.motions.turn(k, p, self.joint, rate));
             out.close(factor * *effect::STIFFNESS_BEYOND);
         };
-        add(now.iter().zip(&end).map(|(now, end)| now - end).collect(), 1.0);
+        add(
+            now.iter().zip(&end).map(|(now, end)| now - end).collect(),
+            1.0,
+        );
         add(end, share);
         Some(of)
     }
@@ -175,7 +233,11 @@ impl Placed for BentWindup {
 
     /// Both near no load and far out.
     fn is_against_load(&self, p: &[f64], error: &dyn Fn(usize) -> f64) -> bool {
-        let per = if let HardeningLaw::Curve { most_nm } = self.law { 1.0 / most_nm } else { 1.0 };
+        let per = if let HardeningLaw::Curve { most_nm } = self.law {
+            1.0 / most_nm
+        } else {
+            1.0
+        };
         let bent = |sum: &dyn Fn(usize) -> f64| per * (1..p.len()).map(sum).sum::<f64>();
         // The sines of a free curve are 1 and -1 in turn where the load is largest.
         let near = p[0] + bent(&|k| if k % 2 == 1 { p[k] } else { -p[k] });
@@ -186,22 +248,41 @@ impl Placed for BentWindup {
         Some((self.joint, *p.first()?))
     }
 
-    fn impossible(&self, _p: &[f64], _error: &dyn Fn(usize) -> f64, survey: &Survey) -> Option<String> {
-        let (HardeningLaw::Saturating { at_nm } | HardeningLaw::SoftZone { at_nm } | HardeningLaw::Knee { at_nm }) = self.law
+    fn impossible(
+        &self,
+        _p: &[f64],
+        _error: &dyn Fn(usize) -> f64,
+        survey: &Survey,
+    ) -> Option<String> {
+        let (HardeningLaw::Saturating { at_nm }
+        | HardeningLaw::SoftZone { at_nm }
+        | HardeningLaw::Knee { at_nm }) = self.law
         else {
             return None;
         };
         let most = survey.recorded_load(self.joint);
         let [at, largest] = [at_nm, most].map(|torque| figure(torque, 0));
-        (at_nm > most).then(|| format!("its bend at {at} Nm lies beyond the largest recorded load of {largest} Nm"))
+        (at_nm > most).then(|| {
+            format!("its bend at {at} Nm lies beyond the largest recorded load of {largest} Nm")
+        })
     }
 
     fn words(&self, _numbers: &[&ParameterEstimate]) -> Option<String> {
         match self.law {
-            HardeningLaw::Saturating { at_nm } => Some(format!("it stiffens above about {} Nm", figure(at_nm, 0))),
-            HardeningLaw::SoftZone { at_nm } => Some(format!("it is soft below about {} Nm", figure(at_nm, 0))),
-            HardeningLaw::Knee { at_nm } => Some(format!("it has two stiffnesses, with the knee at {} Nm", figure(at_nm, 0))),
-            HardeningLaw::Power { exponent, .. } => Some(format!("it grows by the load to the power of {}", figure(exponent, 1))),
+            HardeningLaw::Saturating { at_nm } => {
+                Some(format!("it stiffens above about {} Nm", figure(at_nm, 0)))
+            }
+            HardeningLaw::SoftZone { at_nm } => {
+                Some(format!("it is soft below about {} Nm", figure(at_nm, 0)))
+            }
+            HardeningLaw::Knee { at_nm } => Some(format!(
+                "it has two stiffnesses, with the knee at {} Nm",
+                figure(at_nm, 0)
+            )),
+            HardeningLaw::Power { exponent, .. } => Some(format!(
+                "it grows by the load to the power of {}",
+                figure(exponent, 1)
+            )),
             HardeningLaw::Curve { .. } => None,
         }
     }
@@ -210,17 +291,35 @@ impl Placed for BentWindup {
         let step = libm::pow(1.5, libm::exp2(-0.5 * f64::from(level)));
         let most = survey.load(self.joint);
         let least = least_bend(survey, self.joint);
-        let within = |at_nm: f64, largest: f64| at_nm.clamp(least.min(largest * most), largest * most);
+        let within =
+            |at_nm: f64, largest: f64| at_nm.clamp(least.min(largest * most), largest * most);
         let scaled = |factor: f64| match self.law {
-            HardeningLaw::Saturating { at_nm } => Some(HardeningLaw::Saturating { at_nm: within(at_nm * factor, BENDS[1]) }),
-            HardeningLaw::SoftZone { at_nm } => Some(HardeningLaw::SoftZone { at_nm: within(at_nm * factor, BENDS[1]) }),
-            HardeningLaw::Knee { at_nm } => Some(HardeningLaw::Knee { at_nm: within(at_nm * factor, BENDS[1]) }),
-            HardeningLaw::Power { exponent, at_nm } => {
-                Some(HardeningLaw::Power { exponent: (exponent * factor).clamp(0.2, 6.0), at_nm })
-            }
+            HardeningLaw::Saturating { at_nm } => Some(HardeningLaw::Saturating {
+                at_nm: within(at_nm * factor, BENDS[1]),
+            }),
+            HardeningLaw::SoftZone { at_nm } => Some(HardeningLaw::SoftZone {
+                at_nm: within(at_nm * factor, BENDS[1]),
+            }),
+            HardeningLaw::Knee { at_nm } => Some(HardeningLaw::Knee {
+                at_nm: within(at_nm * factor, BENDS[1]),
+            }),
+            HardeningLaw::Power { exponent, at_nm } => Some(HardeningLaw::Power {
+                exponent: (exponent * factor).clamp(0.2, 6.0),
+                at_nm,
+            }),
             HardeningLaw::Curve { .. } => None,
         };
-        let laws = [step, 1.0 / step].into_iter().filter_map(scaled).filter(|law| *law != self.law);
-        laws.map(|law| Self { joint: self.joint, law }.into()).collect()
+        let laws = [step, 1.0 / step]
+            .into_iter()
+            .filter_map(scaled)
+            .filter(|law| *law != self.law);
+        laws.map(|law| {
+            Self {
+                joint: self.joint,
+                law,
+            }
+            .into()
+        })
+        .collect()
     }
 }

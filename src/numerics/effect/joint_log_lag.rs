@@ -3,8 +3,8 @@
 
 use super::form::placed;
 use super::{
-    ArmState, Cause, Deflection, Form, HiddenSize, Hypothesis, NumberSpec, OwnMotion, Place, Placed, Summary, Survey, Variable,
-    figure, names,
+    ArmState, Cause, Deflection, Form, HiddenSize, Hypothesis, NumberSpec, OwnMotion, Place,
+    Placed, Summary, Survey, Variable, figure, names,
 };
 use crate::criteria::words::CLOCKS;
 use crate::robot::RobotModel;
@@ -45,8 +45,17 @@ pub(super) static CAUSE: Cause = Cause {
     size: "0.1 to 5 % of the move; 0.5 to 20 ms",
     confounded: "backlash; viscous_windup where one joint moves alone",
     needs: "rows in the order of measurement; joint velocities",
-    hidden: Some(|| HiddenSize { subject: Some("clocks"), may: "may be apart", least: *CLOCKS, unit: Unit::Millisecond }),
-    motion: Some(OwnMotion { propose, sentence: Some(sentence), read: Form::kept::<Lag> }),
+    hidden: Some(|| HiddenSize {
+        subject: Some("clocks"),
+        may: "may be apart",
+        least: *CLOCKS,
+        unit: Unit::Millisecond,
+    }),
+    motion: Some(OwnMotion {
+        propose,
+        sentence: Some(sentence),
+        read: Form::kept::<Lag>,
+    }),
     of_the_measurement: true,
     separable_by_poses: false,
     ..Cause::PLAIN
@@ -55,21 +64,56 @@ pub(super) static CAUSE: Cause = Cause {
 fn propose(survey: &Survey) -> Vec<Hypothesis> {
     if survey.moves() {
         // What a joint moves from one row to the next is its velocity: a share of it is a time, too.
-        return vec![Hypothesis::new(Lag { each: false, by: Behind::Clock, only: None }, 1).within(LARGEST)];
+        return vec![
+            Hypothesis::new(
+                Lag {
+                    each: false,
+                    by: Behind::Clock,
+                    only: None,
+                },
+                1,
+            )
+            .within(LARGEST),
+        ];
     }
-    let laws = [(false, Behind::Move), (true, Behind::Move), (false, Behind::Synchronous)].map(|(each, by)| (each, by, None));
-    let turning: Vec<usize> = survey.revolute().filter(|joint| survey.travel(*joint) > 0.0).collect();
-    let all = laws.into_iter().map(|(each, by, only)| Hypothesis::new(Lag { each, by, only }, laws.len()));
-    let one = |joint: &usize| Hypothesis::new(Lag { each: false, by: Behind::Move, only: Some(*joint) }, turning.len());
+    let laws = [
+        (false, Behind::Move),
+        (true, Behind::Move),
+        (false, Behind::Synchronous),
+    ]
+    .map(|(each, by)| (each, by, None));
+    let turning: Vec<usize> = survey
+        .revolute()
+        .filter(|joint| survey.travel(*joint) > 0.0)
+        .collect();
+    let all = laws
+        .into_iter()
+        .map(|(each, by, only)| Hypothesis::new(Lag { each, by, only }, laws.len()));
+    let one = |joint: &usize| {
+        Hypothesis::new(
+            Lag {
+                each: false,
+                by: Behind::Move,
+                only: Some(*joint),
+            },
+            turning.len(),
+        )
+    };
     let one = turning.iter().map(one);
     all.chain(one).collect()
 }
 
 fn sentence(summary: &Summary) -> String {
-    let clocks = summary.variables(names::JOINT_LOG_LAG).contains(&Variable::Speed);
+    let clocks = summary
+        .variables(names::JOINT_LOG_LAG)
+        .contains(&Variable::Speed);
     match summary.parameters.first() {
         Some(n) if clocks => {
-            let (how, when) = if n.value < 0.0 { ("early", "before") } else { ("late", "after") };
+            let (how, when) = if n.value < 0.0 {
+                ("early", "before")
+            } else {
+                ("late", "after")
+            };
             let ms = figure(n.value.abs(), 2);
             format!(
                 "the tracker's clock is {ms} ms {how} relative to the controller's: points were measured that long {when} the joints \
@@ -83,8 +127,11 @@ fn sentence(summary: &Summary) -> String {
             figure(n.value, 0)
         ),
         Some(n)
-            if let Some(joint) =
-                n.name.rsplit_once("share_j").map(|(_, joint)| joint).filter(|_| summary.parameters.len() == 1) =>
+            if let Some(joint) = n
+                .name
+                .rsplit_once("share_j")
+                .map(|(_, joint)| joint)
+                .filter(|_| summary.parameters.len() == 1) =>
         {
             format!(
                 "joint {joint} was logged before it had settled: {} % of its last move was still to come",
@@ -97,7 +144,9 @@ fn sentence(summary: &Summary) -> String {
         ),
         Some(_) => {
             let shares = summary.parameters.iter().map(|n| n.value * 100.0);
-            let most = shares.max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
+            let most = shares
+                .max_by(|a, b| a.abs().total_cmp(&b.abs()))
+                .unwrap_or(0.0);
             format!(
                 "joints were logged before the arm had settled, each by a share of its own: up to {} % of the last move was \
                  still to come",
@@ -118,26 +167,47 @@ impl Placed for Lag {
         match (self.by, self.each) {
             (Behind::Clock, _) => vec![("time".into(), Unit::Second, 0.01)],
             (Behind::Synchronous, _) => vec![("rest".into(), Unit::Radian, 0.01)],
-            (Behind::Move, true) => (1..=robot.joints()).map(|joint| (format!("share_j{joint}"), Unit::One, 0.1)).collect(),
+            (Behind::Move, true) => (1..=robot.joints())
+                .map(|joint| (format!("share_j{joint}"), Unit::One, 0.1))
+                .collect(),
             (Behind::Move, false) => vec![("share".into(), Unit::One, 0.1)],
         }
     }
 
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
-        let largest = if self.by == Behind::Synchronous { state.largest_turn(robot) } else { 0.0 };
-        for joint in (0..robot.joints()).filter(|joint| self.only.is_none_or(|only| only == *joint)) {
+        let largest = if self.by == Behind::Synchronous {
+            state.largest_turn(robot)
+        } else {
+            0.0
+        };
+        for joint in (0..robot.joints()).filter(|joint| self.only.is_none_or(|only| only == *joint))
+        {
             match self.by {
                 Behind::Synchronous if largest == 0.0 => out.turn(0, p, joint, 0.0),
                 Behind::Synchronous => out.turn(0, p, joint, state.last_move(joint) / largest),
                 Behind::Clock => out.turn(0, p, joint, state.velocity(joint)),
-                Behind::Move => out.turn(if self.each { joint } else { 0 }, p, joint, state.last_move(joint)),
+                Behind::Move => out.turn(
+                    if self.each { joint } else { 0 },
+                    p,
+                    joint,
+                    state.last_move(joint),
+                ),
             }
         }
     }
 
     /// Two clocks may be apart either way; of standing points what is still to come is no less than nothing.
-    fn impossible(&self, p: &[f64], error: &dyn Fn(usize) -> f64, _survey: &Survey) -> Option<String> {
-        let (most, share) = p.iter().copied().enumerate().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
+    fn impossible(
+        &self,
+        p: &[f64],
+        error: &dyn Fn(usize) -> f64,
+        _survey: &Survey,
+    ) -> Option<String> {
+        let (most, share) = p
+            .iter()
+            .copied()
+            .enumerate()
+            .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
         (self.by != Behind::Clock && share < -error(most)).then(|| "a lag is not below zero".into())
     }
 }

@@ -29,19 +29,28 @@ impl PartialEq for Factor {
 impl Factor {
     /// Functions of a variable, wherever it is.
     pub const fn new(of: Variable, basis: Basis) -> Self {
-        Self { of, basis, within: None }
+        Self {
+            of,
+            basis,
+            within: None,
+        }
     }
 
     /// The same, fitted to rows of this range; a variable of several numbers has none.
     pub fn held_within(self, [low, high]: [f64; 2]) -> Self {
         let held = self.of.components() == 1 && low <= high;
-        Self { within: held.then_some([low, high]), ..self }
+        Self {
+            within: held.then_some([low, high]),
+            ..self
+        }
     }
 
     /// The variable, where nothing more was seen at the place where the functions are held. A law of few numbers goes on for a while, but
     /// not to a time that nobody states: what was seen last is the best that is known of that.
     fn held(&self, u: f64) -> f64 {
-        let Some([low, high]) = self.within else { return u };
+        let Some([low, high]) = self.within else {
+            return u;
+        };
         let ends = self.basis.is_curve() || u.is_infinite();
         let further = if ends { 0.0 } else { FURTHER * (high - low) };
         u.clamp(low - further, high + further)
@@ -55,7 +64,9 @@ impl Factor {
             // A step has happened.
             Basis::After { .. } => 0.0,
             // What had not yet settled when the recording ended.
-            Basis::Settling { start, constant } if u > high => libm::exp(-(high - start).max(0.0) / constant),
+            Basis::Settling { start, constant } if u > high => {
+                libm::exp(-(high - start).max(0.0) / constant)
+            }
             _ if off == 0.0 => 0.0,
             _ => (off / (high - low)).min(1.0),
         };
@@ -73,7 +84,12 @@ impl Factor {
     fn off(&self, robot: &RobotModel, state: &ArmState) -> Option<(Vec<f64>, f64)> {
         let (off, share) = self.beyond(robot, state)?;
         let values = self.all(robot, state).into_iter().enumerate();
-        Some((values.map(|(k, value)| self.basis.off(k, value, off, share)).collect(), share))
+        Some((
+            values
+                .map(|(k, value)| self.basis.off(k, value, off, share))
+                .collect(),
+            share,
+        ))
     }
 
     /// How many functions it has.
@@ -86,8 +102,12 @@ impl Factor {
             if let Some(u) = self.of.value(component, robot, state) {
                 let u = self.held(u);
                 // Long after the recording a function without a limit counts for nothing.
-                let mut counted =
-                    |k: usize, value: f64| each(component * self.basis.count() + k, if value.is_finite() { value } else { 0.0 });
+                let mut counted = |k: usize, value: f64| {
+                    each(
+                        component * self.basis.count() + k,
+                        if value.is_finite() { value } else { 0.0 },
+                    )
+                };
                 self.basis.at(u, &mut counted);
             }
         }
@@ -111,7 +131,10 @@ pub(super) type Departures = Vec<Vec<(usize, f64)>>;
 impl Law {
     /// Functions of one variable.
     pub const fn new(of: Variable, basis: Basis) -> Self {
-        Self { first: Factor::new(of, basis), times: None }
+        Self {
+            first: Factor::new(of, basis),
+            times: None,
+        }
     }
 
     /// In proportion to a variable.
@@ -121,17 +144,29 @@ impl Law {
 
     /// Multiplied by functions of another variable.
     pub const fn times(self, of: Variable, basis: Basis) -> Self {
-        Self { times: Some(Factor::new(of, basis)), ..self }
+        Self {
+            times: Some(Factor::new(of, basis)),
+            ..self
+        }
     }
 
     /// With another basis of the first variable.
     pub fn with(self, basis: Basis) -> Self {
-        Self { first: Factor { basis, ..self.first }, ..self }
+        Self {
+            first: Factor {
+                basis,
+                ..self.first
+            },
+            ..self
+        }
     }
 
     /// With another first variable.
     pub fn by(self, of: Variable) -> Self {
-        Self { first: Factor::new(of, self.first.basis), ..self }
+        Self {
+            first: Factor::new(of, self.first.basis),
+            ..self
+        }
     }
 
     /// How many functions it has.
@@ -151,11 +186,18 @@ impl Law {
 
     /// In a row beyond the fitted range of a variable: that variable, and what the law may be off, groups of (function, by how much) that
     /// are independent of each other, one standard deviation each. None inside.
-    pub(super) fn beyond(&self, robot: &RobotModel, state: &ArmState) -> Option<(Variable, Departures)> {
+    pub(super) fn beyond(
+        &self,
+        robot: &RobotModel,
+        state: &ArmState,
+    ) -> Option<(Variable, Departures)> {
         let first = self.first.off(robot, state);
         let Some(times) = &self.times else {
             let (off, _) = first?;
-            return Some((self.first.of, off.into_iter().enumerate().map(|one| vec![one]).collect()));
+            return Some((
+                self.first.of,
+                off.into_iter().enumerate().map(|one| vec![one]).collect(),
+            ));
         };
         let second = times.off(robot, state);
         let share = |off: &Option<(Vec<f64>, f64)>| off.as_ref().map_or(0.0, |(_, share)| *share);
@@ -165,22 +207,37 @@ impl Law {
         let mut groups = Vec::new();
         for (i, off) in first.into_iter().flat_map(|(off, _)| off).enumerate() {
             let others = times.all(robot, state).into_iter().enumerate();
-            groups.push(others.map(|(k, value)| (inner * i + k, off * value)).collect());
+            groups.push(
+                others
+                    .map(|(k, value)| (inner * i + k, off * value))
+                    .collect(),
+            );
         }
         for (k, off) in second.into_iter().flat_map(|(off, _)| off).enumerate() {
             let others = self.first.all(robot, state).into_iter().enumerate();
-            groups.push(others.map(|(i, value)| (inner * i + k, off * value)).collect());
+            groups.push(
+                others
+                    .map(|(i, value)| (inner * i + k, off * value))
+                    .collect(),
+            );
         }
         (a + b > 0.0).then_some((most, groups))
     }
 
     /// The values of its functions in a row, numbered; zeros where the row does not tell.
-    pub(super) fn values(&self, robot: &RobotModel, state: &ArmState, each: &mut dyn FnMut(usize, f64)) {
+    pub(super) fn values(
+        &self,
+        robot: &RobotModel,
+        state: &ArmState,
+        each: &mut dyn FnMut(usize, f64),
+    ) {
         match &self.times {
             None => self.first.values(robot, state, each),
             Some(times) => {
                 let inner = times.count();
-                self.first.values(robot, state, &mut |i, x| times.values(robot, state, &mut |k, y| each(inner * i + k, x * y)));
+                self.first.values(robot, state, &mut |i, x| {
+                    times.values(robot, state, &mut |k, y| each(inner * i + k, x * y))
+                });
             }
         }
     }
@@ -215,7 +272,17 @@ links:
 
     /// The sum of a factor's functions at one row, and its share beyond the fitted range.
     fn at(factor: &Factor, angle: f64, [payload, temperature, time]: [f64; 3]) -> (f64, f64) {
-        let robot = RobotModel::new(read_calib(RobotFileText { label: "robot.yaml", text: ROBOT }, None).expect("a robot").robot);
+        let robot = RobotModel::new(
+            read_calib(
+                RobotFileText {
+                    label: "robot.yaml",
+                    text: ROBOT,
+                },
+                None,
+            )
+            .expect("a robot")
+            .robot,
+        );
         let data = Measurements {
             joints: 2,
             q: vec![angle; 2],
@@ -230,19 +297,30 @@ links:
         let state = ArmState::new(&data, 0, &posture, Vector3::new(2.0 + payload, 0.0, 0.0));
         let mut sum = 0.0;
         factor.values(&robot, &state, &mut |_, value| sum += value);
-        (sum, factor.beyond(&robot, &state).map_or(0.0, |(_, share)| share))
+        (
+            sum,
+            factor
+                .beyond(&robot, &state)
+                .map_or(0.0, |(_, share)| share),
+        )
     }
 
     #[test]
     fn every_law_holds_at_the_ends_of_what_was_fitted_and_says_how_far_beyond_it_is() {
-        let curve = |[low, high]: [f64; 2]| Basis::Cosines { low, high, count: 6 };
+        let curve = |[low, high]: [f64; 2]| Basis::Cosines {
+            low,
+            high,
+            count: 6,
+        };
         let line = |_: [f64; 2]| Basis::PROPORTIONAL;
         /// Angle, and payload, temperature and time, of a row at a value of the variable.
         type Row = fn(f64) -> (f64, [f64; 3]);
         let variables: [(Variable, [f64; 2], Row); 5] = [
             (Variable::Angle { joint: 1 }, [-0.4, 0.6], |u| (u, [0.0; 3])),
             (Variable::Payload, [1.0, 9.0], |u| (0.0, [u, 0.0, 0.0])),
-            (Variable::Temperature, [20.0, 30.0], |u| (0.0, [0.0, u, 0.0])),
+            (Variable::Temperature, [20.0, 30.0], |u| {
+                (0.0, [0.0, u, 0.0])
+            }),
             (Variable::Time, [0.0, 1000.0], |u| (0.0, [0.0, 0.0, u])),
             (Variable::Range, [2.0, 4.0], |u| (0.0, [u - 2.0, 0.0, 0.0])),
         ];
@@ -266,16 +344,44 @@ links:
 
     #[test]
     fn what_has_settled_or_stepped_stays_and_what_had_not_is_unknown_later() {
-        let share = |basis: Basis| at(&Factor::new(Variable::Time, basis).held_within([0.0, 1000.0]), 0.0, [0.0, 0.0, 9000.0]).1;
+        let share = |basis: Basis| {
+            at(
+                &Factor::new(Variable::Time, basis).held_within([0.0, 1000.0]),
+                0.0,
+                [0.0, 0.0, 9000.0],
+            )
+            .1
+        };
         assert_eq!(share(Basis::After { at: 500.0 }), 0.0);
-        assert!((share(Basis::Settling { start: 0.0, constant: 200.0 }) - (-5.0f64).exp()).abs() < 1e-12);
-        assert!(share(Basis::Settling { start: 0.0, constant: 2000.0 }) > 0.6);
+        assert!(
+            (share(Basis::Settling {
+                start: 0.0,
+                constant: 200.0
+            }) - (-5.0f64).exp())
+            .abs()
+                < 1e-12
+        );
+        assert!(
+            share(Basis::Settling {
+                start: 0.0,
+                constant: 2000.0
+            }) > 0.6
+        );
         let drift = Factor::new(Variable::Time, Basis::PROPORTIONAL).held_within([0.0, 1000.0]);
         let long_after = |factor: &Factor| at(factor, 0.0, [0.0, 0.0, f64::INFINITY]);
-        assert_eq!(long_after(&drift), (at(&drift, 0.0, [0.0, 0.0, 1000.0]).0, 1.0));
+        assert_eq!(
+            long_after(&drift),
+            (at(&drift, 0.0, [0.0, 0.0, 1000.0]).0, 1.0)
+        );
         let limit = |basis: Basis| long_after(&Factor::new(Variable::Time, basis)).0;
         assert_eq!(limit(Basis::After { at: 500.0 }), 1.0);
-        assert_eq!(limit(Basis::Settling { start: 0.0, constant: 200.0 }), 1.0);
+        assert_eq!(
+            limit(Basis::Settling {
+                start: 0.0,
+                constant: 200.0
+            }),
+            1.0
+        );
         assert_eq!(limit(Basis::PROPORTIONAL), 0.0, "without a limit");
     }
 }

@@ -4,8 +4,8 @@ use super::basis::around;
 use super::motion::{SHORT, extent};
 use super::warmth::Warmth;
 use super::{
-    Axes, AxisPoint, Basis, Cause, Factor, Hypothesis, Law, Motion, NumberSpec, Polar, Survey, Term, Variable, change, figure,
-    lost_motion, orders, warmth,
+    Axes, AxisPoint, Basis, Cause, Factor, Hypothesis, Law, Motion, NumberSpec, Polar, Survey,
+    Term, Variable, change, figure, lost_motion, orders, warmth,
 };
 use crate::criteria::effect::{RARE, RARER};
 use crate::robot::RobotModel;
@@ -169,10 +169,20 @@ impl LawRow {
                 factor => factor.flatten(),
             };
             for (law, tried, rare) in self.follows.laws(motion, joint, survey) {
-                let law = Law { times: factor, ..law };
-                let hypothesis = Hypothesis::new(Term::new(cause, motion, law), tried * (self.tried)());
-                let hypothesis = hypothesis.penalised((self.rarity)() + rarer + rare).within(self.largest);
-                out.push(if self.positive { hypothesis.positive() } else { hypothesis });
+                let law = Law {
+                    times: factor,
+                    ..law
+                };
+                let hypothesis =
+                    Hypothesis::new(Term::new(cause, motion, law), tried * (self.tried)());
+                let hypothesis = hypothesis
+                    .penalised((self.rarity)() + rarer + rare)
+                    .within(self.largest);
+                out.push(if self.positive {
+                    hypothesis.positive()
+                } else {
+                    hypothesis
+                });
             }
         }
         out
@@ -192,20 +202,32 @@ impl LawRow {
         match (term.motion(), self.follows) {
             (Motion::Axis { about, .. }, _) => {
                 let names = ["a_sin", "a_cos", "b_sin", "b_cos"].into_iter().enumerate();
-                names.filter(|(k, _)| about.is_none_or(|about| about == k / 2)).map(|(_, name)| named(name.into())).collect()
+                names
+                    .filter(|(k, _)| about.is_none_or(|about| about == k / 2))
+                    .map(|(_, name)| named(name.into()))
+                    .collect()
             }
             (_, Follows::Waves(..) | Follows::HalfWaves(_)) => {
-                let names = ["sin", "cos", "sin_overtone", "cos_overtone"].into_iter().take(term.basis().count());
+                let names = ["sin", "cos", "sin_overtone", "cos_overtone"]
+                    .into_iter()
+                    .take(term.basis().count());
                 names.map(|name| named(name.into())).collect()
             }
             (Motion::Base { .. } | Motion::Tool { .. } | Motion::Tracker { .. }, Follows::Slow) => {
-                (1..=term.law().count()).flat_map(|k| term.motion().frame_numbers(move |name| format!("{name}_cos{k}"))).collect()
+                (1..=term.law().count())
+                    .flat_map(|k| {
+                        term.motion()
+                            .frame_numbers(move |name| format!("{name}_cos{k}"))
+                    })
+                    .collect()
             }
             (Motion::Base { .. } | Motion::Tool { .. } | Motion::Tracker { .. }, _) => {
                 term.motion().frame_numbers(str::to_string)
             }
             (_, Follows::Warmth(kinds)) => {
-                let kind = kinds.iter().find(|kind| kind.is(term.law().first.of, term.basis()));
+                let kind = kinds
+                    .iter()
+                    .find(|kind| kind.is(term.law().first.of, term.basis()));
                 vec![named(kind.map_or("", |kind| kind.number()).into())]
             }
             _ => vec![named(self.number.into())],
@@ -216,9 +238,12 @@ impl LawRow {
         match (motion, self.times, self.follows) {
             (Motion::Joint { .. }, Some(Times::Load), _) => Unit::RadianPerNewtonMetre,
             (Motion::Joint { .. }, Some(Times::Angle), _) => Unit::One,
-            (Motion::Joint { .. }, _, Follows::Velocity) if motion.unit(robot) == Unit::Radian => Unit::RadianPerRadianPerSecond,
+            (Motion::Joint { .. }, _, Follows::Velocity) if motion.unit(robot) == Unit::Radian => {
+                Unit::RadianPerRadianPerSecond
+            }
             (Motion::Joint { .. }, _, Follows::Velocity) => Unit::Second,
-            (Motion::Coupled { .. } | Motion::Links { .. }, ..) | (Motion::Instrument { .. }, Some(Times::Range), _) => Unit::One,
+            (Motion::Coupled { .. } | Motion::Links { .. }, ..)
+            | (Motion::Instrument { .. }, Some(Times::Range), _) => Unit::One,
             _ => motion.unit(robot),
         }
     }
@@ -228,9 +253,17 @@ impl LawRow {
         if !self.variant.is_empty() {
             return self.variant.into();
         }
-        let Some(order) = orders::order(term.basis()) else { return String::new() };
+        let Some(order) = orders::order(term.basis()) else {
+            return String::new();
+        };
         let rest = match (term.basis(), term.motion()) {
-            (Basis::Wave { order, overtone: true }, _) => format!("_{}", 2 * order),
+            (
+                Basis::Wave {
+                    order,
+                    overtone: true,
+                },
+                _,
+            ) => format!("_{}", 2 * order),
             (_, Motion::Axis { turning: false, .. }) => "_fixed".into(),
             _ => String::new(),
         };
@@ -238,11 +271,25 @@ impl LawRow {
     }
 
     /// Why a term of it with coefficients `p` cannot be its cause: see [`Placed::impossible`](super::Placed::impossible).
-    pub(super) fn impossible(&self, term: &Term, p: &[f64], error: &dyn Fn(usize) -> f64, survey: &Survey) -> Option<String> {
+    pub(super) fn impossible(
+        &self,
+        term: &Term,
+        p: &[f64],
+        error: &dyn Fn(usize) -> f64,
+        survey: &Survey,
+    ) -> Option<String> {
         let value = *p.first()?;
         let beyond = self.limit.and_then(|Limit { most, of, negative }| {
-            let per = if matches!(term.basis(), Basis::Settling { .. }) { "in all" } else { "for each kelvin" };
-            let size = if negative.is_some() { value } else { value.abs() };
+            let per = if matches!(term.basis(), Basis::Settling { .. }) {
+                "in all"
+            } else {
+                "for each kelvin"
+            };
+            let size = if negative.is_some() {
+                value
+            } else {
+                value.abs()
+            };
             match negative {
                 Some(why) if value < -error(0) => Some(why.to_string()),
                 _ => (size > most).then(|| {
@@ -263,13 +310,30 @@ impl LawRow {
 pub(super) fn near(term: &Term, survey: &Survey, level: i32) -> Vec<Term> {
     match (term.law().first.of, term.basis()) {
         (Variable::Time, Basis::After { .. }) => change::near(term, survey),
-        (_, Basis::Power { start, end, exponent }) => {
+        (
+            _,
+            Basis::Power {
+                start,
+                end,
+                exponent,
+            },
+        ) => {
             let exponents = around(exponent, 1.5, 0.7, level, POWERS);
-            term.with_bases(exponents.map(|exponent| Basis::Power { start, end, exponent }))
+            term.with_bases(exponents.map(|exponent| Basis::Power {
+                start,
+                end,
+                exponent,
+            }))
         }
         (Variable::Push { .. }, _) => lost_motion::near(term, survey, level),
         (Variable::Slip { .. }, _) => lost_motion::near_slip(term, level),
-        (Variable::Angle { .. }, Basis::Wave { overtone: false, .. } | Basis::Sway { .. }) => orders::near(term, survey, level),
+        (
+            Variable::Angle { .. },
+            Basis::Wave {
+                overtone: false, ..
+            }
+            | Basis::Sway { .. },
+        ) => orders::near(term, survey, level),
         _ => warmth::near(term, survey, level),
     }
 }
@@ -278,33 +342,45 @@ impl At {
     /// The motions, each with its joint, and how much rarer it is than others.
     fn motions(self, survey: &Survey) -> Vec<(Motion, Option<usize>, f64)> {
         let n = survey.joints();
-        let all = |axes: &[Axes], of: fn(Axes) -> Motion| axes.iter().map(|axes| (of(*axes), None, 0.0)).collect();
+        let all = |axes: &[Axes], of: fn(Axes) -> Motion| {
+            axes.iter().map(|axes| (of(*axes), None, 0.0)).collect()
+        };
         let joint = |joint| (Motion::Joint { joint }, Some(joint), 0.0);
         match self {
             Self::Joints => survey.revolute().map(joint).collect(),
             Self::AllJoints => (0..n).map(joint).collect(),
-            Self::Axes => survey.revolute().filter(|joint| joint + 1 < n).flat_map(|joint| tilts(joint, survey)).collect(),
+            Self::Axes => survey
+                .revolute()
+                .filter(|joint| joint + 1 < n)
+                .flat_map(|joint| tilts(joint, survey))
+                .collect(),
             Self::Pairs => {
                 let couplings = &survey.robot.description().couplings;
                 let declared = |by, moved| couplings.iter().any(|c| c.by == by && c.moved == moved);
                 let pairs = (0..n).flat_map(|by| (0..n).map(move |moved| (by, moved)));
                 let pairs = pairs.filter(|(by, moved)| by != moved && !declared(*by, *moved));
                 let rarer = |by: usize, moved| if by.abs_diff(moved) == 1 { 0.0 } else { *RARER };
-                pairs.map(|(by, moved)| (Motion::Coupled { by, moved }, Some(by), rarer(by, moved))).collect()
+                pairs
+                    .map(|(by, moved)| (Motion::Coupled { by, moved }, Some(by), rarer(by, moved)))
+                    .collect()
             }
             Self::Runs => {
                 let long = |link: usize| extent(survey.robot, link).norm() > SHORT;
-                let runs = (0..n - 1).flat_map(|first| (first..n - 1).map(move |last| (first, last)));
+                let runs =
+                    (0..n - 1).flat_map(|first| (first..n - 1).map(move |last| (first, last)));
                 let runs = runs.filter(|(first, last)| long(*first) && long(*last));
-                runs.map(|(first, last)| (Motion::Links { first, last }, None, 0.0)).collect()
+                runs.map(|(first, last)| (Motion::Links { first, last }, None, 0.0))
+                    .collect()
             }
             Self::Base(axes) => all(axes, |axes| Motion::Base { axes }),
             Self::Tool => all(&[Axes::Place], |axes| Motion::Tool { axes }),
             Self::Tracker(_) if survey.length() <= 0.0 => Vec::new(),
             Self::Tracker(axes) => all(axes, |axes| Motion::Tracker { axes }),
-            Self::Reading(of) => {
-                survey.seen_from_outside().then_some((Motion::Instrument { of }, None, 0.0)).into_iter().collect()
-            }
+            Self::Reading(of) => survey
+                .seen_from_outside()
+                .then_some((Motion::Instrument { of }, None, 0.0))
+                .into_iter()
+                .collect(),
         }
     }
 
@@ -326,12 +402,33 @@ impl At {
 /// Tilts of the axis of a joint: about its own point, or rarely about those nearest to its neighbours.
 fn tilts(joint: usize, survey: &Survey) -> Vec<(Motion, Option<usize>, f64)> {
     let own = survey.robot.point(joint);
-    let far = |at: &AxisPoint| *at == AxisPoint::Own || (at.of(survey.robot, joint) - own).norm() > NEAR;
-    let points = [AxisPoint::Own, AxisPoint::Next, AxisPoint::Before].into_iter().filter(far);
+    let far =
+        |at: &AxisPoint| *at == AxisPoint::Own || (at.of(survey.robot, joint) - own).norm() > NEAR;
+    let points = [AxisPoint::Own, AxisPoint::Next, AxisPoint::Before]
+        .into_iter()
+        .filter(far);
     let ways = points.flat_map(|at| [true, false].map(|turning| (at, turning)));
-    let all =
-        ways.flat_map(|(at, turning)| [None, Some(0), Some(1)].map(|about| (at, Motion::Axis { joint, about, turning, at })));
-    all.map(|(at, motion)| (motion, Some(joint), if at == AxisPoint::Own { 0.0 } else { *RARE })).collect()
+    let all = ways.flat_map(|(at, turning)| {
+        [None, Some(0), Some(1)].map(|about| {
+            (
+                at,
+                Motion::Axis {
+                    joint,
+                    about,
+                    turning,
+                    at,
+                },
+            )
+        })
+    });
+    all.map(|(at, motion)| {
+        (
+            motion,
+            Some(joint),
+            if at == AxisPoint::Own { 0.0 } else { *RARE },
+        )
+    })
+    .collect()
 }
 
 impl Follows {
@@ -341,7 +438,9 @@ impl Follows {
         let [start, end] = survey.time;
         match (self, joint) {
             (Self::Waves(turning, [from, to], overtone), joint) => {
-                let Some(of) = turning.variable(joint, survey) else { return Vec::new() };
+                let Some(of) = turning.variable(joint, survey) else {
+                    return Vec::new();
+                };
                 // An axis tilts whether its joint travels far or not.
                 let is_seen = |order: &u32| match (motion, of) {
                     (Motion::Joint { .. }, Variable::Angle { joint }) => {
@@ -350,12 +449,22 @@ impl Follows {
                     _ => true,
                 };
                 let law = |order| Law::new(of, Basis::Wave { order, overtone });
-                (from..=to).filter(is_seen).map(|order| (law(order), 1, 0.0)).collect()
+                (from..=to)
+                    .filter(is_seen)
+                    .map(|order| (law(order), 1, 0.0))
+                    .collect()
             }
             (Self::HalfWaves(below), Some(joint)) => {
                 let halves = (1..below).map(|order| f64::from(order) + 0.5);
                 let seen = halves.filter(|order| orders::is_within(*order, survey.travel(joint)));
-                seen.map(|order| (Law::new(Variable::Angle { joint }, orders::of_order(order)), 1, 0.0)).collect()
+                seen.map(|order| {
+                    (
+                        Law::new(Variable::Angle { joint }, orders::of_order(order)),
+                        1,
+                        0.0,
+                    )
+                })
+                .collect()
             }
             (Self::Approach, Some(joint)) if survey.both_directions(joint) => {
                 of(Variable::Approach { joint }, Basis::PROPORTIONAL)
@@ -365,17 +474,49 @@ impl Follows {
             (Self::Slip, Some(joint)) => lost_motion::slip(joint, survey),
             (Self::Angle, Some(joint)) => of(Variable::Angle { joint }, Basis::PROPORTIONAL),
             (Self::Velocity, Some(joint)) => {
-                let moves = survey.moves() && survey.rows.iter().any(|row| survey.data.velocity(*row, joint) != 0.0);
-                if moves { of(Variable::Velocity { joint }, Basis::Linear { zero: 0.0, per: -1.0 }) } else { Vec::new() }
+                let moves = survey.moves()
+                    && survey
+                        .rows
+                        .iter()
+                        .any(|row| survey.data.velocity(*row, joint) != 0.0);
+                if moves {
+                    of(
+                        Variable::Velocity { joint },
+                        Basis::Linear {
+                            zero: 0.0,
+                            per: -1.0,
+                        },
+                    )
+                } else {
+                    Vec::new()
+                }
             }
             // 1 at any range.
             (Self::Constant, _) => of(Variable::Range, Basis::After { at: 0.0 }),
-            (Self::Payload, _) if survey.payload_changes() => {
-                of(Variable::Payload, Basis::Linear { zero: 0.0, per: 2.0 * survey.heavy_payload() })
-            }
+            (Self::Payload, _) if survey.payload_changes() => of(
+                Variable::Payload,
+                Basis::Linear {
+                    zero: 0.0,
+                    per: 2.0 * survey.heavy_payload(),
+                },
+            ),
             (Self::Step, _) => change::laws(motion, survey),
-            (Self::Steady, _) => of(Variable::Time, Basis::Power { start, end, exponent: 1.0 }),
-            (Self::Slow, _) => of(Variable::Time, Basis::Cosines { low: start, high: end, count: SLOW }),
+            (Self::Steady, _) => of(
+                Variable::Time,
+                Basis::Power {
+                    start,
+                    end,
+                    exponent: 1.0,
+                },
+            ),
+            (Self::Slow, _) => of(
+                Variable::Time,
+                Basis::Cosines {
+                    low: start,
+                    high: end,
+                    count: SLOW,
+                },
+            ),
             (Self::Warmth(kinds), joint) => {
                 let laws = kinds.iter().flat_map(|kind| kind.laws(joint, survey));
                 laws.map(|(law, tried)| (law, tried, 0.0)).collect()
@@ -387,7 +528,8 @@ impl Follows {
     fn is(self, Factor { of, basis, .. }: Factor) -> bool {
         match self {
             Self::Waves(turning, _, overtone) => {
-                turning.is(of) && matches!(basis, Basis::Wave { overtone: own, .. } if own == overtone)
+                turning.is(of)
+                    && matches!(basis, Basis::Wave { overtone: own, .. } if own == overtone)
             }
             Self::HalfWaves(_) => Turning::Joint.is(of) && matches!(basis, Basis::Sway { .. }),
             Self::Approach => matches!(of, Variable::Approach { .. }),
@@ -434,13 +576,22 @@ impl Times {
     fn factor(self, joint: Option<usize>, survey: &Survey) -> Option<Factor> {
         let of = |of| Some(Factor::new(of, Basis::PROPORTIONAL));
         match (self, joint) {
-            (Self::Approach, Some(joint)) if survey.both_directions(joint) => of(Variable::Approach { joint }),
+            (Self::Approach, Some(joint)) if survey.both_directions(joint) => {
+                of(Variable::Approach { joint })
+            }
             (Self::Load, Some(joint)) if survey.is_loaded(joint) => of(Variable::Load { joint }),
             (Self::Angle, Some(joint)) => of(Variable::Angle { joint }),
             (Self::Range, _) => of(Variable::Range),
             (Self::Time, _) if survey.length() > 0.0 => {
                 let [start, end] = survey.time;
-                Some(Factor::new(Variable::Time, Basis::Creep { start, end, exponent: 1.0 }))
+                Some(Factor::new(
+                    Variable::Time,
+                    Basis::Creep {
+                        start,
+                        end,
+                        exponent: 1.0,
+                    },
+                ))
             }
             _ => None,
         }

@@ -2,7 +2,10 @@
 
 use super::form::placed;
 use super::spring::{MEASURE, Spring};
-use super::{ArmState, Cause, Deflection, Form, Hypothesis, NumberSpec, OwnMotion, Place, Placed, Survey, Variable, names};
+use super::{
+    ArmState, Cause, Deflection, Form, Hypothesis, NumberSpec, OwnMotion, Place, Placed, Survey,
+    Variable, names,
+};
 use crate::criteria::effect::RARE;
 use crate::robot::{LoadCorrection, RobotModel};
 use crate::units::Unit;
@@ -26,7 +29,11 @@ pub(super) static CAUSE: Cause = Cause {
     needs: "link masses and motor currents",
     sentence: "the mass or centre of {place} in the torque model is wrong",
     measure: Some(MEASURE),
-    motion: Some(OwnMotion { propose, sentence: None, read: Form::kept::<WrongLinkMass> }),
+    motion: Some(OwnMotion {
+        propose,
+        sentence: None,
+        read: Form::kept::<WrongLinkMass>,
+    }),
     ..Cause::PLAIN
 };
 
@@ -39,7 +46,10 @@ fn propose(survey: &Survey) -> Vec<Hypothesis> {
     let forms = links.flat_map(|link| [false, true].map(|centre| WrongLinkMass { link, centre }));
     // What is off by more than half of a link is no error of its mass.
     let half = |form: &WrongLinkMass| 0.5 * body(&form.link).mass.unwrap_or(f64::INFINITY);
-    forms.map(|form| (half(&form), form)).map(|(half, form)| Hypothesis::new(form, 2).penalised(*RARE).within(half)).collect()
+    forms
+        .map(|form| (half(&form), form))
+        .map(|(half, form)| Hypothesis::new(form, 2).penalised(*RARE).within(half))
+        .collect()
 }
 
 impl Placed for WrongLinkMass {
@@ -48,12 +58,18 @@ impl Placed for WrongLinkMass {
     fn numbers(&self, _robot: &RobotModel) -> Vec<NumberSpec> {
         let mass = ("mass".into(), Unit::Kilogram, 1e4);
         let moments = ["x", "y", "z"].map(|axis| (axis.into(), Unit::KilogramMetre, 1e4));
-        std::iter::once(mass).chain(moments.into_iter().filter(|_| self.centre)).collect()
+        std::iter::once(mass)
+            .chain(moments.into_iter().filter(|_| self.centre))
+            .collect()
     }
 
     fn deflect(&self, robot: &RobotModel, state: &ArmState, _p: &[f64], out: &mut Deflection) {
         for joint in 0..=self.link {
-            out.load(0, joint, state.posture.torque_of_mass(robot, joint, self.link));
+            out.load(
+                0,
+                joint,
+                state.posture.torque_of_mass(robot, joint, self.link),
+            );
             if self.centre {
                 let torque = state.posture.torque_of_moment(robot, joint, self.link);
                 for axis in 0..3 {
@@ -75,7 +91,11 @@ impl Placed for WrongLinkMass {
     }
 
     fn identities(&self, _called: &str) -> Vec<(&'static str, Place)> {
-        if Spring::balances(self.link) { vec![(names::COUNTERBALANCE, Place::Joint(self.link))] } else { Vec::new() }
+        if Spring::balances(self.link) {
+            vec![(names::COUNTERBALANCE, Place::Joint(self.link))]
+        } else {
+            Vec::new()
+        }
     }
 
     fn is_of_torque_model(&self) -> bool {

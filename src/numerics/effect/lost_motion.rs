@@ -25,7 +25,9 @@ pub(super) fn by_load(joint: usize, survey: &Survey) -> RatedLaws {
         return Vec::new();
     }
     let law = |width| Law::new(Variable::Load { joint }, Basis::Rise { centre: 0.0, width });
-    [1e-9, 0.03, 0.08].map(|share| (law(share * survey.load(joint)), 3, otherwise(joint, survey))).into()
+    [1e-9, 0.03, 0.08]
+        .map(|share| (law(share * survey.load(joint)), 3, otherwise(joint, survey)))
+        .into()
 }
 
 /// Friction of so many Nm decides under smaller loads, larger ones push the joint to their side; blurred over some torque.
@@ -36,18 +38,28 @@ pub(super) fn mixed(joint: usize, survey: &Survey) -> RatedLaws {
     }
     let mut loads: Vec<f64> = survey.torques(joint).map(f64::abs).collect();
     loads.sort_by(f64::total_cmp);
-    let shares = [0.05, 0.15, 0.3, 0.5].map(|share| loads[((loads.len() - 1) as f64 * share) as usize]);
+    let shares =
+        [0.05, 0.15, 0.3, 0.5].map(|share| loads[((loads.len() - 1) as f64 * share) as usize]);
     let tried = shares.map(|friction| (friction, *BENDS * BLURS.len(), otherwise(joint, survey)));
     let known = known(joint, survey).map(|friction| (friction, BLURS.len(), 0.0));
-    let laws = known.into_iter().chain(tried).flat_map(|(friction, tried, rare)| {
-        let of = move |friction: f64| BLURS.map(|blur| (pushed(joint, friction, blur * friction.abs()), tried, rare));
-        [friction, -friction].into_iter().flat_map(of)
-    });
+    let laws = known
+        .into_iter()
+        .chain(tried)
+        .flat_map(|(friction, tried, rare)| {
+            let of = move |friction: f64| {
+                BLURS.map(|blur| (pushed(joint, friction, blur * friction.abs()), tried, rare))
+            };
+            [friction, -friction].into_iter().flat_map(of)
+        });
     laws.collect()
 }
 
 fn pushed(joint: usize, friction_nm: f64, width: f64) -> Law {
-    let basis = if width > 0.0 { Basis::Rise { centre: 0.0, width } } else { Basis::Sign };
+    let basis = if width > 0.0 {
+        Basis::Rise { centre: 0.0, width }
+    } else {
+        Basis::Sign
+    };
     Law::new(Variable::Push { joint, friction_nm }, basis)
 }
 
@@ -59,32 +71,57 @@ fn known(joint: usize, survey: &Survey) -> Option<f64> {
 
 /// How much rarer another friction is than a known one.
 fn otherwise(joint: usize, survey: &Survey) -> f64 {
-    if survey.both_directions(joint) && known(joint, survey).is_some() { *RARE } else { 0.0 }
+    if survey.both_directions(joint) && known(joint, survey).is_some() {
+        *RARE
+    } else {
+        0.0
+    }
 }
 
 /// Other thresholds and blurs.
 pub(super) fn near(term: &Term, survey: &Survey, level: i32) -> Vec<Term> {
-    let Variable::Push { joint, friction_nm } = term.law().first.of else { return Vec::new() };
-    let width = if let Basis::Rise { width, .. } = term.basis() { width } else { 0.0 };
+    let Variable::Push { joint, friction_nm } = term.law().first.of else {
+        return Vec::new();
+    };
+    let width = if let Basis::Rise { width, .. } = term.basis() {
+        width
+    } else {
+        0.0
+    };
     if known(joint, survey) == Some(friction_nm.abs()) {
         return Vec::new();
     }
     let bounds = THRESHOLDS.map(|share| share * survey.load(joint));
     let scaled = |value: f64| {
-        let sizes = [1.6, 1.25].into_iter().flat_map(move |first| around(value.abs(), first, 0.5, level, bounds));
+        let sizes = [1.6, 1.25]
+            .into_iter()
+            .flat_map(move |first| around(value.abs(), first, 0.5, level, bounds));
         sizes.map(move |size| libm::copysign(size, value))
     };
-    let wider = scaled(width).filter(|_| width > 0.0).map(|width| pushed(joint, friction_nm, width));
-    scaled(friction_nm).map(|friction_nm| pushed(joint, friction_nm, width)).chain(wider).map(|law| term.with(law)).collect()
+    let wider = scaled(width)
+        .filter(|_| width > 0.0)
+        .map(|width| pushed(joint, friction_nm, width));
+    scaled(friction_nm)
+        .map(|friction_nm| pushed(joint, friction_nm, width))
+        .chain(wider)
+        .map(|law| term.with(law))
+        .collect()
 }
 
 /// Why no play is as a term with a half-gap has it: a threshold that no load reached, or a gap below nothing.
-pub(super) fn impossible(term: &Term, half_gap: f64, error: f64, survey: &Survey) -> Option<String> {
+pub(super) fn impossible(
+    term: &Term,
+    half_gap: f64,
+    error: f64,
+    survey: &Survey,
+) -> Option<String> {
     if let Variable::Push { joint, friction_nm } = term.law().first.of {
         let most = survey.recorded_load(joint);
         let [friction, largest] = [friction_nm.abs(), most].map(|torque| figure(torque, 0));
         if friction_nm.abs() > most {
-            return Some(format!("its threshold of {friction} Nm lies beyond the largest recorded load of {largest} Nm"));
+            return Some(format!(
+                "its threshold of {friction} Nm lies beyond the largest recorded load of {largest} Nm"
+            ));
         }
     }
     (half_gap < -error).then(|| "its gap is negative".into())
@@ -93,16 +130,37 @@ pub(super) fn impossible(term: &Term, half_gap: f64, error: f64, survey: &Survey
 /// Pre-sliding over travels that some moves are shorter than.
 pub(super) fn slip(joint: usize, survey: &Survey) -> RatedLaws {
     let shortly = |travel: &f64| {
-        let moves = survey.rows.iter().map(|row| survey.data.last_move(*row, joint).abs());
-        moves.filter(|moved| *moved > 0.0 && *moved < SHORT * travel).take(ROWS).count() == ROWS
+        let moves = survey
+            .rows
+            .iter()
+            .map(|row| survey.data.last_move(*row, joint).abs());
+        moves
+            .filter(|moved| *moved > 0.0 && *moved < SHORT * travel)
+            .take(ROWS)
+            .count()
+            == ROWS
     };
-    let travels = TRAVELS.into_iter().filter(|travel| survey.both_directions(joint) && shortly(travel));
-    travels.map(|travel| (Law::of(Variable::Slip { joint, travel }), TRAVELS.len(), 0.0)).collect()
+    let travels = TRAVELS
+        .into_iter()
+        .filter(|travel| survey.both_directions(joint) && shortly(travel));
+    travels
+        .map(|travel| {
+            (
+                Law::of(Variable::Slip { joint, travel }),
+                TRAVELS.len(),
+                0.0,
+            )
+        })
+        .collect()
 }
 
 /// Other travels.
 pub(super) fn near_slip(term: &Term, level: i32) -> Vec<Term> {
-    let Variable::Slip { joint, travel } = term.law().first.of else { return Vec::new() };
+    let Variable::Slip { joint, travel } = term.law().first.of else {
+        return Vec::new();
+    };
     let travels = around(travel, 1.6, 0.5, level, BOUNDS);
-    travels.map(|travel| term.with(Law::of(Variable::Slip { joint, travel }))).collect()
+    travels
+        .map(|travel| term.with(Law::of(Variable::Slip { joint, travel })))
+        .collect()
 }

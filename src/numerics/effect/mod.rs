@@ -53,7 +53,9 @@ pub use base_frame::BasePlacement;
 pub use basis::Basis;
 pub use cause::{ArmEffectOf, Cause, Measure, OwnMotion, arm_effect, cause, identified};
 pub use change::moved_with_the_payload;
-pub use declared::{DeclarationFault, DeclaredCause, DeclaredForm, EffectDeclaration, Laws, ShapeRange, Starts};
+pub use declared::{
+    DeclarationFault, DeclaredCause, DeclaredForm, EffectDeclaration, Laws, ShapeRange, Starts,
+};
 pub use deflection::{BeyondRange, Deflection, Direction};
 pub use form::{Form, NumberSpec, Placed};
 pub use holder::turned_holder;
@@ -109,8 +111,19 @@ pub struct ArmState<'a> {
 }
 
 impl<'a> ArmState<'a> {
-    pub(crate) fn new(data: &'a Measurements, row: usize, posture: &'a Posture, point: Vector3<f64>) -> Self {
-        Self { data, row, q: data.q(row), posture, point }
+    pub(crate) fn new(
+        data: &'a Measurements,
+        row: usize,
+        posture: &'a Posture,
+        point: Vector3<f64>,
+    ) -> Self {
+        Self {
+            data,
+            row,
+            q: data.q(row),
+            posture,
+            point,
+        }
     }
 
     /// The target as the instrument sees it.
@@ -179,7 +192,9 @@ impl<'a> ArmState<'a> {
     /// The largest of the moves of all joints that turn from the stop before, rad.
     pub fn largest_turn(&self, robot: &RobotModel) -> f64 {
         let turns = (0..robot.joints()).filter(|joint| robot.is_revolute(*joint));
-        turns.map(|joint| self.last_move(joint).abs()).fold(0.0, f64::max)
+        turns
+            .map(|joint| self.last_move(joint).abs())
+            .fold(0.0, f64::max)
     }
 
     /// Velocity of a joint, rad/s or m/s; 0 where the arm stood.
@@ -246,7 +261,9 @@ impl Load {
 
     /// The load to which a compliance of this unit belongs.
     pub fn of_compliance(unit: Unit) -> Option<Self> {
-        [Self::GravityTorque, Self::MotorCurrent].into_iter().find(|load| load.unit_of_compliance() == unit)
+        [Self::GravityTorque, Self::MotorCurrent]
+            .into_iter()
+            .find(|load| load.unit_of_compliance() == unit)
     }
 }
 

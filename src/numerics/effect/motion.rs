@@ -102,7 +102,9 @@ impl AxisPoint {
             Self::Own => *own,
             Self::Next if joint + 1 < robot.joints() => *robot.point(joint + 1),
             Self::Next => robot.home().translation,
-            Self::Before => joint.checked_sub(1).map_or(*own, |before| *robot.point(before)),
+            Self::Before => joint
+                .checked_sub(1)
+                .map_or(*own, |before| *robot.point(before)),
         };
         own + axis * axis.dot(&(other - own))
     }
@@ -154,7 +156,9 @@ impl Motion {
     /// Where it acts.
     pub fn place(&self) -> Place {
         match *self {
-            Self::Joint { joint } | Self::Axis { joint, .. } | Self::Slide { joint, .. } => Place::Joint(joint),
+            Self::Joint { joint } | Self::Axis { joint, .. } | Self::Slide { joint, .. } => {
+                Place::Joint(joint)
+            }
             Self::Bend { link } => Place::Links(link, link),
             Self::Coupled { by, moved } => Place::Coupled(by, moved),
             Self::Links { first, last } => Place::Links(first, last),
@@ -175,8 +179,16 @@ impl Motion {
     /// The unit of a travel of the joint that moves; of a frame, of its displacement.
     pub(super) fn unit(&self, robot: &RobotModel) -> Unit {
         match *self {
-            Self::Joint { joint } | Self::Coupled { moved: joint, .. } if robot.is_revolute(joint) => Unit::Radian,
-            Self::Axis { .. } | Self::Bend { .. } | Self::Instrument { of: Polar::Azimuth | Polar::Elevation } => Unit::Radian,
+            Self::Joint { joint } | Self::Coupled { moved: joint, .. }
+                if robot.is_revolute(joint) =>
+            {
+                Unit::Radian
+            }
+            Self::Axis { .. }
+            | Self::Bend { .. }
+            | Self::Instrument {
+                of: Polar::Azimuth | Polar::Elevation,
+            } => Unit::Radian,
             _ => Unit::Millimetre,
         }
     }
@@ -184,9 +196,11 @@ impl Motion {
     /// Coefficients of a frame's motion, under names made of those of its axes.
     pub(super) fn frame_numbers(&self, name: impl Fn(&str) -> String) -> Vec<NumberSpec> {
         match self {
-            Self::Base { axes } | Self::Tracker { axes } | Self::Tool { axes } => {
-                axes.numbers().iter().map(|(axis, unit, sigma)| (name(axis), *unit, *sigma)).collect()
-            }
+            Self::Base { axes } | Self::Tracker { axes } | Self::Tool { axes } => axes
+                .numbers()
+                .iter()
+                .map(|(axis, unit, sigma)| (name(axis), *unit, *sigma))
+                .collect(),
             _ => Vec::new(),
         }
     }
@@ -202,21 +216,40 @@ impl Motion {
         out: &mut Deflection,
     ) {
         match *self {
-            Self::Joint { joint } | Self::Coupled { moved: joint, .. } => out.turn(k, p, joint, value),
-            Self::Axis { joint, about, turning, at } => {
+            Self::Joint { joint } | Self::Coupled { moved: joint, .. } => {
+                out.turn(k, p, joint, value)
+            }
+            Self::Axis {
+                joint,
+                about,
+                turning,
+                at,
+            } => {
                 let normals = robot.normals(joint).iter().enumerate();
-                let (station, point) = (if turning { joint + 1 } else { joint }, at.of(robot, joint));
-                let chosen = normals.filter(|(axis, _)| about.is_none_or(|about| about == *axis)).map(|(_, normal)| normal);
+                let (station, point) =
+                    (if turning { joint + 1 } else { joint }, at.of(robot, joint));
+                let chosen = normals
+                    .filter(|(axis, _)| about.is_none_or(|about| about == *axis))
+                    .map(|(_, normal)| normal);
                 for (i, (_, normal)) in chosen.enumerate() {
                     out.shift(count * i + k, p, station, screw(normal, &point) * value);
                 }
             }
             Self::Slide { joint, along } => {
                 let axis = along.then(|| robot.axis(joint));
-                let across = robot.normals(joint).iter().filter(|_| !along).map(|(_, normal)| normal);
+                let across = robot
+                    .normals(joint)
+                    .iter()
+                    .filter(|_| !along)
+                    .map(|(_, normal)| normal);
                 for (i, direction) in axis.into_iter().chain(across).enumerate() {
                     let moved = direction * value;
-                    out.shift(count * i + k, p, joint, Twist::new(moved.x, moved.y, moved.z, 0.0, 0.0, 0.0));
+                    out.shift(
+                        count * i + k,
+                        p,
+                        joint,
+                        Twist::new(moved.x, moved.y, moved.z, 0.0, 0.0, 0.0),
+                    );
                 }
             }
             Self::Bend { link } => {
@@ -232,7 +265,12 @@ impl Motion {
             Self::Links { first, last } => {
                 for link in first..=last {
                     let growth = extent(robot, link) * value;
-                    out.shift(k, p, link + 1, Twist::new(growth.x, growth.y, growth.z, 0.0, 0.0, 0.0));
+                    out.shift(
+                        k,
+                        p,
+                        link + 1,
+                        Twist::new(growth.x, growth.y, growth.z, 0.0, 0.0, 0.0),
+                    );
                 }
             }
             Self::Base { axes } | Self::Tracker { axes } => shift(0, axes, k, value, p, out),
@@ -251,7 +289,11 @@ fn shift(station: usize, axes: Axes, k: usize, value: f64, p: &[f64], out: &mut 
 
 /// From the point of a link's joint to that of the next one, m, zero pose; the last link ends at the tool.
 pub(super) fn extent(robot: &RobotModel, link: usize) -> Vector3<f64> {
-    let end = if link + 1 < robot.joints() { *robot.point(link + 1) } else { robot.home().translation };
+    let end = if link + 1 < robot.joints() {
+        *robot.point(link + 1)
+    } else {
+        robot.home().translation
+    };
     end - robot.point(link)
 }
 

@@ -10,9 +10,14 @@ const PHASE: f64 = 2.2;
 pub(super) fn of_order(order: f64) -> Basis {
     let whole = order.round();
     if (order - whole).abs() < 1e-9 && whole >= 1.0 {
-        Basis::Wave { order: whole as u32, overtone: false }
+        Basis::Wave {
+            order: whole as u32,
+            overtone: false,
+        }
     } else {
-        Basis::Sway { period: TAU / order }
+        Basis::Sway {
+            period: TAU / order,
+        }
     }
 }
 
@@ -32,15 +37,22 @@ pub(super) fn is_within(order: f64, travel: f64) -> bool {
 
 /// An order in the name of a parameter, which has no points.
 pub(super) fn in_name(order: f64) -> String {
-    format!("{:.3}", order).trim_end_matches('0').trim_end_matches('.').replace('.', "_")
+    format!("{:.3}", order)
+        .trim_end_matches('0')
+        .trim_end_matches('.')
+        .replace('.', "_")
 }
 
 /// Orders between those of a wave of a joint's angle: a gear stage need not be in phase with its joint.
 pub(super) fn near(term: &Term, survey: &Survey, level: i32) -> Vec<Term> {
-    let (Motion::Joint { joint }, None, Some(order)) = (term.motion(), term.law().times, order(term.basis())) else {
+    let (Motion::Joint { joint }, None, Some(order)) =
+        (term.motion(), term.law().times, order(term.basis()))
+    else {
         return Vec::new();
     };
     let step = 0.25 * libm::exp2(-f64::from(level));
-    let orders = [order - step, order + step].into_iter().filter(|order| is_within(*order, survey.travel(joint)));
+    let orders = [order - step, order + step]
+        .into_iter()
+        .filter(|order| is_within(*order, survey.travel(joint)));
     term.with_bases(orders.map(of_order))
 }

@@ -3,7 +3,8 @@
 use super::form::placed;
 use super::spring::MEASURE;
 use super::{
-    ArmState, Cause, Deflection, Form, Hypothesis, NumberSpec, OwnMotion, Place, Placed, Summary, Survey, Variable, figure, names,
+    ArmState, Cause, Deflection, Form, Hypothesis, NumberSpec, OwnMotion, Place, Placed, Summary,
+    Survey, Variable, figure, names,
 };
 use crate::criteria::effect::RARE;
 use crate::robot::{LoadCorrection, RobotModel};
@@ -31,18 +32,48 @@ pub(super) static CAUSE: Cause = Cause {
     confounded: "joint_hardening",
     needs: "rows with and without the payload",
     measure: Some(MEASURE),
-    motion: Some(OwnMotion { propose, sentence: Some(sentence), read: Form::kept::<WrongPayload> }),
+    motion: Some(OwnMotion {
+        propose,
+        sentence: Some(sentence),
+        read: Form::kept::<WrongPayload>,
+    }),
     ..Cause::PLAIN
 };
 
 fn propose(survey: &Survey) -> Vec<Hypothesis> {
     let yields = survey.compliance.iter().any(|compliance| *compliance > 0.0);
-    let forms = [false, true].into_iter().filter(|_| yields && survey.heavy_payload() > 0.0);
-    let mut out: Vec<Hypothesis> = forms.map(|centre| Hypothesis::new(WrongPayload { centre, tool: false }, 2)).collect();
+    let forms = [false, true]
+        .into_iter()
+        .filter(|_| yields && survey.heavy_payload() > 0.0);
+    let mut out: Vec<Hypothesis> = forms
+        .map(|centre| {
+            Hypothesis::new(
+                WrongPayload {
+                    centre,
+                    tool: false,
+                },
+                2,
+            )
+        })
+        .collect();
     // Without any mass of the links nothing says how much of a wind-up is the tool's.
-    let weighs = survey.robot.description().joints.iter().any(|joint| joint.mass.is_some());
+    let weighs = survey
+        .robot
+        .description()
+        .joints
+        .iter()
+        .any(|joint| joint.mass.is_some());
     if yields && weighs {
-        out.push(Hypothesis::new(WrongPayload { centre: false, tool: true }, 2).penalised(*RARE));
+        out.push(
+            Hypothesis::new(
+                WrongPayload {
+                    centre: false,
+                    tool: true,
+                },
+                2,
+            )
+            .penalised(*RARE),
+        );
     }
     out
 }
@@ -50,13 +81,23 @@ fn propose(survey: &Survey) -> Vec<Hypothesis> {
 fn sentence(summary: &Summary) -> String {
     match summary.parameters.first() {
         // A tool's mass is its only form that loads an arm without a payload.
-        Some(n) if summary.variables(names::PAYLOAD_ERROR).contains(&Variable::ArmLoad) => {
+        Some(n)
+            if summary
+                .variables(names::PAYLOAD_ERROR)
+                .contains(&Variable::ArmLoad) =>
+        {
             let how = if n.value < 0.0 { "less" } else { "more" };
-            format!("the tool weighs {} kg {how} than the robot file and the payload say", figure(n.value.abs(), 1))
+            format!(
+                "the tool weighs {} kg {how} than the robot file and the payload say",
+                figure(n.value.abs(), 1)
+            )
         }
         Some(n) => {
             let how = if n.value < 0.0 { "lighter" } else { "heavier" };
-            format!("the payload is {} % {how} than declared", figure(n.value.abs() * 100.0, 1))
+            format!(
+                "the payload is {} % {how} than declared",
+                figure(n.value.abs() * 100.0, 1)
+            )
         }
         None => "the payload is not what was declared".to_string(),
     }
@@ -68,18 +109,28 @@ impl Placed for WrongPayload {
     /// In shares of the declared payload, so that an empty flange stays empty.
     fn numbers(&self, robot: &RobotModel) -> Vec<NumberSpec> {
         if self.tool {
-            return vec![("tool_mass".into(), Unit::Kilogram, TOOL.max(robot.description().payload_mass))];
+            return vec![(
+                "tool_mass".into(),
+                Unit::Kilogram,
+                TOOL.max(robot.description().payload_mass),
+            )];
         }
         let mass = ("mass".into(), Unit::One, 1.0);
         let centre = ["x", "y", "z"].map(|axis| (axis.into(), Unit::Millimetre, 1.0));
-        std::iter::once(mass).chain(centre.into_iter().filter(|_| self.centre)).collect()
+        std::iter::once(mass)
+            .chain(centre.into_iter().filter(|_| self.centre))
+            .collect()
     }
 
     fn deflect(&self, robot: &RobotModel, state: &ArmState, _p: &[f64], out: &mut Deflection) {
         let last = robot.joints() - 1;
         for joint in 0..=last {
             let carried = if self.tool { 1.0 } else { state.payload() };
-            out.load(0, joint, state.posture.torque_of_payload(robot, joint) * carried);
+            out.load(
+                0,
+                joint,
+                state.posture.torque_of_payload(robot, joint) * carried,
+            );
             if self.centre {
                 let torque = state.posture.torque_of_moment(robot, joint, last) * state.payload();
                 for axis in 0..3 {

@@ -72,12 +72,25 @@ impl FromStr for Place {
             Some((by, moved)) => two(by, moved).map(|(by, moved)| Self::Coupled(by, moved)),
             None => one(numbers).map(Self::Joint),
         };
-        let whole = [Self::Base, Self::Tool, Self::Tracker, Self::Recording, Self::Anchor, Self::Arm];
+        let whole = [
+            Self::Base,
+            Self::Tool,
+            Self::Tracker,
+            Self::Recording,
+            Self::Anchor,
+            Self::Arm,
+        ];
         if let Some(place) = whole.into_iter().find(|place| place.to_string() == text) {
             return Ok(place);
         }
-        let words = || text.strip_prefix("joint ").map(|numbers| joints(numbers, "->"));
-        let words = words().or_else(|| text.strip_prefix("link ").map(|numbers| links(numbers, '-')));
+        let words = || {
+            text.strip_prefix("joint ")
+                .map(|numbers| joints(numbers, "->"))
+        };
+        let words = words().or_else(|| {
+            text.strip_prefix("link ")
+                .map(|numbers| links(numbers, '-'))
+        });
         let tag = || text.strip_prefix('j').map(|numbers| joints(numbers, "_j"));
         let tag = || tag().or_else(|| text.strip_prefix('l').map(|numbers| links(numbers, '_')));
         words.or_else(tag).flatten().ok_or(())
@@ -105,9 +118,24 @@ mod tests {
         ];
         for (place, words, tag) in all {
             assert_eq!((words.parse(), tag.parse()), (Ok(place), Ok(place)));
-            assert_eq!((place.to_string().as_str(), place.tag().as_str()), (words, tag));
+            assert_eq!(
+                (place.to_string().as_str(), place.tag().as_str()),
+                (words, tag)
+            );
         }
-        for text in ["", "joint", "joint 0", "j0", "j-1", "joint 2 ", "link 2->3", "Joint 2", "j2_3", "l2_l3", "elbow"] {
+        for text in [
+            "",
+            "joint",
+            "joint 0",
+            "j0",
+            "j-1",
+            "joint 2 ",
+            "link 2->3",
+            "Joint 2",
+            "j2_3",
+            "l2_l3",
+            "elbow",
+        ] {
             assert_eq!(text.parse::<Place>(), Err(()), "{text}");
         }
     }

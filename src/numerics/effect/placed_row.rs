@@ -70,7 +70,12 @@ pub(super) struct Station {
 
 impl Station {
     pub fn of(twist: &Twist) -> Self {
-        Self { twist: *twist, still: *twist == Twist::zeros(), motion: Pose::exp(twist), jacobian: left_jacobian(twist) }
+        Self {
+            twist: *twist,
+            still: *twist == Twist::zeros(),
+            motion: Pose::exp(twist),
+            jacobian: left_jacobian(twist),
+        }
     }
 }
 
@@ -88,14 +93,19 @@ pub struct PlacedRow<'a> {
 impl PlacedRow<'_> {
     /// The target's orientation.
     pub fn orientation(&self) -> Matrix3<f64> {
-        self.scratch.posture.behind[self.robot.joints()].rotation * self.robot.mounting(self.scratch.target).rotation
+        self.scratch.posture.behind[self.robot.joints()].rotation
+            * self.robot.mounting(self.scratch.target).rotation
     }
 
     /// From where an anchor is to the point, m. `None` where the robot knows no such anchor.
     pub fn from_anchor(&self, anchor: &str) -> Option<Vector3<f64>> {
         let setup = self.robot.setup();
         let anchor = setup.anchors.get(setup.anchor(anchor)?)?;
-        let Deflection { anchor: shift, reading, .. } = &self.scratch.deflection;
+        let Deflection {
+            anchor: shift,
+            reading,
+            ..
+        } = &self.scratch.deflection;
         // What the tracker misreads lengthens no wire.
         Some(self.point - reading - anchor.place - shift)
     }
@@ -116,7 +126,9 @@ impl PlacedRow<'_> {
         let behind = &self.scratch.posture.behind;
         let tool = behind[self.robot.joints()] * self.robot.tool_at(self.scratch.target);
         for (joint, velocity) in velocities.iter_mut().enumerate() {
-            *velocity = self.robot.velocity(joint, &behind[joint], &tool.translation);
+            *velocity = self
+                .robot
+                .velocity(joint, &behind[joint], &tool.translation);
         }
         tool
     }
@@ -124,9 +136,17 @@ impl PlacedRow<'_> {
     /// Derivatives of the point, m.
     pub fn partials(&mut self, mut emit: impl FnMut(usize, Vector3<f64>)) {
         self.scratch.velocities(self.robot, &self.point);
-        let PlacementBuffers { deflection, by_station, by_joint, .. } = &*self.scratch;
+        let PlacementBuffers {
+            deflection,
+            by_station,
+            by_joint,
+            ..
+        } = &*self.scratch;
         for (parameter, direction) in &deflection.partials {
-            emit(*parameter, along(direction, by_joint, by_station, &deflection.compliance));
+            emit(
+                *parameter,
+                along(direction, by_joint, by_station, &deflection.compliance),
+            );
         }
     }
 
@@ -143,11 +163,29 @@ impl PlacedRow<'_> {
 
     /// Derivatives of the vector from the row's anchor to the point (m), which is `reach`: as seen from a plane that tilts, from the
     /// surface of a sphere that grows.
-    pub fn partials_from_anchor(&mut self, reach: &Vector3<f64>, mut emit: impl FnMut(usize, Vector3<f64>)) {
+    pub fn partials_from_anchor(
+        &mut self,
+        reach: &Vector3<f64>,
+        mut emit: impl FnMut(usize, Vector3<f64>),
+    ) {
         self.scratch.velocities(self.robot, &self.point);
-        let PlacementBuffers { deflection, by_station, by_joint, .. } = &*self.scratch;
+        let PlacementBuffers {
+            deflection,
+            by_station,
+            by_joint,
+            ..
+        } = &*self.scratch;
         for (parameter, direction) in &deflection.partials {
-            emit(*parameter, from_anchor(direction, reach, by_joint, by_station, &deflection.compliance));
+            emit(
+                *parameter,
+                from_anchor(
+                    direction,
+                    reach,
+                    by_joint,
+                    by_station,
+                    &deflection.compliance,
+                ),
+            );
         }
     }
 }
@@ -155,18 +193,32 @@ impl PlacedRow<'_> {
 impl PlacementBuffers {
     /// How the point moves with every joint and station.
     pub(super) fn velocities(&mut self, robot: &RobotModel, point: &Vector3<f64>) {
-        let Self { posture: Posture { behind, .. }, stations, before, by_station, by_joint, .. } = self;
+        let Self {
+            posture: Posture { behind, .. },
+            stations,
+            before,
+            by_station,
+            by_joint,
+            ..
+        } = self;
         for ((velocity, frame), station) in by_station.iter_mut().zip(&*before).zip(&*stations) {
             // A twist (v; w) in the frame moves the point by R v + R w x arm.
             let mut spatial = Matrix3x6::zeros();
-            spatial.fixed_view_mut::<3, 3>(0, 0).copy_from(&frame.rotation);
-            spatial.fixed_view_mut::<3, 3>(0, 3).copy_from(&(hat(&(frame.translation - point)) * frame.rotation));
+            spatial
+                .fixed_view_mut::<3, 3>(0, 0)
+                .copy_from(&frame.rotation);
+            spatial
+                .fixed_view_mut::<3, 3>(0, 3)
+                .copy_from(&(hat(&(frame.translation - point)) * frame.rotation));
             *velocity = spatial * station.jacobian;
         }
         for (joint, velocity) in by_joint.iter_mut().enumerate() {
             let axis = behind[joint].rotation * robot.axis(joint);
-            *velocity =
-                if robot.is_revolute(joint) { axis.cross(&(point - behind[joint].point(robot.point(joint)))) } else { axis };
+            *velocity = if robot.is_revolute(joint) {
+                axis.cross(&(point - behind[joint].point(robot.point(joint))))
+            } else {
+                axis
+            };
         }
     }
 }
@@ -183,11 +235,23 @@ impl PlacementBuffers {
     /// How the target turns, of the row that was placed last.
     pub(super) fn turns(&self, robot: &RobotModel) -> Turns {
         let joint = |joint: usize| {
-            if robot.is_revolute(joint) { self.posture.behind[joint].rotation * robot.axis(joint) } else { Vector3::zeros() }
+            if robot.is_revolute(joint) {
+                self.posture.behind[joint].rotation * robot.axis(joint)
+            } else {
+                Vector3::zeros()
+            }
         };
         let stations = self.before.iter().zip(&self.stations);
-        let by_station = stations.map(|(frame, station)| (frame.rotation, station.jacobian.fixed_rows::<3>(3).into_owned()));
-        Turns { by_joint: (0..robot.joints()).map(joint).collect(), by_station: by_station.collect() }
+        let by_station = stations.map(|(frame, station)| {
+            (
+                frame.rotation,
+                station.jacobian.fixed_rows::<3>(3).into_owned(),
+            )
+        });
+        Turns {
+            by_joint: (0..robot.joints()).map(joint).collect(),
+            by_station: by_station.collect(),
+        }
     }
 }
 
@@ -200,8 +264,13 @@ impl Turns {
                 let (frame, twist) = &self.by_station[*station];
                 Some(frame * (twist * rate))
             }
-            Direction::Torque(joint, rate) => Some(self.by_joint[*joint] * (yielding[*joint] * *rate)),
-            Direction::Anchor(_) | Direction::AnchorTilt(..) | Direction::AnchorGrowth(_) | Direction::Instrument(_) => None,
+            Direction::Torque(joint, rate) => {
+                Some(self.by_joint[*joint] * (yielding[*joint] * *rate))
+            }
+            Direction::Anchor(_)
+            | Direction::AnchorTilt(..)
+            | Direction::AnchorGrowth(_)
+            | Direction::Instrument(_) => None,
         }
     }
 }
@@ -217,7 +286,9 @@ pub(super) fn from_anchor(
     match direction {
         Direction::Anchor(rate) => -rate,
         Direction::AnchorTilt(normal, turn) => normal * turn.dot(reach),
-        Direction::AnchorGrowth(rate) => reach.try_normalize(0.0).map_or_else(Vector3::zeros, |along| along * -*rate),
+        Direction::AnchorGrowth(rate) => reach
+            .try_normalize(0.0)
+            .map_or_else(Vector3::zeros, |along| along * -*rate),
         Direction::Instrument(_) => Vector3::zeros(),
         other => along(other, by_joint, by_station, yielding),
     }
@@ -233,7 +304,9 @@ pub(super) fn along(
         Direction::Joint(joint, rate) => by_joint[*joint] * *rate,
         Direction::Station(station, rate) => by_station[*station] * rate,
         Direction::Torque(joint, rate) => by_joint[*joint] * (yielding[*joint] * *rate),
-        Direction::Anchor(_) | Direction::AnchorTilt(..) | Direction::AnchorGrowth(_) => Vector3::zeros(),
+        Direction::Anchor(_) | Direction::AnchorTilt(..) | Direction::AnchorGrowth(_) => {
+            Vector3::zeros()
+        }
         Direction::Instrument(rate) => *rate,
     }
 }

@@ -1,11 +1,16 @@
 //! What a mechanic is told of a finding: words with holes.
 
-use super::{Basis, Cause, Clock, ParameterEstimate, Summary, Term, Variable, figure, orders, unknown, warmth};
+use super::{
+    Basis, Cause, Clock, ParameterEstimate, Summary, Term, Variable, figure, orders, unknown,
+    warmth,
+};
 
 /// The words in the holes of a sentence; `None` for one that is not closed.
 pub(super) fn holes(sentence: &str) -> Vec<Option<&str>> {
     let parts = sentence.split('{').skip(1);
-    parts.map(|part| part.split_once('}').map(|(word, _)| word)).collect()
+    parts
+        .map(|part| part.split_once('}').map(|(word, _)| word))
+        .collect()
 }
 
 /// The sentence with what is known of each word.
@@ -40,11 +45,22 @@ pub(super) fn of(cause: &Cause, summary: &Summary) -> String {
         };
         own.iter().map(one).collect::<Vec<String>>().join(", ")
     };
-    filled(text, &|word| if word == "each" { each() } else { hole(word, first, &all, summary) })
+    filled(text, &|word| {
+        if word == "each" {
+            each()
+        } else {
+            hole(word, first, &all, summary)
+        }
+    })
 }
 
 /// What a word of a cause's sentence means; `1e6:2` is the first number times 1e6 with two decimals.
-pub(super) fn hole(word: &str, term: Option<&Term>, numbers: &[&ParameterEstimate], summary: &Summary) -> String {
+pub(super) fn hole(
+    word: &str,
+    term: Option<&Term>,
+    numbers: &[&ParameterEstimate],
+    summary: &Summary,
+) -> String {
     let (first, clock) = (numbers.first(), summary.clock);
     let known = |text: Option<String>| text.unwrap_or_default();
     let order = || orders::order(term?.basis());
@@ -81,14 +97,25 @@ pub(super) fn hole(word: &str, term: Option<&Term>, numbers: &[&ParameterEstimat
             _ => None,
         }),
         "pace" => match (of, term.map(Term::basis)) {
-            (_, Some(Basis::Power { exponent, .. })) if exponent < 0.7 => "slower and slower".into(),
-            (_, Some(Basis::Power { exponent, .. })) if exponent > 1.4 => "faster and faster".into(),
+            (_, Some(Basis::Power { exponent, .. })) if exponent < 0.7 => {
+                "slower and slower".into()
+            }
+            (_, Some(Basis::Power { exponent, .. })) if exponent > 1.4 => {
+                "faster and faster".into()
+            }
             (_, Some(Basis::Power { .. })) => "steadily".into(),
             (Some(Variable::Work { .. }), _) => {
-                format!("at its hardest work, decaying with a time constant of {}", known(span()))
+                format!(
+                    "at its hardest work, decaying with a time constant of {}",
+                    known(span())
+                )
             }
-            (Some(Variable::Lagging { .. }), _) => format!("per kelvin, lagging by {}", known(span())),
-            (_, Some(Basis::Settling { .. })) => format!("in the end with a time constant of {}", known(span())),
+            (Some(Variable::Lagging { .. }), _) => {
+                format!("per kelvin, lagging by {}", known(span()))
+            }
+            (_, Some(Basis::Settling { .. })) => {
+                format!("in the end with a time constant of {}", known(span()))
+            }
             _ => "for each kelvin".into(),
         },
         "law" => known(unknown::described(summary)),
@@ -96,7 +123,10 @@ pub(super) fn hole(word: &str, term: Option<&Term>, numbers: &[&ParameterEstimat
         number => {
             let scaled = || {
                 let (scale, decimals) = number.split_once(':')?;
-                Some(figure(first?.value * scale.parse::<f64>().ok()?, decimals.parse().ok()?))
+                Some(figure(
+                    first?.value * scale.parse::<f64>().ok()?,
+                    decimals.parse().ok()?,
+                ))
             };
             known(scaled())
         }

@@ -33,7 +33,11 @@ impl Sight {
     /// Where an instrument sees a point of its frame, m.
     pub fn of(point: &Vector3<f64>) -> Self {
         let level = point.x.hypot(point.y);
-        Self { azimuth: libm::atan2(point.y, point.x), elevation: libm::atan2(point.z, level), range: point.norm() }
+        Self {
+            azimuth: libm::atan2(point.y, point.x),
+            elevation: libm::atan2(point.z, level),
+            range: point.norm(),
+        }
     }
 
     /// By how much the point moves (m) where a reading grows by 1 (rad, m).
@@ -59,8 +63,16 @@ mod tests {
         };
         let (at, step) = ([2.1, -0.4, 3.7], 1e-6);
         let sight = Sight::of(&point(at));
-        assert!((sight.azimuth - at[0]).abs() + (sight.elevation - at[1]).abs() + (sight.range - at[2]).abs() < 1e-12);
-        for (k, of) in [Polar::Azimuth, Polar::Elevation, Polar::Range].into_iter().enumerate() {
+        assert!(
+            (sight.azimuth - at[0]).abs()
+                + (sight.elevation - at[1]).abs()
+                + (sight.range - at[2]).abs()
+                < 1e-12
+        );
+        for (k, of) in [Polar::Azimuth, Polar::Elevation, Polar::Range]
+            .into_iter()
+            .enumerate()
+        {
             let [mut more, mut less] = [at; 2];
             (more[k], less[k]) = (at[k] + step, at[k] - step);
             let expected = (point(more) - point(less)) / (2.0 * step);

@@ -23,7 +23,11 @@ pub(super) fn moments(robot: &RobotModel) -> Vec<Vector3<f64>> {
         let axis = robot.axis(body);
         let along = axis * axis.dot(&moment);
         moments[body] = moment - along;
-        carried = if robot.is_revolute(body) { along } else { moment };
+        carried = if robot.is_revolute(body) {
+            along
+        } else {
+            moment
+        };
         weight += own;
     }
     moments

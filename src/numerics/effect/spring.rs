@@ -7,8 +7,8 @@
 use super::form::placed;
 use super::unknown::described;
 use super::{
-    ArmState, BeyondRange, Cause, Deflection, Form, Hypothesis, Measure, NumberSpec, OwnMotion, Place, Placed, Summary, Survey,
-    Variable, names,
+    ArmState, BeyondRange, Cause, Deflection, Form, Hypothesis, Measure, NumberSpec, OwnMotion,
+    Place, Placed, Summary, Survey, Variable, names,
 };
 use crate::criteria::effect::UNCOMMON;
 use crate::robot::{LoadCorrection, RobotModel};
@@ -63,7 +63,9 @@ fn pulled(summary: &Summary) -> String {
     match described(summary) {
         Some(law) => format!("something pulls on {place} as a hose package does: {law}"),
         None => {
-            format!("a torque on {place} that depends on its angle, e.g. from a hose package, is missing from the torque model")
+            format!(
+                "a torque on {place} that depends on its angle, e.g. from a hose package, is missing from the torque model"
+            )
         }
     }
 }
@@ -91,10 +93,23 @@ const ORDERS: [u32; 3] = [1, 2, 4];
 
 impl Spring {
     /// At every joint that yields in the present model, of those for which `here` holds.
-    pub fn propose(cause: &'static Cause, survey: &Survey, here: fn(usize) -> bool) -> Vec<Hypothesis> {
-        let joints = survey.revolute().filter(|joint| here(*joint) && survey.compliance[*joint] > 0.0);
-        let springs = joints.flat_map(|joint| ORDERS.map(move |orders| Self { cause, shape: SpringShape { joint, orders } }));
-        springs.map(|spring| Hypothesis::new(spring, ORDERS.len()).penalised(*UNCOMMON)).collect()
+    pub fn propose(
+        cause: &'static Cause,
+        survey: &Survey,
+        here: fn(usize) -> bool,
+    ) -> Vec<Hypothesis> {
+        let joints = survey
+            .revolute()
+            .filter(|joint| here(*joint) && survey.compliance[*joint] > 0.0);
+        let springs = joints.flat_map(|joint| {
+            ORDERS.map(move |orders| Self {
+                cause,
+                shape: SpringShape { joint, orders },
+            })
+        });
+        springs
+            .map(|spring| Hypothesis::new(spring, ORDERS.len()).penalised(*UNCOMMON))
+            .collect()
     }
 
     /// Whether a joint (from 0) is one that balancers sit on.
@@ -104,13 +119,18 @@ impl Spring {
 
     /// Reads the body of a form.
     pub fn read(cause: &'static Cause, body: &serde_json::Value) -> serde_json::Result<Form> {
-        Ok(Self { cause, shape: SpringShape::deserialize(body)? }.into())
+        Ok(Self {
+            cause,
+            shape: SpringShape::deserialize(body)?,
+        }
+        .into())
     }
 
     /// Sine and cosine of every order.
     fn waves(&self, q: &[f64]) -> impl Iterator<Item = f64> {
         let angle = q[self.shape.joint];
-        (1..=self.shape.orders).flat_map(move |order| <[f64; 2]>::from(libm::sincos(f64::from(order) * angle)))
+        (1..=self.shape.orders)
+            .flat_map(move |order| <[f64; 2]>::from(libm::sincos(f64::from(order) * angle)))
     }
 }
 
@@ -118,13 +138,22 @@ impl Placed for Spring {
     placed! { self: Place::Joint(self.shape.joint), self.cause, [Variable::Angle { joint: self.shape.joint }], self.shape }
 
     fn numbers(&self, _robot: &RobotModel) -> Vec<NumberSpec> {
-        let order = |order: u32| if order == 1 { String::new() } else { order.to_string() };
-        let names = (1..=self.shape.orders).flat_map(|k| ["sin", "cos"].map(|name| format!("{name}{}", order(k))));
+        let order = |order: u32| {
+            if order == 1 {
+                String::new()
+            } else {
+                order.to_string()
+            }
+        };
+        let names = (1..=self.shape.orders)
+            .flat_map(|k| ["sin", "cos"].map(|name| format!("{name}{}", order(k))));
         names.map(|name| (name, Unit::NewtonMetre, 1e5)).collect()
     }
 
     fn deflect(&self, _robot: &RobotModel, state: &ArmState, _p: &[f64], out: &mut Deflection) {
-        self.waves(state.q).enumerate().for_each(|(k, wave)| out.load(k, self.shape.joint, wave));
+        self.waves(state.q)
+            .enumerate()
+            .for_each(|(k, wave)| out.load(k, self.shape.joint, wave));
     }
 
     /// Sine and cosine together are their size whatever the phase.
@@ -155,8 +184,15 @@ impl Placed for Spring {
     /// The torque of a link about its own joint is of first order in that joint's angle.
     fn identities(&self, _called: &str) -> Vec<(&'static str, Place)> {
         let (joint, place) = (self.shape.joint, self.place());
-        let balancer = (self.cause.name() == names::COUNTERBALANCE).then_some((names::CABLE_DRAG, place));
-        balancer.into_iter().chain([(names::GEAR_CYCLIC, place), (names::LINK_MASS, Place::Links(joint, joint))]).collect()
+        let balancer =
+            (self.cause.name() == names::COUNTERBALANCE).then_some((names::CABLE_DRAG, place));
+        balancer
+            .into_iter()
+            .chain([
+                (names::GEAR_CYCLIC, place),
+                (names::LINK_MASS, Place::Links(joint, joint)),
+            ])
+            .collect()
     }
 
     fn is_of_torque_model(&self) -> bool {

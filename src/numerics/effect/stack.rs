@@ -32,33 +32,60 @@ impl EffectStack {
         Self::numbered(numbered, specs, base)
     }
 
-    fn numbered(numbered: Vec<(Arc<dyn Effect>, Range<usize>)>, specs: Vec<ParameterSpec>, base: Pose) -> Self {
+    fn numbered(
+        numbered: Vec<(Arc<dyn Effect>, Range<usize>)>,
+        specs: Vec<ParameterSpec>,
+        base: Pose,
+    ) -> Self {
         let needs_torque = numbered.iter().any(|(effect, _)| effect.needs_torque());
         let needs_sight = numbered.iter().any(|(effect, _)| effect.needs_sight());
-        Self { effects: numbered, specs, base, needs_torque, needs_sight }
+        Self {
+            effects: numbered,
+            specs,
+            base,
+            needs_torque,
+            needs_sight,
+        }
     }
 
     /// The same stack with the laws of its forms held at the ends of what some rows have of their variables.
-    pub(crate) fn held_within(&self, robot: &RobotModel, data: &Measurements, rows: &[usize], x: &[f64]) -> Self {
+    pub(crate) fn held_within(
+        &self,
+        robot: &RobotModel,
+        data: &Measurements,
+        rows: &[usize],
+        x: &[f64],
+    ) -> Self {
         let mut ranges: Vec<Vec<Option<[f64; 2]>>> = vec![Vec::new(); self.effects.len()];
         let mut scratch = self.scratch(robot);
         for row in rows {
             let point = self.place(robot, data, *row, x, &mut scratch).point;
             let state = ArmState::new(data, *row, &scratch.posture, point);
             for ((effect, _), ranges) in self.effects.iter().zip(&mut ranges) {
-                let sizes = effect.form().map_or_else(Vec::new, |form| form.sizes(robot, &state));
+                let sizes = effect
+                    .form()
+                    .map_or_else(Vec::new, |form| form.sizes(robot, &state));
                 ranges.resize(sizes.len(), None);
                 for (size, range) in sizes.into_iter().zip(ranges) {
                     if let Some(size) = size.filter(|size| size.is_finite()) {
-                        *range = Some(range.map_or([size; 2], |[low, high]| [low.min(size), high.max(size)]));
+                        *range = Some(
+                            range.map_or([size; 2], |[low, high]| [low.min(size), high.max(size)]),
+                        );
                     }
                 }
             }
         }
         let held = |effect: &Arc<dyn Effect>, ranges: Vec<Option<[f64; 2]>>| -> Arc<dyn Effect> {
-            effect.form().map_or_else(|| effect.clone(), |form| Arc::new(form.fitted_within(ranges)))
+            effect.form().map_or_else(
+                || effect.clone(),
+                |form| Arc::new(form.fitted_within(ranges)),
+            )
         };
-        let effects = self.effects.iter().zip(ranges).map(|((effect, own), ranges)| (held(effect, ranges), own.clone()));
+        let effects = self
+            .effects
+            .iter()
+            .zip(ranges)
+            .map(|((effect, own), ranges)| (held(effect, ranges), own.clone()));
         Self::numbered(effects.collect(), self.specs.clone(), self.base)
     }
 
@@ -75,11 +102,18 @@ impl EffectStack {
         let mut beyond = BeyondRange::new(robot.joints());
         let mut out = Vec::new();
         for (effect, range) in &self.effects {
-            let (Some(form), p) = (effect.form(), &x[range.clone()]) else { continue };
+            let (Some(form), p) = (effect.form(), &x[range.clone()]) else {
+                continue;
+            };
             beyond.clear();
-            let Some(of) = form.beyond(robot, &state, p, &mut beyond) else { continue };
+            let Some(of) = form.beyond(robot, &state, p, &mut beyond) else {
+                continue;
+            };
             let moved = |(factor, motions): (f64, &[(usize, Direction)])| {
-                let sum: Vector3<f64> = motions.iter().map(|(k, direction)| motion.point_along(direction) * p[*k]).sum();
+                let sum: Vector3<f64> = motions
+                    .iter()
+                    .map(|(k, direction)| motion.point_along(direction) * p[*k])
+                    .sum();
                 sum * sum.transpose() * (factor * factor)
             };
             out.push((range.start, of, beyond.groups().map(moved).sum()));
@@ -99,12 +133,16 @@ impl EffectStack {
 
     /// Effects and the range of their parameters.
     pub fn effects(&self) -> impl Iterator<Item = (&dyn Effect, Range<usize>)> {
-        self.effects.iter().map(|(effect, range)| (effect.as_ref(), range.clone()))
+        self.effects
+            .iter()
+            .map(|(effect, range)| (effect.as_ref(), range.clone()))
     }
 
     /// Positions of the parameters of an effect by its canonical name, at all of its places.
     pub fn parameters_of(&self, name: &str) -> impl Iterator<Item = usize> {
-        self.effects().filter(move |(effect, _)| effect.name() == name).flat_map(|(_, range)| range)
+        self.effects()
+            .filter(move |(effect, _)| effect.name() == name)
+            .flat_map(|(_, range)| range)
     }
 
     /// Buffers for [`EffectStack::place`], one a thread.
@@ -114,15 +152,28 @@ impl EffectStack {
 
     /// Prepares for rows of which only the points are wanted, all under the same `x`: there are no partials, and what is the same at
     /// every row is summed once.
-    pub(crate) fn only_points(&self, robot: &RobotModel, data: &Measurements, x: &[f64], scratch: &mut PlacementBuffers) {
+    pub(crate) fn only_points(
+        &self,
+        robot: &RobotModel,
+        data: &Measurements,
+        x: &[f64],
+        scratch: &mut PlacementBuffers,
+    ) {
         scratch.deflection.clear();
         scratch.deflection.bare = true;
         scratch.constant = None;
         let state = ArmState::new(data, 0, &scratch.posture, Vector3::zeros());
-        for (effect, range) in self.effects.iter().filter(|(effect, _)| effect.is_constant()) {
+        for (effect, range) in self
+            .effects
+            .iter()
+            .filter(|(effect, _)| effect.is_constant())
+        {
             effect.deflect(robot, &state, &x[range.clone()], &mut scratch.deflection);
         }
-        scratch.constant = Some((scratch.deflection.joint.clone(), scratch.deflection.station.clone()));
+        scratch.constant = Some((
+            scratch.deflection.joint.clone(),
+            scratch.deflection.station.clone(),
+        ));
     }
 
     /// Places the arm of a row under parameters `x`: all that it shows follows from what comes back.
@@ -138,7 +189,11 @@ impl EffectStack {
         scratch: &'a mut PlacementBuffers,
     ) -> PlacedRow<'a> {
         for (travel, q) in scratch.commanded.iter_mut().zip(data.q(row)) {
-            *travel = if scratch.near { travel.moved(q - travel.value()) } else { Travel::new(*q) };
+            *travel = if scratch.near {
+                travel.moved(q - travel.value())
+            } else {
+                Travel::new(*q)
+            };
         }
         scratch.deflection.clear();
         if let Some((joint, station)) = &scratch.constant {
@@ -152,10 +207,17 @@ impl EffectStack {
             scratch.deflection.keep();
             scratch.load_correction.clear();
             for (effect, range) in &self.effects {
-                effect.load_correction(data.q(row), data.payload[row], &x[range.clone()], &mut scratch.load_correction);
+                effect.load_correction(
+                    data.q(row),
+                    data.payload[row],
+                    &x[range.clone()],
+                    &mut scratch.load_correction,
+                );
             }
             for _ in 0..2 {
-                scratch.posture.gravity_torques(robot, data.payload[row], &scratch.load_correction);
+                scratch
+                    .posture
+                    .gravity_torques(robot, data.payload[row], &scratch.load_correction);
                 scratch.deflection.restore();
                 self.deflect(Needs::Torque, robot, (data, row), x, scratch);
                 point = self.chain(robot, scratch);
@@ -165,7 +227,11 @@ impl EffectStack {
             self.deflect(Needs::Sight(point), robot, (data, row), x, scratch);
             point += scratch.deflection.reading;
         }
-        PlacedRow { robot, scratch, point }
+        PlacedRow {
+            robot,
+            scratch,
+            point,
+        }
     }
 
     /// The measured point (m, tracker frame) of a row under parameters `x`.
@@ -206,7 +272,9 @@ impl EffectStack {
     ) -> PointMotion {
         let point = self.point(robot, data, row, x, scratch);
         if !self.needs_torque {
-            scratch.posture.gravity_torques(robot, data.payload[row], &scratch.load_correction);
+            scratch
+                .posture
+                .gravity_torques(robot, data.payload[row], &scratch.load_correction);
         }
         scratch.velocities(robot, &point);
         PointMotion {
@@ -230,7 +298,10 @@ impl EffectStack {
         scratch: &mut PlacementBuffers,
     ) -> PointMotion {
         let motion = self.point_motion(robot, data, row, x, scratch);
-        PointMotion { turns: Some(scratch.turns(robot)), ..motion }
+        PointMotion {
+            turns: Some(scratch.turns(robot)),
+            ..motion
+        }
     }
 
     /// Adds the motions of the effects with the given need.
@@ -242,15 +313,25 @@ impl EffectStack {
         x: &[f64],
         scratch: &mut PlacementBuffers,
     ) {
-        let point = if let Needs::Sight(point) = needs { point } else { Vector3::zeros() };
+        let point = if let Needs::Sight(point) = needs {
+            point
+        } else {
+            Vector3::zeros()
+        };
         let state = ArmState::new(data, row, &scratch.posture, point);
         let summed = scratch.constant.is_some();
         let due = |effect: &dyn Effect| match needs {
-            Needs::Nothing => !(effect.needs_torque() || effect.needs_sight() || summed && effect.is_constant()),
+            Needs::Nothing => {
+                !(effect.needs_torque() || effect.needs_sight() || summed && effect.is_constant())
+            }
             Needs::Torque => effect.needs_torque(),
             Needs::Sight(_) => effect.needs_sight(),
         };
-        for (effect, range) in self.effects.iter().filter(|(effect, _)| due(effect.as_ref())) {
+        for (effect, range) in self
+            .effects
+            .iter()
+            .filter(|(effect, _)| due(effect.as_ref()))
+        {
             scratch.deflection.start(range.start);
             effect.deflect(robot, &state, &x[range.clone()], &mut scratch.deflection);
         }
@@ -259,7 +340,13 @@ impl EffectStack {
     fn chain(&self, robot: &RobotModel, scratch: &mut PlacementBuffers) -> Vector3<f64> {
         let n = robot.joints();
         let mut frame = self.base;
-        for (k, (twist, station)) in scratch.deflection.station.iter().zip(&mut scratch.stations).enumerate() {
+        for (k, (twist, station)) in scratch
+            .deflection
+            .station
+            .iter()
+            .zip(&mut scratch.stations)
+            .enumerate()
+        {
             if *twist != station.twist {
                 *station = Station::of(twist);
             }
@@ -269,7 +356,8 @@ impl EffectStack {
             }
             scratch.posture.behind[k] = frame;
             if k < n {
-                frame = frame * robot.motion(k, &scratch.commanded[k].moved(scratch.deflection.joint[k]));
+                frame = frame
+                    * robot.motion(k, &scratch.commanded[k].moved(scratch.deflection.joint[k]));
                 scratch.posture.body[k] = frame;
             }
         }
@@ -295,36 +383,81 @@ pub struct PointMotion {
 
 impl PointMotion {
     /// A variable of one number in this row; none where the row does not tell.
-    pub(crate) fn value(&self, robot: &RobotModel, data: &Measurements, row: usize, of: Variable) -> Option<f64> {
-        of.value(0, robot, &ArmState::new(data, row, &self.posture, self.point))
+    pub(crate) fn value(
+        &self,
+        robot: &RobotModel,
+        data: &Measurements,
+        row: usize,
+        of: Variable,
+    ) -> Option<f64> {
+        of.value(
+            0,
+            robot,
+            &ArmState::new(data, row, &self.posture, self.point),
+        )
     }
 
     /// Puts into `buffer` where each parameter of an effect acts at zero.
-    pub fn deflect(&self, robot: &RobotModel, data: &Measurements, effect: &dyn Effect, zeros: &[f64], buffer: &mut Deflection) {
+    pub fn deflect(
+        &self,
+        robot: &RobotModel,
+        data: &Measurements,
+        effect: &dyn Effect,
+        zeros: &[f64],
+        buffer: &mut Deflection,
+    ) {
         buffer.clear();
         buffer.start(0);
-        effect.deflect(robot, &ArmState::new(data, self.row, &self.posture, self.point), zeros, buffer);
+        effect.deflect(
+            robot,
+            &ArmState::new(data, self.row, &self.posture, self.point),
+            zeros,
+            buffer,
+        );
     }
 
     /// Derivative of the point as the tracker reads it, m per unit of a parameter that acts there.
     pub fn point_along(&self, direction: &Direction) -> Vector3<f64> {
-        along(direction, &self.by_joint, &self.by_station, &self.compliance)
+        along(
+            direction,
+            &self.by_joint,
+            &self.by_station,
+            &self.compliance,
+        )
     }
 
     /// Derivative of the vector from the row's anchor to the point, which is `reach`, m per unit.
     pub fn from_anchor_along(&self, direction: &Direction, reach: &Vector3<f64>) -> Vector3<f64> {
-        from_anchor(direction, reach, &self.by_joint, &self.by_station, &self.compliance)
+        from_anchor(
+            direction,
+            reach,
+            &self.by_joint,
+            &self.by_station,
+            &self.compliance,
+        )
     }
 
     /// Rotation of the target about the tracker's axes, rad per unit; zero where turns were not asked for.
     pub fn turn_along(&self, direction: &Direction) -> Vector3<f64> {
         let turns = self.turns.as_ref();
-        turns.and_then(|turns| turns.along(direction, &self.compliance)).unwrap_or_else(Vector3::zeros)
+        turns
+            .and_then(|turns| turns.along(direction, &self.compliance))
+            .unwrap_or_else(Vector3::zeros)
     }
 
     /// The values of a law's functions in this row, numbered; none of those that the row does not tell.
-    pub(crate) fn law(&self, robot: &RobotModel, data: &Measurements, law: &Law, mut each: impl FnMut(usize, f64)) {
-        law.values(robot, &ArmState::new(data, self.row, &self.posture, self.point), &mut each);
+    pub(crate) fn law(
+        &self,
+        robot: &RobotModel,
+        data: &Measurements,
+        law: &Law,
+        mut each: impl FnMut(usize, f64),
+    ) {
+        law.values(
+            robot,
+            &ArmState::new(data, self.row, &self.posture, self.point),
+            &mut each,
+        );
     }
 }
 

@@ -30,7 +30,11 @@ pub fn people(unit: Unit) -> (Unit, &'static str) {
 
 /// The unit behind a number; none of ratios.
 fn unit(number: &ParameterEstimate) -> String {
-    if number.unit == "1" { String::new() } else { format!(" {}", number.unit) }
+    if number.unit == "1" {
+        String::new()
+    } else {
+        format!(" {}", number.unit)
+    }
 }
 
 /// A finding: its place, its forms and their fitted numbers.
@@ -49,29 +53,47 @@ pub struct Summary<'a> {
 impl<'a> Summary<'a> {
     /// The cause of a name: of one of the forms, or of the library.
     pub fn cause(&self, name: &str) -> Option<&'static Cause> {
-        self.forms.iter().map(|form| form.cause()).find(|own| own.name() == name).or_else(|| cause(name))
+        self.forms
+            .iter()
+            .map(|form| form.cause())
+            .find(|own| own.name() == name)
+            .or_else(|| cause(name))
     }
 
     /// The forms under a cause's name, each with its fitted numbers.
-    fn own(&self, name: &'static str) -> impl Iterator<Item = (&'a Form, Vec<&'a ParameterEstimate>)> {
-        let numbers = move |form: usize| self.parameters.iter().filter(|n| n.form == form).collect();
-        let forms = self.forms.iter().enumerate().filter(move |(_, form)| form.name() == name);
+    fn own(
+        &self,
+        name: &'static str,
+    ) -> impl Iterator<Item = (&'a Form, Vec<&'a ParameterEstimate>)> {
+        let numbers =
+            move |form: usize| self.parameters.iter().filter(|n| n.form == form).collect();
+        let forms = self
+            .forms
+            .iter()
+            .enumerate()
+            .filter(move |(_, form)| form.name() == name);
         forms.map(move |(number, form)| (form, numbers(number)))
     }
 
     /// What the first form under a cause's name that has words of its own says: see [`Placed::words`](super::Placed::words).
     pub(super) fn words(&self, name: &'static str) -> Option<String> {
-        self.own(name).find_map(|(form, numbers)| form.words(&numbers))
+        self.own(name)
+            .find_map(|(form, numbers)| form.words(&numbers))
     }
 
     /// The fitted numbers of the first form under a cause's name that has none.
     pub(super) fn wordless(&self, name: &'static str) -> Vec<&'a ParameterEstimate> {
-        self.own(name).find(|(form, numbers)| form.words(numbers).is_none()).map(|(_, numbers)| numbers).unwrap_or_default()
+        self.own(name)
+            .find(|(form, numbers)| form.words(numbers).is_none())
+            .map(|(_, numbers)| numbers)
+            .unwrap_or_default()
     }
 
     /// What the forms under a cause's name depend on.
     pub(super) fn variables(&self, name: &'static str) -> Vec<Variable> {
-        self.own(name).flat_map(|(form, _)| form.variables()).collect()
+        self.own(name)
+            .flat_map(|(form, _)| form.variables())
+            .collect()
     }
 
     /// The terms under a cause's name.
@@ -80,17 +102,25 @@ impl<'a> Summary<'a> {
     }
 
     /// The terms under a cause's name, each with its fitted numbers.
-    pub(super) fn estimates(&self, name: &'static str) -> impl Iterator<Item = (&'a Term, Vec<&'a ParameterEstimate>)> {
-        self.own(name).filter_map(|(form, numbers)| Some((form.term()?, numbers)))
+    pub(super) fn estimates(
+        &self,
+        name: &'static str,
+    ) -> impl Iterator<Item = (&'a Term, Vec<&'a ParameterEstimate>)> {
+        self.own(name)
+            .filter_map(|(form, numbers)| Some((form.term()?, numbers)))
     }
 
     /// The first number with its unit.
     pub(super) fn value(&self) -> String {
-        self.parameters.first().map_or_else(String::new, |n| format!("{:.3e}{}", n.value, unit(n)))
+        self.parameters
+            .first()
+            .map_or_else(String::new, |n| format!("{:.3e}{}", n.value, unit(n)))
     }
 
     /// The size of the first number with its unit.
     pub(super) fn size(&self) -> String {
-        self.parameters.first().map_or_else(String::new, |n| format!("{}{}", figure(n.value.abs(), 0), unit(n)))
+        self.parameters.first().map_or_else(String::new, |n| {
+            format!("{}{}", figure(n.value.abs(), 0), unit(n))
+        })
     }
 }

@@ -43,21 +43,43 @@ impl<'a> Survey<'a> {
         let range = (0..robot.joints())
             .map(|joint| {
                 let values = rows.iter().map(|row| data.q(*row)[joint]);
-                values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], q| [low.min(q), high.max(q)])
+                values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], q| {
+                    [low.min(q), high.max(q)]
+                })
             })
             .collect();
         let mut times: Vec<f64> = rows.iter().map(|row| data.time(*row)).collect();
         times.sort_by(f64::total_cmp);
         times.dedup();
-        let between: Vec<f64> = times.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
-        let boundaries = between.get(EDGE - 1..between.len().saturating_sub(EDGE - 1)).unwrap_or_default().to_vec();
-        let time = [times.first().copied().unwrap_or(0.0), times.last().copied().unwrap_or(0.0)];
+        let between: Vec<f64> = times
+            .windows(2)
+            .map(|pair| 0.5 * (pair[0] + pair[1]))
+            .collect();
+        let boundaries = between
+            .get(EDGE - 1..between.len().saturating_sub(EDGE - 1))
+            .unwrap_or_default()
+            .to_vec();
+        let time = [
+            times.first().copied().unwrap_or(0.0),
+            times.last().copied().unwrap_or(0.0),
+        ];
         let reference_c = rows.first().and_then(|row| data.temperature(*row));
         let payload_change = only_payload_change(data, rows).and_then(|at| {
             let near = near(&boundaries, at);
             Some([*near.first()?, *near.last()?])
         });
-        Self { robot, data, rows, torque, compliance, range, boundaries, time, reference_c, payload_change }
+        Self {
+            robot,
+            data,
+            rows,
+            torque,
+            compliance,
+            range,
+            boundaries,
+            time,
+            reference_c,
+            payload_change,
+        }
     }
 
     /// Whether the payload changes once, so that what follows it may as well have moved then.
@@ -67,7 +89,8 @@ impl<'a> Survey<'a> {
 
     /// Whether what steps at a time may as well follow the payload, which changes once, and about then.
     pub fn is_payload_change(&self, time: f64) -> bool {
-        self.payload_change.is_some_and(|[first, last]| (first..=last).contains(&time))
+        self.payload_change
+            .is_some_and(|[first, last]| (first..=last).contains(&time))
     }
 
     /// Joints of the arm.
@@ -92,19 +115,31 @@ impl<'a> Survey<'a> {
 
     /// Load torques of a joint, Nm.
     pub fn torques(&self, joint: usize) -> impl Iterator<Item = f64> + '_ {
-        self.torque.iter().skip(joint).step_by(self.joints().max(1)).copied()
+        self.torque
+            .iter()
+            .skip(joint)
+            .step_by(self.joints().max(1))
+            .copied()
     }
 
     /// Largest load torque of a joint, Nm.
     pub fn load(&self, joint: usize) -> f64 {
-        self.torques(joint).fold(0.0, |most, torque| most.max(torque.abs()))
+        self.torques(joint)
+            .fold(0.0, |most, torque| most.max(torque.abs()))
     }
 
     /// Largest load torque (Nm) of a joint that the recording holds: by the present model, and no more than robot file and stated payloads
     /// make, since a load that a model itself makes up is not recorded.
     pub fn recorded_load(&self, joint: usize) -> f64 {
-        let stated = |row: &usize| Posture::as_stated(self.robot, self.data.q(*row), self.data.payload[*row]).torque[joint].abs();
-        self.rows.iter().map(stated).fold(0.0, f64::max).min(self.load(joint))
+        let stated = |row: &usize| {
+            Posture::as_stated(self.robot, self.data.q(*row), self.data.payload[*row]).torque[joint]
+                .abs()
+        };
+        self.rows
+            .iter()
+            .map(stated)
+            .fold(0.0, f64::max)
+            .min(self.load(joint))
     }
 
     /// From the first fitted row to the last, s.
@@ -114,7 +149,9 @@ impl<'a> Survey<'a> {
 
     /// Whether gravity loads the joint enough to speak of it.
     pub fn is_loaded(&self, joint: usize) -> bool {
-        let most = (0..self.joints()).map(|joint| self.load(joint)).fold(0.0, f64::max);
+        let most = (0..self.joints())
+            .map(|joint| self.load(joint))
+            .fold(0.0, f64::max);
         self.robot.is_revolute(joint) && self.load(joint) > (1e-3 * most).max(1e-6)
     }
 
@@ -126,7 +163,10 @@ impl<'a> Survey<'a> {
 
     /// At most `most` change points, evenly taken.
     pub fn changes(&self, most: usize) -> impl Iterator<Item = f64> + '_ {
-        self.boundaries.iter().step_by(self.boundaries.len().div_ceil(most.max(1)).max(1)).copied()
+        self.boundaries
+            .iter()
+            .step_by(self.boundaries.len().div_ceil(most.max(1)).max(1))
+            .copied()
     }
 
     /// The change points around one.
@@ -145,7 +185,11 @@ impl<'a> Survey<'a> {
     /// Whether some but not all rows carry (more than half of the largest) payload.
     pub fn payload_changes(&self) -> bool {
         let heavy = self.heavy_payload();
-        let loaded = self.rows.iter().filter(|row| self.data.payload[**row] > heavy).count();
+        let loaded = self
+            .rows
+            .iter()
+            .filter(|row| self.data.payload[**row] > heavy)
+            .count();
         loaded > 0 && loaded < self.rows.len()
     }
 
@@ -164,14 +208,23 @@ fn near(boundaries: &[f64], time: f64) -> &[f64] {
 
 /// Half of the largest payload of some rows, kg.
 fn heavy_payload(data: &Measurements, rows: &[usize]) -> f64 {
-    0.5 * rows.iter().map(|row| data.payload[*row]).fold(0.0, f64::max)
+    0.5 * rows
+        .iter()
+        .map(|row| data.payload[*row])
+        .fold(0.0, f64::max)
 }
 
 /// When the payload of some rows changes (s), where it does so once.
 fn only_payload_change(data: &Measurements, rows: &[usize]) -> Option<f64> {
-    let mut by_time: Vec<(f64, f64)> = rows.iter().map(|row| (data.time(*row), data.payload[*row])).collect();
+    let mut by_time: Vec<(f64, f64)> = rows
+        .iter()
+        .map(|row| (data.time(*row), data.payload[*row]))
+        .collect();
     by_time.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut changes = by_time.windows(2).filter(|pair| pair[0].1 != pair[1].1).map(|pair| 0.5 * (pair[0].0 + pair[1].0));
+    let mut changes = by_time
+        .windows(2)
+        .filter(|pair| pair[0].1 != pair[1].1)
+        .map(|pair| 0.5 * (pair[0].0 + pair[1].0));
     changes.next().filter(|_| changes.next().is_none())
 }
 
@@ -193,12 +246,21 @@ pub struct Hypothesis {
 impl Hypothesis {
     /// A hypothesis of `tried` like ones.
     pub fn new(form: impl Into<Form>, tried: usize) -> Self {
-        Self { form: form.into(), tried: tried.max(1) as f64, prior_penalty: 0.0, positive: false, largest: f64::INFINITY }
+        Self {
+            form: form.into(),
+            tried: tried.max(1) as f64,
+            prior_penalty: 0.0,
+            positive: false,
+            largest: f64::INFINITY,
+        }
     }
 
     /// With coefficients that must be positive.
     pub fn positive(self) -> Self {
-        Self { positive: true, ..self }
+        Self {
+            positive: true,
+            ..self
+        }
     }
 
     /// With coefficients up to `largest`, SI.
@@ -208,6 +270,9 @@ impl Hypothesis {
 
     /// Less likely beside the other shapes of its cell, -2 ln of the odds.
     pub fn penalised(self, prior_penalty: f64) -> Self {
-        Self { prior_penalty: self.prior_penalty + prior_penalty, ..self }
+        Self {
+            prior_penalty: self.prior_penalty + prior_penalty,
+            ..self
+        }
     }
 }

@@ -4,39 +4,83 @@
 //! A row says where its cause acts ([`At`]), what it follows there ([`Follows`]) and how rare it is; proposals, names of numbers, sentences,
 //! pages and `calib effects` are made from it. Motions with physics of their own stand in files of theirs, with a [`OwnMotion`](super::OwnMotion).
 
-use super::Follows::{Angle, Constant, HalfWaves, Push, Side, Slip, Slow, Steady, Step, Velocity, Waves};
+use super::Follows::{
+    Angle, Constant, HalfWaves, Push, Side, Slip, Slow, Steady, Step, Velocity, Waves,
+};
 use super::Warmth::{Temperature, WarmUp, Work};
 use super::geometry::{DeclaredCouplings, JointOffset, LinkGeometry, ReductionRatio};
 use super::{
-    AnchorShift, At, Axes, BasePlacement, Basis, Cause, Follows, HiddenSize, LawRow, Limit, Measure, Place, Polar, Times,
-    ToolOffset, Turning, base_compliance, change, joint_compliance, joint_hardening, joint_log_lag, link_compliance, link_mass,
-    names, payload_error, spring, unknown,
+    AnchorShift, At, Axes, BasePlacement, Basis, Cause, Follows, HiddenSize, LawRow, Limit,
+    Measure, Place, Polar, Times, ToolOffset, Turning, base_compliance, change, joint_compliance,
+    joint_hardening, joint_log_lag, link_compliance, link_mass, names, payload_error, spring,
+    unknown,
 };
 use crate::criteria::effect::{LOW_ORDERS, RARE, UNCOMMON, WOBBLES};
 use crate::units::Unit;
 
 /// What separates warmth of the arm from that of its surroundings.
-const WATCH: Measure =
-    Measure { rank: 4, advice: "log the arm's temperature from a cold start and watch a fixed target on the floor" };
+const WATCH: Measure = Measure {
+    rank: 4,
+    advice: "log the arm's temperature from a cold start and watch a fixed target on the floor",
+};
 /// What shows errors of the instrument itself.
-const TWO_FACES: Measure = Measure { rank: 2, advice: "measure fixed points in both faces, and from a second station" };
+const TWO_FACES: Measure = Measure {
+    rank: 2,
+    advice: "measure fixed points in both faces, and from a second station",
+};
 
 const ORDER: &str = "{order} times a turn by {amplitude}";
 
 const PLAIN: LawRow = LawRow::PLAIN;
 /// No gear or encoder errs by more than a quarter of a degree.
-const GEAR: LawRow = LawRow { largest: 5e-3, says: ORDER, ..PLAIN };
-const GAP: LawRow = LawRow { number: "half_gap", ..PLAIN };
-const GROWTH: LawRow = LawRow { at: At::Runs, positive: true, ..PLAIN };
-const OF_LINKS: Limit =
-    Limit { most: f64::INFINITY, of: "of any material of links", negative: Some("links do not shrink as they warm up") };
+const GEAR: LawRow = LawRow {
+    largest: 5e-3,
+    says: ORDER,
+    ..PLAIN
+};
+const GAP: LawRow = LawRow {
+    number: "half_gap",
+    ..PLAIN
+};
+const GROWTH: LawRow = LawRow {
+    at: At::Runs,
+    positive: true,
+    ..PLAIN
+};
+const OF_LINKS: Limit = Limit {
+    most: f64::INFINITY,
+    of: "of any material of links",
+    negative: Some("links do not shrink as they warm up"),
+};
 /// What of a joint follows its warmth is one of three.
-const ZERO: LawRow =
-    LawRow { follows: Follows::Warmth(&[Temperature, WarmUp, Work]), tried: || 3, rarity: || *RARE, variant: "zero", ..PLAIN };
-const DRIFT: LawRow = LawRow { at: At::Tracker(&[Axes::Place, Axes::Both]), ..PLAIN };
-const CIRCLE: LawRow = LawRow { rarity: || *RARE, sigma: 1e-3, ..PLAIN };
-const AIR: LawRow = LawRow { at: At::Reading(Polar::Range), times: Some(Times::Range), rarity: || *RARE, sigma: 1e-4, ..PLAIN };
-const OF_AIR: Limit = Limit { most: f64::INFINITY, of: "that air can make", negative: None };
+const ZERO: LawRow = LawRow {
+    follows: Follows::Warmth(&[Temperature, WarmUp, Work]),
+    tried: || 3,
+    rarity: || *RARE,
+    variant: "zero",
+    ..PLAIN
+};
+const DRIFT: LawRow = LawRow {
+    at: At::Tracker(&[Axes::Place, Axes::Both]),
+    ..PLAIN
+};
+const CIRCLE: LawRow = LawRow {
+    rarity: || *RARE,
+    sigma: 1e-3,
+    ..PLAIN
+};
+const AIR: LawRow = LawRow {
+    at: At::Reading(Polar::Range),
+    times: Some(Times::Range),
+    rarity: || *RARE,
+    sigma: 1e-4,
+    ..PLAIN
+};
+const OF_AIR: Limit = Limit {
+    most: f64::INFINITY,
+    of: "that air can make",
+    negative: None,
+};
 
 /// Every cause.
 pub static CAUSES: &[&Cause] = &[
@@ -101,7 +145,11 @@ pub static CAUSES: &[&Cause] = &[
         confounded: "axis_wobble, link_geometry",
         needs: "a wide travel of joint A",
         sentence: "{place}: the second moves with the first by {100:2} % of its angle",
-        laws: &[LawRow { at: At::Pairs, follows: Angle, ..PLAIN }],
+        laws: &[LawRow {
+            at: At::Pairs,
+            follows: Angle,
+            ..PLAIN
+        }],
         arm_effect: Some(|_| Box::new(DeclaredCouplings)),
         ..Cause::PLAIN
     },
@@ -119,7 +167,11 @@ pub static CAUSES: &[&Cause] = &[
         sentence: "the transmission or encoder of {place} errs periodically with its angle: {each}",
         // Eccentricity makes the lowest orders on any joint; strain wave gears and absolute encoders show some twenty, worm wheels more.
         laws: &[
-            LawRow { follows: Waves(Turning::Joint, [1, 4], false), tried: || *LOW_ORDERS, ..GEAR },
+            LawRow {
+                follows: Waves(Turning::Joint, [1, 4], false),
+                tried: || *LOW_ORDERS,
+                ..GEAR
+            },
             LawRow {
                 follows: Waves(Turning::Joint, [1, 4], true),
                 tried: || *LOW_ORDERS,
@@ -127,9 +179,18 @@ pub static CAUSES: &[&Cause] = &[
                 says: "{order} times a turn by {amplitude} and {twice} times by {overtone}",
                 ..GEAR
             },
-            LawRow { follows: Waves(Turning::Joint, [5, 48], false), tried: || 48, ..GEAR },
+            LawRow {
+                follows: Waves(Turning::Joint, [5, 48], false),
+                tried: || 48,
+                ..GEAR
+            },
             // Gears with a fraction of a turn.
-            LawRow { follows: HalfWaves(20), tried: || 48, rarity: || *UNCOMMON, ..GEAR },
+            LawRow {
+                follows: HalfWaves(20),
+                tried: || 48,
+                rarity: || *UNCOMMON,
+                ..GEAR
+            },
         ],
         same: |term| {
             let first = matches!(term.basis(), Basis::Wave { order: 1, .. });
@@ -146,7 +207,11 @@ pub static CAUSES: &[&Cause] = &[
         needs: "reduction ratios in the robot file",
         sentence: "{place} errs periodically with its motor's angle, amplitude {amplitude}",
         // Shaft, and two teeth or poles.
-        laws: &[LawRow { follows: Waves(Turning::Motor, [1, 2], false), tried: || 2, ..PLAIN }],
+        laws: &[LawRow {
+            follows: Waves(Turning::Motor, [1, 2], false),
+            tried: || 2,
+            ..PLAIN
+        }],
         ..Cause::PLAIN
     },
     &Cause {
@@ -164,7 +229,10 @@ pub static CAUSES: &[&Cause] = &[
             says: ORDER,
             ..PLAIN
         }],
-        measure: Some(Measure { rank: 5, advice: "repeat poses from both sides over the whole range of the joint" }),
+        measure: Some(Measure {
+            rank: 5,
+            advice: "repeat poses from both sides over the whole range of the joint",
+        }),
         ..Cause::PLAIN
     },
     &Cause {
@@ -184,7 +252,10 @@ pub static CAUSES: &[&Cause] = &[
             says: ORDER,
             ..PLAIN
         }],
-        measure: Some(Measure { rank: 5, advice: "repeat poses with and without a payload over the whole range of the joint" }),
+        measure: Some(Measure {
+            rank: 5,
+            advice: "repeat poses with and without a payload over the whole range of the joint",
+        }),
         ..Cause::PLAIN
     },
     &Cause {
@@ -219,7 +290,10 @@ pub static CAUSES: &[&Cause] = &[
                        side to which the load pushes it",
                 ..GAP
             },
-            LawRow { says: "{place} has lost motion: a half-gap of {size} by the direction of approach", ..GAP },
+            LawRow {
+                says: "{place} has lost motion: a half-gap of {size} by the direction of approach",
+                ..GAP
+            },
             LawRow {
                 times: Some(Times::Time),
                 tried: || 2,
@@ -240,7 +314,10 @@ pub static CAUSES: &[&Cause] = &[
                 ..GAP
             },
         ],
-        measure: Some(Measure { rank: 5, advice: "repeat poses from both sides under loads of both signs" }),
+        measure: Some(Measure {
+            rank: 5,
+            advice: "repeat poses from both sides under loads of both signs",
+        }),
         ..Cause::PLAIN
     },
     &Cause {
@@ -256,7 +333,10 @@ pub static CAUSES: &[&Cause] = &[
             says: "lost motion of {place} fades in after each reversal over a travel of {travel} deg: {size} to either side",
             ..GAP
         }],
-        measure: Some(Measure { rank: 5, advice: "approach one pose from both sides in steps of a tenth of a degree up to ten" }),
+        measure: Some(Measure {
+            rank: 5,
+            advice: "approach one pose from both sides in steps of a tenth of a degree up to ten",
+        }),
         ..Cause::PLAIN
     },
     &Cause {
@@ -273,7 +353,10 @@ pub static CAUSES: &[&Cause] = &[
             LawRow {
                 follows: Follows::Warmth(&[Temperature]),
                 largest: 1e-4,
-                limit: Some(Limit { most: 7e-5, ..OF_LINKS }),
+                limit: Some(Limit {
+                    most: 7e-5,
+                    ..OF_LINKS
+                }),
                 sigma: 1e-3,
                 says: "{place} grows by {1e6:1} um/m for each kelvin{lagging}",
                 ..GROWTH
@@ -281,7 +364,10 @@ pub static CAUSES: &[&Cause] = &[
             LawRow {
                 follows: Follows::Warmth(&[WarmUp]),
                 largest: 60.0 * 1e-4,
-                limit: Some(Limit { most: 60.0 * 7e-5, ..OF_LINKS }),
+                limit: Some(Limit {
+                    most: 60.0 * 7e-5,
+                    ..OF_LINKS
+                }),
                 says: "{place} grows as the robot warms up, {1e6:0} um/m in the end with a time constant of {span}",
                 ..GROWTH
             },
@@ -298,8 +384,16 @@ pub static CAUSES: &[&Cause] = &[
         needs: "temperature or time",
         sentence: "{place} changes with warmth: {each}",
         laws: &[
-            LawRow { says: "its zero by {1:0} arcsec {pace}", ..ZERO },
-            LawRow { times: Some(Times::Angle), variant: "ratio", says: "its ratio by {1e6:0} ppm {pace}", ..ZERO },
+            LawRow {
+                says: "its zero by {1:0} arcsec {pace}",
+                ..ZERO
+            },
+            LawRow {
+                times: Some(Times::Angle),
+                variant: "ratio",
+                says: "its ratio by {1e6:0} ppm {pace}",
+                ..ZERO
+            },
             LawRow {
                 times: Some(Times::Load),
                 sigma: 1e-4,
@@ -334,7 +428,10 @@ pub static CAUSES: &[&Cause] = &[
             largest: 2e-3,
             ..PLAIN
         }],
-        measure: Some(Measure { rank: 6, advice: "measure a second target off the first" }),
+        measure: Some(Measure {
+            rank: 6,
+            advice: "measure a second target off the first",
+        }),
         ..Cause::PLAIN
     },
     &Cause {
@@ -346,7 +443,14 @@ pub static CAUSES: &[&Cause] = &[
         needs: "joint velocities, of a moving arm",
         sentence: "{place} trails behind in proportion to its speed, by {1:2} {unit}",
         // Viscous friction winds the gear up: c is its coefficient over the gear's stiffness, s. A joint that trails by 0.1 s is not driven.
-        laws: &[LawRow { at: At::AllJoints, follows: Velocity, positive: true, largest: 0.1, number: "trail", ..PLAIN }],
+        laws: &[LawRow {
+            at: At::AllJoints,
+            follows: Velocity,
+            positive: true,
+            largest: 0.1,
+            number: "trail",
+            ..PLAIN
+        }],
         // A joint that trails by less than 5 arcsec for each deg/s is no cause to measure again.
         hidden: Some(|| HiddenSize {
             subject: None,
@@ -364,10 +468,18 @@ pub static CAUSES: &[&Cause] = &[
         confounded: "base_shift (joint 1), tool_shift (last joint)",
         needs: "rows in the order of measurement",
         sentence: "the zero of {place} steps by {size}{when}",
-        laws: &[LawRow { at: At::AllJoints, follows: Step, number: "step", sigma: 0.1, ..PLAIN }],
+        laws: &[LawRow {
+            at: At::AllJoints,
+            follows: Step,
+            number: "step",
+            sigma: 0.1,
+            ..PLAIN
+        }],
         measure: Some(change::MEASURE),
         separable_by_poses: false,
-        same: |term| (term.motion().place() == Place::Joint(0)).then_some((names::BASE_SHIFT, Place::Base)),
+        same: |term| {
+            (term.motion().place() == Place::Joint(0)).then_some((names::BASE_SHIFT, Place::Base))
+        },
         ..Cause::PLAIN
     },
     &Cause {
@@ -378,7 +490,11 @@ pub static CAUSES: &[&Cause] = &[
         confounded: "zero_shift of the last joints",
         needs: "rows in the order of measurement",
         sentence: "the target on the tool has moved{when}",
-        laws: &[LawRow { at: At::Tool, follows: Step, ..PLAIN }],
+        laws: &[LawRow {
+            at: At::Tool,
+            follows: Step,
+            ..PLAIN
+        }],
         measure: Some(change::MEASURE),
         separable_by_poses: false,
         ..Cause::PLAIN
@@ -391,7 +507,11 @@ pub static CAUSES: &[&Cause] = &[
         confounded: "zero_shift of joint 1, tracker_drift",
         needs: "rows in the order of measurement",
         sentence: "the base (or the tracker) has moved{when}",
-        laws: &[LawRow { at: At::Base(&[Axes::Place, Axes::Both]), follows: Step, ..PLAIN }],
+        laws: &[LawRow {
+            at: At::Base(&[Axes::Place, Axes::Both]),
+            follows: Step,
+            ..PLAIN
+        }],
         measure: Some(change::MEASURE),
         of_the_measurement: true,
         separable_by_poses: false,
@@ -406,7 +526,12 @@ pub static CAUSES: &[&Cause] = &[
         needs: "time",
         sentence: "the tracker's frame drifts slowly{rows}",
         laws: &[
-            LawRow { follows: Steady, tried: || 3, says: "the tracker's frame drifts {pace}{rows}", ..DRIFT },
+            LawRow {
+                follows: Steady,
+                tried: || 3,
+                says: "the tracker's frame drifts {pace}{rows}",
+                ..DRIFT
+            },
             LawRow {
                 follows: Follows::Warmth(&[Temperature, WarmUp]),
                 tried: || 3,
@@ -414,7 +539,12 @@ pub static CAUSES: &[&Cause] = &[
                 says: "the tracker's frame drifts with the warm-up{rows}",
                 ..DRIFT
             },
-            LawRow { at: At::Tracker(&[Axes::Place]), follows: Slow, rarity: || *RARE, ..DRIFT },
+            LawRow {
+                at: At::Tracker(&[Axes::Place]),
+                follows: Slow,
+                rarity: || *RARE,
+                ..DRIFT
+            },
         ],
         measure: Some(WATCH),
         of_the_measurement: true,
@@ -490,8 +620,17 @@ pub static CAUSES: &[&Cause] = &[
         needs: "points measured from outside the arm's reach, the instrument at the recording's origin",
         sentence: "every range of the tracker is wrong by {1e3:0} um",
         // A dead path, or the constant of another reflector.
-        laws: &[LawRow { at: At::Reading(Polar::Range), follows: Constant, rarity: || *RARE, number: "offset", ..PLAIN }],
-        measure: Some(Measure { rank: 2, advice: "measure a line of three points from within it and from its end" }),
+        laws: &[LawRow {
+            at: At::Reading(Polar::Range),
+            follows: Constant,
+            rarity: || *RARE,
+            number: "offset",
+            ..PLAIN
+        }],
+        measure: Some(Measure {
+            rank: 2,
+            advice: "measure a line of three points from within it and from its end",
+        }),
         of_the_measurement: true,
         ..Cause::PLAIN
     },
@@ -509,13 +648,19 @@ pub static CAUSES: &[&Cause] = &[
             LawRow {
                 follows: Follows::Warmth(&[Temperature]),
                 largest: 1e-5,
-                limit: Some(Limit { most: 5e-6, ..OF_AIR }),
+                limit: Some(Limit {
+                    most: 5e-6,
+                    ..OF_AIR
+                }),
                 ..AIR
             },
             LawRow {
                 follows: Follows::Warmth(&[WarmUp]),
                 largest: 3e-4,
-                limit: Some(Limit { most: 30.0 * 5e-6, ..OF_AIR }),
+                limit: Some(Limit {
+                    most: 30.0 * 5e-6,
+                    ..OF_AIR
+                }),
                 says: "the tracker's ranges grow as the air warms up, by {1e6:1} um/m in the end with a time constant of {span}",
                 ..AIR
             },

@@ -2,7 +2,10 @@
 
 use super::form::Placed;
 use super::law::Factor;
-use super::{ArmState, Basis, BeyondRange, Cause, Deflection, Form, Law, Motion, NumberSpec, Place, Survey, Variable};
+use super::{
+    ArmState, Basis, BeyondRange, Cause, Deflection, Form, Law, Motion, NumberSpec, Place, Survey,
+    Variable,
+};
 use crate::robot::{Measurements, RobotModel};
 use serde::{Deserialize, Serialize};
 
@@ -24,7 +27,11 @@ struct Stored {
 impl Term {
     /// A law of a motion, under the name of a cause.
     pub fn new(cause: impl Into<&'static Cause>, motion: Motion, law: Law) -> Self {
-        Self { cause: cause.into(), motion, law }
+        Self {
+            cause: cause.into(),
+            motion,
+            law,
+        }
     }
 
     /// Reads what [`Form::body`] made of a term.
@@ -50,7 +57,10 @@ impl Term {
 
     /// The same with other bases of its first variable.
     pub fn with_bases(&self, bases: impl IntoIterator<Item = Basis>) -> Vec<Self> {
-        bases.into_iter().map(|basis| self.with(self.law.with(basis))).collect()
+        bases
+            .into_iter()
+            .map(|basis| self.with(self.law.with(basis)))
+            .collect()
     }
 
     /// The basis of its first variable.
@@ -83,7 +93,9 @@ impl Term {
 
 impl PartialEq for Term {
     fn eq(&self, other: &Self) -> bool {
-        self.cause.name() == other.cause.name() && self.motion == other.motion && self.law == other.law
+        self.cause.name() == other.cause.name()
+            && self.motion == other.motion
+            && self.law == other.law
     }
 }
 
@@ -106,7 +118,9 @@ impl Placed for Term {
 
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
         let count = self.law.count();
-        self.law.values(robot, state, &mut |k, value| self.motion.add(robot, state, (k, count), value, p, out));
+        self.law.values(robot, state, &mut |k, value| {
+            self.motion.add(robot, state, (k, count), value, p, out)
+        });
     }
 
     fn needs_torque(&self) -> bool {
@@ -124,14 +138,23 @@ impl Placed for Term {
     }
 
     fn near(&self, survey: &Survey, level: i32) -> Vec<Form> {
-        self.cause.near(self, survey, level).into_iter().map(Form::from).collect()
+        self.cause
+            .near(self, survey, level)
+            .into_iter()
+            .map(Form::from)
+            .collect()
     }
 
     fn variant(&self) -> String {
         self.cause.variant(self)
     }
 
-    fn impossible(&self, p: &[f64], error: &dyn Fn(usize) -> f64, survey: &Survey) -> Option<String> {
+    fn impossible(
+        &self,
+        p: &[f64],
+        error: &dyn Fn(usize) -> f64,
+        survey: &Survey,
+    ) -> Option<String> {
         self.cause.law(self)?.impossible(self, p, error, survey)
     }
 
@@ -144,8 +167,17 @@ impl Placed for Term {
     }
 
     fn held_within(&self, ranges: &[Option<[f64; 2]>]) -> Option<Form> {
-        let held = |factor: Factor, k: usize| ranges.get(k).copied().flatten().map_or(factor, |range| factor.held_within(range));
-        let law = Law { first: held(self.law.first, 0), times: self.law.times.map(|times| held(times, 1)) };
+        let held = |factor: Factor, k: usize| {
+            ranges
+                .get(k)
+                .copied()
+                .flatten()
+                .map_or(factor, |range| factor.held_within(range))
+        };
+        let law = Law {
+            first: held(self.law.first, 0),
+            times: self.law.times.map(|times| held(times, 1)),
+        };
         Some(self.with(law).into())
     }
 
@@ -160,13 +192,19 @@ impl Placed for Term {
         let (of, groups) = self.law.beyond(robot, state)?;
         let count = self.law.count();
         for group in groups {
-            group.into_iter().for_each(|(k, off)| self.motion.add(robot, state, (k, count), off, p, &mut out.motions));
+            group.into_iter().for_each(|(k, off)| {
+                self.motion
+                    .add(robot, state, (k, count), off, p, &mut out.motions)
+            });
             out.close(1.0);
         }
         Some(of)
     }
 
     fn body(&self) -> serde_json::Value {
-        serde_json::json!(Stored { motion: self.motion, law: self.law })
+        serde_json::json!(Stored {
+            motion: self.motion,
+            law: self.law
+        })
     }
 }

@@ -22,7 +22,11 @@ fn width(target: &Target) -> usize {
 impl ToolOffset {
     /// What the names of a target's parameters begin with, dot included.
     pub fn prefix(target: &str) -> String {
-        if target.is_empty() { format!("{}.", names::TOOL_OFFSET) } else { format!("{}.{target}.", names::TOOL_OFFSET) }
+        if target.is_empty() {
+            format!("{}.", names::TOOL_OFFSET)
+        } else {
+            format!("{}.{target}.", names::TOOL_OFFSET)
+        }
     }
 }
 
@@ -34,15 +38,25 @@ impl Effect for ToolOffset {
     fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
         let targets: Vec<(&str, usize)> = match robot.setup().targets.as_slice() {
             [] => vec![("", 3)],
-            targets => targets.iter().map(|target| (target.name.as_str(), width(target))).collect(),
+            targets => targets
+                .iter()
+                .map(|target| (target.name.as_str(), width(target)))
+                .collect(),
         };
         let all = targets.into_iter().flat_map(|(name, width)| {
-            AXES[..width].iter().enumerate().map(move |(k, axis)| ParameterSpec {
-                name: format!("{}{axis}", Self::prefix(name)),
-                place: Place::Tool,
-                unit: if k < 3 { Unit::Millimetre } else { Unit::Radian },
-                prior_sigma: 0.05,
-            })
+            AXES[..width]
+                .iter()
+                .enumerate()
+                .map(move |(k, axis)| ParameterSpec {
+                    name: format!("{}{axis}", Self::prefix(name)),
+                    place: Place::Tool,
+                    unit: if k < 3 {
+                        Unit::Millimetre
+                    } else {
+                        Unit::Radian
+                    },
+                    prior_sigma: 0.05,
+                })
         });
         all.collect()
     }
@@ -53,13 +67,20 @@ impl Effect for ToolOffset {
         if number.is_none() && !targets.is_empty() {
             return;
         }
-        let first: usize = targets.iter().take(number.unwrap_or_default()).map(width).sum();
+        let first: usize = targets
+            .iter()
+            .take(number.unwrap_or_default())
+            .map(width)
+            .sum();
         for axis in 0..3 {
             let mut twist = Twist::zeros();
             twist[axis] = 1.0;
             out.shift(first + axis, p, robot.joints(), twist);
         }
-        if let Some(target) = number.and_then(|number| targets.get(number)).filter(|target| target.oriented) {
+        if let Some(target) = number
+            .and_then(|number| targets.get(number))
+            .filter(|target| target.oriented)
+        {
             for axis in 0..3 {
                 let turn = screw(&Vector3::ith(axis, 1.0), &target.mounting.translation);
                 out.shift(first + 3 + axis, p, robot.joints(), turn);

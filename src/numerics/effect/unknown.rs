@@ -1,6 +1,8 @@
 //! `unknown`: laws without a name, for what no cause of the list explains: placed and described, never christened.
 
-use super::{Axes, Basis, Cause, Clock, Motion, NumberSpec, Place, Polar, Summary, Term, Variable, names};
+use super::{
+    Axes, Basis, Cause, Clock, Motion, NumberSpec, Place, Polar, Summary, Term, Variable, names,
+};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -32,24 +34,42 @@ pub(super) const PLAUSIBLE: f64 = 3e-4;
 pub(super) fn numbers(term: &Term, robot: &RobotModel) -> Vec<NumberSpec> {
     let counted = 1..=term.law().count();
     let each = |prefixes: &[&str], unit: Unit, sigma: f64| -> Vec<NumberSpec> {
-        let of_one = |prefix| counted.clone().map(move |k| (format!("{prefix}{k}"), unit, sigma));
+        let of_one = |prefix| {
+            counted
+                .clone()
+                .map(move |k| (format!("{prefix}{k}"), unit, sigma))
+        };
         prefixes.iter().flat_map(of_one).collect()
     };
     match term.motion() {
-        Motion::Joint { .. } => match term.law().times.filter(|factor| matches!(factor.of, Variable::Load { .. })) {
-            Some(load) if load.basis == Basis::PROPORTIONAL => each(&["c"], Unit::RadianPerNewtonMetre, PER_LOAD),
+        Motion::Joint { .. } => match term
+            .law()
+            .times
+            .filter(|factor| matches!(factor.of, Variable::Load { .. }))
+        {
+            Some(load) if load.basis == Basis::PROPORTIONAL => {
+                each(&["c"], Unit::RadianPerNewtonMetre, PER_LOAD)
+            }
             Some(_) => each(&["c"], term.motion().unit(robot), PER_LOAD),
-            None => each(&["c"], term.motion().unit(robot), if term.is_own_curve() { PLAUSIBLE } else { WIDE }),
+            None => each(
+                &["c"],
+                term.motion().unit(robot),
+                if term.is_own_curve() { PLAUSIBLE } else { WIDE },
+            ),
         },
         Motion::Instrument { of: Polar::Range } => each(&["c"], Unit::Millimetre, 1e-3),
         Motion::Instrument { .. } => each(&["c"], Unit::Radian, 1e-4),
-        Motion::Axis { about: Some(axis), .. } => each(&[["a", "b"][axis.min(1)]], Unit::Radian, WIDE),
+        Motion::Axis {
+            about: Some(axis), ..
+        } => each(&[["a", "b"][axis.min(1)]], Unit::Radian, WIDE),
         Motion::Axis { .. } | Motion::Bend { .. } => each(&["a", "b"], Unit::Radian, WIDE),
         Motion::Links { .. } => each(&["c"], Unit::One, WIDE),
         Motion::Slide { along: true, .. } => each(&["s"], Unit::Millimetre, WIDE),
         Motion::Slide { .. } => each(&["u", "v"], Unit::Millimetre, WIDE),
         motion => {
-            let numbers = counted.clone().flat_map(|k| motion.frame_numbers(move |axis| format!("{axis}{k}")));
+            let numbers = counted
+                .clone()
+                .flat_map(|k| motion.frame_numbers(move |axis| format!("{axis}{k}")));
             numbers.map(|(name, unit, _)| (name, unit, WIDE)).collect()
         }
     }
@@ -62,7 +82,10 @@ pub(super) fn variant(term: &Term) -> String {
         Variable::Stretch { joint, .. } => format!("stretch_{}", joint + 1),
         Variable::Recent { joint, .. } => format!("recent_{}", joint + 1),
         Variable::Position { along } | Variable::Sighted { along } => {
-            format!("position_{}", along.map(|value| format!("{:.0}", 100.0 * value)).join("_"))
+            format!(
+                "position_{}",
+                along.map(|value| format!("{:.0}", 100.0 * value)).join("_")
+            )
         }
         of => of.to_string().replace(' ', "_"),
     };
@@ -82,7 +105,9 @@ pub(super) fn variant(term: &Term) -> String {
         Motion::Bend { .. } => "bent_",
         Motion::Axis { turning: true, .. } => "axis_turning_",
         Motion::Axis { .. } => "axis_",
-        Motion::Base { axes: Axes::Rotation } => "turned_",
+        Motion::Base {
+            axes: Axes::Rotation,
+        } => "turned_",
         _ => "",
     };
     if !moves.is_empty() || curve && term.law().times.is_some() {
@@ -117,12 +142,20 @@ pub(super) fn identities(term: &Term, called: &str) -> Vec<(&'static str, Place)
 
 /// What a finding's law without a name is a function of and how, in words; none where it has no such law.
 pub(super) fn described(summary: &Summary) -> Option<String> {
-    summary.terms(names::UNKNOWN).next().map(|term| in_words(term, summary.clock))
+    summary
+        .terms(names::UNKNOWN)
+        .next()
+        .map(|term| in_words(term, summary.clock))
 }
 
 /// A law as a function of what and how.
 fn in_words(term: &Term, clock: Clock) -> String {
-    let variables: Vec<String> = term.law().variables().into_iter().map(|variable| clock.named(variable)).collect();
+    let variables: Vec<String> = term
+        .law()
+        .variables()
+        .into_iter()
+        .map(|variable| clock.named(variable))
+        .collect();
     let of = variables.join(" and ");
     if let Motion::Instrument { of: read } = term.motion() {
         let read = match read {
@@ -133,9 +166,13 @@ fn in_words(term: &Term, clock: Clock) -> String {
         return format!("its {read} err with the {of}");
     }
     match (term.basis(), term.law().first.of) {
-        (Basis::Wave { .. }, _) if term.law().times.is_some() => format!("product of functions of {of}"),
+        (Basis::Wave { .. }, _) if term.law().times.is_some() => {
+            format!("product of functions of {of}")
+        }
         (Basis::Wave { order, .. }, _) => format!("periodic in {of}, {order} a turn"),
-        (_, Variable::Gravity { .. }) => "depends on the direction of gravity, as when a mounting yields".into(),
+        (_, Variable::Gravity { .. }) => {
+            "depends on the direction of gravity, as when a mounting yields".into()
+        }
         (_, Variable::Temperature) => match term.law().times {
             Some(times) => format!("depends on the warm-up and on {}", clock.named(times.of)),
             None => "depends on the warm-up".into(),

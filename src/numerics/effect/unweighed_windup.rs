@@ -6,7 +6,8 @@
 use super::form::placed;
 use super::skeleton::moments;
 use super::{
-    ArmState, Cause, Deflection, Form, Hypothesis, NumberSpec, ParameterEstimate, Place, Placed, Survey, Variable, figure, names,
+    ArmState, Cause, Deflection, Form, Hypothesis, NumberSpec, ParameterEstimate, Place, Placed,
+    Survey, Variable, figure, names,
 };
 use crate::robot::{Measurements, Posture, RobotModel};
 use crate::units::Unit;
@@ -61,21 +62,52 @@ impl UnweighedWindup {
             return Vec::new();
         }
         let lines = moments(survey.robot);
-        let postures: Vec<Posture> =
-            survey.rows.iter().map(|row| Posture::as_stated(survey.robot, survey.data.q(*row), 0.0)).collect();
-        let loaded = survey.revolute().filter(|joint| lever(survey.robot, *joint, &postures) > LEVER);
-        loaded.flat_map(|joint| Self::at(cause, survey.robot, joint, &lines)).collect()
+        let postures: Vec<Posture> = survey
+            .rows
+            .iter()
+            .map(|row| Posture::as_stated(survey.robot, survey.data.q(*row), 0.0))
+            .collect();
+        let loaded = survey
+            .revolute()
+            .filter(|joint| lever(survey.robot, *joint, &postures) > LEVER);
+        loaded
+            .flat_map(|joint| Self::at(cause, survey.robot, joint, &lines))
+            .collect()
     }
 
-    fn at(cause: &'static Cause, robot: &RobotModel, joint: usize, lines: &[Vector3<f64>]) -> Vec<Hypothesis> {
-        let most = lines[joint..].iter().map(|line| line.norm()).fold(0.0, f64::max);
-        let bodies: Vec<usize> = (joint..robot.joints()).filter(|body| robot.is_revolute(*body)).collect();
-        let heavy: Vec<usize> = bodies.iter().copied().filter(|body| lines[*body].norm() > SLIGHT * most).collect();
+    fn at(
+        cause: &'static Cause,
+        robot: &RobotModel,
+        joint: usize,
+        lines: &[Vector3<f64>],
+    ) -> Vec<Hypothesis> {
+        let most = lines[joint..]
+            .iter()
+            .map(|line| line.norm())
+            .fold(0.0, f64::max);
+        let bodies: Vec<usize> = (joint..robot.joints())
+            .filter(|body| robot.is_revolute(*body))
+            .collect();
+        let heavy: Vec<usize> = bodies
+            .iter()
+            .copied()
+            .filter(|body| lines[*body].norm() > SLIGHT * most)
+            .collect();
         let own_angle = (0..joint).all(|before| is_plumb(robot, before));
-        let outwards = |bodies: &[usize]| -> Vec<Moment> { bodies.iter().map(|body| Moment::outwards(*body, lines)).collect() };
+        let outwards = |bodies: &[usize]| -> Vec<Moment> {
+            bodies
+                .iter()
+                .map(|body| Moment::outwards(*body, lines))
+                .collect()
+        };
         let both = |bodies: &[usize]| -> Vec<Moment> {
-            let pair =
-                |body: &usize| if heavy.contains(body) { Moment::both(*body, robot, lines) } else { Moment::any(*body, robot) };
+            let pair = |body: &usize| {
+                if heavy.contains(body) {
+                    Moment::both(*body, robot, lines)
+                } else {
+                    Moment::any(*body, robot)
+                }
+            };
             bodies.iter().flat_map(pair).collect()
         };
         let first = |count: usize| &heavy[..count.min(heavy.len())];
@@ -88,18 +120,32 @@ impl UnweighedWindup {
         let mut out: Vec<Hypothesis> = Vec::new();
         for (moments, positive) in all.into_iter().filter(|(moments, _)| !moments.is_empty()) {
             let own_angle = own_angle && moments.iter().all(|moment| moment.body == joint);
-            let form = Form::from(Self { cause, shape: WindupShape { joint, moments, own_angle } });
+            let form = Form::from(Self {
+                cause,
+                shape: WindupShape {
+                    joint,
+                    moments,
+                    own_angle,
+                },
+            });
             if out.iter().any(|other| other.form == form) {
                 continue;
             }
             let hypothesis = Hypothesis::new(form, FORMS).within(LARGEST);
-            out.push(if positive { hypothesis.positive() } else { hypothesis });
+            out.push(if positive {
+                hypothesis.positive()
+            } else {
+                hypothesis
+            });
         }
         out
     }
 
     /// Reads the body of a form, where it is one of these.
-    pub fn read(cause: &'static Cause, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
+    pub fn read(
+        cause: &'static Cause,
+        body: &serde_json::Value,
+    ) -> Option<serde_json::Result<Form>> {
         body.get("moments")?;
         Some(WindupShape::deserialize(body).map(|shape| Self { cause, shape }.into()))
     }
@@ -107,15 +153,26 @@ impl UnweighedWindup {
     /// The deflection (arcsec) with all its bodies level, with its standard deviation where that is known, as if the moments were
     /// independent.
     fn largest(&self, numbers: &[&ParameterEstimate]) -> String {
-        let moments: Vec<(usize, f64, Option<f64>)> =
-            self.shape.moments.iter().zip(numbers).map(|(moment, own)| (moment.body, own.value, own.sigma)).collect();
+        let moments: Vec<(usize, f64, Option<f64>)> = self
+            .shape
+            .moments
+            .iter()
+            .zip(numbers)
+            .map(|(moment, own)| (moment.body, own.value, own.sigma))
+            .collect();
         let (mut size, mut variance) = (0.0, Some(0.0));
         for body in moments.chunk_by(|a, b| a.0 == b.0) {
-            let length = body.iter().map(|(_, value, _)| value * value).sum::<f64>().sqrt();
+            let length = body
+                .iter()
+                .map(|(_, value, _)| value * value)
+                .sum::<f64>()
+                .sqrt();
             size += length;
             for (_, value, sigma) in body {
                 let share = if length > 0.0 { value / length } else { 1.0 };
-                variance = variance.zip(*sigma).map(|(sum, sigma)| sum + (share * sigma).powi(2));
+                variance = variance
+                    .zip(*sigma)
+                    .map(|(sum, sigma)| sum + (share * sigma).powi(2));
             }
         }
         match variance {
@@ -127,7 +184,11 @@ impl UnweighedWindup {
 
 /// Whether a robot file gives no mass at all.
 pub(super) fn is_unweighed(robot: &RobotModel) -> bool {
-    robot.description().joints.iter().all(|joint| joint.mass.is_none() || joint.centre.is_none())
+    robot
+        .description()
+        .joints
+        .iter()
+        .all(|joint| joint.mass.is_none() || joint.centre.is_none())
 }
 
 /// Whether a joint turns about gravity's own direction, wherever the joints before it stand.
@@ -138,23 +199,48 @@ fn is_plumb(robot: &RobotModel, joint: usize) -> bool {
 
 /// The largest lever of a joint for gravity: 1 about a level axis.
 fn lever(robot: &RobotModel, joint: usize, postures: &[Posture]) -> f64 {
-    let of = |posture: &Posture| posture.torque_of_moment(robot, joint, joint).norm() / posture.gravity.norm();
-    postures.iter().map(of).filter(|lever| lever.is_finite()).fold(0.0, f64::max)
+    let of = |posture: &Posture| {
+        posture.torque_of_moment(robot, joint, joint).norm() / posture.gravity.norm()
+    };
+    postures
+        .iter()
+        .map(of)
+        .filter(|lever| lever.is_finite())
+        .fold(0.0, f64::max)
 }
 
 impl Moment {
     fn outwards(body: usize, lines: &[Vector3<f64>]) -> Self {
-        Self { body, direction: lines[body].normalize().into(), outwards: true }
+        Self {
+            body,
+            direction: lines[body].normalize().into(),
+            outwards: true,
+        }
     }
 
     /// Outwards, and across that and the axis.
     fn both(body: usize, robot: &RobotModel, lines: &[Vector3<f64>]) -> Vec<Self> {
         let across = robot.axis(body).cross(&lines[body]).normalize();
-        vec![Self::outwards(body, lines), Self { body, direction: across.into(), outwards: false }]
+        vec![
+            Self::outwards(body, lines),
+            Self {
+                body,
+                direction: across.into(),
+                outwards: false,
+            },
+        ]
     }
 
     fn any(body: usize, robot: &RobotModel) -> Vec<Self> {
-        robot.normals(body).iter().map(|(_, normal)| Self { body, direction: (*normal).into(), outwards: false }).collect()
+        robot
+            .normals(body)
+            .iter()
+            .map(|(_, normal)| Self {
+                body,
+                direction: (*normal).into(),
+                outwards: false,
+            })
+            .collect()
     }
 }
 
@@ -163,17 +249,26 @@ impl Placed for UnweighedWindup {
 
     /// Moments beside the arm's lines, which are small: those along them are as large as links are heavy.
     fn of_one_size(&self) -> Vec<usize> {
-        (0..self.shape.moments.len()).filter(|k| !self.shape.moments[*k].outwards).collect()
+        (0..self.shape.moments.len())
+            .filter(|k| !self.shape.moments[*k].outwards)
+            .collect()
     }
 
     fn numbers(&self, _robot: &RobotModel) -> Vec<NumberSpec> {
         let mut names: Vec<String> = Vec::new();
         for Moment { body, outwards, .. } in &self.shape.moments {
             let first = format!("link{}", body + 1);
-            let name = if *outwards || !names.contains(&first) { first } else { format!("{first}_across") };
+            let name = if *outwards || !names.contains(&first) {
+                first
+            } else {
+                format!("{first}_across")
+            };
             names.push(name);
         }
-        names.into_iter().map(|name| (name, Unit::Radian, WIDE)).collect()
+        names
+            .into_iter()
+            .map(|name| (name, Unit::Radian, WIDE))
+            .collect()
     }
 
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
@@ -181,8 +276,17 @@ impl Placed for UnweighedWindup {
         if gravity == 0.0 {
             return;
         }
-        for (k, Moment { body, direction, .. }) in self.shape.moments.iter().enumerate() {
-            let torque = state.posture.torque_of_moment(robot, joint, *body).dot(&Vector3::from(*direction));
+        for (
+            k,
+            Moment {
+                body, direction, ..
+            },
+        ) in self.shape.moments.iter().enumerate()
+        {
+            let torque = state
+                .posture
+                .torque_of_moment(robot, joint, *body)
+                .dot(&Vector3::from(*direction));
             out.turn(k, p, joint, torque / gravity);
         }
     }
@@ -192,7 +296,8 @@ impl Placed for UnweighedWindup {
     }
 
     fn missing(&self, robot: &RobotModel, _data: &Measurements) -> Option<String> {
-        (Vector3::from(robot.description().gravity) == Vector3::zeros()).then(|| "the robot file gives no gravity".into())
+        (Vector3::from(robot.description().gravity) == Vector3::zeros())
+            .then(|| "the robot file gives no gravity".into())
     }
 
     fn variant(&self) -> String {
@@ -201,7 +306,9 @@ impl Placed for UnweighedWindup {
 
     /// An eccentric wheel, or a balancer, does the same as a weight about the first level axis.
     fn identities(&self, _called: &str) -> Vec<(&'static str, Place)> {
-        let names = [names::GEAR_CYCLIC, names::COUNTERBALANCE].into_iter().filter(|_| self.shape.own_angle);
+        let names = [names::GEAR_CYCLIC, names::COUNTERBALANCE]
+            .into_iter()
+            .filter(|_| self.shape.own_angle);
         names.map(|name| (name, self.place())).collect()
     }
 

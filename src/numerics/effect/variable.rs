@@ -135,21 +135,37 @@ impl Variable {
                 Place::Joint(own) | Place::Links(own, _) if own == joint => "own angle",
                 _ => "other angle",
             },
-            Self::Load { .. } | Self::Push { .. } | Self::Current { .. } | Self::Gravity { .. } | Self::ArmLoad => "load",
+            Self::Load { .. }
+            | Self::Push { .. }
+            | Self::Current { .. }
+            | Self::Gravity { .. }
+            | Self::ArmLoad => "load",
             Self::Payload => "payload",
             Self::Approach { .. } => "approach",
-            Self::Move { .. } | Self::Slip { .. } | Self::Stretch { .. } | Self::Recent { .. } | Self::LastMove => "travel",
+            Self::Move { .. }
+            | Self::Slip { .. }
+            | Self::Stretch { .. }
+            | Self::Recent { .. }
+            | Self::LastMove => "travel",
             Self::Velocity { .. } | Self::Speed | Self::Work { .. } => "speed",
             Self::Temperature | Self::Lagging { .. } => "temperature",
             Self::Time => "time",
-            Self::Azimuth | Self::Elevation | Self::Range | Self::Position { .. } | Self::Sighted { .. } => "position",
+            Self::Azimuth
+            | Self::Elevation
+            | Self::Range
+            | Self::Position { .. }
+            | Self::Sighted { .. } => "position",
             Self::Circumstance { .. } => "circumstance",
         }
     }
 
     /// How many numbers it is.
     pub(super) fn components(self) -> usize {
-        if self == (Self::Gravity { axis: None }) { 3 } else { 1 }
+        if self == (Self::Gravity { axis: None }) {
+            3
+        } else {
+            1
+        }
     }
 
     /// Whether it is one number of a row.
@@ -158,18 +174,36 @@ impl Variable {
     }
 
     /// One of its numbers in a row; `None` where the row does not tell.
-    pub(super) fn value(self, component: usize, robot: &RobotModel, state: &ArmState) -> Option<f64> {
+    pub(super) fn value(
+        self,
+        component: usize,
+        robot: &RobotModel,
+        state: &ArmState,
+    ) -> Option<f64> {
         match self {
             Self::Angle { joint } => Some(state.q[joint]),
-            Self::Motor { joint } => Some(robot.description().joints[joint].reduction_ratio.unwrap_or(0.0) * state.q[joint]),
+            Self::Motor { joint } => Some(
+                robot.description().joints[joint]
+                    .reduction_ratio
+                    .unwrap_or(0.0)
+                    * state.q[joint],
+            ),
             Self::Load { joint } => Some(state.torque()[joint]),
-            Self::Push { joint, friction_nm } => Some(state.torque()[joint] + friction_nm * state.direction(joint)),
-            Self::Current { joint } => state.current().map(|all| all[joint]).filter(|current| current.is_finite()),
+            Self::Push { joint, friction_nm } => {
+                Some(state.torque()[joint] + friction_nm * state.direction(joint))
+            }
+            Self::Current { joint } => state
+                .current()
+                .map(|all| all[joint])
+                .filter(|current| current.is_finite()),
             Self::Approach { joint } => Some(state.direction(joint)),
             Self::Move { joint } => Some(state.last_move(joint)),
             Self::Velocity { joint } => Some(state.velocity(joint)),
             Self::Payload => Some(state.payload()),
-            Self::Gravity { axis } => state.posture.down(state.q.len()).map(|down| down[axis.unwrap_or(component)]),
+            Self::Gravity { axis } => state
+                .posture
+                .down(state.q.len())
+                .map(|down| down[axis.unwrap_or(component)]),
             Self::Temperature => state.temperature(),
             Self::Time => Some(state.time()),
             Self::Circumstance { column, joint } => state.circumstance(column.text(), joint),
@@ -182,35 +216,64 @@ impl Variable {
             Self::Position { along } => Some(Vector3::from(along).dot(&state.posture.tool(robot))),
             Self::Sighted { along } => Some(Vector3::from(along).dot(&state.point)),
             Self::Work { joint, cooling } => Some(state.memory(Memory::Work { joint, cooling })),
-            Self::Lagging { lag } => state.temperature().map(|_| state.memory(Memory::Temperature { lag })),
+            Self::Lagging { lag } => state
+                .temperature()
+                .map(|_| state.memory(Memory::Temperature { lag })),
             Self::ArmLoad | Self::LastMove | Self::Speed => None,
         }
     }
 
     /// By how much a value is beyond a range, at most 1: as a share of the range, of a load of its distance from no load.
     pub(super) fn share_beyond(self, value: f64, [low, high]: [f64; 2]) -> f64 {
-        let loads = matches!(self, Self::Load { .. } | Self::Push { .. } | Self::Current { .. } | Self::ArmLoad);
-        let [low, high] = if loads { [low.min(0.0), high.max(0.0)] } else { [low, high] };
+        let loads = matches!(
+            self,
+            Self::Load { .. } | Self::Push { .. } | Self::Current { .. } | Self::ArmLoad
+        );
+        let [low, high] = if loads {
+            [low.min(0.0), high.max(0.0)]
+        } else {
+            [low, high]
+        };
         let span = if loads { high.max(-low) } else { high - low };
         let off = (low - value).max(value - high).max(0.0);
-        if off == 0.0 { 0.0 } else { (off / span).min(1.0) }
+        if off == 0.0 {
+            0.0
+        } else {
+            (off / span).min(1.0)
+        }
     }
 
     /// Whether its value needs to know how the arm hangs.
     pub(super) fn needs_torque(self) -> bool {
-        matches!(self, Self::Load { .. } | Self::Push { .. } | Self::Gravity { .. } | Self::ArmLoad | Self::Position { .. })
+        matches!(
+            self,
+            Self::Load { .. }
+                | Self::Push { .. }
+                | Self::Gravity { .. }
+                | Self::ArmLoad
+                | Self::Position { .. }
+        )
     }
 
     /// Whether no target states it: it follows from the moves before, or is a circumstance that targets have no column for.
     pub fn is_no_targets(self) -> bool {
-        let by_moves = matches!(self, Self::Move { .. } | Self::Stretch { .. } | Self::Recent { .. } | Self::Work { .. });
+        let by_moves = matches!(
+            self,
+            Self::Move { .. } | Self::Stretch { .. } | Self::Recent { .. } | Self::Work { .. }
+        );
         by_moves || matches!(self, Self::Circumstance { .. })
     }
 
     /// Whether it follows from the way to the row, which nobody knows for the first one.
     pub fn follows_the_way(self) -> bool {
-        let last = matches!(self, Self::Push { .. } | Self::Approach { .. } | Self::Move { .. } | Self::LastMove);
-        last || matches!(self, Self::Slip { .. } | Self::Stretch { .. } | Self::Recent { .. })
+        let last = matches!(
+            self,
+            Self::Push { .. } | Self::Approach { .. } | Self::Move { .. } | Self::LastMove
+        );
+        last || matches!(
+            self,
+            Self::Slip { .. } | Self::Stretch { .. } | Self::Recent { .. }
+        )
     }
 }
 
@@ -220,7 +283,9 @@ impl fmt::Display for Variable {
             Self::Angle { joint } => write!(f, "q{}", joint + 1),
             Self::Motor { joint } => write!(f, "motor {}", joint + 1),
             Self::Load { joint } => write!(f, "load of joint {}", joint + 1),
-            Self::Push { joint, .. } | Self::Approach { joint } => write!(f, "approach of joint {}", joint + 1),
+            Self::Push { joint, .. } | Self::Approach { joint } => {
+                write!(f, "approach of joint {}", joint + 1)
+            }
             Self::Current { joint } => write!(f, "current of joint {}", joint + 1),
             Self::Move { joint } => write!(f, "last move of joint {}", joint + 1),
             Self::Velocity { joint } => write!(f, "speed of joint {}", joint + 1),
@@ -228,21 +293,40 @@ impl fmt::Display for Variable {
             Self::Gravity { .. } => f.write_str("direction of gravity"),
             Self::Temperature => f.write_str("temperature"),
             Self::Time => f.write_str("time"),
-            Self::Circumstance { column, joint: None } => f.write_str(column.text()),
-            Self::Circumstance { column, joint: Some(joint) } => write!(f, "{} of joint {}", column.text(), joint + 1),
+            Self::Circumstance {
+                column,
+                joint: None,
+            } => f.write_str(column.text()),
+            Self::Circumstance {
+                column,
+                joint: Some(joint),
+            } => write!(f, "{} of joint {}", column.text(), joint + 1),
             Self::ArmLoad => f.write_str("load of the arm"),
             Self::LastMove => f.write_str("last move"),
             Self::Speed => f.write_str("speed"),
             Self::Azimuth => f.write_str("azimuth"),
             Self::Elevation => f.write_str("elevation"),
             Self::Range => f.write_str("range"),
-            Self::Slip { joint, .. } => write!(f, "travel of joint {} since it reversed", joint + 1),
-            Self::Stretch { joint, limit } => {
-                write!(f, "travel of joint {} that sticks up to {:.1} deg", joint + 1, limit.to_degrees())
+            Self::Slip { joint, .. } => {
+                write!(f, "travel of joint {} since it reversed", joint + 1)
             }
-            Self::Recent { joint, time } => write!(f, "travel of joint {} in the last {time:.0} s", joint + 1),
+            Self::Stretch { joint, limit } => {
+                write!(
+                    f,
+                    "travel of joint {} that sticks up to {:.1} deg",
+                    joint + 1,
+                    limit.to_degrees()
+                )
+            }
+            Self::Recent { joint, time } => {
+                write!(f, "travel of joint {} in the last {time:.0} s", joint + 1)
+            }
             Self::Position { along } => write!(f, "position of the tool along {}", arrow(along)),
-            Self::Sighted { along } => write!(f, "position of the target along {} of the instrument", arrow(along)),
+            Self::Sighted { along } => write!(
+                f,
+                "position of the target along {} of the instrument",
+                arrow(along)
+            ),
             Self::Work { joint, .. } => write!(f, "work of joint {}", joint + 1),
             Self::Lagging { .. } => f.write_str("lagging temperature"),
         }

@@ -47,8 +47,16 @@ impl PlacedRow<'_> {
     fn spread(&mut self, closing: &Closing) -> Option<Spread> {
         self.scratch.velocities(self.robot, &self.point);
         let lines = closing.lines();
-        let columns: Vec<Vector3<f64>> = self.scratch.by_joint.iter().map(|velocity| lines * velocity).collect();
-        let mut square: Matrix3<f64> = columns.iter().map(|column| column * column.transpose()).sum();
+        let columns: Vec<Vector3<f64>> = self
+            .scratch
+            .by_joint
+            .iter()
+            .map(|velocity| lines * velocity)
+            .collect();
+        let mut square: Matrix3<f64> = columns
+            .iter()
+            .map(|column| column * column.transpose())
+            .sum();
         for axis in 0..3 {
             if lines.row(axis).norm() == 0.0 {
                 square[(axis, axis)] = 1.0;
@@ -56,23 +64,50 @@ impl PlacedRow<'_> {
         }
         let factor = square.cholesky()?;
         let log_volume = factor.l_dirty().diagonal().map(f64::ln).sum();
-        Some(Spread { lines, columns, inverse: factor.inverse(), log_volume })
+        Some(Spread {
+            lines,
+            columns,
+            inverse: factor.inverse(),
+            log_volume,
+        })
     }
 
     /// The least motion of the joints (rad or m) that takes off `error`, measured - predicted, of what is closed.
-    pub(crate) fn closing_step(&mut self, closing: &Closing, error: &Vector3<f64>) -> Option<Vec<f64>> {
+    pub(crate) fn closing_step(
+        &mut self,
+        closing: &Closing,
+        error: &Vector3<f64>,
+    ) -> Option<Vec<f64>> {
         let spread = self.spread(closing)?;
         let pull = spread.inverse * error;
-        Some(spread.columns.iter().map(|column| column.dot(&pull)).collect())
+        Some(
+            spread
+                .columns
+                .iter()
+                .map(|column| column.dot(&pull))
+                .collect(),
+        )
     }
 
     /// ln sqrt(det(G G^T)), and its derivatives by every parameter through `emit(parameter, derivative)`, which add up.
-    pub(crate) fn log_volume(&mut self, closing: &Closing, mut emit: impl FnMut(usize, f64)) -> Option<f64> {
-        let Spread { lines, columns, inverse, log_volume } = self.spread(closing)?;
+    pub(crate) fn log_volume(
+        &mut self,
+        closing: &Closing,
+        mut emit: impl FnMut(usize, f64),
+    ) -> Option<f64> {
+        let Spread {
+            lines,
+            columns,
+            inverse,
+            log_volume,
+        } = self.spread(closing)?;
         let (robot, scratch) = (self.robot, &*self.scratch);
         let joints = robot.joints();
         // How the volume changes with the velocity of each joint.
-        let by_velocity: Vec<Vector3<f64>> = columns.iter().map(|column| lines.tr_mul(&(inverse * column))).collect();
+        let by_velocity: Vec<Vector3<f64>> = columns
+            .iter()
+            .map(|column| lines.tr_mul(&(inverse * column)))
+            .collect();
         // A motion of what is beyond joint k turns the velocities by the joints behind it, and moves the point for those in front.
         let mut turned = vec![Vector3::zeros(); joints + 1];
         let mut moved = turned.clone();
@@ -81,13 +116,22 @@ impl PlacedRow<'_> {
         }
         for joint in 0..joints {
             let axis = scratch.posture.behind[joint].rotation * robot.axis(joint);
-            let own = if robot.is_revolute(joint) { by_velocity[joint].cross(&axis) } else { Vector3::zeros() };
+            let own = if robot.is_revolute(joint) {
+                by_velocity[joint].cross(&axis)
+            } else {
+                Vector3::zeros()
+            };
             moved[joint + 1] = moved[joint] + own;
         }
         // The direction of what is closed turns too.
         let along: Vector3<f64> = match closing {
             Closing::Point => Vector3::zeros(),
-            _ => scratch.by_joint.iter().zip(&columns).map(|(velocity, column)| velocity * (inverse[(0, 0)] * column.x)).sum(),
+            _ => scratch
+                .by_joint
+                .iter()
+                .zip(&columns)
+                .map(|(velocity, column)| velocity * (inverse[(0, 0)] * column.x))
+                .sum(),
         };
         let curved = match closing {
             Closing::Sphere(reach) => {
@@ -101,13 +145,19 @@ impl PlacedRow<'_> {
         };
         let by_joint = |joint: usize, rate: f64| {
             let axis = scratch.posture.behind[joint].rotation * robot.axis(joint);
-            let rotation = if robot.is_revolute(joint) { axis * rate } else { Vector3::zeros() };
+            let rotation = if robot.is_revolute(joint) {
+                axis * rate
+            } else {
+                Vector3::zeros()
+            };
             rigid(joint + 1, &rotation, &(scratch.by_joint[joint] * rate))
         };
         for (parameter, direction) in &scratch.deflection.partials {
             let change = match direction {
                 Direction::Joint(joint, rate) => by_joint(*joint, *rate),
-                Direction::Torque(joint, rate) => by_joint(*joint, scratch.deflection.compliance[*joint] * *rate),
+                Direction::Torque(joint, rate) => {
+                    by_joint(*joint, scratch.deflection.compliance[*joint] * *rate)
+                }
                 Direction::Station(station, rate) => {
                     let turn = scratch.stations[*station].jacobian * rate;
                     let rotation = scratch.before[*station].rotation * turn.fixed_rows::<3>(3);
@@ -128,7 +178,9 @@ mod tests {
     use super::*;
     use crate::effect::{EffectContext, EffectStack, Load, arm_effect};
     use crate::robot::import::{RobotFileText, read_calib};
-    use crate::robot::{Anchor, MeasurementSetup, Measurements, Named, Readings, RobotModel, Shape};
+    use crate::robot::{
+        Anchor, MeasurementSetup, Measurements, Named, Readings, RobotModel, Shape,
+    };
     use crate::spatial::Pose;
 
     const ARM: &str = "
@@ -147,19 +199,51 @@ tool: {point: [20, 10, 60]}
 
     #[test]
     fn derivatives_of_the_volume_are_central_differences() {
-        let text = RobotFileText { label: "arm.yaml", text: ARM };
+        let text = RobotFileText {
+            label: "arm.yaml",
+            text: ARM,
+        };
         let robot = RobotModel::new(read_calib(text, None).expect("sound").robot);
-        let shapes = [Shape::Point, Shape::Plane(Vector3::new(0.3, -0.2, 0.9).normalize()), Shape::Sphere(0.05)];
+        let shapes = [
+            Shape::Point,
+            Shape::Plane(Vector3::new(0.3, -0.2, 0.9).normalize()),
+            Shape::Sphere(0.05),
+        ];
         for shape in shapes {
-            let anchor = Anchor { name: "a".into(), place: Vector3::new(0.4, -0.3, 0.2), shape };
-            let robot = robot.clone().measured_by(MeasurementSetup { targets: Vec::new(), anchors: vec![anchor] });
-            let setting = EffectContext { base: Pose::identity(), load: Load::GravityTorque };
-            let names = ["anchor", "base_frame", "tool_offset", "joint_offset", "link_geometry"];
-            let effects = names.iter().filter_map(|name| arm_effect(name, &setting)).collect();
+            let anchor = Anchor {
+                name: "a".into(),
+                place: Vector3::new(0.4, -0.3, 0.2),
+                shape,
+            };
+            let robot = robot.clone().measured_by(MeasurementSetup {
+                targets: Vec::new(),
+                anchors: vec![anchor],
+            });
+            let setting = EffectContext {
+                base: Pose::identity(),
+                load: Load::GravityTorque,
+            };
+            let names = [
+                "anchor",
+                "base_frame",
+                "tool_offset",
+                "joint_offset",
+                "link_geometry",
+            ];
+            let effects = names
+                .iter()
+                .filter_map(|name| arm_effect(name, &setting))
+                .collect();
             let stack = EffectStack::new(&robot, Pose::identity(), effects);
-            let x: Vec<f64> = (0..stack.specs().len()).map(|k| 3e-3 * (1.7 * k as f64).sin()).collect();
-            let readings =
-                Readings { kind: "socket", sigma: vec![1e-4], anchor: Some(Named::of(["a"].into_iter())), ..Readings::default() };
+            let x: Vec<f64> = (0..stack.specs().len())
+                .map(|k| 3e-3 * (1.7 * k as f64).sin())
+                .collect();
+            let readings = Readings {
+                kind: "socket",
+                sigma: vec![1e-4],
+                anchor: Some(Named::of(["a"].into_iter())),
+                ..Readings::default()
+            };
             let data = Measurements {
                 joints: 6,
                 q: vec![0.4, -1.1, 0.9, 0.5, -0.8, 0.3],
@@ -175,7 +259,9 @@ tool: {point: [20, 10, 60]}
                     Shape::Plane(normal) => Closing::Plane(normal),
                     Shape::Sphere(_) => Closing::Sphere(placed.from_anchor("a").expect("there")),
                 };
-                placed.log_volume(&closing, emit).expect("no singular posture")
+                placed
+                    .log_volume(&closing, emit)
+                    .expect("no singular posture")
             };
             let mut rates = vec![0.0; x.len()];
             volume(&x, &mut |k, rate| rates[k] += rate);

@@ -28,24 +28,44 @@ impl Warmth {
     /// What the recording offers, and of how many of its kind each is one.
     pub(super) fn laws(self, joint: Option<usize>, survey: &Survey) -> Vec<(Law, usize)> {
         let [start, end] = survey.time;
-        let shared = |shares: &'static [f64]| shares.iter().filter(move |_| end > start).map(move |share| share * (end - start));
-        let above = |of| survey.reference_c.map(|zero| Law::new(of, Basis::Linear { zero, per: 1.0 }));
+        let shared = |shares: &'static [f64]| {
+            shares
+                .iter()
+                .filter(move |_| end > start)
+                .map(move |share| share * (end - start))
+        };
+        let above = |of| {
+            survey
+                .reference_c
+                .map(|zero| Law::new(of, Basis::Linear { zero, per: 1.0 }))
+        };
         let kinds = 1 + 2 * usize::from(survey.reference_c.is_some());
         match (self, joint) {
             (Self::Temperature, _) => {
                 let lagging = shared(&LAGS).filter_map(|lag| above(Variable::Lagging { lag }));
                 let measured = above(Variable::Temperature).map(|law| (law, kinds));
-                measured.into_iter().chain(lagging.map(|law| (law, kinds * LAGS.len()))).collect()
+                measured
+                    .into_iter()
+                    .chain(lagging.map(|law| (law, kinds * LAGS.len())))
+                    .collect()
             }
             (Self::WarmUp, _) => {
                 let law = |constant| Law::new(Variable::Time, Basis::Settling { start, constant });
-                shared(&WARM_UPS).map(|constant| (law(constant), kinds * WARM_UPS.len())).collect()
+                shared(&WARM_UPS)
+                    .map(|constant| (law(constant), kinds * WARM_UPS.len()))
+                    .collect()
             }
             (Self::Work, Some(joint)) if survey.data.has_clock() => {
                 let law = |cooling| {
-                    let heat = |row: &usize| survey.data.memory(Memory::Work { joint, cooling }, *row);
+                    let heat =
+                        |row: &usize| survey.data.memory(Memory::Work { joint, cooling }, *row);
                     let per = survey.rows.iter().map(heat).fold(0.0, f64::max);
-                    (per > 0.0).then(|| Law::new(Variable::Work { joint, cooling }, Basis::Linear { zero: 0.0, per }))
+                    (per > 0.0).then(|| {
+                        Law::new(
+                            Variable::Work { joint, cooling },
+                            Basis::Linear { zero: 0.0, per },
+                        )
+                    })
                 };
                 let laws: Vec<Law> = shared(&COOLINGS).filter_map(law).collect();
                 let tried = 3 * laws.len();
@@ -89,7 +109,11 @@ pub(super) fn impossible(term: &Term, survey: &Survey) -> Option<String> {
     // What ends at the bound would go on beyond it.
     let beyond = time >= SLOWEST * CONSTANTS[1] * length;
     beyond.then(|| {
-        format!("its time constant of {} is ten times as long as the recording ({})", clock.span(time), clock.span(length))
+        format!(
+            "its time constant of {} is ten times as long as the recording ({})",
+            clock.span(time),
+            clock.span(length)
+        )
     })
 }
 
@@ -102,11 +126,14 @@ pub(super) fn near(term: &Term, survey: &Survey, level: i32) -> Vec<Term> {
     match (term.law().first.of, term.basis()) {
         (Variable::Lagging { lag }, _) => {
             let lags = around(lag, 1.7, 0.5, level, bounds(BEHIND));
-            lags.map(|lag| term.with(term.law().by(Variable::Lagging { lag }))).collect()
+            lags.map(|lag| term.with(term.law().by(Variable::Lagging { lag })))
+                .collect()
         }
         (Variable::Work { joint, cooling }, _) => {
             let coolings = around(cooling, 1.5, 0.5, level, bounds(CONSTANTS));
-            coolings.map(|cooling| term.with(term.law().by(Variable::Work { joint, cooling }))).collect()
+            coolings
+                .map(|cooling| term.with(term.law().by(Variable::Work { joint, cooling })))
+                .collect()
         }
         (_, Basis::Settling { start, constant }) => {
             let constants = around(constant, 1.5, 0.5, level, bounds(CONSTANTS));

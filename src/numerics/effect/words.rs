@@ -39,8 +39,15 @@ pub enum Clock {
 impl Clock {
     /// The clock of a recording.
     pub fn of(data: &Measurements) -> Self {
-        let times = data.time.iter().flatten().copied().filter(|time| time.is_finite());
-        times.reduce(f64::min).map_or(Self::Rows, |first| Self::Seconds { first })
+        let times = data
+            .time
+            .iter()
+            .flatten()
+            .copied()
+            .filter(|time| time.is_finite());
+        times
+            .reduce(f64::min)
+            .map_or(Self::Rows, |first| Self::Seconds { first })
     }
 
     /// What time is called: `time`, or `row`.
@@ -53,14 +60,20 @@ impl Clock {
 
     /// What a variable is called.
     pub fn named(self, variable: Variable) -> String {
-        if variable == Variable::Time { self.name().into() } else { variable.to_string() }
+        if variable == Variable::Time {
+            self.name().into()
+        } else {
+            variable.to_string()
+        }
     }
 
     /// When something changed for good: ` at 447 s`, of a clock that counts since an epoch after the first row, or the first row (from 1)
     /// after it.
     pub fn since(self, time: f64) -> String {
         match self {
-            Self::Seconds { first } if first.abs() > EPOCH => format!(" {} s after the first row", figure(time - first, 0)),
+            Self::Seconds { first } if first.abs() > EPOCH => {
+                format!(" {} s after the first row", figure(time - first, 0))
+            }
             Self::Seconds { .. } => format!(" at {} s", figure(time, 0)),
             Self::Rows => format!(" from row {:.0}", time.floor() + 2.0),
         }
@@ -81,8 +94,13 @@ mod tests {
 
     #[test]
     fn no_figure_but_zero_reads_as_zero() {
-        let read: Vec<String> = [0.0, 447.2, 15.4, 9.96, 6.31, 0.42, -0.004, 3e-9].map(|value| figure(value, 0)).into();
-        assert_eq!(read, ["0", "447", "15", "10", "6.3", "0.42", "-0.0040", "3.0e-9"]);
+        let read: Vec<String> = [0.0, 447.2, 15.4, 9.96, 6.31, 0.42, -0.004, 3e-9]
+            .map(|value| figure(value, 0))
+            .into();
+        assert_eq!(
+            read,
+            ["0", "447", "15", "10", "6.3", "0.42", "-0.0040", "3.0e-9"]
+        );
         assert_eq!([figure(12.344, 2), figure(0.004, 2)], ["12.34", "0.0040"]);
     }
 
@@ -92,7 +110,16 @@ mod tests {
         assert_eq!(Clock::Rows.since(289.5), " from row 291");
         let clock = Clock::Seconds { first: 12.0 };
         assert_eq!(clock.since(289.5), " at 290 s");
-        assert_eq!([Clock::Rows.span(173.2), clock.span(3.21)], ["173 rows", "3.2 s"]);
-        assert_eq!(Clock::Seconds { first: 1_709_564_908.0 }.since(1_709_565_355.2), " 447 s after the first row");
+        assert_eq!(
+            [Clock::Rows.span(173.2), clock.span(3.21)],
+            ["173 rows", "3.2 s"]
+        );
+        assert_eq!(
+            Clock::Seconds {
+                first: 1_709_564_908.0
+            }
+            .since(1_709_565_355.2),
+            " 447 s after the first row"
+        );
     }
 }

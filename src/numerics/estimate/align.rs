@@ -19,9 +19,16 @@ const JUDGES: usize = 500;
 /// has it, else the identity.
 pub fn align(robot: &RobotModel, data: &Measurements, rows: &[usize]) -> Pose {
     let all = rows;
-    let rows: Vec<usize> = rows.iter().copied().filter(|row| data.has_point(*row)).collect();
+    let rows: Vec<usize> = rows
+        .iter()
+        .copied()
+        .filter(|row| data.has_point(*row))
+        .collect();
     if rows.len() < 3 {
-        return KINDS.iter().find_map(|kind| kind.base(robot, data, all)).unwrap_or_else(Pose::identity);
+        return KINDS
+            .iter()
+            .find_map(|kind| kind.base(robot, data, all))
+            .unwrap_or_else(Pose::identity);
     }
     let target = |row: &usize| robot.last_body(data.q(*row)) * *robot.mounting_at(data, *row);
     let model: Vec<Vector3<f64>> = rows.iter().map(|row| target(row).translation).collect();
@@ -34,7 +41,11 @@ pub fn align_points(model: &[Vector3<f64>], measured: &[Vector3<f64>]) -> Pose {
     let mut used: Vec<usize> = Vec::new();
     let mut pose = best_start(model, measured);
     for _ in 0..10 {
-        let errors: Vec<f64> = model.iter().zip(measured).map(|(a, b)| (pose.point(a) - b).norm()).collect();
+        let errors: Vec<f64> = model
+            .iter()
+            .zip(measured)
+            .map(|(a, b)| (pose.point(a) - b).norm())
+            .collect();
         let mut sorted = errors.clone();
         sorted.sort_by(f64::total_cmp);
         let limit = TRIM * sorted[sorted.len() / 2];
@@ -54,7 +65,10 @@ fn best_start(model: &[Vector3<f64>], measured: &[Vector3<f64>]) -> Pose {
     let all: Vec<usize> = (0..n).collect();
     let judges: Vec<usize> = (0..n).step_by(n.div_ceil(JUDGES)).collect();
     let median = |pose: &Pose| {
-        let mut errors: Vec<f64> = judges.iter().map(|i| (pose.point(&model[*i]) - measured[*i]).norm()).collect();
+        let mut errors: Vec<f64> = judges
+            .iter()
+            .map(|i| (pose.point(&model[*i]) - measured[*i]).norm())
+            .collect();
         nearest(&mut errors, 0.5).unwrap_or(f64::INFINITY)
     };
     // Spread evenly over the recording by the golden ratio's multiples: no two of a triple are neighbours.
@@ -76,11 +90,17 @@ fn best_start(model: &[Vector3<f64>], measured: &[Vector3<f64>]) -> Pose {
 
 pub(super) fn kabsch(from: &[Vector3<f64>], to: &[Vector3<f64>], used: &[usize]) -> Pose {
     let count = used.len() as f64;
-    let centre = |points: &[Vector3<f64>]| used.iter().map(|i| points[*i]).sum::<Vector3<f64>>() / count;
+    let centre =
+        |points: &[Vector3<f64>]| used.iter().map(|i| points[*i]).sum::<Vector3<f64>>() / count;
     let (a, b) = (centre(from), centre(to));
-    let covariance: Matrix3<f64> = used.iter().map(|i| (to[*i] - b) * (from[*i] - a).transpose()).sum();
+    let covariance: Matrix3<f64> = used
+        .iter()
+        .map(|i| (to[*i] - b) * (from[*i] - a).transpose())
+        .sum();
     let svd = covariance.svd(true, true);
-    let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else { return Pose::identity() };
+    let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else {
+        return Pose::identity();
+    };
     let mut sign = Matrix3::identity();
     // Without this a mirrored solution could win.
     sign[(2, 2)] = (u * v_t).determinant().signum();

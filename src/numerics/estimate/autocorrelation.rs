@@ -20,7 +20,11 @@ pub fn autocorrelation_time(residual: &[f64], each: usize) -> f64 {
     let chance = CHANCE / (residual.len() as f64).sqrt();
     let mut time = 1.0;
     for lag in 1..=rows / FARTHEST {
-        let product: f64 = residual.iter().zip(&residual[lag * each..]).map(|(a, b)| a * b).sum();
+        let product: f64 = residual
+            .iter()
+            .zip(&residual[lag * each..])
+            .map(|(a, b)| a * b)
+            .sum();
         let correlation = product / square;
         if correlation < chance || lag as f64 > WINDOW * time {
             break;

@@ -35,10 +35,16 @@ const DISTINCT: f64 = 1e-6;
 const TIE: f64 = 0.99;
 
 /// Tests every parameter but the base's, in order of precedence; both models have the same parameters.
-pub fn changes(before: &Session, after: &Session, precedence: impl Fn(usize) -> usize) -> Vec<ParameterChange> {
+pub fn changes(
+    before: &Session,
+    after: &Session,
+    precedence: impl Fn(usize) -> usize,
+) -> Vec<ParameterChange> {
     let stack = &before.model.stack;
     let base: Vec<usize> = stack.parameters_of(names::BASE_FRAME).collect();
-    let shared: Vec<usize> = (0..stack.specs().len()).filter(|k| !base.contains(k)).collect();
+    let shared: Vec<usize> = (0..stack.specs().len())
+        .filter(|k| !base.contains(k))
+        .collect();
     let mut reduced = Reduced::of(before, after, &shared, &base);
     let wide = |j: usize| stack.specs()[shared[j]].prior_sigma;
     let mut ranks: Vec<Option<usize>> = vec![None; shared.len()];
@@ -48,19 +54,31 @@ pub fn changes(before: &Session, after: &Session, precedence: impl Fn(usize) -> 
             .filter(|j| reduced.sigma(*j).is_some_and(|s| s < wide(*j)))
             .collect();
         let score = |j: usize| reduced.step(j).abs() / reduced.sigma(j).unwrap_or(f64::INFINITY);
-        let Some(best) = open.iter().map(|j| score(*j)).max_by(f64::total_cmp) else { break };
+        let Some(best) = open.iter().map(|j| score(*j)).max_by(f64::total_cmp) else {
+            break;
+        };
         if chance(best) * open.len() as f64 > CHANCE {
             break;
         }
         let tied = open.into_iter().filter(|j| score(*j) >= TIE * best);
-        let Some(chosen) = tied.min_by_key(|j| precedence(shared[*j])) else { break };
+        let Some(chosen) = tied.min_by_key(|j| precedence(shared[*j])) else {
+            break;
+        };
         ranks[chosen] = Some(rank);
         reduced.take(chosen);
     }
     let told = (0..shared.len()).filter_map(|j| {
         // Those taken in are judged beside each other.
-        let others = ranks.iter().enumerate().filter(|(i, rank)| *i != j && rank.is_some()).map(|(i, _)| i);
-        let alone = if ranks[j].is_some() { reduced.fresh_without(others) } else { reduced.clone() };
+        let others = ranks
+            .iter()
+            .enumerate()
+            .filter(|(i, rank)| *i != j && rank.is_some())
+            .map(|(i, _)| i);
+        let alone = if ranks[j].is_some() {
+            reduced.fresh_without(others)
+        } else {
+            reduced.clone()
+        };
         let (step, sigma) = (alone.step(j), alone.sigma(j)?);
         (sigma < wide(j)).then(|| ParameterChange {
             parameter: shared[j],
@@ -94,7 +112,11 @@ impl Reduced {
     fn of(before: &Session, after: &Session, shared: &[usize], base: &[usize]) -> Self {
         let order: Vec<usize> = shared.iter().chain(base).copied().collect();
         let factor = |session: &Session| {
-            let problem = Problem { data: session.data, rows: session.rows, excess: session.fitted.excess() };
+            let problem = Problem {
+                data: session.data,
+                rows: session.rows,
+                excess: session.fitted.excess(),
+            };
             problem.observe(session.model, &order).factor
         };
         let (first, second) = (factor(before), factor(after));
@@ -113,7 +135,11 @@ impl Reduced {
                 }
             }
             // About the values before: what the later fit moved is for the steps to explain.
-            let moved: f64 = (0..s).map(|j| second.entry(i, j) * (after.model.x[shared[j]] - before.model.x[shared[j]])).sum();
+            let moved: f64 = (0..s)
+                .map(|j| {
+                    second.entry(i, j) * (after.model.x[shared[j]] - before.model.x[shared[j]])
+                })
+                .sum();
             rows[(i, width - 1)] = first.entry(i, s + b);
             rows[(height + i, width - 1)] = second.entry(i, s + b) + moved;
         }
@@ -124,21 +150,41 @@ impl Reduced {
         }
         let whole = TriangularFactor::of(&rows);
         let start = s + 2 * b;
-        let columns: Vec<Vec<f64>> = (0..s).map(|j| (0..s).map(|i| whole.entry(start + i, start + j)).collect()).collect();
+        let columns: Vec<Vec<f64>> = (0..s)
+            .map(|j| (0..s).map(|i| whole.entry(start + i, start + j)).collect())
+            .collect();
         let right: Vec<f64> = (0..s).map(|i| whole.entry(start + i, width - 1)).collect();
         let values = 3 * (before.rows.len() + after.rows.len());
         let freedom = values.saturating_sub(2 * s + 2 * b).max(1) as f64;
         let rest = whole.entry(width - 1, width - 1).powi(2);
-        let lengths = (0..s).map(|j| (0..s + b + 1).map(|i| second.entry(i, j).powi(2)).sum::<f64>().sqrt()).collect();
+        let lengths = (0..s)
+            .map(|j| {
+                (0..s + b + 1)
+                    .map(|i| second.entry(i, j).powi(2))
+                    .sum::<f64>()
+                    .sqrt()
+            })
+            .collect();
         let original = (columns.clone(), right.clone());
-        Self { columns, right, original, lengths, scale: (rest / freedom).sqrt().max(1.0) }
+        Self {
+            columns,
+            right,
+            original,
+            lengths,
+            scale: (rest / freedom).sqrt().max(1.0),
+        }
     }
 
     fn square(&self, j: usize) -> f64 {
         self.columns[j].iter().map(|value| value * value).sum()
     }
     fn step(&self, j: usize) -> f64 {
-        self.columns[j].iter().zip(&self.right).map(|(a, b)| a * b).sum::<f64>() / self.square(j).max(f64::MIN_POSITIVE)
+        self.columns[j]
+            .iter()
+            .zip(&self.right)
+            .map(|(a, b)| a * b)
+            .sum::<f64>()
+            / self.square(j).max(f64::MIN_POSITIVE)
     }
     /// `None` where the rest can do the same.
     fn sigma(&self, j: usize) -> Option<f64> {
@@ -155,17 +201,28 @@ impl Reduced {
         let own = self.columns[j].clone();
         let project = |column: &mut Vec<f64>| {
             let share = column.iter().zip(&own).map(|(a, b)| a * b).sum::<f64>() / square;
-            column.iter_mut().zip(&own).for_each(|(a, b)| *a -= share * b);
+            column
+                .iter_mut()
+                .zip(&own)
+                .for_each(|(a, b)| *a -= share * b);
         };
         project(&mut self.right);
-        self.columns.iter_mut().enumerate().filter(|(i, _)| *i != j).for_each(|(_, column)| project(column));
+        self.columns
+            .iter_mut()
+            .enumerate()
+            .filter(|(i, _)| *i != j)
+            .for_each(|(_, column)| project(column));
         self.columns[j].fill(0.0);
     }
 
     /// From the beginning, with others taken in.
     fn fresh_without(&self, others: impl Iterator<Item = usize>) -> Self {
         let (columns, right) = self.original.clone();
-        let mut fresh = Self { columns, right, ..self.clone() };
+        let mut fresh = Self {
+            columns,
+            right,
+            ..self.clone()
+        };
         others.for_each(|other| fresh.take(other));
         fresh
     }

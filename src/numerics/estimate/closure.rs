@@ -18,13 +18,23 @@ impl Problem<'_> {
     /// The data of all candidates from joints at which what was brought to a place lies there; none where nothing was.
     pub fn shown(&self, model: &Model, candidates: &[usize]) -> Option<TriangularFactor> {
         let data = closed(model, self.data, self.rows)?;
-        Some(Problem { data: &data, ..*self }.observe(model, candidates).factor)
+        Some(
+            Problem {
+                data: &data,
+                ..*self
+            }
+            .observe(model, candidates)
+            .factor,
+        )
     }
 }
 
 /// The measurements with joints that close in these rows; none where no row was brought to a place.
 pub(super) fn closed(model: &Model, data: &Measurements, rows: &[usize]) -> Option<Measurements> {
-    let brought: Vec<&dyn MeasurementKind> = kinds(data).into_iter().filter(|kind| kind.is_brought()).collect();
+    let brought: Vec<&dyn MeasurementKind> = kinds(data)
+        .into_iter()
+        .filter(|kind| kind.is_brought())
+        .collect();
     if brought.is_empty() {
         return None;
     }
@@ -34,15 +44,21 @@ pub(super) fn closed(model: &Model, data: &Measurements, rows: &[usize]) -> Opti
         for kind in brought.iter().filter(|kind| kind.axes(data, *row) > 0) {
             for _ in 0..STEPS {
                 let mut placed = model.place(&out, *row, &mut scratch);
-                let error = kind.residual(&out, *row, &placed).map(|(error, _)| error).filter(|error| error.norm() > CLOSED);
+                let error = kind
+                    .residual(&out, *row, &placed)
+                    .map(|(error, _)| error)
+                    .filter(|error| error.norm() > CLOSED);
                 let closing = kind.closing(&out, *row, &placed);
-                let Some(step) =
-                    closing.zip(error).and_then(|(closing, error)| placed.closing_step(&closing, &error.first_three()))
-                else {
+                let Some(step) = closing.zip(error).and_then(|(closing, error)| {
+                    placed.closing_step(&closing, &error.first_three())
+                }) else {
                     break;
                 };
                 let joints = &mut out.q[row * data.joints..(row + 1) * data.joints];
-                joints.iter_mut().zip(step).for_each(|(q, change)| *q += change);
+                joints
+                    .iter_mut()
+                    .zip(step)
+                    .for_each(|(q, change)| *q += change);
             }
         }
     }

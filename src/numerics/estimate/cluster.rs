@@ -17,51 +17,75 @@ const SOLE: f64 = 0.98;
 const CHUNK: usize = 256;
 
 /// A root of the covariance of the `free` parameters (upper triangular, p x p) whose factor's inverse is `inverse`, priors included.
-pub(crate) fn clustered(problem: &Problem, model: &Model, free: &[usize], inverse: &Triangle, poses: &[Vec<usize>]) -> Triangle {
+pub(crate) fn clustered(
+    problem: &Problem,
+    model: &Model,
+    free: &[usize],
+    inverse: &Triangle,
+    poses: &[Vec<usize>],
+) -> Triangle {
     let p = free.len();
     let mut column = vec![usize::MAX; model.stack.specs().len()];
     for (j, parameter) in free.iter().enumerate() {
         column[*parameter] = j;
     }
-    let lines: Vec<Vec<f64>> =
-        poses
-            .par_iter()
-            .map_init(
-                || (model.stack.scratch(&model.robot), Vec::new()),
-                |(scratch, jacobian), pose| {
-                    let (mut errors, mut visible) = (Vec::new(), Vec::new());
-                    for &row in pose {
-                        let mut placed = model.place(problem.data, row, scratch);
-                        for kind in KINDS {
-                            let Some((term, _)) = ObservationTerm::of(*kind, problem.data, row, &placed, problem.excess) else {
-                                continue;
-                            };
-                            let share = term.share();
-                            let height = kind.height();
-                            jacobian.clear();
-                            jacobian.resize(height * p, 0.0);
-                            term.derivatives(&mut placed, |parameter, derivative| {
-                                if column[parameter] < p {
-                                    let own = &mut jacobian[height * column[parameter]..][..derivative.len()];
-                                    own.iter_mut().zip(derivative).for_each(|(sum, value)| *sum += value);
-                                }
-                            });
-                            let error = term.error.times(share);
-                            for line in 0..height {
-                                errors.push(error.get(line).copied().unwrap_or_default());
-                                visible.extend((0..p).map(|k| {
-                                    (0..=k).map(|j| jacobian[height * j + line] * inverse.at(j, k)).sum::<f64>() * share
-                                }));
+    let lines: Vec<Vec<f64>> = poses
+        .par_iter()
+        .map_init(
+            || (model.stack.scratch(&model.robot), Vec::new()),
+            |(scratch, jacobian), pose| {
+                let (mut errors, mut visible) = (Vec::new(), Vec::new());
+                for &row in pose {
+                    let mut placed = model.place(problem.data, row, scratch);
+                    for kind in KINDS {
+                        let Some((term, _)) =
+                            ObservationTerm::of(*kind, problem.data, row, &placed, problem.excess)
+                        else {
+                            continue;
+                        };
+                        let share = term.share();
+                        let height = kind.height();
+                        jacobian.clear();
+                        jacobian.resize(height * p, 0.0);
+                        term.derivatives(&mut placed, |parameter, derivative| {
+                            if column[parameter] < p {
+                                let own =
+                                    &mut jacobian[height * column[parameter]..][..derivative.len()];
+                                own.iter_mut()
+                                    .zip(derivative)
+                                    .for_each(|(sum, value)| *sum += value);
                             }
+                        });
+                        let error = term.error.times(share);
+                        for line in 0..height {
+                            errors.push(error.get(line).copied().unwrap_or_default());
+                            visible.extend((0..p).map(|k| {
+                                (0..=k)
+                                    .map(|j| jacobian[height * j + line] * inverse.at(j, k))
+                                    .sum::<f64>()
+                                    * share
+                            }));
                         }
                     }
-                    let visible = DMatrix::from_row_slice(errors.len(), p, &visible);
-                    influence(&visible, &DVector::from_vec(errors), inverse)
-                },
-            )
-            .collect();
-    let priors = free.iter().enumerate().filter_map(|(j, k)| model.known(*k).prior.map(|prior| (j, 1.0 / prior.sigma)));
-    let told = priors.map(|(j, weight)| upwards(inverse, |k| if k < j { 0.0 } else { inverse.at(j, k) * weight }));
+                }
+                let visible = DMatrix::from_row_slice(errors.len(), p, &visible);
+                influence(&visible, &DVector::from_vec(errors), inverse)
+            },
+        )
+        .collect();
+    let priors = free
+        .iter()
+        .enumerate()
+        .filter_map(|(j, k)| model.known(*k).prior.map(|prior| (j, 1.0 / prior.sigma)));
+    let told = priors.map(|(j, weight)| {
+        upwards(inverse, |k| {
+            if k < j {
+                0.0
+            } else {
+                inverse.at(j, k) * weight
+            }
+        })
+    });
     triangle(p, lines.into_iter().chain(told))
 }
 
@@ -79,7 +103,9 @@ fn influence(visible: &DMatrix<f64>, errors: &DVector<f64>, inverse: &Triangle) 
 /// R^-1 times a vector.
 fn upwards(inverse: &Triangle, vector: impl Fn(usize) -> f64) -> Vec<f64> {
     let p = inverse.size();
-    (0..p).map(|j| (j..p).map(|k| inverse.at(j, k) * vector(k)).sum()).collect()
+    (0..p)
+        .map(|j| (j..p).map(|k| inverse.at(j, k) * vector(k)).sum())
+        .collect()
 }
 
 /// The upper triangular root of A' A: columns are factored last first, and the factor turned over.

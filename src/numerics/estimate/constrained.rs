@@ -15,7 +15,9 @@ impl Model {
 
     /// The nearest allowed value.
     pub(crate) fn within(&self, parameter: usize, value: f64) -> f64 {
-        self.known(parameter).bounds.map_or(value, |bounds| value.clamp(bounds.low, bounds.high))
+        self.known(parameter)
+            .bounds
+            .map_or(value, |bounds| value.clamp(bounds.low, bounds.high))
     }
 
     pub(crate) fn known(&self, parameter: usize) -> Known {
@@ -23,11 +25,19 @@ impl Model {
     }
 
     /// The factor with a row for every prior of the `free` parameters and for every known length, and what these add to the cost.
-    pub(crate) fn with_priors(&self, free: &[usize], factor: TriangularFactor) -> (TriangularFactor, f64) {
+    pub(crate) fn with_priors(
+        &self,
+        free: &[usize],
+        factor: TriangularFactor,
+    ) -> (TriangularFactor, f64) {
         let priors: Vec<(usize, f64, f64)> = free
             .iter()
             .enumerate()
-            .filter_map(|(j, k)| self.known(*k).prior.map(|prior| (j, prior.sigma, (prior.mean - self.x[*k]) / prior.sigma)))
+            .filter_map(|(j, k)| {
+                self.known(*k)
+                    .prior
+                    .map(|prior| (j, prior.sigma, (prior.mean - self.x[*k]) / prior.sigma))
+            })
             .collect();
         let lengths: Vec<LengthTerm> = self.length_terms().collect();
         if priors.is_empty() && lengths.is_empty() {
@@ -36,7 +46,10 @@ impl Model {
         let mut rows = Mat::zeros(priors.len() + lengths.len(), free.len() + 1);
         for (i, term) in lengths.iter().enumerate() {
             for (parameter, rate) in &term.rates {
-                free.iter().position(|k| k == parameter).into_iter().for_each(|j| rows[(priors.len() + i, j)] += rate);
+                free.iter()
+                    .position(|k| k == parameter)
+                    .into_iter()
+                    .for_each(|j| rows[(priors.len() + i, j)] += rate);
             }
             rows[(priors.len() + i, free.len())] = term.error;
         }
@@ -44,7 +57,10 @@ impl Model {
             rows[(i, *j)] = 1.0 / sigma;
             rows[(i, free.len())] = *off;
         }
-        let squares = priors.iter().map(|(_, _, off)| off * off).chain(lengths.iter().map(|term| term.error * term.error));
+        let squares = priors
+            .iter()
+            .map(|(_, _, off)| off * off)
+            .chain(lengths.iter().map(|term| term.error * term.error));
         let cost = squares.map(|square| 0.5 * square).sum();
         (factor.stack(&TriangularFactor::of(&rows)), cost)
     }
@@ -53,19 +69,35 @@ impl Model {
     ///
     /// An active set: who stands on a bound and is pulled outwards stays; who would go beyond is put on the bound, and the others
     /// take their best step beside.
-    pub(crate) fn step_within_bounds(&self, free: &[usize], factor: &TriangularFactor, damping: f64) -> Option<Vec<f64>> {
+    pub(crate) fn step_within_bounds(
+        &self,
+        free: &[usize],
+        factor: &TriangularFactor,
+        damping: f64,
+    ) -> Option<Vec<f64>> {
         if self.known.values().all(|known| known.bounds.is_none()) {
             return factor.solve(damping);
         }
         let room: Vec<Option<(f64, f64)>> = free
             .iter()
-            .map(|k| self.known(*k).bounds.map(|bounds| (bounds.low - self.x[*k], bounds.high - self.x[*k])))
+            .map(|k| {
+                self.known(*k)
+                    .bounds
+                    .map(|bounds| (bounds.low - self.x[*k], bounds.high - self.x[*k]))
+            })
             .collect();
-        let mut fixed: Vec<Option<f64>> = self.pinned(free, factor).into_iter().map(|pinned| pinned.then_some(0.0)).collect();
+        let mut fixed: Vec<Option<f64>> = self
+            .pinned(free, factor)
+            .into_iter()
+            .map(|pinned| pinned.then_some(0.0))
+            .collect();
         loop {
             let part = factor.given(&fixed).solve(damping)?;
             let mut others = part.into_iter();
-            let step: Vec<f64> = fixed.iter().map(|fixed| fixed.or_else(|| others.next()).unwrap_or_default()).collect();
+            let step: Vec<f64> = fixed
+                .iter()
+                .map(|fixed| fixed.or_else(|| others.next()).unwrap_or_default())
+                .collect();
             let mut beyond = false;
             for ((fixed, room), change) in fixed.iter_mut().zip(&room).zip(&step) {
                 if let (None, Some((low, high))) = (*fixed, room)
@@ -86,9 +118,10 @@ impl Model {
         // The factor's J^T r points downhill: residuals are measured - predicted.
         let downhill = factor.gradient();
         let stands = |(k, down): (&usize, f64)| {
-            self.known(*k)
-                .bounds
-                .is_some_and(|bounds| (self.x[*k] >= bounds.high && down > 0.0) || (self.x[*k] <= bounds.low && down < 0.0))
+            self.known(*k).bounds.is_some_and(|bounds| {
+                (self.x[*k] >= bounds.high && down > 0.0)
+                    || (self.x[*k] <= bounds.low && down < 0.0)
+            })
         };
         free.iter().zip(downhill).map(stands).collect()
     }

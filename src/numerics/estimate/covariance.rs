@@ -20,24 +20,37 @@ pub struct Covariance {
 impl Covariance {
     /// From the whitened factor. `None` if singular.
     pub(crate) fn of(factor: &TriangularFactor, free: &[usize]) -> Option<Self> {
-        Some(Self { free: free.to_vec(), root: factor.inverse()? })
+        Some(Self {
+            free: free.to_vec(),
+            root: factor.inverse()?,
+        })
     }
 
     /// From a root.
     pub(crate) fn of_root(root: Triangle, free: &[usize]) -> Self {
-        Self { free: free.to_vec(), root }
+        Self {
+            free: free.to_vec(),
+            root,
+        }
     }
 
     /// From the covariance (SI) of pairs of parameters of the stack, each once with the smaller position first; pairs that are not there
     /// are independent. `None` of no pairs, and where it is no covariance.
     pub fn of_pairs(values: &BTreeMap<(usize, usize), f64>) -> Option<Self> {
-        let free: Vec<usize> = values.keys().filter(|(a, b)| a == b).map(|(a, _)| *a).collect();
+        let free: Vec<usize> = values
+            .keys()
+            .filter(|(a, b)| a == b)
+            .map(|(a, _)| *a)
+            .collect();
         let p = free.len();
         let sigma: Vec<f64> = free.iter().map(|k| values[&(*k, *k)].sqrt()).collect();
         // Factored from the last row up: the root is upper triangular.
         let correlation = DMatrix::from_fn(p, p, |i, j| {
             let (a, b) = (p - 1 - i, p - 1 - j);
-            let value = values.get(&(free[a.min(b)], free[a.max(b)])).copied().unwrap_or(0.0);
+            let value = values
+                .get(&(free[a.min(b)], free[a.max(b)]))
+                .copied()
+                .unwrap_or(0.0);
             value / (sigma[a] * sigma[b])
         });
         let factor = correlation.cholesky()?.unpack();
@@ -56,33 +69,58 @@ impl Covariance {
         let pairs = (0..self.free.len()).flat_map(|a| (a..self.free.len()).map(move |b| (a, b)));
         pairs.map(move |(a, b)| {
             let value = self.product(a, b);
-            let correlation = if a == b { 1.0 } else { (value / (sigma[a] * sigma[b])).clamp(-1.0, 1.0) };
+            let correlation = if a == b {
+                1.0
+            } else {
+                (value / (sigma[a] * sigma[b])).clamp(-1.0, 1.0)
+            };
             (self.free[a], self.free[b], value, correlation)
         })
     }
 
     /// The covariance (SI) of some of the parameters, in their order; `None` where one of them was not estimated.
     pub fn block(&self, parameters: &[usize]) -> Option<DMatrix<f64>> {
-        let rows: Option<Vec<usize>> =
-            parameters.iter().map(|parameter| self.free.iter().position(|free| free == parameter)).collect();
+        let rows: Option<Vec<usize>> = parameters
+            .iter()
+            .map(|parameter| self.free.iter().position(|free| free == parameter))
+            .collect();
         let rows = rows?;
-        Some(DMatrix::from_fn(rows.len(), rows.len(), |a, b| self.product(rows[a], rows[b])))
+        Some(DMatrix::from_fn(rows.len(), rows.len(), |a, b| {
+            self.product(rows[a], rows[b])
+        }))
     }
 
     /// Covariance (m2) of a point with these derivatives (m per unit) by [`Covariance::parameters`].
     pub fn of_point(&self, jacobian: &[Vector3<f64>]) -> Matrix3<f64> {
-        let along = |k: usize| -> Vector3<f64> { self.root.column(k).iter().zip(jacobian).map(|(root, by)| by * *root).sum() };
-        (0..self.free.len()).map(along).map(|along| along * along.transpose()).sum()
+        let along = |k: usize| -> Vector3<f64> {
+            self.root
+                .column(k)
+                .iter()
+                .zip(jacobian)
+                .map(|(root, by)| by * *root)
+                .sum()
+        };
+        (0..self.free.len())
+            .map(along)
+            .map(|along| along * along.transpose())
+            .sum()
     }
 
     /// Variance of what has these derivatives (SI) by [`Covariance::parameters`].
     pub(crate) fn along(&self, derivatives: &[f64]) -> f64 {
-        (0..self.free.len()).map(|k| dot(derivatives, self.root.column(k)).powi(2)).sum()
+        (0..self.free.len())
+            .map(|k| dot(derivatives, self.root.column(k)).powi(2))
+            .sum()
     }
 
     /// The same where only some parameters, by their rows, have an effect.
     pub(crate) fn along_rows(&self, derivatives: &[f64], rows: &[usize]) -> f64 {
-        let by_column = |k: usize| rows.iter().map(|row| derivatives[*row] * self.root.at(*row, k)).sum::<f64>().powi(2);
+        let by_column = |k: usize| {
+            rows.iter()
+                .map(|row| derivatives[*row] * self.root.at(*row, k))
+                .sum::<f64>()
+                .powi(2)
+        };
         (0..self.free.len()).map(by_column).sum()
     }
 
@@ -92,18 +130,30 @@ impl Covariance {
     }
 
     fn product(&self, a: usize, b: usize) -> f64 {
-        (a.max(b)..self.free.len()).map(|column| self.root.at(a, column) * self.root.at(b, column)).sum()
+        (a.max(b)..self.free.len())
+            .map(|column| self.root.at(a, column) * self.root.at(b, column))
+            .sum()
     }
 
     /// The squared distance of `values` of some free parameters from zero, in standard deviations: chi-square of as many degrees of
     /// freedom where nothing is there. `None` where one of them is not free.
     pub fn distance(&self, parameters: &[usize], values: &[f64]) -> Option<f64> {
-        let rows: Option<Vec<usize>> =
-            parameters.iter().map(|parameter| self.free.iter().position(|free| free == parameter)).collect();
+        let rows: Option<Vec<usize>> = parameters
+            .iter()
+            .map(|parameter| self.free.iter().position(|free| free == parameter))
+            .collect();
         let rows = rows?;
         let sigma: Vec<f64> = rows.iter().map(|row| self.sigma(*row)).collect();
-        let correlation = DMatrix::from_fn(rows.len(), rows.len(), |a, b| self.product(rows[a], rows[b]) / (sigma[a] * sigma[b]));
-        let scaled = DVector::from_iterator(rows.len(), values.iter().zip(&sigma).map(|(value, sigma)| value / sigma));
+        let correlation = DMatrix::from_fn(rows.len(), rows.len(), |a, b| {
+            self.product(rows[a], rows[b]) / (sigma[a] * sigma[b])
+        });
+        let scaled = DVector::from_iterator(
+            rows.len(),
+            values
+                .iter()
+                .zip(&sigma)
+                .map(|(value, sigma)| value / sigma),
+        );
         Some(scaled.dot(&correlation.cholesky()?.solve(&scaled)))
     }
 
@@ -113,7 +163,12 @@ impl Covariance {
         let own = self.sigma(row);
         (0..self.free.len())
             .filter(|other| *other != row)
-            .map(|other| (self.free[other], self.product(row, other) / (own * self.sigma(other))))
+            .map(|other| {
+                (
+                    self.free[other],
+                    self.product(row, other) / (own * self.sigma(other)),
+                )
+            })
             .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
     }
 
@@ -127,18 +182,38 @@ impl Covariance {
         (0..data.rows())
             .into_par_iter()
             .map_init(
-                || (model.stack.scratch(&model.robot), vec![Vector3::zeros(); p], [(); 3].map(|()| vec![0.0; p])),
+                || {
+                    (
+                        model.stack.scratch(&model.robot),
+                        vec![Vector3::zeros(); p],
+                        [(); 3].map(|()| vec![0.0; p]),
+                    )
+                },
                 |(scratch, jacobian, lines), row| {
                     jacobian.fill(Vector3::zeros());
-                    model.stack.derivatives(&model.robot, data, row, &model.x, scratch, |parameter, derivative| {
-                        if let Some(sum) = jacobian.get_mut(column[parameter]) {
-                            *sum += derivative;
-                        }
-                    });
+                    model.stack.derivatives(
+                        &model.robot,
+                        data,
+                        row,
+                        &model.x,
+                        scratch,
+                        |parameter, derivative| {
+                            if let Some(sum) = jacobian.get_mut(column[parameter]) {
+                                *sum += derivative;
+                            }
+                        },
+                    );
                     for (axis, line) in lines.iter_mut().enumerate() {
-                        line.iter_mut().zip(&*jacobian).for_each(|(value, derivative)| *value = derivative[axis]);
+                        line.iter_mut()
+                            .zip(&*jacobian)
+                            .for_each(|(value, derivative)| *value = derivative[axis]);
                     }
-                    let along = |k: usize| lines.iter().map(|line| dot(line, self.root.column(k)).powi(2)).sum::<f64>();
+                    let along = |k: usize| {
+                        lines
+                            .iter()
+                            .map(|line| dot(line, self.root.column(k)).powi(2))
+                            .sum::<f64>()
+                    };
                     (0..p).map(along).sum::<f64>().sqrt()
                 },
             )

@@ -31,10 +31,19 @@ impl ErrorScale {
             return Self::Lengths;
         }
         let dimension = dimension(data, rows);
-        let noise: Vec<f64> = rows.iter().filter_map(|row| noise(data, *row, dimension)).collect();
-        let size = (noise.iter().map(|sigma| sigma * sigma).sum::<f64>() / noise.len().max(1) as f64).sqrt();
+        let noise: Vec<f64> = rows
+            .iter()
+            .filter_map(|row| noise(data, *row, dimension))
+            .collect();
+        let size = (noise.iter().map(|sigma| sigma * sigma).sum::<f64>()
+            / noise.len().max(1) as f64)
+            .sqrt();
         let numbers: usize = rows.iter().map(|row| values(data, *row)).sum();
-        Self::Noise { dimension, size, values: numbers as f64 / rows.len().max(1) as f64 }
+        Self::Noise {
+            dimension,
+            size,
+            values: numbers as f64 / rows.len().max(1) as f64,
+        }
     }
 
     /// What errors are sizes of: m, or rad where no length was measured.
@@ -62,16 +71,29 @@ impl ErrorScale {
     }
 
     /// The error of a row under a model, m or rad.
-    pub(crate) fn error(&self, model: &Model, data: &Measurements, row: usize, scratch: &mut PlacementBuffers) -> f64 {
+    pub(crate) fn error(
+        &self,
+        model: &Model,
+        data: &Measurements,
+        row: usize,
+        scratch: &mut PlacementBuffers,
+    ) -> f64 {
         self.of_placed(data, row, &model.place(data, row, scratch))
     }
 
     /// The error of a row that was placed, m or rad.
     pub(crate) fn of_placed(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> f64 {
-        let Self::Noise { size, .. } = self else { return placed_row_error(data, row, placed).length };
-        let of_row = kinds(data).into_iter().filter_map(|kind| Residual::of(kind, data, row, placed));
+        let Self::Noise { size, .. } = self else {
+            return placed_row_error(data, row, placed).length;
+        };
+        let of_row = kinds(data)
+            .into_iter()
+            .filter_map(|kind| Residual::of(kind, data, row, placed));
         let (square, count) = of_row.fold((0.0, 0), |(square, count), residual| {
-            (square + residual.whitened(data, 0.0).norm_squared(), count + residual.axes)
+            (
+                square + residual.whitened(data, 0.0).norm_squared(),
+                count + residual.axes,
+            )
         });
         (square / f64::from(count.max(1) as u32)).sqrt() * size
     }
@@ -79,17 +101,29 @@ impl ErrorScale {
 
 /// Length of one sigma (m or rad) of the first kind of a dimension that a row measured.
 pub(crate) fn noise(data: &Measurements, row: usize, of: Dimension) -> Option<f64> {
-    KINDS.iter().filter(|kind| kind.about().dimension == of).find_map(|kind| kind.noise(data, row))
+    KINDS
+        .iter()
+        .filter(|kind| kind.about().dimension == of)
+        .find_map(|kind| kind.noise(data, row))
 }
 
 impl Model {
     /// Sizes (m or rad) of what is left of every row, of the first kind of a dimension that it measured.
     pub fn error_sizes(&self, data: &Measurements, of: Dimension) -> Vec<Option<f64>> {
-        let kinds: Vec<_> = kinds(data).into_iter().filter(|kind| kind.about().dimension == of).collect();
+        let kinds: Vec<_> = kinds(data)
+            .into_iter()
+            .filter(|kind| kind.about().dimension == of)
+            .collect();
         let size = |scratch: &mut PlacementBuffers, row: usize| {
             let placed = self.place(data, row, scratch);
-            kinds.iter().find_map(|kind| Residual::of(*kind, data, row, &placed)).map(|residual| residual.error.norm())
+            kinds
+                .iter()
+                .find_map(|kind| Residual::of(*kind, data, row, &placed))
+                .map(|residual| residual.error.norm())
         };
-        (0..data.rows()).into_par_iter().map_init(|| self.stack.scratch(&self.robot), size).collect()
+        (0..data.rows())
+            .into_par_iter()
+            .map_init(|| self.stack.scratch(&self.robot), size)
+            .collect()
     }
 }

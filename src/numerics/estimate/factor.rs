@@ -2,7 +2,9 @@
 
 use super::triangle::{Triangle, axpy, dot};
 use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::qr::no_pivoting::factor::{qr_in_place, qr_in_place_scratch, recommended_block_size};
+use faer::linalg::qr::no_pivoting::factor::{
+    qr_in_place, qr_in_place_scratch, recommended_block_size,
+};
 use faer::{Mat, Par};
 
 /// Upper triangular factor R of the rows `[J | r]`: its last column is Q^T r, so R alone states the least-squares problem.
@@ -26,8 +28,19 @@ impl StackedRows {
     pub fn new(columns: usize, chunk: usize) -> Self {
         let height = columns + chunk;
         let block = recommended_block_size::<f64>(height, columns);
-        let memory = MemBuffer::new(qr_in_place_scratch::<f64>(height, columns, block, Par::Seq, Default::default()));
-        Self { rows: Mat::zeros(height, columns), top: 0, reflectors: Mat::zeros(block, columns), memory }
+        let memory = MemBuffer::new(qr_in_place_scratch::<f64>(
+            height,
+            columns,
+            block,
+            Par::Seq,
+            Default::default(),
+        ));
+        Self {
+            rows: Mat::zeros(height, columns),
+            top: 0,
+            reflectors: Mat::zeros(block, columns),
+            memory,
+        }
     }
 
     /// The columns of the next chunk of `height` rows; all zero.
@@ -45,7 +58,13 @@ impl StackedRows {
         let (used, columns) = (self.top + height, self.rows.ncols());
         let reflectors = self.reflectors.as_mut().subcols_mut(0, columns.min(used));
         let rows = self.rows.as_mut().subrows_mut(0, used);
-        qr_in_place(rows, reflectors, Par::Seq, MemStack::new(&mut self.memory), Default::default());
+        qr_in_place(
+            rows,
+            reflectors,
+            Par::Seq,
+            MemStack::new(&mut self.memory),
+            Default::default(),
+        );
         self.top = columns.min(used);
         for j in 0..columns {
             // What faer leaves below the diagonal are its reflectors.
@@ -57,7 +76,13 @@ impl StackedRows {
     /// The factor of all chunks.
     pub fn factor(&self) -> TriangularFactor {
         TriangularFactor {
-            r: Triangle::from_fn(self.rows.ncols(), |i, j| if i < self.top { self.rows.col_as_slice(j)[i] } else { 0.0 }),
+            r: Triangle::from_fn(self.rows.ncols(), |i, j| {
+                if i < self.top {
+                    self.rows.col_as_slice(j)[i]
+                } else {
+                    0.0
+                }
+            }),
         }
     }
 }
@@ -74,7 +99,10 @@ impl TriangularFactor {
     }
 
     /// The factor of rows made of some of this one's columns above each other's.
-    fn of_columns<'a>(height: usize, columns: impl ExactSizeIterator<Item = [&'a [f64]; 2]>) -> Self {
+    fn of_columns<'a>(
+        height: usize,
+        columns: impl ExactSizeIterator<Item = [&'a [f64]; 2]>,
+    ) -> Self {
         let mut tall = StackedRows::new(columns.len(), 2 * height);
         for (to, [above, below]) in tall.chunk(2 * height).into_iter().zip(columns) {
             to[..above.len()].copy_from_slice(above);
@@ -87,7 +115,10 @@ impl TriangularFactor {
     /// The factor of both sets of rows together.
     pub fn stack(&self, other: &TriangularFactor) -> Self {
         let columns = self.r.size();
-        Self::of_columns(columns, (0..columns).map(|j| [self.r.column(j), other.r.column(j)]))
+        Self::of_columns(
+            columns,
+            (0..columns).map(|j| [self.r.column(j), other.r.column(j)]),
+        )
     }
 
     /// The factor of the problem in some of the parameters only.
@@ -111,13 +142,19 @@ impl TriangularFactor {
             axpy(-step.unwrap_or_default(), self.r.column(j), &mut right);
         }
         let open: Vec<usize> = (0..p).filter(|j| steps[*j].is_none()).collect();
-        let columns: Vec<&[f64]> = open.iter().map(|j| self.r.column(*j)).chain([&right[..]]).collect();
+        let columns: Vec<&[f64]> = open
+            .iter()
+            .map(|j| self.r.column(*j))
+            .chain([&right[..]])
+            .collect();
         Self::of_columns(p + 1, columns.iter().map(|column| [column, &[][..]]))
     }
 
     /// The factor of the same rows, all multiplied by `weight`.
     pub fn weighted(self, weight: f64) -> Self {
-        Self { r: self.r.scaled(weight) }
+        Self {
+            r: self.r.scaled(weight),
+        }
     }
 
     /// The same problem with `pull` beside J^T r: the downhill gradient of what is no sum of squares. Nothing where a column is nought.
@@ -131,10 +168,17 @@ impl TriangularFactor {
             let column = self.r.column(j);
             let pivot = column[j];
             let known = dot(&column[..j], &more[..j]);
-            more[j] = if pivot.abs() > 1e-12 * self.column_norm(j) { (pull[j] - known) / pivot } else { 0.0 };
+            more[j] = if pivot.abs() > 1e-12 * self.column_norm(j) {
+                (pull[j] - known) / pivot
+            } else {
+                0.0
+            };
         }
-        let entry = |i: usize, j: usize| self.r.at(i, j) + if j == p && i < p { more[i] } else { 0.0 };
-        Self { r: Triangle::from_fn(p + 1, entry) }
+        let entry =
+            |i: usize, j: usize| self.r.at(i, j) + if j == p && i < p { more[i] } else { 0.0 };
+        Self {
+            r: Triangle::from_fn(p + 1, entry),
+        }
     }
 
     /// An entry of R; row and column p are the right-hand side's.
@@ -164,7 +208,9 @@ impl TriangularFactor {
 
     /// J^T r.
     pub fn gradient(&self) -> Vec<f64> {
-        (0..self.parameters()).map(|j| dot(self.r.column(j), self.right())).collect()
+        (0..self.parameters())
+            .map(|j| dot(self.r.column(j), self.right()))
+            .collect()
     }
 
     /// The step of least |J dx - r|^2 + damping |D dx|^2, D the column norms (Marquardt's scaling). `None` if singular.
@@ -188,7 +234,12 @@ impl TriangularFactor {
         }
         let mut step = small.column(p)[..p].to_vec();
         small.solve(&mut step);
-        Some(step.iter().zip(&scale).map(|(value, norm)| value / norm).collect())
+        Some(
+            step.iter()
+                .zip(&scale)
+                .map(|(value, norm)| value / norm)
+                .collect(),
+        )
     }
 
     /// The inverse of R (p x p), so that the covariance is `inverse * inverse^T`. `None` if singular.
@@ -213,7 +264,8 @@ mod tests {
 
     #[test]
     fn chunks_give_the_same_solution_as_one_piece() {
-        let value = |i: usize, j: usize| ((i * 7 + j * 13) % 11) as f64 - 5.0 + ((i * i + j) as f64).sin();
+        let value =
+            |i: usize, j: usize| ((i * 7 + j * 13) % 11) as f64 - 5.0 + ((i * i + j) as f64).sin();
         let rows = Mat::from_fn(40, 5, value);
         let whole = TriangularFactor::of(&rows);
         let top = TriangularFactor::of(&Mat::from_fn(3, 5, value));
@@ -225,8 +277,11 @@ mod tests {
         }
         // Normal equations hold at the solution.
         for j in 0..4 {
-            let gradient: f64 =
-                (0..40).map(|i| rows[(i, j)] * ((0..4).map(|k| rows[(i, k)] * a[k]).sum::<f64>() - rows[(i, 4)])).sum();
+            let gradient: f64 = (0..40)
+                .map(|i| {
+                    rows[(i, j)] * ((0..4).map(|k| rows[(i, k)] * a[k]).sum::<f64>() - rows[(i, 4)])
+                })
+                .sum();
             assert!(gradient.abs() < 1e-10);
         }
     }

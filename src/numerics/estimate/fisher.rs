@@ -5,7 +5,11 @@ pub fn tail(ratio: f64, numerator: f64, denominator: f64) -> f64 {
     if !ratio.is_finite() {
         return 0.0;
     }
-    incomplete_beta(0.5 * denominator, 0.5 * numerator, denominator / (denominator + numerator * ratio.max(0.0)))
+    incomplete_beta(
+        0.5 * denominator,
+        0.5 * numerator,
+        denominator / (denominator + numerator * ratio.max(0.0)),
+    )
 }
 
 fn incomplete_beta(a: f64, b: f64, x: f64) -> f64 {
@@ -15,9 +19,15 @@ fn incomplete_beta(a: f64, b: f64, x: f64) -> f64 {
     if x >= 1.0 {
         return 1.0;
     }
-    let front = (libm::lgamma(a + b) - libm::lgamma(a) - libm::lgamma(b) + a * x.ln() + b * (-x).ln_1p()).exp();
+    let front =
+        (libm::lgamma(a + b) - libm::lgamma(a) - libm::lgamma(b) + a * x.ln() + b * (-x).ln_1p())
+            .exp();
     // The fraction converges fast on this side of the mean only.
-    if x < (a + 1.0) / (a + b + 2.0) { front * fraction(a, b, x) / a } else { 1.0 - front * fraction(b, a, 1.0 - x) / b }
+    if x < (a + 1.0) / (a + b + 2.0) {
+        front * fraction(a, b, x) / a
+    } else {
+        1.0 - front * fraction(b, a, 1.0 - x) / b
+    }
 }
 
 fn fraction(a: f64, b: f64, x: f64) -> f64 {
@@ -61,7 +71,12 @@ mod tests {
             1.505_632_735_149_311_6e-7,
         ];
         let x = x - 1.0;
-        let sum = TERMS.iter().zip(1..).fold(0.999_999_999_999_809_9, |sum, (term, k)| sum + term / (x + f64::from(k)));
+        let sum = TERMS
+            .iter()
+            .zip(1..)
+            .fold(0.999_999_999_999_809_9, |sum, (term, k)| {
+                sum + term / (x + f64::from(k))
+            });
         let t = x + 7.5;
         0.5 * std::f64::consts::TAU.ln() + (x + 0.5) * t.ln() - t + sum.ln()
     }
@@ -72,7 +87,10 @@ mod tests {
         for half in (1..2000).chain((2000..1_000_000).step_by(997)) {
             let x = 0.5 * f64::from(half);
             let (found, other) = (libm::lgamma(x), lanczos(x));
-            assert!((found - other).abs() < 1e-12 * found.abs().max(1.0), "{x}: {found} and {other}");
+            assert!(
+                (found - other).abs() < 1e-12 * found.abs().max(1.0),
+                "{x}: {found} and {other}"
+            );
         }
     }
 
@@ -88,7 +106,10 @@ mod tests {
         ];
         for (ratio, numerator, denominator, expected) in cases {
             let found = tail(ratio, numerator, denominator);
-            assert!((found / expected - 1.0).abs() < 1e-9, "F {ratio} ({numerator}, {denominator}): {found:e} for {expected:e}");
+            assert!(
+                (found / expected - 1.0).abs() < 1e-9,
+                "F {ratio} ({numerator}, {denominator}): {found:e} for {expected:e}"
+            );
         }
         assert_eq!(tail(0.0, 3.0, 7.0), 1.0);
     }

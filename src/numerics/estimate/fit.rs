@@ -78,17 +78,25 @@ pub struct Fitted {
 impl Fitted {
     /// Parameters that were estimated.
     pub(crate) fn free(&self) -> Vec<usize> {
-        (0..self.statuses.len()).filter(|k| matches!(self.statuses[*k], ParameterStatus::Free(_))).collect()
+        (0..self.statuses.len())
+            .filter(|k| matches!(self.statuses[*k], ParameterStatus::Free(_)))
+            .collect()
     }
 
     /// What the rows show beyond their own noise.
     pub(crate) fn excess(&self) -> ExcessSigma {
-        ExcessSigma { length: self.excess_sigma, angle: self.excess_sigma_angle.unwrap_or_default() }
+        ExcessSigma {
+            length: self.excess_sigma,
+            angle: self.excess_sigma_angle.unwrap_or_default(),
+        }
     }
 }
 
 /// Effort of rounds whose weights are not settled.
-const ROUGH: Effort = Effort { tolerance: ROUGH_TOLERANCE, ..FINE };
+const ROUGH: Effort = Effort {
+    tolerance: ROUGH_TOLERANCE,
+    ..FINE
+};
 /// Effort of the first round, which only finds out how large the residual is and what it lets one see.
 const FIRST: Effort = Effort { limit: 4, ..ROUGH };
 /// A parameter that the nominal robot hid is taken up where the data know it this many times better than its prior sigma ...
@@ -106,7 +114,11 @@ const ROUNDS: usize = 4;
 /// The model with those of the candidates fitted that the data can see, from its values on.
 pub fn fit(start: &Model, data: &Measurements, options: &FitOptions) -> (Model, Fitted) {
     let mut model = start.clone();
-    let mut problem = Problem { data, rows: options.rows, excess: ExcessSigma::default() };
+    let mut problem = Problem {
+        data,
+        rows: options.rows,
+        excess: ExcessSigma::default(),
+    };
     for k in options.candidates {
         model.x[*k] = model.within(*k, model.x[*k]);
     }
@@ -121,7 +133,9 @@ pub fn fit(start: &Model, data: &Measurements, options: &FitOptions) -> (Model, 
     };
     search.settle(&mut problem, &mut model, options.candidates, sight, true);
     let mut all = problem.observe(&model, options.candidates);
-    let shown = problem.shown(&model, options.candidates).unwrap_or_else(|| all.factor.clone());
+    let shown = problem
+        .shown(&model, options.candidates)
+        .unwrap_or_else(|| all.factor.clone());
     if search.reconsider(&mut problem, &mut model, options.candidates, shown) {
         all = problem.observe(&model, options.candidates);
     }
@@ -138,27 +152,72 @@ pub(crate) fn seen(
     further: &[usize],
     times: f64,
 ) -> Vec<usize> {
-    let problem = Problem { data, rows, excess: fitted.excess() };
+    let problem = Problem {
+        data,
+        rows,
+        excess: fitted.excess(),
+    };
     let known = fitted.free();
     let candidates: Vec<usize> = known.iter().chain(further).copied().collect();
-    let prior = |k: &usize| if known.contains(k) { f64::INFINITY } else { model.stack.specs()[*k].prior_sigma / times };
-    let seen = visibility(&problem.observe(model, &candidates).factor, &candidates.iter().map(prior).collect::<Vec<_>>());
-    let seen = seen.into_iter().zip(candidates).filter(|(seen, k)| *seen == Visibility::Seen && further.contains(k));
+    let prior = |k: &usize| {
+        if known.contains(k) {
+            f64::INFINITY
+        } else {
+            model.stack.specs()[*k].prior_sigma / times
+        }
+    };
+    let seen = visibility(
+        &problem.observe(model, &candidates).factor,
+        &candidates.iter().map(prior).collect::<Vec<_>>(),
+    );
+    let seen = seen
+        .into_iter()
+        .zip(candidates)
+        .filter(|(seen, k)| *seen == Visibility::Seen && further.contains(k));
     seen.map(|(_, k)| k).collect()
 }
 
 /// What the data (`all`: in all candidates, at the minimum) say of a fitted model.
-fn stated(problem: &Problem, model: &Model, candidates: &[usize], search: Minimisation, all: Evaluation) -> Fitted {
-    let prior = |set: &[usize]| set.iter().map(|k| model.stack.specs()[*k].prior_sigma).collect::<Vec<_>>();
-    let Minimisation { mut statuses, course, stop, free } = search;
+fn stated(
+    problem: &Problem,
+    model: &Model,
+    candidates: &[usize],
+    search: Minimisation,
+    all: Evaluation,
+) -> Fitted {
+    let prior = |set: &[usize]| {
+        set.iter()
+            .map(|k| model.stack.specs()[*k].prior_sigma)
+            .collect::<Vec<_>>()
+    };
+    let Minimisation {
+        mut statuses,
+        course,
+        stop,
+        free,
+    } = search;
     let errors = problem.errors(&all.residuals);
-    let place = |k: &usize| candidates.iter().position(|other| other == k).expect("free ones are candidates");
-    let data = all.factor.select(&free.iter().map(place).collect::<Vec<_>>());
+    let place = |k: &usize| {
+        candidates
+            .iter()
+            .position(|other| other == k)
+            .expect("free ones are candidates")
+    };
+    let data = all
+        .factor
+        .select(&free.iter().map(place).collect::<Vec<_>>());
     let (factor, _) = model.with_priors(&free, data);
     let pinned = model.pinned(&free, &factor);
     bounded(model, &free, &pinned, &factor, &mut statuses);
-    let free: Vec<usize> = free.into_iter().zip(pinned).filter(|(_, pinned)| !pinned).map(|(k, _)| k).collect();
-    let data = all.factor.select(&free.iter().map(place).collect::<Vec<_>>());
+    let free: Vec<usize> = free
+        .into_iter()
+        .zip(pinned)
+        .filter(|(_, pinned)| !pinned)
+        .map(|(k, _)| k)
+        .collect();
+    let data = all
+        .factor
+        .select(&free.iter().map(place).collect::<Vec<_>>());
     // The noise is known up to a factor, what was known beforehand is not.
     let scale = reduced(&errors, free.len()).sqrt() * lasting(problem, &all.residuals).sqrt();
     let weight = if scale > 0.0 { 1.0 / scale } else { 1.0 };
@@ -169,8 +228,13 @@ fn stated(problem: &Problem, model: &Model, candidates: &[usize], search: Minimi
             .with_priors(&free, data.clone())
             .0
             .inverse()
-            .map(|inverse| Covariance::of_root(clustered(problem, model, &free, &inverse, poses), &free)),
-        None => Covariance::of(&model.with_priors(&free, data.clone().weighted(weight)).0, &free),
+            .map(|inverse| {
+                Covariance::of_root(clustered(problem, model, &free, &inverse, poses), &free)
+            }),
+        None => Covariance::of(
+            &model.with_priors(&free, data.clone().weighted(weight)).0,
+            &free,
+        ),
     };
     let mut prior_checks = BTreeMap::new();
     if let Some(covariance) = &covariance {
@@ -182,12 +246,18 @@ fn stated(problem: &Problem, model: &Model, candidates: &[usize], search: Minimi
             }
         }
     }
-    let has_angles = all.residuals.iter().any(|residual| residual.dimension() == Dimension::Angle);
+    let has_angles = all
+        .residuals
+        .iter()
+        .any(|residual| residual.dimension() == Dimension::Angle);
     let (factor, _) = model.with_priors(&free, data);
     let singular = factor.singular_values(&prior(&free));
     let singular_all = match problem.shown(model, candidates) {
         None if free == candidates => singular.clone(),
-        shown => model.with_priors(candidates, shown.unwrap_or(all.factor)).0.singular_values(&prior(candidates)),
+        shown => model
+            .with_priors(candidates, shown.unwrap_or(all.factor))
+            .0
+            .singular_values(&prior(candidates)),
     };
     Fitted {
         statuses,
@@ -199,7 +269,12 @@ fn stated(problem: &Problem, model: &Model, candidates: &[usize], search: Minimi
         noise_scale: 1.0 / weight,
         covariance,
         prior_checks,
-        repeated: poses.against(model, problem.data, whole_points(&all.residuals), free.len()),
+        repeated: poses.against(
+            model,
+            problem.data,
+            whole_points(&all.residuals),
+            free.len(),
+        ),
         clusters: clusters.map_or(0, <[Vec<usize>]>::len),
         downweighted: downweighted(&all.residuals, &errors),
         indices: indices(&singular, problem.rows.len()),
@@ -220,24 +295,44 @@ struct Minimisation {
 impl Minimisation {
     /// Takes up candidates that the nominal robot hid and the identified one (`all`, the data in all candidates there) shows: a
     /// point meant to lie on the last axis never does. Whether any was worth it; else the model is as before.
-    fn reconsider(&mut self, problem: &mut Problem, model: &mut Model, candidates: &[usize], all: TriangularFactor) -> bool {
+    fn reconsider(
+        &mut self,
+        problem: &mut Problem,
+        model: &mut Model,
+        candidates: &[usize],
+        all: TriangularFactor,
+    ) -> bool {
         // What is estimated comes first, so that only what it cannot do counts as new.
         let (sight, _) = model.with_priors(candidates, all);
         let mut order: Vec<usize> = (0..candidates.len()).collect();
         order.sort_by_key(|j| !self.free.contains(&candidates[*j]));
-        let wary = order.iter().map(|j| model.stack.specs()[candidates[*j]].prior_sigma / CLEARLY).collect::<Vec<_>>();
+        let wary = order
+            .iter()
+            .map(|j| model.stack.specs()[candidates[*j]].prior_sigma / CLEARLY)
+            .collect::<Vec<_>>();
         let seen = visibility(&sight.select(&order), &wary);
         let known = self.free.len();
-        let new: Vec<usize> =
-            order.iter().zip(&seen).skip(known).filter(|(_, v)| **v == Visibility::Seen).map(|(j, _)| candidates[*j]).collect();
+        let new: Vec<usize> = order
+            .iter()
+            .zip(&seen)
+            .skip(known)
+            .filter(|(_, v)| **v == Visibility::Seen)
+            .map(|(j, _)| candidates[*j])
+            .collect();
         if new.is_empty() {
             return false;
         }
-        let free: Vec<usize> = candidates.iter().copied().filter(|k| self.free.contains(k) || new.contains(k)).collect();
+        let free: Vec<usize> = candidates
+            .iter()
+            .copied()
+            .filter(|k| self.free.contains(k) || new.contains(k))
+            .collect();
         let (before, start) = (model.x.clone(), problem.evaluate(model, &free));
         let cost = start.objective();
         let (_, stop, end) = minimise(problem, model, &free, start, FINE);
-        if stop != Stop::Converged || cost - end.objective() < WORTH[0] + WORTH[1] * (new.len() - 1) as f64 {
+        if stop != Stop::Converged
+            || cost - end.objective() < WORTH[0] + WORTH[1] * (new.len() - 1) as f64
+        {
             model.x = before;
             return false;
         }
@@ -247,29 +342,51 @@ impl Minimisation {
 
     /// Rounds of choosing what is seen of the candidates, fitting it, and learning how much stays unmodelled, from `sight`, the
     /// problem in all candidates; far from the solution at the `first` time.
-    fn settle(&mut self, problem: &mut Problem, model: &mut Model, candidates: &[usize], mut sight: Evaluation, first: bool) {
+    fn settle(
+        &mut self,
+        problem: &mut Problem,
+        model: &mut Model,
+        candidates: &[usize],
+        mut sight: Evaluation,
+        first: bool,
+    ) {
         let mut candidates = candidates.to_vec();
         for round in 0..ROUNDS {
-            let prior: Vec<f64> = candidates.iter().map(|k| model.stack.specs()[*k].prior_sigma).collect();
-            let shown = problem.shown(model, &candidates).map(|factor| model.with_priors(&candidates, factor).0);
+            let prior: Vec<f64> = candidates
+                .iter()
+                .map(|k| model.stack.specs()[*k].prior_sigma)
+                .collect();
+            let shown = problem
+                .shown(model, &candidates)
+                .map(|factor| model.with_priors(&candidates, factor).0);
             let seen = visibility(shown.as_ref().unwrap_or(&sight.factor), &prior);
             for (k, verdict) in candidates.iter().zip(&seen) {
                 self.statuses[*k] = match verdict {
                     Visibility::Seen => ParameterStatus::Free(f64::NAN),
                     Visibility::Unseen => ParameterStatus::Unseen,
-                    Visibility::Redundant(with) => {
-                        ParameterStatus::Redundant(with.iter().map(|(j, share)| (candidates[*j], *share)).collect())
-                    }
+                    Visibility::Redundant(with) => ParameterStatus::Redundant(
+                        with.iter()
+                            .map(|(j, share)| (candidates[*j], *share))
+                            .collect(),
+                    ),
                 };
             }
-            let free: Vec<usize> =
-                candidates.iter().zip(&seen).filter(|(_, v)| **v == Visibility::Seen).map(|(k, _)| *k).collect();
+            let free: Vec<usize> = candidates
+                .iter()
+                .zip(&seen)
+                .filter(|(_, v)| **v == Visibility::Seen)
+                .map(|(k, _)| *k)
+                .collect();
             // What is dropped goes back to what was known beforehand and stays there.
             for k in candidates.iter().filter(|k| !free.contains(k)) {
                 model.x[*k] = model.rest(*k);
             }
             let weighted_so = !first || round > 0 || problem.excess == ExcessSigma::default();
-            let start = if weighted_so && free == candidates { sight } else { problem.evaluate(model, &free) };
+            let start = if weighted_so && free == candidates {
+                sight
+            } else {
+                problem.evaluate(model, &free)
+            };
             let effort = if first && round == 0 {
                 FIRST
             } else if round + 1 < ROUNDS {
@@ -304,7 +421,9 @@ impl Minimisation {
 
 /// What is left of whole points.
 fn whole_points(residuals: &[Residual]) -> impl Iterator<Item = &Residual> + Clone {
-    residuals.iter().filter(|residual| residual.dimension() == Dimension::Length && residual.axes == 3)
+    residuals
+        .iter()
+        .filter(|residual| residual.dimension() == Dimension::Length && residual.axes == 3)
 }
 
 /// How many rows of a moving arm count as one: what is left on the way lasts from row to row.
@@ -316,7 +435,11 @@ fn lasting(problem: &Problem, residuals: &[Residual]) -> f64 {
         .flat_map(|residual| {
             let error = residual.whitened(problem.data, problem.excess.length);
             // Gross errors last for one row and would hide that others last longer.
-            <[f64; 3]>::from(error.times(bound(3) / error.norm().max(bound(3))).first_three())
+            <[f64; 3]>::from(
+                error
+                    .times(bound(3) / error.norm().max(bound(3)))
+                    .first_three(),
+            )
         })
         .collect();
     autocorrelation_time(&whitened, 3)
@@ -324,16 +447,35 @@ fn lasting(problem: &Problem, residuals: &[Residual]) -> f64 {
 
 /// The poses, where enough rows repeat one and poses are enough to tell the spread of all parameters.
 fn clusters(poses: &Poses, rows: usize, parameters: usize) -> Option<&[Vec<usize>]> {
-    let repeated: usize = poses.all().iter().filter(|rows| rows.len() > 1).map(Vec::len).sum();
-    (REPEATING * repeated >= rows && rows > 0 && poses.all().len() > parameters).then_some(poses.all())
+    let repeated: usize = poses
+        .all()
+        .iter()
+        .filter(|rows| rows.len() > 1)
+        .map(Vec::len)
+        .sum();
+    (REPEATING * repeated >= rows && rows > 0 && poses.all().len() > parameters)
+        .then_some(poses.all())
 }
 
 /// Names those of the free parameters that a bound stops, with where the data would have each if it alone were let go.
-fn bounded(model: &Model, free: &[usize], pinned: &[bool], factor: &TriangularFactor, statuses: &mut [ParameterStatus]) {
+fn bounded(
+    model: &Model,
+    free: &[usize],
+    pinned: &[bool],
+    factor: &TriangularFactor,
+    statuses: &mut [ParameterStatus],
+) {
     for (j, k) in free.iter().enumerate().filter(|(j, _)| pinned[*j]) {
-        let fixed: Vec<Option<f64>> = pinned.iter().enumerate().map(|(i, pinned)| (*pinned && i != j).then_some(0.0)).collect();
+        let fixed: Vec<Option<f64>> = pinned
+            .iter()
+            .enumerate()
+            .map(|(i, pinned)| (*pinned && i != j).then_some(0.0))
+            .collect();
         let among = fixed.iter().take(j).filter(|fixed| fixed.is_none()).count();
-        let step = factor.given(&fixed).solve(0.0).and_then(|step| step.get(among).copied());
+        let step = factor
+            .given(&fixed)
+            .solve(0.0)
+            .and_then(|step| step.get(among).copied());
         statuses[*k] = ParameterStatus::Bound(model.x[*k] + step.unwrap_or_default());
     }
 }
@@ -341,9 +483,15 @@ fn bounded(model: &Model, free: &[usize], pinned: &[bool], factor: &TriangularFa
 /// Rows with a reduced weight, of residuals with their (error, axes).
 fn downweighted(residuals: &[Residual], errors: &[(f64, usize)]) -> BTreeMap<usize, f64> {
     let mut out = BTreeMap::new();
-    for (residual, (error, axes)) in residuals.iter().zip(errors).filter(|(_, (error, axes))| *error > bound(*axes)) {
+    for (residual, (error, axes)) in residuals
+        .iter()
+        .zip(errors)
+        .filter(|(_, (error, axes))| *error > bound(*axes))
+    {
         let weight = share(*error, *axes).powi(2);
-        out.entry(residual.row).and_modify(|least: &mut f64| *least = least.min(weight)).or_insert(weight);
+        out.entry(residual.row)
+            .and_modify(|least: &mut f64| *least = least.min(weight))
+            .or_insert(weight);
     }
     out
 }
@@ -351,7 +499,10 @@ fn downweighted(residuals: &[Residual], errors: &[(f64, usize)]) -> BTreeMap<usi
 /// Reduced chi-square with Huber's weights, of (error, axes). The weights' own noise counts as [`STATED`] degrees of freedom: a fit with
 /// hardly any left cannot say how far points scatter, and one with none knows that noise alone.
 fn reduced(errors: &[(f64, usize)], parameters: usize) -> f64 {
-    let sum: f64 = errors.iter().map(|(e, axes)| e.min(bound(*axes)) * e.min(bound(*axes))).sum();
+    let sum: f64 = errors
+        .iter()
+        .map(|(e, axes)| e.min(bound(*axes)) * e.min(bound(*axes)))
+        .sum();
     let values: usize = errors.iter().map(|(_, axes)| axes).sum();
     (STATED + sum) / (STATED + values.saturating_sub(parameters) as f64)
 }
@@ -363,14 +514,25 @@ fn excess_sigma(problem: &Problem, at: &Evaluation, parameters: usize) -> Excess
     let mut errors = Vec::with_capacity(at.residuals.len());
     let mut of = |dimension: Dimension| {
         excess(|extra| {
-            let own = at.residuals.iter().filter(|residual| residual.dimension() == dimension);
-            let square = |residual: &Residual| residual.whitened(problem.data, extra).norm_squared() * as_of_three(residual.axes);
+            let own = at
+                .residuals
+                .iter()
+                .filter(|residual| residual.dimension() == dimension);
+            let square = |residual: &Residual| {
+                residual.whitened(problem.data, extra).norm_squared() * as_of_three(residual.axes)
+            };
             errors.clear();
             errors.extend(own.map(square));
-            (nearest(&mut errors, 0.5).unwrap_or(0.0) / freedom, errors.len())
+            (
+                nearest(&mut errors, 0.5).unwrap_or(0.0) / freedom,
+                errors.len(),
+            )
         })
     };
-    ExcessSigma { length: of(Dimension::Length), angle: of(Dimension::Angle) }
+    ExcessSigma {
+        length: of(Dimension::Length),
+        angle: of(Dimension::Angle),
+    }
 }
 
 /// The extra standard deviation with which the median squared error (of so many) is that of three unit normals.
@@ -387,7 +549,11 @@ fn excess(mut median: impl FnMut(f64) -> (f64, usize)) -> f64 {
     }
     for _ in 0..40 {
         let middle = 0.5 * (low + high);
-        if median(middle).0 > MEDIAN_CHI2[3] { low = middle } else { high = middle }
+        if median(middle).0 > MEDIAN_CHI2[3] {
+            low = middle
+        } else {
+            high = middle
+        }
     }
     0.5 * (low + high)
 }

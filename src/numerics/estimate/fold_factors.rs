@@ -45,8 +45,18 @@ struct LeftOutRows<'a> {
 
 impl<'a> NearbyFits<'a> {
     /// Around the model of a session. `None` where bounds are in the way.
-    pub fn of(session: &Session<'a>, parts: &'a [Vec<usize>], columns: &[usize], scale: ErrorScale) -> Option<Self> {
-        let Session { data, model, fitted, .. } = *session;
+    pub fn of(
+        session: &Session<'a>,
+        parts: &'a [Vec<usize>],
+        columns: &[usize],
+        scale: ErrorScale,
+    ) -> Option<Self> {
+        let Session {
+            data,
+            model,
+            fitted,
+            ..
+        } = *session;
         if model.known.values().any(|known| known.bounds.is_some()) {
             return None;
         }
@@ -54,14 +64,36 @@ impl<'a> NearbyFits<'a> {
         let part = |rows: &'a Vec<usize>| {
             let problem = Problem { data, rows, excess };
             let seen = problem.observe(model, columns);
-            let shares = problem.errors(&seen.residuals).into_iter().map(|(error, axes)| share(error, axes)).collect();
-            LeftOutRows { rows, factor: seen.factor, pull: seen.pull, shares }
+            let shares = problem
+                .errors(&seen.residuals)
+                .into_iter()
+                .map(|(error, axes)| share(error, axes))
+                .collect();
+            LeftOutRows {
+                rows,
+                factor: seen.factor,
+                pull: seen.pull,
+                shares,
+            }
         };
         let parts: Vec<LeftOutRows> = parts.par_iter().map(part).collect();
-        let all = parts.iter().map(|part| part.factor.clone()).reduce(|sum, part| sum.stack(&part))?;
-        let pull: Vec<f64> = (0..columns.len()).map(|j| parts.iter().map(|part| part.pull[j]).sum()).collect();
+        let all = parts
+            .iter()
+            .map(|part| part.factor.clone())
+            .reduce(|sum, part| sum.stack(&part))?;
+        let pull: Vec<f64> = (0..columns.len())
+            .map(|j| parts.iter().map(|part| part.pull[j]).sum())
+            .collect();
         let whole = model.with_priors(columns, all).0.pulled(&pull);
-        Some(Self { data, model, excess, scale, columns: columns.to_vec(), whole, parts })
+        Some(Self {
+            data,
+            model,
+            excess,
+            scale,
+            columns: columns.to_vec(),
+            whole,
+            parts,
+        })
     }
 
     /// Errors of the rows of each part under a fit to the others; none where that is farther than a small step.
@@ -79,10 +111,25 @@ impl<'a> NearbyFits<'a> {
         for (parameter, step) in self.columns.iter().zip(steps) {
             model.x[*parameter] += step.unwrap_or_default();
         }
-        let open: Vec<usize> =
-            self.columns.iter().zip(steps).filter(|(_, step)| step.is_none()).map(|(parameter, _)| *parameter).collect();
-        let beside = FitOfAll { whole, inverse, model, open };
-        Some(self.parts.par_iter().map(|part| self.without(part, &beside, &part.factor.given(steps))).collect())
+        let open: Vec<usize> = self
+            .columns
+            .iter()
+            .zip(steps)
+            .filter(|(_, step)| step.is_none())
+            .map(|(parameter, _)| *parameter)
+            .collect();
+        let beside = FitOfAll {
+            whole,
+            inverse,
+            model,
+            open,
+        };
+        Some(
+            self.parts
+                .par_iter()
+                .map(|part| self.without(part, &beside, &part.factor.given(steps)))
+                .collect(),
+        )
     }
 
     /// Values of some of the columns under a fit to all rows, the columns that have a step moved by it and kept, with their standard
@@ -90,7 +137,10 @@ impl<'a> NearbyFits<'a> {
     pub fn estimated(&self, steps: &[Option<f64>], of: &[usize]) -> Option<Vec<(f64, f64)>> {
         let whole = self.whole.given(steps);
         let (inverse, found) = (whole.inverse()?, whole.solve(0.0)?);
-        let open: Vec<usize> = (0..steps.len()).filter(|j| steps[*j].is_none()).map(|j| self.columns[j]).collect();
+        let open: Vec<usize> = (0..steps.len())
+            .filter(|j| steps[*j].is_none())
+            .map(|j| self.columns[j])
+            .collect();
         let one = |parameter: &usize| {
             let i = open.iter().position(|other| other == parameter)?;
             let square: f64 = (i..open.len()).map(|j| inverse.at(i, j).powi(2)).sum();
@@ -99,28 +149,75 @@ impl<'a> NearbyFits<'a> {
         of.iter().map(one).collect()
     }
 
-    fn without(&self, part: &LeftOutRows, beside: &FitOfAll, factor: &TriangularFactor) -> Option<Vec<f64>> {
-        let FitOfAll { whole, inverse, model, open } = beside;
+    fn without(
+        &self,
+        part: &LeftOutRows,
+        beside: &FitOfAll,
+        factor: &TriangularFactor,
+    ) -> Option<Vec<f64>> {
+        let FitOfAll {
+            whole,
+            inverse,
+            model,
+            open,
+        } = beside;
         let p = open.len();
         let own = Mat::from_fn(p, p, |i, j| if i <= j { factor.entry(i, j) } else { 0.0 });
         let (mut seen, mut left) = (Mat::zeros(p, p), Mat::identity(p, p));
-        let (upper, lower) = (BlockStructure::TriangularUpper, BlockStructure::TriangularLower);
-        matmul(seen.as_mut(), upper, Accum::Replace, own.as_ref(), upper, inverse.as_ref(), upper, 1.0, Par::Seq);
-        matmul(left.as_mut(), lower, Accum::Add, seen.transpose(), lower, seen.as_ref(), upper, -1.0, Par::Seq);
+        let (upper, lower) = (
+            BlockStructure::TriangularUpper,
+            BlockStructure::TriangularLower,
+        );
+        matmul(
+            seen.as_mut(),
+            upper,
+            Accum::Replace,
+            own.as_ref(),
+            upper,
+            inverse.as_ref(),
+            upper,
+            1.0,
+            Par::Seq,
+        );
+        matmul(
+            left.as_mut(),
+            lower,
+            Accum::Add,
+            seen.transpose(),
+            lower,
+            seen.as_ref(),
+            upper,
+            -1.0,
+            Par::Seq,
+        );
         let left = left.llt(Side::Lower).ok()?;
-        if left.L().diagonal().column_vector().iter().any(|pivot| pivot * pivot < LEFT) {
+        if left
+            .L()
+            .diagonal()
+            .column_vector()
+            .iter()
+            .any(|pivot| pivot * pivot < LEFT)
+        {
             return None;
         }
         let errors: Vec<f64> = (0..=p).map(|i| factor.entry(i, p)).collect();
-        let gradient = |j: usize| errors.iter().zip(seen.col_as_slice(j)).map(|(error, seen)| error * seen).sum::<f64>();
+        let gradient = |j: usize| {
+            errors
+                .iter()
+                .zip(seen.col_as_slice(j))
+                .map(|(error, seen)| error * seen)
+                .sum::<f64>()
+        };
         let along = left.solve(&Mat::from_fn(p, 1, |j, _| whole.entry(j, p) - gradient(j)));
         let along = along.col_as_slice(0);
         let mut other = model.clone();
         for (i, parameter) in open.iter().enumerate() {
             other.x[*parameter] += (i..p).map(|j| inverse[(i, j)] * along[j]).sum::<f64>();
         }
-        let ahead = (0..p).map(|i| errors[i] - (0..p).map(|j| seen[(i, j)] * along[j]).sum::<f64>());
-        let straight = (ahead.map(|error| error * error).sum::<f64>() + errors[p] * errors[p]).sqrt();
+        let ahead =
+            (0..p).map(|i| errors[i] - (0..p).map(|j| seen[(i, j)] * along[j]).sum::<f64>());
+        let straight =
+            (ahead.map(|error| error * error).sum::<f64>() + errors[p] * errors[p]).sqrt();
         let (lengths, arrived) = self.arrive(part, &other);
         ((arrived - straight).abs() <= STRAIGHT * straight).then_some(lengths)
     }
@@ -132,7 +229,9 @@ impl<'a> NearbyFits<'a> {
         let mut shares = part.shares.iter();
         for row in part.rows {
             let placed = model.place(self.data, *row, &mut scratch);
-            let terms = KINDS.iter().filter_map(|kind| ObservationTerm::of(*kind, self.data, *row, &placed, self.excess));
+            let terms = KINDS.iter().filter_map(|kind| {
+                ObservationTerm::of(*kind, self.data, *row, &placed, self.excess)
+            });
             for ((term, _), share) in terms.zip(&mut shares) {
                 square += term.error.times(*share).norm_squared();
             }

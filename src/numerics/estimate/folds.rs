@@ -43,8 +43,13 @@ pub fn cross_validate(whole: &Session, count: usize, seed: u64) -> Option<Folds>
     let order = whole.divisible(&parts, count)?;
     let blocks = blocks(data, rows, &order, count);
     let random = at_random(order, rows.len(), count, seed);
-    let [one, other] = [&random, &blocks].map(|folds| whole.without_each(folds, ErrorScale::Lengths));
-    Some(Folds { count, random: gather(data, rows, &random, &one), blocks: gather(data, rows, &blocks, &other) })
+    let [one, other] =
+        [&random, &blocks].map(|folds| whole.without_each(folds, ErrorScale::Lengths));
+    Some(Folds {
+        count,
+        random: gather(data, rows, &random, &one),
+        blocks: gather(data, rows, &blocks, &other),
+    })
 }
 
 /// Takes every pose off a fit in turn; both kinds of folds are the same then. `None` where one pose less leaves too few rows.
@@ -55,8 +60,17 @@ pub fn leave_one_out(whole: &Session) -> Option<Folds> {
     if folds.len() < 2 || 3 * (rows.len() - longest) <= whole.candidates().len() {
         return None;
     }
-    let errors = gather(data, rows, &folds, &whole.without_each(&folds, ErrorScale::Lengths));
-    Some(Folds { count: folds.len(), random: errors.clone(), blocks: errors })
+    let errors = gather(
+        data,
+        rows,
+        &folds,
+        &whole.without_each(&folds, ErrorScale::Lengths),
+    );
+    Some(Folds {
+        count: folds.len(),
+        random: errors.clone(),
+        blocks: errors,
+    })
 }
 
 /// Poses of the rows, of which folds are made; of a moving arm stretches of rows.
@@ -92,7 +106,12 @@ fn at_random(mut order: Vec<&Vec<usize>>, rows: usize, count: usize, seed: u64) 
 
 impl Session<'_> {
     fn candidates(&self) -> Vec<usize> {
-        let estimated = |k: &usize| matches!(self.fitted.statuses[*k], ParameterStatus::Free(_) | ParameterStatus::Bound(_));
+        let estimated = |k: &usize| {
+            matches!(
+                self.fitted.statuses[*k],
+                ParameterStatus::Free(_) | ParameterStatus::Bound(_)
+            )
+        };
         (0..self.fitted.statuses.len()).filter(estimated).collect()
     }
 
@@ -108,9 +127,13 @@ impl Session<'_> {
         let fitted = self.fitted;
         let candidates = self.candidates();
         let nearby = NearbyFits::of(self, folds, &fitted.free(), scale);
-        let close = nearby.as_ref().and_then(NearbyFits::alone).unwrap_or_else(|| vec![None; folds.len()]);
-        let repeated =
-            |(fold, close): (&Vec<usize>, Option<Vec<f64>>)| close.unwrap_or_else(|| without(self, &candidates, fold, scale));
+        let close = nearby
+            .as_ref()
+            .and_then(NearbyFits::alone)
+            .unwrap_or_else(|| vec![None; folds.len()]);
+        let repeated = |(fold, close): (&Vec<usize>, Option<Vec<f64>>)| {
+            close.unwrap_or_else(|| without(self, &candidates, fold, scale))
+        };
         folds.par_iter().zip(close).map(repeated).collect()
     }
 }
@@ -121,15 +144,28 @@ fn parts(data: &Measurements, rows: &[usize]) -> Vec<Vec<usize>> {
     if !data.in_motion(rows) {
         return Poses::of(data, rows).all().to_vec();
     }
-    rows.chunks(rows.len().div_ceil(STRETCHES).max(1)).map(<[usize]>::to_vec).collect()
+    rows.chunks(rows.len().div_ceil(STRETCHES).max(1))
+        .map(<[usize]>::to_vec)
+        .collect()
 }
 
 /// Every place that the target was brought to with its rows and, of the other poses, contiguous stretches; where there is but one place,
 /// stretches of all.
-fn blocks(data: &Measurements, rows: &[usize], order: &[&Vec<usize>], count: usize) -> Vec<Vec<usize>> {
-    let brought: Vec<_> = kinds(data).into_iter().filter(|kind| kind.is_brought()).collect();
+fn blocks(
+    data: &Measurements,
+    rows: &[usize],
+    order: &[&Vec<usize>],
+    count: usize,
+) -> Vec<Vec<usize>> {
+    let brought: Vec<_> = kinds(data)
+        .into_iter()
+        .filter(|kind| kind.is_brought())
+        .collect();
     let place = |row: usize| {
-        let name = brought.iter().find_map(|kind| kind.reading(data, row)).map(|reading| reading.anchor)?;
+        let name = brought
+            .iter()
+            .find_map(|kind| kind.reading(data, row))
+            .map(|reading| reading.anchor)?;
         Some(name.rsplit_once('/').map_or(name, |(place, _)| place))
     };
     let mut places: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
@@ -144,7 +180,9 @@ fn blocks(data: &Measurements, rows: &[usize], order: &[&Vec<usize>], count: usi
         return deal(order, rows.len(), count);
     }
     let left = others.iter().map(|pose| pose.len()).sum();
-    let stretches = deal(&others, left, count).into_iter().filter(|stretch| !stretch.is_empty());
+    let stretches = deal(&others, left, count)
+        .into_iter()
+        .filter(|stretch| !stretch.is_empty());
     let mut blocks: Vec<Vec<usize>> = places.into_values().chain(stretches).collect();
     blocks.iter_mut().for_each(|block| block.sort_unstable());
     blocks
@@ -172,14 +210,34 @@ fn without(whole: &Session, candidates: &[usize], part: &[usize], scale: ErrorSc
     if let Some(errors) = without_places(whole, candidates, part, scale) {
         return errors;
     }
-    let Session { model, data, rows, .. } = *whole;
-    let kept: Vec<usize> = rows.iter().copied().filter(|row| part.binary_search(row).is_err()).collect();
-    let (other, _) = fit(model, data, &FitOptions { rows: &kept, candidates });
+    let Session {
+        model, data, rows, ..
+    } = *whole;
+    let kept: Vec<usize> = rows
+        .iter()
+        .copied()
+        .filter(|row| part.binary_search(row).is_err())
+        .collect();
+    let (other, _) = fit(
+        model,
+        data,
+        &FitOptions {
+            rows: &kept,
+            candidates,
+        },
+    );
     let mut scratch = other.stack.scratch(&other.robot);
-    part.iter().map(|row| scale.error(&other, data, *row, &mut scratch)).collect()
+    part.iter()
+        .map(|row| scale.error(&other, data, *row, &mut scratch))
+        .collect()
 }
 
-pub(crate) fn gather(data: &Measurements, rows: &[usize], parts: &[Vec<usize>], errors: &[Vec<f64>]) -> Vec<f64> {
+pub(crate) fn gather(
+    data: &Measurements,
+    rows: &[usize],
+    parts: &[Vec<usize>],
+    errors: &[Vec<f64>],
+) -> Vec<f64> {
     let mut all = vec![f64::NAN; data.rows()];
     for (row, error) in parts.iter().flatten().zip(errors.iter().flatten()) {
         all[*row] = *error;

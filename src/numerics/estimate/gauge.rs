@@ -29,41 +29,82 @@ pub fn gauge(
     };
     let target = |name: &String| {
         let offset = stated.get(name).copied().unwrap_or_else(Vector3::zeros);
-        Target { name: name.clone(), mounting: Pose::new(home.rotation, home.point(&offset)), oriented: false }
+        Target {
+            name: name.clone(),
+            mounting: Pose::new(home.rotation, home.point(&offset)),
+            oriented: false,
+        }
     };
-    let mut robot = robot.measured_by(MeasurementSetup { targets: names.iter().map(target).collect(), anchors: Vec::new() });
+    let mut robot = robot.measured_by(MeasurementSetup {
+        targets: names.iter().map(target).collect(),
+        anchors: Vec::new(),
+    });
     let open = |target: &Target| !target.name.is_empty() && !stated.contains_key(&target.name);
     let mut base = align(&robot, data, rows);
     for _ in 0..ROUNDS {
         if !robot.setup().targets.iter().any(open) {
             break;
         }
-        let place = |target: &Target| match seen_at(&robot, data, rows, &base, target).filter(|_| open(target)) {
-            Some(point) => Target { mounting: Pose::new(target.mounting.rotation, point), ..target.clone() },
+        let place = |target: &Target| match seen_at(&robot, data, rows, &base, target)
+            .filter(|_| open(target))
+        {
+            Some(point) => Target {
+                mounting: Pose::new(target.mounting.rotation, point),
+                ..target.clone()
+            },
             None => target.clone(),
         };
         let targets = robot.setup().targets.iter().map(place).collect();
-        robot = robot.measured_by(MeasurementSetup { targets, anchors: Vec::new() });
+        robot = robot.measured_by(MeasurementSetup {
+            targets,
+            anchors: Vec::new(),
+        });
         base = align(&robot, data, rows);
     }
     let turned = |target: &Target| match rotation_of(&robot, data, rows, &base, target) {
-        Some(rotation) => Target { mounting: Pose::new(rotation, target.mounting.translation), oriented: true, ..target.clone() },
+        Some(rotation) => Target {
+            mounting: Pose::new(rotation, target.mounting.translation),
+            oriented: true,
+            ..target.clone()
+        },
         None => target.clone(),
     };
     let targets = robot.setup().targets.iter().map(turned).collect();
-    let anchors: Vec<Anchor> =
-        KINDS.iter().map(|kind| kind.anchors(&robot, data, rows, &base)).collect::<Result<Vec<_>, _>>()?.concat();
-    if let Some(twice) = (1..anchors.len()).find(|k| anchors[..*k].iter().any(|other| other.name == anchors[*k].name)) {
-        return Err(format!("`{}` names things of two kinds; give each a name of its own", anchors[twice].name));
+    let anchors: Vec<Anchor> = KINDS
+        .iter()
+        .map(|kind| kind.anchors(&robot, data, rows, &base))
+        .collect::<Result<Vec<_>, _>>()?
+        .concat();
+    if let Some(twice) = (1..anchors.len()).find(|k| {
+        anchors[..*k]
+            .iter()
+            .any(|other| other.name == anchors[*k].name)
+    }) {
+        return Err(format!(
+            "`{}` names things of two kinds; give each a name of its own",
+            anchors[twice].name
+        ));
     }
-    Ok((robot.measured_by(MeasurementSetup { targets, anchors }), base))
+    Ok((
+        robot.measured_by(MeasurementSetup { targets, anchors }),
+        base,
+    ))
 }
 
 /// Whole points of a target, zero pose, base frame: their median by axis.
-fn seen_at(robot: &RobotModel, data: &Measurements, rows: &[usize], base: &Pose, target: &Target) -> Option<Vector3<f64>> {
+fn seen_at(
+    robot: &RobotModel,
+    data: &Measurements,
+    rows: &[usize],
+    base: &Pose,
+    target: &Target,
+) -> Option<Vector3<f64>> {
     let own = rows.iter().filter(|row| data.target(**row) == target.name);
-    let points: Vec<Vector3<f64>> =
-        own.filter_map(|row| Some((*base * robot.last_body(data.q(*row))).inverse_point(&data.point(*row)?))).collect();
+    let points: Vec<Vector3<f64>> = own
+        .filter_map(|row| {
+            Some((*base * robot.last_body(data.q(*row))).inverse_point(&data.point(*row)?))
+        })
+        .collect();
     let median = |axis: usize| {
         let mut values: Vec<f64> = points.iter().map(|point| point[axis]).collect();
         nearest(&mut values, 0.5)
@@ -72,11 +113,19 @@ fn seen_at(robot: &RobotModel, data: &Measurements, rows: &[usize], base: &Pose,
 }
 
 /// Orientation of a target at the zero pose, base frame: the rotation nearest to the sum over its rows (Markley).
-fn rotation_of(robot: &RobotModel, data: &Measurements, rows: &[usize], base: &Pose, target: &Target) -> Option<Matrix3<f64>> {
+fn rotation_of(
+    robot: &RobotModel,
+    data: &Measurements,
+    rows: &[usize],
+    base: &Pose,
+    target: &Target,
+) -> Option<Matrix3<f64>> {
     let own = rows.iter().filter(|row| data.target(**row) == target.name);
     let attitudes = own.flat_map(|row| {
         let body = base.rotation * robot.last_body(data.q(*row)).rotation;
-        KINDS.iter().filter_map(move |kind| kind.attitude(data, *row, &body))
+        KINDS
+            .iter()
+            .filter_map(move |kind| kind.attitude(data, *row, &body))
     });
     let sum = attitudes.reduce(|sum, next| sum + next)?;
     let svd = sum.svd(true, true);

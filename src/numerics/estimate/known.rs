@@ -59,9 +59,20 @@ impl PriorCheck {
         let rest = own - variance;
         // The data's share of the information is rest / own: smaller, it is rounding.
         if rest <= 1e-6 * own {
-            return Self { prior, without: None, conflict: 0.0 };
+            return Self {
+                prior,
+                without: None,
+                conflict: 0.0,
+            };
         }
-        let without = (prior.mean + off * own / rest, (variance * own / rest).sqrt());
-        Self { prior, without: Some(without), conflict: off.abs() / rest.sqrt() }
+        let without = (
+            prior.mean + off * own / rest,
+            (variance * own / rest).sqrt(),
+        );
+        Self {
+            prior,
+            without: Some(without),
+            conflict: off.abs() / rest.sqrt(),
+        }
     }
 }

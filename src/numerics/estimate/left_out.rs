@@ -13,12 +13,22 @@ use crate::robot::Measurements;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Anchors that no row to fit names and others do, by their numbers, with the rows that do.
-fn unseen(model: &Model, data: &Measurements, rows: &[usize], others: &[usize]) -> BTreeMap<usize, Vec<usize>> {
+fn unseen(
+    model: &Model,
+    data: &Measurements,
+    rows: &[usize],
+    others: &[usize],
+) -> BTreeMap<usize, Vec<usize>> {
     let setup = model.robot.setup();
-    let brought: Vec<_> = kinds(data).into_iter().filter(|kind| kind.is_brought()).collect();
+    let brought: Vec<_> = kinds(data)
+        .into_iter()
+        .filter(|kind| kind.is_brought())
+        .collect();
     let anchor = |row: &usize| {
         let mut readings = brought.iter().filter_map(|kind| kind.reading(data, *row));
-        readings.next().and_then(|reading| setup.anchor(reading.anchor))
+        readings
+            .next()
+            .and_then(|reading| setup.anchor(reading.anchor))
     };
     let seen: BTreeSet<usize> = rows.iter().filter_map(anchor).collect();
     let mut unseen: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
@@ -33,7 +43,9 @@ fn unseen(model: &Model, data: &Measurements, rows: &[usize], others: &[usize]) 
 /// The parameters of anchors by their numbers, in the stack.
 fn parameters<'a>(model: &Model, anchors: impl Iterator<Item = &'a usize>) -> Vec<usize> {
     let setup = model.robot.setup();
-    let Some(first) = model.stack.parameters_of(names::ANCHOR).next() else { return Vec::new() };
+    let Some(first) = model.stack.parameters_of(names::ANCHOR).next() else {
+        return Vec::new();
+    };
     let of = |number: &usize| {
         let begin = first + setup.first_of_anchor(*number);
         begin..begin + setup.anchors[*number].shape.parameters()
@@ -43,14 +55,22 @@ fn parameters<'a>(model: &Model, anchors: impl Iterator<Item = &'a usize>) -> Ve
 
 /// The model of a fit to `rows` with every anchor that only other rows name placed by these, robustly; and by how much their errors are
 /// to be multiplied, since each has a part in its place.
-pub fn placed_by_left_out(model: &Model, data: &Measurements, rows: &[usize]) -> (Model, BTreeMap<usize, f64>) {
+pub fn placed_by_left_out(
+    model: &Model,
+    data: &Measurements,
+    rows: &[usize],
+) -> (Model, BTreeMap<usize, f64>) {
     let mut fitted = vec![false; data.rows()];
     rows.iter().for_each(|row| fitted[*row] = true);
     let others: Vec<usize> = (0..data.rows()).filter(|row| !fitted[*row]).collect();
     placed_by(model, data, &unseen(model, data, rows, &others))
 }
 
-fn placed_by(model: &Model, data: &Measurements, unseen: &BTreeMap<usize, Vec<usize>>) -> (Model, BTreeMap<usize, f64>) {
+fn placed_by(
+    model: &Model,
+    data: &Measurements,
+    unseen: &BTreeMap<usize, Vec<usize>>,
+) -> (Model, BTreeMap<usize, f64>) {
     let candidates = parameters(model, unseen.keys());
     let mut inflation = BTreeMap::new();
     if candidates.is_empty() {
@@ -59,39 +79,93 @@ fn placed_by(model: &Model, data: &Measurements, unseen: &BTreeMap<usize, Vec<us
     let rows: BTreeSet<usize> = unseen.values().flatten().copied().collect();
     let rows: Vec<usize> = rows.into_iter().collect();
     for (number, own) in unseen {
-        let axes =
-            |row: &usize| kinds(data).iter().filter(|kind| kind.is_brought()).map(|kind| kind.axes(data, *row)).sum::<usize>();
-        let (values, placed) = (own.iter().map(axes).sum::<usize>(), model.robot.setup().anchors[*number].shape.parameters());
-        let by = if values > placed { values as f64 / (values - placed) as f64 } else { f64::NAN };
+        let axes = |row: &usize| {
+            kinds(data)
+                .iter()
+                .filter(|kind| kind.is_brought())
+                .map(|kind| kind.axes(data, *row))
+                .sum::<usize>()
+        };
+        let (values, placed) = (
+            own.iter().map(axes).sum::<usize>(),
+            model.robot.setup().anchors[*number].shape.parameters(),
+        );
+        let by = if values > placed {
+            values as f64 / (values - placed) as f64
+        } else {
+            f64::NAN
+        };
         inflation.extend(own.iter().map(|row| (*row, by)));
     }
     // Lengths belong to the arm's fit: here the arm stands.
-    let start = Model { lengths: Vec::new(), ..model.clone() };
-    let (placed, _) = fit(&start, data, &FitOptions { rows: &rows, candidates: &candidates });
-    (Model { x: placed.x, ..model.clone() }, inflation)
+    let start = Model {
+        lengths: Vec::new(),
+        ..model.clone()
+    };
+    let (placed, _) = fit(
+        &start,
+        data,
+        &FitOptions {
+            rows: &rows,
+            candidates: &candidates,
+        },
+    );
+    (
+        Model {
+            x: placed.x,
+            ..model.clone()
+        },
+        inflation,
+    )
 }
 
 /// Errors of the rows `part` under a fit to the others, from the whole one on, where `part` holds all rows of some anchor; `None` where it
 /// does not. The noise is that of the whole fit.
-pub(super) fn without_places(whole: &Session, candidates: &[usize], part: &[usize], scale: ErrorScale) -> Option<Vec<f64>> {
-    let Session { model, data, rows, fitted } = *whole;
-    let kept: Vec<usize> = rows.iter().copied().filter(|row| part.binary_search(row).is_err()).collect();
+pub(super) fn without_places(
+    whole: &Session,
+    candidates: &[usize],
+    part: &[usize],
+    scale: ErrorScale,
+) -> Option<Vec<f64>> {
+    let Session {
+        model,
+        data,
+        rows,
+        fitted,
+    } = *whole;
+    let kept: Vec<usize> = rows
+        .iter()
+        .copied()
+        .filter(|row| part.binary_search(row).is_err())
+        .collect();
     let unseen = unseen(model, data, &kept, part);
     if unseen.is_empty() {
         return None;
     }
     let gone = parameters(model, unseen.keys());
-    let free: Vec<usize> = candidates.iter().copied().filter(|k| !gone.contains(k)).collect();
+    let free: Vec<usize> = candidates
+        .iter()
+        .copied()
+        .filter(|k| !gone.contains(k))
+        .collect();
     let numbers = |between: &[usize; 2]| between.iter().any(|number| unseen.contains_key(number));
     let mut other = model.clone();
     other.lengths.retain(|known| !numbers(&known.between));
-    let problem = Problem { data, rows: &kept, excess: fitted.excess() };
+    let problem = Problem {
+        data,
+        rows: &kept,
+        excess: fitted.excess(),
+    };
     let start = problem.evaluate(&other, &free);
     minimise(&problem, &mut other, &free, start, FINE);
     let (other, inflation) = placed_by(&other, data, &unseen);
     let mut scratch = other.stack.scratch(&other.robot);
     let error = |row: &usize| {
-        let by = inflation.get(row).copied().filter(|by| by.is_finite()).unwrap_or(1.0);
+        let by = inflation
+            .get(row)
+            .copied()
+            .filter(|by| by.is_finite())
+            .unwrap_or(1.0);
         by * scale.error(&other, data, *row, &mut scratch)
     };
     Some(part.iter().map(error).collect())

@@ -53,7 +53,10 @@ pub(crate) const STEP_TOLERANCE: f64 = 1e-3;
 pub(crate) const ROUGH_TOLERANCE: f64 = 0.1;
 
 /// To the minimum; calibration problems need four to ten steps.
-pub(crate) const FINE: Effort = Effort { limit: 60, tolerance: STEP_TOLERANCE };
+pub(crate) const FINE: Effort = Effort {
+    limit: 60,
+    tolerance: STEP_TOLERANCE,
+};
 
 /// How long an iteration goes on.
 #[derive(Debug, Clone, Copy)]
@@ -121,9 +124,25 @@ pub(crate) fn minimise(
     (course, Stop::IterationLimit, now)
 }
 
-fn iteration(model: &Model, free: &[usize], state: &Evaluation, step_norm: f64, damping: f64) -> Iteration {
-    let gradient = cosine(&state.factor, state.cost, &model.pinned(free, &state.factor));
-    Iteration { cost: state.cost, rms: state.rms, gradient, step_norm, damping }
+fn iteration(
+    model: &Model,
+    free: &[usize],
+    state: &Evaluation,
+    step_norm: f64,
+    damping: f64,
+) -> Iteration {
+    let gradient = cosine(
+        &state.factor,
+        state.cost,
+        &model.pinned(free, &state.factor),
+    );
+    Iteration {
+        cost: state.cost,
+        rms: state.rms,
+        gradient,
+        step_norm,
+        damping,
+    }
 }
 
 /// Whether the step moves no prediction visibly, or promises to lower the cost by no more than rounding.

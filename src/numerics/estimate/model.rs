@@ -28,7 +28,13 @@ impl Model {
     /// The model with all parameters zero: the nominal robot.
     pub fn nominal(robot: RobotModel, stack: EffectStack) -> Self {
         let x = vec![0.0; stack.specs().len()];
-        Self { robot, stack: Arc::new(stack), x, known: BTreeMap::new(), lengths: Vec::new() }
+        Self {
+            robot,
+            stack: Arc::new(stack),
+            x,
+            known: BTreeMap::new(),
+            lengths: Vec::new(),
+        }
     }
 
     /// Where the base stands in the tracker's frame, corrections included.
@@ -36,17 +42,27 @@ impl Model {
         self.stack
             .effects()
             .find(|(effect, _)| effect.name() == names::BASE_FRAME)
-            .map_or(*self.stack.base(), |(_, range)| BasePlacement::new(*self.stack.base()).pose(&self.x[range]))
+            .map_or(*self.stack.base(), |(_, range)| {
+                BasePlacement::new(*self.stack.base()).pose(&self.x[range])
+            })
     }
 
     /// The same model with every law held at the ends of what these rows have of its variables: beyond, nothing was fitted.
     pub fn held_within(&self, data: &Measurements, rows: &[usize]) -> Self {
         let stack = self.stack.held_within(&self.robot, data, rows, &self.x);
-        Self { stack: Arc::new(stack), ..self.clone() }
+        Self {
+            stack: Arc::new(stack),
+            ..self.clone()
+        }
     }
 
     /// Places the arm of a row.
-    pub(crate) fn place<'a>(&'a self, data: &Measurements, row: usize, scratch: &'a mut PlacementBuffers) -> PlacedRow<'a> {
+    pub(crate) fn place<'a>(
+        &'a self,
+        data: &Measurements,
+        row: usize,
+        scratch: &'a mut PlacementBuffers,
+    ) -> PlacedRow<'a> {
         self.stack.place(&self.robot, data, row, &self.x, scratch)
     }
 

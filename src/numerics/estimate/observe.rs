@@ -47,7 +47,9 @@ pub(crate) fn visibility(factor: &TriangularFactor, prior_sigma: &[f64]) -> Vec<
         }
         let left = length(&rest);
         if left < RANK_TOLERANCE * norm || left * prior < 1.0 {
-            out.push(Visibility::Redundant(combination(&triangle, &kept, &shares, factor, norm)));
+            out.push(Visibility::Redundant(combination(
+                &triangle, &kept, &shares, factor, norm,
+            )));
             continue;
         }
         for value in &mut rest {
@@ -63,7 +65,13 @@ pub(crate) fn visibility(factor: &TriangularFactor, prior_sigma: &[f64]) -> Vec<
 }
 
 /// Which kept columns make up a redundant one: those with at least a tenth of its norm.
-fn combination(triangle: &[Vec<f64>], kept: &[usize], shares: &[f64], factor: &TriangularFactor, norm: f64) -> Vec<(usize, f64)> {
+fn combination(
+    triangle: &[Vec<f64>],
+    kept: &[usize],
+    shares: &[f64],
+    factor: &TriangularFactor,
+    norm: f64,
+) -> Vec<(usize, f64)> {
     let n = shares.len();
     let mut coefficients = vec![0.0; n];
     for i in (0..n).rev() {
@@ -86,21 +94,35 @@ fn length(values: &[f64]) -> f64 {
 
 /// Condition and observability indices of singular values (largest first) from `rows` measured points.
 pub fn indices(singular: &[f64], rows: usize) -> Vec<(&'static str, f64, &'static str)> {
-    let (Some(first), Some(last)) = (singular.first(), singular.last()) else { return Vec::new() };
+    let (Some(first), Some(last)) = (singular.first(), singular.last()) else {
+        return Vec::new();
+    };
     let p = singular.len() as f64;
     let root = (rows as f64).sqrt();
     let mean_log = singular.iter().map(|s| s.ln()).sum::<f64>() / p;
     let inverse: f64 = singular.iter().map(|s| 1.0 / s).sum();
     vec![
-        ("condition", first / last, "largest over smallest singular value, columns scaled to unit prior sigma"),
+        (
+            "condition",
+            first / last,
+            "largest over smallest singular value, columns scaled to unit prior sigma",
+        ),
         (
             "O1",
             mean_log.exp() / root,
             "geometric mean of the singular values over root of points: size of the whole ellipsoid (D-optimality)",
         ),
         ("O2", last / first, "inverse condition number: roundness"),
-        ("O3", *last, "smallest singular value: the worst seen direction (E-optimality)"),
+        (
+            "O3",
+            *last,
+            "smallest singular value: the worst seen direction (E-optimality)",
+        ),
         ("O4", last * last / first, "noise amplification index"),
-        ("O5", 1.0 / inverse, "harmonic mean over p of the singular values (A-optimality)"),
+        (
+            "O5",
+            1.0 / inverse,
+            "harmonic mean over p of the singular values (A-optimality)",
+        ),
     ]
 }

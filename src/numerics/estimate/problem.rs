@@ -48,15 +48,26 @@ impl Evaluation {
 impl Problem<'_> {
     /// Length in standard deviations and number of axes of every residual.
     pub fn errors(&self, residuals: &[Residual]) -> Vec<(f64, usize)> {
-        let length = |residual: &Residual| residual.whitened(self.data, self.excess.of(residual.dimension())).norm();
-        residuals.iter().map(|residual| (length(residual), residual.axes)).collect()
+        let length = |residual: &Residual| {
+            residual
+                .whitened(self.data, self.excess.of(residual.dimension()))
+                .norm()
+        };
+        residuals
+            .iter()
+            .map(|residual| (length(residual), residual.axes))
+            .collect()
     }
 
     /// The problem at the model's parameters, linearised in the `free` ones, with what is known of them beforehand.
     pub fn evaluate(&self, model: &Model, free: &[usize]) -> Evaluation {
         let data = self.observe(model, free);
         let (factor, cost) = model.with_priors(free, data.factor);
-        Evaluation { factor: factor.pulled(&data.pull), cost: data.cost + cost, ..data }
+        Evaluation {
+            factor: factor.pulled(&data.pull),
+            cost: data.cost + cost,
+            ..data
+        }
     }
 
     /// The same from the data alone.
@@ -65,19 +76,42 @@ impl Problem<'_> {
         for (j, parameter) in free.iter().enumerate() {
             column[*parameter] = Some(j);
         }
-        let spans: Vec<Span> = self.rows.par_chunks(SPAN).map(|span| self.span(model, span, &column, free.len())).collect();
+        let spans: Vec<Span> = self
+            .rows
+            .par_chunks(SPAN)
+            .map(|span| self.span(model, span, &column, free.len()))
+            .collect();
         let mut residuals = Vec::with_capacity(self.rows.len());
         let mut sum: Option<TriangularFactor> = None;
         let (mut volume, mut pull) = (0.0, vec![0.0; free.len()]);
-        for Span { residuals: some, factor, volume: own, pull: towards } in spans {
+        for Span {
+            residuals: some,
+            factor,
+            volume: own,
+            pull: towards,
+        } in spans
+        {
             residuals.extend(some);
             volume += own;
-            pull.iter_mut().zip(towards).for_each(|(sum, own)| *sum += own);
+            pull.iter_mut()
+                .zip(towards)
+                .for_each(|(sum, own)| *sum += own);
             sum = Some(sum.map_or_else(|| factor.clone(), |sum| sum.stack(&factor)));
         }
-        let cost = self.errors(&residuals).into_iter().map(|(error, axes)| huber(error, axes)).sum();
+        let cost = self
+            .errors(&residuals)
+            .into_iter()
+            .map(|(error, axes)| huber(error, axes))
+            .sum();
         let factor = sum.unwrap_or_else(|| TriangularFactor::of(&Mat::zeros(1, free.len() + 1)));
-        Evaluation { cost, volume, pull, rms: rms(&residuals), residuals, factor }
+        Evaluation {
+            cost,
+            volume,
+            pull,
+            rms: rms(&residuals),
+            residuals,
+            factor,
+        }
     }
 
     /// Residuals and factor of some rows, in memory of a chunk.
@@ -106,12 +140,16 @@ impl Problem<'_> {
                 let mut placed = model.place(self.data, row, &mut scratch);
                 let mut first = lines_of_row * i;
                 for (kind, height) in kinds.iter().zip(&blocks) {
-                    if let Some((term, residual)) = ObservationTerm::of(*kind, self.data, row, &placed, self.excess) {
+                    if let Some((term, residual)) =
+                        ObservationTerm::of(*kind, self.data, row, &placed, self.excess)
+                    {
                         write(first, term, &mut placed);
                         residuals.push(residual);
                         if let Some(closing) = kind.closing(self.data, row, &placed) {
                             let own = placed.log_volume(&closing, |parameter, change| {
-                                column[parameter].into_iter().for_each(|j| pull[j] += change);
+                                column[parameter]
+                                    .into_iter()
+                                    .for_each(|j| pull[j] += change);
                             });
                             volume += own.unwrap_or_default();
                         }
@@ -121,23 +159,39 @@ impl Problem<'_> {
             }
             tall.absorb(height);
         }
-        Span { residuals, factor: tall.factor(), volume, pull }
+        Span {
+            residuals,
+            factor: tall.factor(),
+            volume,
+            pull,
+        }
     }
 }
 
 /// Root mean square of the lengths (m) of the first kind that measured one.
 fn rms(residuals: &[Residual]) -> f64 {
-    let lengths = KINDS.iter().map(|kind| kind.about()).filter(|kind| kind.dimension == Dimension::Length);
+    let lengths = KINDS
+        .iter()
+        .map(|kind| kind.about())
+        .filter(|kind| kind.dimension == Dimension::Length);
     let squares = |name: &str| -> Vec<f64> {
-        let own = residuals.iter().filter(|residual| residual.kind.about().name == name);
+        let own = residuals
+            .iter()
+            .filter(|residual| residual.kind.about().name == name);
         own.map(|residual| residual.error.norm_squared()).collect()
     };
-    let first = lengths.map(|kind| squares(kind.name)).find(|squares| !squares.is_empty()).unwrap_or_default();
+    let first = lengths
+        .map(|kind| squares(kind.name))
+        .find(|squares| !squares.is_empty())
+        .unwrap_or_default();
     (first.iter().sum::<f64>() / first.len().max(1) as f64).sqrt()
 }
 
 fn add(to: &mut [f64], values: &[f64], share: f64) {
-    to[..values.len()].iter_mut().zip(values).for_each(|(to, value)| *to += value * share);
+    to[..values.len()]
+        .iter_mut()
+        .zip(values)
+        .for_each(|(to, value)| *to += value * share);
 }
 
 /// What a thread makes of its rows.

@@ -40,9 +40,24 @@ const BESIDE: f64 = 0.1;
 const TARGET_PRIOR: f64 = 0.1;
 
 /// What would show each redundant or unseen parameter of a fit to `rows`.
-pub fn remedies(model: &Model, data: &Measurements, rows: &[usize], fitted: &Fitted) -> BTreeMap<usize, Remedy> {
-    let estimated = |k: &usize| matches!(fitted.statuses[*k], ParameterStatus::Free(_) | ParameterStatus::Bound(_));
-    let hidden = |k: &usize| matches!(fitted.statuses[*k], ParameterStatus::Redundant(_) | ParameterStatus::Unseen);
+pub fn remedies(
+    model: &Model,
+    data: &Measurements,
+    rows: &[usize],
+    fitted: &Fitted,
+) -> BTreeMap<usize, Remedy> {
+    let estimated = |k: &usize| {
+        matches!(
+            fitted.statuses[*k],
+            ParameterStatus::Free(_) | ParameterStatus::Bound(_)
+        )
+    };
+    let hidden = |k: &usize| {
+        matches!(
+            fitted.statuses[*k],
+            ParameterStatus::Redundant(_) | ParameterStatus::Unseen
+        )
+    };
     let count = fitted.statuses.len();
     let mut candidates: Vec<usize> = (0..count).filter(estimated).collect();
     let known = candidates.len();
@@ -53,9 +68,17 @@ pub fn remedies(model: &Model, data: &Measurements, rows: &[usize], fitted: &Fit
     let excess = fitted.excess();
     let at = |model: &Model, data: &Measurements| {
         let rows: Vec<usize> = (0..data.rows()).collect();
-        Problem { data, rows: &rows, excess }.observe(model, &candidates).factor
+        Problem {
+            data,
+            rows: &rows,
+            excess,
+        }
+        .observe(model, &candidates)
+        .factor
     };
-    let own = Problem { data, rows, excess }.observe(model, &candidates).factor;
+    let own = Problem { data, rows, excess }
+        .observe(model, &candidates)
+        .factor;
     let declared = model.robot.description().payload_mass;
     let usual = data.payload[rows[0]];
     let spread = at(model, &poses(model, data, rows, &[usual]));
@@ -67,27 +90,50 @@ pub fn remedies(model: &Model, data: &Measurements, rows: &[usize], fitted: &Fit
     let prior: Vec<f64> = candidates.iter().map(|k| specs[*k].prior_sigma).collect();
     let none = vec![false; candidates.len()];
     let tried = [
-        (Remedy::Move(lazy(model, data, rows)), Some(shown(&own, &spread, &none, &prior, known))),
-        (Remedy::Payload, loaded.map(|loaded| shown(&own, &loaded, &none, &prior, known))),
-        (Remedy::SecondTarget, Some(shown(&own, &target, &tool, &prior, known))),
+        (
+            Remedy::Move(lazy(model, data, rows)),
+            Some(shown(&own, &spread, &none, &prior, known)),
+        ),
+        (
+            Remedy::Payload,
+            loaded.map(|loaded| shown(&own, &loaded, &none, &prior, known)),
+        ),
+        (
+            Remedy::SecondTarget,
+            Some(shown(&own, &target, &tool, &prior, known)),
+        ),
     ];
     let mut out = BTreeMap::new();
     for (j, k) in candidates.iter().enumerate().skip(known) {
-        let first = tried.iter().find(|(_, shown)| shown.as_ref().is_some_and(|shown| shown[j - known]));
-        out.insert(*k, first.map_or(Remedy::Nothing, |(remedy, _)| remedy.clone()));
+        let first = tried
+            .iter()
+            .find(|(_, shown)| shown.as_ref().is_some_and(|shown| shown[j - known]));
+        out.insert(
+            *k,
+            first.map_or(Remedy::Nothing, |(remedy, _)| remedy.clone()),
+        );
     }
     out
 }
 
 /// Which of the candidates behind the first `known` are seen with `more` rows, in which the columns `apart` are new unknowns.
-fn shown(own: &TriangularFactor, more: &TriangularFactor, apart: &[bool], prior: &[f64], known: usize) -> Vec<bool> {
+fn shown(
+    own: &TriangularFactor,
+    more: &TriangularFactor,
+    apart: &[bool],
+    prior: &[f64],
+    known: usize,
+) -> Vec<bool> {
     let p = prior.len();
     let new: Vec<usize> = (0..p).filter(|j| apart[*j]).collect();
     // Estimated ones, new ones, then those in question.
     let place = |j: usize| if j < known { j } else { j + new.len() };
     let mut rows = Mat::zeros(2 * p, p + new.len() + 1);
     for j in 0..p {
-        let second = new.iter().position(|other| *other == j).map_or(place(j), |extra| known + extra);
+        let second = new
+            .iter()
+            .position(|other| *other == j)
+            .map_or(place(j), |extra| known + extra);
         rows.col_as_slice_mut(place(j))[..=j].copy_from_slice(own.column(j));
         rows.col_as_slice_mut(second)[p..=p + j].copy_from_slice(more.column(j));
     }
@@ -96,7 +142,10 @@ fn shown(own: &TriangularFactor, more: &TriangularFactor, apart: &[bool], prior:
         sigma[place(j)] = prior / CLEARLY;
     }
     let seen = visibility(&TriangularFactor::of(&rows), &sigma);
-    seen[known + new.len()..].iter().map(|verdict| *verdict == Visibility::Seen).collect()
+    seen[known + new.len()..]
+        .iter()
+        .map(|verdict| *verdict == Visibility::Seen)
+        .collect()
 }
 
 /// Poses all over the joints' ranges (an additive recurrence: even and reproducible), under the payloads in turn.
@@ -108,8 +157,14 @@ fn poses(model: &Model, data: &Measurements, rows: &[usize], payloads: &[f64]) -
     for _ in 0..60 {
         root = (1.0 + root).powf(1.0 / (joints as f64 + 1.0));
     }
-    let ranges: Vec<[f64; 2]> = (0..joints).map(|joint| range(model, data, rows, joint)).collect();
-    let sigma = rows.iter().map(|row| data.points.sigma[*row]).sum::<Vector3<f64>>() / rows.len() as f64;
+    let ranges: Vec<[f64; 2]> = (0..joints)
+        .map(|joint| range(model, data, rows, joint))
+        .collect();
+    let sigma = rows
+        .iter()
+        .map(|row| data.points.sigma[*row])
+        .sum::<Vector3<f64>>()
+        / rows.len() as f64;
     let mut q = Vec::with_capacity(count * joints);
     for i in 0..count {
         for (joint, [low, high]) in ranges.iter().enumerate() {
@@ -120,7 +175,10 @@ fn poses(model: &Model, data: &Measurements, rows: &[usize], payloads: &[f64]) -
     Measurements {
         joints,
         q,
-        points: PointReadings { position: vec![Vector3::zeros(); count], sigma: vec![sigma; count] },
+        points: PointReadings {
+            position: vec![Vector3::zeros(); count],
+            sigma: vec![sigma; count],
+        },
         payload: (0..count).map(|i| payloads[i % payloads.len()]).collect(),
         ..Measurements::default()
     }
@@ -130,18 +188,25 @@ fn poses(model: &Model, data: &Measurements, rows: &[usize], payloads: &[f64]) -
 fn range(model: &Model, data: &Measurements, rows: &[usize], joint: usize) -> [f64; 2] {
     let limits = model.robot.description().joints[joint].limits;
     limits.unwrap_or_else(|| {
-        if model.robot.is_revolute(joint) { [-std::f64::consts::PI, std::f64::consts::PI] } else { used(data, rows, joint) }
+        if model.robot.is_revolute(joint) {
+            [-std::f64::consts::PI, std::f64::consts::PI]
+        } else {
+            used(data, rows, joint)
+        }
     })
 }
 
 fn used(data: &Measurements, rows: &[usize], joint: usize) -> [f64; 2] {
     let values = rows.iter().map(|row| data.q(*row)[joint]);
-    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], q| [low.min(q), high.max(q)])
+    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], q| {
+        [low.min(q), high.max(q)]
+    })
 }
 
 fn lazy(model: &Model, data: &Measurements, rows: &[usize]) -> Vec<usize> {
     let hardly = |joint: &usize| {
-        let ([low, high], [from, to]) = (used(data, rows, *joint), range(model, data, rows, *joint));
+        let ([low, high], [from, to]) =
+            (used(data, rows, *joint), range(model, data, rows, *joint));
         high - low < HARDLY * (to - from)
     };
     (0..data.joints).filter(hardly).collect()
@@ -151,9 +216,16 @@ fn lazy(model: &Model, data: &Measurements, rows: &[usize]) -> Vec<usize> {
 fn beside(model: &Model) -> Model {
     let last = model.robot.joints() - 1;
     let axis = model.robot.axis(last);
-    let across = if axis.x.abs() < 0.6 { axis.cross(&Vector3::x()) } else { axis.cross(&Vector3::y()) };
+    let across = if axis.x.abs() < 0.6 {
+        axis.cross(&Vector3::x())
+    } else {
+        axis.cross(&Vector3::y())
+    };
     let mut description = model.robot.description().clone();
     let moved = Vector3::from(description.tool) + across.normalize() * BESIDE;
     description.tool = moved.into();
-    Model { robot: RobotModel::new(description), ..model.clone() }
+    Model {
+        robot: RobotModel::new(description),
+        ..model.clone()
+    }
 }

@@ -38,7 +38,12 @@ impl Poses {
     pub fn of(data: &Measurements, rows: &[usize]) -> Self {
         // The neighbours of a row are always near in a recording of a moving arm.
         let limit = if data.in_motion(rows) { SAME } else { NEAR };
-        let poses = grouped(rows, |row| data.q(row), limit, |a, b| data.payload[a] == data.payload[b]);
+        let poses = grouped(
+            rows,
+            |row| data.q(row),
+            limit,
+            |a, b| data.payload[a] == data.payload[b],
+        );
         let points = poses.iter().flat_map(|rows| points(data, rows)).collect();
         Self { all: poses, points }
     }
@@ -76,26 +81,48 @@ impl Poses {
         if freedom == 0 {
             return None;
         }
-        let total: f64 = whole.clone().map(|residual| residual.whitened(data, 0.0).norm_squared()).sum();
-        let between = (3 * whole.count()).checked_sub(parameters + freedom).filter(|between| *between > 0);
+        let total: f64 = whole
+            .clone()
+            .map(|residual| residual.whitened(data, 0.0).norm_squared())
+            .sum();
+        let between = (3 * whole.count())
+            .checked_sub(parameters + freedom)
+            .filter(|between| *between > 0);
         let lack_of_fit = between.filter(|_| whitened > 0.0).map(|between| {
             let ratio = (total - whitened).max(0.0) / between as f64 / (whitened / freedom as f64);
             (ratio, tail(ratio, between as f64, freedom as f64))
         });
         let noise = (squares / freedom as f64).sqrt();
-        Some(Repeated { poses: self.repeated().count(), noise, freedom, revisited, lack_of_fit })
+        Some(Repeated {
+            poses: self.repeated().count(),
+            noise,
+            freedom,
+            revisited,
+            lack_of_fit,
+        })
     }
 
     /// One standard deviation (rad) by which revolute joints miss a pose that they return to. `None` where no pose was left and
     /// returned to, or where the tracker's noise explains the scatter.
     pub fn joint_repeatability(&self, model: &Model, data: &Measurements) -> Option<f64> {
-        let groups: Vec<PoseGroup> = self.repeated().filter_map(|pose| PoseGroup::of(model, data, pose)).collect();
+        let groups: Vec<PoseGroup> = self
+            .repeated()
+            .filter_map(|pose| PoseGroup::of(model, data, pose))
+            .collect();
         // A pose that scatters far more than the others saw a mistake or an event.
         let mut scatters: Vec<f64> = groups.iter().map(|group| group.scatter).collect();
         scatters.sort_unstable_by(f64::total_cmp);
         let limit = STRANGE * scatters.get(scatters.len() / 2)?;
-        let groups: Vec<PoseGroup> = groups.into_iter().filter(|group| group.scatter <= limit).collect();
-        let deviance = |log: f64| groups.iter().map(|group| group.deviance(log.exp())).sum::<f64>();
+        let groups: Vec<PoseGroup> = groups
+            .into_iter()
+            .filter(|group| group.scatter <= limit)
+            .collect();
+        let deviance = |log: f64| {
+            groups
+                .iter()
+                .map(|group| group.deviance(log.exp()))
+                .sum::<f64>()
+        };
         let silent: f64 = groups.iter().map(|group| group.deviance(0.0)).sum();
         let grid = (0..=60).map(|k| FINEST.ln() + (COARSEST / FINEST).ln() * f64::from(k) / 60.0);
         let best = grid.min_by(|a, b| deviance(*a).total_cmp(&deviance(*b)))?;
@@ -122,14 +149,19 @@ fn in_first_pose(model: &Model, data: &Measurements, rows: &[usize]) -> Vec<Vect
     let mut scratch = model.stack.scratch(&model.robot);
     let mut predicted = |row: usize| model.place(data, row, &mut scratch).point;
     let first = predicted(rows[0]);
-    rows.iter().filter_map(|row| Some(data.point(*row)? - (predicted(*row) - first))).collect()
+    rows.iter()
+        .filter_map(|row| Some(data.point(*row)? - (predicted(*row) - first)))
+        .collect()
 }
 
 /// The whole points among the rows of a pose, by target.
 fn points(data: &Measurements, pose: &[usize]) -> Vec<Vec<usize>> {
     let mut by_target: Vec<Vec<usize>> = Vec::new();
     for row in pose.iter().filter(|row| data.has_point(**row)) {
-        match by_target.iter_mut().find(|rows| data.target(rows[0]) == data.target(*row)) {
+        match by_target
+            .iter_mut()
+            .find(|rows| data.target(rows[0]) == data.target(*row))
+        {
             Some(rows) => rows.push(*row),
             None => by_target.push(vec![*row]),
         }
@@ -139,8 +171,12 @@ fn points(data: &Measurements, pose: &[usize]) -> Vec<Vec<usize>> {
 
 /// Rows of a point between which the arm did not move: nothing but rows of the same pose lies between.
 pub(crate) fn visits<'a>(data: &Measurements, point: &'a [usize]) -> Vec<&'a [usize]> {
-    let stands = |a: usize, b: usize| data.payload[a] == data.payload[b] && near(data.q(a), data.q(b), STILL);
-    point.chunk_by(|a, b| (a + 1..=*b).all(|next| stands(*a, next))).collect()
+    let stands = |a: usize, b: usize| {
+        data.payload[a] == data.payload[b] && near(data.q(a), data.q(b), STILL)
+    };
+    point
+        .chunk_by(|a, b| (a + 1..=*b).all(|next| stands(*a, next)))
+        .collect()
 }
 
 /// A pose that was left and returned to.
@@ -159,17 +195,28 @@ impl PoseGroup {
         let visits: Vec<(Vector3<f64>, Matrix3<f64>)> = visits(data, pose)
             .into_iter()
             .map(|rows| {
-                let variance = rows.iter().map(|row| data.points.sigma[*row].map(|sigma| sigma * sigma)).sum::<Vector3<f64>>();
+                let variance = rows
+                    .iter()
+                    .map(|row| data.points.sigma[*row].map(|sigma| sigma * sigma))
+                    .sum::<Vector3<f64>>();
                 let count = rows.len() as f64;
                 let mean = points.by_ref().take(rows.len()).sum::<Vector3<f64>>() / count;
                 (mean, Matrix3::from_diagonal(&(variance / (count * count))))
             })
             .collect();
-        let middle = visits.iter().map(|(point, _)| point).sum::<Vector3<f64>>() / visits.len() as f64;
-        let squares: f64 = visits.iter().map(|(point, _)| (point - middle).norm_squared()).sum();
+        let middle =
+            visits.iter().map(|(point, _)| point).sum::<Vector3<f64>>() / visits.len() as f64;
+        let squares: f64 = visits
+            .iter()
+            .map(|(point, _)| (point - middle).norm_squared())
+            .sum();
         let freedom = visits.len().checked_sub(1).filter(|freedom| *freedom > 0)?;
         let lever = levers(model, data, pose.first().copied().into_iter()).pop()?;
-        Some(Self { visits, lever, scatter: squares / freedom as f64 })
+        Some(Self {
+            visits,
+            lever,
+            scatter: squares / freedom as f64,
+        })
     }
 
     /// -2 log of the restricted likelihood of a joint repeatability (rad), but for a constant.
@@ -186,34 +233,60 @@ impl PoseGroup {
         }
         sum += information.determinant().ln();
         let middle = information.try_inverse().unwrap_or_else(Matrix3::zeros) * weighted;
-        let squares =
-            self.visits.iter().zip(&inverses).map(|((point, _), inverse)| (point - middle).dot(&(inverse * (point - middle))));
+        let squares = self
+            .visits
+            .iter()
+            .zip(&inverses)
+            .map(|((point, _), inverse)| (point - middle).dot(&(inverse * (point - middle))));
         sum + squares.sum::<f64>()
     }
 }
 
 /// J J' (m2 per rad2, tracker frame) of the revolute joints at every row.
-fn levers(model: &Model, data: &Measurements, rows: impl Iterator<Item = usize>) -> Vec<Matrix3<f64>> {
-    let setting = EffectContext { base: model.base(), load: Load::GravityTorque };
+fn levers(
+    model: &Model,
+    data: &Measurements,
+    rows: impl Iterator<Item = usize>,
+) -> Vec<Matrix3<f64>> {
+    let setting = EffectContext {
+        base: model.base(),
+        load: Load::GravityTorque,
+    };
     let zeros = arm_effect("joint_offset", &setting);
-    let joints = Model::nominal(model.robot.clone(), EffectStack::new(&model.robot, setting.base, zeros.into_iter().collect()));
+    let joints = Model::nominal(
+        model.robot.clone(),
+        EffectStack::new(&model.robot, setting.base, zeros.into_iter().collect()),
+    );
     let mut scratch = joints.stack.scratch(&joints.robot);
     let mut columns = vec![Vector3::zeros(); joints.robot.joints()];
     rows.map(|row| {
         columns.fill(Vector3::zeros());
-        joints.stack.derivatives(&joints.robot, data, row, &joints.x, &mut scratch, |joint, derivative| {
-            if joints.robot.is_revolute(joint) {
-                columns[joint] += derivative;
-            }
-        });
-        columns.iter().map(|column| column * column.transpose()).sum()
+        joints.stack.derivatives(
+            &joints.robot,
+            data,
+            row,
+            &joints.x,
+            &mut scratch,
+            |joint, derivative| {
+                if joints.robot.is_revolute(joint) {
+                    columns[joint] += derivative;
+                }
+            },
+        );
+        columns
+            .iter()
+            .map(|column| column * column.transpose())
+            .sum()
     })
     .collect()
 }
 
 /// Covariance (m2) that joints make of every row's point which repeat to `sigma` (rad, one standard deviation).
 pub fn spread(model: &Model, data: &Measurements, sigma: f64) -> Vec<Matrix3<f64>> {
-    levers(model, data, 0..data.rows()).into_iter().map(|lever| lever * (sigma * sigma)).collect()
+    levers(model, data, 0..data.rows())
+        .into_iter()
+        .map(|lever| lever * (sigma * sigma))
+        .collect()
 }
 
 /// Golden section: where a function of one valley between `low` and `high` is least.
@@ -221,7 +294,11 @@ fn minimum(value: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     const GOLDEN: f64 = 0.618_033_988_749_894_8;
     for _ in 0..30 {
         let (left, right) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
-        if value(left) < value(right) { high = right } else { low = left }
+        if value(left) < value(right) {
+            high = right
+        } else {
+            low = left
+        }
     }
     0.5 * (low + high)
 }

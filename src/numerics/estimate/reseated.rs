@@ -25,7 +25,9 @@ const CUT: f64 = 4.0;
 
 /// The place in the order of `rows` that parts them best, of rows that lay in sockets; `sigma` is what they scatter by, m per axis.
 pub fn reseated(model: &Model, data: &Measurements, rows: &[usize], sigma: f64) -> Option<Reseat> {
-    let socket = kinds(data).into_iter().find(|kind| kind.is_brought() && kind.about().axes == 3)?;
+    let socket = kinds(data)
+        .into_iter()
+        .find(|kind| kind.is_brought() && kind.about().axes == 3)?;
     let mut scratch = model.stack.scratch(&model.robot);
     let mut seen: Vec<(usize, Vector3<f64>)> = Vec::new();
     for row in rows {
@@ -47,7 +49,11 @@ pub fn reseated(model: &Model, data: &Measurements, rows: &[usize], sigma: f64) 
         let apart = ((total - before) / after as f64 - before / count as f64).norm();
         let statistic = apart / (sigma * (1.0 / count as f64 + 1.0 / after as f64).sqrt());
         if statistic > best.map_or(CERTAIN, |best| best.statistic) {
-            best = Some(Reseat { row: seen[count].0, shift: apart, statistic });
+            best = Some(Reseat {
+                row: seen[count].0,
+                shift: apart,
+                statistic,
+            });
         }
     }
     best

@@ -19,21 +19,33 @@ pub struct RowError {
 }
 
 /// How far off a row is under a model.
-pub(crate) fn row_error(model: &Model, data: &Measurements, row: usize, scratch: &mut PlacementBuffers) -> RowError {
+pub(crate) fn row_error(
+    model: &Model,
+    data: &Measurements,
+    row: usize,
+    scratch: &mut PlacementBuffers,
+) -> RowError {
     placed_row_error(data, row, &model.place(data, row, scratch))
 }
 
 /// The same of a row whose arm was placed.
 pub(crate) fn placed_row_error(data: &Measurements, row: usize, placed: &PlacedRow) -> RowError {
     let (mut length, mut angle) = (None, None);
-    for residual in KINDS.iter().filter_map(|kind| Residual::of(*kind, data, row, placed)) {
+    for residual in KINDS
+        .iter()
+        .filter_map(|kind| Residual::of(*kind, data, row, placed))
+    {
         let first = match residual.dimension() {
             Dimension::Length => &mut length,
             Dimension::Angle => &mut angle,
         };
         first.get_or_insert_with(|| residual.error.norm());
     }
-    RowError { point: data.points.residual(row, &placed.point), length: length.unwrap_or(0.0), angle }
+    RowError {
+        point: data.points.residual(row, &placed.point),
+        length: length.unwrap_or(0.0),
+        angle,
+    }
 }
 
 impl Model {
@@ -42,6 +54,9 @@ impl Model {
         let plain = data.readings.is_empty() && (0..data.rows()).all(|row| data.has_point(row));
         let rows = if plain { 0 } else { data.rows() };
         let scratch = || self.stack.scratch(&self.robot);
-        (0..rows).into_par_iter().map_init(scratch, |scratch, row| row_error(self, data, row, scratch)).collect()
+        (0..rows)
+            .into_par_iter()
+            .map_init(scratch, |scratch, row| row_error(self, data, row, scratch))
+            .collect()
     }
 }

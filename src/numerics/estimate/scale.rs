@@ -31,45 +31,88 @@ pub struct ArmScale {
 
 /// The scale of an arm by rows that were fitted; none where links stay at nominal, or where some measured other than that the target was
 /// brought to a place.
-pub fn scale(model: &Model, data: &Measurements, rows: &[usize], covariance: Option<&Covariance>) -> Option<ArmScale> {
+pub fn scale(
+    model: &Model,
+    data: &Measurements,
+    rows: &[usize],
+    covariance: Option<&Covariance>,
+) -> Option<ArmScale> {
     // Links that stay at nominal are the scale.
     let free = covariance.map_or(&[][..], |covariance| covariance.parameters());
-    let linked = model.stack.parameters_of(names::LINK_GEOMETRY).any(|k| free.contains(&k));
+    let linked = model
+        .stack
+        .parameters_of(names::LINK_GEOMETRY)
+        .any(|k| free.contains(&k));
     if rows.is_empty() || !linked || !only_brought(data, rows) {
         return None;
     }
     let mut scratch = model.stack.scratch(&model.robot);
-    let points: Vec<Vector3<f64>> =
-        rows.iter().map(|row| model.stack.point(&model.robot, data, *row, &model.x, &mut scratch)).collect();
+    let points: Vec<Vector3<f64>> = rows
+        .iter()
+        .map(|row| {
+            model
+                .stack
+                .point(&model.robot, data, *row, &model.x, &mut scratch)
+        })
+        .collect();
     let middle = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
-    let square: f64 = points.iter().map(|point| (point - middle).norm_squared()).sum();
+    let square: f64 = points
+        .iter()
+        .map(|point| (point - middle).norm_squared())
+        .sum();
     let links: Vec<usize> = model.stack.parameters_of(names::LINK_GEOMETRY).collect();
     let beyond = covariance.map_or(1.0, |covariance| beyond_priors(model, covariance));
-    let sigmas = covariance.filter(|_| (square / points.len() as f64).sqrt() > APART).and_then(|covariance| {
-        let mut along = vec![0.0; model.x.len()];
-        for (row, point) in rows.iter().zip(&points) {
-            let off = (point - middle) / square;
-            model.stack.derivatives(&model.robot, data, *row, &model.x, &mut scratch, |k, rate| along[k] += off.dot(&rate));
-        }
-        let parameters = covariance.parameters();
-        let weights = DVector::from_iterator(parameters.len(), parameters.iter().map(|k| along[*k]));
-        let along = covariance.block(parameters)? * &weights;
-        let whole = weights.dot(&along);
-        // How the scale follows the mean of each prior, in standard deviations of that; and the errors along axes beside it.
-        let lengths = parameters.iter().enumerate().filter(|(_, k)| model.stack.specs()[**k].unit == Unit::Millimetre);
-        let lengths = lengths.filter(|(_, k)| links.contains(k));
-        let part = |(row, k): (usize, &usize)| {
-            let part = along[row].abs() / model.known(*k).prior?.sigma;
-            Some((part, carried(&model.robot, &model.stack.specs()[*k].name) as f64))
-        };
-        let parts: Vec<(f64, f64)> = lengths.filter_map(part).collect();
-        let own: f64 = parts.iter().map(|(part, _)| part * part).sum();
-        let together = (whole - own).max(0.0) + parts.iter().map(|(part, _)| part).sum::<f64>().powi(2);
-        let whole = whole + parts.iter().map(|(part, carried)| part * part * carried).sum::<f64>();
-        let together = together.max(whole);
-        Some([together, whole].map(|variance| beyond * variance.max(0.0).sqrt()))
-    });
-    let is_told = |k: usize| model.known.get(&k).is_some_and(|known| known.prior.is_some());
+    let sigmas = covariance
+        .filter(|_| (square / points.len() as f64).sqrt() > APART)
+        .and_then(|covariance| {
+            let mut along = vec![0.0; model.x.len()];
+            for (row, point) in rows.iter().zip(&points) {
+                let off = (point - middle) / square;
+                model.stack.derivatives(
+                    &model.robot,
+                    data,
+                    *row,
+                    &model.x,
+                    &mut scratch,
+                    |k, rate| along[k] += off.dot(&rate),
+                );
+            }
+            let parameters = covariance.parameters();
+            let weights =
+                DVector::from_iterator(parameters.len(), parameters.iter().map(|k| along[*k]));
+            let along = covariance.block(parameters)? * &weights;
+            let whole = weights.dot(&along);
+            // How the scale follows the mean of each prior, in standard deviations of that; and the errors along axes beside it.
+            let lengths = parameters
+                .iter()
+                .enumerate()
+                .filter(|(_, k)| model.stack.specs()[**k].unit == Unit::Millimetre);
+            let lengths = lengths.filter(|(_, k)| links.contains(k));
+            let part = |(row, k): (usize, &usize)| {
+                let part = along[row].abs() / model.known(*k).prior?.sigma;
+                Some((
+                    part,
+                    carried(&model.robot, &model.stack.specs()[*k].name) as f64,
+                ))
+            };
+            let parts: Vec<(f64, f64)> = lengths.filter_map(part).collect();
+            let own: f64 = parts.iter().map(|(part, _)| part * part).sum();
+            let together =
+                (whole - own).max(0.0) + parts.iter().map(|(part, _)| part).sum::<f64>().powi(2);
+            let whole = whole
+                + parts
+                    .iter()
+                    .map(|(part, carried)| part * part * carried)
+                    .sum::<f64>();
+            let together = together.max(whole);
+            Some([together, whole].map(|variance| beyond * variance.max(0.0).sqrt()))
+        });
+    let is_told = |k: usize| {
+        model
+            .known
+            .get(&k)
+            .is_some_and(|known| known.prior.is_some())
+    };
     let is_radius = |k: usize| model.stack.specs()[k].name.ends_with(".radius");
     let told = |name: &'static str| model.stack.parameters_of(name).any(is_told);
     Some(ArmScale {
@@ -78,20 +121,35 @@ pub fn scale(model: &Model, data: &Measurements, rows: &[usize], covariance: Opt
         beyond,
         by_length: !model.lengths.is_empty()
             || known_places(model) > 1
-            || model.known.iter().any(|(k, known)| is_radius(*k) && known.prior.is_some()),
+            || model
+                .known
+                .iter()
+                .any(|(k, known)| is_radius(*k) && known.prior.is_some()),
         by_priors: told(names::LINK_GEOMETRY) || told(names::TOOL_OFFSET),
-        reach: points.iter().map(|point| (point - model.base().translation).norm()).fold(0.0, f64::max),
+        reach: points
+            .iter()
+            .map(|point| (point - model.base().translation).norm())
+            .fold(0.0, f64::max),
     })
 }
 
 /// How many errors of earlier links a shift of a link stands for beside its own: a link's error along the axis of its joint is none of its
 /// parameters, since a shift of the next link that is not along its own joint's axis does the same.
 fn carried(robot: &RobotModel, name: &str) -> usize {
-    let parts = name.strip_prefix("link_geometry.l").and_then(|own| own.split_once('.'));
-    let Some((Ok(link), axis)) = parts.map(|(link, axis)| (link.parse::<usize>(), axis)) else { return 0 };
-    let Some(axis) = ["x", "y", "z"].iter().position(|own| *own == axis) else { return 0 };
+    let parts = name
+        .strip_prefix("link_geometry.l")
+        .and_then(|own| own.split_once('.'));
+    let Some((Ok(link), axis)) = parts.map(|(link, axis)| (link.parse::<usize>(), axis)) else {
+        return 0;
+    };
+    let Some(axis) = ["x", "y", "z"].iter().position(|own| *own == axis) else {
+        return 0;
+    };
     let along = |joint: &usize| robot.is_revolute(*joint) && robot.axis(*joint)[axis].abs() > ALONG;
-    (1..link.min(robot.joints())).rev().take_while(along).count()
+    (1..link.min(robot.joints()))
+        .rev()
+        .take_while(along)
+        .count()
 }
 
 /// Cosine beyond which an axis lies along another.
@@ -101,7 +159,11 @@ const ALONG: f64 = 0.999;
 pub fn known_places(model: &Model) -> usize {
     let specs = model.stack.specs();
     let told = |k: &usize| specs[*k].name.ends_with(".x") && model.known(*k).prior.is_some();
-    model.stack.parameters_of(names::ANCHOR).filter(told).count()
+    model
+        .stack
+        .parameters_of(names::ANCHOR)
+        .filter(told)
+        .count()
 }
 
 /// Root of the squares of links' deviations from their priors, in standard deviations, over the number of directions that the data see of
@@ -109,11 +171,20 @@ pub fn known_places(model: &Model) -> usize {
 fn beyond_priors(model: &Model, covariance: &Covariance) -> f64 {
     let (mut square, mut seen) = (0.0, 0.0);
     let links: Vec<usize> = model.stack.parameters_of(names::LINK_GEOMETRY).collect();
-    for (row, k) in covariance.parameters().iter().enumerate().filter(|(_, k)| links.contains(k)) {
+    for (row, k) in covariance
+        .parameters()
+        .iter()
+        .enumerate()
+        .filter(|(_, k)| links.contains(k))
+    {
         if let Some(prior) = model.known(*k).prior {
             square += ((model.x[*k] - prior.mean) / prior.sigma).powi(2);
             seen += (1.0 - (covariance.sigma(row) / prior.sigma).powi(2)).max(0.0);
         }
     }
-    if seen < 1.0 { 1.0 } else { (square / seen).sqrt().max(1.0) }
+    if seen < 1.0 {
+        1.0
+    } else {
+        (square / seen).sqrt().max(1.0)
+    }
 }

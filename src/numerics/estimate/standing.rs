@@ -10,11 +10,19 @@ impl Model {
     /// Nominal and present value of a parameter of the stack, SI.
     pub fn standing(&self, parameter: usize) -> (f64, f64) {
         let change = (0.0, self.x.get(parameter).copied().unwrap_or_default());
-        let found = self.stack.effects().find(|(_, range)| range.contains(&parameter));
-        let Some((effect, range)) = found else { return change };
+        let found = self
+            .stack
+            .effects()
+            .find(|(_, range)| range.contains(&parameter));
+        let Some((effect, range)) = found else {
+            return change;
+        };
         let number = parameter - range.start;
         match effect.name() {
-            names::BASE_FRAME => (component(self.stack.base(), number), component(&self.base(), number)),
+            names::BASE_FRAME => (
+                component(self.stack.base(), number),
+                component(&self.base(), number),
+            ),
             names::ANCHOR => self.anchored(number).unwrap_or(change),
             names::TOOL_OFFSET => self.mounting(number, &self.x[range]).unwrap_or(change),
             _ => change,
@@ -25,7 +33,9 @@ impl Model {
     /// along its normal, or a tilt of that.
     fn anchored(&self, number: usize) -> Option<(f64, f64)> {
         let setup = self.robot.setup();
-        let of = (0..setup.anchors.len()).rev().find(|of| setup.first_of_anchor(*of) <= number)?;
+        let of = (0..setup.anchors.len())
+            .rev()
+            .find(|of| setup.first_of_anchor(*of) <= number)?;
         let axis = number - setup.first_of_anchor(of);
         let anchor = setup.anchors.get(of)?;
         let now = self.standing_anchor(of)?;
@@ -33,9 +43,10 @@ impl Model {
             (Shape::Plane(before), Shape::Plane(normal)) if axis == 0 => {
                 Some((before.dot(&anchor.place), normal.dot(&now.place)))
             }
-            (Shape::Plane(before), Shape::Plane(normal)) => {
-                Some((Anchor::tilts(&before)[axis - 1], Anchor::tilts(&normal)[axis - 1]))
-            }
+            (Shape::Plane(before), Shape::Plane(normal)) => Some((
+                Anchor::tilts(&before)[axis - 1],
+                Anchor::tilts(&normal)[axis - 1],
+            )),
             (Shape::Sphere(before), Shape::Sphere(radius)) if axis == 3 => Some((before, radius)),
             _ => Some((anchor.place[axis], now.place[axis])),
         }
@@ -49,7 +60,10 @@ impl Model {
             if number < first + width {
                 let corrected = corrected(target, x.get(first..first + width)?);
                 let axis = number - first;
-                return Some((self.beside_tool(&target.mounting, axis), self.beside_tool(&corrected, axis)));
+                return Some((
+                    self.beside_tool(&target.mounting, axis),
+                    self.beside_tool(&corrected, axis),
+                ));
             }
             first += width;
         }
@@ -59,7 +73,13 @@ impl Model {
     /// x, y, z from the tool point (m), or a component of the rotation vector from the tool frame (rad), base axes at the zero pose.
     fn beside_tool(&self, mounting: &Pose, axis: usize) -> f64 {
         let home = self.robot.home();
-        component(&Pose::new(mounting.rotation * home.rotation.transpose(), mounting.translation - home.translation), axis)
+        component(
+            &Pose::new(
+                mounting.rotation * home.rotation.transpose(),
+                mounting.translation - home.translation,
+            ),
+            axis,
+        )
     }
 }
 
@@ -70,7 +90,9 @@ fn corrected(target: &Target, x: &[f64]) -> Pose {
         if axis < 3 {
             twist[axis] += value;
         } else {
-            twist += crate::spatial::screw(&Vector3::ith(axis - 3, 1.0), &target.mounting.translation) * *value;
+            twist +=
+                crate::spatial::screw(&Vector3::ith(axis - 3, 1.0), &target.mounting.translation)
+                    * *value;
         }
     }
     Pose::exp(&twist) * target.mounting
@@ -78,5 +100,9 @@ fn corrected(target: &Target, x: &[f64]) -> Pose {
 
 /// x, y, z (m) or a component of the rotation vector (rad).
 fn component(pose: &Pose, axis: usize) -> f64 {
-    if axis < 3 { pose.translation[axis] } else { pose.rotation_vector()[axis - 3] }
+    if axis < 3 {
+        pose.translation[axis]
+    } else {
+        pose.rotation_vector()[axis - 3]
+    }
 }

@@ -25,6 +25,10 @@ pub fn in_order<T: Send>(jobs: usize, count: usize, work: impl Fn(usize) -> T + 
             });
         }
     });
-    let filled = slots.into_iter().map(|slot| slot.into_inner().expect("the threads have ended"));
-    filled.map(|value| value.expect("every piece was computed")).collect()
+    let filled = slots
+        .into_iter()
+        .map(|slot| slot.into_inner().expect("the threads have ended"));
+    filled
+        .map(|value| value.expect("every piece was computed"))
+        .collect()
 }

@@ -31,7 +31,11 @@ impl Triangle {
     }
 
     pub fn at(&self, i: usize, j: usize) -> f64 {
-        if i <= j { self.values[j * (j + 1) / 2 + i] } else { 0.0 }
+        if i <= j {
+            self.values[j * (j + 1) / 2 + i]
+        } else {
+            0.0
+        }
     }
 
     pub fn scaled(mut self, by: f64) -> Self {
@@ -43,7 +47,10 @@ impl Triangle {
 
     /// The first `size` rows and columns.
     pub fn head(&self, size: usize) -> Self {
-        Self { size, values: self.values[..size * (size + 1) / 2].to_vec() }
+        Self {
+            size,
+            values: self.values[..size * (size + 1) / 2].to_vec(),
+        }
     }
 
     /// Solves in place for a right-hand side that ends with row `right.len() - 1`. The diagonal must not be zero there.
@@ -68,7 +75,10 @@ impl Triangle {
             column[j] = 1.0;
             self.solve(column);
         }
-        Some(Self { size: self.size, values })
+        Some(Self {
+            size: self.size,
+            values,
+        })
     }
 }
 
@@ -109,7 +119,13 @@ mod tests {
 
     #[test]
     fn a_triangle_times_its_inverse_is_one() {
-        let triangle = Triangle::from_fn(7, |i, j| if i == j { 2.0 + j as f64 } else { ((3 * i + 5 * j) % 7) as f64 - 3.0 });
+        let triangle = Triangle::from_fn(7, |i, j| {
+            if i == j {
+                2.0 + j as f64
+            } else {
+                ((3 * i + 5 * j) % 7) as f64 - 3.0
+            }
+        });
         let inverse = triangle.inverse().unwrap();
         for i in 0..7 {
             for j in 0..7 {

@@ -3,7 +3,10 @@
 //! tilt = asin(up . R e) with up the z axis of the recording's frame, which is levelled (trackers are, by a level of their own), or
 //! where the level is the only instrument defines it. The target's z axis points above the horizon: such instruments work upright.
 
-use super::{DeclaredColumn, Dimension, KindDescription, MeasurementKind, Rank, ResidualNumbers, Sensitivity, Weight};
+use super::{
+    DeclaredColumn, Dimension, KindDescription, MeasurementKind, Rank, ResidualNumbers,
+    Sensitivity, Weight,
+};
 use crate::effect::PlacedRow;
 use crate::robot::Measurements;
 use crate::units::Quantity::Angle;
@@ -30,11 +33,26 @@ static ABOUT: KindDescription = KindDescription {
             "Angle of the target's x axis above the horizon: a level on the tool.",
         )
         .together(BOTH),
-        DeclaredColumn::value(&["tilt_y"], Angle, UPRIGHT, "Angle of the target's y axis above the horizon.").together(BOTH),
-        DeclaredColumn::sigma(&["sigma_tilt"], Angle, "Standard deviation of the level's angles."),
+        DeclaredColumn::value(
+            &["tilt_y"],
+            Angle,
+            UPRIGHT,
+            "Angle of the target's y axis above the horizon.",
+        )
+        .together(BOTH),
+        DeclaredColumn::sigma(
+            &["sigma_tilt"],
+            Angle,
+            "Standard deviation of the level's angles.",
+        ),
     ],
     own_sigma: true,
-    rank: Rank { places: false, rotations: true, scale: true, blind: [3, 1] },
+    rank: Rank {
+        places: false,
+        rotations: true,
+        scale: true,
+        blind: [3, 1],
+    },
     is_screened: false,
 };
 
@@ -43,25 +61,53 @@ impl MeasurementKind for Inclination {
         &ABOUT
     }
 
-    fn residual(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<(ResidualNumbers, f64)> {
+    fn residual(
+        &self,
+        data: &Measurements,
+        row: usize,
+        placed: &PlacedRow,
+    ) -> Option<(ResidualNumbers, f64)> {
         let reading = self.reading(data, row)?;
         let rotation = placed.orientation();
         let left = |axis: usize| reading.values[axis] - rotation[(2, axis)].clamp(-1.0, 1.0).asin();
-        Some((ResidualNumbers::new([left(0), left(1)]), reading.sigma * reading.sigma))
+        Some((
+            ResidualNumbers::new([left(0), left(1)]),
+            reading.sigma * reading.sigma,
+        ))
     }
 
     /// A rotation w changes up . R e by w . (R e x up), and the angle by as much over its cosine, the length of R e x up.
-    fn sensitivity(&self, _data: &Measurements, _row: usize, placed: &PlacedRow, weight: Weight) -> Sensitivity {
+    fn sensitivity(
+        &self,
+        _data: &Measurements,
+        _row: usize,
+        placed: &PlacedRow,
+        weight: Weight,
+    ) -> Sensitivity {
         let rotation = placed.orientation();
-        let line = |axis: usize| rotation.column(axis).cross(&Vector3::z()).try_normalize(0.0).unwrap_or_else(Vector3::zeros);
+        let line = |axis: usize| {
+            rotation
+                .column(axis)
+                .cross(&Vector3::z())
+                .try_normalize(0.0)
+                .unwrap_or_else(Vector3::zeros)
+        };
         let lines = Matrix3::from_columns(&[line(0), line(1), Vector3::zeros()]).transpose();
         let weighted = [0, 1, 2].map(|axis: usize| weight.apply(&lines.column(axis).into_owned()));
         Sensitivity::Rotation(Weight::Full(Matrix3::from_columns(&weighted)))
     }
 
     /// What is up to the target is up to the last body.
-    fn attitude(&self, data: &Measurements, row: usize, body: &Matrix3<f64>) -> Option<Matrix3<f64>> {
-        let [x, y] = [0, 1].map(|axis: usize| self.reading(data, row).map(|reading| reading.values[axis].sin()));
+    fn attitude(
+        &self,
+        data: &Measurements,
+        row: usize,
+        body: &Matrix3<f64>,
+    ) -> Option<Matrix3<f64>> {
+        let [x, y] = [0, 1].map(|axis: usize| {
+            self.reading(data, row)
+                .map(|reading| reading.values[axis].sin())
+        });
         let (x, y) = x.zip(y)?;
         let up = Vector3::new(x, y, (1.0 - x * x - y * y).max(0.0).sqrt());
         Some(body.tr_mul(&Vector3::z()) * up.transpose())

@@ -36,8 +36,16 @@ use nalgebra::{Matrix3, Vector3};
 use std::ops::RangeInclusive;
 
 /// Every kind of measurement; a recording that maps no other holds the first.
-pub const KINDS: &[&dyn MeasurementKind] =
-    &[&PointKind, &Orientation, &Distance, &Inclination, &SocketKind, &PlaneKind, &SphereKind, &Planar];
+pub const KINDS: &[&dyn MeasurementKind] = &[
+    &PointKind,
+    &Orientation,
+    &Distance,
+    &Inclination,
+    &SocketKind,
+    &PlaneKind,
+    &SphereKind,
+    &Planar,
+];
 
 /// What a kind's residual is a size of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -108,15 +116,29 @@ pub enum Sensitivity {
 impl Sensitivity {
     /// Hands `take` the derivative of each number by a parameter that acts along a direction, in standard deviations: as many as the
     /// kind has, or three of narrower ones, zero beyond.
-    pub fn along<T>(&self, motion: &PointMotion, direction: &Direction, take: impl FnOnce(&[f64]) -> T) -> T {
+    pub fn along<T>(
+        &self,
+        motion: &PointMotion,
+        direction: &Direction,
+        take: impl FnOnce(&[f64]) -> T,
+    ) -> T {
         match self {
             Self::Point(weight) => take(weight.apply(&motion.point_along(direction)).as_slice()),
             Self::Lines(lines) => {
                 let velocity = motion.point_along(direction);
-                take(&lines.iter().map(|line| line.dot(&velocity)).collect::<Vec<f64>>())
+                take(
+                    &lines
+                        .iter()
+                        .map(|line| line.dot(&velocity))
+                        .collect::<Vec<f64>>(),
+                )
             }
             Self::Rotation(weight) => take(weight.apply(&motion.turn_along(direction)).as_slice()),
-            Self::FromAnchor(weight, reach) => take(weight.apply(&motion.from_anchor_along(direction, reach)).as_slice()),
+            Self::FromAnchor(weight, reach) => take(
+                weight
+                    .apply(&motion.from_anchor_along(direction, reach))
+                    .as_slice(),
+            ),
         }
     }
 
@@ -124,17 +146,25 @@ impl Sensitivity {
     /// number as [`Sensitivity::along`] has them.
     pub fn derivatives(&self, placed: &mut PlacedRow, mut emit: impl FnMut(usize, &[f64])) {
         match self {
-            Self::Point(weight) => placed.partials(|k, velocity| emit(k, weight.apply(&velocity).as_slice())),
+            Self::Point(weight) => {
+                placed.partials(|k, velocity| emit(k, weight.apply(&velocity).as_slice()))
+            }
             Self::Lines(lines) => {
                 let mut seen = vec![0.0; lines.len()];
                 placed.partials(|k, velocity| {
-                    seen.iter_mut().zip(lines).for_each(|(seen, line)| *seen = line.dot(&velocity));
+                    seen.iter_mut()
+                        .zip(lines)
+                        .for_each(|(seen, line)| *seen = line.dot(&velocity));
                     emit(k, &seen);
                 });
             }
-            Self::Rotation(weight) => placed.rotations(|k, rotation| emit(k, weight.apply(&rotation).as_slice())),
+            Self::Rotation(weight) => {
+                placed.rotations(|k, rotation| emit(k, weight.apply(&rotation).as_slice()))
+            }
             Self::FromAnchor(weight, reach) => {
-                placed.partials_from_anchor(reach, |k, velocity| emit(k, weight.apply(&velocity).as_slice()));
+                placed.partials_from_anchor(reach, |k, velocity| {
+                    emit(k, weight.apply(&velocity).as_slice())
+                });
             }
         }
     }
@@ -147,10 +177,21 @@ pub trait MeasurementKind: Sync {
 
     /// Measured - predicted (m or rad, zero where a number was not measured) and the variance of each number; `None` where the row
     /// measured none, or the robot lacks what it was measured from.
-    fn residual(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<(ResidualNumbers, f64)>;
+    fn residual(
+        &self,
+        data: &Measurements,
+        row: usize,
+        placed: &PlacedRow,
+    ) -> Option<(ResidualNumbers, f64)>;
 
     /// What it sees of the target's motion, its residual being turned into standard deviations by `weight`.
-    fn sensitivity(&self, data: &Measurements, row: usize, placed: &PlacedRow, weight: Weight) -> Sensitivity;
+    fn sensitivity(
+        &self,
+        data: &Measurements,
+        row: usize,
+        placed: &PlacedRow,
+        weight: Weight,
+    ) -> Sensitivity;
 
     /// In which directions the target was brought to something, where that is the measurement: nothing was read but the joints.
     fn closing(&self, _data: &Measurements, _row: usize, _placed: &PlacedRow) -> Option<Closing> {
@@ -159,7 +200,11 @@ pub trait MeasurementKind: Sync {
 
     /// Values that a row has of it.
     fn axes(&self, data: &Measurements, row: usize) -> usize {
-        if self.reading(data, row).is_some() { self.about().axes } else { 0 }
+        if self.reading(data, row).is_some() {
+            self.about().axes
+        } else {
+            0
+        }
     }
 
     /// Turns its residual into standard deviations, with `excess` (m or rad) beside its own variance.
@@ -169,7 +214,9 @@ pub trait MeasurementKind: Sync {
 
     /// What the joints' repeatability adds to the variance of each number of a row.
     fn joint_variance(&self, data: &Measurements, row: usize) -> f64 {
-        data.reading_spread.get(self.about().name).map_or(0.0, |all| all[row])
+        data.reading_spread
+            .get(self.about().name)
+            .map_or(0.0, |all| all[row])
     }
 
     /// Numbers of its residual, from 0, that a row measured, ascending.
@@ -186,22 +233,33 @@ pub trait MeasurementKind: Sync {
     /// Length of one sigma of what a row measured, m or rad.
     fn noise(&self, data: &Measurements, row: usize) -> Option<f64> {
         let joints = self.about().axes as f64 * self.joint_variance(data, row);
-        self.instrument(data, row).map(|sigma| if joints > 0.0 { (sigma * sigma + joints).sqrt() } else { sigma })
+        self.instrument(data, row).map(|sigma| {
+            if joints > 0.0 {
+                (sigma * sigma + joints).sqrt()
+            } else {
+                sigma
+            }
+        })
     }
 
     /// Length of one sigma of the instrument alone, m or rad.
     fn instrument(&self, data: &Measurements, row: usize) -> Option<f64> {
-        self.reading(data, row).map(|reading| reading.sigma * (self.about().axes as f64).sqrt())
+        self.reading(data, row)
+            .map(|reading| reading.sigma * (self.about().axes as f64).sqrt())
     }
 
     /// The error (m or rad) in standard deviations of the instrument alone, squared and summed.
     fn stated(&self, data: &Measurements, row: usize, error: &ResidualNumbers) -> f64 {
-        self.reading(data, row).map_or(0.0, |reading| error.norm_squared() / (reading.sigma * reading.sigma))
+        self.reading(data, row).map_or(0.0, |reading| {
+            error.norm_squared() / (reading.sigma * reading.sigma)
+        })
     }
 
     /// Whether the rows may measure it at all.
     fn is_in(&self, data: &Measurements) -> bool {
-        data.readings.iter().any(|readings| readings.kind == self.about().name)
+        data.readings
+            .iter()
+            .any(|readings| readings.kind == self.about().name)
     }
 
     /// What a row holds of it; none where nothing was measured.
@@ -211,7 +269,11 @@ pub trait MeasurementKind: Sync {
 
     /// Words for what a row measured of it.
     fn words(&self, data: &Measurements, row: usize) -> Vec<&'static str> {
-        if self.axes(data, row) > 0 { vec![self.about().word] } else { Vec::new() }
+        if self.axes(data, row) > 0 {
+            vec![self.about().word]
+        } else {
+            Vec::new()
+        }
     }
 
     /// The numbers of a reading from those of the table (SI; NaN where a row measured none).
@@ -221,7 +283,12 @@ pub trait MeasurementKind: Sync {
 
     /// For a start: a matrix that, summed over rows, is nearest to how the target is turned on the last body, whose rotation at the
     /// row is `body` (tracker frame).
-    fn attitude(&self, _data: &Measurements, _row: usize, _body: &Matrix3<f64>) -> Option<Matrix3<f64>> {
+    fn attitude(
+        &self,
+        _data: &Measurements,
+        _row: usize,
+        _body: &Matrix3<f64>,
+    ) -> Option<Matrix3<f64>> {
         None
     }
 
@@ -231,7 +298,13 @@ pub trait MeasurementKind: Sync {
     }
 
     /// For a start: where anchors are. Fails with a sentence where too little was measured from one.
-    fn anchors(&self, _robot: &RobotModel, _data: &Measurements, _rows: &[usize], _base: &Pose) -> Result<Vec<Anchor>, String> {
+    fn anchors(
+        &self,
+        _robot: &RobotModel,
+        _data: &Measurements,
+        _rows: &[usize],
+        _base: &Pose,
+    ) -> Result<Vec<Anchor>, String> {
         Ok(Vec::new())
     }
 }
@@ -239,13 +312,23 @@ pub trait MeasurementKind: Sync {
 impl dyn MeasurementKind + '_ {
     /// Its columns of a part.
     pub fn columns(&self, part: Part) -> impl Iterator<Item = &'static DeclaredColumn> {
-        self.about().columns.iter().filter(move |column| column.part == part)
+        self.about()
+            .columns
+            .iter()
+            .filter(move |column| column.part == part)
     }
 
     /// Columns that say that a row measured it: its values or, of a kind that reads none, the name of what the target was brought to.
     pub fn telling(&self) -> impl Iterator<Item = &'static DeclaredColumn> {
-        let part = if self.is_brought() { Part::Anchor } else { Part::Value };
-        self.about().columns.iter().filter(move |column| column.part == part)
+        let part = if self.is_brought() {
+            Part::Anchor
+        } else {
+            Part::Value
+        };
+        self.about()
+            .columns
+            .iter()
+            .filter(move |column| column.part == part)
     }
 
     /// Whether the target is brought to something, and nothing is read but the joints.
@@ -267,27 +350,46 @@ impl dyn MeasurementKind + '_ {
         let (mut kept, mut stored) = (Vec::new(), Vec::new());
         for row in 0..sigma.len() {
             stored.clear();
-            values.iter().for_each(|(all, width)| stored.extend_from_slice(&all[row * width..(row + 1) * width]));
+            values.iter().for_each(|(all, width)| {
+                stored.extend_from_slice(&all[row * width..(row + 1) * width])
+            });
             self.keep(&stored, &mut kept);
         }
-        let anchor = self.columns(Part::Anchor).next().map(|column| named(column.setting));
+        let anchor = self
+            .columns(Part::Anchor)
+            .next()
+            .map(|column| named(column.setting));
         if self.is_brought() && anchor.as_ref().is_none_or(Option::is_none) {
             return None;
         }
         let anchor = anchor.map(Option::unwrap_or_default);
-        Some(Readings { kind: self.about().name, width: kept.len() / sigma.len().max(1), values: kept, sigma, anchor })
+        Some(Readings {
+            kind: self.about().name,
+            width: kept.len() / sigma.len().max(1),
+            values: kept,
+            sigma,
+            anchor,
+        })
     }
 }
 
 /// Kinds that the rows may measure.
 pub fn kinds(data: &Measurements) -> Vec<&'static dyn MeasurementKind> {
-    KINDS.iter().copied().filter(|kind| kind.is_in(data)).collect()
+    KINDS
+        .iter()
+        .copied()
+        .filter(|kind| kind.is_in(data))
+        .collect()
 }
 
 /// Whether all that these rows measured is that the target was brought to places: nothing was read but the joints.
 pub fn only_brought(data: &Measurements, rows: &[usize]) -> bool {
     let kinds = kinds(data);
-    let brought = |row: &usize| kinds.iter().all(|kind| kind.is_brought() || kind.axes(data, *row) == 0);
+    let brought = |row: &usize| {
+        kinds
+            .iter()
+            .all(|kind| kind.is_brought() || kind.axes(data, *row) == 0)
+    };
     kinds.iter().any(|kind| kind.is_brought()) && rows.iter().all(brought)
 }
 
@@ -298,15 +400,27 @@ pub fn values(data: &Measurements, row: usize) -> usize {
 
 /// What the errors of a recording are sizes of: lengths wherever one of the rows measured one.
 pub fn dimension(data: &Measurements, rows: &[usize]) -> Dimension {
-    let lengths = || kinds(data).into_iter().filter(|kind| kind.about().dimension == Dimension::Length);
+    let lengths = || {
+        kinds(data)
+            .into_iter()
+            .filter(|kind| kind.about().dimension == Dimension::Length)
+    };
     let measured = |row: &usize| lengths().any(|kind| kind.axes(data, *row) > 0);
-    if rows.is_empty() || rows.iter().any(measured) { Dimension::Length } else { Dimension::Angle }
+    if rows.is_empty() || rows.iter().any(measured) {
+        Dimension::Length
+    } else {
+        Dimension::Angle
+    }
 }
 
 /// Length (m) of one sigma of what a row measured: of its point, or else of another length; zero where it measured none.
 pub fn noise(data: &Measurements, row: usize) -> f64 {
-    let mut lengths = KINDS.iter().filter(|kind| kind.about().dimension == Dimension::Length);
-    lengths.find_map(|kind| kind.noise(data, row)).unwrap_or(0.0)
+    let mut lengths = KINDS
+        .iter()
+        .filter(|kind| kind.about().dimension == Dimension::Length);
+    lengths
+        .find_map(|kind| kind.noise(data, row))
+        .unwrap_or(0.0)
 }
 
 /// Cosine beyond which a plane's normal lies along an axis: within 0.8 deg.
@@ -317,13 +431,26 @@ const ALONG: f64 = 0.9999;
 /// 4R + 2P for the axes (their directions alone are 2R), 3 for a target's place and as many for its orientation, 3 for an anchor (4 for a
 /// sphere); less what moves the whole cell unseen, and its scale where no kind sees it and no `length` is known. Sockets
 /// whose place is known, `points` of them on no line, fix the cell: one its translations, two the scale and all turns but about their line.
-pub fn rank(robot: &RobotModel, data: &Measurements, rows: &[usize], length: bool, points: usize) -> Option<usize> {
+pub fn rank(
+    robot: &RobotModel,
+    data: &Measurements,
+    rows: &[usize],
+    length: bool,
+    points: usize,
+) -> Option<usize> {
     let axes = |kind: &dyn MeasurementKind, wanted: RangeInclusive<usize>| {
-        rows.iter().any(|row| wanted.contains(&kind.axes(data, *row)))
+        rows.iter()
+            .any(|row| wanted.contains(&kind.axes(data, *row)))
     };
-    let used: Vec<&dyn MeasurementKind> = KINDS.iter().copied().filter(|kind| axes(*kind, 1..=kind.about().axes)).collect();
-    let (whole, rest): (Vec<&dyn MeasurementKind>, Vec<&dyn MeasurementKind>) =
-        used.iter().copied().partition(|kind| axes(*kind, kind.about().axes..=kind.about().axes));
+    let used: Vec<&dyn MeasurementKind> = KINDS
+        .iter()
+        .copied()
+        .filter(|kind| axes(*kind, 1..=kind.about().axes))
+        .collect();
+    let (whole, rest): (Vec<&dyn MeasurementKind>, Vec<&dyn MeasurementKind>) = used
+        .iter()
+        .copied()
+        .partition(|kind| axes(*kind, kind.about().axes..=kind.about().axes));
     let blind = |k: usize| whole.iter().map(|kind| kind.about().rank.blind[k]).min();
     let (translations, rotations) = match points {
         0 => (blind(0)?, blind(1)?),
@@ -343,17 +470,32 @@ pub fn rank(robot: &RobotModel, data: &Measurements, rows: &[usize], length: boo
     };
     let setup = robot.setup();
     let place = if places { 3 } else { 0 };
-    let targets: usize = setup.targets.iter().map(|target| place + if target.oriented { 3 } else { 0 }).sum();
-    let seen = (0..robot.joints()).map(axis).sum::<usize>() + targets.max(place) + setup.first_of_anchor(setup.anchors.len());
+    let targets: usize = setup
+        .targets
+        .iter()
+        .map(|target| place + if target.oriented { 3 } else { 0 })
+        .sum();
+    let seen = (0..robot.joints()).map(axis).sum::<usize>()
+        + targets.max(place)
+        + setup.first_of_anchor(setup.anchors.len());
     // Planes square to the first axis do not show where that stands.
     let along_first = |anchor: &Anchor| match anchor.shape {
         Shape::Plane(normal) => normal.dot(robot.axis(0)).abs() > ALONG,
         _ => false,
     };
-    let flat = used.iter().all(|kind| kind.about().name == PlaneKind.about().name) && setup.anchors.iter().all(along_first);
-    let unplaced = if flat && robot.is_revolute(0) && points == 0 { 2 } else { 0 };
+    let flat = used
+        .iter()
+        .all(|kind| kind.about().name == PlaneKind.about().name)
+        && setup.anchors.iter().all(along_first);
+    let unplaced = if flat && robot.is_revolute(0) && points == 0 {
+        2
+    } else {
+        0
+    };
     // The travel of a slide is a length.
     let slides = (0..robot.joints()).any(|joint| !robot.is_revolute(joint));
-    let scale = usize::from(used.iter().all(|kind| !kind.about().rank.scale) && !length && !slides && points < 2);
+    let scale = usize::from(
+        used.iter().all(|kind| !kind.about().rank.scale) && !length && !slides && points < 2,
+    );
     Some(seen - scale - unplaced - if places { translations } else { 0 } - rotations)
 }

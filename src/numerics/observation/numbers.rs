@@ -32,7 +32,9 @@ impl ResidualNumbers {
 
     /// All of them times a factor.
     pub fn times(mut self, factor: f64) -> Self {
-        self.values[..self.count].iter_mut().for_each(|value| *value *= factor);
+        self.values[..self.count]
+            .iter_mut()
+            .for_each(|value| *value *= factor);
         self
     }
 

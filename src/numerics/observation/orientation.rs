@@ -1,8 +1,8 @@
 //! Orientations: how a target is turned in the tracker's frame; kept as a rotation matrix, its residual is a rotation vector.
 
 use super::{
-    ColumnShape, Convention, Conventions, DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank,
-    ResidualNumbers, Sensitivity, Weight,
+    ColumnShape, Convention, Conventions, DeclaredColumn, Dimension, KindDescription,
+    MeasurementKind, Part, Rank, ResidualNumbers, Sensitivity, Weight,
 };
 use crate::effect::PlacedRow;
 use crate::robot::{Measurements, ONE_AND_A_HALF_TURNS};
@@ -50,7 +50,9 @@ static CONVENTIONS: Conventions = Conventions {
             numbers: 3,
             unitless: false,
             read: |n| {
-                let about = |axis: usize| UnitQuaternion::from_scaled_axis(Vector3::ith(axis, 1.0) * n[axis]);
+                let about = |axis: usize| {
+                    UnitQuaternion::from_scaled_axis(Vector3::ith(axis, 1.0) * n[axis])
+                };
                 Ok(vector(about(0) * about(1) * about(2)))
             },
         },
@@ -59,13 +61,19 @@ static CONVENTIONS: Conventions = Conventions {
             about: "Columns of x, y, z of the rotation vector: the axis times the angle.",
             numbers: 3,
             unitless: false,
-            read: |n| Ok(vector(UnitQuaternion::from_scaled_axis(Vector3::new(n[0], n[1], n[2])))),
+            read: |n| {
+                Ok(vector(UnitQuaternion::from_scaled_axis(Vector3::new(
+                    n[0], n[1], n[2],
+                ))))
+            },
         },
     ],
 };
 
 fn vector(rotation: UnitQuaternion<f64>) -> [f64; 3] {
-    Pose::new(Rotation3::from(rotation).into_inner(), Vector3::zeros()).rotation_vector().into()
+    Pose::new(Rotation3::from(rotation).into_inner(), Vector3::zeros())
+        .rotation_vector()
+        .into()
 }
 
 static ABOUT: KindDescription = KindDescription {
@@ -95,7 +103,12 @@ static ABOUT: KindDescription = KindDescription {
         .as_part(Part::Sigma),
     ],
     own_sigma: true,
-    rank: Rank { places: false, rotations: true, scale: true, blind: [3, 0] },
+    rank: Rank {
+        places: false,
+        rotations: true,
+        scale: true,
+        blind: [3, 0],
+    },
     is_screened: false,
 };
 
@@ -112,13 +125,27 @@ impl MeasurementKind for Orientation {
         &ABOUT
     }
 
-    fn residual(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<(ResidualNumbers, f64)> {
+    fn residual(
+        &self,
+        data: &Measurements,
+        row: usize,
+        placed: &PlacedRow,
+    ) -> Option<(ResidualNumbers, f64)> {
         let (measured, sigma) = self.measured(data, row)?;
         let off = measured * placed.orientation().transpose();
-        Some((Pose::new(off, Vector3::zeros()).rotation_vector().into(), sigma * sigma))
+        Some((
+            Pose::new(off, Vector3::zeros()).rotation_vector().into(),
+            sigma * sigma,
+        ))
     }
 
-    fn sensitivity(&self, _data: &Measurements, _row: usize, _placed: &PlacedRow, weight: Weight) -> Sensitivity {
+    fn sensitivity(
+        &self,
+        _data: &Measurements,
+        _row: usize,
+        _placed: &PlacedRow,
+        weight: Weight,
+    ) -> Sensitivity {
         Sensitivity::Rotation(weight)
     }
 
@@ -127,7 +154,12 @@ impl MeasurementKind for Orientation {
         kept.extend(pose.rotation.iter());
     }
 
-    fn attitude(&self, data: &Measurements, row: usize, body: &Matrix3<f64>) -> Option<Matrix3<f64>> {
+    fn attitude(
+        &self,
+        data: &Measurements,
+        row: usize,
+        body: &Matrix3<f64>,
+    ) -> Option<Matrix3<f64>> {
         Some(body.tr_mul(&self.measured(data, row)?.0))
     }
 }

@@ -3,7 +3,10 @@
 //! u = -y / x to the right, v = -z / x downwards: the frame's x axis is the optical axis, z is up. They are pixels from the principal point
 //! over the focal length, lens distortion taken off. One view sees neither depth nor how large the arm is.
 
-use super::{DeclaredColumn, Dimension, KindDescription, MeasurementKind, Rank, ResidualNumbers, Sensitivity, Weight};
+use super::{
+    DeclaredColumn, Dimension, KindDescription, MeasurementKind, Rank, ResidualNumbers,
+    Sensitivity, Weight,
+};
 use crate::effect::PlacedRow;
 use crate::robot::{Measurements, RobotModel};
 use crate::spatial::Pose;
@@ -50,14 +53,28 @@ impl MeasurementKind for Planar {
         &ABOUT
     }
 
-    fn residual(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<(ResidualNumbers, f64)> {
+    fn residual(
+        &self,
+        data: &Measurements,
+        row: usize,
+        placed: &PlacedRow,
+    ) -> Option<(ResidualNumbers, f64)> {
         let (reading, point) = (self.reading(data, row)?, CAMERA * placed.point);
         let left = |axis: usize| reading.values[axis] - point[axis] / point.z.max(NEAREST);
-        Some((ResidualNumbers::new([left(0), left(1)]), reading.sigma * reading.sigma))
+        Some((
+            ResidualNumbers::new([left(0), left(1)]),
+            reading.sigma * reading.sigma,
+        ))
     }
 
     /// The derivative of a quotient: d(a / c) = (da - a / c dc) / c.
-    fn sensitivity(&self, _data: &Measurements, _row: usize, placed: &PlacedRow, weight: Weight) -> Sensitivity {
+    fn sensitivity(
+        &self,
+        _data: &Measurements,
+        _row: usize,
+        placed: &PlacedRow,
+        weight: Weight,
+    ) -> Sensitivity {
         let point = CAMERA * placed.point;
         let depth = point.z.max(NEAREST);
         let line = |axis: usize| {
@@ -72,7 +89,9 @@ impl MeasurementKind for Planar {
 
     /// The camera's pose by the direct linear transform (Hartley and Zisserman, 2004, 7.1): the nominal arm's points against their images.
     fn base(&self, robot: &RobotModel, data: &Measurements, rows: &[usize]) -> Option<Pose> {
-        let seen = rows.iter().filter_map(|row| Some((*row, self.reading(data, *row)?)));
+        let seen = rows
+            .iter()
+            .filter_map(|row| Some((*row, self.reading(data, *row)?)));
         let pairs: Vec<(Vector3<f64>, [f64; 2])> = seen
             .map(|(row, reading)| {
                 let target = robot.last_body(data.q(row)) * *robot.mounting_at(data, row);
@@ -83,11 +102,16 @@ impl MeasurementKind for Planar {
             return None;
         }
         // About their centre and by their size, without which squares lose half of the digits.
-        let centre = pairs.iter().map(|(point, _)| point).sum::<Vector3<f64>>() / pairs.len() as f64;
-        let size = pairs.iter().map(|(point, _)| (point - centre).norm()).fold(f64::MIN_POSITIVE, f64::max);
+        let centre =
+            pairs.iter().map(|(point, _)| point).sum::<Vector3<f64>>() / pairs.len() as f64;
+        let size = pairs
+            .iter()
+            .map(|(point, _)| (point - centre).norm())
+            .fold(f64::MIN_POSITIVE, f64::max);
         let mut normal = DMatrix::zeros(12, 12);
         for (point, image) in &pairs {
-            let own = Vector4::from_iterator(((point - centre) / size).iter().copied().chain([1.0]));
+            let own =
+                Vector4::from_iterator(((point - centre) / size).iter().copied().chain([1.0]));
             for (axis, seen) in image.iter().enumerate() {
                 let mut line = DMatrix::zeros(12, 1);
                 line.view_mut((4 * axis, 0), (4, 1)).copy_from(&own);
@@ -104,7 +128,10 @@ impl MeasurementKind for Planar {
         let svd = (turned / scale).svd(true, true);
         let rotation = svd.u? * svd.v_t?;
         let shift = Vector3::from_fn(|i, _| camera[4 * i + 3]) * (size / scale);
-        let base = Pose::new(CAMERA.tr_mul(&rotation), CAMERA.tr_mul(&(shift - rotation * centre)));
+        let base = Pose::new(
+            CAMERA.tr_mul(&rotation),
+            CAMERA.tr_mul(&(shift - rotation * centre)),
+        );
         (base.translation.iter().all(|value| value.is_finite()) && shift.z > 0.0).then_some(base)
     }
 }

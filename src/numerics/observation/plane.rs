@@ -1,7 +1,10 @@
 //! Planes: the target touches one (a table, a cube's face, a dial gauge at zero), which is estimated too; nothing is read but the joints.
 
 use super::socket::touches;
-use super::{DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank, ResidualNumbers, Sensitivity, Weight};
+use super::{
+    DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank, ResidualNumbers,
+    Sensitivity, Weight,
+};
 use crate::effect::{Closing, PlacedRow};
 use crate::robot::{Anchor, Measurements, RobotModel, Shape};
 use crate::spatial::Pose;
@@ -21,20 +24,39 @@ static ABOUT: KindDescription = KindDescription {
     dimension: Dimension::Length,
     axes: 1,
     columns: &[
-        DeclaredColumn::text("plane", "The plane that the target touches: a table, the face of a cube; it is estimated.")
-            .as_part(Part::Anchor),
-        DeclaredColumn::sigma(&["sigma_plane"], Length, "Standard deviation, along its normal, with which a plane is touched."),
+        DeclaredColumn::text(
+            "plane",
+            "The plane that the target touches: a table, the face of a cube; it is estimated.",
+        )
+        .as_part(Part::Anchor),
+        DeclaredColumn::sigma(
+            &["sigma_plane"],
+            Length,
+            "Standard deviation, along its normal, with which a plane is touched.",
+        ),
     ],
     own_sigma: true,
-    rank: Rank { places: true, rotations: false, scale: false, blind: [3, 3] },
+    rank: Rank {
+        places: true,
+        rotations: false,
+        scale: false,
+        blind: [3, 3],
+    },
     is_screened: false,
 };
 
 impl PlaneKind {
     /// The vector from the row's plane, and the plane's normal.
-    fn touch(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<(Vector3<f64>, Vector3<f64>)> {
+    fn touch(
+        &self,
+        data: &Measurements,
+        row: usize,
+        placed: &PlacedRow,
+    ) -> Option<(Vector3<f64>, Vector3<f64>)> {
         let anchor = self.reading(data, row)?.anchor;
-        let Shape::Plane(normal) = placed.anchor_shape(anchor)? else { return None };
+        let Shape::Plane(normal) = placed.anchor_shape(anchor)? else {
+            return None;
+        };
         Some((placed.from_anchor(anchor)?, normal))
     }
 }
@@ -44,36 +66,73 @@ impl MeasurementKind for PlaneKind {
         &ABOUT
     }
 
-    fn residual(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<(ResidualNumbers, f64)> {
+    fn residual(
+        &self,
+        data: &Measurements,
+        row: usize,
+        placed: &PlacedRow,
+    ) -> Option<(ResidualNumbers, f64)> {
         let (reach, normal) = self.touch(data, row, placed)?;
         let sigma = self.reading(data, row)?.sigma;
-        let joints = data.spread.as_ref().map_or(0.0, |all| normal.dot(&(all[row] * normal)));
-        Some((ResidualNumbers::new([-normal.dot(&reach)]), sigma * sigma + joints))
+        let joints = data
+            .spread
+            .as_ref()
+            .map_or(0.0, |all| normal.dot(&(all[row] * normal)));
+        Some((
+            ResidualNumbers::new([-normal.dot(&reach)]),
+            sigma * sigma + joints,
+        ))
     }
 
-    fn sensitivity(&self, data: &Measurements, row: usize, placed: &PlacedRow, weight: Weight) -> Sensitivity {
+    fn sensitivity(
+        &self,
+        data: &Measurements,
+        row: usize,
+        placed: &PlacedRow,
+        weight: Weight,
+    ) -> Sensitivity {
         let (reach, normal) = self.touch(data, row, placed).unwrap_or_default();
         Sensitivity::FromAnchor(Weight::Along(weight.apply(&normal)), reach)
     }
 
     fn closing(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<Closing> {
-        self.touch(data, row, placed).map(|(_, normal)| Closing::Plane(normal))
+        self.touch(data, row, placed)
+            .map(|(_, normal)| Closing::Plane(normal))
     }
 
     /// Through the middle of the touches, across the direction in which they scatter least.
-    fn anchors(&self, robot: &RobotModel, data: &Measurements, rows: &[usize], base: &Pose) -> Result<Vec<Anchor>, String> {
+    fn anchors(
+        &self,
+        robot: &RobotModel,
+        data: &Measurements,
+        rows: &[usize],
+        base: &Pose,
+    ) -> Result<Vec<Anchor>, String> {
         let place = |(name, points): (&str, Vec<Vector3<f64>>)| {
             if points.len() < FEWEST {
-                return Err(format!("plane `{name}`: {} touches cannot place it, at least {FEWEST} are needed", points.len()));
+                return Err(format!(
+                    "plane `{name}`: {} touches cannot place it, at least {FEWEST} are needed",
+                    points.len()
+                ));
             }
             let place = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
-            let scatter: Matrix3<f64> = points.iter().map(|point| (point - place) * (point - place).transpose()).sum();
+            let scatter: Matrix3<f64> = points
+                .iter()
+                .map(|point| (point - place) * (point - place).transpose())
+                .sum();
             let axes = scatter.symmetric_eigen();
             let normal: Vector3<f64> = axes.eigenvectors.column(axes.eigenvalues.imin()).into();
             // Two normals are one plane: that which points up is taken.
             let sign = if normal.z < 0.0 { -1.0 } else { 1.0 };
-            Ok(Anchor { name: name.into(), place, shape: Shape::Plane(normal.normalize() * sign) })
+            Ok(Anchor {
+                name: name.into(),
+                place,
+                shape: Shape::Plane(normal.normalize() * sign),
+            })
         };
-        touches(self, robot, data, rows, base).into_iter().map(place).collect()
+        touches(self, robot, data, rows, base)
+            .into_iter()
+            .map(place)
+            .collect()
     }
 }

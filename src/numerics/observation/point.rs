@@ -1,6 +1,9 @@
 //! Points: where a target is in the tracker's frame, all of its axes or some of them.
 
-use super::{DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank, ResidualNumbers, Sensitivity, Weight};
+use super::{
+    DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank, ResidualNumbers,
+    Sensitivity, Weight,
+};
 use crate::effect::PlacedRow;
 use crate::robot::Measurements;
 use crate::units::Quantity::Length;
@@ -18,12 +21,22 @@ const TWO: f64 = 2.0;
 /// m; no tracker sees farther.
 const FAR: [f64; 2] = [-200.0, 200.0];
 
-const fn axis(setting: &'static str, stored: &'static [&'static str], about: &'static str) -> DeclaredColumn {
+const fn axis(
+    setting: &'static str,
+    stored: &'static [&'static str],
+    about: &'static str,
+) -> DeclaredColumn {
     DeclaredColumn::number(setting, stored, Length, FAR, about).as_part(Part::Value)
 }
 
-const fn sigma(setting: &'static str, stored: &'static [&'static str], about: &'static str) -> DeclaredColumn {
-    DeclaredColumn::number(setting, stored, Length, [0.0, 1.0], about).as_part(Part::Sigma).together(SIGMAS)
+const fn sigma(
+    setting: &'static str,
+    stored: &'static [&'static str],
+    about: &'static str,
+) -> DeclaredColumn {
+    DeclaredColumn::number(setting, stored, Length, [0.0, 1.0], about)
+        .as_part(Part::Sigma)
+        .together(SIGMAS)
 }
 
 static ABOUT: KindDescription = KindDescription {
@@ -44,21 +57,47 @@ static ABOUT: KindDescription = KindDescription {
             TWO,
             "Uncertainty of each coordinate with 95 % coverage: two standard deviations.",
         ),
-        DeclaredColumn::uncertainty("u95_x", &["sigma_x"], TWO, "Uncertainty of x with 95 % coverage.").together(EXPANDED),
-        DeclaredColumn::uncertainty("u95_y", &["sigma_y"], TWO, "Uncertainty of y with 95 % coverage.").together(EXPANDED),
-        DeclaredColumn::uncertainty("u95_z", &["sigma_z"], TWO, "Uncertainty of z with 95 % coverage.").together(EXPANDED),
+        DeclaredColumn::uncertainty(
+            "u95_x",
+            &["sigma_x"],
+            TWO,
+            "Uncertainty of x with 95 % coverage.",
+        )
+        .together(EXPANDED),
+        DeclaredColumn::uncertainty(
+            "u95_y",
+            &["sigma_y"],
+            TWO,
+            "Uncertainty of y with 95 % coverage.",
+        )
+        .together(EXPANDED),
+        DeclaredColumn::uncertainty(
+            "u95_z",
+            &["sigma_z"],
+            TWO,
+            "Uncertainty of z with 95 % coverage.",
+        )
+        .together(EXPANDED),
         DeclaredColumn::uncertainty(
             "u",
             SIGMAS,
             1.0,
             "Standard uncertainty of each coordinate, or with `coverage_factor` an expanded one.",
         ),
-        DeclaredColumn::uncertainty("u_x", &["sigma_x"], 1.0, "Standard uncertainty of x.").together(STANDARD),
-        DeclaredColumn::uncertainty("u_y", &["sigma_y"], 1.0, "Standard uncertainty of y.").together(STANDARD),
-        DeclaredColumn::uncertainty("u_z", &["sigma_z"], 1.0, "Standard uncertainty of z.").together(STANDARD),
+        DeclaredColumn::uncertainty("u_x", &["sigma_x"], 1.0, "Standard uncertainty of x.")
+            .together(STANDARD),
+        DeclaredColumn::uncertainty("u_y", &["sigma_y"], 1.0, "Standard uncertainty of y.")
+            .together(STANDARD),
+        DeclaredColumn::uncertainty("u_z", &["sigma_z"], 1.0, "Standard uncertainty of z.")
+            .together(STANDARD),
     ],
     own_sigma: false,
-    rank: Rank { places: true, rotations: false, scale: true, blind: [0, 0] },
+    rank: Rank {
+        places: true,
+        rotations: false,
+        scale: true,
+        blind: [0, 0],
+    },
     is_screened: true,
 };
 
@@ -67,12 +106,24 @@ impl MeasurementKind for PointKind {
         &ABOUT
     }
 
-    fn residual(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<(ResidualNumbers, f64)> {
+    fn residual(
+        &self,
+        data: &Measurements,
+        row: usize,
+        placed: &PlacedRow,
+    ) -> Option<(ResidualNumbers, f64)> {
         // Each axis has a variance of its own: see `weight`.
-        (data.points.axes(row) > 0).then(|| (data.points.residual(row, &placed.point).into(), f64::NAN))
+        (data.points.axes(row) > 0)
+            .then(|| (data.points.residual(row, &placed.point).into(), f64::NAN))
     }
 
-    fn sensitivity(&self, _data: &Measurements, _row: usize, _placed: &PlacedRow, weight: Weight) -> Sensitivity {
+    fn sensitivity(
+        &self,
+        _data: &Measurements,
+        _row: usize,
+        _placed: &PlacedRow,
+        weight: Weight,
+    ) -> Sensitivity {
         Sensitivity::Point(weight)
     }
 
@@ -107,7 +158,11 @@ impl MeasurementKind for PointKind {
     }
 
     fn stated(&self, data: &Measurements, row: usize, error: &ResidualNumbers) -> f64 {
-        error.iter().zip(&data.points.sigma[row]).map(|(error, sigma)| (error / sigma) * (error / sigma)).sum()
+        error
+            .iter()
+            .zip(&data.points.sigma[row])
+            .map(|(error, sigma)| (error / sigma) * (error / sigma))
+            .sum()
     }
 
     /// Every recording has its columns.
@@ -116,7 +171,10 @@ impl MeasurementKind for PointKind {
     }
 
     fn words(&self, data: &Measurements, row: usize) -> Vec<&'static str> {
-        let measured = AXES.into_iter().enumerate().filter(|(axis, _)| data.points.has(row, *axis));
+        let measured = AXES
+            .into_iter()
+            .enumerate()
+            .filter(|(axis, _)| data.points.has(row, *axis));
         measured.map(|(_, name)| name).collect()
     }
 }

@@ -40,9 +40,20 @@ pub struct Residual {
 
 impl Residual {
     /// What is left of a row that was placed; `None` as by [`MeasurementKind::residual`].
-    pub fn of(kind: &'static dyn MeasurementKind, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<Self> {
+    pub fn of(
+        kind: &'static dyn MeasurementKind,
+        data: &Measurements,
+        row: usize,
+        placed: &PlacedRow,
+    ) -> Option<Self> {
         let (error, variance) = kind.residual(data, row, placed)?;
-        Some(Self { kind, row, error, axes: kind.axes(data, row), variance })
+        Some(Self {
+            kind,
+            row,
+            error,
+            axes: kind.axes(data, row),
+            variance,
+        })
     }
 
     /// Whether it is a length or an angle.
@@ -61,7 +72,12 @@ impl Residual {
     }
 
     /// What the kind sees of the target's motion, in standard deviations by `weight`.
-    pub fn sensitivity(&self, data: &Measurements, placed: &PlacedRow, weight: Weight) -> Sensitivity {
+    pub fn sensitivity(
+        &self,
+        data: &Measurements,
+        placed: &PlacedRow,
+        weight: Weight,
+    ) -> Sensitivity {
         self.kind.sensitivity(data, self.row, placed, weight)
     }
 }

@@ -1,6 +1,9 @@
 //! Sockets: a ball on the tool lies in one, whose centre is estimated too; nothing is read but the joints.
 
-use super::{DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank, ResidualNumbers, Sensitivity, Weight};
+use super::{
+    DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank, ResidualNumbers,
+    Sensitivity, Weight,
+};
 use crate::effect::{Closing, PlacedRow};
 use crate::robot::{Anchor, Measurements, RobotModel, Shape};
 use crate::spatial::Pose;
@@ -18,8 +21,11 @@ static ABOUT: KindDescription = KindDescription {
     dimension: Dimension::Length,
     axes: 3,
     columns: &[
-        DeclaredColumn::text("socket", "The socket (cone, nest) that the ball on the tool lies in; its centre is estimated.")
-            .as_part(Part::Anchor),
+        DeclaredColumn::text(
+            "socket",
+            "The socket (cone, nest) that the ball on the tool lies in; its centre is estimated.",
+        )
+        .as_part(Part::Anchor),
         DeclaredColumn::sigma(
             &["sigma_socket"],
             Length,
@@ -27,7 +33,12 @@ static ABOUT: KindDescription = KindDescription {
         ),
     ],
     own_sigma: true,
-    rank: Rank { places: true, rotations: false, scale: false, blind: [3, 3] },
+    rank: Rank {
+        places: true,
+        rotations: false,
+        scale: false,
+        blind: [3, 3],
+    },
     is_screened: false,
 };
 
@@ -46,9 +57,15 @@ pub(super) fn touches<'a>(
     for fit in [true, false] {
         let known: Vec<&str> = touched.keys().copied().collect();
         for row in (0..data.rows()).filter(|row| fitted[*row] == fit) {
-            if let Some(reading) = kind.reading(data, row).filter(|reading| !known.contains(&reading.anchor)) {
+            if let Some(reading) = kind
+                .reading(data, row)
+                .filter(|reading| !known.contains(&reading.anchor))
+            {
                 let ball = robot.mounting_at(data, row).translation;
-                touched.entry(reading.anchor).or_default().push((*base * robot.last_body(data.q(row))).point(&ball));
+                touched
+                    .entry(reading.anchor)
+                    .or_default()
+                    .push((*base * robot.last_body(data.q(row))).point(&ball));
             }
         }
     }
@@ -60,26 +77,48 @@ impl MeasurementKind for SocketKind {
         &ABOUT
     }
 
-    fn residual(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<(ResidualNumbers, f64)> {
+    fn residual(
+        &self,
+        data: &Measurements,
+        row: usize,
+        placed: &PlacedRow,
+    ) -> Option<(ResidualNumbers, f64)> {
         let reading = self.reading(data, row)?;
-        placed.anchor_shape(reading.anchor).filter(|shape| *shape == Shape::Point)?;
-        Some(((-placed.from_anchor(reading.anchor)?).into(), reading.sigma * reading.sigma))
+        placed
+            .anchor_shape(reading.anchor)
+            .filter(|shape| *shape == Shape::Point)?;
+        Some((
+            (-placed.from_anchor(reading.anchor)?).into(),
+            reading.sigma * reading.sigma,
+        ))
     }
 
-    fn sensitivity(&self, _data: &Measurements, _row: usize, _placed: &PlacedRow, weight: Weight) -> Sensitivity {
+    fn sensitivity(
+        &self,
+        _data: &Measurements,
+        _row: usize,
+        _placed: &PlacedRow,
+        weight: Weight,
+    ) -> Sensitivity {
         Sensitivity::FromAnchor(weight, Vector3::zeros())
     }
 
     fn weight(&self, data: &Measurements, row: usize, variance: f64, excess: f64) -> Weight {
         let variance = variance + excess * excess;
-        let spread = data.spread.as_ref().map(|all| all[row] + Matrix3::from_diagonal_element(variance));
-        let inverse = spread.and_then(|covariance| covariance.cholesky()).and_then(|factor| factor.l().try_inverse());
+        let spread = data
+            .spread
+            .as_ref()
+            .map(|all| all[row] + Matrix3::from_diagonal_element(variance));
+        let inverse = spread
+            .and_then(|covariance| covariance.cholesky())
+            .and_then(|factor| factor.l().try_inverse());
         inverse.map_or_else(|| Weight::uniform(variance.sqrt()), Weight::Full)
     }
 
     fn noise(&self, data: &Measurements, row: usize) -> Option<f64> {
         let joints = data.spread.as_ref().map_or(0.0, |all| all[row].trace());
-        self.reading(data, row).map(|reading| (3.0 * reading.sigma * reading.sigma + joints).sqrt())
+        self.reading(data, row)
+            .map(|reading| (3.0 * reading.sigma * reading.sigma + joints).sqrt())
     }
 
     fn closing(&self, data: &Measurements, row: usize, _placed: &PlacedRow) -> Option<Closing> {
@@ -87,9 +126,18 @@ impl MeasurementKind for SocketKind {
     }
 
     /// The middle of where the nominal robot puts the ball.
-    fn anchors(&self, robot: &RobotModel, data: &Measurements, rows: &[usize], base: &Pose) -> Result<Vec<Anchor>, String> {
+    fn anchors(
+        &self,
+        robot: &RobotModel,
+        data: &Measurements,
+        rows: &[usize],
+        base: &Pose,
+    ) -> Result<Vec<Anchor>, String> {
         let touched = touches(self, robot, data, rows, base).into_iter();
-        let middle = |points: &[Vector3<f64>]| points.iter().sum::<Vector3<f64>>() / points.len() as f64;
-        Ok(touched.map(|(name, points)| Anchor::point(name, middle(&points))).collect())
+        let middle =
+            |points: &[Vector3<f64>]| points.iter().sum::<Vector3<f64>>() / points.len() as f64;
+        Ok(touched
+            .map(|(name, points)| Anchor::point(name, middle(&points)))
+            .collect())
     }
 }

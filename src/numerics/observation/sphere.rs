@@ -2,7 +2,10 @@
 //! is read but the joints.
 
 use super::socket::touches;
-use super::{DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank, ResidualNumbers, Sensitivity, Weight};
+use super::{
+    DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank, ResidualNumbers,
+    Sensitivity, Weight,
+};
 use crate::effect::{Closing, PlacedRow};
 use crate::robot::{Anchor, Measurements, RobotModel, Shape};
 use crate::spatial::Pose;
@@ -36,10 +39,20 @@ static ABOUT: KindDescription = KindDescription {
 
 impl SphereKind {
     /// The vector from the centre of the row's sphere, and the sphere's radius.
-    fn touch(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<(Vector3<f64>, f64)> {
+    fn touch(
+        &self,
+        data: &Measurements,
+        row: usize,
+        placed: &PlacedRow,
+    ) -> Option<(Vector3<f64>, f64)> {
         let anchor = self.reading(data, row)?.anchor;
-        let Shape::Sphere(radius) = placed.anchor_shape(anchor)? else { return None };
-        placed.from_anchor(anchor).filter(|reach| reach.norm() > 0.0).map(|reach| (reach, radius))
+        let Shape::Sphere(radius) = placed.anchor_shape(anchor)? else {
+            return None;
+        };
+        placed
+            .from_anchor(anchor)
+            .filter(|reach| reach.norm() > 0.0)
+            .map(|reach| (reach, radius))
     }
 }
 
@@ -48,38 +61,82 @@ impl MeasurementKind for SphereKind {
         &ABOUT
     }
 
-    fn residual(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<(ResidualNumbers, f64)> {
+    fn residual(
+        &self,
+        data: &Measurements,
+        row: usize,
+        placed: &PlacedRow,
+    ) -> Option<(ResidualNumbers, f64)> {
         let (reach, radius) = self.touch(data, row, placed)?;
         let (sigma, along) = (self.reading(data, row)?.sigma, reach.normalize());
-        let joints = data.spread.as_ref().map_or(0.0, |all| along.dot(&(all[row] * along)));
-        Some((ResidualNumbers::new([radius - reach.norm()]), sigma * sigma + joints))
+        let joints = data
+            .spread
+            .as_ref()
+            .map_or(0.0, |all| along.dot(&(all[row] * along)));
+        Some((
+            ResidualNumbers::new([radius - reach.norm()]),
+            sigma * sigma + joints,
+        ))
     }
 
-    fn sensitivity(&self, data: &Measurements, row: usize, placed: &PlacedRow, weight: Weight) -> Sensitivity {
-        let reach = self.touch(data, row, placed).map_or_else(Vector3::zeros, |(reach, _)| reach);
+    fn sensitivity(
+        &self,
+        data: &Measurements,
+        row: usize,
+        placed: &PlacedRow,
+        weight: Weight,
+    ) -> Sensitivity {
+        let reach = self
+            .touch(data, row, placed)
+            .map_or_else(Vector3::zeros, |(reach, _)| reach);
         let along = reach.try_normalize(0.0).unwrap_or_else(Vector3::zeros);
         Sensitivity::FromAnchor(Weight::Along(weight.apply(&along)), reach)
     }
 
     fn closing(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<Closing> {
-        self.touch(data, row, placed).map(|(reach, _)| Closing::Sphere(reach))
+        self.touch(data, row, placed)
+            .map(|(reach, _)| Closing::Sphere(reach))
     }
 
     /// Centre and radius from p2 = 2 c p + (r2 - c2), linear in both.
-    fn anchors(&self, robot: &RobotModel, data: &Measurements, rows: &[usize], base: &Pose) -> Result<Vec<Anchor>, String> {
+    fn anchors(
+        &self,
+        robot: &RobotModel,
+        data: &Measurements,
+        rows: &[usize],
+        base: &Pose,
+    ) -> Result<Vec<Anchor>, String> {
         let place = |(name, points): (&str, Vec<Vector3<f64>>)| {
             let count = points.len();
             if count < FEWEST {
-                return Err(format!("sphere `{name}`: {count} touches cannot place it, at least {FEWEST} are needed"));
+                return Err(format!(
+                    "sphere `{name}`: {count} touches cannot place it, at least {FEWEST} are needed"
+                ));
             }
             let middle = points.iter().sum::<Vector3<f64>>() / count as f64;
-            let lines = DMatrix::from_fn(count, 4, |i, j| if j < 3 { 2.0 * (points[i] - middle)[j] } else { 1.0 });
+            let lines = DMatrix::from_fn(count, 4, |i, j| {
+                if j < 3 {
+                    2.0 * (points[i] - middle)[j]
+                } else {
+                    1.0
+                }
+            });
             let right = DVector::from_fn(count, |i, _| (points[i] - middle).norm_squared());
-            let solution = lines.svd(true, true).solve(&right, 1e-12).map_err(|_| format!("sphere `{name}` cannot be placed"))?;
+            let solution = lines
+                .svd(true, true)
+                .solve(&right, 1e-12)
+                .map_err(|_| format!("sphere `{name}` cannot be placed"))?;
             let centre = Vector3::new(solution[0], solution[1], solution[2]);
             let radius = (solution[3] + centre.norm_squared()).max(0.0).sqrt();
-            Ok(Anchor { name: name.into(), place: middle + centre, shape: Shape::Sphere(radius) })
+            Ok(Anchor {
+                name: name.into(),
+                place: middle + centre,
+                shape: Shape::Sphere(radius),
+            })
         };
-        touches(self, robot, data, rows, base).into_iter().map(place).collect()
+        touches(self, robot, data, rows, base)
+            .into_iter()
+            .map(place)
+            .collect()
     }
 }

@@ -34,11 +34,26 @@ impl Weight {
             }
             // What was not measured stands apart, so that the others are weighted by their own covariance.
             let apart = |i: usize, j: usize| if i == j { 1.0 } else { 0.0 };
-            Matrix3::from_fn(|i, j| if measured(i) && measured(j) { covariance[(i, j)] } else { apart(i, j) })
+            Matrix3::from_fn(|i, j| {
+                if measured(i) && measured(j) {
+                    covariance[(i, j)]
+                } else {
+                    apart(i, j)
+                }
+            })
         });
-        match full.and_then(|covariance| covariance.cholesky()).and_then(|factor| factor.l().try_inverse()) {
+        match full
+            .and_then(|covariance| covariance.cholesky())
+            .and_then(|factor| factor.l().try_inverse())
+        {
             Some(inverse) if data.has_point(row) => Self::Full(inverse),
-            Some(inverse) => Self::Full(Matrix3::from_fn(|i, j| if measured(i) && measured(j) { inverse[(i, j)] } else { 0.0 })),
+            Some(inverse) => Self::Full(Matrix3::from_fn(|i, j| {
+                if measured(i) && measured(j) {
+                    inverse[(i, j)]
+                } else {
+                    0.0
+                }
+            })),
             None => Self::Axes(variance.map(|value| 1.0 / value.sqrt())),
         }
     }
@@ -47,7 +62,9 @@ impl Weight {
     pub fn whiten(&self, error: &ResidualNumbers) -> ResidualNumbers {
         match self {
             Self::Uniform(weight) => error.times(*weight),
-            Self::Axes(_) | Self::Full(_) | Self::Along(_) => error.with_first_three(&self.apply(&error.first_three())),
+            Self::Axes(_) | Self::Full(_) | Self::Along(_) => {
+                error.with_first_three(&self.apply(&error.first_three()))
+            }
         }
     }
 

@@ -40,11 +40,19 @@ impl Bound {
     /// What is wrong with a value in SI; nothing of NaN, which stands for what could not be read.
     pub fn fault(self, value: f64) -> Option<String> {
         let (most, unit, instead) = self.most();
-        let number = |value: f64| if value.abs() < 1e6 { format!("{value}") } else { format!("{value:e}") };
-        (value.abs() > most).then(|| format!("{} {unit}", number(value)).trim_end().to_string()).map(|shown| {
-            let most = format!("{} {unit}", number(most));
-            format!("{shown} is more than {}{instead}", most.trim_end())
-        })
+        let number = |value: f64| {
+            if value.abs() < 1e6 {
+                format!("{value}")
+            } else {
+                format!("{value:e}")
+            }
+        };
+        (value.abs() > most)
+            .then(|| format!("{} {unit}", number(value)).trim_end().to_string())
+            .map(|shown| {
+                let most = format!("{} {unit}", number(most));
+                format!("{shown} is more than {}{instead}", most.trim_end())
+            })
     }
 }
 
@@ -54,9 +62,25 @@ mod tests {
 
     #[test]
     fn what_no_robot_has_is_told_with_its_size() {
-        assert_eq!(Bound::Length.fault(-1e305).as_deref(), Some("-1e305 m is more than 1000 m; is it in another unit?"));
-        assert_eq!(Bound::Angle.fault(180.0).as_deref(), Some("180 rad is more than 63 rad, ten turns; is it in another unit?"));
-        assert_eq!(Bound::Factor.fault(f64::INFINITY).as_deref(), Some("inf is more than 1e6"));
-        assert_eq!([Bound::Length.fault(999.0), Bound::Angle.fault(-62.8), Bound::Mass.fault(f64::NAN)], [None, None, None]);
+        assert_eq!(
+            Bound::Length.fault(-1e305).as_deref(),
+            Some("-1e305 m is more than 1000 m; is it in another unit?")
+        );
+        assert_eq!(
+            Bound::Angle.fault(180.0).as_deref(),
+            Some("180 rad is more than 63 rad, ten turns; is it in another unit?")
+        );
+        assert_eq!(
+            Bound::Factor.fault(f64::INFINITY).as_deref(),
+            Some("inf is more than 1e6")
+        );
+        assert_eq!(
+            [
+                Bound::Length.fault(999.0),
+                Bound::Angle.fault(-62.8),
+                Bound::Mass.fault(f64::NAN)
+            ],
+            [None, None, None]
+        );
     }
 }

@@ -116,22 +116,39 @@ impl DeclaredColumn {
     }
 
     /// A measured number, stored by the name of its setting.
-    pub const fn value(name: &'static [&'static str; 1], quantity: Quantity, range: [f64; 2], about: &'static str) -> Self {
+    pub const fn value(
+        name: &'static [&'static str; 1],
+        quantity: Quantity,
+        range: [f64; 2],
+        about: &'static str,
+    ) -> Self {
         Self::number(name[0], name, quantity, range, about).as_part(Part::Value)
     }
 
     /// The standard deviation of what was measured, stored by the name of its setting.
-    pub const fn sigma(name: &'static [&'static str; 1], quantity: Quantity, about: &'static str) -> Self {
+    pub const fn sigma(
+        name: &'static [&'static str; 1],
+        quantity: Quantity,
+        about: &'static str,
+    ) -> Self {
         Self::number(name[0], name, quantity, [0.0, 1.0], about).as_part(Part::Sigma)
     }
 
     /// A text, stored by the name of its setting.
     pub const fn text(setting: &'static str, about: &'static str) -> Self {
-        Self { shape: ColumnShape::Text, ..Self::number(setting, &[], Quantity::Number, [0.0, 0.0], about) }
+        Self {
+            shape: ColumnShape::Text,
+            ..Self::number(setting, &[], Quantity::Number, [0.0, 0.0], about)
+        }
     }
 
     /// So many standard deviations of the settings `of`, which it stands for.
-    pub const fn uncertainty(setting: &'static str, of: &'static [&'static str], coverage: f64, about: &'static str) -> Self {
+    pub const fn uncertainty(
+        setting: &'static str,
+        of: &'static [&'static str],
+        coverage: f64,
+        about: &'static str,
+    ) -> Self {
         Self {
             shape: ColumnShape::Uncertainty { of, coverage },
             ..Self::number(setting, &[], Quantity::Length, [0.0, 1.0], about)
@@ -150,7 +167,10 @@ impl DeclaredColumn {
 
     /// The same, which declared laws may read by its name.
     pub const fn in_laws(self) -> Self {
-        Self { in_laws: true, ..self }
+        Self {
+            in_laws: true,
+            ..self
+        }
     }
 
     /// Whether it has a number for each joint.
@@ -169,16 +189,21 @@ impl DeclaredColumn {
             ColumnShape::Text | ColumnShape::Count | ColumnShape::Uncertainty { .. } => 0,
             ColumnShape::Number => 1,
             ColumnShape::Joints { .. } => joints,
-            ColumnShape::Conventions(conventions) => {
-                conventions.all.iter().map(|convention| convention.numbers).max().unwrap_or_default()
-            }
+            ColumnShape::Conventions(conventions) => conventions
+                .all
+                .iter()
+                .map(|convention| convention.numbers)
+                .max()
+                .unwrap_or_default(),
         }
     }
 
     /// Quantity and range of a joint's number; of the only one where it is not by joint.
     pub fn of_joint(&self, is_prismatic: bool) -> (Quantity, [f64; 2]) {
         match self.shape {
-            ColumnShape::Joints { prismatic: Some(other) } if is_prismatic => other,
+            ColumnShape::Joints {
+                prismatic: Some(other),
+            } if is_prismatic => other,
             _ => (self.quantity, self.range),
         }
     }
@@ -188,14 +213,30 @@ impl DeclaredColumn {
         let named = |name: &str, quantity: Quantity| {
             let unit = Unit::stored(quantity);
             let ending = unit.symbol().replace('/', "_").to_lowercase();
-            (if quantity == Quantity::Number { name.into() } else { format!("{name}_{ending}") }, unit)
+            (
+                if quantity == Quantity::Number {
+                    name.into()
+                } else {
+                    format!("{name}_{ending}")
+                },
+                unit,
+            )
         };
         match self.shape {
             ColumnShape::Joints { .. } => (1..)
                 .zip(prismatic)
-                .map(|(joint, slides)| named(&self.stored[0].replace("{j}", &format!("{joint}")), self.of_joint(*slides).0))
+                .map(|(joint, slides)| {
+                    named(
+                        &self.stored[0].replace("{j}", &format!("{joint}")),
+                        self.of_joint(*slides).0,
+                    )
+                })
                 .collect(),
-            _ => self.stored.iter().map(|name| named(name, self.quantity)).collect(),
+            _ => self
+                .stored
+                .iter()
+                .map(|name| named(name, self.quantity))
+                .collect(),
         }
     }
 }

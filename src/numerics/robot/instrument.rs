@@ -6,7 +6,9 @@
 use nalgebra::Vector3;
 
 /// Noise of a point by its range.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
+)]
 #[serde(deny_unknown_fields)]
 pub struct Instrument {
     /// Constant part of the stated figure, um.
@@ -33,20 +35,44 @@ const fn published(
     [constant_um, per_metre_um, coverage]: [f64; 3],
     source: &'static str,
 ) -> PublishedInstrument {
-    PublishedInstrument { name, figures: Instrument { constant_um, per_metre_um, coverage }, source }
+    PublishedInstrument {
+        name,
+        figures: Instrument {
+            constant_um,
+            per_metre_um,
+            coverage,
+        },
+        source,
+    }
 }
 
 /// What may be named, one line each: constant part (um), growth (um/m) and divisor, and where they stand.
 pub const INSTRUMENTS: &[PublishedInstrument] = &[
-    published("api_radian", [10.0, 5.0, 2.0], "API, Radian series, data sheet: static point 10 um + 5 um/m, two sigma"),
-    published("faro_vantage", [20.0, 5.0, 2.0], "FARO, Vantage laser trackers, technical sheet: transverse 20 um + 5 um/m, MPE"),
-    published("leica_at402", [15.0, 6.0, 2.0], "Leica, AT402, product sheet: U(x, y, z) 15 um + 6 um/m, MPE"),
+    published(
+        "api_radian",
+        [10.0, 5.0, 2.0],
+        "API, Radian series, data sheet: static point 10 um + 5 um/m, two sigma",
+    ),
+    published(
+        "faro_vantage",
+        [20.0, 5.0, 2.0],
+        "FARO, Vantage laser trackers, technical sheet: transverse 20 um + 5 um/m, MPE",
+    ),
+    published(
+        "leica_at402",
+        [15.0, 6.0, 2.0],
+        "Leica, AT402, product sheet: U(x, y, z) 15 um + 6 um/m, MPE",
+    ),
     published(
         "leica_at500",
         [15.0, 6.0, 2.0],
         "Leica, AT500, user manual, 2.8.2: transverse 15 um + 6 um/m, MPE by ISO 10360-10:2021",
     ),
-    published("leica_at960", [15.0, 6.0, 2.0], "Leica, AT960, product sheet: U(x, y, z) 15 um + 6 um/m, MPE"),
+    published(
+        "leica_at960",
+        [15.0, 6.0, 2.0],
+        "Leica, AT960, product sheet: U(x, y, z) 15 um + 6 um/m, MPE",
+    ),
     published(
         "mocap_optitrack",
         [100.0, 0.0, 2.0],
@@ -56,12 +82,19 @@ pub const INSTRUMENTS: &[PublishedInstrument] = &[
 
 /// The weight to start from where a recording states neither standard deviations nor an instrument: a laser tracker of 10 um + 2.5 um/m,
 /// two sigma (Wang et al. 2020, Sec. 6). How far such points scatter is then inferred from what a model leaves.
-pub const START: Instrument = Instrument { constant_um: 10.0, per_metre_um: 2.5, coverage: 2.0 };
+pub const START: Instrument = Instrument {
+    constant_um: 10.0,
+    per_metre_um: 2.5,
+    coverage: 2.0,
+};
 
 impl Instrument {
     /// The figures of an instrument by name.
     pub fn named(name: &str) -> Option<Self> {
-        INSTRUMENTS.iter().find(|known| known.name == name).map(|known| known.figures)
+        INSTRUMENTS
+            .iter()
+            .find(|known| known.name == name)
+            .map(|known| known.figures)
     }
 
     /// One standard deviation per axis (m) at a point in the tracker's frame.

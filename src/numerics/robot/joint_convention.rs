@@ -27,12 +27,20 @@ pub struct JointConvention {
 impl JointConvention {
     /// A convention of as many joints as there are signs (1 or -1) and zeros (rad or m, as the controller shows them).
     pub fn new(sign: Vec<f64>, zero: Vec<f64>, coupled: Vec<CountedCoupling>) -> Self {
-        Self { sign, zero, coupled }
+        Self {
+            sign,
+            zero,
+            coupled,
+        }
     }
 
     /// The robot file's own counting.
     pub fn of_the_robot_file(joints: usize) -> Self {
-        Self { sign: vec![1.0; joints], zero: vec![0.0; joints], coupled: Vec::new() }
+        Self {
+            sign: vec![1.0; joints],
+            zero: vec![0.0; joints],
+            coupled: Vec::new(),
+        }
     }
 
     /// 1 or -1, a joint.
@@ -52,7 +60,9 @@ impl JointConvention {
 
     /// Whether the controller counts as the robot file does.
     pub fn is_of_the_robot_file(&self) -> bool {
-        self.sign.iter().all(|sign| *sign == 1.0) && self.zero.iter().all(|zero| *zero == 0.0) && self.coupled.is_empty()
+        self.sign.iter().all(|sign| *sign == 1.0)
+            && self.zero.iter().all(|zero| *zero == 0.0)
+            && self.coupled.is_empty()
     }
 
     /// The controller's numbers -> joint positions of the robot file, in place.
@@ -96,20 +106,38 @@ impl JointConvention {
         let list = |values: Vec<String>| format!("[{}]", values.join(", "));
         let mut parts = Vec::new();
         if self.sign.contains(&-1.0) {
-            parts.push(format!("sign {}", list(self.sign.iter().map(f64::to_string).collect())));
+            parts.push(format!(
+                "sign {}",
+                list(self.sign.iter().map(f64::to_string).collect())
+            ));
         }
         if self.zero.iter().any(|zero| *zero != 0.0) {
             let all_turn = (0..self.zero.len()).all(|joint| robot.is_revolute(joint));
             let shown = |(joint, zero): (usize, &f64)| {
-                let unit = if robot.is_revolute(joint) { Unit::Degree } else { Unit::Millimetre };
+                let unit = if robot.is_revolute(joint) {
+                    Unit::Degree
+                } else {
+                    Unit::Millimetre
+                };
                 let value = (unit.from_si(*zero) * 1e6).round() / 1e6;
-                if all_turn { value.to_string() } else { format!("{value} {unit}") }
+                if all_turn {
+                    value.to_string()
+                } else {
+                    format!("{value} {unit}")
+                }
             };
             let values = list(self.zero.iter().enumerate().map(shown).collect());
-            parts.push(format!("zero {values}{}", if all_turn { " deg" } else { "" }));
+            parts.push(format!(
+                "zero {values}{}",
+                if all_turn { " deg" } else { "" }
+            ));
         }
         for CountedCoupling { joint, by, ratio } in &self.coupled {
-            parts.push(format!("joint {} with {ratio} times joint {}", joint + 1, by + 1));
+            parts.push(format!(
+                "joint {} with {ratio} times joint {}",
+                joint + 1,
+                by + 1
+            ));
         }
         Some(parts.join(", "))
     }

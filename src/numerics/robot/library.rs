@@ -16,12 +16,23 @@ pub struct LibraryArm {
 impl LibraryArm {
     /// The robot, and what its file says of itself. Fails with the faults of the file.
     pub fn read(&self) -> Result<Imported> {
-        read_calib(RobotFileText { label: self.name, text: self.text }, None)
+        read_calib(
+            RobotFileText {
+                label: self.name,
+                text: self.text,
+            },
+            None,
+        )
     }
 
     /// The arm of that name; capitals, blanks and dashes do not matter.
     pub fn find(name: &str) -> Option<&'static Self> {
-        let plain = |text: &str| text.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_ascii_lowercase();
+        let plain = |text: &str| {
+            text.chars()
+                .filter(char::is_ascii_alphanumeric)
+                .collect::<String>()
+                .to_ascii_lowercase()
+        };
         LIBRARY.iter().find(|arm| plain(arm.name) == plain(name))
     }
 }

@@ -73,22 +73,33 @@ impl Measurements {
 
     /// Motor currents of a row, A, where recorded.
     pub fn current(&self, row: usize) -> Option<&[f64]> {
-        self.current.as_ref().map(|all| &all[row * self.joints..(row + 1) * self.joints])
+        self.current
+            .as_ref()
+            .map(|all| &all[row * self.joints..(row + 1) * self.joints])
     }
 
     /// Whether any row has a time: else [`Measurements::time`] counts rows.
     pub fn has_clock(&self) -> bool {
-        self.time.as_ref().is_some_and(|all| all.iter().any(|time| time.is_finite()))
+        self.time
+            .as_ref()
+            .is_some_and(|all| all.iter().any(|time| time.is_finite()))
     }
 
     /// s from some start, that of the last row that has one where this row has none; without a clock the number of the row, from 0.
     pub fn time(&self, row: usize) -> f64 {
-        self.time.as_ref().and_then(|all| nearest(all, row)).unwrap_or(row as f64)
+        self.time
+            .as_ref()
+            .and_then(|all| nearest(all, row))
+            .unwrap_or(row as f64)
     }
 
     /// When a row is for a law of time.
     pub fn row_time(&self, row: usize) -> RowTime {
-        if self.long_after { RowTime::LongAfter } else { RowTime::At(self.time(row)) }
+        if self.long_after {
+            RowTime::LongAfter
+        } else {
+            RowTime::At(self.time(row))
+        }
     }
 
     /// C; that of the last row that has one where this row has none.
@@ -101,25 +112,40 @@ impl Measurements {
         let all = self.circumstances.get(column)?;
         match joint {
             None => nearest(all, row),
-            Some(joint) => all.get(row * self.joints + joint).copied().filter(|value| value.is_finite()),
+            Some(joint) => all
+                .get(row * self.joints + joint)
+                .copied()
+                .filter(|value| value.is_finite()),
         }
     }
 
     /// The row that was measured at a place, from 0, of the order of measurement.
     pub fn at_place(&self, place: usize) -> usize {
-        self.sequence.as_ref().map_or(place, |sequence| sequence.row(place))
+        self.sequence
+            .as_ref()
+            .map_or(place, |sequence| sequence.row(place))
     }
 
     /// The place of a row in the order of measurement, from 0.
     pub fn rank_in_time(&self, row: usize) -> usize {
-        self.sequence.as_ref().map_or(row, |sequence| sequence.rank_in_time(row))
+        self.sequence
+            .as_ref()
+            .map_or(row, |sequence| sequence.rank_in_time(row))
     }
 
     /// The first row of the stop at which a row was measured: several targets in a row, one after the other in one pose.
     pub fn stop(&self, row: usize) -> usize {
-        let Some(target) = &self.target else { return row };
-        let (here, name) = (self.rank_in_time(row), |place: usize| target.name(self.at_place(place)));
-        let mut first = (0..here).rev().take_while(|other| self.near_pose(self.at_place(*other), row)).last().unwrap_or(here);
+        let Some(target) = &self.target else {
+            return row;
+        };
+        let (here, name) = (self.rank_in_time(row), |place: usize| {
+            target.name(self.at_place(place))
+        });
+        let mut first = (0..here)
+            .rev()
+            .take_while(|other| self.near_pose(self.at_place(*other), row))
+            .last()
+            .unwrap_or(here);
         for other in first + 1..=here {
             // The same target again: the arm came back to the pose.
             if (first..other).any(|k| name(k) == name(other)) {
@@ -149,7 +175,8 @@ impl Measurements {
 
     /// What joint `joint` moved (rad or m) from the stop before to that of this row; 0 at the first.
     pub fn last_move(&self, row: usize, joint: usize) -> f64 {
-        self.preceding_move(row).map_or(0.0, |[from, to]| self.q(to)[joint] - self.q(from)[joint])
+        self.preceding_move(row)
+            .map_or(0.0, |[from, to]| self.q(to)[joint] - self.q(from)[joint])
     }
 
     /// Direction (+1 or -1) from which joint `joint` came to rest, as recorded or by the order of measurement; 0 if it never moved.
@@ -157,20 +184,33 @@ impl Measurements {
         if let Some(direction) = self.recorded_direction(row, joint) {
             return direction;
         }
-        let moves = (0..=self.rank_in_time(row)).rev().map(|place| self.last_move(self.at_place(place), joint));
-        moves.map(|moved| if moved == 0.0 { 0.0 } else { moved.signum() }).find(|sign| *sign != 0.0).unwrap_or(0.0)
+        let moves = (0..=self.rank_in_time(row))
+            .rev()
+            .map(|place| self.last_move(self.at_place(place), joint));
+        moves
+            .map(|moved| if moved == 0.0 { 0.0 } else { moved.signum() })
+            .find(|sign| *sign != 0.0)
+            .unwrap_or(0.0)
     }
 
     /// Direction (+1 or -1) that the recording gives a joint, if it gives one.
     pub fn recorded_direction(&self, row: usize, joint: usize) -> Option<f64> {
-        let recorded = self.direction.as_ref().map(|all| all[row * self.joints + joint]);
-        recorded.filter(|value| value.is_finite() && *value != 0.0).map(f64::signum)
+        let recorded = self
+            .direction
+            .as_ref()
+            .map(|all| all[row * self.joints + joint]);
+        recorded
+            .filter(|value| value.is_finite() && *value != 0.0)
+            .map(f64::signum)
     }
 
     /// Velocity of a joint, rad/s or m/s; 0 where none was recorded.
     pub fn velocity(&self, row: usize, joint: usize) -> f64 {
         let all = self.velocity.as_ref();
-        all.and_then(|all| all.get(row * self.joints + joint)).copied().filter(|value| value.is_finite()).unwrap_or(0.0)
+        all.and_then(|all| all.get(row * self.joints + joint))
+            .copied()
+            .filter(|value| value.is_finite())
+            .unwrap_or(0.0)
     }
 
     /// Whether these rows are a recording of motion: in one of ten at least a joint moved.
@@ -196,18 +236,27 @@ impl Measurements {
 
     /// Length (m) of the one-sigma noise of a row's point: root of the summed variances of what was measured of it.
     pub fn noise(&self, row: usize) -> f64 {
-        self.points.noise(row, self.spread.as_ref().map(|all| &all[row]))
+        self.points
+            .noise(row, self.spread.as_ref().map(|all| &all[row]))
     }
 
     /// What a row measured of a kind beside points, by the kind's name.
     pub fn reading(&self, kind: &str, row: usize) -> Option<Reading<'_>> {
-        self.readings.iter().find(|readings| readings.kind == kind)?.row(row)
+        self.readings
+            .iter()
+            .find(|readings| readings.kind == kind)?
+            .row(row)
     }
 
     /// The anchor that a row measured from; empty where it has no name.
     pub fn anchor(&self, row: usize) -> Option<&str> {
-        let mut anchored = self.readings.iter().filter(|readings| readings.anchor.is_some());
-        anchored.find_map(|readings| readings.row(row)).map(|reading| reading.anchor)
+        let mut anchored = self
+            .readings
+            .iter()
+            .filter(|readings| readings.anchor.is_some());
+        anchored
+            .find_map(|readings| readings.row(row))
+            .map(|reading| reading.anchor)
     }
 
     /// Whether rows `a` and `b` are the same pose under the same payload.
@@ -223,5 +272,9 @@ impl Measurements {
 
 /// The value of a row, of the last one that has one, or of the next.
 fn nearest(all: &[f64], row: usize) -> Option<f64> {
-    (0..=row).rev().chain(row + 1..all.len()).map(|k| all[k]).find(|value| value.is_finite())
+    (0..=row)
+        .rev()
+        .chain(row + 1..all.len())
+        .map(|k| all[k])
+        .find(|value| value.is_finite())
 }

@@ -30,7 +30,12 @@ impl std::fmt::Debug for Memories {
 impl Memories {
     /// A state at a row, computed for every row where it was not asked for before.
     pub(super) fn of(&self, key: Key, row: usize, along: impl FnOnce() -> Arc<[f64]>) -> f64 {
-        let known = self.known.read().unwrap_or_else(PoisonError::into_inner).get(&key).map(|states| states[row]);
+        let known = self
+            .known
+            .read()
+            .unwrap_or_else(PoisonError::into_inner)
+            .get(&key)
+            .map(|states| states[row]);
         known.unwrap_or_else(|| {
             let states = along();
             let value = states[row];

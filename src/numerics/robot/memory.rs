@@ -59,7 +59,9 @@ impl Memory {
         let mut state = match self {
             _ if data.rows() == 0 => 0.0,
             Self::Temperature { .. } => data.temperature(data.at_place(0)).unwrap_or(0.0),
-            Self::Slip { joint, .. } => data.recorded_direction(data.at_place(0), joint).unwrap_or(0.0),
+            Self::Slip { joint, .. } => data
+                .recorded_direction(data.at_place(0), joint)
+                .unwrap_or(0.0),
             Self::Work { .. } | Self::Stretch { .. } | Self::Recent { .. } => 0.0,
         };
         for place in 0..data.rows() {
@@ -83,14 +85,18 @@ impl Memory {
                     // It came from elsewhere than the row before: nobody knows how far.
                     Some(side) if side * moved < 0.0 => side,
                     _ if moved == 0.0 => state,
-                    _ => moved.signum() + (state - moved.signum()) * libm::exp(-moved.abs() / travel),
+                    _ => {
+                        moved.signum() + (state - moved.signum()) * libm::exp(-moved.abs() / travel)
+                    }
                 }
             }
-            Self::Stretch { joint, limit } => match (moved(joint), data.recorded_direction(to, joint)) {
-                // It came from elsewhere than the row before, far enough to slip.
-                (moved, Some(side)) if side * moved < 0.0 => side * limit,
-                (moved, _) => (state + moved).clamp(-limit, limit),
-            },
+            Self::Stretch { joint, limit } => {
+                match (moved(joint), data.recorded_direction(to, joint)) {
+                    // It came from elsewhere than the row before, far enough to slip.
+                    (moved, Some(side)) if side * moved < 0.0 => side * limit,
+                    (moved, _) => (state + moved).clamp(-limit, limit),
+                }
+            }
             Self::Recent { joint, time: fades } => state * libm::exp(-time / fades) + moved(joint),
             Self::Work { .. } | Self::Temperature { .. } if time == 0.0 => state,
             Self::Work { joint, cooling } => {
@@ -120,16 +126,41 @@ mod tests {
 
     fn recording(q: &[f64], time: &[f64], temperature: &[f64]) -> Measurements {
         let (q, time, temperature) = (q.to_vec(), Some(time.to_vec()), Some(temperature.to_vec()));
-        Measurements { joints: 1, q, time, temperature, ..Measurements::default() }
+        Measurements {
+            joints: 1,
+            q,
+            time,
+            temperature,
+            ..Measurements::default()
+        }
     }
 
     #[test]
     fn friction_before_sliding_fades_in_over_a_travel_after_each_reversal() {
-        let data = recording(&[0.0, 10.0, 9.9, 9.9, 9.7], &[0.0, 1.0, 2.0, 3.0, 4.0], &[20.0; 5]);
-        let slip = |row| data.memory(Memory::Slip { joint: 0, travel: 0.2 }, row);
+        let data = recording(
+            &[0.0, 10.0, 9.9, 9.9, 9.7],
+            &[0.0, 1.0, 2.0, 3.0, 4.0],
+            &[20.0; 5],
+        );
+        let slip = |row| {
+            data.memory(
+                Memory::Slip {
+                    joint: 0,
+                    travel: 0.2,
+                },
+                row,
+            )
+        };
         let after = |travelled: f64| -1.0 + 2.0 * (-travelled / 0.2).exp();
-        for (row, expected) in [0.0, 1.0, after(0.1), after(0.1), after(0.3)].into_iter().enumerate() {
-            assert!((slip(row) - expected).abs() < 1e-9, "{row}: {} {expected}", slip(row));
+        for (row, expected) in [0.0, 1.0, after(0.1), after(0.1), after(0.3)]
+            .into_iter()
+            .enumerate()
+        {
+            assert!(
+                (slip(row) - expected).abs() < 1e-9,
+                "{row}: {} {expected}",
+                slip(row)
+            );
         }
     }
 
@@ -144,20 +175,48 @@ mod tests {
 
     #[test]
     fn what_sticks_is_stretched_to_its_limit_and_relaxes_only_by_the_way_back() {
-        let data = recording(&[0.0, 0.2, 1.0, 0.9, 0.9, 0.0], &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0], &[20.0; 6]);
-        let stretch = |row| data.memory(Memory::Stretch { joint: 0, limit: 0.3 }, row);
+        let data = recording(
+            &[0.0, 0.2, 1.0, 0.9, 0.9, 0.0],
+            &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0],
+            &[20.0; 6],
+        );
+        let stretch = |row| {
+            data.memory(
+                Memory::Stretch {
+                    joint: 0,
+                    limit: 0.3,
+                },
+                row,
+            )
+        };
         for (row, expected) in [0.0, 0.2, 0.3, 0.2, 0.2, -0.3].into_iter().enumerate() {
-            assert!((stretch(row) - expected).abs() < 1e-12, "{row}: {} {expected}", stretch(row));
+            assert!(
+                (stretch(row) - expected).abs() < 1e-12,
+                "{row}: {} {expected}",
+                stretch(row)
+            );
         }
     }
 
     #[test]
     fn travel_of_late_fades_with_time() {
         let data = recording(&[0.0, 1.0, 1.0, 0.5], &[0.0, 1.0, 11.0, 21.0], &[20.0; 4]);
-        let recent = |row| data.memory(Memory::Recent { joint: 0, time: 10.0 }, row);
+        let recent = |row| {
+            data.memory(
+                Memory::Recent {
+                    joint: 0,
+                    time: 10.0,
+                },
+                row,
+            )
+        };
         let expected = [0.0, 1.0, (-1.0f64).exp(), (-2.0f64).exp() - 0.5];
         for (row, expected) in expected.into_iter().enumerate() {
-            assert!((recent(row) - expected).abs() < 1e-12, "{row}: {} {expected}", recent(row));
+            assert!(
+                (recent(row) - expected).abs() < 1e-12,
+                "{row}: {} {expected}",
+                recent(row)
+            );
         }
     }
 
@@ -166,8 +225,20 @@ mod tests {
         let time: Vec<f64> = (0..100).map(|k| 2.0 * f64::from(k)).collect();
         let there_and_back: Vec<f64> = (0..100).map(|k| f64::from(k % 2)).collect();
         let data = recording(&there_and_back, &time, &[20.0; 100]);
-        let work = |row: usize| data.memory(Memory::Work { joint: 0, cooling: 20.0 }, row);
+        let work = |row: usize| {
+            data.memory(
+                Memory::Work {
+                    joint: 0,
+                    cooling: 20.0,
+                },
+                row,
+            )
+        };
         let expected = |row: f64| 0.5 * (1.0 - (-row / 10.0).exp());
-        assert!([0, 5, 99].into_iter().all(|row| (work(row) - expected(row as f64)).abs() < 1e-9));
+        assert!(
+            [0, 5, 99]
+                .into_iter()
+                .all(|row| (work(row) - expected(row as f64)).abs() < 1e-9)
+        );
     }
 }

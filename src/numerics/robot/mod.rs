@@ -24,7 +24,9 @@ mod visited;
 pub use bound::{Bound, ONE_AND_A_HALF_TURNS};
 pub use circumstances::{CIRCUMSTANCES, CircumstanceName, law_columns};
 pub use column::{ColumnShape, Convention, Conventions, DeclaredColumn, Part};
-pub use instrument::{INSTRUMENTS, Instrument, NoiseBasis, PublishedInstrument, START, SigmaSource};
+pub use instrument::{
+    INSTRUMENTS, Instrument, NoiseBasis, PublishedInstrument, START, SigmaSource,
+};
 pub use joint_convention::{CountedCoupling, JointConvention};
 pub use library::{LIBRARY, LibraryArm};
 pub use measurements::{Measurements, RowTime};
@@ -62,6 +64,16 @@ joints: [{name: A1}, {name: A2}]
 
     /// The arm: about the vertical, then about a level axis 400 mm up; the point 500 mm out.
     pub(crate) fn small_arm() -> RobotModel {
-        RobotModel::new(read_calib(RobotFileText { label: "robot.yaml", text: FILE }, None).expect("a robot").robot)
+        RobotModel::new(
+            read_calib(
+                RobotFileText {
+                    label: "robot.yaml",
+                    text: FILE,
+                },
+                None,
+            )
+            .expect("a robot")
+            .robot,
+        )
     }
 }

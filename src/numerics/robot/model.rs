@@ -27,8 +27,16 @@ pub struct RobotModel {
 impl RobotModel {
     /// The chain of a description, with nothing measured yet.
     pub fn new(description: RobotDescription) -> Self {
-        let axes: Vec<Vector3<f64>> = description.joints.iter().map(|joint| Vector3::from(joint.axis).normalize()).collect();
-        let points: Vec<Vector3<f64>> = description.joints.iter().map(|joint| Vector3::from(joint.point)).collect();
+        let axes: Vec<Vector3<f64>> = description
+            .joints
+            .iter()
+            .map(|joint| Vector3::from(joint.axis).normalize())
+            .collect();
+        let points: Vec<Vector3<f64>> = description
+            .joints
+            .iter()
+            .map(|joint| Vector3::from(joint.point))
+            .collect();
         let screws = description
             .joints
             .iter()
@@ -38,12 +46,24 @@ impl RobotModel {
                 JointKind::Prismatic => Twist::new(axis.x, axis.y, axis.z, 0.0, 0.0, 0.0),
             })
             .collect();
-        let turns = axes.iter().map(|axis| (hat(axis), hat(axis) * hat(axis))).collect();
+        let turns = axes
+            .iter()
+            .map(|axis| (hat(axis), hat(axis) * hat(axis)))
+            .collect();
         let normals = axes.iter().map(normals).collect();
         let r = &description.tool_rotation;
         let rotation = Matrix3::from_fn(|row, column| r[row][column]);
         let home = Pose::new(rotation, Vector3::from(description.tool));
-        Self { description, screws, axes, points, turns, normals, home, setup: MeasurementSetup::default() }
+        Self {
+            description,
+            screws,
+            axes,
+            points,
+            turns,
+            normals,
+            home,
+            setup: MeasurementSetup::default(),
+        }
     }
 
     /// The robot with what it is measured by.
@@ -58,7 +78,9 @@ impl RobotModel {
 
     /// Where a target (by number) sits, the tool point without one: zero pose, base frame.
     pub fn mounting(&self, target: Option<usize>) -> &Pose {
-        target.and_then(|target| self.setup.targets.get(target)).map_or(&self.home, |target| &target.mounting)
+        target
+            .and_then(|target| self.setup.targets.get(target))
+            .map_or(&self.home, |target| &target.mounting)
     }
 
     /// The tool frame where a target (by number) sits: how an instrument's frame is turned against the tool belongs to the instrument.

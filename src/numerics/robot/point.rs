@@ -14,7 +14,10 @@ pub struct PointReadings {
 impl PointReadings {
     /// Whole points with one standard deviation, m.
     pub fn new(position: Vec<Vector3<f64>>, sigma: f64) -> Self {
-        Self { sigma: vec![Vector3::repeat(sigma); position.len()], position }
+        Self {
+            sigma: vec![Vector3::repeat(sigma); position.len()],
+            position,
+        }
     }
 
     /// Readings of so many rows, none of which measured a point.
@@ -24,8 +27,16 @@ impl PointReadings {
 
     /// The readings of some rows, in their order.
     pub fn subset(&self, rows: &[usize]) -> Self {
-        let of = |all: &[Vector3<f64>]| rows.iter().filter_map(|row| all.get(*row)).copied().collect();
-        Self { position: of(&self.position), sigma: of(&self.sigma) }
+        let of = |all: &[Vector3<f64>]| {
+            rows.iter()
+                .filter_map(|row| all.get(*row))
+                .copied()
+                .collect()
+        };
+        Self {
+            position: of(&self.position),
+            sigma: of(&self.sigma),
+        }
     }
 
     /// One more whole point with a standard deviation, m.
@@ -52,29 +63,40 @@ impl PointReadings {
 
     /// Where all three axes of a row were measured: its point.
     pub fn all_axes(&self, row: usize) -> Option<Vector3<f64>> {
-        let is_whole = self.sigma.get(row).is_some_and(|sigma| sigma.iter().all(|sigma| sigma.is_finite()));
+        let is_whole = self
+            .sigma
+            .get(row)
+            .is_some_and(|sigma| sigma.iter().all(|sigma| sigma.is_finite()));
         is_whole.then(|| self.position[row])
     }
 
     /// Whether an axis, from 0, of a row's point was measured.
     pub fn has(&self, row: usize, axis: usize) -> bool {
-        self.sigma.get(row).is_some_and(|sigma| sigma[axis].is_finite())
+        self.sigma
+            .get(row)
+            .is_some_and(|sigma| sigma[axis].is_finite())
     }
 
     /// How many axes of a row's point were measured.
     pub fn axes(&self, row: usize) -> usize {
-        self.sigma.get(row).map_or(0, |sigma| sigma.iter().filter(|sigma| sigma.is_finite()).count())
+        self.sigma.get(row).map_or(0, |sigma| {
+            sigma.iter().filter(|sigma| sigma.is_finite()).count()
+        })
     }
 
     /// Length (m) of the one-sigma noise of a row's point, with the covariance (m2) beyond the instrument's: root of the summed
     /// variances of what was measured of it.
     pub fn noise(&self, row: usize, beyond: Option<&Matrix3<f64>>) -> f64 {
-        let Some(sigma) = self.sigma.get(row) else { return 0.0 };
+        let Some(sigma) = self.sigma.get(row) else {
+            return 0.0;
+        };
         if self.axes(row) == 3 {
             return (sigma.norm_squared() + beyond.map_or(0.0, Matrix3::trace)).sqrt();
         }
         let measured = (0..3).filter(|axis| sigma[*axis].is_finite());
-        let variance: f64 = measured.map(|axis| sigma[axis].powi(2) + beyond.map_or(0.0, |beyond| beyond[(axis, axis)])).sum();
+        let variance: f64 = measured
+            .map(|axis| sigma[axis].powi(2) + beyond.map_or(0.0, |beyond| beyond[(axis, axis)]))
+            .sum();
         variance.sqrt()
     }
 
@@ -82,9 +104,13 @@ impl PointReadings {
     pub fn residual(&self, row: usize, predicted: &Vector3<f64>) -> Vector3<f64> {
         match self.all_axes(row) {
             Some(point) => point - predicted,
-            None => {
-                Vector3::from_fn(|axis, _| if self.has(row, axis) { self.position[row][axis] - predicted[axis] } else { 0.0 })
-            }
+            None => Vector3::from_fn(|axis, _| {
+                if self.has(row, axis) {
+                    self.position[row][axis] - predicted[axis]
+                } else {
+                    0.0
+                }
+            }),
         }
     }
 }

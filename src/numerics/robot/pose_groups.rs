@@ -26,11 +26,21 @@ pub fn grouped<'a>(
     same: impl Fn(usize, usize) -> bool,
 ) -> Vec<Vec<usize>> {
     // On a line askew to all joints near poses are near, and few others: also of a grid.
-    let along = |row: usize| q(row).iter().zip(1..).map(|(value, k)| value * weight(k)).sum::<f64>();
+    let along = |row: usize| {
+        q(row)
+            .iter()
+            .zip(1..)
+            .map(|(value, k)| value * weight(k))
+            .sum::<f64>()
+    };
     let reach = limit * q_len(rows, &q).map_or(0.0, |joints| (1..=joints).map(weight).sum());
     let mut sorted: Vec<(f64, usize)> = rows.iter().map(|row| (along(*row), *row)).collect();
     sorted.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let place: BTreeMap<usize, usize> = sorted.iter().enumerate().map(|(at, (_, row))| (*row, at)).collect();
+    let place: BTreeMap<usize, usize> = sorted
+        .iter()
+        .enumerate()
+        .map(|(at, (_, row))| (*row, at))
+        .collect();
     let mut taken = vec![false; sorted.len()];
     let mut groups = Vec::new();
     for (row, at) in place {
@@ -69,12 +79,23 @@ mod tests {
 
     #[test]
     fn near_poses_are_one_and_others_are_not() {
-        let all = [[0.1, 2.0], [0.1 + 4e-4, 2.0 - 4e-4], [0.1 + 4e-4, 2.0 + 6e-4], [1.0, 2.0], [0.1, 2.0]];
+        let all = [
+            [0.1, 2.0],
+            [0.1 + 4e-4, 2.0 - 4e-4],
+            [0.1 + 4e-4, 2.0 + 6e-4],
+            [1.0, 2.0],
+            [0.1, 2.0],
+        ];
         let rows: Vec<usize> = (0..all.len()).collect();
         let groups = |limit: f64| grouped(&rows, |row| &all[row][..], limit, |_, _| true);
         assert_eq!(groups(NEAR), [vec![0, 1, 4], vec![2], vec![3]]);
         assert_eq!(groups(SAME), [vec![0, 4], vec![1], vec![2], vec![3]]);
-        let apart = grouped(&rows, |row| &all[row][..], NEAR, |a, b| (a == 4) == (b == 4));
+        let apart = grouped(
+            &rows,
+            |row| &all[row][..],
+            NEAR,
+            |a, b| (a == 4) == (b == 4),
+        );
         assert_eq!(apart, [vec![0, 1], vec![2], vec![3], vec![4]]);
     }
 }

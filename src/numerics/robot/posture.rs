@@ -8,7 +8,10 @@ use nalgebra::Vector3;
 impl RobotModel {
     /// True when every link has a mass, so that torques mean something without a payload.
     pub fn has_masses(&self) -> bool {
-        self.description().joints.iter().all(|joint| joint.mass.is_some() && joint.centre.is_some())
+        self.description()
+            .joints
+            .iter()
+            .all(|joint| joint.mass.is_some() && joint.centre.is_some())
     }
 }
 
@@ -32,7 +35,13 @@ impl LoadCorrection {
     pub fn new(joints: usize) -> Self {
         let none = vec![0.0; joints];
         let body_moment = vec![Vector3::zeros(); joints];
-        Self { payload: 0.0, payload_moment: Vector3::zeros(), body: none.clone(), body_moment, torque: none }
+        Self {
+            payload: 0.0,
+            payload_moment: Vector3::zeros(),
+            body: none.clone(),
+            body_moment,
+            torque: none,
+        }
     }
 
     /// Sets every correction to zero.
@@ -95,19 +104,27 @@ impl Posture {
     /// Computes what is carried and the torques from the frames, with `payload` kg declared on the tool.
     ///
     /// Gravity is known in the base frame as corrected, hence `behind[0]`. Bodies without mass count as massless.
-    pub fn gravity_torques(&mut self, robot: &RobotModel, payload: f64, load_correction: &LoadCorrection) {
+    pub fn gravity_torques(
+        &mut self,
+        robot: &RobotModel,
+        payload: f64,
+        load_correction: &LoadCorrection,
+    ) {
         let description = robot.description();
         let n = robot.joints();
         self.gravity = self.behind[0].rotation * Vector3::from(description.gravity);
         let last = self.body[n - 1];
         let mut carried = Carried {
             mass: payload + load_correction.payload,
-            moment: last.point(&Vector3::from(description.payload_centre)) * (payload + load_correction.payload)
+            moment: last.point(&Vector3::from(description.payload_centre))
+                * (payload + load_correction.payload)
                 + last.rotation * load_correction.payload_moment,
         };
         self.carried[n] = carried;
         for j in (0..n).rev() {
-            if let (Some(own), Some(centre)) = (description.joints[j].mass, description.joints[j].centre) {
+            if let (Some(own), Some(centre)) =
+                (description.joints[j].mass, description.joints[j].centre)
+            {
                 let mass = own + load_correction.body[j];
                 carried.mass += mass;
                 carried.moment += self.body[j].point(&Vector3::from(centre)) * mass;
@@ -117,7 +134,10 @@ impl Posture {
             let axis = self.axis(robot, j);
             self.torque[j] = load_correction.torque[j]
                 + if robot.is_revolute(j) {
-                    axis.dot(&(carried.moment - self.behind[j].point(robot.point(j)) * carried.mass).cross(&self.gravity))
+                    axis.dot(
+                        &(carried.moment - self.behind[j].point(robot.point(j)) * carried.mass)
+                            .cross(&self.gravity),
+                    )
                 } else {
                     axis.dot(&self.gravity) * carried.mass
                 };
@@ -145,7 +165,9 @@ impl Posture {
     pub fn moment(&self, station: usize, point: &Vector3<f64>) -> Vector3<f64> {
         let frame = &self.behind[station];
         let Carried { mass, moment } = self.carried[station];
-        frame.rotation.tr_mul(&(moment - frame.point(point) * mass).cross(&self.gravity))
+        frame
+            .rotation
+            .tr_mul(&(moment - frame.point(point) * mass).cross(&self.gravity))
     }
 
     /// Torque about joint `joint` per kg m of first moment of body `body` along each zero-pose axis; zero if it does not carry it.
@@ -154,22 +176,39 @@ impl Posture {
             return Vector3::zeros();
         }
         // axis . (R e x g) = (R^T (g x axis)) . e
-        self.body[body].rotation.tr_mul(&self.gravity.cross(&self.axis(robot, joint)))
+        self.body[body]
+            .rotation
+            .tr_mul(&self.gravity.cross(&self.axis(robot, joint)))
     }
 
     /// Torque about joint `joint` per kg at the payload's centre.
     pub fn torque_of_payload(&self, robot: &RobotModel, joint: usize) -> f64 {
-        self.torque_of_weight(robot, joint, robot.joints() - 1, &Vector3::from(robot.description().payload_centre))
+        self.torque_of_weight(
+            robot,
+            joint,
+            robot.joints() - 1,
+            &Vector3::from(robot.description().payload_centre),
+        )
     }
 
     /// Torque about joint `joint` per kg at the centre of body `body`; zero if it does not carry it or the file gives no centre.
     pub fn torque_of_mass(&self, robot: &RobotModel, joint: usize, body: usize) -> f64 {
-        let centre = robot.description().joints[body].centre.filter(|_| body >= joint);
-        centre.map_or(0.0, |centre| self.torque_of_weight(robot, joint, body, &Vector3::from(centre)))
+        let centre = robot.description().joints[body]
+            .centre
+            .filter(|_| body >= joint);
+        centre.map_or(0.0, |centre| {
+            self.torque_of_weight(robot, joint, body, &Vector3::from(centre))
+        })
     }
 
     /// Torque about a joint per kg at a point (m, zero pose) of a body.
-    fn torque_of_weight(&self, robot: &RobotModel, joint: usize, body: usize, point: &Vector3<f64>) -> f64 {
+    fn torque_of_weight(
+        &self,
+        robot: &RobotModel,
+        joint: usize,
+        body: usize,
+        point: &Vector3<f64>,
+    ) -> f64 {
         if !robot.is_revolute(joint) {
             return self.axis(robot, joint).dot(&self.gravity);
         }

@@ -41,9 +41,16 @@ impl Readings {
         Self {
             kind: self.kind,
             width: self.width,
-            values: rows.iter().flat_map(|row| &self.values[row * self.width..(row + 1) * self.width]).copied().collect(),
+            values: rows
+                .iter()
+                .flat_map(|row| &self.values[row * self.width..(row + 1) * self.width])
+                .copied()
+                .collect(),
             sigma: rows.iter().map(|row| self.sigma[*row]).collect(),
-            anchor: self.anchor.as_ref().map(|names| Named::of(rows.iter().map(|row| names.name(*row)))),
+            anchor: self
+                .anchor
+                .as_ref()
+                .map(|names| Named::of(rows.iter().map(|row| names.name(*row)))),
         }
     }
 
@@ -53,7 +60,11 @@ impl Readings {
         let anchor = self.anchor.as_ref().map_or("", |anchor| anchor.name(row));
         // What has no number was measured where it has a name.
         let there = self.width > 0 || !anchor.is_empty();
-        (there && values.iter().all(|value| value.is_finite())).then(|| Reading { values, sigma: self.sigma[row], anchor })
+        (there && values.iter().all(|value| value.is_finite())).then(|| Reading {
+            values,
+            sigma: self.sigma[row],
+            anchor,
+        })
     }
 }
 
@@ -62,12 +73,22 @@ impl Named {
     pub fn of<'a>(rows: impl Iterator<Item = &'a str> + Clone) -> Self {
         let all: std::collections::BTreeSet<&str> = rows.clone().collect();
         let names: Vec<String> = all.into_iter().map(String::from).collect();
-        let number = |name: &str| names.binary_search_by(|other| other.as_str().cmp(name)).unwrap_or_default() as u32;
-        Self { of: rows.map(number).collect(), names }
+        let number = |name: &str| {
+            names
+                .binary_search_by(|other| other.as_str().cmp(name))
+                .unwrap_or_default() as u32
+        };
+        Self {
+            of: rows.map(number).collect(),
+            names,
+        }
     }
 
     /// The name that a row carries; empty where it carries none.
     pub fn name(&self, row: usize) -> &str {
-        self.of.get(row).and_then(|number| self.names.get(*number as usize)).map_or("", String::as_str)
+        self.of
+            .get(row)
+            .and_then(|number| self.names.get(*number as usize))
+            .map_or("", String::as_str)
     }
 }

@@ -37,8 +37,15 @@ pub struct DhTable {
 impl DhRow {
     fn pose(&self) -> Pose {
         let turn = |axis: Vector3<f64>, angle: f64| Rotation3::new(axis * angle).into_inner();
-        let screw_z = Pose::new(turn(Vector3::z(), self.theta), Vector3::new(0.0, 0.0, self.d));
-        screw_z * Pose::new(turn(Vector3::x(), self.alpha), Vector3::new(self.a, 0.0, 0.0))
+        let screw_z = Pose::new(
+            turn(Vector3::z(), self.theta),
+            Vector3::new(0.0, 0.0, self.d),
+        );
+        screw_z
+            * Pose::new(
+                turn(Vector3::x(), self.alpha),
+                Vector3::new(self.a, 0.0, 0.0),
+            )
     }
 }
 
@@ -54,14 +61,23 @@ impl DhTable {
         }
         let base = rows.remove(0);
         rows.push(DhRow::default());
-        Self { base, joints: rows, tool: frame.inverse() * *robot.home() }
+        Self {
+            base,
+            joints: rows,
+            tool: frame.inverse() * *robot.home(),
+        }
     }
 
     /// The smallest angle (rad) between neighbouring axes that are not parallel, and the joint (from 0) before it: near zero, the common
     /// normal is far away and the table badly conditioned.
     pub fn flattest(&self) -> Option<(usize, f64)> {
         let angle = |row: &DhRow| row.alpha.sin().abs();
-        let skew = self.joints.iter().enumerate().map(|(joint, row)| (joint, angle(row))).filter(|(_, angle)| *angle > PARALLEL);
+        let skew = self
+            .joints
+            .iter()
+            .enumerate()
+            .map(|(joint, row)| (joint, angle(row)))
+            .filter(|(_, angle)| *angle > PARALLEL);
         skew.min_by(|a, b| a.1.total_cmp(&b.1))
     }
 }
@@ -74,11 +90,21 @@ fn normal(frame: &Pose, axis: &Vector3<f64>, point: &Vector3<f64>) -> DhRow {
     if sine < PARALLEL {
         let away = p.x.hypot(p.y);
         let theta = if away == 0.0 { 0.0 } else { p.y.atan2(p.x) };
-        return DhRow { theta, d: 0.0, a: away, alpha: if u.z > 0.0 { 0.0 } else { std::f64::consts::PI } };
+        return DhRow {
+            theta,
+            d: 0.0,
+            a: away,
+            alpha: if u.z > 0.0 { 0.0 } else { std::f64::consts::PI },
+        };
     }
     // x along z cross u, y = z cross x.
     let x = Vector3::new(-u.y, u.x, 0.0) / sine;
     let y = Vector3::z().cross(&x);
     let along = p.dot(&y) / sine;
-    DhRow { theta: x.y.atan2(x.x), d: p.z + along * u.z, a: p.dot(&x), alpha: sine.atan2(u.z) }
+    DhRow {
+        theta: x.y.atan2(x.x),
+        d: p.z + along * u.z,
+        a: p.dot(&x),
+        alpha: sine.atan2(u.z),
+    }
 }

@@ -51,20 +51,32 @@ impl Shape {
 impl Anchor {
     /// A point.
     pub fn point(name: &str, place: Vector3<f64>) -> Self {
-        Self { name: name.into(), place, shape: Shape::Point }
+        Self {
+            name: name.into(),
+            place,
+            shape: Shape::Point,
+        }
     }
 
     /// The turns (rad) about the x and y axes, as one rotation vector, that bring the z axis to a unit normal.
     pub fn tilts(normal: &Vector3<f64>) -> [f64; 2] {
         let flat = normal.x.hypot(normal.y);
-        let per_sine = if flat > 0.0 { libm::atan2(flat, normal.z) / flat } else { 1.0 };
+        let per_sine = if flat > 0.0 {
+            libm::atan2(flat, normal.z) / flat
+        } else {
+            1.0
+        };
         [-normal.y * per_sine, normal.x * per_sine]
     }
 
     /// The unit normal that such turns make of the z axis.
     pub fn normal([about_x, about_y]: [f64; 2]) -> Vector3<f64> {
         let angle = about_x.hypot(about_y);
-        let sine = if angle > 0.0 { libm::sin(angle) / angle } else { 1.0 };
+        let sine = if angle > 0.0 {
+            libm::sin(angle) / angle
+        } else {
+            1.0
+        };
         Vector3::new(sine * about_y, -sine * about_x, libm::cos(angle))
     }
 
@@ -79,8 +91,16 @@ impl Anchor {
         let share = sine / angle;
         let bend = (cosine - share) / (angle * angle);
         [
-            Vector3::new(bend * about_x * about_y, -share - bend * about_x * about_x, -share * about_x),
-            Vector3::new(share + bend * about_y * about_y, -bend * about_x * about_y, -share * about_y),
+            Vector3::new(
+                bend * about_x * about_y,
+                -share - bend * about_x * about_x,
+                -share * about_x,
+            ),
+            Vector3::new(
+                share + bend * about_y * about_y,
+                -bend * about_x * about_y,
+                -share * about_y,
+            ),
         ]
     }
 }
@@ -110,6 +130,10 @@ impl MeasurementSetup {
 
     /// Where the numbers of an anchor (by its own number) begin among those of all.
     pub fn first_of_anchor(&self, number: usize) -> usize {
-        self.anchors.iter().take(number).map(|anchor| anchor.shape.parameters()).sum()
+        self.anchors
+            .iter()
+            .take(number)
+            .map(|anchor| anchor.shape.parameters())
+            .sum()
     }
 }

@@ -16,7 +16,11 @@ impl Travel {
     pub fn new(value: f64) -> Self {
         // The same bits on every machine, and no call into the C library, which here costs a fifth of a whole fit.
         let (sine, cosine) = libm::sincos(value);
-        Self { value, sine, cosine }
+        Self {
+            value,
+            sine,
+            cosine,
+        }
     }
 
     /// rad or m.
@@ -55,7 +59,10 @@ mod tests {
                 let (moved, whole) = (Travel::new(value).moved(by), Travel::new(value + by));
                 assert_eq!(moved.value, whole.value);
                 assert!((moved.sine - whole.sine).abs() < 3e-16, "{value} + {by}");
-                assert!((moved.cosine - whole.cosine).abs() < 3e-16, "{value} + {by}");
+                assert!(
+                    (moved.cosine - whole.cosine).abs() < 3e-16,
+                    "{value} + {by}"
+                );
             }
         }
     }

@@ -31,11 +31,21 @@ impl Visited {
     /// What some rows visited.
     pub fn of(data: &Measurements, rows: &[usize]) -> Self {
         let joint = |j: usize| Joint::of(rows.iter().map(|row| data.q(*row)[j]).collect());
-        let temperature = |all: &Vec<f64>| range(rows.iter().map(|row| all[*row]).filter(|value| value.is_finite()));
+        let temperature = |all: &Vec<f64>| {
+            range(
+                rows.iter()
+                    .map(|row| all[*row])
+                    .filter(|value| value.is_finite()),
+            )
+        };
         Self {
             joints: (0..data.joints).map(joint).collect(),
             payload: range(rows.iter().map(|row| data.payload[*row])),
-            temperature: data.temperature.as_ref().map(temperature).filter(|range| range[0] <= range[1]),
+            temperature: data
+                .temperature
+                .as_ref()
+                .map(temperature)
+                .filter(|range| range[0] <= range[1]),
         }
     }
 
@@ -47,7 +57,11 @@ impl Visited {
         };
         let mut out = Vec::new();
         let joints = |is: &dyn Fn(f64, &Joint) -> bool| -> Vec<usize> {
-            (0..).zip(q.iter().zip(&self.joints)).filter(|(_, (q, joint))| is(**q, joint)).map(|(number, _)| number).collect()
+            (0..)
+                .zip(q.iter().zip(&self.joints))
+                .filter(|(_, (q, joint))| is(**q, joint))
+                .map(|(number, _)| number)
+                .collect()
         };
         let beyond = joints(&|q, joint| outside(q, joint.range, 1e-3));
         out.extend((!beyond.is_empty()).then_some(Unmeasured::Joints(beyond)));
@@ -70,13 +84,19 @@ impl Joint {
         values.sort_by(f64::total_cmp);
         let (count, range) = (values.len() as f64, range(values.iter().copied()));
         let least = GAP.max(CHANCE * (range[1] - range[0]) * count.ln() / count);
-        let gaps = values.windows(2).filter(|pair| pair[1] - pair[0] > least).map(|pair| [pair[0], pair[1]]).collect();
+        let gaps = values
+            .windows(2)
+            .filter(|pair| pair[1] - pair[0] > least)
+            .map(|pair| [pair[0], pair[1]])
+            .collect();
         Self { range, gaps }
     }
 
     fn is_in_gap(&self, q: f64) -> bool {
         let slack = (SLACK * (self.range[1] - self.range[0])).max(1e-3);
-        self.gaps.iter().any(|[low, high]| q > low + slack && q < high - slack)
+        self.gaps
+            .iter()
+            .any(|[low, high]| q > low + slack && q < high - slack)
     }
 }
 
@@ -96,8 +116,14 @@ pub enum Unmeasured {
 impl fmt::Display for Unmeasured {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Joints(joints) => write!(f, "joint {} beyond the measured range", numbered(joints)),
-            Self::Gaps(joints) => write!(f, "joint {} in a gap of the measured range", numbered(joints)),
+            Self::Joints(joints) => {
+                write!(f, "joint {} beyond the measured range", numbered(joints))
+            }
+            Self::Gaps(joints) => write!(
+                f,
+                "joint {} in a gap of the measured range",
+                numbered(joints)
+            ),
             Self::Payload => f.write_str("payload beyond the measured range"),
             Self::Temperature => f.write_str("temperature beyond the measured range"),
         }
@@ -106,11 +132,18 @@ impl fmt::Display for Unmeasured {
 
 /// Joints, from 0, as people count them: `3, 5`.
 pub(crate) fn numbered(joints: &[usize]) -> String {
-    joints.iter().map(|joint| (joint + 1).to_string()).collect::<Vec<_>>().join(", ")
+    joints
+        .iter()
+        .map(|joint| (joint + 1).to_string())
+        .collect::<Vec<_>>()
+        .join(", ")
 }
 
 fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
-    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[lower, upper], value| [lower.min(value), upper.max(value)])
+    values.fold(
+        [f64::INFINITY, f64::NEG_INFINITY],
+        |[lower, upper], value| [lower.min(value), upper.max(value)],
+    )
 }
 
 #[cfg(test)]
@@ -130,11 +163,21 @@ mod tests {
         let visited = Visited::of(&data, &[0, 1, 2, 3]);
         let said = |q: [f64; 2], payload, temperature| {
             let beyond = visited.beyond(&q, payload, temperature);
-            beyond.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
+            beyond
+                .iter()
+                .map(ToString::to_string)
+                .collect::<Vec<_>>()
+                .join("; ")
         };
         assert_eq!(said([0.2, 0.3], 5.0, Some(22.0)), "");
-        assert_eq!(said([0.5, 0.6], 5.0, None), "joint 1, 2 beyond the measured range");
-        assert_eq!(said([-0.4, 0.1], 5.0, Some(25.5)), "joint 1 in a gap of the measured range");
+        assert_eq!(
+            said([0.5, 0.6], 5.0, None),
+            "joint 1, 2 beyond the measured range"
+        );
+        assert_eq!(
+            said([-0.4, 0.1], 5.0, Some(25.5)),
+            "joint 1 in a gap of the measured range"
+        );
         assert_eq!(
             said([0.2, 0.3], 20.0, Some(40.0)),
             "payload beyond the measured range; temperature beyond the measured range"

@@ -19,23 +19,33 @@ const SMALL_ANGLE: f64 = 2e-2;
 impl Pose {
     /// No motion.
     pub fn identity() -> Self {
-        Self { rotation: Matrix3::identity(), translation: Vector3::zeros() }
+        Self {
+            rotation: Matrix3::identity(),
+            translation: Vector3::zeros(),
+        }
     }
 
     /// A pose from its parts; `rotation` must be orthonormal.
     pub fn new(rotation: Matrix3<f64>, translation: Vector3<f64>) -> Self {
-        Self { rotation, translation }
+        Self {
+            rotation,
+            translation,
+        }
     }
 
     /// Builds a pose from a rotation vector (rad) and a translation (m).
     pub fn from_rotation_vector(rotation_vector: Vector3<f64>, translation: Vector3<f64>) -> Self {
-        Self { rotation: Rotation3::new(rotation_vector).into_inner(), translation }
+        Self {
+            rotation: Rotation3::new(rotation_vector).into_inner(),
+            translation,
+        }
     }
 
     /// Returns the rotation vector (rad), angle in [0, pi].
     pub fn rotation_vector(&self) -> Vector3<f64> {
         // By way of a quaternion: the arc cosine of the trace would lose half the digits of a small angle.
-        UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(self.rotation)).scaled_axis()
+        UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(self.rotation))
+            .scaled_axis()
     }
 
     /// Exponential of a twist (v; w): Modern Robotics, Eq. 3.88.
@@ -44,7 +54,10 @@ impl Pose {
         let w: Vector3<f64> = twist.fixed_rows::<3>(3).into();
         let angle_squared = w.norm_squared();
         if angle_squared == 0.0 {
-            return Self { rotation: Matrix3::identity(), translation: v };
+            return Self {
+                rotation: Matrix3::identity(),
+                translation: v,
+            };
         }
         let (a, b, c) = coefficients(angle_squared);
         let cross = hat(&w);
@@ -58,7 +71,10 @@ impl Pose {
     /// The motion back: `pose * pose.inverse()` is the identity.
     pub fn inverse(&self) -> Self {
         let rotation = self.rotation.transpose();
-        Self { rotation, translation: -(rotation * self.translation) }
+        Self {
+            rotation,
+            translation: -(rotation * self.translation),
+        }
     }
 
     /// The point (m) as it stands after this motion.
@@ -89,7 +105,10 @@ fn coefficients(angle_squared: f64) -> (f64, f64, f64) {
 impl Mul for Pose {
     type Output = Pose;
     fn mul(self, right: Pose) -> Pose {
-        Pose { rotation: self.rotation * right.rotation, translation: self.rotation * right.translation + self.translation }
+        Pose {
+            rotation: self.rotation * right.rotation,
+            translation: self.rotation * right.translation + self.translation,
+        }
     }
 }
 

@@ -50,7 +50,10 @@ mod tests {
         for k in 0..6 {
             let mut step = Twist::zeros();
             step[k] = h;
-            let (plus, minus) = (Pose::exp(&(twist + step)) * back, Pose::exp(&(twist - step)) * back);
+            let (plus, minus) = (
+                Pose::exp(&(twist + step)) * back,
+                Pose::exp(&(twist - step)) * back,
+            );
             let rotation = (plus.rotation_vector() - minus.rotation_vector()) / (2.0 * h);
             let translation = (plus.translation - minus.translation) / (2.0 * h);
             for i in 0..3 {

@@ -44,31 +44,50 @@ fn read(text: &str, duplicate_keys: DuplicateKeyPolicy) -> Result<Node, Trouble>
         non_finite_float_policy: NonFiniteFloatPolicy::PassThrough,
         with_snippet: false,
     };
-    serde_saphyr::from_str_with_options::<Spanned<Tree>>(text, options).map(Tree::node).map_err(|error| {
-        let formatted = error.render_with_formatter(&serde_saphyr::UserMessageFormatter);
-        let line = error.location().and_then(|location| text.lines().nth(location.line().saturating_sub(1) as usize));
-        let message = line.and_then(bare_variable).unwrap_or_else(|| in_words(&formatted));
-        Trouble::new(message).at(error.location().map_or(Mark::Unknown, mark))
-    })
+    serde_saphyr::from_str_with_options::<Spanned<Tree>>(text, options)
+        .map(Tree::node)
+        .map_err(|error| {
+            let formatted = error.render_with_formatter(&serde_saphyr::UserMessageFormatter);
+            let line = error
+                .location()
+                .and_then(|location| text.lines().nth(location.line().saturating_sub(1) as usize));
+            let message = line
+                .and_then(bare_variable)
+                .unwrap_or_else(|| in_words(&formatted));
+            Trouble::new(message).at(error.location().map_or(Mark::Unknown, mark))
+        })
 }
 
 /// What to write where a variable without quotes breaks the syntax of its line.
 fn bare_variable(line: &str) -> Option<String> {
     let quotes = |before: &str| before.matches(['"', '\'']).count();
-    let (at, _) = line.match_indices("${").find(|(at, _)| quotes(&line[..*at]) % 2 == 0)?;
+    let (at, _) = line
+        .match_indices("${")
+        .find(|(at, _)| quotes(&line[..*at]) % 2 == 0)?;
     let (variable, _) = line[at..].split_once('}')?;
-    Some(format!("inside {{}} and [] a variable stands in quotes: \"{variable}}}\""))
+    Some(format!(
+        "inside {{}} and [] a variable stands in quotes: \"{variable}}}\""
+    ))
 }
 
 /// One line, in our words where it matters; the place is printed once, in front of it.
 fn in_words(message: &str) -> String {
     let first = message.lines().next().unwrap_or_default();
-    let first = first.split(" at line ").next().unwrap_or(first).trim_start_matches("error: ");
-    let twice = first.split_once("duplicate mapping key: ").and_then(|(_, rest)| rest.strip_suffix(" not allowed here"));
+    let first = first
+        .split(" at line ")
+        .next()
+        .unwrap_or(first)
+        .trim_start_matches("error: ");
+    let twice = first
+        .split_once("duplicate mapping key: ")
+        .and_then(|(_, rest)| rest.strip_suffix(" not allowed here"));
     if let Some(key) = twice {
         return format!("key `{key}` is given twice in this block");
     }
-    match first.strip_prefix("line ").and_then(|rest| rest.split_once(": ")) {
+    match first
+        .strip_prefix("line ")
+        .and_then(|rest| rest.split_once(": "))
+    {
         Some((_, message)) => message.into(),
         None => first.into(),
     }
@@ -96,7 +115,9 @@ impl Tree {
 
 impl<'de> Deserialize<'de> for Tree {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(TreeVisitor).map(|value| Tree { value })
+        deserializer
+            .deserialize_any(TreeVisitor)
+            .map(|value| Tree { value })
     }
 }
 
@@ -172,7 +193,10 @@ mod tests {
         if let Some(node) = node {
             troubles.extend(typed::<Sample>(&node).err().unwrap_or_default());
         }
-        troubles.into_iter().map(|trouble| trouble.fault("f.yaml").to_string()).collect()
+        troubles
+            .into_iter()
+            .map(|trouble| trouble.fault("f.yaml").to_string())
+            .collect()
     }
 
     #[test]
@@ -190,9 +214,13 @@ mod tests {
     #[test]
     fn a_number_beyond_any_quantity_is_refused_at_its_place() {
         let text = "every: 4\nratio: .1e309\nlist: [1e15, -1e16]\n";
-        let said =
-            |number: &str, place: &str| format!("f.yaml:{place}: {number} is no quantity of a cell; expected at most 1e15");
-        assert_eq!(faults(text), [said("1e308", "2:8: ratio"), said("-1e16", "3:14: list[1]")]);
+        let said = |number: &str, place: &str| {
+            format!("f.yaml:{place}: {number} is no quantity of a cell; expected at most 1e15")
+        };
+        assert_eq!(
+            faults(text),
+            [said("1e308", "2:8: ratio"), said("-1e16", "3:14: list[1]")]
+        );
     }
 
     /// serde reads such an enum through a buffer without places.
@@ -207,39 +235,68 @@ mod tests {
     fn faults_inside_variants_have_their_place() {
         let faults = |text: &str| -> Vec<String> {
             let troubles = typed::<Vec<Tagged>>(&parse(text).0.unwrap()).unwrap_err();
-            troubles.into_iter().map(|trouble| trouble.fault("f").to_string()).collect()
+            troubles
+                .into_iter()
+                .map(|trouble| trouble.fault("f").to_string())
+                .collect()
         };
-        assert_eq!(faults("- {by: every, n: x, list: []}"), ["f:1:18: [0].n: expected a whole number, 0 or more; found `x`"]);
-        assert_eq!(faults("- {by: every, n: 1, list: [1, b]}"), ["f:1:31: [0].list[1]: expected a number; found `b`"]);
+        assert_eq!(
+            faults("- {by: every, n: x, list: []}"),
+            ["f:1:18: [0].n: expected a whole number, 0 or more; found `x`"]
+        );
+        assert_eq!(
+            faults("- {by: every, n: 1, list: [1, b]}"),
+            ["f:1:31: [0].list[1]: expected a number; found `b`"]
+        );
         assert_eq!(
             faults("- {by: evry, n: 1, list: []}"),
             ["f:1:8: [0].by: unknown value `evry`; did you mean `every`? Allowed: every"]
         );
         let unknown = "- {by: every, n: 1, list: [], lst: 2}";
-        assert_eq!(faults(unknown), ["f:1:31: [0].lst: unknown key; did you mean `list`? Allowed: n, list"]);
+        assert_eq!(
+            faults(unknown),
+            ["f:1:31: [0].lst: unknown key; did you mean `list`? Allowed: n, list"]
+        );
     }
 
     #[test]
     fn a_key_given_twice_and_the_other_faults_come_together() {
         let faults = faults("every: 4\nevery: 5\nratio: yes\n");
         assert_eq!(faults.len(), 2, "{faults:?}");
-        assert!(faults[0].starts_with("f.yaml:2:1: ") && faults[0].contains("every"), "{faults:?}");
-        assert_eq!(faults[1], "f.yaml:3:8: ratio: expected a number; found `yes`");
+        assert!(
+            faults[0].starts_with("f.yaml:2:1: ") && faults[0].contains("every"),
+            "{faults:?}"
+        );
+        assert_eq!(
+            faults[1],
+            "f.yaml:3:8: ratio: expected a number; found `yes`"
+        );
     }
 
     #[test]
     fn text_keeps_the_spelling_of_numbers() {
         let (node, _) = parse("every: 4\nlabel: 007\n");
         assert_eq!(typed::<Sample>(&node.unwrap()).unwrap().label, "007");
-        assert_eq!(faults("every: 010"), ["f.yaml:1:8: every: expected a positive whole number, e.g. 4; found 10.0"]);
+        assert_eq!(
+            faults("every: 010"),
+            ["f.yaml:1:8: every: expected a positive whole number, e.g. 4; found 10.0"]
+        );
     }
 
     #[test]
     fn a_variable_without_quotes_inside_braces_says_what_to_write() {
         let told = "f.yaml:2:9: inside {} and [] a variable stands in quotes: \"${u}\"";
-        assert_eq!(faults("every: 4\nlist: [${u}]\n").last().map(String::as_str), Some(told));
+        assert_eq!(
+            faults("every: 4\nlist: [${u}]\n")
+                .last()
+                .map(String::as_str),
+            Some(told)
+        );
         let told = faults("every: 4\nlist: {a: \"${u}\", b: ${name}}\n");
-        assert!(told[0].ends_with("stands in quotes: \"${name}\""), "{told:?}");
+        assert!(
+            told[0].ends_with("stands in quotes: \"${name}\""),
+            "{told:?}"
+        );
     }
 
     #[test]

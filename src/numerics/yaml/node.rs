@@ -55,10 +55,22 @@ pub enum YamlValue {
 impl Node {
     /// A value at a place.
     pub fn new(value: YamlValue, mark: Mark) -> Self {
-        Self { value, mark, raw: None, overridden: false, bytes: None }
+        Self {
+            value,
+            mark,
+            raw: None,
+            overridden: false,
+            bytes: None,
+        }
     }
     pub(super) fn parsed(value: YamlValue, mark: Mark, bytes: Option<(u64, u64)>) -> Self {
-        Self { value, mark, raw: None, overridden: false, bytes }
+        Self {
+            value,
+            mark,
+            raw: None,
+            overridden: false,
+            bytes,
+        }
     }
     /// A map without entries.
     pub fn empty_map(mark: Mark) -> Self {
@@ -77,7 +89,9 @@ impl Node {
                 });
             }
             YamlValue::List(items) => items.iter_mut().for_each(|item| item.fill_raw(text)),
-            YamlValue::Map(entries) => entries.iter_mut().for_each(|(_, _, value)| value.fill_raw(text)),
+            YamlValue::Map(entries) => entries
+                .iter_mut()
+                .for_each(|(_, _, value)| value.fill_raw(text)),
             YamlValue::Null | YamlValue::Text(_) => {}
         }
     }
@@ -87,7 +101,9 @@ impl Node {
         match &self.value {
             YamlValue::Text(text) => Some(text.clone()),
             YamlValue::Bool(value) => Some(self.raw.clone().unwrap_or_else(|| value.to_string())),
-            YamlValue::Integer(value) => Some(self.raw.clone().unwrap_or_else(|| value.to_string())),
+            YamlValue::Integer(value) => {
+                Some(self.raw.clone().unwrap_or_else(|| value.to_string()))
+            }
             YamlValue::Float(value) => Some(self.raw.clone().unwrap_or_else(|| value.to_string())),
             YamlValue::Null | YamlValue::List(_) | YamlValue::Map(_) => None,
         }
@@ -95,15 +111,26 @@ impl Node {
 
     /// Entries of a map, each with the place of its key; none of anything else.
     pub fn entries(&self) -> &[(String, Mark, Node)] {
-        if let YamlValue::Map(entries) = &self.value { entries } else { &[] }
+        if let YamlValue::Map(entries) = &self.value {
+            entries
+        } else {
+            &[]
+        }
     }
     /// Items of a list; none of anything else.
     pub fn items(&self) -> &[Node] {
-        if let YamlValue::List(items) = &self.value { items } else { &[] }
+        if let YamlValue::List(items) = &self.value {
+            items
+        } else {
+            &[]
+        }
     }
     /// The value of a key of a map.
     pub fn get(&self, key: &str) -> Option<&Node> {
-        self.entries().iter().find(|(name, _, _)| name == key).map(|(_, _, node)| node)
+        self.entries()
+            .iter()
+            .find(|(name, _, _)| name == key)
+            .map(|(_, _, node)| node)
     }
 
     /// The node at a path like `effects[0].cycles` or `effects.0.cycles`.
@@ -112,9 +139,9 @@ impl Node {
             return Some(self);
         }
         match &self.value {
-            YamlValue::Map(entries) => {
-                entries.iter().find_map(|(key, _, node)| rest_after(path, key).and_then(|rest| node.at(rest)))
-            }
+            YamlValue::Map(entries) => entries
+                .iter()
+                .find_map(|(key, _, node)| rest_after(path, key).and_then(|rest| node.at(rest))),
             YamlValue::List(items) => {
                 let (index, rest) = split_index(path)?;
                 items.get(index)?.at(rest)
@@ -128,9 +155,9 @@ impl Node {
             return Some(self);
         }
         match &mut self.value {
-            YamlValue::Map(entries) => {
-                entries.iter_mut().find_map(|(key, _, node)| rest_after(path, key).and_then(|rest| node.at_mut(rest)))
-            }
+            YamlValue::Map(entries) => entries.iter_mut().find_map(|(key, _, node)| {
+                rest_after(path, key).and_then(|rest| node.at_mut(rest))
+            }),
             YamlValue::List(items) => {
                 let (index, rest) = split_index(path)?;
                 items.get_mut(index)?.at_mut(rest)
@@ -176,7 +203,8 @@ impl Node {
                 Ok(())
             }
             YamlValue::List(items) => {
-                let (index, rest) = split_index(path).ok_or_else(|| format!("`{path}` is no index of a list"))?;
+                let (index, rest) =
+                    split_index(path).ok_or_else(|| format!("`{path}` is no index of a list"))?;
                 if index > items.len() {
                     return Err(format!(
                         "the list has {}; index {index} is too large",
@@ -196,8 +224,15 @@ impl Node {
     pub(super) fn remove(&mut self, path: &str) -> bool {
         match &mut self.value {
             YamlValue::Map(entries) => {
-                let Some(index) = entries.iter().position(|(key, _, _)| rest_after(path, key).is_some()) else { return false };
-                let rest = rest_after(path, &entries[index].0).unwrap_or_default().to_string();
+                let Some(index) = entries
+                    .iter()
+                    .position(|(key, _, _)| rest_after(path, key).is_some())
+                else {
+                    return false;
+                };
+                let rest = rest_after(path, &entries[index].0)
+                    .unwrap_or_default()
+                    .to_string();
                 // The innermost entry that can go, so that the siblings are still looked at.
                 if rest.is_empty() || !entries[index].2.remove(&rest) {
                     entries.remove(index);

@@ -12,7 +12,11 @@ pub(crate) fn join(path: &str, rest: &str) -> String {
 /// What follows a key at the head of a path.
 pub(super) fn rest_after<'p>(path: &'p str, key: &str) -> Option<&'p str> {
     let rest = path.strip_prefix(key)?;
-    if rest.is_empty() || rest.starts_with('[') { Some(rest) } else { rest.strip_prefix('.') }
+    if rest.is_empty() || rest.starts_with('[') {
+        Some(rest)
+    } else {
+        rest.strip_prefix('.')
+    }
 }
 
 /// The first key of a path and what follows it.

@@ -34,7 +34,13 @@ pub(super) enum Clue {
 impl Trouble {
     /// A fault of the value itself.
     pub fn new(message: impl Into<String>) -> Self {
-        Self { path: String::new(), mark: None, message: message.into(), missing: None, clue: None }
+        Self {
+            path: String::new(),
+            mark: None,
+            message: message.into(),
+            missing: None,
+            clue: None,
+        }
     }
     /// A key that is not among those allowed.
     pub fn unknown_key(found: &str, allowed: &[&str]) -> Self {
@@ -43,7 +49,10 @@ impl Trouble {
         } else {
             format!("unknown key{}", instead(found, allowed))
         };
-        Self { clue: Some(Clue::Key(found.into())), ..Self::new(message) }
+        Self {
+            clue: Some(Clue::Key(found.into())),
+            ..Self::new(message)
+        }
     }
     /// Whether the fault is a key that is not known.
     pub fn is_unknown_key(&self) -> bool {
@@ -66,7 +75,14 @@ impl Trouble {
             Some(Mark::CommandLine) => "--set".into(),
             Some(Mark::Unknown) | None => file.into(),
         };
-        Fault::new(if self.path.is_empty() { place } else { format!("{place}: {}", self.path) }, self.message)
+        Fault::new(
+            if self.path.is_empty() {
+                place
+            } else {
+                format!("{place}: {}", self.path)
+            },
+            self.message,
+        )
     }
 }
 
@@ -84,23 +100,35 @@ impl de::Error for Trouble {
     fn invalid_type(found: Unexpected<'_>, expected: &dyn Expected) -> Self {
         let expected = wanted(&expected.to_string());
         let message = format!("expected {expected}; found {}", given(found));
-        Self { clue: Some(Clue::Expected(expected)), ..Self::new(message) }
+        Self {
+            clue: Some(Clue::Expected(expected)),
+            ..Self::new(message)
+        }
     }
     fn invalid_value(found: Unexpected<'_>, expected: &dyn Expected) -> Self {
         Self::invalid_type(found, expected)
     }
     fn invalid_length(found: usize, expected: &dyn Expected) -> Self {
-        Self::new(format!("expected {}; found {found}", wanted(&expected.to_string())))
+        Self::new(format!(
+            "expected {}; found {found}",
+            wanted(&expected.to_string())
+        ))
     }
     fn unknown_variant(found: &str, allowed: &'static [&'static str]) -> Self {
         let message = format!("unknown value `{found}`{}", instead(found, allowed));
-        Self { clue: Some(Clue::Word(found.into())), ..Self::new(message) }
+        Self {
+            clue: Some(Clue::Word(found.into())),
+            ..Self::new(message)
+        }
     }
     fn unknown_field(found: &str, allowed: &'static [&'static str]) -> Self {
         Self::unknown_key(found, allowed)
     }
     fn missing_field(field: &'static str) -> Self {
-        Self { missing: Some(field), ..Self::new(format!("missing key `{field}`")) }
+        Self {
+            missing: Some(field),
+            ..Self::new(format!("missing key `{field}`"))
+        }
     }
     fn duplicate_field(field: &'static str) -> Self {
         Self::new(format!("key `{field}` is given twice"))

@@ -4,8 +4,8 @@ use super::trouble::Clue;
 use super::{Mark, Node, Trouble, YamlValue};
 use serde::de::value::StrDeserializer;
 use serde::de::{
-    self, DeserializeOwned, DeserializeSeed, Deserializer, EnumAccess, IntoDeserializer, MapAccess, SeqAccess, Unexpected,
-    VariantAccess, Visitor,
+    self, DeserializeOwned, DeserializeSeed, Deserializer, EnumAccess, IntoDeserializer, MapAccess,
+    SeqAccess, Unexpected, VariantAccess, Visitor,
 };
 use serde::forward_to_deserialize_any;
 
@@ -42,7 +42,9 @@ pub fn typed<T: DeserializeOwned>(node: &Node) -> Result<T, Vec<Trouble>> {
 /// Finds the place of a fault inside a block that serde had to buffer (variants distinguished by a key), where places are lost:
 /// the value that, put out of shape, still is not what was expected there.
 fn locate<T: DeserializeOwned>(trouble: Trouble, root: &Node) -> Trouble {
-    let (Some(clue), Some(block)) = (trouble.clue.clone(), root.at(&trouble.path)) else { return trouble };
+    let (Some(clue), Some(block)) = (trouble.clue.clone(), root.at(&trouble.path)) else {
+        return trouble;
+    };
     let mut candidates: Vec<(String, Mark)> = Vec::new();
     block.walk(&trouble.path, &mut |path, node| match &clue {
         Clue::Expected(_) => candidates.push((path.into(), node.mark)),
@@ -57,17 +59,28 @@ fn locate<T: DeserializeOwned>(trouble: Trouble, root: &Node) -> Trouble {
     });
     let still = |path: &str| {
         let mut bent = root.clone();
-        let Some(place) = bent.at_mut(path) else { return false };
+        let Some(place) = bent.at_mut(path) else {
+            return false;
+        };
         // Null, or true in the place of null, is another value than what stands there.
-        place.value = if matches!(place.value, YamlValue::Null) { YamlValue::Bool(true) } else { YamlValue::Null };
-        T::deserialize(&bent).is_err_and(|other| other.clue == trouble.clue && other.message != trouble.message)
+        place.value = if matches!(place.value, YamlValue::Null) {
+            YamlValue::Bool(true)
+        } else {
+            YamlValue::Null
+        };
+        T::deserialize(&bent)
+            .is_err_and(|other| other.clue == trouble.clue && other.message != trouble.message)
     };
     let found = match clue {
         Clue::Expected(_) => candidates.into_iter().rev().find(|(path, _)| still(path)),
         Clue::Key(_) | Clue::Word(_) => candidates.into_iter().next(),
     };
     match found {
-        Some((path, mark)) => Trouble { path, mark: Some(mark), ..trouble },
+        Some((path, mark)) => Trouble {
+            path,
+            mark: Some(mark),
+            ..trouble
+        },
         None => trouble,
     }
 }
@@ -102,19 +115,28 @@ impl<'de> Deserializer<'de> for &'de Node {
                 _ => visitor.visit_i128(*value),
             },
             YamlValue::Float(value) if value.is_finite() && value.abs() > LARGEST => {
-                Err(Trouble::new(format!("{value:e} is no quantity of a cell; expected at most {LARGEST:e}")))
+                Err(Trouble::new(format!(
+                    "{value:e} is no quantity of a cell; expected at most {LARGEST:e}"
+                )))
             }
             YamlValue::Float(value) => visitor.visit_f64(*value),
             YamlValue::Text(text) => visitor.visit_borrowed_str(text),
-            YamlValue::List(items) => visitor.visit_seq(Items { items: items.iter().enumerate() }),
-            YamlValue::Map(entries) => visitor.visit_map(Entries { entries: entries.iter(), value: None }),
+            YamlValue::List(items) => visitor.visit_seq(Items {
+                items: items.iter().enumerate(),
+            }),
+            YamlValue::Map(entries) => visitor.visit_map(Entries {
+                entries: entries.iter(),
+                value: None,
+            }),
         };
         result.map_err(|trouble| trouble.at(self.mark))
     }
     fn deserialize_str<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Trouble> {
         match (&self.value, &self.raw) {
             (YamlValue::Bool(_) | YamlValue::Integer(_) | YamlValue::Float(_), Some(raw)) => {
-                visitor.visit_borrowed_str(raw).map_err(|trouble: Trouble| trouble.at(self.mark))
+                visitor
+                    .visit_borrowed_str(raw)
+                    .map_err(|trouble: Trouble| trouble.at(self.mark))
             }
             _ => self.deserialize_any(visitor),
         }
@@ -123,9 +145,17 @@ impl<'de> Deserializer<'de> for &'de Node {
         self.deserialize_str(visitor)
     }
     fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Trouble> {
-        if matches!(self.value, YamlValue::Null) { visitor.visit_none() } else { visitor.visit_some(self) }
+        if matches!(self.value, YamlValue::Null) {
+            visitor.visit_none()
+        } else {
+            visitor.visit_some(self)
+        }
     }
-    fn deserialize_newtype_struct<V: Visitor<'de>>(self, _name: &'static str, visitor: V) -> Result<V::Value, Trouble> {
+    fn deserialize_newtype_struct<V: Visitor<'de>>(
+        self,
+        _name: &'static str,
+        visitor: V,
+    ) -> Result<V::Value, Trouble> {
         visitor.visit_newtype_struct(self)
     }
     fn deserialize_enum<V: Visitor<'de>>(
@@ -137,10 +167,20 @@ impl<'de> Deserializer<'de> for &'de Node {
         let result = match &self.value {
             YamlValue::Text(text) => visitor.visit_enum(StrDeserializer::new(text)),
             YamlValue::Map(entries) => match entries.as_slice() {
-                [(key, mark, node)] => visitor.visit_enum(Variant { key, mark: *mark, node }),
-                _ => Err(Trouble::new(format!("expected one of: {}", variants.join(", ")))),
+                [(key, mark, node)] => visitor.visit_enum(Variant {
+                    key,
+                    mark: *mark,
+                    node,
+                }),
+                _ => Err(Trouble::new(format!(
+                    "expected one of: {}",
+                    variants.join(", ")
+                ))),
             },
-            _ => Err(de::Error::invalid_type(self.unexpected(), &format!("one of: {}", variants.join(", ")).as_str())),
+            _ => Err(de::Error::invalid_type(
+                self.unexpected(),
+                &format!("one of: {}", variants.join(", ")).as_str(),
+            )),
         };
         result.map_err(|trouble| trouble.at(self.mark))
     }
@@ -156,9 +196,16 @@ struct Items<'de> {
 
 impl<'de> SeqAccess<'de> for Items<'de> {
     type Error = Trouble;
-    fn next_element_seed<S: DeserializeSeed<'de>>(&mut self, seed: S) -> Result<Option<S::Value>, Trouble> {
-        let Some((index, node)) = self.items.next() else { return Ok(None) };
-        seed.deserialize(node).map(Some).map_err(|trouble| trouble.at(node.mark).below(&format!("[{index}]")))
+    fn next_element_seed<S: DeserializeSeed<'de>>(
+        &mut self,
+        seed: S,
+    ) -> Result<Option<S::Value>, Trouble> {
+        let Some((index, node)) = self.items.next() else {
+            return Ok(None);
+        };
+        seed.deserialize(node)
+            .map(Some)
+            .map_err(|trouble| trouble.at(node.mark).below(&format!("[{index}]")))
     }
     fn size_hint(&self) -> Option<usize> {
         Some(self.items.len())
@@ -172,15 +219,26 @@ struct Entries<'de> {
 
 impl<'de> MapAccess<'de> for Entries<'de> {
     type Error = Trouble;
-    fn next_key_seed<S: DeserializeSeed<'de>>(&mut self, seed: S) -> Result<Option<S::Value>, Trouble> {
-        let Some((key, mark, node)) = self.entries.next() else { return Ok(None) };
+    fn next_key_seed<S: DeserializeSeed<'de>>(
+        &mut self,
+        seed: S,
+    ) -> Result<Option<S::Value>, Trouble> {
+        let Some((key, mark, node)) = self.entries.next() else {
+            return Ok(None);
+        };
         self.value = Some((key, node));
         let deserializer: StrDeserializer<'_, Trouble> = key.as_str().into_deserializer();
-        seed.deserialize(deserializer).map(Some).map_err(|trouble| trouble.at(*mark).below(key))
+        seed.deserialize(deserializer)
+            .map(Some)
+            .map_err(|trouble| trouble.at(*mark).below(key))
     }
     fn next_value_seed<S: DeserializeSeed<'de>>(&mut self, seed: S) -> Result<S::Value, Trouble> {
-        let (key, node) = self.value.take().ok_or_else(|| Trouble::new("a value without a key"))?;
-        seed.deserialize(node).map_err(|trouble| trouble.at(node.mark).below(key))
+        let (key, node) = self
+            .value
+            .take()
+            .ok_or_else(|| Trouble::new("a value without a key"))?;
+        seed.deserialize(node)
+            .map_err(|trouble| trouble.at(node.mark).below(key))
     }
 }
 
@@ -195,7 +253,9 @@ impl<'de> EnumAccess<'de> for Variant<'de> {
     type Variant = Self;
     fn variant_seed<S: DeserializeSeed<'de>>(self, seed: S) -> Result<(S::Value, Self), Trouble> {
         let deserializer: StrDeserializer<'_, Trouble> = self.key.into_deserializer();
-        let name = seed.deserialize(deserializer).map_err(|trouble| trouble.at(self.mark))?;
+        let name = seed
+            .deserialize(deserializer)
+            .map_err(|trouble| trouble.at(self.mark))?;
         Ok((name, self))
     }
 }
@@ -205,16 +265,33 @@ impl<'de> VariantAccess<'de> for Variant<'de> {
     fn unit_variant(self) -> Result<(), Trouble> {
         match self.node.value {
             YamlValue::Null => Ok(()),
-            _ => Err(Trouble::new(format!("`{}` takes no settings of its own", self.key)).at(self.node.mark).below(self.key)),
+            _ => Err(
+                Trouble::new(format!("`{}` takes no settings of its own", self.key))
+                    .at(self.node.mark)
+                    .below(self.key),
+            ),
         }
     }
     fn newtype_variant_seed<S: DeserializeSeed<'de>>(self, seed: S) -> Result<S::Value, Trouble> {
-        seed.deserialize(self.node).map_err(|trouble| trouble.at(self.node.mark).below(self.key))
+        seed.deserialize(self.node)
+            .map_err(|trouble| trouble.at(self.node.mark).below(self.key))
     }
-    fn tuple_variant<V: Visitor<'de>>(self, _length: usize, visitor: V) -> Result<V::Value, Trouble> {
-        self.node.deserialize_any(visitor).map_err(|trouble| trouble.below(self.key))
+    fn tuple_variant<V: Visitor<'de>>(
+        self,
+        _length: usize,
+        visitor: V,
+    ) -> Result<V::Value, Trouble> {
+        self.node
+            .deserialize_any(visitor)
+            .map_err(|trouble| trouble.below(self.key))
     }
-    fn struct_variant<V: Visitor<'de>>(self, _fields: &'static [&'static str], visitor: V) -> Result<V::Value, Trouble> {
-        self.node.deserialize_any(visitor).map_err(|trouble| trouble.below(self.key))
+    fn struct_variant<V: Visitor<'de>>(
+        self,
+        _fields: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, Trouble> {
+        self.node
+            .deserialize_any(visitor)
+            .map_err(|trouble| trouble.below(self.key))
     }
 }

@@ -21,7 +21,11 @@ pub(super) struct Type {
 }
 
 impl Type {
-    pub const FRAME: Self = Self { axes: false, externals: 0, status: false };
+    pub const FRAME: Self = Self {
+        axes: false,
+        externals: 0,
+        status: false,
+    };
 
     /// By name, in capitals; none for types of no target.
     pub fn of(name: &str) -> Option<Self> {
@@ -34,7 +38,11 @@ impl Type {
             "E6AXIS" => (true, 6),
             _ => return None,
         };
-        Some(Self { axes, externals, status: !axes })
+        Some(Self {
+            axes,
+            externals,
+            status: !axes,
+        })
     }
 
     pub fn is_of_axes(self) -> bool {
@@ -46,7 +54,10 @@ impl Type {
     }
 
     fn others(self) -> impl Iterator<Item = &'static str> {
-        STATUS.into_iter().filter(move |_| self.status).chain(EXTERNALS.into_iter().take(self.externals))
+        STATUS
+            .into_iter()
+            .filter(move |_| self.status)
+            .chain(EXTERNALS.into_iter().take(self.externals))
     }
 }
 
@@ -76,7 +87,12 @@ impl<'t> Aggregate<'t> {
                 depth == 0 && token.is(b',')
             })
             .collect();
-        Self { source, tokens, prefix, fields }
+        Self {
+            source,
+            tokens,
+            prefix,
+            fields,
+        }
     }
 
     /// The type before the colon, in capitals.
@@ -100,26 +116,39 @@ impl<'t> Aggregate<'t> {
     /// What it is as operand of a motion.
     pub fn by_fields(&self) -> Type {
         let axes = self.has_axes();
-        Type { axes, externals: 6, status: !axes }
+        Type {
+            axes,
+            externals: 6,
+            status: !axes,
+        }
     }
 
     /// X, Y, Z, A, B, C and nothing else: a FRAME as much as a POS.
     pub fn is_frame(&self) -> bool {
         let names: Vec<String> = self.names().collect();
-        names.iter().any(|name| name == "X") && names.iter().all(|name| FRAME.contains(&name.as_str()))
+        names.iter().any(|name| name == "X")
+            && names.iter().all(|name| FRAME.contains(&name.as_str()))
     }
 
     /// Whether its fields are those of a target.
     pub fn may_be_target(&self) -> bool {
         let names: Vec<String> = self.names().collect();
-        let of = |sets: &[&[&str]], name: &String| sets.iter().any(|set| set.contains(&name.as_str()));
+        let of =
+            |sets: &[&[&str]], name: &String| sets.iter().any(|set| set.contains(&name.as_str()));
         names.iter().any(|name| of(&[&AXES, &FRAME[..3]], name))
-            || (!names.is_empty() && names.iter().all(|name| of(&[&FRAME, &STATUS, &EXTERNALS], name)))
+            || (!names.is_empty()
+                && names
+                    .iter()
+                    .all(|name| of(&[&FRAME, &STATUS, &EXTERNALS], name)))
     }
 
     /// The number of a field, in capitals, where it is one.
     pub fn number(&self, name: &str) -> Option<f64> {
-        let field = self.fields.iter().find(|field| field.first().is_some_and(|first| self.source.is_word(first, &[name])))?;
+        let field = self.fields.iter().find(|field| {
+            field
+                .first()
+                .is_some_and(|first| self.source.is_word(first, &[name]))
+        })?;
         self.source.number(&field[1..]).map(|(number, _)| number)
     }
 
@@ -160,58 +189,126 @@ impl<'t> Aggregate<'t> {
             return;
         }
         let given = |name: &str| numbers.iter().find(|(given, ..)| given == name);
-        for (name, value, span) in numbers.iter().filter(|(name, value, _)| EXTERNALS.contains(&name.as_str()) && *value != 0.0) {
-            let message = format!("{name} is {value}: calib assumed that external axes stand at 0 and do not move the robot");
+        for (name, value, span) in numbers
+            .iter()
+            .filter(|(name, value, _)| EXTERNALS.contains(&name.as_str()) && *value != 0.0)
+        {
+            let message = format!(
+                "{name} is {value}: calib assumed that external axes stand at 0 and do not move the robot"
+            );
             found.warn(span.start, message);
         }
         let names = kind.coordinates();
-        let missing: Vec<&str> = names.into_iter().filter(|name| given(name).is_none()).collect();
+        let missing: Vec<&str> = names
+            .into_iter()
+            .filter(|name| given(name).is_none())
+            .collect();
         if !missing.is_empty() {
-            found.partial(open, format!("the target has no {}; a target is corrected whole or not at all", missing.join(", ")));
+            found.partial(
+                open,
+                format!(
+                    "the target has no {}; a target is corrected whole or not at all",
+                    missing.join(", ")
+                ),
+            );
             return;
         }
-        let (values, spans) = names.into_iter().filter_map(given).map(|(_, value, span)| (*value, span.clone())).unzip();
-        let external = EXTERNALS.into_iter().map(|name| given(name).map(|(_, value, _)| *value)).collect();
-        let kind = if kind.axes { TargetKind::Joints } else { TargetKind::Frame };
-        let [status, turn] = STATUS.map(|name| given(name).map(|(_, value, span)| (*value as u32, span)));
+        let (values, spans) = names
+            .into_iter()
+            .filter_map(given)
+            .map(|(_, value, span)| (*value, span.clone()))
+            .unzip();
+        let external = EXTERNALS
+            .into_iter()
+            .map(|name| given(name).map(|(_, value, _)| *value))
+            .collect();
+        let kind = if kind.axes {
+            TargetKind::Joints
+        } else {
+            TargetKind::Frame
+        };
+        let [status, turn] =
+            STATUS.map(|name| given(name).map(|(_, value, span)| (*value as u32, span)));
         if let Some((_, span)) = status.filter(|(status, _)| status & ACCURATE != 0) {
             let message = "S says that the point was taught at an absolutely accurate robot: calib assumed that the controller's own model of the robot's errors is off";
             found.warn(span.start, message);
         }
-        let posture_spans: Vec<Range<usize>> = [&status, &turn].into_iter().flatten().map(|(_, span)| (*span).clone()).collect();
+        let posture_spans: Vec<Range<usize>> = [&status, &turn]
+            .into_iter()
+            .flatten()
+            .map(|(_, span)| (*span).clone())
+            .collect();
         let posture = match [status, turn].map(|stated| stated.map(|(bits, _)| bits)) {
             [None, None] => PostureStatement::Unstated,
             [status, turn] => PostureStatement::StatusTurn { status, turn },
         };
-        found.literals.push(Literal::read(kind, (values, spans), external, (posture, posture_spans)));
+        found.literals.push(Literal::read(
+            kind,
+            (values, spans),
+            external,
+            (posture, posture_spans),
+        ));
     }
 
     /// Name and number of a field; status and turn may be bit patterns.
-    fn field(&self, kind: Type, field: &[Token], first: &Token, found: &mut Gathered) -> Option<(String, f64, Range<usize>)> {
+    fn field(
+        &self,
+        kind: Type,
+        field: &[Token],
+        first: &Token,
+        found: &mut Gathered,
+    ) -> Option<(String, f64, Range<usize>)> {
         let bytes = self.source.bytes;
         if first.sort != TokenKind::Word {
-            found.fault(first.span.start, format!("{} has no name", quoted(bytes, self.source.over(field, 0))));
+            found.fault(
+                first.span.start,
+                format!("{} has no name", quoted(bytes, self.source.over(field, 0))),
+            );
             return None;
         }
         let name = self.source.upper(first);
-        if !kind.coordinates().into_iter().chain(kind.others()).any(|known| known == name) {
-            let allowed: Vec<&str> = kind.coordinates().into_iter().chain(kind.others()).collect();
+        if !kind
+            .coordinates()
+            .into_iter()
+            .chain(kind.others())
+            .any(|known| known == name)
+        {
+            let allowed: Vec<&str> = kind
+                .coordinates()
+                .into_iter()
+                .chain(kind.others())
+                .collect();
             let given = quoted(bytes, first.span.clone());
-            found.fault(first.span.start, format!("unknown field {given} (allowed: {})", allowed.join(", ")));
+            found.fault(
+                first.span.start,
+                format!("unknown field {given} (allowed: {})", allowed.join(", ")),
+            );
             return None;
         }
         let value = &field[1..];
         let bits = STATUS.contains(&name.as_str());
-        let number = self.source.number(value).or_else(|| if bits { pattern(bytes, value) } else { None });
-        if let Some((number, span)) = number.filter(|(number, _)| !bits || (number.fract() == 0.0 && *number >= 0.0)) {
+        let number = self
+            .source
+            .number(value)
+            .or_else(|| if bits { pattern(bytes, value) } else { None });
+        if let Some((number, span)) =
+            number.filter(|(number, _)| !bits || (number.fract() == 0.0 && *number >= 0.0))
+        {
             return Some((name, number, span));
         }
         let span = self.value(field);
         let message = if value.is_empty() {
             format!("{name} has no number")
         } else {
-            let expected = if bits { "a whole number or a bit pattern" } else { "a number" };
-            format!("{name} is {}, expected {expected}", quoted(bytes, span.clone()))
+            let expected = if bits {
+                "a whole number or a bit pattern"
+            } else {
+                "a number"
+            };
+            format!(
+                "{name} is {}, expected {expected}",
+                quoted(bytes, span.clone())
+            )
         };
         found.fault(span.start, message);
         None
@@ -229,5 +326,7 @@ fn pattern(bytes: &[u8], value: &[Token]) -> Option<(f64, Range<usize>)> {
         "H" | "h" => 16,
         _ => return None,
     };
-    u32::from_str_radix(digits, radix).ok().map(|number| (f64::from(number), only.span.clone()))
+    u32::from_str_radix(digits, radix)
+        .ok()
+        .map(|number| (f64::from(number), only.span.clone()))
 }

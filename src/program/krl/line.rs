@@ -3,14 +3,21 @@
 use super::super::token::{ProgramText, Token, TokenKind};
 
 /// Types that need no DECL.
-const PREDEFINED: [&str; 11] = ["INT", "REAL", "BOOL", "CHAR", "FRAME", "POS", "E3POS", "E6POS", "AXIS", "E3AXIS", "E6AXIS"];
+const PREDEFINED: [&str; 11] = [
+    "INT", "REAL", "BOOL", "CHAR", "FRAME", "POS", "E3POS", "E6POS", "AXIS", "E3AXIS", "E6AXIS",
+];
 
 /// The type and the names that a line declares, in capitals.
 pub(super) fn declared(source: ProgramText, line: &[Token]) -> Option<(String, Vec<String>)> {
-    let skipped = line.iter().take_while(|token| source.is_word(token, &["DECL", "GLOBAL", "CONST"])).count();
+    let skipped = line
+        .iter()
+        .take_while(|token| source.is_word(token, &["DECL", "GLOBAL", "CONST"]))
+        .count();
     let rest = &line[skipped..];
     let [kind, first, ..] = rest else { return None };
-    let plain = rest.get(2).is_none_or(|next| next.is(b'=') || next.is(b'[') || next.is(b','));
+    let plain = rest
+        .get(2)
+        .is_none_or(|next| next.is(b'=') || next.is(b'[') || next.is(b','));
     if kind.sort != TokenKind::Word || first.sort != TokenKind::Word || !plain {
         return None;
     }
@@ -31,9 +38,14 @@ pub(super) fn declared(source: ProgramText, line: &[Token]) -> Option<(String, V
 
 /// The type that a line declares as a structure: `[GLOBAL] STRUC NAME ...`.
 pub(super) fn structure(source: ProgramText, line: &[Token]) -> Option<String> {
-    let skipped = line.iter().take_while(|token| source.is_word(token, &["GLOBAL"])).count();
+    let skipped = line
+        .iter()
+        .take_while(|token| source.is_word(token, &["GLOBAL"]))
+        .count();
     match &line[skipped..] {
-        [word, name, ..] if source.is_word(word, &["STRUC"]) && name.sort == TokenKind::Word => Some(source.upper(name)),
+        [word, name, ..] if source.is_word(word, &["STRUC"]) && name.sort == TokenKind::Word => {
+            Some(source.upper(name))
+        }
         _ => None,
     }
 }
@@ -64,12 +76,17 @@ pub(super) fn closing(line: &[Token], open: usize) -> usize {
 }
 
 /// Behind a name: the last member of `[1].FRAME.X`, and what follows `=`; the second is none where nothing is set.
-pub(super) fn member<'t>(source: ProgramText, rest: &'t [Token]) -> Option<(Option<String>, Option<&'t [Token]>)> {
+pub(super) fn member<'t>(
+    source: ProgramText,
+    rest: &'t [Token],
+) -> Option<(Option<String>, Option<&'t [Token]>)> {
     let mut member = None;
     let mut k = 0;
     loop {
         match rest.get(k).map(|token| token.sort) {
-            Some(TokenKind::Sign(b'[')) => k += rest[k..].iter().position(|token| token.is(b']'))? + 1,
+            Some(TokenKind::Sign(b'[')) => {
+                k += rest[k..].iter().position(|token| token.is(b']'))? + 1
+            }
             Some(TokenKind::Sign(b'.')) => {
                 member = Some(source.upper(rest.get(k + 1)?));
                 k += 2;

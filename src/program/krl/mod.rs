@@ -23,10 +23,27 @@ use std::ops::Range;
 use system::SystemData;
 
 /// Motions, and how many positions each has.
-const MOTIONS: [(&str, usize); 7] = [("PTP", 1), ("LIN", 1), ("CIRC", 2), ("SPTP", 1), ("SLIN", 1), ("SCIRC", 2), ("SPL", 1)];
+const MOTIONS: [(&str, usize); 7] = [
+    ("PTP", 1),
+    ("LIN", 1),
+    ("CIRC", 2),
+    ("SPTP", 1),
+    ("SLIN", 1),
+    ("SCIRC", 2),
+    ("SPL", 1),
+];
 
 /// What moves by a distance, or no axis of the robot.
-const LEFT: [&str; 8] = ["PTP_REL", "LIN_REL", "CIRC_REL", "SPTP_REL", "SLIN_REL", "SCIRC_REL", "SPL_REL", "ASYPTP"];
+const LEFT: [&str; 8] = [
+    "PTP_REL",
+    "LIN_REL",
+    "CIRC_REL",
+    "SPTP_REL",
+    "SLIN_REL",
+    "SCIRC_REL",
+    "SPL_REL",
+    "ASYPTP",
+];
 
 /// What may stand behind a position: how it is blended.
 const BLENDING: [&str; 5] = ["C_PTP", "C_DIS", "C_ORI", "C_VEL", "C_SPL"];
@@ -47,7 +64,10 @@ const FRAME_TABLES: [&str; 2] = ["BASE_DATA", "TOOL_DATA"];
 
 pub(super) fn read(bytes: &[u8], companions: &[Companion]) -> Gathered {
     let mut found = Gathered::default();
-    let source = ProgramText { bytes, language: Language::Krl };
+    let source = ProgramText {
+        bytes,
+        language: Language::Krl,
+    };
     let own = tokens(source, &mut found);
     let lines = lines(&own);
     let mut types: BTreeMap<String, Vec<String>> = BTreeMap::new();
@@ -61,19 +81,33 @@ pub(super) fn read(bytes: &[u8], companions: &[Companion]) -> Gathered {
             }
         }
     }
-    let structures = lines.iter().filter_map(|line| structure(source, line)).collect();
-    let mut reader = Reader { source, types, structures, names: Vec::new(), found };
+    let structures = lines
+        .iter()
+        .filter_map(|line| structure(source, line))
+        .collect();
+    let mut reader = Reader {
+        source,
+        types,
+        structures,
+        names: Vec::new(),
+        found,
+    };
     for line in &lines {
         reader.line(line);
     }
-    let Reader { names, mut found, .. } = reader;
+    let Reader {
+        names, mut found, ..
+    } = reader;
     in_force(source, &lines, companions, &names, &mut found);
     found
 }
 
 /// Statements, one a line.
 fn lines(tokens: &[Token]) -> Vec<&[Token]> {
-    tokens.split(|token| token.sort == TokenKind::LineEnd).filter(|line| !line.is_empty()).collect()
+    tokens
+        .split(|token| token.sort == TokenKind::LineEnd)
+        .filter(|line| !line.is_empty())
+        .collect()
 }
 
 /// Gives targets their frames, tools and loads, by all files of the program.
@@ -85,24 +119,42 @@ fn in_force(
     found: &mut Gathered,
 ) {
     // What is wrong with the writing of another file is no fault of this one.
-    let read = |companion: &Companion| tokens(companion.text(Language::Krl), &mut Gathered::default());
+    let read =
+        |companion: &Companion| tokens(companion.text(Language::Krl), &mut Gathered::default());
     let others: Vec<Vec<Token>> = companions.iter().map(read).collect();
     let (mut data, mut reached) = (SystemData::default(), Reached::default());
     let companions = || companions.iter().zip(&others);
-    let read: Vec<(ProgramText, Vec<&[Token]>)> =
-        companions().map(|(companion, tokens)| (companion.text(Language::Krl), lines(tokens))).collect();
-    read.iter().for_each(|(source, lines)| data.declare(*source, lines));
+    let read: Vec<(ProgramText, Vec<&[Token]>)> = companions()
+        .map(|(companion, tokens)| (companion.text(Language::Krl), lines(tokens)))
+        .collect();
+    read.iter()
+        .for_each(|(source, lines)| data.declare(*source, lines));
     data.declare_routines(&read);
     data.declare(source, own);
     reached::reach(source, own, &data, None, &mut reached);
     for (companion, tokens) in companions() {
-        reached::reach(companion.text(Language::Krl), &lines(tokens), &data, Some(companion.place), &mut reached);
+        reached::reach(
+            companion.text(Language::Krl),
+            &lines(tokens),
+            &data,
+            Some(companion.place),
+            &mut reached,
+        );
     }
     let uses = reached.uses(&found.literals, names);
     settle(found, uses, &WORDS);
     let mut called = BTreeSet::new();
-    if found.literals.iter().any(|literal| literal.frame.is_some() || literal.tool_in_force.is_some()) {
-        found.warnings.extend(reached.assumed.into_iter().filter(|(_, message)| called.insert(message.clone())));
+    if found
+        .literals
+        .iter()
+        .any(|literal| literal.frame.is_some() || literal.tool_in_force.is_some())
+    {
+        found.warnings.extend(
+            reached
+                .assumed
+                .into_iter()
+                .filter(|(_, message)| called.insert(message.clone())),
+        );
     }
     found.tools = data.tools().collect();
 }
@@ -126,8 +178,9 @@ impl Reader<'_> {
         let head = self.source.upper(&line[0]);
         if LEFT.contains(&head.as_str()) {
             if head.ends_with("_REL") {
-                let message =
-                    format!("left as it is: {head} moves by a distance from where the target before, as corrected, has led");
+                let message = format!(
+                    "left as it is: {head} moves by a distance from where the target before, as corrected, has led"
+                );
                 self.found.warn(line[0].span.start, message);
             }
             return;
@@ -148,14 +201,16 @@ impl Reader<'_> {
             if token.is(b'{') {
                 open.push(token);
                 if open.len() == DEPTH {
-                    self.found.fault(token.span.start, "brackets are nested too deep");
+                    self.found
+                        .fault(token.span.start, "brackets are nested too deep");
                 }
             } else if token.is(b'}') && open.pop().is_none() {
                 self.found.fault(token.span.start, "`}` without `{`");
             }
         }
         for token in open {
-            self.found.fault(token.span.start, "`{` without `}` on its line");
+            self.found
+                .fault(token.span.start, "`{` without `}` on its line");
         }
         self.found.faults.len() == before
     }
@@ -165,7 +220,10 @@ impl Reader<'_> {
             self.found.fault(colon, RELATIVE);
             return;
         }
-        let end = line.iter().position(|token| self.source.is_word(token, &["WITH"])).unwrap_or(line.len());
+        let end = line
+            .iter()
+            .position(|token| self.source.is_word(token, &["WITH"]))
+            .unwrap_or(line.len());
         let (mut depth, mut operand, mut begins) = (0, 0, true);
         let mut k = 1;
         while k < end {
@@ -184,10 +242,18 @@ impl Reader<'_> {
             let behind = line.get(close + 1).filter(|_| close + 1 < end);
             let whole = begins && operand < positions;
             if !whole || depth != 0 {
-                self.found.fault(token.span.start, "an aggregate that is no position of this motion");
-            } else if let Some(stray) = behind.filter(|next| !(next.is(b',') || self.source.is_word(next, &BLENDING))) {
+                self.found.fault(
+                    token.span.start,
+                    "an aggregate that is no position of this motion",
+                );
+            } else if let Some(stray) =
+                behind.filter(|next| !(next.is(b',') || self.source.is_word(next, &BLENDING)))
+            {
                 let text = quoted(self.source.bytes, stray.span.clone());
-                self.found.fault(stray.span.start, format!("{text} behind a position is not understood"));
+                self.found.fault(
+                    stray.span.start,
+                    format!("{text} behind a position is not understood"),
+                );
             } else {
                 self.position(&line[k..=close]);
             }
@@ -219,9 +285,14 @@ impl Reader<'_> {
         while k < tokens.len() {
             if tokens[k].is(b'{') {
                 let close = closing(tokens, k);
-                let system = k > 1 && tokens[k - 1].is(b'=') && self.source.upper(&tokens[k - 2]).starts_with('$');
+                let system = k > 1
+                    && tokens[k - 1].is(b'=')
+                    && self.source.upper(&tokens[k - 2]).starts_with('$');
                 if !system && Aggregate::new(self.source, &tokens[k..=close]).may_be_target() {
-                    self.found.fault(tokens[k].span.start, "an aggregate that is no position of this motion");
+                    self.found.fault(
+                        tokens[k].span.start,
+                        "an aggregate that is no position of this motion",
+                    );
                 }
                 k = close;
             }
@@ -232,16 +303,23 @@ impl Reader<'_> {
     /// Where a geometric operator stands.
     fn geometric(&self, line: &[Token]) -> Option<usize> {
         let label = line.len() == 2;
-        let heading = line.iter().any(|token| self.source.is_word(token, &["DEF", "DEFFCT", "EXT", "EXTFCT", "EXTP", "EXTFCTP"]));
+        let heading = line.iter().any(|token| {
+            self.source.is_word(
+                token,
+                &["DEF", "DEFFCT", "EXT", "EXTFCT", "EXTP", "EXTFCTP"],
+            )
+        });
         let mut depth = 0;
-        line.iter().filter(|_| !label && !heading).find_map(|token| {
-            match token.sort {
-                TokenKind::Sign(b'{') => depth += 1,
-                TokenKind::Sign(b'}') => depth -= 1,
-                _ => {}
-            }
-            (depth == 0 && token.is(b':')).then_some(token.span.start)
-        })
+        line.iter()
+            .filter(|_| !label && !heading)
+            .find_map(|token| {
+                match token.sort {
+                    TokenKind::Sign(b'{') => depth += 1,
+                    TokenKind::Sign(b'}') => depth -= 1,
+                    _ => {}
+                }
+                (depth == 0 && token.is(b':')).then_some(token.span.start)
+            })
     }
 
     /// A declaration, an assignment, or what is neither.
@@ -252,7 +330,10 @@ impl Reader<'_> {
             match has_aggregate {
                 _ if declares.as_deref() == Some("FRAME") || self.sets_frame(line) => {}
                 true => self.found.fault(at, RELATIVE),
-                false => self.found.warn(at, "left as it is: a pose that the program computes by the geometric operator `:`"),
+                false => self.found.warn(
+                    at,
+                    "left as it is: a pose that the program computes by the geometric operator `:`",
+                ),
             }
             return;
         }
@@ -271,7 +352,10 @@ impl Reader<'_> {
                 }
                 if let Some(stray) = line.get(close + 1).filter(|next| taken && !next.is(b',')) {
                     let text = quoted(self.source.bytes, stray.span.clone());
-                    self.found.fault(stray.span.start, format!("{text} behind a target is not understood"));
+                    self.found.fault(
+                        stray.span.start,
+                        format!("{text} behind a target is not understood"),
+                    );
                 }
                 k = close;
             }
@@ -282,7 +366,9 @@ impl Reader<'_> {
     /// Whether a line sets a variable that is known to be no target.
     fn sets_frame(&self, line: &[Token]) -> bool {
         let name = self.source.upper(&line[0]);
-        name.starts_with('$') || FRAME_TABLES.contains(&name.as_str()) || self.stated(&name) == Some("FRAME")
+        name.starts_with('$')
+            || FRAME_TABLES.contains(&name.as_str())
+            || self.stated(&name) == Some("FRAME")
     }
 
     /// The one type that a variable has in this file.
@@ -300,23 +386,40 @@ impl Reader<'_> {
         let (name, member) = variable(self.source, before).unwrap_or_default();
         let prefix = aggregate.prefix();
         if name.starts_with('$') {
-            if aggregate.by_fields().is_of_axes() || prefix.as_deref().and_then(Type::of).is_some() {
-                self.found.warn(at, format!("left as it is: `{name}` is a variable of the system"));
+            if aggregate.by_fields().is_of_axes() || prefix.as_deref().and_then(Type::of).is_some()
+            {
+                self.found.warn(
+                    at,
+                    format!("left as it is: `{name}` is a variable of the system"),
+                );
             }
             return;
         }
         if FRAME_TABLES.contains(&name.as_str()) {
             return;
         }
-        let by_name = declares.or_else(|| self.stated(&name)).filter(|_| member.is_none()).map(String::from);
+        let by_name = declares
+            .or_else(|| self.stated(&name))
+            .filter(|_| member.is_none())
+            .map(String::from);
         match prefix.or(by_name) {
             Some(kind) => match Type::of(&kind) {
                 Some(kind) => aggregate.take(kind, &mut self.found),
                 None => self.of_other_type(&kind, tokens),
             },
             None if aggregate.may_be_target() => {
-                let what = if name.is_empty() { "this aggregate".into() } else { format!("`{name}`") };
-                self.found.fault(at, format!("the type of {what} is not stated in this file; write {}", aggregate.advice()));
+                let what = if name.is_empty() {
+                    "this aggregate".into()
+                } else {
+                    format!("`{name}`")
+                };
+                self.found.fault(
+                    at,
+                    format!(
+                        "the type of {what} is not stated in this file; write {}",
+                        aggregate.advice()
+                    ),
+                );
             }
             None => self.nested(tokens),
         }
@@ -325,11 +428,21 @@ impl Reader<'_> {
     /// An aggregate of a type that is none of targets: it is left where the type is known, or declared in this file.
     fn of_other_type(&mut self, kind: &str, tokens: &[Token]) {
         let at = tokens[0].span.start;
-        if kind != "FDAT" && !KNOWN.contains(&kind) && Aggregate::new(self.source, tokens).may_be_target() {
+        if kind != "FDAT"
+            && !KNOWN.contains(&kind)
+            && Aggregate::new(self.source, tokens).may_be_target()
+        {
             if self.structures.contains(kind) {
-                self.found.warn(at, format!("left as it is: {kind} is a structure of this file and no type of targets"));
+                self.found.warn(
+                    at,
+                    format!(
+                        "left as it is: {kind} is a structure of this file and no type of targets"
+                    ),
+                );
             } else {
-                let message = format!("type {kind} is not understood: calib cannot say whether this is a target");
+                let message = format!(
+                    "type {kind} is not understood: calib cannot say whether this is a target"
+                );
                 self.found.fault(at, message);
                 return;
             }
@@ -347,14 +460,22 @@ impl Reader<'_> {
                 let aggregate = Aggregate::new(self.source, inner);
                 match aggregate.prefix().as_deref().map(Type::of) {
                     Some(Some(kind)) => aggregate.take(kind, &mut self.found),
-                    Some(None) => self.of_other_type(&aggregate.prefix().unwrap_or_default(), inner),
+                    Some(None) => {
+                        self.of_other_type(&aggregate.prefix().unwrap_or_default(), inner)
+                    }
                     // The centre of mass and the inertia of a LOAD.
                     None if self.source.is_word(&tokens[k - 1], &["CM", "J"]) => {}
                     None if aggregate.is_frame() => {
-                        self.found.warn(inner[0].span.start, "left as it is: read as a FRAME inside a structure");
+                        self.found.warn(
+                            inner[0].span.start,
+                            "left as it is: read as a FRAME inside a structure",
+                        );
                     }
                     None if aggregate.may_be_target() => {
-                        let message = format!("the type of this aggregate is not stated; write {}", aggregate.advice());
+                        let message = format!(
+                            "the type of this aggregate is not stated; write {}",
+                            aggregate.advice()
+                        );
                         self.found.fault(inner[0].span.start, message);
                     }
                     _ => self.nested(inner),
@@ -367,8 +488,13 @@ impl Reader<'_> {
 
     /// `XP1.Z = 50`: one number of a target.
     fn component(&mut self, line: &[Token], head: &str) {
-        let Some((Some(member), Some(_))) = member(self.source, &line[1..]) else { return };
-        let of_target = ["X", "Y", "Z", "A", "B", "C", "A1", "A2", "A3", "A4", "A5", "A6"].contains(&member.as_str());
+        let Some((Some(member), Some(_))) = member(self.source, &line[1..]) else {
+            return;
+        };
+        let of_target = [
+            "X", "Y", "Z", "A", "B", "C", "A1", "A2", "A3", "A4", "A5", "A6",
+        ]
+        .contains(&member.as_str());
         if !of_target || head.starts_with('$') || self.sets_frame(line) {
             return;
         }
@@ -378,7 +504,12 @@ impl Reader<'_> {
             self.found
                 .partial(at, format!("sets {member} of the target `{head}` alone; a target is corrected whole or not at all"));
         } else if types.is_empty() {
-            self.found.warn(at, format!("left as it is: sets {member} of `{head}`, whose type this file does not state"));
+            self.found.warn(
+                at,
+                format!(
+                    "left as it is: sets {member} of `{head}`, whose type this file does not state"
+                ),
+            );
         }
     }
 }

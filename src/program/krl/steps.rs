@@ -7,30 +7,75 @@ use super::super::token::{ProgramText, Token, TokenKind};
 const ROUTINES: [&str; 2] = ["DEF", "DEFFCT"];
 
 /// The lines of a file as steps; `sets`: whether a line sets what is in force.
-pub(super) fn steps(source: ProgramText, lines: &[&[Token]], sets: impl Fn(&[Token]) -> bool) -> Vec<FlowLine> {
+pub(super) fn steps(
+    source: ProgramText,
+    lines: &[&[Token]],
+    sets: impl Fn(&[Token]) -> bool,
+) -> Vec<FlowLine> {
     let all: Vec<FlowStep> = lines.iter().map(|line| step(source, line)).collect();
-    let routines: Vec<&String> =
-        all.iter().filter_map(|step| if let FlowStep::Routine(name) = step { Some(name) } else { None }).collect();
+    let routines: Vec<&String> = all
+        .iter()
+        .filter_map(|step| {
+            if let FlowStep::Routine(name) = step {
+                Some(name)
+            } else {
+                None
+            }
+        })
+        .collect();
     let called = |line: &[Token], step: &FlowStep| -> Vec<String> {
-        let calls = line.windows(2).filter(|w| w[0].sort == TokenKind::Word && w[1].is(b'('));
-        let named = calls.map(|w| source.upper(&w[0])).filter(|name| routines.contains(&name));
-        if matches!(step, FlowStep::Routine(_)) || is_declared(source, line) { Vec::new() } else { named.collect() }
+        let calls = line
+            .windows(2)
+            .filter(|w| w[0].sort == TokenKind::Word && w[1].is(b'('));
+        let named = calls
+            .map(|w| source.upper(&w[0]))
+            .filter(|name| routines.contains(&name));
+        if matches!(step, FlowStep::Routine(_)) || is_declared(source, line) {
+            Vec::new()
+        } else {
+            named.collect()
+        }
     };
-    let of = |(line, step): (&&[Token], FlowStep)| FlowLine { calls: called(line, &step), sets: sets(line), step };
+    let of = |(line, step): (&&[Token], FlowStep)| FlowLine {
+        calls: called(line, &step),
+        sets: sets(line),
+        step,
+    };
     lines.iter().zip(all.clone()).map(of).collect()
 }
 
 /// `EXT`, `INTERRUPT DECL` and `TRIGGER`: what they name runs at another time.
 fn is_declared(source: ProgramText, line: &[Token]) -> bool {
-    source.is_word(&line[0], &["EXT", "EXTFCT", "EXTP", "EXTFCTP", "INTERRUPT", "GLOBAL", "TRIGGER"])
+    source.is_word(
+        &line[0],
+        &[
+            "EXT",
+            "EXTFCT",
+            "EXTP",
+            "EXTFCTP",
+            "INTERRUPT",
+            "GLOBAL",
+            "TRIGGER",
+        ],
+    )
 }
 
 pub(super) fn step(source: ProgramText, line: &[Token]) -> FlowStep {
     let word = source.upper(&line[0]);
-    let second = line.get(1).map(|token| source.upper(token)).unwrap_or_default();
-    if let Some(at) = line.iter().take(3).position(|token| source.is_word(token, &ROUTINES)) {
+    let second = line
+        .get(1)
+        .map(|token| source.upper(token))
+        .unwrap_or_default();
+    if let Some(at) = line
+        .iter()
+        .take(3)
+        .position(|token| source.is_word(token, &ROUTINES))
+    {
         // A function has its type before its name.
-        let name = line[at + 1..].windows(2).find(|w| w[1].is(b'(')).map(|w| source.upper(&w[0]));
+        let name = line[at + 1..]
+            .windows(2)
+            .find(|w| w[1].is(b'('))
+            .map(|w| source.upper(&w[0]));
         return FlowStep::Routine(name.unwrap_or(second));
     }
     if line.len() == 2 && line[0].sort == TokenKind::Word && line[1].is(b':') {

@@ -19,7 +19,9 @@ use std::collections::BTreeMap;
 const OF_A_POINT: [&str; 5] = ["FRAMES", "PTP_PARAMS", "CP_PARAMS", "PTP_DAT", "CP_DAT"];
 
 /// Heads of lines that name a routine and do not call it.
-const DECLARING: [&str; 7] = ["DEF", "DEFFCT", "GLOBAL", "EXT", "EXTFCT", "EXTP", "EXTFCTP"];
+const DECLARING: [&str; 7] = [
+    "DEF", "DEFFCT", "GLOBAL", "EXT", "EXTFCT", "EXTP", "EXTFCTP",
+];
 
 /// What an inline form says of its point.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,14 +55,25 @@ pub(super) struct SystemState {
 
 impl JoinedState for SystemState {
     fn joined(&self, other: &Self) -> Self {
-        let point = self.point.clone().filter(|point| other.point.as_ref() == Some(point));
-        Self { force: self.force.joined(&other.force), point, astray: self.astray.joined(&other.astray) }
+        let point = self
+            .point
+            .clone()
+            .filter(|point| other.point.as_ref() == Some(point));
+        Self {
+            force: self.force.joined(&other.force),
+            point,
+            astray: self.astray.joined(&other.astray),
+        }
     }
 }
 
 impl SystemState {
     /// At the beginning of a program.
-    pub const START: Self = Self { force: InForce::NOTHING, point: None, astray: Setting::Unset };
+    pub const START: Self = Self {
+        force: InForce::NOTHING,
+        point: None,
+        astray: Setting::Unset,
+    };
 
     /// What is in force at a motion.
     pub fn at_motion(&self) -> InForce {
@@ -68,9 +81,15 @@ impl SystemState {
             Setting::Unset => return self.force.clone(),
             Setting::Known(why, _) if why.is_empty() => return self.force.clone(),
             Setting::Known(why, _) => why.clone(),
-            Setting::Open(_) => "is not known: $IPO_MODE or $ROBROOT is set on some of the ways that lead here".into(),
+            Setting::Open(_) => {
+                "is not known: $IPO_MODE or $ROBROOT is set on some of the ways that lead here"
+                    .into()
+            }
         };
-        InForce { base: Setting::Open(base), ..self.force.clone() }
+        InForce {
+            base: Setting::Open(base),
+            ..self.force.clone()
+        }
     }
 }
 
@@ -88,29 +107,60 @@ impl SystemData {
         for line in lines {
             if let Some((name, number, value)) = entry(source, line) {
                 match name.as_str() {
-                    "BASE_DATA" => note(&mut self.bases, number, value.and_then(|value| frame(source, value))),
-                    "TOOL_DATA" => note(&mut self.tools, number, value.and_then(|value| frame(source, value))),
-                    _ => note(&mut self.loads, number, value.and_then(|value| mass(source, value))),
+                    "BASE_DATA" => note(
+                        &mut self.bases,
+                        number,
+                        value.and_then(|value| frame(source, value)),
+                    ),
+                    "TOOL_DATA" => note(
+                        &mut self.tools,
+                        number,
+                        value.and_then(|value| frame(source, value)),
+                    ),
+                    _ => note(
+                        &mut self.loads,
+                        number,
+                        value.and_then(|value| mass(source, value)),
+                    ),
                 }
             } else if let Some((kind, names)) = declared(source, line)
                 && let Some(at) = line.iter().position(|token| token.is(b'='))
             {
                 match kind.as_str() {
-                    "FDAT" => note(&mut self.points, names[0].clone(), point(source, &line[at + 1..])),
-                    "FRAME" => note(&mut self.frames, names[0].clone(), frame(source, &line[at + 1..])),
+                    "FDAT" => note(
+                        &mut self.points,
+                        names[0].clone(),
+                        point(source, &line[at + 1..]),
+                    ),
+                    "FRAME" => note(
+                        &mut self.frames,
+                        names[0].clone(),
+                        frame(source, &line[at + 1..]),
+                    ),
                     _ => {}
                 }
             }
         }
         // Set a second time, in whole or in part.
-        for line in lines.iter().filter(|line| line.len() > 2 && declared(source, line).is_none()) {
+        for line in lines
+            .iter()
+            .filter(|line| line.len() > 2 && declared(source, line).is_none())
+        {
             let name = source.upper(&line[0]);
             if let Some((of, Some(value))) = member(source, &line[1..]) {
                 let whole = of.is_none();
                 if self.frames.contains_key(&name) {
-                    note(&mut self.frames, name, frame(source, value).filter(|_| whole));
+                    note(
+                        &mut self.frames,
+                        name,
+                        frame(source, value).filter(|_| whole),
+                    );
                 } else if self.points.contains_key(&name) {
-                    note(&mut self.points, name, point(source, value).filter(|_| whole));
+                    note(
+                        &mut self.points,
+                        name,
+                        point(source, value).filter(|_| whole),
+                    );
                 }
             }
         }
@@ -121,7 +171,9 @@ impl SystemData {
     pub fn declare_routines(&mut self, files: &[(ProgramText, Vec<&[Token]>)]) {
         loop {
             let before = self.routines.clone();
-            files.iter().for_each(|(source, lines)| self.declare_routines_of(*source, lines));
+            files
+                .iter()
+                .for_each(|(source, lines)| self.declare_routines_of(*source, lines));
             if self.routines == before {
                 return;
             }
@@ -148,7 +200,15 @@ impl SystemData {
 
     /// Whether a line sets what is in force.
     pub fn sets(&self, source: ProgramText, line: &[Token]) -> bool {
-        const SET: [&str; 7] = ["$BASE", "$TOOL", "$LOAD", "$IPO_MODE", "$ROBROOT", "FDAT_ACT", "BAS"];
+        const SET: [&str; 7] = [
+            "$BASE",
+            "$TOOL",
+            "$LOAD",
+            "$IPO_MODE",
+            "$ROBROOT",
+            "FDAT_ACT",
+            "BAS",
+        ];
         source.is_word(&line[0], &SET) || self.called(source, line).is_some()
     }
 
@@ -157,14 +217,19 @@ impl SystemData {
         if source.is_word(&line[0], &DECLARING) {
             return None;
         }
-        let calls = line.windows(2).filter(|w| w[0].sort == TokenKind::Word && w[1].is(b'('));
-        calls.map(|w| source.upper(&w[0])).find(|name| self.routines.get(name) == Some(&true))
+        let calls = line
+            .windows(2)
+            .filter(|w| w[0].sort == TokenKind::Word && w[1].is(b'('));
+        calls
+            .map(|w| source.upper(&w[0]))
+            .find(|name| self.routines.get(name) == Some(&true))
     }
 
     /// The routine that a line calls and that no file that was read has.
     pub fn unknown_call(&self, source: ProgramText, line: &[Token]) -> Option<String> {
         let call = line.len() > 2 && line[0].sort == TokenKind::Word && line[1].is(b'(');
-        let known = source.is_word(&line[0], &["BAS"]) || self.routines.contains_key(&source.upper(&line[0]));
+        let known = source.is_word(&line[0], &["BAS"])
+            || self.routines.contains_key(&source.upper(&line[0]));
         (call && !known).then(|| source.upper(&line[0]))
     }
 
@@ -173,16 +238,27 @@ impl SystemData {
         if source.is_word(&line[0], &["BAS"]) {
             self.call(source, line, place, state);
         } else if let Some(name) = self.called(source, line) {
-            state.force = InForce::open(&format!("is set by {name}, a routine of another file ({place})"));
+            state.force = InForce::open(&format!(
+                "is set by {name}, a routine of another file ({place})"
+            ));
         } else {
             self.set(source, line, place, state);
         }
     }
 
     /// A motion with what stands behind its `WITH`.
-    pub fn at_motion(&self, source: ProgramText, line: &[Token], place: &str, state: &SystemState) -> InForce {
+    pub fn at_motion(
+        &self,
+        source: ProgramText,
+        line: &[Token],
+        place: &str,
+        state: &SystemState,
+    ) -> InForce {
         let mut state = state.clone();
-        let with = line.iter().position(|token| source.is_word(token, &["WITH"])).map_or(line.len(), |at| at + 1);
+        let with = line
+            .iter()
+            .position(|token| source.is_word(token, &["WITH"]))
+            .map_or(line.len(), |at| at + 1);
         let mut depth = 0;
         let settings = line[with..].split(|token| {
             depth += opens(token);
@@ -197,7 +273,9 @@ impl SystemData {
     /// `$BASE = ...` and the like.
     fn set(&self, source: ProgramText, line: &[Token], place: &str, state: &mut SystemState) {
         let name = source.upper(&line[0]);
-        let Some((of, Some(value))) = member(source, &line[1..]) else { return };
+        let Some((of, Some(value))) = member(source, &line[1..]) else {
+            return;
+        };
         let by = format!("{name} of {place}");
         let open = |why: &str| format!("{why} ({name} of {place})");
         match name.as_str() {
@@ -220,47 +298,73 @@ impl SystemData {
                 }
             }
             "$IPO_MODE" => {
-                let carried = value.get(1).is_some_and(|word| source.is_word(word, &["BASE"]));
-                let point = of_function(source, value, &["SIPO_MODE"]).and_then(|name| self.point(&name));
+                let carried = value
+                    .get(1)
+                    .is_some_and(|word| source.is_word(word, &["BASE"]));
+                let point =
+                    of_function(source, value, &["SIPO_MODE"]).and_then(|name| self.point(&name));
                 let carried = carried || point.is_some_and(|point| !point.fixed_tool);
-                state.astray = Setting::Known(if carried { String::new() } else { open(FIXED) }, by);
+                state.astray =
+                    Setting::Known(if carried { String::new() } else { open(FIXED) }, by);
             }
             "$ROBROOT" => {
                 let zero = frame(source, value).is_some_and(|pose| pose == Pose::identity());
                 let why = open("is not known: the program moves the robot's base");
                 state.astray = Setting::Known(if zero { String::new() } else { why }, by);
             }
-            "FDAT_ACT" => state.point = value.first().map(|name| source.upper(name)).filter(|_| of.is_none()),
+            "FDAT_ACT" => {
+                state.point = value
+                    .first()
+                    .map(|name| source.upper(name))
+                    .filter(|_| of.is_none())
+            }
             _ => {}
         }
     }
 
     /// `BAS(#BASE, 3)`.
     fn call(&self, source: ProgramText, line: &[Token], place: &str, state: &mut SystemState) {
-        let [_, open, sharp, what, rest @ ..] = line else { return };
+        let [_, open, sharp, what, rest @ ..] = line else {
+            return;
+        };
         if !open.is(b'(') || !sharp.is(b'#') {
             return;
         }
         let what = source.upper(what);
-        let number = rest.get(1..2).and_then(|number| source.number(number)).map(|(number, _)| number as i64);
+        let number = rest
+            .get(1..2)
+            .and_then(|number| source.number(number))
+            .map(|(number, _)| number as i64);
         if OF_A_POINT.contains(&what.as_str()) {
-            let point = state.point.as_ref().map(|name| (name.clone(), self.point(name)));
+            let point = state
+                .point
+                .as_ref()
+                .map(|name| (name.clone(), self.point(name)));
             match point {
-                Some((name, Some(point))) => self.apply(point, &format!("{name} at {place}"), state),
+                Some((name, Some(point))) => {
+                    self.apply(point, &format!("{name} at {place}"), state)
+                }
                 Some((name, None)) => {
-                    state.force = InForce::open(&format!("is that of {name}, which no file that was read declares ({place})"))
+                    state.force = InForce::open(&format!(
+                        "is that of {name}, which no file that was read declares ({place})"
+                    ))
                 }
                 None => {}
             }
         } else if what == "BASE" {
             state.force.base = match number.and_then(|number| self.base_of(number)) {
                 Some(pose) => Setting::Known(pose, format!("BAS(#BASE) of {place}")),
-                None => Setting::Open(format!("is an entry of BASE_DATA that no file that was read declares ({place})")),
+                None => Setting::Open(format!(
+                    "is an entry of BASE_DATA that no file that was read declares ({place})"
+                )),
             };
         } else if what == "TOOL" {
             match number {
                 Some(number) => self.use_tool(number, &format!("BAS(#TOOL) of {place}"), state),
-                None => state.force.tool = Setting::Open(format!("is chosen when the program runs ({place})")),
+                None => {
+                    state.force.tool =
+                        Setting::Open(format!("is chosen when the program runs ({place})"))
+                }
             }
         } else if what == "EX_BASE" {
             state.force.base = Setting::Open(format!("moves with an external kinematic ({place})"));
@@ -271,14 +375,27 @@ impl SystemData {
         self.use_tool(point.tool, by, state);
         state.force.base = match self.base_of(point.base) {
             Some(pose) => Setting::Known(pose, format!("BASE_DATA[{}] by {by}", point.base)),
-            None => Setting::Open(format!("is BASE_DATA[{}], which no file that was read declares ({by})", point.base)),
+            None => Setting::Open(format!(
+                "is BASE_DATA[{}], which no file that was read declares ({by})",
+                point.base
+            )),
         };
-        state.astray = Setting::Known(if point.fixed_tool { format!("{FIXED} ({by})") } else { String::new() }, by.into());
+        state.astray = Setting::Known(
+            if point.fixed_tool {
+                format!("{FIXED} ({by})")
+            } else {
+                String::new()
+            },
+            by.into(),
+        );
     }
 
     fn use_tool(&self, number: i64, by: &str, state: &mut SystemState) {
         state.force.tool = Setting::Known(self.tool_of(number), by.into());
-        state.force.load = Setting::Known(self.loads.get(&number).copied().flatten(), format!("LOAD_DATA[{number}], by {by},"));
+        state.force.load = Setting::Known(
+            self.loads.get(&number).copied().flatten(),
+            format!("LOAD_DATA[{number}], by {by},"),
+        );
     }
 
     fn point(&self, name: &str) -> Option<PointData> {
@@ -286,12 +403,23 @@ impl SystemData {
     }
 
     fn base_of(&self, number: i64) -> Option<Pose> {
-        if number == 0 { Some(Pose::identity()) } else { self.bases.get(&number).copied().flatten() }
+        if number == 0 {
+            Some(Pose::identity())
+        } else {
+            self.bases.get(&number).copied().flatten()
+        }
     }
 
     fn tool_of(&self, number: i64) -> ToolInForce {
-        let frame = if number == 0 { Some(Pose::identity()) } else { self.tools.get(&number).copied().flatten() };
-        ToolInForce { name: format!("TOOL_DATA[{number}]"), frame }
+        let frame = if number == 0 {
+            Some(Pose::identity())
+        } else {
+            self.tools.get(&number).copied().flatten()
+        };
+        ToolInForce {
+            name: format!("TOOL_DATA[{number}]"),
+            frame,
+        }
     }
 
     /// Frames of tools by their names, as the files declare them.
@@ -301,7 +429,9 @@ impl SystemData {
 
     fn base(&self, source: ProgramText, value: &[Token]) -> Option<Pose> {
         let of_point = || {
-            of_function(source, value, &["SBASE"]).and_then(|name| self.point(&name)).and_then(|point| self.base_of(point.base))
+            of_function(source, value, &["SBASE"])
+                .and_then(|name| self.point(&name))
+                .and_then(|point| self.base_of(point.base))
         };
         frame(source, value)
             .or_else(|| self.named(source, value))
@@ -311,11 +441,18 @@ impl SystemData {
 
     fn tool(&self, source: ProgramText, value: &[Token]) -> Option<ToolInForce> {
         let plain = frame(source, value).or_else(|| self.named(source, value));
-        let named = |frame| ToolInForce { name: "$TOOL".into(), frame: Some(frame) };
+        let named = |frame| ToolInForce {
+            name: "$TOOL".into(),
+            frame: Some(frame),
+        };
         let number = indexed(source, value, "TOOL_DATA").or_else(|| {
-            of_function(source, value, &["STOOL", "STOOL2"]).and_then(|name| self.point(&name)).map(|point| point.tool)
+            of_function(source, value, &["STOOL", "STOOL2"])
+                .and_then(|name| self.point(&name))
+                .map(|point| point.tool)
         });
-        plain.map(named).or_else(|| number.map(|number| self.tool_of(number)))
+        plain
+            .map(named)
+            .or_else(|| number.map(|number| self.tool_of(number)))
     }
 
     /// The mass of a load, none where its declaration does not say; none at all where the text does not say which load it is.
@@ -323,8 +460,11 @@ impl SystemData {
         if value.first().is_some_and(|first| first.is(b'{')) {
             return Some(mass(source, value));
         }
-        let number = indexed(source, value, "LOAD_DATA")
-            .or_else(|| of_function(source, value, &["SLOAD"]).and_then(|name| self.point(&name)).map(|point| point.tool));
+        let number = indexed(source, value, "LOAD_DATA").or_else(|| {
+            of_function(source, value, &["SLOAD"])
+                .and_then(|name| self.point(&name))
+                .map(|point| point.tool)
+        });
         number.map(|number| self.loads.get(&number).copied().flatten())
     }
 
@@ -335,10 +475,14 @@ impl SystemData {
 
     /// Why a frame is not known.
     fn unknown(&self, source: ProgramText, value: &[Token], of_part: bool) -> String {
-        let table = ["BASE_DATA", "TOOL_DATA"].into_iter().find_map(|table| Some((table, indexed(source, value, table)?)));
+        let table = ["BASE_DATA", "TOOL_DATA"]
+            .into_iter()
+            .find_map(|table| Some((table, indexed(source, value, table)?)));
         match table {
             _ if of_part => "is set in parts".into(),
-            Some((table, number)) => format!("is {table}[{number}], which no file that was read declares"),
+            Some((table, number)) => {
+                format!("is {table}[{number}], which no file that was read declares")
+            }
             None => "is computed when the program runs".into(),
         }
     }
@@ -348,23 +492,38 @@ const FIXED: &str = "is carried by the robot: the tool stands still ($IPO_MODE #
 
 /// `BASE_DATA[3] = {...}`: name, number, and the value; none where a part of it is set.
 fn entry<'t>(source: ProgramText, line: &'t [Token]) -> Option<(String, i64, Option<&'t [Token]>)> {
-    let [name, open, number, close, rest @ ..] = line else { return None };
-    let is = open.is(b'[') && close.is(b']') && source.is_word(name, &["BASE_DATA", "TOOL_DATA", "LOAD_DATA"]);
+    let [name, open, number, close, rest @ ..] = line else {
+        return None;
+    };
+    let is = open.is(b'[')
+        && close.is(b']')
+        && source.is_word(name, &["BASE_DATA", "TOOL_DATA", "LOAD_DATA"]);
     let (number, _) = source.number(std::slice::from_ref(number))?;
     let (of, value) = member(source, rest).filter(|_| is)?;
-    Some((source.upper(name), number as i64, value.filter(|_| of.is_none())))
+    Some((
+        source.upper(name),
+        number as i64,
+        value.filter(|_| of.is_none()),
+    ))
 }
 
 /// The number in `TABLE[3]`.
 fn indexed(source: ProgramText, value: &[Token], table: &str) -> Option<i64> {
-    let [name, open, number, close] = value else { return None };
+    let [name, open, number, close] = value else {
+        return None;
+    };
     let is = source.is_word(name, &[table]) && open.is(b'[') && close.is(b']');
-    source.number(std::slice::from_ref(number)).filter(|_| is).map(|(number, _)| number as i64)
+    source
+        .number(std::slice::from_ref(number))
+        .filter(|_| is)
+        .map(|(number, _)| number as i64)
 }
 
 /// The point in `NAME(FP1)` or `NAME(FP1.MEMBER)`.
 fn of_function(source: ProgramText, value: &[Token], names: &[&str]) -> Option<String> {
-    let [name, open, point, ..] = value else { return None };
+    let [name, open, point, ..] = value else {
+        return None;
+    };
     let is = source.is_word(name, names) && open.is(b'(') && point.sort == TokenKind::Word;
     is.then(|| source.upper(point))
 }
@@ -388,13 +547,21 @@ fn mass(source: ProgramText, value: &[Token]) -> Option<f64> {
 /// The data of a point.
 fn point(source: ProgramText, value: &[Token]) -> Option<PointData> {
     let number = |name: &str| field(source, value, name).map(|number| number as i64);
-    let fixed_tool = value.windows(3).any(|w| source.is_word(&w[0], &["IPO_FRAME"]) && source.is_word(&w[2], &["TCP"]));
-    Some(PointData { tool: number("TOOL_NO")?, base: number("BASE_NO")?, fixed_tool })
+    let fixed_tool = value
+        .windows(3)
+        .any(|w| source.is_word(&w[0], &["IPO_FRAME"]) && source.is_word(&w[2], &["TCP"]));
+    Some(PointData {
+        tool: number("TOOL_NO")?,
+        base: number("BASE_NO")?,
+        fixed_tool,
+    })
 }
 
 /// A number of an aggregate by its name, not of those inside.
 fn field(source: ProgramText, value: &[Token], name: &str) -> Option<f64> {
-    let [open, .., close] = value else { return None };
+    let [open, .., close] = value else {
+        return None;
+    };
     let whole = open.is(b'{') && close.is(b'}') && closing(value, 0) + 1 == value.len();
     whole.then(|| Aggregate::new(source, value).number(name))?
 }

@@ -20,8 +20,11 @@ pub(super) fn depths(tokens: &[Token]) -> impl Iterator<Item = (&Token, i32)> {
 
 /// Between the commas outside of brackets.
 pub(super) fn arguments(tokens: &[Token]) -> Vec<&[Token]> {
-    let commas: Vec<usize> =
-        depths(tokens).enumerate().filter(|(_, (token, depth))| *depth == 0 && token.is(b',')).map(|(k, _)| k).collect();
+    let commas: Vec<usize> = depths(tokens)
+        .enumerate()
+        .filter(|(_, (token, depth))| *depth == 0 && token.is(b','))
+        .map(|(k, _)| k)
+        .collect();
     let mut start = 0;
     let mut out = Vec::with_capacity(commas.len() + 1);
     for comma in commas {

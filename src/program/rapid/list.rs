@@ -19,12 +19,20 @@ pub(super) enum Want {
 
 impl Want {
     pub fn name(self) -> &'static str {
-        if self == Self::Joints { "jointtarget" } else { "robtarget" }
+        if self == Self::Joints {
+            "jointtarget"
+        } else {
+            "robtarget"
+        }
     }
 
     /// How many numbers each list has.
     fn shape(self) -> &'static [usize] {
-        if self == Self::Joints { &[6, 6] } else { &[3, 4, 4, 6] }
+        if self == Self::Joints {
+            &[6, 6]
+        } else {
+            &[3, 4, 4, 6]
+        }
     }
 }
 
@@ -61,7 +69,8 @@ impl<'t> List<'t> {
                 k += Self::read(source, &tokens[k..]).tokens;
                 continue;
             }
-            round += i32::from(token.is(b'(') || token.is(b'{')) - i32::from(token.is(b')') || token.is(b'}'));
+            round += i32::from(token.is(b'(') || token.is(b'{'))
+                - i32::from(token.is(b')') || token.is(b'}'));
             let closes = token.is(b']');
             if closes || (token.is(b',') && round == 0) {
                 items.push(match inner.take() {
@@ -75,21 +84,40 @@ impl<'t> List<'t> {
                 break;
             }
         }
-        Self { source, span: source.over(&tokens[..k], 0), tokens: k, items }
+        Self {
+            source,
+            span: source.over(&tokens[..k], 0),
+            tokens: k,
+            items,
+        }
     }
 
     fn lists(&self) -> impl Iterator<Item = &List<'t>> {
-        self.items.iter().filter_map(|item| if let Item::List(list) = item { Some(list) } else { None })
+        self.items.iter().filter_map(|item| {
+            if let Item::List(list) = item {
+                Some(list)
+            } else {
+                None
+            }
+        })
     }
 
     /// The list that is item `k`.
     pub fn list(&self, k: usize) -> Option<&List<'t>> {
-        self.items.get(k).and_then(|item| if let Item::List(list) = item { Some(list) } else { None })
+        self.items.get(k).and_then(|item| {
+            if let Item::List(list) = item {
+                Some(list)
+            } else {
+                None
+            }
+        })
     }
 
     /// The number that is item `k`.
     pub fn number(&self, k: usize) -> Option<f64> {
-        let Item::Leaf(tokens) = self.items.get(k)? else { return None };
+        let Item::Leaf(tokens) = self.items.get(k)? else {
+            return None;
+        };
         self.source.number(tokens).map(|(number, _)| number)
     }
 
@@ -106,7 +134,9 @@ impl<'t> List<'t> {
                 Item::List(list) => list.items.len() == *size && list.lists().next().is_none(),
                 Item::Leaf(_) => true,
             };
-            self.items.len() == shape.len() && self.lists().next().is_some() && self.items.iter().zip(shape).all(fits)
+            self.items.len() == shape.len()
+                && self.lists().next().is_some()
+                && self.items.iter().zip(shape).all(fits)
         };
         // A slip in what follows makes no other thing of it.
         let begins = |want: &Want| {
@@ -116,7 +146,10 @@ impl<'t> List<'t> {
             self.items.len() > used && self.items.iter().zip(&shape[..used]).all(fits)
         };
         let wants = [Want::Joints, Want::Pose];
-        wants.into_iter().find(|want| form(want) || begins(want)).or_else(|| self.lists().find_map(List::has_form))
+        wants
+            .into_iter()
+            .find(|want| form(want) || begins(want))
+            .or_else(|| self.lists().find_map(List::has_form))
     }
 
     /// Takes the targets in it, those of an array where that is allowed, or says everything that is wrong.
@@ -133,7 +166,10 @@ impl<'t> List<'t> {
                 Item::List(list) => list.take(want, array, found),
                 Item::Leaf(tokens) => {
                     let span = self.source.over(tokens, self.span.start);
-                    found.fault(span.start, format!("{} in an array of targets", quoted(self.source.bytes, span)));
+                    found.fault(
+                        span.start,
+                        format!("{} in an array of targets", quoted(self.source.bytes, span)),
+                    );
                 }
             }
         }
@@ -147,46 +183,88 @@ impl<'t> List<'t> {
             match item {
                 Item::List(list) if list.items.len() == *size => numbers.push(list.numbers(found)),
                 Item::List(list) => {
-                    let message = format!("{}, expected {size} here in a {}", counted(list.items.len(), "number"), want.name());
+                    let message = format!(
+                        "{}, expected {size} here in a {}",
+                        counted(list.items.len(), "number"),
+                        want.name()
+                    );
                     found.fault(list.span.start, message);
                 }
                 Item::Leaf(tokens) => {
                     let span = self.source.over(tokens, self.span.start);
                     let text = quoted(self.source.bytes, span.clone());
-                    found.fault(span.start, format!("{text} in a {}, expected a list of {size} numbers", want.name()));
+                    found.fault(
+                        span.start,
+                        format!(
+                            "{text} in a {}, expected a list of {size} numbers",
+                            want.name()
+                        ),
+                    );
                 }
             }
         }
         if self.items.len() != shape.len() {
             let sizes: Vec<String> = shape.iter().map(usize::to_string).collect();
-            let message = format!("expected a {}: lists of {} numbers", want.name(), sizes.join(", "));
+            let message = format!(
+                "expected a {}: lists of {} numbers",
+                want.name(),
+                sizes.join(", ")
+            );
             found.fault(self.span.start, message);
         }
         if found.faults.len() > before {
             return;
         }
-        for (value, span) in numbers.last().into_iter().flatten().filter(|(value, _)| *value != NOT_CONNECTED) {
-            let message = format!("external axis at {value}: calib assumed that external axes do not move the robot");
+        for (value, span) in numbers
+            .last()
+            .into_iter()
+            .flatten()
+            .filter(|(value, _)| *value != NOT_CONNECTED)
+        {
+            let message = format!(
+                "external axis at {value}: calib assumed that external axes do not move the robot"
+            );
             found.warn(span.start, message);
         }
         let axis = |(value, _): &(f64, _)| (*value != NOT_CONNECTED).then_some(*value);
         let external = numbers.last().into_iter().flatten().map(axis).collect();
-        let posture = if want == Want::Pose { configuration(&numbers[2], found) } else { PostureStatement::Unstated };
+        let posture = if want == Want::Pose {
+            configuration(&numbers[2], found)
+        } else {
+            PostureStatement::Unstated
+        };
         let posture_spans = match posture {
             PostureStatement::Unstated => Vec::new(),
             _ => numbers[2].iter().map(|(_, span)| span.clone()).collect(),
         };
         let used = if want == Want::Joints { 1 } else { 2 };
-        let (values, spans): (Vec<f64>, Vec<Range<usize>>) = numbers.into_iter().take(used).flatten().unzip();
+        let (values, spans): (Vec<f64>, Vec<Range<usize>>) =
+            numbers.into_iter().take(used).flatten().unzip();
         if want == Want::Pose {
-            let length = values[3..].iter().map(|part| part * part).sum::<f64>().sqrt();
+            let length = values[3..]
+                .iter()
+                .map(|part| part * part)
+                .sum::<f64>()
+                .sqrt();
             if (length - 1.0).abs() > UNIT {
-                found.fault(spans[3].start, format!("the quaternion has length {length:.4}, expected 1"));
+                found.fault(
+                    spans[3].start,
+                    format!("the quaternion has length {length:.4}, expected 1"),
+                );
                 return;
             }
         }
-        let kind = if want == Want::Joints { TargetKind::Joints } else { TargetKind::Quaternion };
-        found.literals.push(Literal::read(kind, (values, spans), external, (posture, posture_spans)));
+        let kind = if want == Want::Joints {
+            TargetKind::Joints
+        } else {
+            TargetKind::Quaternion
+        };
+        found.literals.push(Literal::read(
+            kind,
+            (values, spans),
+            external,
+            (posture, posture_spans),
+        ));
     }
 
     fn numbers(&self, found: &mut Gathered) -> Vec<(f64, Range<usize>)> {
@@ -204,7 +282,10 @@ impl<'t> List<'t> {
                 None if tokens.is_empty() => found.fault(at, "a number is missing in this list"),
                 None => {
                     let span = self.source.over(tokens, at);
-                    found.fault(span.start, format!("{} is no number", quoted(self.source.bytes, span)));
+                    found.fault(
+                        span.start,
+                        format!("{} is no number", quoted(self.source.bytes, span)),
+                    );
                 }
             }
         }
@@ -224,7 +305,9 @@ fn configuration(numbers: &[(f64, Range<usize>)], found: &mut Gathered) -> Postu
             3 if value.fract() != 0.0 || !(0.0..8.0).contains(value) => {
                 "no configuration cfx, expected a whole number from 0 to 7"
             }
-            _ if value.fract() != 0.0 || value.abs() > MOST => "no quadrant of a joint, expected a whole number",
+            _ if value.fract() != 0.0 || value.abs() > MOST => {
+                "no quadrant of a joint, expected a whole number"
+            }
             _ => {
                 *own = *value as i32;
                 continue;

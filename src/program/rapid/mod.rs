@@ -64,7 +64,10 @@ const NUMBERS: [&str; 5] = ["NUM", "DNUM", "BYTE", "ROBJOINT", "EXTJOINT"];
 
 pub(super) fn read(bytes: &[u8], companions: &[Companion]) -> Gathered {
     let mut found = Gathered::default();
-    let source = ProgramText { bytes, language: Language::Rapid };
+    let source = ProgramText {
+        bytes,
+        language: Language::Rapid,
+    };
     let own = tokens(source, &mut found);
     let statements = statements(source, &own, &mut found);
     let mut types: BTreeMap<String, Vec<String>> = BTreeMap::new();
@@ -76,23 +79,36 @@ pub(super) fn read(bytes: &[u8], companions: &[Companion]) -> Gathered {
             }
         }
     }
-    let mut reader = Reader { source, types, names: Vec::new(), found };
+    let mut reader = Reader {
+        source,
+        types,
+        names: Vec::new(),
+        found,
+    };
     for statement in &statements {
         reader.statement(statement);
     }
-    let Reader { names, mut found, .. } = reader;
+    let Reader {
+        names, mut found, ..
+    } = reader;
     in_force((source, &statements), companions, &names, &mut found);
     found
 }
 
 /// The motion instruction of this name, in capitals.
 fn motion(name: &str) -> Option<(&'static str, &'static [usize])> {
-    MOTIONS.into_iter().find(|(begin, _)| name.starts_with(begin) && name != NO_MOTION)
+    MOTIONS
+        .into_iter()
+        .find(|(begin, _)| name.starts_with(begin) && name != NO_MOTION)
 }
 
 /// The statements of a program, each without its `;` and without the heads of blocks before it. A value that no `;` ends before the
 /// next block is a fault: what follows would be read as a part of it, or the other way round.
-fn statements<'t>(source: ProgramText, tokens: &'t [Token], found: &mut Gathered) -> Vec<&'t [Token]> {
+fn statements<'t>(
+    source: ProgramText,
+    tokens: &'t [Token],
+    found: &mut Gathered,
+) -> Vec<&'t [Token]> {
     let mut out: Vec<&[Token]> = Vec::new();
     let mut start = 0;
     let mut k = 0;
@@ -106,7 +122,12 @@ fn statements<'t>(source: ProgramText, tokens: &'t [Token], found: &mut Gathered
             heading(source, &tokens[k..]).map(|length| (k + length, k + length))
         };
         let ends = token.is(b';') || token.is(b':') || source.is_word(token, &["THEN", "DO"]);
-        if end.is_some() && !ends && tokens[start..k].iter().any(|t| t.is(b'[') || t.sort == TokenKind::Pair(b':')) {
+        if end.is_some()
+            && !ends
+            && tokens[start..k]
+                .iter()
+                .any(|t| t.is(b'[') || t.sort == TokenKind::Pair(b':'))
+        {
             let text = quoted(source.bytes, token.span.clone());
             found.fault(token.span.start, format!("`;` is missing before {text}"));
         }
@@ -148,17 +169,39 @@ struct Declaration<'t> {
 }
 
 fn declaration<'t>(source: ProgramText, statement: &'t [Token]) -> Option<Declaration<'t>> {
-    let scoped = statement.iter().take_while(|token| source.is_word(token, &["LOCAL", "TASK"])).count();
-    let [storage, kind, name, rest @ ..] = &statement[scoped..] else { return None };
-    if !source.is_word(storage, &STORAGE) || kind.sort != TokenKind::Word || name.sort != TokenKind::Word {
+    let scoped = statement
+        .iter()
+        .take_while(|token| source.is_word(token, &["LOCAL", "TASK"]))
+        .count();
+    let [storage, kind, name, rest @ ..] = &statement[scoped..] else {
+        return None;
+    };
+    if !source.is_word(storage, &STORAGE)
+        || kind.sort != TokenKind::Word
+        || name.sort != TokenKind::Word
+    {
         return None;
     }
-    let assign = rest.iter().position(|token| token.sort == TokenKind::Pair(b':'));
+    let assign = rest
+        .iter()
+        .position(|token| token.sort == TokenKind::Pair(b':'));
     let dimensions = rest.iter().take_while(|token| !token.is(b'}')).count();
-    let named =
-        if rest.first().is_some_and(|token| token.is(b'{')) { rest.get(dimensions + 1..).unwrap_or_default() } else { rest };
-    let stray = if assign.is_none() { named.first() } else { None };
-    Some(Declaration { kind: source.upper(kind), name: source.upper(name), value: assign.map(|k| &rest[k + 1..]), stray })
+    let named = if rest.first().is_some_and(|token| token.is(b'{')) {
+        rest.get(dimensions + 1..).unwrap_or_default()
+    } else {
+        rest
+    };
+    let stray = if assign.is_none() {
+        named.first()
+    } else {
+        None
+    };
+    Some(Declaration {
+        kind: source.upper(kind),
+        name: source.upper(name),
+        value: assign.map(|k| &rest[k + 1..]),
+        stray,
+    })
 }
 
 struct Reader<'p> {
@@ -176,21 +219,41 @@ impl Reader<'_> {
             return;
         }
         self.frames(statement);
-        if let Some(Declaration { kind, value, stray, name }) = declaration(self.source, statement) {
+        if let Some(Declaration {
+            kind,
+            value,
+            stray,
+            name,
+        }) = declaration(self.source, statement)
+        {
             if let Some(stray) = stray {
                 let text = quoted(self.source.bytes, stray.span.clone());
-                self.found.fault(stray.span.start, format!("{text} in a declaration is not understood; expected `:=` or `;`"));
+                self.found.fault(
+                    stray.span.start,
+                    format!("{text} in a declaration is not understood; expected `:=` or `;`"),
+                );
             }
             return self.set(value.unwrap_or_default(), Some(&kind), name);
         }
         // In the head of a routine these words stand in brackets.
-        let storage = |(token, depth): &(&Token, _)| *depth == 0 && self.source.is_word(token, &STORAGE);
+        let storage =
+            |(token, depth): &(&Token, _)| *depth == 0 && self.source.is_word(token, &STORAGE);
         if let Some((storage, _)) = depths(statement).find(storage) {
-            self.found.fault(storage.span.start, "a declaration that is not understood; expected a type and a name");
+            self.found.fault(
+                storage.span.start,
+                "a declaration that is not understood; expected a type and a name",
+            );
             return;
         }
-        match depths(statement).position(|(token, depth)| depth == 0 && token.sort == TokenKind::Pair(b':')) {
-            Some(k) if k > 0 && !statement[..k].iter().any(|token| token.is(b'\\') || token.is(b',')) => {
+        match depths(statement)
+            .position(|(token, depth)| depth == 0 && token.sort == TokenKind::Pair(b':'))
+        {
+            Some(k)
+                if k > 0
+                    && !statement[..k]
+                        .iter()
+                        .any(|token| token.is(b'\\') || token.is(b',')) =>
+            {
                 self.assignment(statement, k)
             }
             _ => self.instruction(statement),
@@ -206,16 +269,25 @@ impl Reader<'_> {
             if let Some((opens, closes)) = PAIRS.into_iter().find(|(opens, _)| token.is(*opens)) {
                 open.push((token, opens, closes));
                 if open.len() == DEPTH {
-                    self.found.fault(token.span.start, "brackets are nested too deep");
+                    self.found
+                        .fault(token.span.start, "brackets are nested too deep");
                 }
-            } else if let Some((opens, closes)) = PAIRS.into_iter().find(|(_, closes)| token.is(*closes))
+            } else if let Some((opens, closes)) =
+                PAIRS.into_iter().find(|(_, closes)| token.is(*closes))
                 && open.pop().is_none_or(|(_, last, _)| last != opens)
             {
-                self.found.fault(token.span.start, format!("`{}` without `{}`", char::from(closes), char::from(opens)));
+                self.found.fault(
+                    token.span.start,
+                    format!("`{}` without `{}`", char::from(closes), char::from(opens)),
+                );
             }
         }
         for (token, opens, closes) in open {
-            let message = format!("`{}` without `{}` in its statement", char::from(opens), char::from(closes));
+            let message = format!(
+                "`{}` without `{}` in its statement",
+                char::from(opens),
+                char::from(closes)
+            );
             self.found.fault(token.span.start, message);
         }
         self.found.faults.len() == before
@@ -223,11 +295,18 @@ impl Reader<'_> {
 
     /// Displacements.
     fn frames(&mut self, statement: &[Token]) {
-        const BASE: &str = "calib assumed that targets are in the robot's base, as in wobj0 without displacement";
+        const BASE: &str =
+            "calib assumed that targets are in the robot's base, as in wobj0 without displacement";
         let head = &statement[0];
-        if self.source.is_word(head, &["PDISPON", "PDISPSET", "EOFFSON", "EOFFSSET"]) {
+        if self
+            .source
+            .is_word(head, &["PDISPON", "PDISPSET", "EOFFSON", "EOFFSSET"])
+        {
             let name = quoted(self.source.bytes, head.span.clone());
-            self.found.frame(head.span.start, format!("{name} displaces what follows: {BASE}"));
+            self.found.frame(
+                head.span.start,
+                format!("{name} displaces what follows: {BASE}"),
+            );
         }
     }
 
@@ -244,7 +323,10 @@ impl Reader<'_> {
                 if list.tokens < value.len() {
                     let stray = &value[list.tokens];
                     let text = quoted(self.source.bytes, stray.span.clone());
-                    self.found.fault(stray.span.start, format!("{text} behind a target is not understood"));
+                    self.found.fault(
+                        stray.span.start,
+                        format!("{text} behind a target is not understood"),
+                    );
                 } else {
                     let before = self.found.literals.len();
                     list.take(want, true, &mut self.found);
@@ -253,7 +335,10 @@ impl Reader<'_> {
             }
             _ if kind.is_some_and(|kind| NUMBERS.contains(&kind)) => {}
             _ => {
-                let of = kind.map_or_else(|| "whose type this file does not state".into(), |kind| format!("of type {kind}"));
+                let of = kind.map_or_else(
+                    || "whose type this file does not state".into(),
+                    |kind| format!("of type {kind}"),
+                );
                 self.computed(value, want.is_some());
                 self.others(value, format!("a variable {of}"));
             }
@@ -267,8 +352,10 @@ impl Reader<'_> {
             if tokens[k].is(b'[') {
                 let list = List::read(self.source, &tokens[k..]);
                 if let Some(want) = list.has_form() {
-                    let message =
-                        format!("has the form of a {} and stands in {place}; declare it: `CONST {0} p := [...]`", want.name());
+                    let message = format!(
+                        "has the form of a {} and stands in {place}; declare it: `CONST {0} p := [...]`",
+                        want.name()
+                    );
                     self.found.fault(tokens[k].span.start, message);
                 }
                 k += list.tokens;
@@ -282,20 +369,33 @@ impl Reader<'_> {
     fn assignment(&mut self, statement: &[Token], assign: usize) {
         let (variable, value) = (&statement[..assign], &statement[assign + 1..]);
         let name = self.source.upper(&variable[0]);
-        let members: Vec<String> = variable.windows(2).filter(|w| w[0].is(b'.')).map(|w| self.source.upper(&w[1])).collect();
+        let members: Vec<String> = variable
+            .windows(2)
+            .filter(|w| w[0].is(b'.'))
+            .map(|w| self.source.upper(&w[1]))
+            .collect();
         let types = self.types.get(&name).map(Vec::as_slice).unwrap_or_default();
         let Some(member) = members.first() else {
-            let kind = if let [one] = types { Some(one.clone()) } else { None };
+            let kind = if let [one] = types {
+                Some(one.clone())
+            } else {
+                None
+            };
             return self.set(value, kind.as_deref(), name);
         };
         let at = variable[0].span.start;
-        let target = types.iter().any(|kind| matches!(kind.as_str(), "ROBTARGET" | "JOINTTARGET"));
+        let target = types
+            .iter()
+            .any(|kind| matches!(kind.as_str(), "ROBTARGET" | "JOINTTARGET"));
         let part = ["TRANS", "ROT", "ROBAX"].contains(&member.as_str());
         let given = quoted(self.source.bytes, self.source.over(variable, at));
         if target && part {
             self.found.partial(at, format!("{given} sets a part of a target alone; a target is corrected whole or not at all"));
         } else if part && types.is_empty() {
-            self.found.warn(at, format!("left as it is: {given}, of a type that this file does not state"));
+            self.found.warn(
+                at,
+                format!("left as it is: {given}, of a type that this file does not state"),
+            );
         } else {
             self.others(value, "a member of a variable".into());
         }
@@ -304,13 +404,23 @@ impl Reader<'_> {
     fn instruction(&mut self, statement: &[Token]) {
         let name = self.source.upper(&statement[0]);
         let Some((begin, positions)) = motion(&name) else {
-            return self.others(statement, format!("`{name}`, no motion instruction that calib knows"));
+            return self.others(
+                statement,
+                format!("`{name}`, no motion instruction that calib knows"),
+            );
         };
         if begin == "MOVEEXTJ" {
-            self.found.warn(statement[0].span.start, "moves external axes alone: calib assumed that they do not move the robot");
+            self.found.warn(
+                statement[0].span.start,
+                "moves external axes alone: calib assumed that they do not move the robot",
+            );
             return;
         }
-        let want = if name.contains("ABSJ") { Want::Joints } else { Want::Pose };
+        let want = if name.contains("ABSJ") {
+            Want::Joints
+        } else {
+            Want::Pose
+        };
         let (mut number, arguments) = (0, arguments(&statement[1..]));
         for argument in arguments {
             let Some(first) = argument.first() else {
@@ -325,7 +435,10 @@ impl Reader<'_> {
             if positions.contains(&number) {
                 self.position(argument, want);
             } else {
-                self.others(argument, format!("an argument of `{name}` that is no position"));
+                self.others(
+                    argument,
+                    format!("an argument of `{name}` that is no position"),
+                );
             }
             number += 1;
         }
@@ -337,7 +450,10 @@ impl Reader<'_> {
             match argument.get(list.tokens) {
                 Some(stray) if !stray.is(b'\\') => {
                     let text = quoted(self.source.bytes, stray.span.clone());
-                    self.found.fault(stray.span.start, format!("{text} behind a target is not understood"));
+                    self.found.fault(
+                        stray.span.start,
+                        format!("{text} behind a target is not understood"),
+                    );
                 }
                 _ => {
                     list.take(want, false, &mut self.found);
@@ -352,16 +468,24 @@ impl Reader<'_> {
 
     /// A call in the place of a target; where that is not sure, those that give one.
     fn computed(&mut self, tokens: &[Token], target: bool) {
-        let [function, bracket, ..] = tokens else { return };
+        let [function, bracket, ..] = tokens else {
+            return;
+        };
         let name = quoted(self.source.bytes, function.span.clone());
         if !bracket.is(b'(') {
             return;
         }
         if self.source.is_word(function, &["OFFS", "RELTOOL"]) {
             let message = "shifts its target; where that one is corrected, the shifted one gets the same correction";
-            self.found.warn(function.span.start, format!("left as it is: {name} {message}"));
+            self.found.warn(
+                function.span.start,
+                format!("left as it is: {name} {message}"),
+            );
         } else if target {
-            self.found.warn(function.span.start, format!("left as it is: {name} computes the target"));
+            self.found.warn(
+                function.span.start,
+                format!("left as it is: {name} computes the target"),
+            );
         }
     }
 }

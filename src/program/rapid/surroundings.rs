@@ -42,18 +42,28 @@ impl DeclaredSurroundings {
     pub fn declare_all(&mut self, source: ProgramText, statements: &[&[Token]]) {
         for statement in statements {
             match declaration(source, statement) {
-                Some(Declaration { kind, name, value, .. }) => self.declare(source, &kind, name, value.unwrap_or_default()),
-                None if source.is_word(&statement[0], &["GRIPLOAD"]) => self.grip(source, statement),
+                Some(Declaration {
+                    kind, name, value, ..
+                }) => self.declare(source, &kind, name, value.unwrap_or_default()),
+                None if source.is_word(&statement[0], &["GRIPLOAD"]) => {
+                    self.grip(source, statement)
+                }
                 None => {}
             }
         }
-        for statement in statements.iter().filter(|statement| declaration(source, statement).is_none()) {
+        for statement in statements
+            .iter()
+            .filter(|statement| declaration(source, statement).is_none())
+        {
             self.unset(source, statement);
         }
     }
 
     fn declare(&mut self, source: ProgramText, kind: &str, name: String, value: &[Token]) {
-        let list = value.first().filter(|first| first.is(b'[')).map(|_| List::read(source, value));
+        let list = value
+            .first()
+            .filter(|first| first.is(b'['))
+            .map(|_| List::read(source, value));
         let mass = |load: &List| load.number(0).filter(|mass| *mass >= 0.0);
         match kind {
             "WOBJDATA" => note(&mut self.objects, name, object(list.as_ref())),
@@ -62,7 +72,11 @@ impl DeclaredSurroundings {
                 let load = carried.as_ref().and_then(|list| mass(list.list(2)?));
                 let pose = carried.as_ref().and_then(|list| frame(list.list(1)?));
                 let still = "stands still, or is not declared with its numbers: expected one that the robot carries";
-                note(&mut self.tools, name.clone(), pose.ok_or_else(|| still.into()));
+                note(
+                    &mut self.tools,
+                    name.clone(),
+                    pose.ok_or_else(|| still.into()),
+                );
                 self.masses.insert(name, load);
             }
             "LOADDATA" => drop(self.masses.insert(name, list.and_then(|list| mass(&list)))),
@@ -72,10 +86,19 @@ impl DeclaredSurroundings {
 
     /// `wobj1.oframe := ...`: what a program sets when it runs its text does not say.
     fn unset(&mut self, source: ProgramText, statement: &[Token]) {
-        let assigns = statement.iter().any(|token| token.sort == TokenKind::Pair(b':'));
-        let Some(first) = statement.first().filter(|first| assigns && first.sort == TokenKind::Word) else { return };
+        let assigns = statement
+            .iter()
+            .any(|token| token.sort == TokenKind::Pair(b':'));
+        let Some(first) = statement
+            .first()
+            .filter(|first| assigns && first.sort == TokenKind::Word)
+        else {
+            return;
+        };
         let name = source.upper(first);
-        let of_load = statement.windows(2).any(|w| w[0].is(b'.') && source.is_word(&w[1], &["TLOAD"]));
+        let of_load = statement
+            .windows(2)
+            .any(|w| w[0].is(b'.') && source.is_word(&w[1], &["TLOAD"]));
         if let Some(pose) = self.objects.get_mut(&name) {
             *pose = Err(SET.into());
         }
@@ -89,15 +112,22 @@ impl DeclaredSurroundings {
 
     /// `GripLoad`: from there on another load is carried, and where that is the order of execution alone says.
     fn grip(&mut self, source: ProgramText, statement: &[Token]) {
-        if statement.get(1).is_none_or(|load| !source.is_word(load, &["LOAD0"])) {
+        if statement
+            .get(1)
+            .is_none_or(|load| !source.is_word(load, &["LOAD0"]))
+        {
             let text = quoted(source.bytes, source.over(statement, 0));
-            self.gripped.get_or_insert_with(|| format!("changes when the program runs: {text}"));
+            self.gripped
+                .get_or_insert_with(|| format!("changes when the program runs: {text}"));
         }
     }
 
     /// Frames of tools by their names, as the files declare them.
     pub fn tools(&self) -> impl Iterator<Item = ToolInForce> + '_ {
-        self.tools.iter().map(|(name, frame)| ToolInForce { name: name.clone(), frame: frame.clone().ok() })
+        self.tools.iter().map(|(name, frame)| ToolInForce {
+            name: name.clone(),
+            frame: frame.clone().ok(),
+        })
     }
 
     /// Takes note of what a motion names: `arguments` between its commas, `positions` by which of them are positions. Of a motion of another
@@ -110,26 +140,44 @@ impl DeclaredSurroundings {
         out: &mut Reached,
     ) {
         let force = self.in_force(source, instruction, arguments);
-        let positional = arguments.iter().filter(|argument| argument.first().is_none_or(|first| !first.is(b'\\')));
-        for (_, argument) in positional.enumerate().filter(|(number, _)| positions.contains(number)) {
+        let positional = arguments
+            .iter()
+            .filter(|argument| argument.first().is_none_or(|first| !first.is(b'\\')));
+        for (_, argument) in positional
+            .enumerate()
+            .filter(|(number, _)| positions.contains(number))
+        {
             let name = match argument.first() {
                 Some(first) if first.is(b'[') => {
                     let span = source.over(argument, first.span.start);
                     out.placed.extend(is_own.then(|| (span, force.clone())));
                     continue;
                 }
-                Some(first) if source.is_word(first, &["OFFS", "RELTOOL"]) && argument.len() > 2 => &argument[2],
+                Some(first)
+                    if source.is_word(first, &["OFFS", "RELTOOL"]) && argument.len() > 2 =>
+                {
+                    &argument[2]
+                }
                 Some(first) => first,
                 None => continue,
             };
-            out.named.entry(source.upper(name)).or_default().push(force.clone());
+            out.named
+                .entry(source.upper(name))
+                .or_default()
+                .push(force.clone());
         }
     }
 
     /// What is in force by the arguments of a motion.
     fn in_force(&self, source: ProgramText, instruction: &str, arguments: &[&[Token]]) -> InForce {
         let (mut object, mut tool, mut load) = (None, None, None);
-        let plain = || arguments.iter().filter(|argument| argument.first().is_some_and(|first| first.sort == TokenKind::Word));
+        let plain = || {
+            arguments.iter().filter(|argument| {
+                argument
+                    .first()
+                    .is_some_and(|first| first.sort == TokenKind::Word)
+            })
+        };
         for argument in plain() {
             let known = self.masses.contains_key(&source.upper(&argument[0]));
             if known && argument.get(1).is_none_or(|next| next.is(b'\\')) {
@@ -152,22 +200,35 @@ impl DeclaredSurroundings {
         let written = |token: &Token| quoted(source.bytes, token.span.clone());
         let base = match object {
             None => Setting::Known(Pose::identity(), "wobj0".into()),
-            Some(object) if source.is_word(object, &["WOBJ0"]) => Setting::Known(Pose::identity(), "wobj0".into()),
+            Some(object) if source.is_word(object, &["WOBJ0"]) => {
+                Setting::Known(Pose::identity(), "wobj0".into())
+            }
             Some(object) => match self.objects.get(&source.upper(object)) {
                 Some(Ok(pose)) => Setting::Known(*pose, format!("work object {}", written(object))),
                 Some(Err(why)) => Setting::Open(format!("{} {why}", written(object))),
-                None => Setting::Open(format!("{} is declared in none of the files that were read", written(object))),
+                None => Setting::Open(format!(
+                    "{} is declared in none of the files that were read",
+                    written(object)
+                )),
             },
         };
         let of_tool = |token: &Token| {
             let name = source.upper(token);
-            let frame = if name == "TOOL0" { Some(Ok(Pose::identity())) } else { self.tools.get(&name).cloned() };
+            let frame = if name == "TOOL0" {
+                Some(Ok(Pose::identity()))
+            } else {
+                self.tools.get(&name).cloned()
+            };
             match frame.transpose() {
                 Ok(frame) => Setting::Known(ToolInForce { name, frame }, written(token)),
                 Err(why) => Setting::Open(format!("{} {why}", written(token))),
             }
         };
-        InForce { base, tool: tool.map_or(Setting::Unset, of_tool), load: self.load(source, load.or(tool)) }
+        InForce {
+            base,
+            tool: tool.map_or(Setting::Unset, of_tool),
+            load: self.load(source, load.or(tool)),
+        }
     }
 
     fn load(&self, source: ProgramText, by: Option<&Token>) -> Setting<Option<f64>> {
@@ -183,9 +244,15 @@ impl DeclaredSurroundings {
 }
 
 /// Takes note of a second declaration of one name, which may be another routine's.
-fn note(known: &mut BTreeMap<String, DeclaredValue<Pose>>, name: String, value: DeclaredValue<Pose>) {
+fn note(
+    known: &mut BTreeMap<String, DeclaredValue<Pose>>,
+    name: String,
+    value: DeclaredValue<Pose>,
+) {
     match known.get_mut(&name) {
-        Some(before) if *before != value => *before = Err("is declared twice, with other numbers".into()),
+        Some(before) if *before != value => {
+            *before = Err("is declared twice, with other numbers".into())
+        }
         Some(_) => {}
         None => drop(known.insert(name, value)),
     }
@@ -193,14 +260,22 @@ fn note(known: &mut BTreeMap<String, DeclaredValue<Pose>>, name: String, value: 
 
 /// A work object in the robot's base.
 fn object(list: Option<&List>) -> DeclaredValue<Pose> {
-    let Some(list) = list else { return Err("is not declared with its numbers".into()) };
+    let Some(list) = list else {
+        return Err("is not declared with its numbers".into());
+    };
     if list.is_word(0, "TRUE") {
         return Err("is carried by the robot: expected one that stands still".into());
     }
     if !list.is_word(1, "TRUE") {
-        return Err("is moved by a mechanical unit or a conveyor: expected one that stands still".into());
+        return Err(
+            "is moved by a mechanical unit or a conveyor: expected one that stands still".into(),
+        );
     }
-    let pose = list.list(3).and_then(frame).zip(list.list(4).and_then(frame)).map(|(user, own)| user * own);
+    let pose = list
+        .list(3)
+        .and_then(frame)
+        .zip(list.list(4).and_then(frame))
+        .map(|(user, own)| user * own);
     pose.ok_or_else(|| "is not declared with its numbers".into())
 }
 
@@ -211,5 +286,12 @@ fn frame(list: &List) -> Option<Pose> {
     let translation = Vector3::new(at(place, 0)?, at(place, 1)?, at(place, 2)?) * 1e-3;
     let turn = Quaternion::new(at(turn, 0)?, at(turn, 1)?, at(turn, 2)?, at(turn, 3)?);
     let unit = (turn.norm() - 1.0).abs() < super::list::UNIT;
-    unit.then(|| Pose::new(UnitQuaternion::from_quaternion(turn).to_rotation_matrix().into_inner(), translation))
+    unit.then(|| {
+        Pose::new(
+            UnitQuaternion::from_quaternion(turn)
+                .to_rotation_matrix()
+                .into_inner(),
+            translation,
+        )
+    })
 }

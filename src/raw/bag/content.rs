@@ -35,12 +35,32 @@ impl BagTopic {
     }
     /// In a line: type, number, rate, longest gap.
     pub fn account(&self) -> String {
-        let Self { name, kind, messages, received: [first, last], gap, .. } = self;
+        let Self {
+            name,
+            kind,
+            messages,
+            received: [first, last],
+            gap,
+            ..
+        } = self;
         let span = last - first;
-        let rate =
-            if span > 0.0 { format!(", {:.4} Hz, longest gap {gap:.4} s", (*messages - 1) as f64 / span) } else { String::new() };
-        let not = if self.is_read { "" } else { "; this type is not read" };
-        format!("topic `{name}`: {kind}, {}{rate}{not}", counted(*messages, "message"))
+        let rate = if span > 0.0 {
+            format!(
+                ", {:.4} Hz, longest gap {gap:.4} s",
+                (*messages - 1) as f64 / span
+            )
+        } else {
+            String::new()
+        };
+        let not = if self.is_read {
+            ""
+        } else {
+            "; this type is not read"
+        };
+        format!(
+            "topic `{name}`: {kind}, {}{rate}{not}",
+            counted(*messages, "message")
+        )
     }
 }
 
@@ -61,13 +81,23 @@ pub fn bag_content(source: Box<dyn InputSource>, label: &str) -> Result<BagConte
         let topic = &message.topic;
         let kind = topic.known();
         let names = match kind.filter(|kind| kind.of_frames) {
-            Some(_) => message::frames(&message.data).into_iter().map(|frames| format!("{} {frames}", topic.name)).collect(),
+            Some(_) => message::frames(&message.data)
+                .into_iter()
+                .map(|frames| format!("{} {frames}", topic.name))
+                .collect(),
             None => vec![topic.name.clone()],
         };
         for name in names {
-            let new =
-                || BagTopic { name: name.clone(), kind: topic.kind.clone(), is_read: kind.is_some(), ..BagTopic::default() };
-            found.entry(name.clone()).or_insert_with(new).see(message.received as f64 * 1e-9);
+            let new = || BagTopic {
+                name: name.clone(),
+                kind: topic.kind.clone(),
+                is_read: kind.is_some(),
+                ..BagTopic::default()
+            };
+            found
+                .entry(name.clone())
+                .or_insert_with(new)
+                .see(message.received as f64 * 1e-9);
         }
     }
     for topic in messages.topics {
@@ -76,44 +106,92 @@ pub fn bag_content(source: Box<dyn InputSource>, label: &str) -> Result<BagConte
             let is_read = topic.known().is_some();
             found.insert(
                 topic.name.clone(),
-                BagTopic { name: topic.name.clone(), kind: topic.kind.clone(), is_read, ..BagTopic::default() },
+                BagTopic {
+                    name: topic.name.clone(),
+                    kind: topic.kind.clone(),
+                    is_read,
+                    ..BagTopic::default()
+                },
             );
         }
     }
     let loss = (!messages.losses.is_empty()).then(|| messages.losses.join("; "));
-    let source = messages.source.ok_or_else(|| Error::Bug("a bag without its bytes".into()))?;
-    Ok(BagContent { topics: found.into_values().collect(), loss, source })
+    let source = messages
+        .source
+        .ok_or_else(|| Error::Bug("a bag without its bytes".into()))?;
+    Ok(BagContent {
+        topics: found.into_values().collect(),
+        loss,
+        source,
+    })
 }
 
 /// The only topic of a bag whose type is read.
-pub(super) fn only_topic(source: Box<dyn InputSource>, label: &str) -> Result<(Box<dyn InputSource>, String)> {
+pub(super) fn only_topic(
+    source: Box<dyn InputSource>,
+    label: &str,
+) -> Result<(Box<dyn InputSource>, String)> {
     let content = bag_content(source, label)?;
-    let mut read = content.topics.iter().filter(|topic| topic.is_read && topic.messages > 0);
+    let mut read = content
+        .topics
+        .iter()
+        .filter(|topic| topic.is_read && topic.messages > 0);
     match (read.next(), read.next()) {
         (Some(only), None) => Ok((content.source, only.name.clone())),
         (None, _) => Err(Error::data(label, no_topic("", &content))),
-        _ => Err(Error::data(label, format!("holds several topics; say which, `topic: NAME`; {}", listed(&content.topics)))),
+        _ => Err(Error::data(
+            label,
+            format!(
+                "holds several topics; say which, `topic: NAME`; {}",
+                listed(&content.topics)
+            ),
+        )),
     }
 }
 
 fn listed(found: &[BagTopic]) -> String {
-    let allowed: Vec<String> = found.iter().filter(|topic| topic.is_read).map(|topic| format!("`{}`", topic.name)).collect();
-    if allowed.is_empty() { "none of its topics is read".into() } else { format!("allowed: {}", allowed.join(", ")) }
+    let allowed: Vec<String> = found
+        .iter()
+        .filter(|topic| topic.is_read)
+        .map(|topic| format!("`{}`", topic.name))
+        .collect();
+    if allowed.is_empty() {
+        "none of its topics is read".into()
+    } else {
+        format!("allowed: {}", allowed.join(", "))
+    }
 }
 
 /// Why nothing is read of a topic.
 pub(super) fn no_topic(topic: &str, content: &BagContent) -> String {
     let found = &content.topics;
-    let kinds = || KINDS.iter().map(|kind| kind.name).collect::<Vec<_>>().join(", ");
+    let kinds = || {
+        KINDS
+            .iter()
+            .map(|kind| kind.name)
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
     let message = match found.iter().find(|other| other.name == topic) {
         Some(other) if !other.is_read => {
-            format!("topic `{topic}` holds {}, which is not read; allowed: {}", other.kind, kinds())
+            format!(
+                "topic `{topic}` holds {}, which is not read; allowed: {}",
+                other.kind,
+                kinds()
+            )
         }
         _ if found.is_empty() => "holds no message".into(),
         _ => {
-            let others: Vec<String> =
-                found.iter().filter(|topic| !topic.is_read).map(|one| format!("`{}` ({})", one.name, one.kind)).collect();
-            let others = if others.is_empty() { String::new() } else { format!("; of other types: {}", others.join(", ")) };
+            let others: Vec<String> = found
+                .iter()
+                .filter(|topic| !topic.is_read)
+                .map(|one| format!("`{}` ({})", one.name, one.kind))
+                .collect();
+            let others = if others.is_empty() {
+                String::new()
+            } else {
+                format!("; of other types: {}", others.join(", "))
+            };
             let first = if topic.is_empty() {
                 "has no topic that is read".into()
             } else {
@@ -122,5 +200,10 @@ pub(super) fn no_topic(topic: &str, content: &BagContent) -> String {
             format!("{first}; {}{others}", listed(found))
         }
     };
-    message + &content.loss.iter().map(|loss| format!("; {loss}")).collect::<String>()
+    message
+        + &content
+            .loss
+            .iter()
+            .map(|loss| format!("; {loss}"))
+            .collect::<String>()
 }

@@ -39,13 +39,27 @@ enum ReadStep {
 impl McapMessages {
     /// The file between two places of the source.
     pub(super) fn open(source: Box<dyn InputSource>, [start, end]: [u64; 2]) -> Self {
-        let options = LinearReaderOptions::default().with_validate_chunk_crcs(true).with_record_length_limit(LONGEST);
+        let options = LinearReaderOptions::default()
+            .with_validate_chunk_crcs(true)
+            .with_record_length_limit(LONGEST);
         let reader = LinearReader::new_with_options(options);
         let source = BufReader::with_capacity(BLOCK, source);
-        Self { source, reader, at: start, end, start, schemas: BTreeMap::new(), channels: BTreeMap::new() }
+        Self {
+            source,
+            reader,
+            at: start,
+            end,
+            start,
+            schemas: BTreeMap::new(),
+            channels: BTreeMap::new(),
+        }
     }
 
-    fn step(&mut self, wanted: &dyn Fn(&str) -> bool, message: &mut Message) -> Result<ReadStep, McapError> {
+    fn step(
+        &mut self,
+        wanted: &dyn Fn(&str) -> bool,
+        message: &mut Message,
+    ) -> Result<ReadStep, McapError> {
         let (opcode, data) = match self.reader.next_event() {
             None => return Ok(ReadStep::End),
             Some(Ok(LinearReadEvent::ReadRequest(bytes))) => return Ok(ReadStep::Read(bytes)),
@@ -53,10 +67,20 @@ impl McapMessages {
             Some(Err(error)) => return Err(error),
         };
         if opcode == op::MESSAGE {
-            let Some((header, content)) = data.split_at_checked(HEADER) else { return Err(McapError::UnexpectedEof) };
+            let Some((header, content)) = data.split_at_checked(HEADER) else {
+                return Err(McapError::UnexpectedEof);
+            };
             let channel = u16::from_le_bytes([header[0], header[1]]);
-            let Some(topic) = self.channels.get(&channel).filter(|topic| wanted(&topic.name)) else { return Ok(ReadStep::Other) };
-            let time = header[6..14].first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes));
+            let Some(topic) = self
+                .channels
+                .get(&channel)
+                .filter(|topic| wanted(&topic.name))
+            else {
+                return Ok(ReadStep::Other);
+            };
+            let time = header[6..14]
+                .first_chunk()
+                .map_or(0, |bytes| u64::from_le_bytes(*bytes));
             message.received = i64::try_from(time).unwrap_or(i64::MAX);
             message.topic = topic.clone();
             message.data.clear();
@@ -71,9 +95,19 @@ impl McapMessages {
             }
             op::CHANNEL => {
                 if let Record::Channel(channel) = parse_record(opcode, data)? {
-                    let kind = self.schemas.get(&channel.schema_id).cloned().unwrap_or_default();
-                    let topic = Topic { name: channel.topic, kind, encoding: channel.message_encoding };
-                    self.channels.entry(channel.id).or_insert_with(|| Arc::new(topic));
+                    let kind = self
+                        .schemas
+                        .get(&channel.schema_id)
+                        .cloned()
+                        .unwrap_or_default();
+                    let topic = Topic {
+                        name: channel.topic,
+                        kind,
+                        encoding: channel.message_encoding,
+                    };
+                    self.channels
+                        .entry(channel.id)
+                        .or_insert_with(|| Arc::new(topic));
                 }
             }
             _ => {}
@@ -88,7 +122,10 @@ impl McapMessages {
             return Ok(false);
         }
         // No more than it asked for: it keeps what it does not need yet.
-        let read = self.source.read(self.reader.insert(asked)).map_err(|error| error.to_string())?;
+        let read = self
+            .source
+            .read(self.reader.insert(asked))
+            .map_err(|error| error.to_string())?;
         self.reader.notify_read(read);
         self.at += read as u64;
         Ok(read > 0)
@@ -96,21 +133,32 @@ impl McapMessages {
 
     fn lost(&self, why: &str) -> String {
         let (at, size) = (self.at - self.start, self.end - self.start);
-        format!("it is cut or damaged before byte {at} of {size} ({why}): what was recorded after that is lost")
+        format!(
+            "it is cut or damaged before byte {at} of {size} ({why}): what was recorded after that is lost"
+        )
     }
 }
 
 impl Container for McapMessages {
-    fn next(&mut self, wanted: &dyn Fn(&str) -> bool, message: &mut Message) -> Result<bool, String> {
+    fn next(
+        &mut self,
+        wanted: &dyn Fn(&str) -> bool,
+        message: &mut Message,
+    ) -> Result<bool, String> {
         loop {
             let step = decoded(|| self.step(wanted, message));
-            match step.and_then(|step| step.map_err(|error| error.to_string())).map_err(|why| self.lost(&why))? {
+            match step
+                .and_then(|step| step.map_err(|error| error.to_string()))
+                .map_err(|why| self.lost(&why))?
+            {
                 ReadStep::Message => return Ok(true),
                 ReadStep::End => return Ok(false),
                 ReadStep::Other => {}
                 ReadStep::Read(bytes) => {
                     if !self.feed(bytes).map_err(|why| self.lost(&why))? {
-                        return Err(self.lost("it has no end: a recorder that was stopped, or a copy that was cut"));
+                        return Err(self.lost(
+                            "it has no end: a recorder that was stopped, or a copy that was cut",
+                        ));
                     }
                 }
             }

@@ -50,12 +50,25 @@ pub(super) const KINDS: &[MessageKind] = &[
     MessageKind {
         name: "sensor_msgs/msg/JointState",
         of_frames: false,
-        parts: &[Stamp, Text("frame_id"), Names, OfNames("position"), OfNames("velocity"), OfNames("effort")],
+        parts: &[
+            Stamp,
+            Text("frame_id"),
+            Names,
+            OfNames("position"),
+            OfNames("velocity"),
+            OfNames("effort"),
+        ],
     },
     MessageKind {
         name: "geometry_msgs/msg/PointStamped",
         of_frames: false,
-        parts: &[Stamp, Text("frame_id"), Number("point.x"), Number("point.y"), Number("point.z")],
+        parts: &[
+            Stamp,
+            Text("frame_id"),
+            Number("point.x"),
+            Number("point.y"),
+            Number("point.z"),
+        ],
     },
     MessageKind {
         name: "geometry_msgs/msg/PoseStamped",
@@ -72,15 +85,36 @@ pub(super) const KINDS: &[MessageKind] = &[
             Number("orientation.w"),
         ],
     },
-    MessageKind { name: "geometry_msgs/msg/TransformStamped", of_frames: false, parts: TRANSFORM },
-    MessageKind { name: "tf2_msgs/msg/TFMessage", of_frames: true, parts: TRANSFORM },
+    MessageKind {
+        name: "geometry_msgs/msg/TransformStamped",
+        of_frames: false,
+        parts: TRANSFORM,
+    },
+    MessageKind {
+        name: "tf2_msgs/msg/TFMessage",
+        of_frames: true,
+        parts: TRANSFORM,
+    },
     MessageKind {
         name: "sensor_msgs/msg/Temperature",
         of_frames: false,
-        parts: &[Stamp, Text("frame_id"), Number("temperature"), Number("variance")],
+        parts: &[
+            Stamp,
+            Text("frame_id"),
+            Number("temperature"),
+            Number("variance"),
+        ],
     },
-    MessageKind { name: "std_msgs/msg/Float64", of_frames: false, parts: &[Number("data")] },
-    MessageKind { name: "std_msgs/msg/Float64MultiArray", of_frames: false, parts: &[Dimensions, List("data")] },
+    MessageKind {
+        name: "std_msgs/msg/Float64",
+        of_frames: false,
+        parts: &[Number("data")],
+    },
+    MessageKind {
+        name: "std_msgs/msg/Float64MultiArray",
+        of_frames: false,
+        parts: &[Dimensions, List("data")],
+    },
 ];
 
 /// Elements of a list, at most.
@@ -99,13 +133,22 @@ pub(super) type FieldFault = String;
 impl<'a> Cdr<'a> {
     fn open(message: &'a [u8]) -> Result<Self, FieldFault> {
         match message {
-            [0, order @ (0 | 1), _, _, data @ ..] => Ok(Self { data, at: 0, is_big: *order == 0 }),
-            [a, b, ..] => Err(format!("the message is in another form than plain CDR ({a:02x} {b:02x})")),
+            [0, order @ (0 | 1), _, _, data @ ..] => Ok(Self {
+                data,
+                at: 0,
+                is_big: *order == 0,
+            }),
+            [a, b, ..] => Err(format!(
+                "the message is in another form than plain CDR ({a:02x} {b:02x})"
+            )),
             _ => Err("the message is empty".into()),
         }
     }
     fn take(&mut self, bytes: usize, what: &str) -> Result<&'a [u8], FieldFault> {
-        let taken = self.at.checked_add(bytes).and_then(|end| self.data.get(self.at..end));
+        let taken = self
+            .at
+            .checked_add(bytes)
+            .and_then(|end| self.data.get(self.at..end));
         self.at += bytes;
         taken.ok_or_else(|| format!("the message ends within `{what}`"))
     }
@@ -119,7 +162,8 @@ impl<'a> Cdr<'a> {
         Ok(bytes)
     }
     fn count(&mut self, what: &str) -> Result<usize, FieldFault> {
-        self.fixed(what).map(|bytes| u32::from_le_bytes(bytes) as usize)
+        self.fixed(what)
+            .map(|bytes| u32::from_le_bytes(bytes) as usize)
     }
     fn number(&mut self, what: &str) -> Result<f64, FieldFault> {
         self.fixed(what).map(f64::from_le_bytes)
@@ -178,9 +222,17 @@ impl MessageCells {
     }
     /// Names of joints of the last message.
     pub(super) fn joints(&self) -> String {
-        let mut cdr = Cdr { data: &self.joints, at: 0, is_big: false };
+        let mut cdr = Cdr {
+            data: &self.joints,
+            at: 0,
+            is_big: false,
+        };
         let names = std::iter::from_fn(|| cdr.text("").ok());
-        names.take(20).map(|name| String::from_utf8_lossy(name).into_owned()).collect::<Vec<_>>().join(", ")
+        names
+            .take(20)
+            .map(|name| String::from_utf8_lossy(name).into_owned())
+            .collect::<Vec<_>>()
+            .join(", ")
     }
     fn place(&mut self, name: &str) -> Option<usize> {
         if let Some(place) = self.places.get(name) {
@@ -206,7 +258,10 @@ impl MessageCells {
             return Ok(());
         }
         self.joints = own;
-        let names: Vec<_> = names.iter().map(|name| String::from_utf8_lossy(name)).collect();
+        let names: Vec<_> = names
+            .iter()
+            .map(|name| String::from_utf8_lossy(name))
+            .collect();
         if let Some(twice) = (1..names.len()).find(|k| names[..*k].contains(&names[*k])) {
             let message = format!("the message names the joint `{}` twice", names[twice]);
             self.joints.clear();
@@ -214,7 +269,8 @@ impl MessageCells {
         }
         self.columns = Vec::new();
         for name in names {
-            let columns = ["position", "velocity", "effort"].map(|what| self.place(&format!("{name}.{what}")));
+            let columns = ["position", "velocity", "effort"]
+                .map(|what| self.place(&format!("{name}.{what}")));
             self.columns.push(columns.to_vec());
         }
         Ok(())
@@ -234,11 +290,21 @@ fn parts(kind: &MessageKind, cdr: &mut Cdr, cells: &mut MessageCells) -> Result<
             Stamp => {
                 let stamp = seconds(cdr)?;
                 // A publisher that does not know the time leaves it at 0.
-                cells.set("stamp", if stamp == 0 { FieldValue::Blank } else { FieldValue::Time(stamp) });
+                cells.set(
+                    "stamp",
+                    if stamp == 0 {
+                        FieldValue::Blank
+                    } else {
+                        FieldValue::Time(stamp)
+                    },
+                );
             }
             Text(name) => {
                 let text = cdr.text(name)?;
-                cells.set(name, FieldValue::Text(String::from_utf8_lossy(text).into_owned()));
+                cells.set(
+                    name,
+                    FieldValue::Text(String::from_utf8_lossy(text).into_owned()),
+                );
             }
             Number(name) => {
                 let number = cdr.number(name)?;
@@ -246,7 +312,9 @@ fn parts(kind: &MessageKind, cdr: &mut Cdr, cells: &mut MessageCells) -> Result<
             }
             Names => {
                 joints = cdr.list("name")?;
-                let names = (0..joints).map(|_| cdr.text("name")).collect::<Result<Vec<_>, _>>()?;
+                let names = (0..joints)
+                    .map(|_| cdr.text("name"))
+                    .collect::<Result<Vec<_>, _>>()?;
                 cells.take_joints(&names)?;
             }
             OfNames(name) => {
@@ -255,7 +323,11 @@ fn parts(kind: &MessageKind, cdr: &mut Cdr, cells: &mut MessageCells) -> Result<
                     return Err(format!("`{name}` has {count} numbers for {joints} names"));
                 }
                 for joint in 0..joints {
-                    let cell = if count == 0 { FieldValue::Blank } else { FieldValue::Number(cdr.number(name)?) };
+                    let cell = if count == 0 {
+                        FieldValue::Blank
+                    } else {
+                        FieldValue::Number(cdr.number(name)?)
+                    };
                     if let Some(place) = cells.columns[joint][list] {
                         cells.cells[place] = cell;
                     }
@@ -290,7 +362,9 @@ pub(super) fn read(
 ) -> Result<bool, FieldFault> {
     cells.clear();
     let mut cdr = Cdr::open(message)?;
-    let Some(wanted) = frames else { return parts(kind, &mut cdr, cells).map(|()| true) };
+    let Some(wanted) = frames else {
+        return parts(kind, &mut cdr, cells).map(|()| true);
+    };
     for _ in 0..cdr.list("transforms")? {
         let at = cdr.at;
         if frames_of(&mut cdr)? == wanted {
@@ -304,14 +378,17 @@ pub(super) fn read(
 /// The frames of a transform, as a topic names them; what follows is the next transform.
 fn frames_of(cdr: &mut Cdr) -> Result<String, FieldFault> {
     seconds(cdr)?;
-    let [parent, child] = [cdr.text("frame_id")?, cdr.text("child_frame_id")?].map(String::from_utf8_lossy);
+    let [parent, child] =
+        [cdr.text("frame_id")?, cdr.text("child_frame_id")?].map(String::from_utf8_lossy);
     (0..7).try_for_each(|_| cdr.number("transform").map(drop))?;
     Ok(format!("{parent}->{child}"))
 }
 
 /// All frames of a message of frames; none where it cannot be read.
 pub(super) fn frames(message: &[u8]) -> Vec<String> {
-    let Ok(mut cdr) = Cdr::open(message) else { return Vec::new() };
+    let Ok(mut cdr) = Cdr::open(message) else {
+        return Vec::new();
+    };
     let count = cdr.list("transforms").unwrap_or_default();
     (0..count).map_while(|_| frames_of(&mut cdr).ok()).collect()
 }

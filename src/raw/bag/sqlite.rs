@@ -48,7 +48,9 @@ enum Value<'a> {
 }
 
 fn big(bytes: &[u8]) -> u64 {
-    bytes.iter().fold(0, |number, byte| (number << 8) | u64::from(*byte))
+    bytes
+        .iter()
+        .fold(0, |number, byte| (number << 8) | u64::from(*byte))
 }
 
 /// A number of one to nine bytes, and how many they are.
@@ -67,14 +69,24 @@ fn varint(bytes: &[u8]) -> Option<(u64, usize)> {
 }
 
 impl DatabasePages {
-    fn open(mut source: Box<dyn InputSource>, [start, end]: [u64; 2]) -> Result<Self, (Box<dyn InputSource>, String)> {
+    fn open(
+        mut source: Box<dyn InputSource>,
+        [start, end]: [u64; 2],
+    ) -> Result<Self, (Box<dyn InputSource>, String)> {
         let mut head = [0; 100];
-        let read = source.seek(SeekFrom::Start(start)).and_then(|_| source.read_exact(&mut head));
+        let read = source
+            .seek(SeekFrom::Start(start))
+            .and_then(|_| source.read_exact(&mut head));
         let size = match big(&head[16..18]) {
             1 => 1 << 16,
             size => size,
         };
-        if read.is_err() || end - start < 100 || size < 512 || !size.is_power_of_two() || u64::from(head[20]) > size - 480 {
+        if read.is_err()
+            || end - start < 100
+            || size < 512
+            || !size.is_power_of_two()
+            || u64::from(head[20]) > size - 480
+        {
             return Err((source, "its first page is damaged".into()));
         }
         let usable = (size - u64::from(head[20])) as usize;
@@ -97,7 +109,10 @@ impl DatabasePages {
         }
         let mut page = vec![0; self.size as usize];
         let place = SeekFrom::Start(self.start + (number - 1) * self.size);
-        self.source.seek(place).and_then(|_| self.source.read_exact(&mut page)).map_err(|error| error.to_string())?;
+        self.source
+            .seek(place)
+            .and_then(|_| self.source.read_exact(&mut page))
+            .map_err(|error| error.to_string())?;
         Ok(Some(page))
     }
 
@@ -108,7 +123,9 @@ impl DatabasePages {
         }
         let (mut bytes, mut next) = (cell.local.clone(), cell.overflow);
         while bytes.len() < cell.length {
-            let Some(page) = self.page(u64::from(next))? else { return Ok(None) };
+            let Some(page) = self.page(u64::from(next))? else {
+                return Ok(None);
+            };
             let more = (cell.length - bytes.len()).min(self.usable - 4);
             bytes.extend_from_slice(&page[4..4 + more]);
             next = big(&page[..4]) as u32;
@@ -129,7 +146,11 @@ struct TableRows {
 
 impl TableRows {
     fn new(root: u64) -> Self {
-        Self { path: Vec::new(), down: Some(root), visited: 0 }
+        Self {
+            path: Vec::new(),
+            down: Some(root),
+            visited: 0,
+        }
     }
 
     fn next(&mut self, pages: &mut DatabasePages) -> Result<Option<PageCell>, String> {
@@ -143,7 +164,9 @@ impl TableRows {
                     self.path.push((page, if number == 1 { 100 } else { 0 }, 0));
                 }
             }
-            let Some((page, head, cell)) = self.path.last_mut() else { return Ok(None) };
+            let Some((page, head, cell)) = self.path.last_mut() else {
+                return Ok(None);
+            };
             let (head, index) = (*head, *cell);
             *cell += 1;
             let count = big(&page[head + 3..head + 5]) as usize;
@@ -164,9 +187,16 @@ impl TableRows {
             let at = page.get(pointer..pointer + 2).map_or(0, big) as usize;
             let bytes = page.get(at..pages.usable).unwrap_or_default();
             if of_leaf {
-                return cell_of(bytes, pages.usable).map(Some).ok_or_else(|| "a row is damaged".into());
+                return cell_of(bytes, pages.usable)
+                    .map(Some)
+                    .ok_or_else(|| "a row is damaged".into());
             }
-            self.down = Some(bytes.get(..4).map(big).ok_or("a page of a table is damaged")?);
+            self.down = Some(
+                bytes
+                    .get(..4)
+                    .map(big)
+                    .ok_or("a page of a table is damaged")?,
+            );
         }
     }
 }
@@ -176,15 +206,27 @@ fn cell_of(bytes: &[u8], usable: usize) -> Option<PageCell> {
     let (length, a) = varint(bytes)?;
     let (id, b) = varint(bytes.get(a..)?)?;
     let bytes = &bytes[a + b..];
-    let length = usize::try_from(length).ok().filter(|length| *length as u64 <= LONGEST)?;
+    let length = usize::try_from(length)
+        .ok()
+        .filter(|length| *length as u64 <= LONGEST)?;
     if length <= usable - 35 {
-        return Some(PageCell { id: id as i64, local: bytes.get(..length)?.to_vec(), length, overflow: 0 });
+        return Some(PageCell {
+            id: id as i64,
+            local: bytes.get(..length)?.to_vec(),
+            length,
+            overflow: 0,
+        });
     }
     let least = (usable - 12) * 32 / 255 - 23;
     let fits = least + (length - least) % (usable - 4);
     let local = if fits <= usable - 35 { fits } else { least };
     let overflow = big(bytes.get(local..local + 4)?) as u32;
-    Some(PageCell { id: id as i64, local: bytes[..local].to_vec(), length, overflow })
+    Some(PageCell {
+        id: id as i64,
+        local: bytes[..local].to_vec(),
+        length,
+        overflow,
+    })
 }
 
 /// A column of a row, counted from 0; none where its bytes are not there.
@@ -220,14 +262,22 @@ fn value(row: &[u8], column: usize) -> Option<Value<'_>> {
 }
 
 fn text(row: &[u8], column: usize) -> Option<String> {
-    let Value::Bytes(bytes) = value(row, column)? else { return None };
+    let Value::Bytes(bytes) = value(row, column)? else {
+        return None;
+    };
     Some(String::from_utf8_lossy(bytes).into_owned())
 }
 
 /// Names of the columns by the statement that made a table.
 fn columns(statement: &str) -> Vec<String> {
     let inside = statement.split_once('(').map_or("", |(_, rest)| rest);
-    let name = |part: &str| part.split_whitespace().next().unwrap_or_default().trim_matches(['"', '`', '[', ']']).to_lowercase();
+    let name = |part: &str| {
+        part.split_whitespace()
+            .next()
+            .unwrap_or_default()
+            .trim_matches(['"', '`', '[', ']'])
+            .to_lowercase()
+    };
     inside.split(',').map(name).collect()
 }
 
@@ -246,10 +296,19 @@ pub(super) struct SqliteMessages {
 
 impl SqliteMessages {
     /// The file between two places of the source.
-    pub(super) fn open(source: Box<dyn InputSource>, bounds: [u64; 2]) -> Result<Self, (Box<dyn InputSource>, String)> {
+    pub(super) fn open(
+        source: Box<dyn InputSource>,
+        bounds: [u64; 2],
+    ) -> Result<Self, (Box<dyn InputSource>, String)> {
         let mut pages = DatabasePages::open(source, bounds)?;
         match Self::tables(&mut pages) {
-            Ok((topics, messages, places)) => Ok(Self { pages, topics, messages, places, cut: 0 }),
+            Ok((topics, messages, places)) => Ok(Self {
+                pages,
+                topics,
+                messages,
+                places,
+                cut: 0,
+            }),
             Err(message) => Err((pages.source, message)),
         }
     }
@@ -258,41 +317,81 @@ impl SqliteMessages {
         let mut tables: BTreeMap<String, (u64, Vec<String>)> = BTreeMap::new();
         let mut rows = TableRows::new(1);
         while let Some(cell) = rows.next(pages)? {
-            let Some(row) = pages.whole(&cell)? else { continue };
-            if let (Some(name), Some(Value::Integer(root)), Some(statement)) = (text(&row, 1), value(&row, 3), text(&row, 4)) {
+            let Some(row) = pages.whole(&cell)? else {
+                continue;
+            };
+            if let (Some(name), Some(Value::Integer(root)), Some(statement)) =
+                (text(&row, 1), value(&row, 3), text(&row, 4))
+            {
                 tables.insert(name, (root as u64, columns(&statement)));
             }
         }
         let table = |name: &str, wanted: &[&str]| {
-            let (root, columns) = tables.get(name).ok_or(format!("it has no table `{name}`: it is no bag of ROS 2"))?;
+            let (root, columns) = tables
+                .get(name)
+                .ok_or(format!("it has no table `{name}`: it is no bag of ROS 2"))?;
             let place = |wanted: &&str| columns.iter().position(|column| column == wanted);
             let places: Option<Vec<usize>> = wanted.iter().map(place).collect();
-            Ok::<_, String>((*root, places.ok_or(format!("its table `{name}` has not the columns of a bag of ROS 2"))?))
+            Ok::<_, String>((
+                *root,
+                places.ok_or(format!(
+                    "its table `{name}` has not the columns of a bag of ROS 2"
+                ))?,
+            ))
         };
         let (root, places) = table("topics", &["name", "type", "serialization_format"])?;
         let (mut topics, mut rows) = (BTreeMap::new(), TableRows::new(root));
         while let Some(cell) = rows.next(pages)? {
-            let Some(row) = pages.whole(&cell)? else { continue };
-            if let [Some(name), Some(kind), Some(encoding)] = [0, 1, 2].map(|k| text(&row, places[k])) {
-                topics.insert(cell.id, Arc::new(Topic { name, kind, encoding }));
+            let Some(row) = pages.whole(&cell)? else {
+                continue;
+            };
+            if let [Some(name), Some(kind), Some(encoding)] =
+                [0, 1, 2].map(|k| text(&row, places[k]))
+            {
+                topics.insert(
+                    cell.id,
+                    Arc::new(Topic {
+                        name,
+                        kind,
+                        encoding,
+                    }),
+                );
             }
         }
         let (root, places) = table("messages", &["topic_id", "timestamp", "data"])?;
-        Ok((topics, TableRows::new(root), [places[0], places[1], places[2]]))
+        Ok((
+            topics,
+            TableRows::new(root),
+            [places[0], places[1], places[2]],
+        ))
     }
 }
 
 impl Container for SqliteMessages {
-    fn next(&mut self, wanted: &dyn Fn(&str) -> bool, message: &mut Message) -> Result<bool, String> {
-        let lost = |why: String| format!("it is damaged ({why}): what was recorded after that is lost");
+    fn next(
+        &mut self,
+        wanted: &dyn Fn(&str) -> bool,
+        message: &mut Message,
+    ) -> Result<bool, String> {
+        let lost =
+            |why: String| format!("it is damaged ({why}): what was recorded after that is lost");
         while let Some(cell) = self.messages.next(&mut self.pages).map_err(lost)? {
             let Some(Value::Integer(topic)) = value(&cell.local, self.places[0]) else {
                 self.cut += 1;
                 continue;
             };
-            let Some(topic) = self.topics.get(&topic).filter(|topic| wanted(&topic.name)).cloned() else { continue };
+            let Some(topic) = self
+                .topics
+                .get(&topic)
+                .filter(|topic| wanted(&topic.name))
+                .cloned()
+            else {
+                continue;
+            };
             let row = self.pages.whole(&cell).map_err(lost)?;
-            let found = row.as_ref().map(|row| (value(row, self.places[1]), value(row, self.places[2])));
+            let found = row
+                .as_ref()
+                .map(|row| (value(row, self.places[1]), value(row, self.places[2])));
             if let Some((Some(Value::Integer(received)), Some(Value::Bytes(data)))) = found {
                 (message.topic, message.received) = (topic, received);
                 message.data.clear();
@@ -301,9 +400,15 @@ impl Container for SqliteMessages {
             }
             self.cut += 1;
         }
-        match (self.pages.missing, self.pages.stated.saturating_sub(self.pages.there)) {
+        match (
+            self.pages.missing,
+            self.pages.stated.saturating_sub(self.pages.there),
+        ) {
             (0, _) if self.cut == 0 => Ok(false),
-            (0, _) => Err(format!("it is damaged: {} of its messages cannot be read, which are lost", self.cut)),
+            (0, _) => Err(format!(
+                "it is damaged: {} of its messages cannot be read, which are lost",
+                self.cut
+            )),
             (missing, pages) => Err(format!(
                 "it is cut: {pages} of {} pages are not there, {missing} of them hold messages, which are lost",
                 self.pages.stated
@@ -318,7 +423,8 @@ impl Container for SqliteMessages {
         self.topics.values().cloned().collect()
     }
     fn position(&self) -> u64 {
-        self.pages.start + (self.messages.visited * self.pages.size).min(self.pages.there * self.pages.size)
+        self.pages.start
+            + (self.messages.visited * self.pages.size).min(self.pages.there * self.pages.size)
     }
     fn into_source(self: Box<Self>) -> Box<dyn InputSource> {
         self.pages.source

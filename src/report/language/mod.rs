@@ -51,7 +51,8 @@ impl PageLanguage {
 
     /// The English of a language's table, in its order; empty for English itself.
     pub fn known(self) -> Vec<&'static str> {
-        self.phrases().map_or_else(Vec::new, |phrases| phrases.english.clone())
+        self.phrases()
+            .map_or_else(Vec::new, |phrases| phrases.english.clone())
     }
 
     /// A sentence in this language; none where its table has no such sentence.
@@ -65,7 +66,10 @@ impl PageLanguage {
     /// An English page in this language. What stands in an element with `translate="no"`, in `code`, `style` or `script` stays as it is.
     pub fn page(self, english: String) -> Translation {
         let Some(phrases) = self.phrases() else {
-            return Translation { html: text::each(&english, micro), missing: Vec::new() };
+            return Translation {
+                html: text::each(&english, micro),
+                missing: Vec::new(),
+            };
         };
         let reader = PhraseReader::new(phrases);
         let mut missing = Vec::new();
@@ -77,7 +81,10 @@ impl PageLanguage {
             translated
         });
         let own = format!("<html lang=\"{}\">", self.code());
-        Translation { html: html.replacen("<html lang=\"en\">", &own, 1), missing }
+        Translation {
+            html: html.replacen("<html lang=\"en\">", &own, 1),
+            missing,
+        }
     }
 }
 
@@ -87,7 +94,11 @@ fn micro(text: &str) -> Option<String> {
         let core = word.trim_start_matches('(');
         let unit = core.trim_end_matches(|c: char| !c.is_alphanumeric());
         let is_unit = ["um", "um/m", "urad", "urad/Nm"].contains(&unit);
-        if is_unit { word.replacen('u', "\u{b5}", 1) } else { word.to_string() }
+        if is_unit {
+            word.replacen('u', "\u{b5}", 1)
+        } else {
+            word.to_string()
+        }
     };
     let out = text.split(' ').map(own).collect::<Vec<_>>().join(" ");
     (out != text).then_some(out)
@@ -104,7 +115,11 @@ mod tests {
             Some("Up (31 \u{b5}m rms at the tool), 4 \u{b5}rad/Nm.")
         );
         assert_eq!(micro("a maximum"), None);
-        let page = PageLanguage::English.page("<p>5 um.</p><code>5 um</code><i translate=\"no\">um</i>".into());
-        assert_eq!(page.html, "<p>5 \u{b5}m.</p><code>5 um</code><i translate=\"no\">um</i>");
+        let page = PageLanguage::English
+            .page("<p>5 um.</p><code>5 um</code><i translate=\"no\">um</i>".into());
+        assert_eq!(
+            page.html,
+            "<p>5 \u{b5}m.</p><code>5 um</code><i translate=\"no\">um</i>"
+        );
     }
 }

@@ -35,7 +35,11 @@ pub(super) fn each(page: &str, mut translate: impl FnMut(&str) -> Option<String>
         let (tag, after) = rest.split_at(rest.find('>').map_or(rest.len(), |at| at + 1));
         rest = after;
         let closes = own.starts_with('/');
-        let name = own.trim_start_matches('/').split(|c: char| !c.is_ascii_alphanumeric()).next().unwrap_or_default();
+        let name = own
+            .trim_start_matches('/')
+            .split(|c: char| !c.is_ascii_alphanumeric())
+            .next()
+            .unwrap_or_default();
         if let Some((element, open)) = silent {
             out.push_str(tag);
             let open = if name != element || tag.ends_with("/>") {
@@ -63,7 +67,13 @@ pub(super) fn each(page: &str, mut translate: impl FnMut(&str) -> Option<String>
 fn sentence(out: &mut String, text: &str, translate: &mut impl FnMut(&str) -> Option<String>) {
     let bare = text.trim_matches([' ', '\n', '\t', '\r']);
     let speaks = outside_of_code(bare).chars().any(char::is_alphanumeric);
-    let letters = |text: &str| LETTERS.iter().fold(text.to_string(), |text, (code, letter)| text.replace(code, letter));
+    let letters = |text: &str| {
+        LETTERS
+            .iter()
+            .fold(text.to_string(), |text, (code, letter)| {
+                text.replace(code, letter)
+            })
+    };
     let words = || letters(&bare.split_ascii_whitespace().collect::<Vec<_>>().join(" "));
     match speaks.then(|| translate(&words())).flatten() {
         Some(translated) => {
@@ -80,7 +90,9 @@ fn sentence(out: &mut String, text: &str, translate: &mut impl FnMut(&str) -> Op
 fn outside_of_code(text: &str) -> String {
     let mut parts = text.split("<code>");
     let first = parts.next().unwrap_or_default().to_string();
-    parts.fold(first, |left, part| left + part.split_once("</code>").map_or("", |(_, after)| after))
+    parts.fold(first, |left, part| {
+        left + part.split_once("</code>").map_or("", |(_, after)| after)
+    })
 }
 
 #[cfg(test)]
@@ -96,8 +108,19 @@ mod tests {
             seen.push(text.to_string());
             (text != "eight").then(|| text.to_uppercase())
         });
-        assert_eq!(seen, ["one <code>two</code> three &amp; 'four'", "eight", "nine"]);
-        assert!(out.contains("<p>\n  ONE <CODE>TWO</CODE> THREE &AMP; 'FOUR'\n</p><code>five</code>"), "{out}");
-        assert!(out.contains("six <td>seven</td></td><b>eight</b>") && out.contains(">NINE<") && out.contains("a: b"), "{out}");
+        assert_eq!(
+            seen,
+            ["one <code>two</code> three &amp; 'four'", "eight", "nine"]
+        );
+        assert!(
+            out.contains("<p>\n  ONE <CODE>TWO</CODE> THREE &AMP; 'FOUR'\n</p><code>five</code>"),
+            "{out}"
+        );
+        assert!(
+            out.contains("six <td>seven</td></td><b>eight</b>")
+                && out.contains(">NINE<")
+                && out.contains("a: b"),
+            "{out}"
+        );
     }
 }

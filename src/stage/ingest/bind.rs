@@ -48,7 +48,11 @@ pub(super) struct Binding {
 
 /// Text from a column, or for every row the same.
 pub(super) enum TextBinding {
-    Column { column: usize, optional: bool, rule: NameRule },
+    Column {
+        column: usize,
+        optional: bool,
+        rule: NameRule,
+    },
     Value(String),
 }
 
@@ -87,35 +91,76 @@ pub(super) struct Difference {
 impl Binding {
     /// What follows from the columns that were found.
     fn settle(&mut self, arm: &RobotJoints, is_wide: bool) {
-        let kept = self.conventions.iter().flat_map(|(places, ..)| places.clone());
-        self.filled = self.slots().into_iter().chain(kept).collect::<BTreeSet<usize>>().into_iter().collect();
-        self.worded = (0..self.texts.len()).filter(|place| self.texts[*place].is_some()).collect();
-        let brought = |kind: &KindSlots| kind.name.is_some_and(|name| self.texts.get(name).is_some_and(Option::is_some));
+        let kept = self
+            .conventions
+            .iter()
+            .flat_map(|(places, ..)| places.clone());
+        self.filled = self
+            .slots()
+            .into_iter()
+            .chain(kept)
+            .collect::<BTreeSet<usize>>()
+            .into_iter()
+            .collect();
+        self.worded = (0..self.texts.len())
+            .filter(|place| self.texts[*place].is_some())
+            .collect();
+        let brought = |kind: &KindSlots| {
+            kind.name
+                .is_some_and(|name| self.texts.get(name).is_some_and(Option::is_some))
+        };
         let is_filled = |place: &usize| self.filled.binary_search(place).is_ok();
-        let is_read = |kind: &KindSlots| kind.values.iter().any(|place| self.cells.iter().any(|cell| cell.index == *place));
+        let is_read = |kind: &KindSlots| {
+            kind.values
+                .iter()
+                .any(|place| self.cells.iter().any(|cell| cell.index == *place))
+        };
         let kinds = &arm.slots.kinds;
         self.measures = is_wide || kinds.iter().any(|kind| brought(kind) || is_read(kind));
-        let is_bound = |kind: &KindSlots| brought(kind) || kind.values.iter().chain(&kind.sigma).any(is_filled);
-        self.kinds = (0..kinds.len()).filter(|index| is_bound(&kinds[*index])).collect();
+        let is_bound = |kind: &KindSlots| {
+            brought(kind) || kind.values.iter().chain(&kind.sigma).any(is_filled)
+        };
+        self.kinds = (0..kinds.len())
+            .filter(|index| is_bound(&kinds[*index]))
+            .collect();
     }
     /// Columns that are read, and whether a row may lack them.
     pub(super) fn columns(&self) -> Vec<(usize, bool)> {
-        let texts = self.id.iter().chain(self.texts.iter().flatten()).filter_map(|text| match text {
-            TextBinding::Column { column, optional, .. } => Some((*column, !optional)),
-            TextBinding::Value(_) => None,
-        });
-        let cells = self.cells.iter().chain(self.points.iter().flat_map(|(_, cells)| cells));
+        let texts = self
+            .id
+            .iter()
+            .chain(self.texts.iter().flatten())
+            .filter_map(|text| match text {
+                TextBinding::Column {
+                    column, optional, ..
+                } => Some((*column, !optional)),
+                TextBinding::Value(_) => None,
+            });
+        let cells = self
+            .cells
+            .iter()
+            .chain(self.points.iter().flat_map(|(_, cells)| cells));
         let numbers = cells.flat_map(|cell| {
-            [Some(cell.column), cell.difference.as_ref().map(|other| other.column)]
-                .into_iter()
-                .flatten()
-                .map(|column| (column, !cell.optional))
+            [
+                Some(cell.column),
+                cell.difference.as_ref().map(|other| other.column),
+            ]
+            .into_iter()
+            .flatten()
+            .map(|column| (column, !cell.optional))
         });
-        texts.chain(numbers).chain(self.sequence.map(|column| (column, true))).collect()
+        texts
+            .chain(numbers)
+            .chain(self.sequence.map(|column| (column, true)))
+            .collect()
     }
     /// Slots that this file fills.
     pub(super) fn slots(&self) -> Vec<usize> {
-        self.cells.iter().map(|cell| cell.index).chain(self.constants.iter().map(|constant| constant.0)).collect()
+        self.cells
+            .iter()
+            .map(|cell| cell.index)
+            .chain(self.constants.iter().map(|constant| constant.0))
+            .collect()
     }
 }
 
@@ -152,15 +197,28 @@ pub(super) fn bind(layout: &FileLayout, head: &FileHeader, arm: &RobotJoints) ->
         filled: Vec::new(),
         missing: Vec::new(),
     };
-    let mut binder = Binder { head, binding, faults: Vec::new() };
+    let mut binder = Binder {
+        head,
+        binding,
+        faults: Vec::new(),
+    };
     let columns = &layout.columns;
     for (declared, text) in columns.texts() {
         let value = text.value.clone().map(TextBinding::Value);
         let bound = value.or_else(|| {
             let column = binder.column(text.column.as_ref()?, declared.setting, text.optional)?;
-            Some(TextBinding::Column { column, optional: text.optional, rule: text.rule() })
+            Some(TextBinding::Column {
+                column,
+                optional: text.optional,
+                rule: text.rule(),
+            })
         });
-        match arm.slots.texts().iter().position(|name| *name == declared.setting) {
+        match arm
+            .slots
+            .texts()
+            .iter()
+            .position(|name| *name == declared.setting)
+        {
             Some(at) => binder.binding.texts[at] = bound,
             None => binder.binding.id = bound,
         }
@@ -170,7 +228,11 @@ pub(super) fn bind(layout: &FileLayout, head: &FileHeader, arm: &RobotJoints) ->
     }
     for (declared, scalar) in columns.numbers() {
         let is_clock = scalar.unit.as_deref() == Some(CLOCK);
-        let unit = if is_clock { Unit::Second } else { unit(scalar.unit.as_deref())? };
+        let unit = if is_clock {
+            Unit::Second
+        } else {
+            unit(scalar.unit.as_deref())?
+        };
         let index = arm.slots.of(declared.setting).start;
         if let Some(value) = scalar.value {
             binder.binding.constants.push((index, unit.to_si(value)));
@@ -179,21 +241,34 @@ pub(super) fn bind(layout: &FileLayout, head: &FileHeader, arm: &RobotJoints) ->
         {
             let difference = binder.difference(scalar, declared.setting)?;
             let cell = binder.cell(declared, false, index, column, unit);
-            binder.binding.cells.push(NumberBinding { optional: scalar.optional, difference, is_clock, ..cell });
+            binder.binding.cells.push(NumberBinding {
+                optional: scalar.optional,
+                difference,
+                is_clock,
+                ..cell
+            });
         }
     }
     binder.uncertainties(columns, arm)?;
     for (declared, conventions, mapped) in columns.conventions() {
-        let Some((convention, references)) = mapped.chosen(conventions) else { continue };
+        let Some((convention, references)) = mapped.chosen(conventions) else {
+            continue;
+        };
         let unit = unit(mapped.unit.as_deref())?;
         let places = arm.slots.of(declared.setting);
         for (index, reference) in places.clone().zip(references) {
             if let Some(column) = binder.column(reference, declared.setting, false) {
                 let cell = binder.cell(declared, false, index, column, unit);
-                binder.binding.cells.push(NumberBinding { optional: mapped.optional, ..cell });
+                binder.binding.cells.push(NumberBinding {
+                    optional: mapped.optional,
+                    ..cell
+                });
             }
         }
-        binder.binding.conventions.push((places, declared, convention));
+        binder
+            .binding
+            .conventions
+            .push((places, declared, convention));
     }
     for (declared, mapped) in columns.joints() {
         binder.joints(declared, mapped, arm)?;
@@ -214,7 +289,9 @@ pub(super) fn bind(layout: &FileLayout, head: &FileHeader, arm: &RobotJoints) ->
 }
 
 fn unit(symbol: Option<&str>) -> Result<Unit> {
-    let Some(symbol) = symbol else { return Ok(Unit::One) };
+    let Some(symbol) = symbol else {
+        return Ok(Unit::One);
+    };
     Unit::parse(symbol).ok_or_else(|| Error::Bug(format!("unchecked unit {symbol}")))
 }
 
@@ -222,21 +299,36 @@ impl Binder<'_> {
     fn fault(&mut self, message: String) {
         let FileHeader { label, line, .. } = self.head;
         // Column names of a Parquet file stand on no line.
-        let place = if *line == 0 { label.clone() } else { format!("{label}:{line}") };
+        let place = if *line == 0 {
+            label.clone()
+        } else {
+            format!("{label}:{line}")
+        };
         self.faults.push(Fault::new(place, message));
     }
     fn name(&self, column: usize) -> String {
-        let name = self.head.names.as_ref().and_then(|names| names.get(column)).filter(|name| !name.is_empty());
-        name.cloned().unwrap_or_else(|| format!("column {}", column + 1))
+        let name = self
+            .head
+            .names
+            .as_ref()
+            .and_then(|names| names.get(column))
+            .filter(|name| !name.is_empty());
+        name.cloned()
+            .unwrap_or_else(|| format!("column {}", column + 1))
     }
     fn find(&self, reference: &ColumnRef) -> Vec<usize> {
         match reference {
-            ColumnRef::Number(number) => {
-                (*number as usize).checked_sub(1).filter(|index| *index < self.head.width).into_iter().collect()
-            }
+            ColumnRef::Number(number) => (*number as usize)
+                .checked_sub(1)
+                .filter(|index| *index < self.head.width)
+                .into_iter()
+                .collect(),
             ColumnRef::Name(name) => {
                 let names = self.head.names.iter().flatten().enumerate();
-                names.filter(|(_, found)| *found == name.trim()).map(|(index, _)| index).collect()
+                names
+                    .filter(|(_, found)| *found == name.trim())
+                    .map(|(index, _)| index)
+                    .collect()
             }
         }
     }
@@ -244,7 +336,10 @@ impl Binder<'_> {
         let found = self.find(reference);
         match found.as_slice() {
             [column] => return Some(*column),
-            [] if optional => self.binding.missing.push(format!("no {reference}; `{quantity}` is left out")),
+            [] if optional => self
+                .binding
+                .missing
+                .push(format!("no {reference}; `{quantity}` is left out")),
             [] => {
                 let hint = self.hint(reference);
                 self.fault(format!("no {reference}, mapped to `{quantity}`{hint}"));
@@ -259,10 +354,17 @@ impl Binder<'_> {
         None
     }
     fn difference(&mut self, scalar: &ScalarColumn, quantity: &str) -> Result<Option<Difference>> {
-        let Some((reference, sign)) = scalar.difference() else { return Ok(None) };
+        let Some((reference, sign)) = scalar.difference() else {
+            return Ok(None);
+        };
         let unit = unit(scalar.difference_unit.as_deref().or(scalar.unit.as_deref()))?;
         let column = self.column(reference, quantity, false);
-        Ok(column.map(|column| Difference { column, sign, unit, name: self.name(column) }))
+        Ok(column.map(|column| Difference {
+            column,
+            sign,
+            unit,
+            name: self.name(column),
+        }))
     }
     fn hint(&self, reference: &ColumnRef) -> String {
         match (reference, &self.head.names) {
@@ -274,16 +376,27 @@ impl Binder<'_> {
     }
     /// What stands in the header, for the last fault of the list.
     fn found(&self) -> String {
-        let Some(names) = &self.head.names else { return String::new() };
+        let Some(names) = &self.head.names else {
+            return String::new();
+        };
         let shown: Vec<&str> = names.iter().take(SHOWN).map(String::as_str).collect();
-        let more = if names.len() > SHOWN { format!(" and {} more", names.len() - SHOWN) } else { String::new() };
+        let more = if names.len() > SHOWN {
+            format!(" and {} more", names.len() - SHOWN)
+        } else {
+            String::new()
+        };
         let mut text = format!("; found: {}{more}", shown.join(", "));
         if let [only] = names.as_slice()
-            && let Some(mark) = [";", "\t", ",", "|"].into_iter().find(|mark| only.contains(mark))
+            && let Some(mark) = [";", "\t", ",", "|"]
+                .into_iter()
+                .find(|mark| only.contains(mark))
         {
             let mark = if mark == "\t" { "tab" } else { mark };
             text.push_str(&format!(" (one column; `delimiter: \"{mark}\"`?)"));
-        } else if names.iter().all(|name| name.replace(',', ".").parse::<f64>().is_ok()) {
+        } else if names
+            .iter()
+            .all(|name| name.replace(',', ".").parse::<f64>().is_ok())
+        {
             text.push_str(" (all numbers; `header: false`?)");
         }
         text
@@ -292,15 +405,26 @@ impl Binder<'_> {
     fn uncertainties(&mut self, columns: &Columns, arm: &RobotJoints) -> Result<()> {
         for (declared, mapped, of, divisor) in columns.uncertainties() {
             let unit = unit(mapped.unit.as_deref())?;
-            let places: Vec<usize> = of.iter().map(|setting| arm.slots.of(setting).start).collect();
+            let places: Vec<usize> = of
+                .iter()
+                .map(|setting| arm.slots.of(setting).start)
+                .collect();
             if let Some(value) = mapped.value {
-                self.binding.constants.extend(places.into_iter().map(|index| (index, unit.to_si(value) / divisor)));
+                self.binding.constants.extend(
+                    places
+                        .into_iter()
+                        .map(|index| (index, unit.to_si(value) / divisor)),
+                );
             } else if let Some(reference) = &mapped.column
                 && let Some(column) = self.column(reference, declared.setting, mapped.optional)
             {
                 for index in places {
                     let cell = self.cell(declared, false, index, column, unit);
-                    self.binding.cells.push(NumberBinding { optional: mapped.optional, divisor, ..cell });
+                    self.binding.cells.push(NumberBinding {
+                        optional: mapped.optional,
+                        divisor,
+                        ..cell
+                    });
                 }
             }
         }
@@ -309,33 +433,71 @@ impl Binder<'_> {
     /// The points of a wide row.
     fn points(&mut self, targets: &WideTargets) -> Result<()> {
         let unit = unit(Some(&targets.unit))?;
-        let axes = ["x", "y", "z"].map(|axis| recording_columns().find(|column| column.setting == axis));
-        let [Some(x), Some(y), Some(z)] = axes else { return Err(Error::Bug("a recording without points".into())) };
+        let axes =
+            ["x", "y", "z"].map(|axis| recording_columns().find(|column| column.setting == axis));
+        let [Some(x), Some(y), Some(z)] = axes else {
+            return Err(Error::Bug("a recording without points".into()));
+        };
         for (target, references) in &targets.columns {
-            let found = references.each_ref().map(|reference| self.column(reference, target, false));
+            let found = references
+                .each_ref()
+                .map(|reference| self.column(reference, target, false));
             if let [Some(a), Some(b), Some(c)] = found {
-                let cells = [(x, a), (y, b), (z, c)].map(|(declared, column)| self.cell(declared, false, 0, column, unit));
+                let cells = [(x, a), (y, b), (z, c)]
+                    .map(|(declared, column)| self.cell(declared, false, 0, column, unit));
                 self.binding.points.push((target.clone(), cells));
             }
         }
         Ok(())
     }
     /// A cell that may not be blank.
-    fn cell(&self, declared: &DeclaredColumn, is_prismatic: bool, index: usize, column: usize, unit: Unit) -> NumberBinding {
+    fn cell(
+        &self,
+        declared: &DeclaredColumn,
+        is_prismatic: bool,
+        index: usize,
+        column: usize,
+        unit: Unit,
+    ) -> NumberBinding {
         let (_, range) = declared.of_joint(is_prismatic);
         let (is_direction, name) = (declared.setting == "direction", self.name(column));
-        let (optional, divisor, zero, sign, difference, is_clock) = (false, 1.0, 0.0, 1.0, None, false);
-        NumberBinding { index, column, unit, range, is_direction, optional, divisor, zero, sign, name, difference, is_clock }
+        let (optional, divisor, zero, sign, difference, is_clock) =
+            (false, 1.0, 0.0, 1.0, None, false);
+        NumberBinding {
+            index,
+            column,
+            unit,
+            range,
+            is_direction,
+            optional,
+            divisor,
+            zero,
+            sign,
+            name,
+            difference,
+            is_clock,
+        }
     }
-    fn joints(&mut self, declared: &DeclaredColumn, joints: &JointColumns, arm: &RobotJoints) -> Result<()> {
+    fn joints(
+        &mut self,
+        declared: &DeclaredColumn,
+        joints: &JointColumns,
+        arm: &RobotJoints,
+    ) -> Result<()> {
         let name = declared.setting;
         let count = arm.joints();
         let references: Vec<ColumnRef> = match (&joints.columns, &joints.column) {
             (Some(list), _) => list.clone(),
             (None, Some(pattern)) => {
                 let called = |joint: usize| arm.names.get(joint).map_or("", String::as_str);
-                let named = |joint: usize| pattern.replace("{j}", &(joint + 1).to_string()).replace("{name}", called(joint));
-                (0..count).map(|joint| ColumnRef::Name(named(joint))).collect()
+                let named = |joint: usize| {
+                    pattern
+                        .replace("{j}", &(joint + 1).to_string())
+                        .replace("{name}", called(joint))
+                };
+                (0..count)
+                    .map(|joint| ColumnRef::Name(named(joint)))
+                    .collect()
             }
             (None, None) => return Err(Error::Bug("unchecked joint columns".into())),
         };
@@ -350,29 +512,58 @@ impl Binder<'_> {
         if !self.are_of_the_robot(joints, name, count) {
             return Ok(());
         }
-        if let Some(pattern) = joints.column.as_ref().filter(|pattern| pattern.contains("{j}")) {
+        if let Some(pattern) = joints
+            .column
+            .as_ref()
+            .filter(|pattern| pattern.contains("{j}"))
+        {
             let next = ColumnRef::Name(pattern.replace("{j}", &(count + 1).to_string()));
             if !self.find(&next).is_empty() {
-                self.fault(format!("{next}, by the pattern of `{name}`: the robot has {} only", counted(count, "joint")));
+                self.fault(format!(
+                    "{next}, by the pattern of `{name}`: the robot has {} only",
+                    counted(count, "joint")
+                ));
                 return Ok(());
             }
         }
-        let there = references.iter().filter(|reference| !self.find(reference).is_empty()).count();
+        let there = references
+            .iter()
+            .filter(|reference| !self.find(reference).is_empty())
+            .count();
         if there == 0 && joints.optional {
-            let first = references.first().map(ToString::to_string).unwrap_or_default();
-            self.binding.missing.push(format!("no {first} and so on; `{name}` is left out"));
+            let first = references
+                .first()
+                .map(ToString::to_string)
+                .unwrap_or_default();
+            self.binding
+                .missing
+                .push(format!("no {first} and so on; `{name}` is left out"));
             return Ok(());
         }
         if there > 0 && there < count {
-            self.fault(format!("`{name}` has {there} of its columns; the robot has {}", counted(count, "joint")));
+            self.fault(format!(
+                "`{name}` has {there} of its columns; the robot has {}",
+                counted(count, "joint")
+            ));
         }
         for (joint, reference) in references.iter().enumerate() {
             let is_prismatic = arm.prismatic.get(joint).copied().unwrap_or(false);
             let linear = is_prismatic && declared.of_joint(true).0 != declared.quantity;
-            let symbol = if linear { &joints.linear_unit } else { &joints.unit };
+            let symbol = if linear {
+                &joints.linear_unit
+            } else {
+                &joints.unit
+            };
             if symbol.is_none() && declared.quantity != Quantity::Number {
-                let (kind, setting) = if linear { ("prismatic", "linear_unit") } else { ("revolute", "unit") };
-                self.fault(format!("joint {} is {kind}; say `{setting}` for `{name}`", joint + 1));
+                let (kind, setting) = if linear {
+                    ("prismatic", "linear_unit")
+                } else {
+                    ("revolute", "unit")
+                };
+                self.fault(format!(
+                    "joint {} is {kind}; say `{setting}` for `{name}`",
+                    joint + 1
+                ));
                 continue;
             }
             let unit = unit(symbol.as_deref())?;
@@ -381,10 +572,20 @@ impl Binder<'_> {
                 let cell = self.cell(declared, is_prismatic, index, column, unit);
                 let sign = joints.sign.get(joint).copied().unwrap_or(1.0);
                 let zero = joints.zero.get(joint).map_or(0.0, |zero| unit.to_si(*zero));
-                self.binding.cells.push(NumberBinding { optional: joints.optional, sign, zero, ..cell });
+                self.binding.cells.push(NumberBinding {
+                    optional: joints.optional,
+                    sign,
+                    zero,
+                    ..cell
+                });
             }
         }
-        self.binding.coupled.extend(joints.coupled.iter().map(|one| (one.joint - 1, one.by - 1, one.ratio)));
+        self.binding.coupled.extend(
+            joints
+                .coupled
+                .iter()
+                .map(|one| (one.joint - 1, one.by - 1, one.ratio)),
+        );
         Ok(())
     }
     /// Whether signs, zeros and couplings are those of this robot's joints.
@@ -393,11 +594,20 @@ impl Binder<'_> {
         for (list, given) in [("sign", joints.sign.len()), ("zero", joints.zero.len())] {
             if given > 0 && given != count {
                 let (given, count) = (counted(given, "number"), counted(count, "joint"));
-                self.fault(format!("`{name}.{list}` lists {given}; the robot has {count}"));
+                self.fault(format!(
+                    "`{name}.{list}` lists {given}; the robot has {count}"
+                ));
             }
         }
-        if joints.coupled.iter().any(|one| one.joint.max(one.by) > count) {
-            self.fault(format!("`{name}.coupled` names a joint beyond the last; the robot has {}", counted(count, "joint")));
+        if joints
+            .coupled
+            .iter()
+            .any(|one| one.joint.max(one.by) > count)
+        {
+            self.fault(format!(
+                "`{name}.coupled` names a joint beyond the last; the robot has {}",
+                counted(count, "joint")
+            ));
         }
         self.faults.len() == before
     }

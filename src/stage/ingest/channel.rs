@@ -21,7 +21,11 @@ impl End {
     /// `beyond` where the value lies further out than the end so far.
     fn push(&mut self, value: f64, beyond: bool) {
         if beyond {
-            *self = Self { value: Some(value), run: 1, held: 0 };
+            *self = Self {
+                value: Some(value),
+                run: 1,
+                held: 0,
+            };
         } else if self.value == Some(value) {
             self.run += 1;
             self.held += match self.run {
@@ -46,21 +50,29 @@ pub(super) struct TorqueChannel {
 impl TorqueChannel {
     pub(super) fn push(&mut self, value: f64) {
         self.rows += 1;
-        self.low.push(value, self.low.value.is_none_or(|low| value < low));
-        self.high.push(value, self.high.value.is_none_or(|high| value > high));
+        self.low
+            .push(value, self.low.value.is_none_or(|low| value < low));
+        self.high
+            .push(value, self.high.value.is_none_or(|high| value > high));
     }
 
     /// The one value of a channel that never changes.
     pub(super) fn constant(&self) -> Option<f64> {
-        self.low.value.filter(|low| Some(*low) == self.high.value && self.rows >= FEWEST)
+        self.low
+            .value
+            .filter(|low| Some(*low) == self.high.value && self.rows >= FEWEST)
     }
 
     /// Where it stands at the ends of its range, in words.
     pub(super) fn clipped(&self) -> Option<String> {
         let held = self.low.held + self.high.held;
         let (low, high) = self.low.value.zip(self.high.value)?;
-        (held as f64 > SHARE * self.rows as f64 && self.rows >= FEWEST)
-            .then(|| format!("stands at {low} or {high}, the ends of its range, for {held} of {} rows", self.rows))
+        (held as f64 > SHARE * self.rows as f64 && self.rows >= FEWEST).then(|| {
+            format!(
+                "stands at {low} or {high}, the ends of its range, for {held} of {} rows",
+                self.rows
+            )
+        })
     }
 }
 
@@ -78,8 +90,16 @@ mod tests {
     fn a_channel_that_is_cut_off_says_so_and_a_sine_does_not() {
         let sine = |k: i32| 10.0 * (0.05 * f64::from(k)).sin();
         assert_eq!(of((0..2000).map(sine)).clipped(), None);
-        let cut = of((0..2000).map(|k| sine(k).clamp(-8.0, 8.0))).clipped().expect("two fifths of the rows are cut off");
+        let cut = of((0..2000).map(|k| sine(k).clamp(-8.0, 8.0)))
+            .clipped()
+            .expect("two fifths of the rows are cut off");
         assert!(cut.starts_with("stands at -8 or 8"), "{cut}");
-        assert_eq!([of((0..200).map(|_| 0.25)).constant(), of((0..200).map(sine)).constant()], [Some(0.25), None]);
+        assert_eq!(
+            [
+                of((0..200).map(|_| 0.25)).constant(),
+                of((0..200).map(sine)).constant()
+            ],
+            [Some(0.25), None]
+        );
     }
 }

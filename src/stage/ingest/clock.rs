@@ -7,8 +7,7 @@ use jiff::tz::TimeZone;
 /// The word that stands for a unit where times are clock times.
 pub(super) const CLOCK: &str = "clock";
 /// What may stand in such a column, for people.
-pub(super) const ALLOWED: &str =
-    "a time of day (08:15:03.25) or a date with a time (2026-11-22T08:15:03, with or without its zone)";
+pub(super) const ALLOWED: &str = "a time of day (08:15:03.25) or a date with a time (2026-11-22T08:15:03, with or without its zone)";
 
 /// Whether text is a clock time that [`Ingest`](super::Ingest) reads with the unit `clock`.
 pub fn is_clock_time(text: &str) -> bool {
@@ -54,7 +53,9 @@ pub(super) enum ClockTime {
 impl ClockTime {
     /// None of other text. Some trackers write a quote before the time, so that spreadsheets leave it alone.
     pub fn parse(cell: &[u8]) -> Option<Self> {
-        let text = std::str::from_utf8(cell).ok()?.trim_matches(['\'', '"', ' ']);
+        let text = std::str::from_utf8(cell)
+            .ok()?
+            .trim_matches(['\'', '"', ' ']);
         if let Ok(time) = text.parse::<Timestamp>() {
             return Some(Self::Dated(time.as_duration().as_secs_f64()));
         }
@@ -63,11 +64,17 @@ impl ClockTime {
         }
         let day = text.contains('-');
         if day {
-            let time = text.parse::<DateTime>().ok()?.to_zoned(TimeZone::UTC).ok()?;
+            let time = text
+                .parse::<DateTime>()
+                .ok()?
+                .to_zoned(TimeZone::UTC)
+                .ok()?;
             return Some(Self::Dated(time.timestamp().as_duration().as_secs_f64()));
         }
         let time: Time = text.parse().ok()?;
-        Some(Self::OfDay(time.duration_since(Time::midnight()).as_secs_f64()))
+        Some(Self::OfDay(
+            time.duration_since(Time::midnight()).as_secs_f64(),
+        ))
     }
 }
 
@@ -78,15 +85,31 @@ mod tests {
     #[test]
     fn times_of_day_and_dates_are_seconds_and_other_text_is_nothing() {
         let parsed = |text: &str| ClockTime::parse(text.as_bytes());
-        assert_eq!(parsed("08:15:03.25"), Some(ClockTime::OfDay(8.0 * 3600.0 + 15.0 * 60.0 + 3.25)));
+        assert_eq!(
+            parsed("08:15:03.25"),
+            Some(ClockTime::OfDay(8.0 * 3600.0 + 15.0 * 60.0 + 3.25))
+        );
         assert_eq!(parsed("'08:15:03,250"), Some(ClockTime::OfDay(29_703.25)));
         assert_eq!(parsed("00:00"), Some(ClockTime::OfDay(0.0)));
         // 2024-02-29 is day 19,782 after 1970-01-01.
         let noon = 19_782.0 * DAY + 43_200.0;
-        for text in ["2024-02-29T12:00:00Z", "2024-02-29 12:00:00", "2024-02-29T13:00:00+01:00", "2024-02-29T12:00:00.000"] {
+        for text in [
+            "2024-02-29T12:00:00Z",
+            "2024-02-29 12:00:00",
+            "2024-02-29T13:00:00+01:00",
+            "2024-02-29T12:00:00.000",
+        ] {
             assert_eq!(parsed(text), Some(ClockTime::Dated(noon)), "{text}");
         }
-        for text in ["", "12", "12.5", "29.02.2024 12:00:00", "25:00:00", "noon", "2024-02-29"] {
+        for text in [
+            "",
+            "12",
+            "12.5",
+            "29.02.2024 12:00:00",
+            "25:00:00",
+            "noon",
+            "2024-02-29",
+        ] {
             assert_eq!(parsed(text), None, "{text}");
         }
     }

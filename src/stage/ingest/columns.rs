@@ -1,6 +1,9 @@
 //! Which column of a file holds which quantity: the block `columns`, by the columns that a recording declares.
 
-use super::mapped::{ColumnRef, ConventionColumns, CountColumn, JointColumns, ScalarColumn, TextColumn, UncertaintyColumn};
+use super::mapped::{
+    ColumnRef, ConventionColumns, CountColumn, JointColumns, ScalarColumn, TextColumn,
+    UncertaintyColumn,
+};
 use crate::observation::{ColumnShape, Convention, Conventions, DeclaredColumn};
 use crate::table::recording_columns;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
@@ -75,23 +78,45 @@ impl Columns {
     /// The mapped quantities of several numbers.
     pub(super) fn conventions(
         &self,
-    ) -> impl Iterator<Item = (&'static DeclaredColumn, &'static Conventions, &ConventionColumns)> {
-        self.0.iter().filter_map(|(column, mapped)| match (column.shape, mapped) {
-            (ColumnShape::Conventions(conventions), Mapped::Conventions(mapped)) => Some((*column, conventions, mapped)),
-            _ => None,
-        })
+    ) -> impl Iterator<
+        Item = (
+            &'static DeclaredColumn,
+            &'static Conventions,
+            &ConventionColumns,
+        ),
+    > {
+        self.0
+            .iter()
+            .filter_map(|(column, mapped)| match (column.shape, mapped) {
+                (ColumnShape::Conventions(conventions), Mapped::Conventions(mapped)) => {
+                    Some((*column, conventions, mapped))
+                }
+                _ => None,
+            })
     }
 
     /// The mapped uncertainties, with the settings that each stands for and how many standard deviations it is.
     pub(super) fn uncertainties(
         &self,
-    ) -> impl Iterator<Item = (&'static DeclaredColumn, &UncertaintyColumn, &'static [&'static str], f64)> {
-        self.0.iter().filter_map(|(column, mapped)| match (column.shape, mapped) {
-            (ColumnShape::Uncertainty { of, coverage }, Mapped::Uncertainty(mapped)) => {
-                Some((*column, mapped, of, mapped.coverage_factor.unwrap_or(coverage)))
-            }
-            _ => None,
-        })
+    ) -> impl Iterator<
+        Item = (
+            &'static DeclaredColumn,
+            &UncertaintyColumn,
+            &'static [&'static str],
+            f64,
+        ),
+    > {
+        self.0
+            .iter()
+            .filter_map(|(column, mapped)| match (column.shape, mapped) {
+                (ColumnShape::Uncertainty { of, coverage }, Mapped::Uncertainty(mapped)) => Some((
+                    *column,
+                    mapped,
+                    of,
+                    mapped.coverage_factor.unwrap_or(coverage),
+                )),
+                _ => None,
+            })
     }
 
     pub(super) fn has(&self, setting: &str) -> bool {
@@ -106,9 +131,15 @@ impl Columns {
     /// The same with another target in every row, where one is mapped.
     pub(super) fn of_target(&self, name: &str) -> Self {
         let of = |(column, mapped): &(&'static DeclaredColumn, Mapped)| match mapped {
-            Mapped::Text(text) if column.setting == "target" => {
-                (*column, Mapped::Text(TextColumn { column: None, path: None, value: Some(name.into()), ..text.clone() }))
-            }
+            Mapped::Text(text) if column.setting == "target" => (
+                *column,
+                Mapped::Text(TextColumn {
+                    column: None,
+                    path: None,
+                    value: Some(name.into()),
+                    ..text.clone()
+                }),
+            ),
             other => (*column, other.clone()),
         };
         Self(self.0.iter().map(of).collect())
@@ -116,42 +147,69 @@ impl Columns {
 
     /// What does not depend on the robot's joints.
     pub(super) fn without_joints(&self) -> Self {
-        let others = self.0.iter().filter(|(_, mapped)| !matches!(mapped, Mapped::Joints(_)));
+        let others = self
+            .0
+            .iter()
+            .filter(|(_, mapped)| !matches!(mapped, Mapped::Joints(_)));
         Self(others.cloned().collect())
     }
 }
 
 impl PartialEq for Columns {
     fn eq(&self, other: &Self) -> bool {
-        let own = self.0.iter().map(|(column, mapped)| (column.setting, mapped));
-        own.eq(other.0.iter().map(|(column, mapped)| (column.setting, mapped)))
+        let own = self
+            .0
+            .iter()
+            .map(|(column, mapped)| (column.setting, mapped));
+        own.eq(other
+            .0
+            .iter()
+            .map(|(column, mapped)| (column.setting, mapped)))
     }
 }
 
 impl ConventionColumns {
     /// The convention with its columns; none unless exactly one is given.
-    pub(super) fn chosen(&self, conventions: &'static Conventions) -> Option<(&'static Convention, &[ColumnRef])> {
+    pub(super) fn chosen(
+        &self,
+        conventions: &'static Conventions,
+    ) -> Option<(&'static Convention, &[ColumnRef])> {
         let mut given = self.columns.iter();
         let (name, columns) = given.next().filter(|_| given.next().is_none())?;
-        let convention = conventions.all.iter().find(|convention| convention.name == *name)?;
+        let convention = conventions
+            .all
+            .iter()
+            .find(|convention| convention.name == *name)?;
         Some((convention, columns.as_slice()))
     }
 }
 
 impl Serialize for Columns {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_map(self.0.iter().map(|(column, mapped)| (column.setting, mapped)))
+        serializer.collect_map(
+            self.0
+                .iter()
+                .map(|(column, mapped)| (column.setting, mapped)),
+        )
     }
 }
 
 /// Settings of the block, and of the conventions of each.
-static SETTINGS: LazyLock<Vec<&'static str>> = LazyLock::new(|| recording_columns().map(|column| column.setting).collect());
+static SETTINGS: LazyLock<Vec<&'static str>> =
+    LazyLock::new(|| recording_columns().map(|column| column.setting).collect());
 static CONVENTIONS: LazyLock<BTreeMap<&'static str, Vec<&'static str>>> = LazyLock::new(|| {
     let named = |column: &DeclaredColumn| match column.shape {
-        ColumnShape::Conventions(conventions) => conventions.all.iter().map(|one| one.name).chain(["unit", "optional"]).collect(),
+        ColumnShape::Conventions(conventions) => conventions
+            .all
+            .iter()
+            .map(|one| one.name)
+            .chain(["unit", "optional"])
+            .collect(),
         _ => Vec::new(),
     };
-    recording_columns().map(|column| (column.setting, named(column))).collect()
+    recording_columns()
+        .map(|column| (column.setting, named(column)))
+        .collect()
 });
 
 impl<'de> Deserialize<'de> for Columns {
@@ -170,20 +228,30 @@ impl<'de> Visitor<'de> for Block {
     fn visit_map<A: MapAccess<'de>>(self, mut access: A) -> Result<Columns, A::Error> {
         let mut found: BTreeMap<&'static str, Mapped> = BTreeMap::new();
         while let Some(setting) = access.next_key_seed(KnownKey(&SETTINGS))? {
-            let Some(column) = recording_columns().find(|column| column.setting == setting) else { continue };
+            let Some(column) = recording_columns().find(|column| column.setting == setting) else {
+                continue;
+            };
             let mapped = match column.shape {
                 ColumnShape::Text => access.next_value::<Option<_>>()?.map(Mapped::Text),
                 ColumnShape::Count => access.next_value::<Option<_>>()?.map(Mapped::Count),
                 ColumnShape::Number => access.next_value::<Option<_>>()?.map(Mapped::Number),
                 ColumnShape::Joints { .. } => access.next_value::<Option<_>>()?.map(Mapped::Joints),
-                ColumnShape::Uncertainty { .. } => access.next_value::<Option<_>>()?.map(Mapped::Uncertainty),
-                ColumnShape::Conventions(_) => access.next_value_seed(OneConvention(column))?.map(Mapped::Conventions),
+                ColumnShape::Uncertainty { .. } => {
+                    access.next_value::<Option<_>>()?.map(Mapped::Uncertainty)
+                }
+                ColumnShape::Conventions(_) => access
+                    .next_value_seed(OneConvention(column))?
+                    .map(Mapped::Conventions),
             };
             if mapped.is_some_and(|mapped| found.insert(column.setting, mapped).is_some()) {
                 return Err(A::Error::duplicate_field(column.setting));
             }
         }
-        Ok(Columns(recording_columns().filter_map(|column| Some((column, found.remove(column.setting)?))).collect()))
+        Ok(Columns(
+            recording_columns()
+                .filter_map(|column| Some((column, found.remove(column.setting)?)))
+                .collect(),
+        ))
     }
 }
 
@@ -194,7 +262,11 @@ impl<'de> DeserializeSeed<'de> for KnownKey {
     type Value = &'static str;
     fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<&'static str, D::Error> {
         let name = Cow::<str>::deserialize(deserializer)?;
-        self.0.iter().copied().find(|known| *known == name).ok_or_else(|| D::Error::unknown_field(&name, self.0))
+        self.0
+            .iter()
+            .copied()
+            .find(|known| *known == name)
+            .ok_or_else(|| D::Error::unknown_field(&name, self.0))
     }
 }
 
@@ -221,7 +293,10 @@ impl<'de> Visitor<'de> for OneConvention {
     }
     fn visit_map<A: MapAccess<'de>>(self, mut access: A) -> Result<Self::Value, A::Error> {
         let mut out = ConventionColumns::default();
-        let known = CONVENTIONS.get(self.0.setting).map(Vec::as_slice).unwrap_or_default();
+        let known = CONVENTIONS
+            .get(self.0.setting)
+            .map(Vec::as_slice)
+            .unwrap_or_default();
         while let Some(key) = access.next_key_seed(KnownKey(known))? {
             match key {
                 "unit" => out.unit = access.next_value()?,
@@ -249,10 +324,14 @@ impl JsonSchema for Columns {
                 ColumnShape::Count => generator.subschema_for::<Option<CountColumn>>(),
                 ColumnShape::Number => generator.subschema_for::<Option<ScalarColumn>>(),
                 ColumnShape::Joints { .. } => generator.subschema_for::<Option<JointColumns>>(),
-                ColumnShape::Uncertainty { .. } => generator.subschema_for::<Option<UncertaintyColumn>>(),
+                ColumnShape::Uncertainty { .. } => {
+                    generator.subschema_for::<Option<UncertaintyColumn>>()
+                }
                 ColumnShape::Conventions(conventions) => {
                     let block = convention_schema(column.setting, conventions, generator);
-                    generator.definitions_mut().insert(conventions.name.into(), block.to_value());
+                    generator
+                        .definitions_mut()
+                        .insert(conventions.name.into(), block.to_value());
                     let reference = format!("#/definitions/{}", conventions.name);
                     json_schema!({ "anyOf": [{ "$ref": reference }, { "type": "null" }] })
                 }
@@ -270,7 +349,11 @@ impl JsonSchema for Columns {
     }
 }
 
-fn convention_schema(setting: &str, conventions: &Conventions, generator: &mut SchemaGenerator) -> Schema {
+fn convention_schema(
+    setting: &str,
+    conventions: &Conventions,
+    generator: &mut SchemaGenerator,
+) -> Schema {
     let described = |mut schema: Schema, about: &str, default: serde_json::Value| {
         schema.insert("description".into(), about.into());
         schema.insert("default".into(), default);
@@ -279,10 +362,16 @@ fn convention_schema(setting: &str, conventions: &Conventions, generator: &mut S
     let mut properties = serde_json::Map::new();
     for convention in conventions.all {
         let columns = generator.subschema_for::<Option<Vec<ColumnRef>>>();
-        properties.insert(convention.name.into(), described(columns, convention.about, serde_json::Value::Null));
+        properties.insert(
+            convention.name.into(),
+            described(columns, convention.about, serde_json::Value::Null),
+        );
     }
     let unit = generator.subschema_for::<Option<String>>();
-    properties.insert("unit".into(), described(unit, conventions.unit, serde_json::Value::Null));
+    properties.insert(
+        "unit".into(),
+        described(unit, conventions.unit, serde_json::Value::Null),
+    );
     let optional = generator.subschema_for::<bool>();
     let about = format!("The cells may be blank: the row has no {setting}.");
     properties.insert("optional".into(), described(optional, &about, false.into()));

@@ -23,8 +23,14 @@ pub(super) fn refuse(scanned: &[(Vec<Scan>, Vec<FileDecision>)]) -> Result<()> {
                 None => format!("files[{index}].file"),
                 Some(later) => format!("later[{later}].files[{index}]"),
             };
-            let own = ReadFile { place, scan, decision };
-            let found = read.iter().find_map(|other| Some((other, shared(other, &own).filter(|rows| *rows > 0)?)));
+            let own = ReadFile {
+                place,
+                scan,
+                decision,
+            };
+            let found = read
+                .iter()
+                .find_map(|other| Some((other, shared(other, &own).filter(|rows| *rows > 0)?)));
             if let Some((other, rows)) = found {
                 let message = format!(
                     "`{}` measured what `{}` of `{}` did, and {} would be used twice: copies look like perfect repeatability; name the \
@@ -39,7 +45,11 @@ pub(super) fn refuse(scanned: &[(Vec<Scan>, Vec<FileDecision>)]) -> Result<()> {
             read.push(own);
         }
     }
-    if faults.is_empty() { Ok(()) } else { Err(Error::Data(faults)) }
+    if faults.is_empty() {
+        Ok(())
+    } else {
+        Err(Error::Data(faults))
+    }
 }
 
 /// Rows that are used of both files; none where what they measured differs.

@@ -5,8 +5,19 @@ use crate::error::{Error, Result};
 use crate::raw::{Record, number};
 
 /// What such columns are called at controllers, without a number and a unit.
-const NAMES: [&str; 11] =
-    ["e", "eax", "ext", "extaxis", "external", "externalaxis", "track", "rail", "linearaxis", "positioner", "gantry"];
+const NAMES: [&str; 11] = [
+    "e",
+    "eax",
+    "ext",
+    "extaxis",
+    "external",
+    "externalaxis",
+    "track",
+    "rail",
+    "linearaxis",
+    "positioner",
+    "gantry",
+];
 const UNITS: [&str; 4] = ["deg", "mm", "rad", "m"];
 /// An axis that moves by less stands: deg or mm, and rad or m.
 const STILL: [f64; 2] = [0.1, 1e-3];
@@ -20,12 +31,17 @@ fn external(name: &str) -> Option<&'static str> {
         .filter(|word| !word.is_empty())
         .map(|word| word.to_ascii_lowercase())
         .collect();
-    let unit = words.last().and_then(|last| UNITS.into_iter().find(|unit| unit == last));
+    let unit = words
+        .last()
+        .and_then(|last| UNITS.into_iter().find(|unit| unit == last));
     let words = &words[..words.len() - usize::from(unit.is_some())];
     let joined = words.concat();
     let numbered = joined.trim_end_matches(|c: char| c.is_ascii_digit());
     // RAPID numbers its axes by letters; a bare `e` is no axis.
-    let bare = numbered.strip_prefix("eax").filter(|letter| letter.len() == 1).map_or(numbered, |_| "eax");
+    let bare = numbered
+        .strip_prefix("eax")
+        .filter(|letter| letter.len() == 1)
+        .map_or(numbered, |_| "eax");
     let is_one = NAMES.contains(&bare) && (bare != "e" || joined.len() == 2);
     is_one.then(|| unit.unwrap_or("deg"))
 }
@@ -39,17 +55,34 @@ pub(super) struct ExternalAxes {
 
 impl ExternalAxes {
     /// Those among columns that nobody mapped, of a file with joints.
-    pub(super) fn among<'n>(unmapped: impl Iterator<Item = (usize, &'n String)>, has_joints: bool, decimal: Decimal) -> Self {
+    pub(super) fn among<'n>(
+        unmapped: impl Iterator<Item = (usize, &'n String)>,
+        has_joints: bool,
+        decimal: Decimal,
+    ) -> Self {
         let axes = unmapped
             .filter(|_| has_joints)
-            .filter_map(|(column, name)| Some((column, name.clone(), external(name)?, [f64::INFINITY, f64::NEG_INFINITY])));
-        Self { columns: axes.collect(), decimal }
+            .filter_map(|(column, name)| {
+                Some((
+                    column,
+                    name.clone(),
+                    external(name)?,
+                    [f64::INFINITY, f64::NEG_INFINITY],
+                ))
+            });
+        Self {
+            columns: axes.collect(),
+            decimal,
+        }
     }
 
     /// Takes a row.
     pub(super) fn see(&mut self, record: &Record) {
         for (column, .., [least, most]) in &mut self.columns {
-            if let Some(number) = number(record.field(*column), self.decimal.mark()).ok().filter(|number| number.abs() < NONE) {
+            if let Some(number) = number(record.field(*column), self.decimal.mark())
+                .ok()
+                .filter(|number| number.abs() < NONE)
+            {
                 (*least, *most) = (least.min(number), most.max(number));
             }
         }
@@ -60,7 +93,9 @@ impl ExternalAxes {
         let moves = |(.., unit, [least, most]): &&(usize, String, &str, [f64; 2])| {
             most - least > STILL[usize::from(matches!(*unit, "rad" | "m"))]
         };
-        let Some((_, name, _, [least, most])) = self.columns.iter().find(moves) else { return Ok(()) };
+        let Some((_, name, _, [least, most])) = self.columns.iter().find(moves) else {
+            return Ok(());
+        };
         let message = format!(
             "column `{name}` is an external axis, in addition to the robot's {joints} joints, and moves from {least} to {most}: what stands on it \
              moves with it, and the robot file does not have it; allowed: the axis as a joint of the robot file, mapped in `q`, rows in which it \
@@ -87,7 +122,9 @@ mod tests {
         ] {
             assert_eq!(external(name), Some(unit), "{name}");
         }
-        for name in ["e", "error_1", "q7", "x_mm", "track_id", "e12", "exact", "mm", ""] {
+        for name in [
+            "e", "error_1", "q7", "x_mm", "track_id", "e12", "exact", "mm", "",
+        ] {
             assert_eq!(external(name), None, "{name}");
         }
     }

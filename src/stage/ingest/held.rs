@@ -24,10 +24,12 @@ impl Texts {
     }
     pub(super) fn bytes(&self, at: usize) -> Option<&[u8]> {
         let end = *self.ends.get(at)?;
-        self.text.get(at.checked_sub(1).map_or(0, |before| self.ends[before])..end)
+        self.text
+            .get(at.checked_sub(1).map_or(0, |before| self.ends[before])..end)
     }
     pub(super) fn get(&self, at: usize) -> Option<&str> {
-        self.bytes(at).and_then(|bytes| std::str::from_utf8(bytes).ok())
+        self.bytes(at)
+            .and_then(|bytes| std::str::from_utf8(bytes).ok())
     }
     /// About what it takes of memory.
     fn size(&self) -> usize {
@@ -69,7 +71,10 @@ struct OwnRows {
 
 impl HeldRows {
     pub(super) fn new(binding: &Binding, has_partners: bool, most: usize) -> Self {
-        let texts = binding.worded.iter().map(|place| (*place, Texts::default()));
+        let texts = binding
+            .worded
+            .iter()
+            .map(|place| (*place, Texts::default()));
         Self {
             places: binding.filled.clone(),
             texts: texts.collect(),
@@ -87,20 +92,31 @@ impl HeldRows {
             return;
         }
         let row = &open.row;
-        self.values.extend(self.places.iter().map(|place| row.values[*place]));
-        self.points.extend((0..self.targets).map(|k| row.points.get(k).copied().unwrap_or([f64::NAN; 3])));
+        self.values
+            .extend(self.places.iter().map(|place| row.values[*place]));
+        self.points
+            .extend((0..self.targets).map(|k| row.points.get(k).copied().unwrap_or([f64::NAN; 3])));
         self.ids.push(row.id.as_bytes());
-        self.texts.iter_mut().for_each(|(place, texts)| texts.push(row.texts[*place].as_bytes()));
+        self.texts
+            .iter_mut()
+            .for_each(|(place, texts)| texts.push(row.texts[*place].as_bytes()));
         let Some(own) = &mut self.own else { return };
         own.lines.push(row.line);
         if open.binding().sequence.is_some() {
             own.sequence.push(row.sequence.unwrap_or(i64::MIN));
         }
         own.records.push(open.text());
-        own.refused.extend(judged.as_ref().err().map(|refusal| (own.lines.len() - 1, refusal.clone())));
+        own.refused.extend(
+            judged
+                .as_ref()
+                .err()
+                .map(|refusal| (own.lines.len() - 1, refusal.clone())),
+        );
         let texts: usize = self.texts.iter().map(|(_, texts)| texts.size()).sum();
         let refused = own.refused.len() * 128 + own.records.size() + 16 * own.lines.len();
-        if 8 * self.values.len() + 24 * self.points.len() + self.ids.size() + texts + refused > self.most {
+        if 8 * self.values.len() + 24 * self.points.len() + self.ids.size() + texts + refused
+            > self.most
+        {
             self.own = None;
             if !self.has_partners {
                 *self = Self::default();
@@ -115,7 +131,12 @@ impl HeldRows {
 
     /// The rows; none where the file must be read again.
     pub(super) fn rows(&self, row: RecordedRow) -> Option<HeldReading<'_>> {
-        Some(HeldReading { held: self, own: self.own.as_ref()?, refused: 0, row })
+        Some(HeldReading {
+            held: self,
+            own: self.own.as_ref()?,
+            refused: 0,
+            row,
+        })
     }
 }
 
@@ -144,7 +165,11 @@ impl RowSource<'_> {
     /// The present row as it stands in the file.
     pub(super) fn text(&self) -> &[u8] {
         match self {
-            Self::Held(held) => held.own.records.bytes(held.row.number as usize - 1).unwrap_or_default(),
+            Self::Held(held) => held
+                .own
+                .records
+                .bytes(held.row.number as usize - 1)
+                .unwrap_or_default(),
             Self::File(open) => open.text(),
         }
     }
@@ -168,15 +193,27 @@ impl HeldReading<'_> {
             row.values[*place] = *value;
         }
         row.points.clear();
-        row.points.extend_from_slice(&held.points[at * held.targets..(at + 1) * held.targets]);
+        row.points
+            .extend_from_slice(&held.points[at * held.targets..(at + 1) * held.targets]);
         let put = |text: &mut String, from: &Texts| {
             text.clear();
             text.push_str(from.get(at).unwrap_or_default());
         };
         put(&mut row.id, &held.ids);
-        held.texts.iter().for_each(|(place, texts)| put(&mut row.texts[*place], texts));
-        row.sequence = self.own.sequence.get(at).copied().filter(|number| *number != i64::MIN);
-        let refusal = self.own.refused.get(self.refused).filter(|(index, _)| *index == at);
+        held.texts
+            .iter()
+            .for_each(|(place, texts)| put(&mut row.texts[*place], texts));
+        row.sequence = self
+            .own
+            .sequence
+            .get(at)
+            .copied()
+            .filter(|number| *number != i64::MIN);
+        let refusal = self
+            .own
+            .refused
+            .get(self.refused)
+            .filter(|(index, _)| *index == at);
         self.refused += usize::from(refusal.is_some());
         Some(refusal.map_or(Ok(()), |(_, refusal)| Err(refusal.clone())))
     }

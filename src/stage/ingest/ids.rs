@@ -27,14 +27,27 @@ pub(super) struct NamedRow {
 impl FileIds {
     /// Adds a usable row, whose content has this hash.
     pub fn push(&mut self, row: &RecordedRow, content: u64, label: &str) -> Result<()> {
-        let (id, last) = (row.id.as_bytes(), self.ids.len().checked_sub(1).and_then(|last| self.ids.bytes(last)));
+        let (id, last) = (
+            row.id.as_bytes(),
+            self.ids
+                .len()
+                .checked_sub(1)
+                .and_then(|last| self.ids.bytes(last)),
+        );
         self.is_mixed |= last.is_some_and(|last| (id.len(), id) <= (last.len(), last));
         self.ids.push(id);
-        self.rows.push(NamedRow { number: narrow(row.number, label)?, line: narrow(row.line, label)?, content });
+        self.rows.push(NamedRow {
+            number: narrow(row.number, label)?,
+            line: narrow(row.line, label)?,
+            content,
+        });
         Ok(())
     }
     pub fn rows(&self) -> impl Iterator<Item = (&[u8], NamedRow)> {
-        self.rows.iter().enumerate().filter_map(|(at, row)| Some((self.ids.bytes(at)?, *row)))
+        self.rows
+            .iter()
+            .enumerate()
+            .filter_map(|(at, row)| Some((self.ids.bytes(at)?, *row)))
     }
 }
 
@@ -55,13 +68,26 @@ impl RowHasher {
         self.bytes.clear();
         // What a row lacks says nothing: a circumstance more that may be declared costs a row nothing.
         for place in places.iter().filter(|place| !row.values[**place].is_nan()) {
-            self.bytes.extend_from_slice([*place as u64, row.values[*place].to_bits()].map(u64::to_le_bytes).as_flattened());
+            self.bytes.extend_from_slice(
+                [*place as u64, row.values[*place].to_bits()]
+                    .map(u64::to_le_bytes)
+                    .as_flattened(),
+            );
         }
         for value in row.points.iter().flatten() {
             self.bytes.extend_from_slice(&value.to_bits().to_le_bytes());
         }
-        for (place, text) in row.texts.iter().enumerate().filter(|(_, text)| !text.is_empty()) {
-            self.bytes.extend_from_slice([place, text.len()].map(|number| (number as u64).to_le_bytes()).as_flattened());
+        for (place, text) in row
+            .texts
+            .iter()
+            .enumerate()
+            .filter(|(_, text)| !text.is_empty())
+        {
+            self.bytes.extend_from_slice(
+                [place, text.len()]
+                    .map(|number| (number as u64).to_le_bytes())
+                    .as_flattened(),
+            );
             self.bytes.extend_from_slice(text.as_bytes());
         }
         XxHash3_128::oneshot(&self.bytes) as u64
@@ -70,5 +96,9 @@ impl RowHasher {
 
 /// Hash of rows and of one more.
 pub(super) fn behind(before: u64, number: u64, content: u64) -> u64 {
-    XxHash3_128::oneshot([before, number, content].map(u64::to_le_bytes).as_flattened()) as u64
+    XxHash3_128::oneshot(
+        [before, number, content]
+            .map(u64::to_le_bytes)
+            .as_flattened(),
+    ) as u64
 }

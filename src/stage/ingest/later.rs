@@ -43,11 +43,23 @@ impl Ingest {
                 Some(target) => layout.columns.of_target(target),
                 None => layout.columns.clone(),
             };
-            let files =
-                layouts.map(|(layout, file)| FileLayout { file: file.clone(), columns: columns(layout), ..layout.clone() });
-            Self { files: files.collect(), later: Vec::new(), ..self.clone() }
+            let files = layouts.map(|(layout, file)| FileLayout {
+                file: file.clone(),
+                columns: columns(layout),
+                ..layout.clone()
+            });
+            Self {
+                files: files.collect(),
+                later: Vec::new(),
+                ..self.clone()
+            }
         });
-        std::iter::once(Self { later: Vec::new(), ..self.clone() }).chain(later).collect()
+        std::iter::once(Self {
+            later: Vec::new(),
+            ..self.clone()
+        })
+        .chain(later)
+        .collect()
     }
 
     /// Where the files of the later measurement `index` already stand, all of them.
@@ -57,13 +69,22 @@ impl Ingest {
         if paths(self.files.iter().map(|layout| &layout.file)) == own {
             return Some("files".into());
         }
-        (0..index).find(|k| later(*k).as_ref() == Some(&own)).map(|k| format!("later[{k}].files"))
+        (0..index)
+            .find(|k| later(*k).as_ref() == Some(&own))
+            .map(|k| format!("later[{k}].files"))
     }
 }
 
 /// Paths without what does not change them, as `./`.
 fn paths<'a>(files: impl Iterator<Item = &'a RawFile>) -> Vec<PathBuf> {
-    files.map(|file| file.0.components().filter(|part| *part != Component::CurDir).collect()).collect()
+    files
+        .map(|file| {
+            file.0
+                .components()
+                .filter(|part| *part != Component::CurDir)
+                .collect()
+        })
+        .collect()
 }
 
 pub(super) fn faults(settings: &Ingest) -> impl Iterator<Item = Fault> + '_ {
@@ -107,7 +128,13 @@ pub(super) struct Continuation {
 
 impl Default for Continuation {
     fn default() -> Self {
-        Self { last: None, latest: f64::NEG_INFINITY, begun: None, sequence_by: 0, time_by: 0.0 }
+        Self {
+            last: None,
+            latest: f64::NEG_INFINITY,
+            begun: None,
+            sequence_by: 0,
+            time_by: 0.0,
+        }
     }
 }
 
@@ -121,12 +148,18 @@ impl Continuation {
     /// the row does not follow it.
     pub fn next(&mut self, sequence: i64, time: f64) -> Result<(i64, f64), (i64, i64)> {
         if let Some(gap) = self.begun.take() {
-            self.sequence_by = self.last.filter(|last| sequence <= *last).map_or(0, |last| last.saturating_sub(sequence - 1));
+            self.sequence_by = self
+                .last
+                .filter(|last| sequence <= *last)
+                .map_or(0, |last| last.saturating_sub(sequence - 1));
             if let Some(gap) = gap.filter(|_| time <= self.latest) {
                 self.time_by = self.latest + gap - time;
             }
         }
-        let (sequence, time) = (sequence.saturating_add(self.sequence_by), time + self.time_by);
+        let (sequence, time) = (
+            sequence.saturating_add(self.sequence_by),
+            time + self.time_by,
+        );
         self.latest = self.latest.max(time);
         match self.last.replace(sequence) {
             Some(last) if sequence <= last => Err((sequence, last)),
@@ -156,6 +189,9 @@ mod tests {
         assert_eq!(together.next(1, 10.0), Ok((1, 10.0)));
         together.begin(None);
         assert_eq!(together.next(1, 10.0), Ok((2, 10.0)));
-        assert!(rows.next(1, f64::NAN).is_ok_and(|(sequence, time)| sequence == 10 && time.is_nan()));
+        assert!(
+            rows.next(1, f64::NAN)
+                .is_ok_and(|(sequence, time)| sequence == 10 && time.is_nan())
+        );
     }
 }

@@ -6,11 +6,17 @@ use crate::raw::{Record, RecordReader, failed};
 use std::io::Read;
 
 /// Names of the columns: as the languages call the axes.
-const RAPID: [&str; 12] =
-    ["rax_1", "rax_2", "rax_3", "rax_4", "rax_5", "rax_6", "eax_a", "eax_b", "eax_c", "eax_d", "eax_e", "eax_f"];
-const KRL: [&str; 12] = ["A1", "A2", "A3", "A4", "A5", "A6", "E1", "E2", "E3", "E4", "E5", "E6"];
+const RAPID: [&str; 12] = [
+    "rax_1", "rax_2", "rax_3", "rax_4", "rax_5", "rax_6", "eax_a", "eax_b", "eax_c", "eax_d",
+    "eax_e", "eax_f",
+];
+const KRL: [&str; 12] = [
+    "A1", "A2", "A3", "A4", "A5", "A6", "E1", "E2", "E3", "E4", "E5", "E6",
+];
 
-const NUMBERED: [&str; 12] = ["J1", "J2", "J3", "J4", "J5", "J6", "E1", "E2", "E3", "E4", "E5", "E6"];
+const NUMBERED: [&str; 12] = [
+    "J1", "J2", "J3", "J4", "J5", "J6", "E1", "E2", "E3", "E4", "E5", "E6",
+];
 
 /// The table that a program lists; its joints are in deg.
 pub struct ListedTable {
@@ -27,9 +33,17 @@ impl ListedTable {
     pub fn read(source: impl Read, label: &str, language: Language) -> Result<Self> {
         let mut bytes = Vec::new();
         // One byte more than may be tells that there are too many.
-        source.take(MOST_BYTES as u64 + 1).read_to_end(&mut bytes).map_err(|error| failed(label, &error))?;
+        source
+            .take(MOST_BYTES as u64 + 1)
+            .read_to_end(&mut bytes)
+            .map_err(|error| failed(label, &error))?;
         let list = joint_list(&bytes, language).map_err(|notes| {
-            let fault = |note: crate::program::Note| Fault::new(format!("{label}:{}:{}", note.line, note.column), note.message);
+            let fault = |note: crate::program::Note| {
+                Fault::new(
+                    format!("{label}:{}:{}", note.line, note.column),
+                    note.message,
+                )
+            };
             Error::Data(notes.into_iter().map(fault).collect())
         })?;
         Self::of(&list, language).ok_or_else(|| {
@@ -37,10 +51,21 @@ impl ListedTable {
                 Language::Krl => "DECL E6AXIS XP1={A1 0.0,A2 -90.0,A3 90.0,A4 0.0,A5 0.0,A6 0.0}",
                 Language::Fanuc => "P[1]{ GP1: UF : 0, UT : 1, J1= 0.000 deg, ... J6= 0.000 deg };",
                 Language::UrScript => "wp1_q = [0.0, -1.57, 1.57, 0.0, 1.57, 0.0]",
-                Language::Rapid => "CONST jointtarget p10:=[[0,-10,20,0,30,0],[9E9,9E9,9E9,9E9,9E9,9E9]];",
+                Language::Rapid => {
+                    "CONST jointtarget p10:=[[0,-10,20,0,30,0],[9E9,9E9,9E9,9E9,9E9,9E9]];"
+                }
             };
-            let poses = if list.poses > 0 { format!(" ({} without joints)", counted(list.poses, "pose")) } else { String::new() };
-            Error::data(label, format!("declares no joint position{poses}; allowed: declarations such as `{example}`"))
+            let poses = if list.poses > 0 {
+                format!(" ({} without joints)", counted(list.poses, "pose"))
+            } else {
+                String::new()
+            };
+            Error::data(
+                label,
+                format!(
+                    "declares no joint position{poses}; allowed: declarations such as `{example}`"
+                ),
+            )
         })
     }
 
@@ -51,22 +76,54 @@ impl ListedTable {
             Language::Fanuc | Language::UrScript => NUMBERED,
         };
         // An axis that no position has makes no column.
-        let used: Vec<usize> =
-            (0..6).filter(|k| list.rows.iter().any(|row| row.external.get(*k).is_some_and(Option::is_some))).collect();
-        let names = ["name"].into_iter().chain(all[..6].iter().copied()).chain(used.iter().map(|k| all[6 + k]));
+        let used: Vec<usize> = (0..6)
+            .filter(|k| {
+                list.rows
+                    .iter()
+                    .any(|row| row.external.get(*k).is_some_and(Option::is_some))
+            })
+            .collect();
+        let names = ["name"]
+            .into_iter()
+            .chain(all[..6].iter().copied())
+            .chain(used.iter().map(|k| all[6 + k]));
         let rows = list.rows.iter().map(|row| {
-            let external = used.iter().map(|k| row.external[*k].map(|value| value.to_string()).unwrap_or_default());
+            let external = used.iter().map(|k| {
+                row.external[*k]
+                    .map(|value| value.to_string())
+                    .unwrap_or_default()
+            });
             let joints = row.joints.iter().map(f64::to_string);
-            (row.line as u64, [row.name.clone()].into_iter().chain(joints).chain(external).collect())
+            (
+                row.line as u64,
+                [row.name.clone()]
+                    .into_iter()
+                    .chain(joints)
+                    .chain(external)
+                    .collect(),
+            )
         });
-        (!list.rows.is_empty()).then(|| Self { names: names.collect(), rows: rows.collect(), poses: list.poses })
+        (!list.rows.is_empty()).then(|| Self {
+            names: names.collect(),
+            rows: rows.collect(),
+            poses: list.poses,
+        })
     }
 }
 
 /// Opens a program.
-pub(super) fn open(source: impl Read, label: &str, language: Language) -> Result<Box<dyn RecordReader>> {
+pub(super) fn open(
+    source: impl Read,
+    label: &str,
+    language: Language,
+) -> Result<Box<dyn RecordReader>> {
     let table = ListedTable::read(source, label, language)?;
-    Ok(Box::new(ListingReader { label: label.into(), table, is_named: false, rows: 0 }))
+    Ok(Box::new(ListingReader {
+        label: label.into(),
+        table,
+        is_named: false,
+        rows: 0,
+    }))
 }
 
 /// Hands out such a table row by row.
@@ -85,10 +142,15 @@ impl RecordReader for ListingReader {
     fn next(&mut self, record: &mut Record) -> Result<bool> {
         if !std::mem::replace(&mut self.is_named, true) {
             record.begin(1);
-            self.table.names.iter().for_each(|name| record.push(name.as_bytes()));
+            self.table
+                .names
+                .iter()
+                .for_each(|name| record.push(name.as_bytes()));
             return Ok(true);
         }
-        let Some((line, cells)) = self.table.rows.get(self.rows) else { return Ok(false) };
+        let Some((line, cells)) = self.table.rows.get(self.rows) else {
+            return Ok(false);
+        };
         self.rows += 1;
         record.begin(*line);
         cells.iter().for_each(|cell| record.push(cell.as_bytes()));
@@ -96,7 +158,10 @@ impl RecordReader for ListingReader {
     }
     /// The line of the last row handed out.
     fn lines(&self) -> u64 {
-        self.rows.checked_sub(1).and_then(|row| self.table.rows.get(row)).map_or(0, |(line, _)| *line)
+        self.rows
+            .checked_sub(1)
+            .and_then(|row| self.table.rows.get(row))
+            .map_or(0, |(line, _)| *line)
     }
     fn bytes(&self) -> u64 {
         self.rows as u64

@@ -35,10 +35,14 @@ impl Visitor<'_> for NameOrNumber {
         Ok(ColumnRef::Name(name.into()))
     }
     fn visit_u64<E: de::Error>(self, number: u64) -> Result<ColumnRef, E> {
-        u32::try_from(number).map(ColumnRef::Number).map_err(|_| E::invalid_value(Unexpected::Unsigned(number), &self))
+        u32::try_from(number)
+            .map(ColumnRef::Number)
+            .map_err(|_| E::invalid_value(Unexpected::Unsigned(number), &self))
     }
     fn visit_i64<E: de::Error>(self, number: i64) -> Result<ColumnRef, E> {
-        u32::try_from(number).map(ColumnRef::Number).map_err(|_| E::invalid_value(Unexpected::Signed(number), &self))
+        u32::try_from(number)
+            .map(ColumnRef::Number)
+            .map_err(|_| E::invalid_value(Unexpected::Signed(number), &self))
     }
 }
 
@@ -95,15 +99,25 @@ pub(super) struct NameRule {
 impl NameRule {
     /// The name that counts; none where it has no number, and one is asked for.
     pub(super) fn applied<'a>(&self, name: &'a str) -> Option<&'a str> {
-        let rest = self.strip.as_deref().and_then(|prefix| name.strip_prefix(prefix)).unwrap_or(name);
-        if self.matching.is_none() { Some(rest) } else { last_number(rest) }
+        let rest = self
+            .strip
+            .as_deref()
+            .and_then(|prefix| name.strip_prefix(prefix))
+            .unwrap_or(name);
+        if self.matching.is_none() {
+            Some(rest)
+        } else {
+            last_number(rest)
+        }
     }
 }
 
 /// The last whole number in a name, without zeros in front.
 pub fn last_number(name: &str) -> Option<&str> {
     let end = name.rfind(|c: char| c.is_ascii_digit())? + 1;
-    let start = name[..end].trim_end_matches(|c: char| c.is_ascii_digit()).len();
+    let start = name[..end]
+        .trim_end_matches(|c: char| c.is_ascii_digit())
+        .len();
     let digits = name[start..end].trim_start_matches('0');
     Some(if digits.is_empty() { "0" } else { digits })
 }
@@ -111,7 +125,10 @@ pub fn last_number(name: &str) -> Option<&str> {
 impl TextColumn {
     /// What of its names counts.
     pub(super) fn rule(&self) -> NameRule {
-        NameRule { matching: self.matching, strip: self.strip.clone() }
+        NameRule {
+            matching: self.matching,
+            strip: self.strip.clone(),
+        }
     }
 }
 
@@ -233,26 +250,51 @@ impl JointColumns {
     /// Faults of how the file is said to count its joints.
     pub(super) fn counting_faults(&self, are_positions: bool, place: &str) -> Vec<Fault> {
         let mut faults = Vec::new();
-        for (index, _) in self.sign.iter().enumerate().filter(|(_, sign)| sign.abs() != 1.0) {
-            faults.push(Fault::new(format!("{place}.sign[{index}]"), "allowed: 1 and -1"));
+        for (index, _) in self
+            .sign
+            .iter()
+            .enumerate()
+            .filter(|(_, sign)| sign.abs() != 1.0)
+        {
+            faults.push(Fault::new(
+                format!("{place}.sign[{index}]"),
+                "allowed: 1 and -1",
+            ));
         }
-        for (index, _) in self.zero.iter().enumerate().filter(|(_, zero)| !zero.is_finite()) {
-            faults.push(Fault::new(format!("{place}.zero[{index}]"), "not a finite number"));
+        for (index, _) in self
+            .zero
+            .iter()
+            .enumerate()
+            .filter(|(_, zero)| !zero.is_finite())
+        {
+            faults.push(Fault::new(
+                format!("{place}.zero[{index}]"),
+                "not a finite number",
+            ));
         }
         for (index, one) in self.coupled.iter().enumerate() {
             let place = format!("{place}.coupled[{index}]");
             if one.joint == 0 || one.by == 0 {
                 faults.push(Fault::new(&place, "joints count from 1"));
             } else if one.joint == one.by {
-                faults.push(Fault::new(&place, "a joint cannot hold itself; expected two different joints"));
+                faults.push(Fault::new(
+                    &place,
+                    "a joint cannot hold itself; expected two different joints",
+                ));
             }
             if !one.ratio.is_finite() {
-                faults.push(Fault::new(format!("{place}.ratio"), "not a finite number, e.g. 1 or -1"));
+                faults.push(Fault::new(
+                    format!("{place}.ratio"),
+                    "not a finite number, e.g. 1 or -1",
+                ));
             }
         }
         let is_plain = self.zero.is_empty() && self.coupled.is_empty();
         if !are_positions && !is_plain {
-            faults.push(Fault::new(place, "`zero` and `coupled` are for positions; say them at `q`"));
+            faults.push(Fault::new(
+                place,
+                "`zero` and `coupled` are for positions; say them at `q`",
+            ));
         }
         faults
     }
@@ -261,7 +303,10 @@ impl JointColumns {
 impl ScalarColumn {
     /// The column that is added to `column`, or taken off (-1).
     pub(super) fn difference(&self) -> Option<(&ColumnRef, f64)> {
-        self.minus.as_ref().map(|column| (column, -1.0)).or_else(|| self.plus.as_ref().map(|column| (column, 1.0)))
+        self.minus
+            .as_ref()
+            .map(|column| (column, -1.0))
+            .or_else(|| self.plus.as_ref().map(|column| (column, 1.0)))
     }
 }
 
@@ -271,13 +316,26 @@ mod tests {
 
     #[test]
     fn names_count_by_their_last_number_or_without_a_prefix() {
-        let number = NameRule { matching: Some(NameMatch::Number), strip: None };
-        for (name, counts) in
-            [("Pose 17", Some("17")), ("pt_017", Some("17")), ("A1-008b", Some("8")), ("P\u{e4}000", Some("0")), ("home", None)]
-        {
+        let number = NameRule {
+            matching: Some(NameMatch::Number),
+            strip: None,
+        };
+        for (name, counts) in [
+            ("Pose 17", Some("17")),
+            ("pt_017", Some("17")),
+            ("A1-008b", Some("8")),
+            ("P\u{e4}000", Some("0")),
+            ("home", None),
+        ] {
             assert_eq!(number.applied(name), counts, "{name}");
         }
-        let strip = NameRule { matching: None, strip: Some("pt_".into()) };
-        assert_eq!([strip.applied("pt_17"), strip.applied("17")], [Some("17"), Some("17")]);
+        let strip = NameRule {
+            matching: None,
+            strip: Some("pt_".into()),
+        };
+        assert_eq!(
+            [strip.applied("pt_17"), strip.applied("17")],
+            [Some("17"), Some("17")]
+        );
     }
 }

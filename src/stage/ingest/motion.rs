@@ -28,11 +28,17 @@ pub struct VelocitySettings {
 impl VelocitySettings {
     pub(super) fn faults(&self) -> Vec<Fault> {
         let mut faults = Vec::new();
-        if self.gap_s.is_some_and(|gap| !(gap > 0.0 && gap.is_finite())) {
+        if self
+            .gap_s
+            .is_some_and(|gap| !(gap > 0.0 && gap.is_finite()))
+        {
             faults.push(Fault::new("motion.gap_s", "allowed: above 0, e.g. 0.1"));
         }
         if !(self.over_s >= 0.0 && self.over_s.is_finite()) {
-            faults.push(Fault::new("motion.over_s", "allowed: 0 and above, e.g. 0.02"));
+            faults.push(Fault::new(
+                "motion.over_s",
+                "allowed: 0 and above, e.g. 0.02",
+            ));
         }
         if !self.later_s.is_finite() {
             faults.push(Fault::new("motion.later_s", "not a finite number"));
@@ -92,13 +98,20 @@ impl JointSamples {
 
     /// Velocity and acceleration of joint `joint` in row `i` by the parabola through three rows.
     fn rate(&self, joints: usize, joint: usize, i: usize, [a, b, c]: [usize; 3]) -> [f64; 2] {
-        let (t, q) = (|k: usize| self.time[k], |k: usize| self.q[k * joints + joint]);
+        let (t, q) = (
+            |k: usize| self.time[k],
+            |k: usize| self.q[k * joints + joint],
+        );
         let slope = (q(c) - q(a)) / (t(c) - t(a));
         if a == b {
             return [slope, 0.0];
         }
-        let curvature = ((q(c) - q(b)) / (t(c) - t(b)) - (q(b) - q(a)) / (t(b) - t(a))) / (t(c) - t(a));
-        [slope + curvature * (2.0 * t(i) - t(a) - t(c)), 2.0 * curvature]
+        let curvature =
+            ((q(c) - q(b)) / (t(c) - t(b)) - (q(b) - q(a)) / (t(b) - t(a))) / (t(c) - t(a));
+        [
+            slope + curvature * (2.0 * t(i) - t(a) - t(c)),
+            2.0 * curvature,
+        ]
     }
 
     /// The track of a file of `rows` data rows, with a word to the user; fails where `motion` asks for velocities and the rows are too
@@ -112,33 +125,54 @@ impl JointSamples {
         context: &Context,
     ) -> Result<Track> {
         let joints = arm.joints();
-        let mut steps: Vec<f64> =
-            self.time.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0 && step.is_finite()).collect();
+        let mut steps: Vec<f64> = self
+            .time
+            .windows(2)
+            .map(|pair| pair[1] - pair[0])
+            .filter(|step| *step > 0.0 && step.is_finite())
+            .collect();
         let middle = steps.len() / 2;
         let given = self.given.iter().any(|value| value.is_finite());
         if steps.is_empty() && (given || motion.is_none()) {
-            return Ok(Track { joints, rates: Vec::new() });
+            return Ok(Track {
+                joints,
+                rates: Vec::new(),
+            });
         }
         if steps.is_empty() {
-            return Err(Error::data(label, "no two consecutive rows have increasing times: joint velocities cannot be derived"));
+            return Err(Error::data(
+                label,
+                "no two consecutive rows have increasing times: joint velocities cannot be derived",
+            ));
         }
         let usual = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
-        let gap = motion.and_then(|motion| motion.gap_s).unwrap_or(GAP * usual);
-        let reach = (0.5 * motion.map_or(0.0, |motion| motion.over_s) / usual - 1e-9).ceil().max(1.0) as usize;
+        let gap = motion
+            .and_then(|motion| motion.gap_s)
+            .unwrap_or(GAP * usual);
+        let reach = (0.5 * motion.map_or(0.0, |motion| motion.over_s) / usual - 1e-9)
+            .ceil()
+            .max(1.0) as usize;
         let mut rates = vec![f64::NAN; rows as usize * 2 * joints];
         let (mut isolated, mut start) = (0, 0);
         let (mut squares, mut errors) = (vec![0.0; joints], vec![0.0; joints]);
         let (mut reported, mut both) = (vec![0.0; joints], vec![0.0; joints]);
         while start < self.time.len() {
-            let connected =
-                |k: &usize| (0.0..=gap).contains(&(self.time[*k] - self.time[*k - 1])) && self.time[*k] > self.time[*k - 1];
-            let end = (start + 1..self.time.len()).take_while(connected).last().unwrap_or(start);
+            let connected = |k: &usize| {
+                (0.0..=gap).contains(&(self.time[*k] - self.time[*k - 1]))
+                    && self.time[*k] > self.time[*k - 1]
+            };
+            let end = (start + 1..self.time.len())
+                .take_while(connected)
+                .last()
+                .unwrap_or(start);
             for i in start..=end {
                 let Some(near) = self.around(i, [start, end], reach) else {
                     isolated += 1;
                     continue;
                 };
-                let far = self.around(i, [start, end], 2 * reach).filter(|far| far[0] < near[0] && far[2] > near[2]);
+                let far = self
+                    .around(i, [start, end], 2 * reach)
+                    .filter(|far| far[0] < near[0] && far[2] > near[2]);
                 let at = (self.numbers[i] as usize - 1) * 2 * joints;
                 for joint in 0..joints {
                     let [velocity, acceleration] = self.rate(joints, joint, i, near);
@@ -146,9 +180,14 @@ impl JointSamples {
                     rates[at + joints + joint] = acceleration;
                     if let Some(far) = far {
                         squares[joint] += velocity * velocity;
-                        errors[joint] += ((self.rate(joints, joint, i, far)[0] - velocity) / 3.0).powi(2);
+                        errors[joint] +=
+                            ((self.rate(joints, joint, i, far)[0] - velocity) / 3.0).powi(2);
                     }
-                    let given = self.given.get(i * joints + joint).copied().unwrap_or(f64::NAN);
+                    let given = self
+                        .given
+                        .get(i * joints + joint)
+                        .copied()
+                        .unwrap_or(f64::NAN);
                     if given.is_finite() {
                         reported[joint] += given * given;
                         both[joint] += given * velocity;
@@ -161,9 +200,16 @@ impl JointSamples {
         // The joint that moves most of each kind speaks for the others.
         let rough = |prismatic: bool| {
             let own = |sums: &[f64]| -> Vec<f64> {
-                sums.iter().zip(&arm.prismatic).filter(|(_, slides)| **slides == prismatic).map(|(sum, _)| *sum).collect()
+                sums.iter()
+                    .zip(&arm.prismatic)
+                    .filter(|(_, slides)| **slides == prismatic)
+                    .map(|(sum, _)| *sum)
+                    .collect()
             };
-            let (all, wrong) = (own(&squares).iter().sum::<f64>(), own(&errors).iter().sum::<f64>());
+            let (all, wrong) = (
+                own(&squares).iter().sum::<f64>(),
+                own(&errors).iter().sum::<f64>(),
+            );
             if all > 0.0 { (wrong / all).sqrt() } else { 0.0 }
         };
         let rough = rough(false).max(rough(true));
@@ -172,7 +218,9 @@ impl JointSamples {
         } else if rough > TOO_ROUGH {
             rates.fill(f64::NAN);
         } else {
-            let fast = (0..joints).filter(|joint| squares[*joint] > 0.01 * fastest(&squares) && reported[*joint] > 0.0);
+            let fast = (0..joints).filter(|joint| {
+                squares[*joint] > 0.01 * fastest(&squares) && reported[*joint] > 0.0
+            });
             for joint in fast {
                 same_unit(joint, reported[joint], both[joint], label)?;
             }
@@ -180,7 +228,15 @@ impl JointSamples {
         Ok(Track { joints, rates })
     }
 
-    fn tell(&self, rough: f64, usual: f64, gap: f64, isolated: usize, label: &str, context: &Context) -> Result<()> {
+    fn tell(
+        &self,
+        rough: f64,
+        usual: f64,
+        gap: f64,
+        isolated: usize,
+        label: &str,
+        context: &Context,
+    ) -> Result<()> {
         let (ms, gap) = (1e3 * usual, 1e3 * gap);
         if rough > TOO_ROUGH {
             let message = format!(
@@ -189,7 +245,11 @@ impl JointSamples {
             );
             return Err(Error::data(label, message));
         }
-        let alone = if isolated > 0 { format!("; none for {} between gaps", counted(isolated, "row")) } else { String::new() };
+        let alone = if isolated > 0 {
+            format!("; none for {} between gaps", counted(isolated, "row"))
+        } else {
+            String::new()
+        };
         context.services.note(format!(
             "{label}: joint velocities by parabolas through neighbouring rows, {ms:.1} ms apart, never across gaps above {gap:.0} ms; right to about {:.2} %{alone}",
             100.0 * rough
@@ -212,7 +272,11 @@ fn same_unit(joint: usize, reported: f64, both: f64, label: &str) -> Result<()> 
     if !against && (1.0 / OTHER_UNIT..=OTHER_UNIT).contains(&factor) {
         return Ok(());
     }
-    let how = if against { "have the opposite sign of".to_string() } else { format!("are {factor:.3} times") };
+    let how = if against {
+        "have the opposite sign of".to_string()
+    } else {
+        format!("are {factor:.3} times")
+    };
     let message = format!(
         "the velocities of joint {} {how} what its positions over time say; state the unit and sign of the file",
         joint + 1
@@ -223,20 +287,34 @@ fn same_unit(joint: usize, reported: f64, both: f64, label: &str) -> Result<()> 
 impl Track {
     fn of(&self, number: u64) -> Option<(&[f64], &[f64])> {
         let at = usize::try_from(number).ok()?.checked_sub(1)? * 2 * self.joints;
-        Some(self.rates.get(at..at + 2 * self.joints)?.split_at(self.joints))
+        Some(
+            self.rates
+                .get(at..at + 2 * self.joints)?
+                .split_at(self.joints),
+        )
     }
 
     /// Velocities of a data row (from 1) into those of `velocity` that are not known.
     pub(super) fn fill(&self, number: u64, velocity: &mut [f64]) {
-        let Some((own, _)) = self.of(number) else { return };
-        for (known, own) in velocity.iter_mut().zip(own).filter(|(known, _)| known.is_nan()) {
+        let Some((own, _)) = self.of(number) else {
+            return;
+        };
+        for (known, own) in velocity
+            .iter_mut()
+            .zip(own)
+            .filter(|(known, _)| known.is_nan())
+        {
             *known = *own;
         }
     }
 
     /// Acceleration of a joint in a data row (from 1), zero where it is not known.
     pub(super) fn acceleration(&self, number: u64, joint: usize) -> f64 {
-        self.of(number).and_then(|(_, all)| all.get(joint)).copied().filter(|value| value.is_finite()).unwrap_or(0.0)
+        self.of(number)
+            .and_then(|(_, all)| all.get(joint))
+            .copied()
+            .filter(|value| value.is_finite())
+            .unwrap_or(0.0)
     }
 }
 
@@ -246,7 +324,10 @@ mod tests {
 
     fn samples(times: &[f64], q: impl Fn(f64) -> f64) -> JointSamples {
         let mut samples = JointSamples::default();
-        times.iter().zip(1..).for_each(|(time, number)| samples.push(number, *time, &[q(*time)], &[]));
+        times
+            .iter()
+            .zip(1..)
+            .for_each(|(time, number)| samples.push(number, *time, &[q(*time)], &[]));
         samples
     }
 
@@ -257,7 +338,10 @@ mod tests {
             for reach in 1..3 {
                 let around = samples.around(i, [0, 4], reach).unwrap();
                 let [velocity, acceleration] = samples.rate(1, 0, i, around);
-                assert!((velocity - (6.0 * samples.time[i] - 1.0)).abs() < 1e-12 && (acceleration - 6.0).abs() < 1e-9);
+                assert!(
+                    (velocity - (6.0 * samples.time[i] - 1.0)).abs() < 1e-12
+                        && (acceleration - 6.0).abs() < 1e-9
+                );
             }
         }
         assert_eq!(samples.around(2, [2, 2], 1), None);

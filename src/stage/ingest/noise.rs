@@ -100,14 +100,26 @@ pub(super) fn faults(settings: &Ingest) -> Vec<Fault> {
         if appended {
             stated.clear();
         }
-        let own = file.columns.numbers().filter(|(declared, _)| declared.part == Part::Sigma);
+        let own = file
+            .columns
+            .numbers()
+            .filter(|(declared, _)| declared.part == Part::Sigma);
         let own = own.map(|(declared, _)| (declared.setting, declared.setting));
         let by = file.columns.uncertainties();
-        let by = by.flat_map(|(declared, _, of, _)| of.iter().map(|setting| (*setting, declared.setting)));
+        let by = by
+            .flat_map(|(declared, _, of, _)| of.iter().map(|setting| (*setting, declared.setting)));
         for (sigma, setting) in own.chain(by) {
-            if let Some(other) = stated.insert(sigma, setting).filter(|other| *other != setting) {
-                let message = format!("states the standard deviation that `{other}` states already; map one of them");
-                faults.push(Fault::new(format!("files[{index}].columns.{setting}"), message));
+            if let Some(other) = stated
+                .insert(sigma, setting)
+                .filter(|other| *other != setting)
+            {
+                let message = format!(
+                    "states the standard deviation that `{other}` states already; map one of them"
+                );
+                faults.push(Fault::new(
+                    format!("files[{index}].columns.{setting}"),
+                    message,
+                ));
             }
         }
     }

@@ -32,38 +32,66 @@ impl FileDecision {
     /// Whether a data row, from 1, has all its partners.
     pub fn is_whole(&self, number: usize) -> bool {
         let row = number.wrapping_sub(1);
-        self.partners.iter().all(|partner| partner.get(row).is_some_and(|partner| *partner != NONE))
+        self.partners
+            .iter()
+            .all(|partner| partner.get(row).is_some_and(|partner| *partner != NONE))
     }
 }
 
 /// Decides for all files. Files that continue each other share their ids.
-pub(super) fn decide(scans: &[Scan], join: Option<&Join>, duplicates: Duplicates) -> Vec<FileDecision> {
+pub(super) fn decide(
+    scans: &[Scan],
+    join: Option<&Join>,
+    duplicates: Duplicates,
+) -> Vec<FileDecision> {
     let mut decisions: Vec<FileDecision> = scans.iter().map(|_| FileDecision::default()).collect();
     let ids: Vec<(usize, &FileIds)> = scans.iter().map(|scan| &scan.ids).enumerate().collect();
     if let Some(Join::Append {}) | None = join {
         single(&ids, duplicates, &mut decisions);
         return decisions;
     }
-    ids.chunks(1).for_each(|one| single(one, duplicates, &mut decisions));
-    let ([first, others @ ..], [one, decisions_of_others @ ..]) = (scans, decisions.as_mut_slice()) else { return decisions };
+    ids.chunks(1)
+        .for_each(|one| single(one, duplicates, &mut decisions));
+    let ([first, others @ ..], [one, decisions_of_others @ ..]) = (scans, decisions.as_mut_slice())
+    else {
+        return decisions;
+    };
     for (index, (second, other)) in others.iter().zip(decisions_of_others.iter()).enumerate() {
         let pairs = match join {
             Some(Join::Id {}) => by_id((&first.ids, one), (&second.ids, other)),
-            Some(Join::Time { tolerance_s, offset_s }) => {
-                let times = |scan: &Scan, decision: &FileDecision, offset: f64| -> Vec<(f64, u32)> {
-                    let rows = scan.times.iter().filter(|(_, number)| !decision.twins.contains_key(number));
-                    rows.map(|(time, number)| (time - offset, *number)).collect()
-                };
+            Some(Join::Time {
+                tolerance_s,
+                offset_s,
+            }) => {
+                let times =
+                    |scan: &Scan, decision: &FileDecision, offset: f64| -> Vec<(f64, u32)> {
+                        let rows = scan
+                            .times
+                            .iter()
+                            .filter(|(_, number)| !decision.twins.contains_key(number));
+                        rows.map(|(time, number)| (time - offset, *number))
+                            .collect()
+                    };
                 // What comes third was made of the first, and has its clock.
                 let offset = if index == 0 { *offset_s } else { 0.0 };
-                by_time(times(first, one, 0.0), times(second, other, offset), *tolerance_s)
+                by_time(
+                    times(first, one, 0.0),
+                    times(second, other, offset),
+                    *tolerance_s,
+                )
             }
             _ => {
                 let usable = |scan: &Scan, decision: &FileDecision, number: u32| {
-                    scan.usable.get(number as usize - 1).copied().unwrap_or(false) && !decision.twins.contains_key(&number)
+                    scan.usable
+                        .get(number as usize - 1)
+                        .copied()
+                        .unwrap_or(false)
+                        && !decision.twins.contains_key(&number)
                 };
                 let rows = 1..=first.read.min(second.read) as u32;
-                rows.filter(|n| usable(first, one, *n) && usable(second, other, *n)).map(|n| (n, n)).collect()
+                rows.filter(|n| usable(first, one, *n) && usable(second, other, *n))
+                    .map(|n| (n, n))
+                    .collect()
             }
         };
         let mut partner = vec![NONE; first.read as usize];
@@ -89,14 +117,22 @@ fn single(files: &[(usize, &FileIds)], duplicates: Duplicates, decisions: &mut [
     }
     let mut first: HashMap<&[u8], (usize, NamedRow)> = HashMap::new();
     let mut repeated: HashMap<&[u8], Vec<(usize, NamedRow)>> = HashMap::new();
-    for (file, (id, row)) in files.iter().flat_map(|(file, ids)| ids.rows().map(move |named| (*file, named))) {
+    for (file, (id, row)) in files
+        .iter()
+        .flat_map(|(file, ids)| ids.rows().map(move |named| (*file, named)))
+    {
         match first.entry(id) {
             Entry::Vacant(entry) => drop(entry.insert((file, row))),
-            Entry::Occupied(entry) => repeated.entry(id).or_insert_with(|| vec![*entry.get()]).push((file, row)),
+            Entry::Occupied(entry) => repeated
+                .entry(id)
+                .or_insert_with(|| vec![*entry.get()])
+                .push((file, row)),
         }
     }
     for same in repeated.values() {
-        let [first, .., last] = same.as_slice() else { continue };
+        let [first, .., last] = same.as_slice() else {
+            continue;
+        };
         let copies = same.iter().all(|(_, row)| row.content == first.1.content);
         let stays = match duplicates {
             Duplicates::Reject if !copies => None,
@@ -107,7 +143,14 @@ fn single(files: &[(usize, &FileIds)], duplicates: Duplicates, decisions: &mut [
             let twin = stays.map_or(if k == 0 { last } else { first }, |stays| &same[stays]);
             let copied = stays.is_some() && twin.1.content == row.content;
             if let Some(decision) = decisions.get_mut(*file) {
-                decision.twins.insert(row.number, Twin { file: twin.0 as u32, line: twin.1.line, copied });
+                decision.twins.insert(
+                    row.number,
+                    Twin {
+                        file: twin.0 as u32,
+                        line: twin.1.line,
+                        copied,
+                    },
+                );
             }
         }
     }
@@ -117,19 +160,32 @@ fn single(files: &[(usize, &FileIds)], duplicates: Duplicates, decisions: &mut [
 fn by_id(first: (&FileIds, &FileDecision), second: (&FileIds, &FileDecision)) -> Vec<(u32, u32)> {
     let used = |(ids, decision): (&'_ FileIds, &'_ FileDecision)| -> Vec<(usize, u32)> {
         let rows = ids.rows.iter().map(|row| row.number).enumerate();
-        rows.filter(|(_, number)| !decision.twins.contains_key(number)).collect()
+        rows.filter(|(_, number)| !decision.twins.contains_key(number))
+            .collect()
     };
     let (mine, theirs) = (used(first), used(second));
     let is = |place: usize, id: &[u8]| second.0.ids.bytes(place) == Some(id);
     let mut known: Option<HashMap<&[u8], usize>> = None;
     let (mut pairs, mut next) = (Vec::with_capacity(mine.len().min(theirs.len())), 0);
     for (place, number) in mine {
-        let Some(id) = first.0.ids.bytes(place) else { continue };
+        let Some(id) = first.0.ids.bytes(place) else {
+            continue;
+        };
         // As nearly every pair of files has it, ids stand in one order.
-        let found = Some(next).filter(|at| theirs.get(*at).is_some_and(|(place, _)| is(*place, id))).or_else(|| {
-            let ids = || theirs.iter().enumerate().filter_map(|(at, (place, _))| Some((second.0.ids.bytes(*place)?, at)));
-            known.get_or_insert_with(|| ids().collect()).get(id).copied()
-        });
+        let found = Some(next)
+            .filter(|at| theirs.get(*at).is_some_and(|(place, _)| is(*place, id)))
+            .or_else(|| {
+                let ids = || {
+                    theirs
+                        .iter()
+                        .enumerate()
+                        .filter_map(|(at, (place, _))| Some((second.0.ids.bytes(*place)?, at)))
+                };
+                known
+                    .get_or_insert_with(|| ids().collect())
+                    .get(id)
+                    .copied()
+            });
         if let Some(at) = found {
             pairs.push((number, theirs[at].1));
             next = at + 1;
@@ -140,7 +196,11 @@ fn by_id(first: (&FileIds, &FileDecision), second: (&FileIds, &FileDecision)) ->
 
 /// Pairs of rows that are each other's nearest in time, not further apart than the tolerance. Of equally near rows the
 /// earlier in the file counts.
-fn by_time(mut first: Vec<(f64, u32)>, mut second: Vec<(f64, u32)>, tolerance: f64) -> Vec<(u32, u32)> {
+fn by_time(
+    mut first: Vec<(f64, u32)>,
+    mut second: Vec<(f64, u32)>,
+    tolerance: f64,
+) -> Vec<(u32, u32)> {
     let order = |a: &(f64, u32), b: &(f64, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
     first.sort_unstable_by(order);
     second.sort_unstable_by(order);
@@ -148,7 +208,9 @@ fn by_time(mut first: Vec<(f64, u32)>, mut second: Vec<(f64, u32)>, tolerance: f
     let back = nearest(&second, &first);
     let mut pairs = Vec::new();
     for (index, (time, number)) in first.iter().enumerate() {
-        let Some(other) = towards.get(index).copied().flatten() else { continue };
+        let Some(other) = towards.get(index).copied().flatten() else {
+            continue;
+        };
         let mutual = back.get(other).copied().flatten() == Some(index);
         if let (true, Some((their, partner))) = (mutual, second.get(other))
             // Clock arithmetic in floating point must not lose a row that lies on the tolerance.
@@ -163,15 +225,25 @@ fn by_time(mut first: Vec<(f64, u32)>, mut second: Vec<(f64, u32)>, tolerance: f
 /// For each time of `from` the index of the nearest in `to`; both sorted.
 fn nearest(from: &[(f64, u32)], to: &[(f64, u32)]) -> Vec<Option<usize>> {
     // Of equal times the first stands for all: clocks that stand still must not cost a search of all rows for each row.
-    let heads: Vec<usize> = (0..to.len()).filter(|index| *index == 0 || to[index - 1].0 != to[*index].0).collect();
+    let heads: Vec<usize> = (0..to.len())
+        .filter(|index| *index == 0 || to[index - 1].0 != to[*index].0)
+        .collect();
     let mut start = 0;
     from.iter()
         .map(|(time, _)| {
             while heads.get(start).is_some_and(|head| to[*head].0 < *time) {
                 start += 1;
             }
-            let around = [start.checked_sub(1), Some(start)].into_iter().flatten().filter_map(|index| heads.get(index).copied());
-            around.min_by(|a, b| (to[*a].0 - time).abs().total_cmp(&(to[*b].0 - time).abs()).then(to[*a].1.cmp(&to[*b].1)))
+            let around = [start.checked_sub(1), Some(start)]
+                .into_iter()
+                .flatten()
+                .filter_map(|index| heads.get(index).copied());
+            around.min_by(|a, b| {
+                (to[*a].0 - time)
+                    .abs()
+                    .total_cmp(&(to[*b].0 - time).abs())
+                    .then(to[*a].1.cmp(&to[*b].1))
+            })
         })
         .collect()
 }
@@ -182,7 +254,11 @@ mod tests {
     use super::*;
 
     fn times(times: &[f64]) -> Vec<(f64, u32)> {
-        times.iter().zip(1..).map(|(time, number)| (*time, number)).collect()
+        times
+            .iter()
+            .zip(1..)
+            .map(|(time, number)| (*time, number))
+            .collect()
     }
 
     #[test]
@@ -205,15 +281,30 @@ mod tests {
         let stays = |duplicates| {
             let (mut ids, mut decisions) = (FileIds::default(), [FileDecision::default()]);
             for (id, number) in ["B", "A", "B", "B"].into_iter().zip(1..) {
-                let row = RecordedRow { id: id.into(), number, line: number + 1, ..RecordedRow::default() };
+                let row = RecordedRow {
+                    id: id.into(),
+                    number,
+                    line: number + 1,
+                    ..RecordedRow::default()
+                };
                 ids.push(&row, number, "a.csv").unwrap();
             }
             single(&[(0, &ids)], duplicates, &mut decisions);
-            let twins: Vec<(u32, u32)> = decisions[0].twins.iter().map(|(number, twin)| (*number, twin.line)).collect();
+            let twins: Vec<(u32, u32)> = decisions[0]
+                .twins
+                .iter()
+                .map(|(number, twin)| (*number, twin.line))
+                .collect();
             let pairs = by_id((&ids, &decisions[0]), (&ids, &decisions[0]));
-            (pairs.iter().map(|(number, _)| *number).collect::<Vec<_>>(), twins)
+            (
+                pairs.iter().map(|(number, _)| *number).collect::<Vec<_>>(),
+                twins,
+            )
         };
-        assert_eq!(stays(Duplicates::Reject), (vec![2], vec![(1, 5), (3, 2), (4, 2)]));
+        assert_eq!(
+            stays(Duplicates::Reject),
+            (vec![2], vec![(1, 5), (3, 2), (4, 2)])
+        );
         assert_eq!(stays(Duplicates::First), (vec![1, 2], vec![(3, 2), (4, 2)]));
         assert_eq!(stays(Duplicates::Last), (vec![2, 4], vec![(1, 5), (3, 5)]));
     }
@@ -223,13 +314,29 @@ mod tests {
         let ids = |names: &[&str]| {
             let mut ids = FileIds::default();
             for (name, number) in names.iter().zip(1..) {
-                ids.push(&RecordedRow { id: (*name).into(), number, ..RecordedRow::default() }, number, "a.csv").unwrap();
+                ids.push(
+                    &RecordedRow {
+                        id: (*name).into(),
+                        number,
+                        ..RecordedRow::default()
+                    },
+                    number,
+                    "a.csv",
+                )
+                .unwrap();
             }
             ids
         };
-        let pairs =
-            |one: &[&str], other: &[&str]| by_id((&ids(one), &FileDecision::default()), (&ids(other), &FileDecision::default()));
-        assert_eq!(pairs(&["A", "B", "C", "D"], &["X", "A", "B", "D", "C"]), [(1, 2), (2, 3), (3, 5), (4, 4)]);
+        let pairs = |one: &[&str], other: &[&str]| {
+            by_id(
+                (&ids(one), &FileDecision::default()),
+                (&ids(other), &FileDecision::default()),
+            )
+        };
+        assert_eq!(
+            pairs(&["A", "B", "C", "D"], &["X", "A", "B", "D", "C"]),
+            [(1, 2), (2, 3), (3, 5), (4, 4)]
+        );
         assert_eq!(pairs(&["A", "Q", "B"], &["A", "B", "C"]), [(1, 1), (3, 2)]);
         assert_eq!(pairs(&["A"], &[]), []);
     }

@@ -11,8 +11,8 @@ use super::row::RowReader;
 use crate::error::{Error, Result, counted};
 use crate::program::listing as language;
 use crate::raw::{
-    self, BagRows, ColumnRows, Delimiter, Record, RecordReader, TextLayout, TextRows, Workbook, failed, has_columns, is_bag,
-    is_workbook, not_read,
+    self, BagRows, ColumnRows, Delimiter, Record, RecordReader, TextLayout, TextRows, Workbook,
+    failed, has_columns, is_bag, is_workbook, not_read,
 };
 use crate::stage::{Context, OpenedInput};
 use crate::table::RejectedRow;
@@ -32,27 +32,61 @@ fn records(source: OpenedInput, layout: &FileLayout) -> Result<Box<dyn RecordRea
     let head = reader.fill_buf().map_err(|error| failed(label, &error))?;
     let is_book = is_workbook(head);
     if let Some(sheet) = layout.sheet.as_ref().filter(|_| !is_book) {
-        let message = format!("is no workbook, and has no sheet `{sheet}`; allowed: a file .xlsx or .xlsm, or no `sheet`");
+        let message = format!(
+            "is no workbook, and has no sheet `{sheet}`; allowed: a file .xlsx or .xlsm, or no `sheet`"
+        );
         return Err(Error::data(label, message));
     }
     let is_bag = is_bag(head);
     if let Some(topic) = layout.topic.as_ref().filter(|_| !is_bag) {
-        let message =
-            format!("is no recording of ROS 2, and has no topic `{topic}`; allowed: a file .mcap or .db3, or no `topic`");
+        let message = format!(
+            "is no recording of ROS 2, and has no topic `{topic}`; allowed: a file .mcap or .db3, or no `topic`"
+        );
         return Err(Error::data(label, message));
     }
-    let delimiter = Delimiter::parse(&layout.delimiter).ok_or_else(|| Error::Bug("an unchecked delimiter".into()))?;
-    let FileLayout { comment, header_in_comment, skip, .. } = layout.clone();
-    let text = TextLayout { delimiter, comment, header_in_comment, skip };
+    let delimiter = Delimiter::parse(&layout.delimiter)
+        .ok_or_else(|| Error::Bug("an unchecked delimiter".into()))?;
+    let FileLayout {
+        comment,
+        header_in_comment,
+        skip,
+        ..
+    } = layout.clone();
+    let text = TextLayout {
+        delimiter,
+        comment,
+        header_in_comment,
+        skip,
+    };
     Ok(if is_book {
         let data = |message: String| Error::data(label, message);
         let mut book = Workbook::read(reader).map_err(data)?;
         let name = book.sheet(layout.sheet.as_deref()).map_err(data)?;
-        let lines = book.lines(&name, if layout.decimal == Decimal::Comma { ',' } else { '.' }).map_err(data)?;
-        let text = TextLayout { delimiter: Delimiter::Byte(b'\t'), ..text };
-        Box::new(TextRows::open(Cursor::new(lines), &format!("{label} sheet `{name}`"), text)?)
+        let lines = book
+            .lines(
+                &name,
+                if layout.decimal == Decimal::Comma {
+                    ','
+                } else {
+                    '.'
+                },
+            )
+            .map_err(data)?;
+        let text = TextLayout {
+            delimiter: Delimiter::Byte(b'\t'),
+            ..text
+        };
+        Box::new(TextRows::open(
+            Cursor::new(lines),
+            &format!("{label} sheet `{name}`"),
+            text,
+        )?)
     } else if is_bag {
-        Box::new(BagRows::open(reader.into_inner(), label, layout.topic.as_deref())?)
+        Box::new(BagRows::open(
+            reader.into_inner(),
+            label,
+            layout.topic.as_deref(),
+        )?)
     } else if let Some(language) = language(&raw::ending(Path::new(label)), head) {
         listing::open(reader, label, language)?
     } else if has_columns(head) {
@@ -61,7 +95,11 @@ fn records(source: OpenedInput, layout: &FileLayout) -> Result<Box<dyn RecordRea
         return Err(Error::data(label, what));
     } else {
         let reader = raw::without_utf16(reader).map_err(|error| failed(label, &error))?;
-        Box::new(TextRows::open(BufReader::with_capacity(BUFFER, reader), label, text)?)
+        Box::new(TextRows::open(
+            BufReader::with_capacity(BUFFER, reader),
+            label,
+            text,
+        )?)
     })
 }
 
@@ -83,10 +121,19 @@ pub(super) struct OpenedFile<'a> {
 
 impl<'a> OpenedFile<'a> {
     /// Opens a file and finds its columns.
-    pub(super) fn open(source: OpenedInput, layout: &FileLayout, arm: &'a RobotJoints, limits: LimitPolicy) -> Result<Self> {
+    pub(super) fn open(
+        source: OpenedInput,
+        layout: &FileLayout,
+        arm: &'a RobotJoints,
+        limits: LimitPolicy,
+    ) -> Result<Self> {
         let mut reader = records(source, layout)?;
         let label = reader.label().to_string();
-        let (header, decimal) = if reader.is_text() { (layout.header, layout.decimal) } else { (true, Decimal::Point) };
+        let (header, decimal) = if reader.is_text() {
+            (layout.header, layout.decimal)
+        } else {
+            (true, Decimal::Point)
+        };
         let mut record = Record::default();
         if !reader.next(&mut record)? {
             let lines = counted(reader.lines(), "line");
@@ -98,7 +145,12 @@ impl<'a> OpenedFile<'a> {
             };
             return Err(Error::data(label, message));
         }
-        let mut head = FileHeader { label: label.clone(), line: record.line, width: record.len(), names: None };
+        let mut head = FileHeader {
+            label: label.clone(),
+            line: record.line,
+            width: record.len(),
+            names: None,
+        };
         if header {
             let mut names = record.cells();
             // A delimiter at the end of the header makes no column.
@@ -113,18 +165,37 @@ impl<'a> OpenedFile<'a> {
         reader.only(&binding.columns());
         let row = RecordedRow::empty(arm);
         let names = head.names.iter().flatten().enumerate();
-        let unmapped = names.filter(|(column, _)| binding.cells.iter().all(|cell| cell.column != *column));
+        let unmapped =
+            names.filter(|(column, _)| binding.cells.iter().all(|cell| cell.column != *column));
         let external = ExternalAxes::among(unmapped, layout.columns.has("q"), decimal);
-        let (remark, judge) = (reader.remark(), RowReader::new(binding, decimal, limits, arm));
-        Ok(Self { label, reader, judge, record, is_ahead: !header, remark, external, row })
+        let (remark, judge) = (
+            reader.remark(),
+            RowReader::new(binding, decimal, limits, arm),
+        );
+        Ok(Self {
+            label,
+            reader,
+            judge,
+            record,
+            is_ahead: !header,
+            remark,
+            external,
+            row,
+        })
     }
     /// What was left out of the file as a whole, and what it lacks.
     pub(super) fn remarks(&self) -> Vec<String> {
-        self.remark.iter().chain(&self.binding().missing).cloned().collect()
+        self.remark
+            .iter()
+            .chain(&self.binding().missing)
+            .cloned()
+            .collect()
     }
     /// What could not be read of the file, once its last row was.
     pub(super) fn loss(&self) -> Option<String> {
-        self.reader.loss().map(|loss| format!("{}: {loss}", self.label))
+        self.reader
+            .loss()
+            .map(|loss| format!("{}: {loss}", self.label))
     }
     pub(super) fn binding(&self) -> &Binding {
         &self.judge.binding
@@ -156,12 +227,20 @@ impl<'a> OpenedFile<'a> {
 }
 
 /// Whether a file has the columns that are mapped; without a robot, those that do not depend on its joints.
-pub(super) fn header(layout: &FileLayout, arm: Option<&RobotJoints>, limits: LimitPolicy, context: &Context) -> Result<()> {
+pub(super) fn header(
+    layout: &FileLayout,
+    arm: Option<&RobotJoints>,
+    limits: LimitPolicy,
+    context: &Context,
+) -> Result<()> {
     let source = context.services.open(&layout.file)?;
     if let Some(arm) = arm {
         return OpenedFile::open(source, layout, arm, limits).map(drop);
     }
-    let layout = FileLayout { columns: layout.columns.without_joints(), ..layout.clone() };
+    let layout = FileLayout {
+        columns: layout.columns.without_joints(),
+        ..layout.clone()
+    };
     let arm = RobotJoints::new(vec![false], vec![[f64::NEG_INFINITY, f64::INFINITY]]);
     OpenedFile::open(source, &layout, &arm, limits).map(drop)
 }
@@ -173,13 +252,25 @@ pub(super) struct FileProgress<'a> {
 }
 
 impl<'a> FileProgress<'a> {
-    pub(super) fn begin(context: &'a Context<'a>, what: &str, total: Option<u64>, unit: &str) -> Self {
+    pub(super) fn begin(
+        context: &'a Context<'a>,
+        what: &str,
+        total: Option<u64>,
+        unit: &str,
+    ) -> Self {
         context.services.begin(what, total, unit);
-        Self { context, done: AtomicU64::new(0) }
+        Self {
+            context,
+            done: AtomicU64::new(0),
+        }
     }
     /// Counts units of work of one of them up to the next sign of progress.
     pub(super) fn counter(&self) -> ProgressCounter<'_> {
-        ProgressCounter { progress: self, rows: 0, told: 0 }
+        ProgressCounter {
+            progress: self,
+            rows: 0,
+            told: 0,
+        }
     }
 }
 

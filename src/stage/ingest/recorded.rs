@@ -37,7 +37,11 @@ impl RecordedRow {
     /// An empty one.
     pub(super) fn empty(arm: &RobotJoints) -> Self {
         let texts = vec![String::new(); arm.slots.texts().len()];
-        Self { texts, values: vec![f64::NAN; arm.slots.count], ..Self::default() }
+        Self {
+            texts,
+            values: vec![f64::NAN; arm.slots.count],
+            ..Self::default()
+        }
     }
     /// The row as one that is not used, of the file that tables call `name`; `text` is what stands there.
     pub(super) fn rejected(&self, name: &str, text: &[u8], refusal: RowRefusal) -> RejectedRow {

@@ -17,10 +17,17 @@ pub(super) struct Rejections<'a> {
 
 impl<'a> Rejections<'a> {
     pub(super) fn new(names: &[String], context: &Context<'a>) -> Result<Self> {
-        Ok(Self { sink: context.services.sink(Rejected::KIND)?, rows: Vec::new(), ordered: names.is_sorted() })
+        Ok(Self {
+            sink: context.services.sink(Rejected::KIND)?,
+            rows: Vec::new(),
+            ordered: names.is_sorted(),
+        })
     }
     pub(super) fn push(&mut self, row: RejectedRow) -> Result<()> {
-        let goes_on = self.rows.last().is_some_and(|last| (&last.file, last.line) == (&row.file, row.line));
+        let goes_on = self
+            .rows
+            .last()
+            .is_some_and(|last| (&last.file, last.line) == (&row.file, row.line));
         if self.ordered && self.rows.len() >= REJECTED_CHUNK && !goes_on {
             self.flush()?;
         }
@@ -28,7 +35,8 @@ impl<'a> Rejections<'a> {
         Ok(())
     }
     fn flush(&mut self) -> Result<()> {
-        self.rows.sort_by(|a, b| (&a.file, a.line).cmp(&(&b.file, b.line)));
+        self.rows
+            .sort_by(|a, b| (&a.file, a.line).cmp(&(&b.file, b.line)));
         // A program may declare several positions in one line.
         self.rows.dedup_by(|next, kept| {
             let same = (&next.file, next.line) == (&kept.file, kept.line);
@@ -37,7 +45,8 @@ impl<'a> Rejections<'a> {
             }
             same
         });
-        self.sink.push(Rejected(std::mem::take(&mut self.rows)).to_frame()?)
+        self.sink
+            .push(Rejected(std::mem::take(&mut self.rows)).to_frame()?)
     }
     pub(super) fn finish(mut self) -> Result<StreamedTable<Rejected>> {
         // Also where nothing was rejected: a table without rows has its columns.

@@ -27,20 +27,42 @@ pub(super) struct RowReader<'a> {
 }
 
 impl<'a> RowReader<'a> {
-    pub(super) fn new(binding: Binding, decimal: Decimal, limits: LimitPolicy, arm: &'a RobotJoints) -> Self {
-        Self { binding, mark: decimal.mark(), limits, arm, last_sequence: None, clock: ClockColumn::default() }
+    pub(super) fn new(
+        binding: Binding,
+        decimal: Decimal,
+        limits: LimitPolicy,
+        arm: &'a RobotJoints,
+    ) -> Self {
+        Self {
+            binding,
+            mark: decimal.mark(),
+            limits,
+            arm,
+            last_sequence: None,
+            clock: ClockColumn::default(),
+        }
     }
 
     /// Fills `row` from a record; `row.id` is filled also where the row is refused for its numbers.
-    pub(super) fn read(&mut self, record: &Record, row: &mut RecordedRow) -> Result<(), RowRefusal> {
+    pub(super) fn read(
+        &mut self,
+        record: &Record,
+        row: &mut RecordedRow,
+    ) -> Result<(), RowRefusal> {
         row.id.clear();
-        self.binding.worded.iter().for_each(|place| row.texts[*place].clear());
+        self.binding
+            .worded
+            .iter()
+            .for_each(|place| row.texts[*place].clear());
         row.sequence = None;
         row.beyond = None;
         row.turned = None;
         row.line = record.line;
         row.points.clear();
-        self.binding.filled.iter().for_each(|place| row.values[*place] = f64::NAN);
+        self.binding
+            .filled
+            .iter()
+            .for_each(|place| row.values[*place] = f64::NAN);
         row.is_blank = record.is_blank(0);
         if let Some((fault, detail)) = &record.fault {
             return refuse((*fault).into(), detail.clone());
@@ -52,13 +74,25 @@ impl<'a> RowReader<'a> {
         let complete = record.len() >= width;
         text(&self.binding.id, record, "point_id", complete, &mut row.id)?;
         if !complete {
-            return refuse(Reason::ShortRow, format!("{} fields; allowed: {width}", record.len()));
+            return refuse(
+                Reason::ShortRow,
+                format!("{} fields; allowed: {width}", record.len()),
+            );
         }
         if !record.is_blank(width) {
-            return refuse(Reason::LongRow, format!("{} fields; allowed: {width}", record.len()));
+            return refuse(
+                Reason::LongRow,
+                format!("{} fields; allowed: {width}", record.len()),
+            );
         }
         for place in &self.binding.worded {
-            text(&self.binding.texts[*place], record, self.arm.slots.texts()[*place], true, &mut row.texts[*place])?;
+            text(
+                &self.binding.texts[*place],
+                record,
+                self.arm.slots.texts()[*place],
+                true,
+                &mut row.texts[*place],
+            )?;
         }
         for (index, value) in &self.binding.constants {
             if let Some(slot) = row.values.get_mut(*index) {
@@ -85,7 +119,10 @@ impl<'a> RowReader<'a> {
             let Some(own) = own else { continue };
             let mut value = cell.unit.to_si(own);
             if let Some(other) = &cell.difference {
-                let Some(added) = self.number(record, other.column, &other.name, cell.optional)? else { continue };
+                let Some(added) = self.number(record, other.column, &other.name, cell.optional)?
+                else {
+                    continue;
+                };
                 value += other.sign * other.unit.to_si(added);
             }
             value = cell.sign * (value - cell.zero) / cell.divisor;
@@ -100,7 +137,11 @@ impl<'a> RowReader<'a> {
                 let allowed = if direction {
                     "1, -1 or 0".to_string()
                 } else {
-                    format!("{} to {} {unit}", round(unit.from_si(lower)), round(unit.from_si(cell.divisor * upper)))
+                    format!(
+                        "{} to {} {unit}",
+                        round(unit.from_si(lower)),
+                        round(unit.from_si(cell.divisor * upper))
+                    )
                 };
                 let text = |column: usize| shown(record, column);
                 let found = match &cell.difference {
@@ -108,7 +149,11 @@ impl<'a> RowReader<'a> {
                     Some(other) => {
                         let sign = if other.sign < 0.0 { "-" } else { "+" };
                         let names = format!("{} {sign} {}", cell.name, other.name);
-                        format!("{names}: `{}` {sign} `{}`", text(cell.column), text(other.column))
+                        format!(
+                            "{names}: `{}` {sign} `{}`",
+                            text(cell.column),
+                            text(other.column)
+                        )
                     }
                 };
                 return refuse(Reason::OutOfRange, format!("{found}; allowed: {allowed}"));
@@ -117,7 +162,10 @@ impl<'a> RowReader<'a> {
                 *slot = value;
             }
         }
-        let q = row.values.get_mut(self.arm.slots.q.clone()).unwrap_or_default();
+        let q = row
+            .values
+            .get_mut(self.arm.slots.q.clone())
+            .unwrap_or_default();
         for (joint, by, ratio) in &self.binding.coupled {
             q[*joint] -= ratio * q[*by];
         }
@@ -129,29 +177,46 @@ impl<'a> RowReader<'a> {
         for (target, cells) in &self.binding.points {
             let mut point = [f64::NAN; 3];
             for (value, cell) in point.iter_mut().zip(cells) {
-                let Some(own) = self.number(record, cell.column, &cell.name, true)? else { continue };
+                let Some(own) = self.number(record, cell.column, &cell.name, true)? else {
+                    continue;
+                };
                 *value = cell.unit.to_si(own);
                 let [lower, upper] = cell.range;
                 if !(lower..=upper).contains(value) {
-                    let [lower, upper] = [lower, upper].map(|limit| round(cell.unit.from_si(limit)));
+                    let [lower, upper] =
+                        [lower, upper].map(|limit| round(cell.unit.from_si(limit)));
                     let found = shown(record, cell.column);
                     return refuse(
                         Reason::OutOfRange,
-                        format!("{}: `{found}`; allowed: {lower} to {upper} {}", cell.name, cell.unit),
+                        format!(
+                            "{}: `{found}`; allowed: {lower} to {upper} {}",
+                            cell.name, cell.unit
+                        ),
                     );
                 }
             }
             let blank = point.iter().filter(|value| value.is_nan()).count();
             if blank == 1 || blank == 2 {
-                return refuse(Reason::Blank, format!("the point of {target} is incomplete"));
+                return refuse(
+                    Reason::Blank,
+                    format!("the point of {target} is incomplete"),
+                );
             }
-            row.points.push(if point == [0.0; 3] { [f64::NAN; 3] } else { point });
+            row.points.push(if point == [0.0; 3] {
+                [f64::NAN; 3]
+            } else {
+                point
+            });
         }
         Ok(())
     }
 
     /// The clock time in a cell, s; nothing where it may be blank and is.
-    fn moment(clock: &mut ClockColumn, record: &Record, cell: &NumberBinding) -> Result<Option<f64>, RowRefusal> {
+    fn moment(
+        clock: &mut ClockColumn,
+        record: &Record,
+        cell: &NumberBinding,
+    ) -> Result<Option<f64>, RowRefusal> {
         let field = record.field(cell.column);
         match clock.read(field) {
             Some(seconds) => Ok(Some(seconds)),
@@ -159,14 +224,26 @@ impl<'a> RowReader<'a> {
             None if field.is_empty() => refuse(Reason::Blank, format!("{} is blank", cell.name)),
             None => {
                 let found = shown(record, cell.column);
-                refuse(Reason::NotANumber, format!("{}: `{found}` is no clock time; allowed: {ALLOWED}", cell.name))
+                refuse(
+                    Reason::NotANumber,
+                    format!(
+                        "{}: `{found}` is no clock time; allowed: {ALLOWED}",
+                        cell.name
+                    ),
+                )
             }
         }
     }
 
     /// The number in a column, in the file's unit; nothing where it may be blank and is.
     #[inline]
-    fn number(&self, record: &Record, column: usize, name: &str, optional: bool) -> Result<Option<f64>, RowRefusal> {
+    fn number(
+        &self,
+        record: &Record,
+        column: usize,
+        name: &str,
+        optional: bool,
+    ) -> Result<Option<f64>, RowRefusal> {
         match number(record.field(column), self.mark) {
             Ok(value) => Ok(Some(value)),
             Err(NumberFault::Blank) if optional => Ok(None),
@@ -177,13 +254,18 @@ impl<'a> RowReader<'a> {
     /// Makes what a recording keeps of quantities of several numbers.
     fn conventions(&self, row: &mut RecordedRow) -> Result<(), RowRefusal> {
         for (places, declared, convention) in &self.binding.conventions {
-            let Some(numbers) = row.values.get_mut(places.clone()) else { continue };
+            let Some(numbers) = row.values.get_mut(places.clone()) else {
+                continue;
+            };
             let own = &numbers[..convention.numbers];
             if own.iter().all(|number| number.is_nan()) {
                 continue;
             }
             if own.iter().any(|number| number.is_nan()) {
-                return refuse(Reason::OutOfRange, format!("the {} is incomplete", declared.setting));
+                return refuse(
+                    Reason::OutOfRange,
+                    format!("the {} is incomplete", declared.setting),
+                );
             }
             match (convention.read)(own) {
                 Ok(kept) => {
@@ -199,21 +281,41 @@ impl<'a> RowReader<'a> {
     /// A row measured something, and what needs a standard deviation has one; of what this file holds.
     fn measured(&self, row: &RecordedRow) -> Result<(), RowRefusal> {
         let there = |index: &usize| row.values.get(*index).is_some_and(|value| !value.is_nan());
-        let kinds = || self.binding.kinds.iter().map(|kind| &self.arm.slots.kinds[*kind]);
-        let brought = |kind: &KindSlots| kind.name.and_then(|name| row.texts.get(name)).is_some_and(|name| !name.is_empty());
+        let kinds = || {
+            self.binding
+                .kinds
+                .iter()
+                .map(|kind| &self.arm.slots.kinds[*kind])
+        };
+        let brought = |kind: &KindSlots| {
+            kind.name
+                .and_then(|name| row.texts.get(name))
+                .is_some_and(|name| !name.is_empty())
+        };
         let seen = row.points.iter().any(|point| !point[0].is_nan());
-        if self.binding.measures && !seen && !kinds().any(|kind| kind.values.iter().any(there) || brought(kind)) {
+        if self.binding.measures
+            && !seen
+            && !kinds().any(|kind| kind.values.iter().any(there) || brought(kind))
+        {
             return refuse(Reason::Blank, "nothing was measured in this row".into());
         }
         for own in kinds().filter(|own| own.own_sigma) {
-            let KindSlots { kind, values, sigma, .. } = own;
+            let KindSlots {
+                kind,
+                values,
+                sigma,
+                ..
+            } = own;
             let measured = values.iter().filter(|index| there(index)).count();
             let name = || kind.about().name;
             if measured > 0 && measured < values.len() {
                 return refuse(Reason::Blank, format!("the {} is incomplete", name()));
             }
             if (measured > 0 || brought(own)) && !sigma.iter().all(there) {
-                return refuse(Reason::Blank, format!("a measured {} without its standard deviation", name()));
+                return refuse(
+                    Reason::Blank,
+                    format!("a measured {} without its standard deviation", name()),
+                );
             }
         }
         Ok(())
@@ -222,15 +324,21 @@ impl<'a> RowReader<'a> {
     fn plausible(&self, row: &mut RecordedRow) -> Result<(), RowRefusal> {
         // A tracker that lost its beam writes these as zero.
         if row.values.get(self.arm.slots.point.clone()) == Some(&[0.0; 3]) {
-            return refuse(Reason::LostBeam, "the position is 0, 0, 0: the tracker saw nothing".into());
+            return refuse(
+                Reason::LostBeam,
+                "the position is 0, 0, 0: the tracker saw nothing".into(),
+            );
         }
         let q = row.values.get(self.arm.slots.q.clone()).unwrap_or_default();
         for (joint, (q, [lower, upper])) in q.iter().zip(&self.arm.limits).enumerate() {
             if *q < lower - SLACK || *q > upper + SLACK {
                 row.beyond = Some(joint);
                 if self.limits == LimitPolicy::Reject {
-                    let (scale, unit) =
-                        if self.arm.prismatic.get(joint) == Some(&true) { (1e3, "mm") } else { (1f64.to_degrees(), "deg") };
+                    let (scale, unit) = if self.arm.prismatic.get(joint) == Some(&true) {
+                        (1e3, "mm")
+                    } else {
+                        (1f64.to_degrees(), "deg")
+                    };
                     let detail = format!(
                         "joint {} at {:.4} {unit}; allowed: {:.4} to {:.4} {unit}",
                         joint + 1,
@@ -252,15 +360,24 @@ impl<'a> RowReader<'a> {
             return refuse(Reason::Blank, "sequence is blank".into());
         }
         let Ok(value) = shown.parse::<i64>() else {
-            return refuse(Reason::NotANumber, format!("sequence: `{shown}` is not a whole number"));
+            return refuse(
+                Reason::NotANumber,
+                format!("sequence: `{shown}` is not a whole number"),
+            );
         };
         if value.abs() > LARGEST_SEQUENCE {
-            return refuse(Reason::OutOfRange, format!("sequence {value} is out of range; allowed: up to {LARGEST_SEQUENCE}"));
+            return refuse(
+                Reason::OutOfRange,
+                format!("sequence {value} is out of range; allowed: up to {LARGEST_SEQUENCE}"),
+            );
         }
         if let Some(last) = self.last_sequence
             && value <= last
         {
-            return refuse(Reason::OutOfOrder, format!("sequence {value} does not follow {last}"));
+            return refuse(
+                Reason::OutOfOrder,
+                format!("sequence {value} does not follow {last}"),
+            );
         }
         self.last_sequence = Some(value);
         Ok(value)
@@ -268,16 +385,27 @@ impl<'a> RowReader<'a> {
 }
 
 #[cold]
-fn no_number<T>(record: &Record, column: usize, name: &str, fault: NumberFault) -> Result<T, RowRefusal> {
+fn no_number<T>(
+    record: &Record,
+    column: usize,
+    name: &str,
+    fault: NumberFault,
+) -> Result<T, RowRefusal> {
     let shown = shown(record, column);
     let detail = match fault {
         NumberFault::Blank => return refuse(Reason::Blank, format!("{name} is blank")),
         NumberFault::Text if ClockTime::parse(record.field(column)).is_some() => {
-            format!("{name}: `{shown}` is a clock time, not a number; `unit: {CLOCK}` reads such times")
+            format!(
+                "{name}: `{shown}` is a clock time, not a number; `unit: {CLOCK}` reads such times"
+            )
         }
         NumberFault::Text => format!("{name}: `{shown}` is not a number"),
-        NumberFault::Comma => format!("{name}: `{shown}` has a decimal comma; allowed: `decimal: comma` in the settings"),
-        NumberFault::Point => format!("{name}: `{shown}` has a decimal point; allowed: `decimal: point` in the settings"),
+        NumberFault::Comma => format!(
+            "{name}: `{shown}` has a decimal comma; allowed: `decimal: comma` in the settings"
+        ),
+        NumberFault::Point => format!(
+            "{name}: `{shown}` has a decimal point; allowed: `decimal: point` in the settings"
+        ),
         NumberFault::NotFinite => format!("{name}: `{shown}` is not a finite number"),
     };
     refuse(Reason::NotANumber, detail)
@@ -285,31 +413,53 @@ fn no_number<T>(record: &Record, column: usize, name: &str, fault: NumberFault) 
 
 /// A field for people, cut at 40 characters.
 fn shown(record: &Record, column: usize) -> String {
-    crate::raw::shown(record.field(column)).chars().take(40).collect()
+    crate::raw::shown(record.field(column))
+        .chars()
+        .take(40)
+        .collect()
 }
 
 fn round(value: f64) -> f64 {
     (value * 1e6).round() / 1e6
 }
 
-fn text(source: &Option<TextBinding>, record: &Record, name: &str, complete: bool, into: &mut String) -> Result<(), RowRefusal> {
+fn text(
+    source: &Option<TextBinding>,
+    record: &Record,
+    name: &str,
+    complete: bool,
+    into: &mut String,
+) -> Result<(), RowRefusal> {
     match source {
         Some(TextBinding::Value(value)) => into.push_str(value),
-        Some(TextBinding::Column { column, optional, rule }) => {
+        Some(TextBinding::Column {
+            column,
+            optional,
+            rule,
+        }) => {
             let bytes = record.field(*column);
             match decoded_text(bytes).as_deref() {
-                Some("") if !optional && complete => return refuse(Reason::Blank, format!("{name} is blank")),
+                Some("") if !optional && complete => {
+                    return refuse(Reason::Blank, format!("{name} is blank"));
+                }
                 Some("") => {}
                 Some(text) => match rule.applied(text) {
                     Some(counts) => into.push_str(counts),
                     None => {
                         return refuse(
                             Reason::NotANumber,
-                            format!("{name}: `{text}` holds no number, and `match: number` asks for one"),
+                            format!(
+                                "{name}: `{text}` holds no number, and `match: number` asks for one"
+                            ),
                         );
                     }
                 },
-                None => return refuse(Reason::NotText, format!("{name} is neither UTF-8 nor Windows-1252 text")),
+                None => {
+                    return refuse(
+                        Reason::NotText,
+                        format!("{name} is neither UTF-8 nor Windows-1252 text"),
+                    );
+                }
             }
         }
         None => {}

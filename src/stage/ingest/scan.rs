@@ -30,7 +30,11 @@ pub(super) type RefusalCounts = BTreeMap<Reason, RefusalCount>;
 
 /// Counts one refusal.
 pub(super) fn tally(counts: &mut RefusalCounts, line: u64, refusal: &RowRefusal) {
-    let new = || RefusalCount { rows: 0, first_line: line, first_detail: refusal.detail.clone() };
+    let new = || RefusalCount {
+        rows: 0,
+        first_line: line,
+        first_detail: refusal.detail.clone(),
+    };
     counts.entry(refusal.reason).or_insert_with(new).rows += 1;
 }
 
@@ -110,7 +114,10 @@ impl Scan {
     }
     /// How far a joint turns over the rows at most, rad or m.
     pub(super) fn largest_turn(&self) -> f64 {
-        self.ranges.iter().map(|[least, most]| most - least).fold(0.0, f64::max)
+        self.ranges
+            .iter()
+            .map(|[least, most]| most - least)
+            .fold(0.0, f64::max)
     }
     pub(super) fn refused(&self) -> u64 {
         self.tally.values().map(|count| count.rows).sum()
@@ -121,24 +128,50 @@ impl Scan {
 }
 
 /// Reads the files of a measurement once, in parallel; each may hold rows of so many bytes in all.
-pub(super) fn files(settings: &Ingest, arm: &RobotJoints, most: usize, context: &Context) -> Result<Vec<Scan>> {
+pub(super) fn files(
+    settings: &Ingest,
+    arm: &RobotJoints,
+    most: usize,
+    context: &Context,
+) -> Result<Vec<Scan>> {
     let (mut opened, mut sizes) = (Vec::new(), Vec::new());
     for layout in &settings.files {
         let source = context.services.open(&layout.file)?;
         sizes.push(source.size);
         let open = OpenedFile::open(source, layout, arm, settings.limits)?;
-        open.remarks().iter().for_each(|remark| context.services.note(format!("{}: {remark}", open.label)));
+        open.remarks()
+            .iter()
+            .for_each(|remark| context.services.note(format!("{}: {remark}", open.label)));
         opened.push(open);
     }
     let labels: Vec<&str> = opened.iter().map(|open| open.label.as_str()).collect();
-    let progress = FileProgress::begin(context, &format!("reading {}", labels.join(", ")), sizes.into_iter().sum(), "bytes");
-    let scans: Vec<Result<Scan>> =
-        opened.into_par_iter().enumerate().map(|(index, open)| file(settings, index, open, (arm, most), &progress)).collect();
+    let progress = FileProgress::begin(
+        context,
+        &format!("reading {}", labels.join(", ")),
+        sizes.into_iter().sum(),
+        "bytes",
+    );
+    let scans: Vec<Result<Scan>> = opened
+        .into_par_iter()
+        .enumerate()
+        .map(|(index, open)| file(settings, index, open, (arm, most), &progress))
+        .collect();
     // Of several faults that of the first file.
     let mut scans = scans.into_iter().collect::<Result<Vec<_>>>()?;
     for scan in &mut scans {
-        scan.loss.take().into_iter().for_each(|loss| context.services.warn(loss));
-        let track = |samples: JointSamples| samples.track(settings.motion.as_ref(), scan.read, arm, &scan.label, context);
+        scan.loss
+            .take()
+            .into_iter()
+            .for_each(|loss| context.services.warn(loss));
+        let track = |samples: JointSamples| {
+            samples.track(
+                settings.motion.as_ref(),
+                scan.read,
+                arm,
+                &scan.label,
+                context,
+            )
+        };
         scan.track = scan.samples.take().map(track).transpose()?;
     }
     Ok(scans)
@@ -153,12 +186,22 @@ fn file(
     progress: &FileProgress,
 ) -> Result<Scan> {
     let layout = &settings.files[index];
-    let joined = matches!(settings.join, Some(Join::Id {} | Join::Time { .. } | Join::Order {}));
-    let held = HeldRows::new(open.binding(), joined && index > 0, most / settings.files.len());
+    let joined = matches!(
+        settings.join,
+        Some(Join::Id {} | Join::Time { .. } | Join::Order {})
+    );
+    let held = HeldRows::new(
+        open.binding(),
+        joined && index > 0,
+        most / settings.files.len(),
+    );
     let mut scan = Scan::new(&open, held);
     scan.samples = is_track(settings, layout).then(JointSamples::default);
     let keyed = layout.columns.has("point_id") && settings.duplicates != Duplicates::Keep;
-    let (by_time, by_id) = (matches!(settings.join, Some(Join::Time { .. })), matches!(settings.join, Some(Join::Id {})));
+    let (by_time, by_id) = (
+        matches!(settings.join, Some(Join::Time { .. })),
+        matches!(settings.join, Some(Join::Id {})),
+    );
     let (mut hasher, mut pace) = (RowHasher::default(), progress.counter());
     while let Some(judged) = open.next()? {
         let row = &open.row;
@@ -168,12 +211,17 @@ fn file(
         match &judged {
             Ok(()) => {
                 let hashed = keyed || scan.measured.is_some();
-                let content = if hashed { hasher.of(row, &open.binding().filled) } else { 0 };
+                let content = if hashed {
+                    hasher.of(row, &open.binding().filled)
+                } else {
+                    0
+                };
                 if keyed && !row.id.is_empty() {
                     scan.ids.push(row, content, &scan.label)?;
                 }
                 if by_id && scan.first_ids.len() < EXAMPLES {
-                    scan.first_ids.push((narrow(row.number, &scan.label)?, row.id.clone()));
+                    scan.first_ids
+                        .push((narrow(row.number, &scan.label)?, row.id.clone()));
                 }
                 if let Some(before) = &mut scan.measured {
                     *before = behind(*before, row.number, content);
@@ -202,7 +250,10 @@ fn file(
     open.external.must_stand(&open.label, arm.joints())?;
     (scan.lines, scan.read, scan.loss) = (open.lines(), open.row.number, open.loss());
     if scan.read == 0 {
-        return Err(Error::data(scan.label, "has a header but no data row; allowed: at least one"));
+        return Err(Error::data(
+            scan.label,
+            "has a header but no data row; allowed: at least one",
+        ));
     }
     Ok(scan)
 }
@@ -218,13 +269,25 @@ pub(super) fn rows<'a>(
         return Ok(RowSource::Held(held));
     }
     let source = context.services.open(&layout.file)?;
-    Ok(RowSource::File(Box::new(OpenedFile::open(source, layout, arm, settings.limits)?)))
+    Ok(RowSource::File(Box::new(OpenedFile::open(
+        source,
+        layout,
+        arm,
+        settings.limits,
+    )?)))
 }
 
 /// Whether velocities, or what they change by, follow from this file's joints over time.
 fn is_track(settings: &Ingest, layout: &FileLayout) -> bool {
-    let timed = layout.columns.number("time").is_some_and(|time| time.column.is_some());
-    let moving = settings.motion.is_some() || settings.files.iter().any(|file| file.columns.has("velocity"));
+    let timed = layout
+        .columns
+        .number("time")
+        .is_some_and(|time| time.column.is_some());
+    let moving = settings.motion.is_some()
+        || settings
+            .files
+            .iter()
+            .any(|file| file.columns.has("velocity"));
     let asked = settings.motion.is_some() || matches!(settings.join, Some(Join::Time { .. }));
     timed && moving && asked && layout.columns.has("q")
 }
@@ -232,22 +295,32 @@ fn is_track(settings: &Ingest, layout: &FileLayout) -> bool {
 fn sample(samples: &mut JointSamples, row: &RecordedRow, layout: &FileLayout, arm: &RobotJoints) {
     let all = |places: &Range<usize>| row.values.get(places.clone()).unwrap_or_default();
     let time = row.values.get(arm.slots.time).copied().unwrap_or(f64::NAN);
-    let given = if layout.columns.has("velocity") { all(&arm.slots.velocity) } else { &[] };
+    let given = if layout.columns.has("velocity") {
+        all(&arm.slots.velocity)
+    } else {
+        &[]
+    };
     samples.push(row.number, time, all(&arm.slots.q), given);
 }
 
 impl Scan {
     fn odd(&mut self, row: &RecordedRow, arm: &RobotJoints) {
         let q = row.values.get(arm.slots.q.clone()).unwrap_or_default();
-        for (value, _) in q.iter().zip(&arm.prismatic).filter(|(_, prismatic)| !**prismatic) {
+        for (value, _) in q
+            .iter()
+            .zip(&arm.prismatic)
+            .filter(|(_, prismatic)| !**prismatic)
+        {
             self.largest = self.largest.max(value.abs());
         }
-        self.ranges.resize(q.len(), [f64::INFINITY, f64::NEG_INFINITY]);
+        self.ranges
+            .resize(q.len(), [f64::INFINITY, f64::NEG_INFINITY]);
         for (value, [least, most]) in q.iter().zip(&mut self.ranges) {
             (*least, *most) = (least.min(*value), most.max(*value));
         }
         if let Some(joint) = row.beyond {
-            self.beyond.count(row.line, joint, q.get(joint).copied().unwrap_or(f64::NAN));
+            self.beyond
+                .count(row.line, joint, q.get(joint).copied().unwrap_or(f64::NAN));
         }
     }
 }

@@ -38,8 +38,10 @@ impl Slots {
             count += column.numbers(joints);
             (column, first..count)
         };
-        let columns: Vec<(&'static DeclaredColumn, Range<usize>)> = recording_columns().map(place).collect();
-        let texts = recording_columns().filter(|column| column.is_text() && column.setting != "point_id");
+        let columns: Vec<(&'static DeclaredColumn, Range<usize>)> =
+            recording_columns().map(place).collect();
+        let texts =
+            recording_columns().filter(|column| column.is_text() && column.setting != "point_id");
         let mut slots = Self {
             texts: texts.map(|column| column.setting).collect(),
             columns,
@@ -50,14 +52,20 @@ impl Slots {
             point: 0..0,
             kinds: Vec::new(),
         };
-        (slots.time, slots.q, slots.velocity) = (slots.of("time").start, slots.of("q"), slots.of("velocity"));
+        (slots.time, slots.q, slots.velocity) =
+            (slots.of("time").start, slots.of("q"), slots.of("velocity"));
         slots.point = slots.of("x").start..slots.of("z").end;
         let part = |kind: &dyn MeasurementKind, part: Part| -> Vec<usize> {
-            kind.columns(part).flat_map(|column| slots.of(column.setting).take(column.stored.len())).collect()
+            kind.columns(part)
+                .flat_map(|column| slots.of(column.setting).take(column.stored.len()))
+                .collect()
         };
         let name = |kind: &dyn MeasurementKind| {
             let own = kind.telling().next().filter(|_| kind.is_brought())?;
-            slots.texts.iter().position(|setting| *setting == own.setting)
+            slots
+                .texts
+                .iter()
+                .position(|setting| *setting == own.setting)
         };
         let kinds = KINDS.iter().map(|kind| KindSlots {
             kind: *kind,
@@ -71,7 +79,10 @@ impl Slots {
     }
     /// The places of a setting's numbers.
     pub(super) fn of(&self, setting: &str) -> Range<usize> {
-        let found = self.columns.iter().find(|(column, _)| column.setting == setting);
+        let found = self
+            .columns
+            .iter()
+            .find(|(column, _)| column.setting == setting);
         found.map_or(0..0, |(_, places)| places.clone())
     }
     /// All columns with numbers, and their places.

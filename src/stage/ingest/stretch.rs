@@ -27,7 +27,15 @@ const TOLD: u64 = 5;
 
 impl Stretches {
     pub(super) fn new() -> Self {
-        Self { number: 0, name: None, last: None, step: None, usual: Vec::new(), gap: None, warned: 0 }
+        Self {
+            number: 0,
+            name: None,
+            last: None,
+            step: None,
+            usual: Vec::new(),
+            gap: None,
+            warned: 0,
+        }
     }
 
     /// Rows of another file follow: another stretch.
@@ -41,7 +49,13 @@ impl Stretches {
     }
 
     /// The stretch of the next row, of the trajectory `name`. Fails with what is wrong with the clock.
-    pub(super) fn next(&mut self, name: &str, time: f64, q: &[f64], line: u64) -> Result<i64, String> {
+    pub(super) fn next(
+        &mut self,
+        name: &str,
+        time: f64,
+        q: &[f64],
+        line: u64,
+    ) -> Result<i64, String> {
         let last = self.last.take();
         let goes_on = self.name.as_deref() == Some(name);
         if let (Some((before, from)), true) = (&last, goes_on) {
@@ -99,7 +113,11 @@ impl Stretches {
     fn went_on(&self, moved: &[f64]) -> bool {
         let Some(step) = &self.step else { return false };
         let size = step.iter().fold(0.0, |most: f64, one| most.max(one.abs()));
-        size > MOVES && moved.iter().zip(step).all(|(moved, step)| (moved - step).abs() < NEAR * size)
+        size > MOVES
+            && moved
+                .iter()
+                .zip(step)
+                .all(|(moved, step)| (moved - step).abs() < NEAR * size)
     }
 
     /// What a person should know of a gap that was just met.
@@ -107,8 +125,12 @@ impl Stretches {
         let (line, gap) = self.gap.take()?;
         self.warned += 1;
         match self.warned {
-            1..TOLD => Some(format!("{label}:{line}: no rows for {gap:.3} s; another stretch begins")),
-            TOLD => Some(format!("{label}:{line}: no rows for {gap:.3} s; further gaps are not listed")),
+            1..TOLD => Some(format!(
+                "{label}:{line}: no rows for {gap:.3} s; another stretch begins"
+            )),
+            TOLD => Some(format!(
+                "{label}:{line}: no rows for {gap:.3} s; further gaps are not listed"
+            )),
             _ => None,
         }
     }
@@ -118,9 +140,15 @@ impl Stretches {
 mod tests {
     use super::Stretches;
 
-    fn rows(stretches: &mut Stretches, rows: std::ops::Range<i32>, later: f64, ahead: f64) -> Result<i64, String> {
+    fn rows(
+        stretches: &mut Stretches,
+        rows: std::ops::Range<i32>,
+        later: f64,
+        ahead: f64,
+    ) -> Result<i64, String> {
         let row = |k: i32| (0.01 * f64::from(k) + later, 0.003 * f64::from(k) + ahead);
-        rows.map(row).try_fold(0, |_, (time, q)| stretches.next("1", time, &[q, 0.0], 7))
+        rows.map(row)
+            .try_fold(0, |_, (time, q)| stretches.next("1", time, &[q, 0.0], 7))
     }
 
     #[test]
@@ -128,12 +156,25 @@ mod tests {
         let mut paused = Stretches::new();
         assert_eq!(rows(&mut paused, 0..50, 0.0, 0.0), Ok(1));
         assert_eq!(rows(&mut paused, 50..90, 3.0, 0.9), Ok(2));
-        assert!(paused.warning("a.csv").expect("a gap").starts_with("a.csv:7: no rows for 3.010 s"));
+        assert!(
+            paused
+                .warning("a.csv")
+                .expect("a gap")
+                .starts_with("a.csv:7: no rows for 3.010 s")
+        );
         let mut jumps = Stretches::new();
         assert_eq!(rows(&mut jumps, 0..50, 0.0, 0.0), Ok(1));
-        assert!(rows(&mut jumps, 50..90, 3.0, 0.0).unwrap_err().starts_with("the clock jumps by 3.010 s"));
+        assert!(
+            rows(&mut jumps, 50..90, 3.0, 0.0)
+                .unwrap_err()
+                .starts_with("the clock jumps by 3.010 s")
+        );
         let mut back = Stretches::new();
         assert_eq!(rows(&mut back, 0..50, 0.0, 0.0), Ok(1));
-        assert!(rows(&mut back, 20..21, 0.0, 0.0).unwrap_err().starts_with("the clock goes back"));
+        assert!(
+            rows(&mut back, 20..21, 0.0, 0.0)
+                .unwrap_err()
+                .starts_with("the clock goes back")
+        );
     }
 }

@@ -52,7 +52,16 @@ fn few() -> f64 {
 }
 
 /// Quantities that a recording of torques may have.
-const USED: [&str; 8] = ["q", "time", "torque", "current", "trajectory", "usage", "velocity", "temperature"];
+const USED: [&str; 8] = [
+    "q",
+    "time",
+    "torque",
+    "current",
+    "trajectory",
+    "usage",
+    "velocity",
+    "temperature",
+];
 /// Rows of the table in memory at once.
 const CHUNK: usize = 1 << 16;
 /// More labels than these are no labels: another column is mapped.
@@ -75,7 +84,8 @@ writes! {
 
 impl Stage for IngestTorques {
     const NAME: &'static str = "ingest_torques";
-    const SUMMARY: &'static str = "reads joint positions with torques or motor currents of an arm that moves";
+    const SUMMARY: &'static str =
+        "reads joint positions with torques or motor currents of an arm that moves";
     const IMPLEMENTATION: u32 = 2;
     type Reads = IngestTorquesReads;
     type Writes = IngestTorquesWrites;
@@ -92,26 +102,45 @@ impl Stage for IngestTorques {
             let place = format!("files[{index}]");
             check::file_faults(file, &place, &mut faults);
             for name in file.names().into_iter().filter(|name| !USED.contains(name)) {
-                let message = format!("is not used of a recording of torques; allowed: {}", USED.join(", "));
+                let message = format!(
+                    "is not used of a recording of torques; allowed: {}",
+                    USED.join(", ")
+                );
                 faults.push(Fault::new(format!("{place}.columns.{name}"), message));
             }
-            let mut missing: Vec<&str> = ["q", "time"].into_iter().filter(|name| !file.has(name)).collect();
+            let mut missing: Vec<&str> = ["q", "time"]
+                .into_iter()
+                .filter(|name| !file.has(name))
+                .collect();
             if !file.has("torque") && !file.has("current") {
                 missing.push("torque or current");
             }
             if !missing.is_empty() {
-                faults.push(Fault::new(format!("{place}.columns"), format!("not mapped: {}", missing.join(", "))));
+                faults.push(Fault::new(
+                    format!("{place}.columns"),
+                    format!("not mapped: {}", missing.join(", ")),
+                ));
             }
         }
         faults
     }
 
     fn files(&self) -> Vec<(String, RawFile)> {
-        self.files.iter().enumerate().map(|(index, file)| (format!("files[{index}].file"), file.file.clone())).collect()
+        self.files
+            .iter()
+            .enumerate()
+            .map(|(index, file)| (format!("files[{index}].file"), file.file.clone()))
+            .collect()
     }
 
-    fn look(&self, reads: Option<IngestTorquesReads>, context: &Context) -> Result<Option<IngestTorquesWrites>> {
-        let arm = reads.map(|reads| RobotJoints::of(&reads.robot)).transpose()?;
+    fn look(
+        &self,
+        reads: Option<IngestTorquesReads>,
+        context: &Context,
+    ) -> Result<Option<IngestTorquesWrites>> {
+        let arm = reads
+            .map(|reads| RobotJoints::of(&reads.robot))
+            .transpose()?;
         let mut faults = Vec::new();
         for layout in &self.files {
             match reading::header(layout, arm.as_ref(), self.limits, context) {
@@ -119,7 +148,11 @@ impl Stage for IngestTorques {
                 other => other?,
             }
         }
-        if faults.is_empty() { Ok(None) } else { Err(Error::Data(faults)) }
+        if faults.is_empty() {
+            Ok(None)
+        } else {
+            Err(Error::Data(faults))
+        }
     }
 
     fn run(&self, reads: IngestTorquesReads, context: &Context) -> Result<IngestTorquesWrites> {
@@ -128,7 +161,11 @@ impl Stage for IngestTorques {
             return Err(Error::Spec(faults));
         }
         let arm = RobotJoints::of(&reads.robot)?;
-        let labels: Vec<String> = self.files.iter().map(|file| file.file.0.display().to_string()).collect();
+        let labels: Vec<String> = self
+            .files
+            .iter()
+            .map(|file| file.file.0.display().to_string())
+            .collect();
         let names = super::names(labels.iter().map(String::as_str));
         let mut rejected = Rejections::new(&names, context)?;
         let mut rows = MotionRows::new(self, &reads.robot, &arm, context)?;
@@ -137,7 +174,11 @@ impl Stage for IngestTorques {
             intake.push(rows.file(layout, name, &mut rejected, context)?);
         }
         intake.sort_by(|a: &IntakeRow, b| a.file.cmp(&b.file));
-        Ok(IngestTorquesWrites { motion: rows.finish(context)?, rejected: rejected.finish()?, intake: Intake(intake) })
+        Ok(IngestTorquesWrites {
+            motion: rows.finish(context)?,
+            rejected: rejected.finish()?,
+            intake: Intake(intake),
+        })
     }
 }
 
@@ -160,8 +201,16 @@ struct MotionRows<'a> {
 }
 
 impl<'a> MotionRows<'a> {
-    fn new(settings: &'a IngestTorques, robot: &Robot, arm: &'a RobotJoints, context: &Context<'a>) -> Result<Self> {
-        let joints = robot.0.iter().filter(|row| row.kind == "revolute" || row.kind == "prismatic");
+    fn new(
+        settings: &'a IngestTorques,
+        robot: &Robot,
+        arm: &'a RobotJoints,
+        context: &Context<'a>,
+    ) -> Result<Self> {
+        let joints = robot
+            .0
+            .iter()
+            .filter(|row| row.kind == "revolute" || row.kind == "prismatic");
         let ratio = joints.map(|row| match (settings.torque_side, row.reduction_ratio) {
             (TorqueSide::Joint, _) => Ok(1.0),
             (TorqueSide::Motor, Some(ratio)) => Ok(ratio),
@@ -171,7 +220,13 @@ impl<'a> MotionRows<'a> {
                 Err(Error::data("with.torque_side", message))
             }
         });
-        let place = |name: &str| arm.slots.texts().iter().position(|text| *text == name).unwrap_or(usize::MAX);
+        let place = |name: &str| {
+            arm.slots
+                .texts()
+                .iter()
+                .position(|text| *text == name)
+                .unwrap_or(usize::MAX)
+        };
         Ok(Self {
             settings,
             arm,
@@ -187,12 +242,20 @@ impl<'a> MotionRows<'a> {
         })
     }
 
-    fn file(&mut self, layout: &FileLayout, name: &str, rejected: &mut Rejections, context: &Context) -> Result<IntakeRow> {
+    fn file(
+        &mut self,
+        layout: &FileLayout,
+        name: &str,
+        rejected: &mut Rejections,
+        context: &Context,
+    ) -> Result<IntakeRow> {
         let source = context.services.open(&layout.file)?;
         let size = source.size;
         let mut open = OpenedFile::open(source, layout, self.arm, self.settings.limits)?;
         let label = open.label.clone();
-        open.remarks().iter().for_each(|remark| context.services.note(format!("{label}: {remark}")));
+        open.remarks()
+            .iter()
+            .for_each(|remark| context.services.note(format!("{label}: {remark}")));
         let progress = FileProgress::begin(context, &format!("reading {label}"), size, "bytes");
         self.signal_of(&open, &label)?;
         let given = open.binding().slots();
@@ -210,15 +273,24 @@ impl<'a> MotionRows<'a> {
                 }
                 Err(refusal) => {
                     tally(&mut refused, open.row.line, &refusal);
-                    rejected.push(RejectedRow { point_id: None, ..open.rejected(name, refusal) })?;
+                    rejected.push(RejectedRow {
+                        point_id: None,
+                        ..open.rejected(name, refusal)
+                    })?;
                 }
             }
             pace.row(open.bytes());
         }
         let read = open.row.number;
-        open.loss().into_iter().for_each(|loss| context.services.warn(loss));
+        open.loss()
+            .into_iter()
+            .for_each(|loss| context.services.warn(loss));
         self.few_rejected(&label, read, accepted, &refused)?;
-        context.services.note(format!("{name}: {} read, {accepted} used, {} rejected", counted(read, "row"), read - accepted));
+        context.services.note(format!(
+            "{name}: {} read, {accepted} used, {} rejected",
+            counted(read, "row"),
+            read - accepted
+        ));
         Ok(IntakeRow {
             file: name.into(),
             lines: open.lines() as i64,
@@ -236,17 +308,24 @@ impl<'a> MotionRows<'a> {
             (true, false) => "torque",
             (false, true) => "current",
             (true, true) => {
-                return Err(Error::data(label, "has torques and currents; map one of them: the other would not be used"));
+                return Err(Error::data(
+                    label,
+                    "has torques and currents; map one of them: the other would not be used",
+                ));
             }
             (false, false) => {
                 let lacks = open.binding().missing.join("; ");
-                return Err(Error::data(label, format!("has neither torques nor motor currents of the joints: {lacks}")));
+                return Err(Error::data(
+                    label,
+                    format!("has neither torques nor motor currents of the joints: {lacks}"),
+                ));
             }
         };
         match self.signal.replace(own) {
-            Some(first) if first != own => {
-                Err(Error::data(label, format!("holds {own}s, the files before hold {first}s; allowed: the same in each")))
-            }
+            Some(first) if first != own => Err(Error::data(
+                label,
+                format!("holds {own}s, the files before hold {first}s; allowed: the same in each"),
+            )),
             _ => Ok(()),
         }
     }
@@ -263,7 +342,10 @@ impl<'a> MotionRows<'a> {
         ] {
             if first != own {
                 let which = if own { "has" } else { "lacks" };
-                return Err(Error::data(label, format!("{which} the quantity `{name}`, other than the files before")));
+                return Err(Error::data(
+                    label,
+                    format!("{which} the quantity `{name}`, other than the files before"),
+                ));
             }
         }
         Ok(())
@@ -273,21 +355,46 @@ impl<'a> MotionRows<'a> {
     fn complete(&self, row: &RecordedRow) -> Result<(), RowRefusal> {
         let signal = self.signal.unwrap_or("torque");
         let blank = |setting: &str| {
-            row.values.get(self.arm.slots.of(setting)).unwrap_or_default().iter().position(|value| value.is_nan())
+            row.values
+                .get(self.arm.slots.of(setting))
+                .unwrap_or_default()
+                .iter()
+                .position(|value| value.is_nan())
         };
-        let velocity = self.chunk.velocity.as_ref().and_then(|_| blank("velocity").map(|joint| ("velocity", joint)));
+        let velocity = self
+            .chunk
+            .velocity
+            .as_ref()
+            .and_then(|_| blank("velocity").map(|joint| ("velocity", joint)));
         let lacking = blank(signal).map(|joint| (signal, joint)).or(velocity);
-        let time = row.values.get(self.arm.slots.time).is_some_and(|time| time.is_nan());
-        let lacking = lacking.map(|(what, joint)| format!("the {what} of joint {} is blank", joint + 1));
+        let time = row
+            .values
+            .get(self.arm.slots.time)
+            .is_some_and(|time| time.is_nan());
+        let lacking =
+            lacking.map(|(what, joint)| format!("the {what} of joint {} is blank", joint + 1));
         match lacking.or_else(|| time.then(|| "time is blank".into())) {
-            Some(detail) => Err(RowRefusal { reason: Reason::Blank, detail }),
+            Some(detail) => Err(RowRefusal {
+                reason: Reason::Blank,
+                detail,
+            }),
             None => Ok(()),
         }
     }
 
     fn push(&mut self, row: &RecordedRow, label: &str, context: &Context) -> Result<()> {
-        let values = |setting: &str| row.values.get(self.arm.slots.of(setting)).unwrap_or_default();
-        let (q, time) = (values("q"), row.values.get(self.arm.slots.time).copied().unwrap_or(f64::NAN));
+        let values = |setting: &str| {
+            row.values
+                .get(self.arm.slots.of(setting))
+                .unwrap_or_default()
+        };
+        let (q, time) = (
+            values("q"),
+            row.values
+                .get(self.arm.slots.time)
+                .copied()
+                .unwrap_or(f64::NAN),
+        );
         let trajectory = row.texts.get(self.trajectory).map_or("", String::as_str);
         let stretch = self
             .stretches
@@ -297,26 +404,43 @@ impl<'a> MotionRows<'a> {
             context.services.warn(warning);
         }
         let signal = values(self.signal.unwrap_or("torque"));
-        self.channels.iter_mut().zip(signal).for_each(|(channel, value)| channel.push(*value));
+        self.channels
+            .iter_mut()
+            .zip(signal)
+            .for_each(|(channel, value)| channel.push(*value));
         let chunk = &mut self.chunk;
         chunk.time.push(time);
         chunk.trajectory.push(stretch);
         chunk.q.extend_from_slice(q);
         if self.signal == Some("current") {
-            chunk.current.get_or_insert_default().extend_from_slice(signal);
+            chunk
+                .current
+                .get_or_insert_default()
+                .extend_from_slice(signal);
         } else {
-            let joint_side = signal.iter().zip(&self.ratio).map(|(torque, ratio)| torque * ratio);
+            let joint_side = signal
+                .iter()
+                .zip(&self.ratio)
+                .map(|(torque, ratio)| torque * ratio);
             chunk.torque.get_or_insert_default().extend(joint_side);
         }
-        chunk.velocity.iter_mut().for_each(|all| all.extend_from_slice(values("velocity")));
-        chunk.temperature.iter_mut().for_each(|all| all.extend_from_slice(values("temperature")));
+        chunk
+            .velocity
+            .iter_mut()
+            .for_each(|all| all.extend_from_slice(values("velocity")));
+        chunk
+            .temperature
+            .iter_mut()
+            .for_each(|all| all.extend_from_slice(values("temperature")));
         let usage = row.texts.get(self.usage).map_or("", String::as_str);
         let known = chunk.usages.iter().position(|known| known == usage);
         let usage = match (usage.is_empty(), known) {
             (true, _) => None,
             (false, Some(known)) => Some(known as u16),
             (false, None) if chunk.usages.len() >= MOST_LABELS => {
-                let message = format!("`usage` has more than {MOST_LABELS} labels; allowed: such as fit and validate");
+                let message = format!(
+                    "`usage` has more than {MOST_LABELS} labels; allowed: such as fit and validate"
+                );
                 return Err(Error::data(format!("{label}:{}", row.line), message));
             }
             (false, None) => {
@@ -327,7 +451,11 @@ impl<'a> MotionRows<'a> {
         chunk.usage.push(usage);
         self.written += 1;
         chunk.sequence.push(self.written);
-        if chunk.rows() >= CHUNK { self.flush() } else { Ok(()) }
+        if chunk.rows() >= CHUNK {
+            self.flush()
+        } else {
+            Ok(())
+        }
     }
 
     fn flush(&mut self) -> Result<()> {
@@ -343,16 +471,27 @@ impl<'a> MotionRows<'a> {
         self.sink.push(full.to_frame()?)
     }
 
-    fn few_rejected(&self, label: &str, read: u64, accepted: u64, refused: &RefusalCounts) -> Result<()> {
+    fn few_rejected(
+        &self,
+        label: &str,
+        read: u64,
+        accepted: u64,
+        refused: &RefusalCounts,
+    ) -> Result<()> {
         let share = self.settings.max_rejected_fraction;
         if read == 0 {
-            return Err(Error::data(label, "has a header but no data row; allowed: at least one"));
+            return Err(Error::data(
+                label,
+                "has a header but no data row; allowed: at least one",
+            ));
         }
         if accepted > 0 && (read - accepted) as f64 <= share * read as f64 {
             return Ok(());
         }
         let worst = refused.values().max_by_key(|count| count.rows);
-        let (line, why) = worst.map_or((0, ""), |count| (count.first_line, count.first_detail.as_str()));
+        let (line, why) = worst.map_or((0, ""), |count| {
+            (count.first_line, count.first_detail.as_str())
+        });
         let message = format!(
             "{} of {read} rows are rejected, allowed: up to {} % (`max_rejected_fraction`); the first: {why}",
             read - accepted,
@@ -376,7 +515,9 @@ impl<'a> MotionRows<'a> {
         }
         for (joint, channel) in (1..).zip(&self.channels) {
             if let Some(clipped) = channel.clipped() {
-                context.services.warn(format!("the {signal} of joint {joint} {clipped}: saturated?"));
+                context.services.warn(format!(
+                    "the {signal} of joint {joint} {clipped}: saturated?"
+                ));
             }
         }
         if self.chunk.rows() > 0 || self.written == 0 {

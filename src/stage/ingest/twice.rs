@@ -37,10 +37,19 @@ pub(super) fn faults(file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
             ColumnRef::Name(name) => Written::Name(name.trim().into()),
         };
         let earlier = uses.entry(written).or_default();
-        if let Some(other) = earlier.iter().find(|other| other.group == own.group || (other.alone && own.alone)) {
-            let both =
-                if other.name == own.name { format!("{} twice", own.name) } else { format!("{} and {}", other.name, own.name) };
-            faults.push(Fault::new(&own.place, format!("{reference} is mapped to {both}; allowed: a column for each")));
+        if let Some(other) = earlier
+            .iter()
+            .find(|other| other.group == own.group || (other.alone && own.alone))
+        {
+            let both = if other.name == own.name {
+                format!("{} twice", own.name)
+            } else {
+                format!("{} and {}", other.name, own.name)
+            };
+            faults.push(Fault::new(
+                &own.place,
+                format!("{reference} is mapped to {both}; allowed: a column for each"),
+            ));
         }
         earlier.push(own);
     });
@@ -49,46 +58,109 @@ pub(super) fn faults(file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
 fn each(file: &FileLayout, place: &str, take: &mut dyn FnMut(&ColumnRef, Use)) {
     let columns = &file.columns;
     let measured = |setting: &str| {
-        let kind = KINDS.iter().find(|kind| kind.columns(Part::Value).any(|column| column.setting == setting));
+        let kind = KINDS.iter().find(|kind| {
+            kind.columns(Part::Value)
+                .any(|column| column.setting == setting)
+        });
         kind.map(|kind| kind.about().name)
     };
-    for (declared, joints) in columns.joints().filter(|(declared, _)| declared.quantity != Quantity::Number) {
-        let (setting, place) = (declared.setting, format!("{place}.columns.{}", declared.setting));
+    for (declared, joints) in columns
+        .joints()
+        .filter(|(declared, _)| declared.quantity != Quantity::Number)
+    {
+        let (setting, place) = (
+            declared.setting,
+            format!("{place}.columns.{}", declared.setting),
+        );
         if let Some(pattern) = &joints.column {
-            let own = Use { name: format!("`{setting}`"), place: format!("{place}.column"), group: setting, alone: true };
+            let own = Use {
+                name: format!("`{setting}`"),
+                place: format!("{place}.column"),
+                group: setting,
+                alone: true,
+            };
             take(&ColumnRef::Name(pattern.clone()), own);
         }
         for (k, reference) in joints.columns.iter().flatten().enumerate() {
             let name = format!("joint {} of `{setting}`", k + 1);
-            take(reference, Use { name, place: format!("{place}.columns[{k}]"), group: setting, alone: true });
+            take(
+                reference,
+                Use {
+                    name,
+                    place: format!("{place}.columns[{k}]"),
+                    group: setting,
+                    alone: true,
+                },
+            );
         }
     }
     // A point beside `targets` is a fault of its own.
     let beside = |setting: &str| file.targets.is_some() && HELD.contains(&setting);
-    for (declared, scalar) in columns.numbers().filter(|(declared, _)| !beside(declared.setting)) {
+    for (declared, scalar) in columns
+        .numbers()
+        .filter(|(declared, _)| !beside(declared.setting))
+    {
         let simulated = SIMULATED.contains(&declared.setting).then_some("simulated");
-        let Some(group) = measured(declared.setting).or(simulated) else { continue };
-        let (name, place) = (format!("`{}`", declared.setting), format!("{place}.columns.{}", declared.setting));
+        let Some(group) = measured(declared.setting).or(simulated) else {
+            continue;
+        };
+        let (name, place) = (
+            format!("`{}`", declared.setting),
+            format!("{place}.columns.{}", declared.setting),
+        );
         let alone = scalar.difference().is_none();
-        let difference = if scalar.minus.is_some() { ("minus", &scalar.minus) } else { ("plus", &scalar.plus) };
+        let difference = if scalar.minus.is_some() {
+            ("minus", &scalar.minus)
+        } else {
+            ("plus", &scalar.plus)
+        };
         for (key, reference) in [("column", &scalar.column), difference] {
             let Some(reference) = reference else { continue };
-            take(reference, Use { name: name.clone(), place: format!("{place}.{key}"), group, alone });
+            take(
+                reference,
+                Use {
+                    name: name.clone(),
+                    place: format!("{place}.{key}"),
+                    group,
+                    alone,
+                },
+            );
         }
     }
     for (declared, conventions, mapped) in columns.conventions() {
-        let (Some(group), Some((convention, references))) = (measured(declared.setting), mapped.chosen(conventions)) else {
+        let (Some(group), Some((convention, references))) =
+            (measured(declared.setting), mapped.chosen(conventions))
+        else {
             continue;
         };
         for (k, reference) in references.iter().enumerate() {
-            let place = format!("{place}.columns.{}.{}[{k}]", declared.setting, convention.name);
-            take(reference, Use { name: format!("`{}`", declared.setting), place, group, alone: true });
+            let place = format!(
+                "{place}.columns.{}.{}[{k}]",
+                declared.setting, convention.name
+            );
+            take(
+                reference,
+                Use {
+                    name: format!("`{}`", declared.setting),
+                    place,
+                    group,
+                    alone: true,
+                },
+            );
         }
     }
     for (target, references) in file.targets.iter().flat_map(|targets| &targets.columns) {
         for (k, reference) in references.iter().enumerate() {
             let place = format!("{place}.targets.columns.{target}[{k}]");
-            take(reference, Use { name: format!("target `{target}`"), place, group: "targets", alone: true });
+            take(
+                reference,
+                Use {
+                    name: format!("target `{target}`"),
+                    place,
+                    group: "targets",
+                    alone: true,
+                },
+            );
         }
     }
 }

@@ -25,7 +25,9 @@ pub(super) fn accepted(scan: &Scan, decision: &FileDecision) -> u64 {
     if decision.partners.is_empty() {
         return scan.used() - decision.twins.len() as u64;
     }
-    (1..=scan.read as usize).filter(|number| decision.is_whole(*number)).count() as u64
+    (1..=scan.read as usize)
+        .filter(|number| decision.is_whole(*number))
+        .count() as u64
 }
 
 /// Fails where a file cannot be what the settings say it is; warns where it is odd.
@@ -53,12 +55,19 @@ pub(super) fn judge(
             true
         }
     });
-    if faults.is_empty() { Ok(()) } else { Err(Error::Data(faults)) }
+    if faults.is_empty() {
+        Ok(())
+    } else {
+        Err(Error::Data(faults))
+    }
 }
 
 /// Rows that belong together by their order alone are as many in each file, whatever became of them.
 fn unequal(settings: &Ingest, scans: &[Scan]) -> Vec<Fault> {
-    let (Some(Join::Order {}), Some((first, others))) = (&settings.join, scans.split_first()) else { return Vec::new() };
+    let (Some(Join::Order {}), Some((first, others))) = (&settings.join, scans.split_first())
+    else {
+        return Vec::new();
+    };
     let other = others.iter().filter(|other| other.last != first.last);
     let faults = other.map(|other| {
         let message = format!(
@@ -71,14 +80,26 @@ fn unequal(settings: &Ingest, scans: &[Scan]) -> Vec<Fault> {
     faults.collect()
 }
 
-fn implausible(scan: &Scan, columns: &Columns, limits: LimitPolicy, arm: &RobotJoints) -> Option<Fault> {
+fn implausible(
+    scan: &Scan,
+    columns: &Columns,
+    limits: LimitPolicy,
+    arm: &RobotJoints,
+) -> Option<Fault> {
     let unit = columns.joint("q")?.unit.as_deref().unwrap_or("rad");
-    let judged = scan.used() + scan.tally.get(&Reason::OutOfRange).map_or(0, |count| count.rows);
+    let judged = scan.used()
+        + scan
+            .tally
+            .get(&Reason::OutOfRange)
+            .map_or(0, |count| count.rows);
     if scan.turns.rows * 2 > judged
         && let Some((line, joint, value)) = scan.turns.first
     {
         let (shown, advice) = if unit == "rad" {
-            (value, "allowed: up to 9.42 rad; if the file holds degrees, say `unit: deg`")
+            (
+                value,
+                "allowed: up to 9.42 rad; if the file holds degrees, say `unit: deg`",
+            )
         } else {
             (value.to_degrees(), "allowed: up to 540 deg")
         };
@@ -96,7 +117,11 @@ fn implausible(scan: &Scan, columns: &Columns, limits: LimitPolicy, arm: &RobotJ
         // Joints that turn this far are in the unit that is declared, whatever they are counted from.
         && (arm.prismatic.get(joint) == Some(&true) || unit != "deg" && scan.largest_turn() < FAR)
     {
-        let degrees = if unit == "deg" { "" } else { "; if the file holds degrees, say `unit: deg`" };
+        let degrees = if unit == "deg" {
+            ""
+        } else {
+            "; if the file holds degrees, say `unit: deg`"
+        };
         let message = format!(
             "{} of {judged} rows are beyond the robot's joint limits, here {}; allowed: the unit and order of columns that the file has, or \
              `limits: ignore`{degrees}",
@@ -108,8 +133,17 @@ fn implausible(scan: &Scan, columns: &Columns, limits: LimitPolicy, arm: &RobotJ
     None
 }
 
-fn too_many_rejected(settings: &Ingest, scans: &[Scan], decisions: &[FileDecision], index: usize) -> Option<Fault> {
-    let (scan, decision, layout) = (scans.get(index)?, decisions.get(index)?, settings.files.get(index)?);
+fn too_many_rejected(
+    settings: &Ingest,
+    scans: &[Scan],
+    decisions: &[FileDecision],
+    index: usize,
+) -> Option<Fault> {
+    let (scan, decision, layout) = (
+        scans.get(index)?,
+        decisions.get(index)?,
+        settings.files.get(index)?,
+    );
     let accepted = accepted(scan, decision);
     let rejected = scan.read - accepted;
     if accepted > 0 && rejected as f64 <= settings.max_rejected_fraction * scan.read as f64 {
@@ -119,26 +153,58 @@ fn too_many_rejected(settings: &Ingest, scans: &[Scan], decisions: &[FileDecisio
     let copies = decision.twins.values().filter(|twin| twin.copied).count() as u64;
     let unmatched = scan.used() - accepted - twins;
     // Every other file is joined to the first; where the rows that lack a partner decide, the shorter file is at fault.
-    let partner = scans.iter().enumerate().filter(|(other, _)| *other != index && (index == 0 || *other == 0));
-    let partner_at = partner.min_by_key(|(_, other)| other.used()).map(|(other, _)| other);
+    let partner = scans
+        .iter()
+        .enumerate()
+        .filter(|(other, _)| *other != index && (index == 0 || *other == 0));
+    let partner_at = partner
+        .min_by_key(|(_, other)| other.used())
+        .map(|(other, _)| other);
     let partner = partner_at.and_then(|other| scans.get(other));
-    let cut = partner.filter(|other| 2 * unmatched > rejected && accepted > 0 && other.used() < scan.used());
+    let cut = partner
+        .filter(|other| 2 * unmatched > rejected && accepted > 0 && other.used() < scan.used());
     let mut counts = scan.tally.clone();
     let first = |copied: bool| {
         let of_kind = decision.twins.values().filter(|twin| twin.copied == copied);
-        of_kind.map(|twin| u64::from(twin.line)).min().unwrap_or_default()
+        of_kind
+            .map(|twin| u64::from(twin.line))
+            .min()
+            .unwrap_or_default()
     };
     let without_partner = partner_at.map_or_else(
         || "no partner in another file".to_string(),
-        |other| format!("no partner in {}{}", scans[other].label, unlike(scans, decisions, [index, other]).unwrap_or_default()),
+        |other| {
+            format!(
+                "no partner in {}{}",
+                scans[other].label,
+                unlike(scans, decisions, [index, other]).unwrap_or_default()
+            )
+        },
     );
     for (reason, rows, first_line, detail) in [
-        (Reason::DuplicateId, twins - copies, first(false), "point ids that occur more than once".to_string()),
-        (Reason::DuplicateRow, copies, first(true), "duplicate rows".to_string()),
+        (
+            Reason::DuplicateId,
+            twins - copies,
+            first(false),
+            "point ids that occur more than once".to_string(),
+        ),
+        (
+            Reason::DuplicateRow,
+            copies,
+            first(true),
+            "duplicate rows".to_string(),
+        ),
         (Reason::Unmatched, unmatched, 0, without_partner),
     ] {
         if rows > 0 {
-            counts.insert(reason, RefusalCount { rows, first_line, first_detail: detail });
+            counts.insert(
+                reason,
+                RefusalCount {
+                    rows,
+                    first_line,
+                    first_detail: detail,
+                },
+            );
         }
     }
     let mut reasons: Vec<_> = counts.iter().collect();
@@ -146,8 +212,17 @@ fn too_many_rejected(settings: &Ingest, scans: &[Scan], decisions: &[FileDecisio
     let listed: Vec<String> = reasons
         .iter()
         .map(|(reason, count)| {
-            let place = if count.first_line == 0 { String::new() } else { format!("line {}: ", count.first_line) };
-            format!("{} {} ({place}{})", count.rows, reason.word(), count.first_detail)
+            let place = if count.first_line == 0 {
+                String::new()
+            } else {
+                format!("line {}: ", count.first_line)
+            };
+            format!(
+                "{} {} ({place}{})",
+                count.rows,
+                reason.word(),
+                count.first_detail
+            )
         })
         .collect();
     let share = match (accepted, cut) {
@@ -165,7 +240,9 @@ fn too_many_rejected(settings: &Ingest, scans: &[Scan], decisions: &[FileDecisio
     let allowed = settings.max_rejected_fraction * 100.0;
     let place = match (cut, reasons.first()) {
         (Some(cut), _) => cut.label.clone(),
-        (_, Some((_, count))) if count.first_line > 0 => format!("{}:{}", scan.label, count.first_line),
+        (_, Some((_, count))) if count.first_line > 0 => {
+            format!("{}:{}", scan.label, count.first_line)
+        }
         _ => scan.label.clone(),
     };
     Some(Fault::new(
@@ -180,8 +257,15 @@ fn too_many_rejected(settings: &Ingest, scans: &[Scan], decisions: &[FileDecisio
 
 /// What points that are too large for their unit usually are, where most are.
 fn smaller(scan: &Scan, columns: &Columns) -> &'static str {
-    let most = scan.tally.get(&Reason::OutOfRange).is_some_and(|count| 2 * count.rows > scan.read);
-    match columns.number("x").filter(|_| most).and_then(|x| x.unit.as_deref()) {
+    let most = scan
+        .tally
+        .get(&Reason::OutOfRange)
+        .is_some_and(|count| 2 * count.rows > scan.read);
+    match columns
+        .number("x")
+        .filter(|_| most)
+        .and_then(|x| x.unit.as_deref())
+    {
         Some("mm") => "; if the file holds micrometres, say `unit: um`",
         Some("m") => "; if the file holds millimetres, say `unit: mm`",
         _ => "",
@@ -192,24 +276,34 @@ fn smaller(scan: &Scan, columns: &Columns) -> &'static str {
 fn unlike(scans: &[Scan], decisions: &[FileDecision], files: [usize; 2]) -> Option<String> {
     let without_partner = |file: usize| -> Option<Vec<&str>> {
         let (scan, decision) = (scans.get(file)?, decisions.get(file)?);
-        let rows = scan
-            .first_ids
-            .iter()
-            .filter(|(number, _)| !decision.is_whole(*number as usize) && !decision.twins.contains_key(number));
+        let rows = scan.first_ids.iter().filter(|(number, _)| {
+            !decision.is_whole(*number as usize) && !decision.twins.contains_key(number)
+        });
         Some(rows.map(|(_, id)| id.as_str()).collect())
     };
     let [here, there] = [without_partner(files[0])?, without_partner(files[1])?];
     // Of three files a row may lack its partner in the third.
-    let (own, known): (BTreeSet<&str>, BTreeSet<&str>) = (here.iter().copied().collect(), there.iter().copied().collect());
+    let (own, known): (BTreeSet<&str>, BTreeSet<&str>) = (
+        here.iter().copied().collect(),
+        there.iter().copied().collect(),
+    );
     let by_case: BTreeMap<String, &str> = there.iter().map(|id| (id.to_lowercase(), *id)).collect();
     let mut strangers = here.iter().filter(|id| !known.contains(*id));
-    if let Some((one, other)) = strangers.clone().find_map(|id| Some((*id, *by_case.get(&id.to_lowercase())?))) {
+    if let Some((one, other)) = strangers
+        .clone()
+        .find_map(|id| Some((*id, *by_case.get(&id.to_lowercase())?)))
+    {
         return Some(format!(
             ", e.g. `{one}` here and `{other}` there: ids that differ in upper and lower case are different ids"
         ));
     }
-    let (one, other) = (strangers.next()?, there.iter().find(|id| !own.contains(*id))?);
-    Some(format!(", e.g. `{one}` here and `{other}` there: ids must be the same in both files"))
+    let (one, other) = (
+        strangers.next()?,
+        there.iter().find(|id| !own.contains(*id))?,
+    );
+    Some(format!(
+        ", e.g. `{one}` here and `{other}` there: ids must be the same in both files"
+    ))
 }
 
 fn warn(scan: &Scan, columns: &Columns, limits: LimitPolicy, arm: &RobotJoints, context: &Context) {
@@ -224,8 +318,14 @@ fn warn(scan: &Scan, columns: &Columns, limits: LimitPolicy, arm: &RobotJoints, 
             if 2 * scan.beyond.rows > scan.used() { COUNTED } else { "" }
         ));
     }
-    let degrees = columns.joint("q").is_some_and(|q| q.unit.as_deref() == Some("deg"));
-    if degrees && scan.largest > 0.0 && scan.largest.to_degrees() < SMALL_IN_DEGREES && scan.used() >= 10 {
+    let degrees = columns
+        .joint("q")
+        .is_some_and(|q| q.unit.as_deref() == Some("deg"));
+    if degrees
+        && scan.largest > 0.0
+        && scan.largest.to_degrees() < SMALL_IN_DEGREES
+        && scan.used() >= 10
+    {
         context.services.warn(format!(
             "{}: no joint is ever beyond {:.2} deg; if the file holds rad, say `unit: rad`",
             scan.label,

@@ -29,15 +29,22 @@ impl WideTargets {
     pub(super) fn faults(&self, others: &[&str], has_header: bool, place: &str) -> Vec<Fault> {
         let mut faults = Vec::new();
         for name in others.iter().filter(|name| HELD.contains(name)) {
-            faults.push(Fault::new(format!("{place}.columns.{name}"), "also in `targets`; map it in one of them"));
+            faults.push(Fault::new(
+                format!("{place}.columns.{name}"),
+                "also in `targets`; map it in one of them",
+            ));
         }
         for name in others.iter().filter(|name| SIMULATED.contains(name)) {
-            let message = "one simulated point and several targets; put each target in a separate file";
+            let message =
+                "one simulated point and several targets; put each target in a separate file";
             faults.push(Fault::new(format!("{place}.columns.{name}"), message));
         }
         let place = &format!("{place}.targets");
         if self.columns.len() < 2 {
-            faults.push(Fault::new(format!("{place}.columns"), "expected two targets or more; one is mapped as x, y and z"));
+            faults.push(Fault::new(
+                format!("{place}.columns"),
+                "expected two targets or more; one is mapped as x, y and z",
+            ));
         }
         for (target, references) in &self.columns {
             let place = format!("{place}.columns.{target}");
@@ -48,7 +55,10 @@ impl WideTargets {
                 match reference {
                     ColumnRef::Number(0) => faults.push(Fault::new(&place, "columns count from 1")),
                     ColumnRef::Name(name) if !has_header => {
-                        faults.push(Fault::new(&place, format!("there is no header with `{name}` in it; give numbers from 1")));
+                        faults.push(Fault::new(
+                            &place,
+                            format!("there is no header with `{name}` in it; give numbers from 1"),
+                        ));
                     }
                     _ => {}
                 }
@@ -56,7 +66,10 @@ impl WideTargets {
         }
         if Unit::parse(&self.unit).is_none_or(|unit| unit.quantity() != Quantity::Length) {
             let allowed = Unit::symbols(Quantity::Length).join(", ");
-            faults.push(Fault::new(format!("{place}.unit"), format!("`{}` is no unit of length; allowed: {allowed}", self.unit)));
+            faults.push(Fault::new(
+                format!("{place}.unit"),
+                format!("`{}` is no unit of length; allowed: {allowed}", self.unit),
+            ));
         }
         faults
     }

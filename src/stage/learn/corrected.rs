@@ -19,14 +19,17 @@ pub(super) fn corrected(
     let (mut fading, mut outside) = (0, 0);
     for (row, sources) in rows.iter_mut().zip(sources) {
         row.step = context.id.into();
-        let Some(correction) = &correction else { continue };
+        let Some(correction) = &correction else {
+            continue;
+        };
         let applied = correction.at(sources);
         outside += usize::from(applied.share == 0.0);
         fading += usize::from(applied.share > 0.0 && applied.share < 1.0);
         let [x, y, z] = applied.delta.map(|value| value * 1e3);
         (row.x_mm, row.y_mm, row.z_mm) = (row.x_mm + x, row.y_mm + y, row.z_mm + z);
         (row.dx_mm, row.dy_mm, row.dz_mm) = (row.dx_mm - x, row.dy_mm - y, row.dz_mm - z);
-        row.error_mm = (row.dx_mm * row.dx_mm + row.dy_mm * row.dy_mm + row.dz_mm * row.dz_mm).sqrt();
+        row.error_mm =
+            (row.dx_mm * row.dx_mm + row.dy_mm * row.dy_mm + row.dz_mm * row.dz_mm).sqrt();
         // Cross-validation was of the model without a correction, whichever rows the correction learned from.
         (row.fold_error_mm, row.block_error_mm) = (None, None);
     }

@@ -11,23 +11,47 @@ pub(super) fn sentence(comparison: &RivalComparison, learnt: bool) -> String {
         format!("{name} {:.3} mm", judged.mean() * 1e3)
     };
     let all: Vec<String> = comparison.judged.iter().map(tell).collect();
-    let kept = comparison.judged[comparison.chosen].rival.filter(|_| learnt);
-    let what = kept.map_or_else(|| "no correction was kept".to_string(), |rival| format!("`{}` was kept", rival.name()));
-    format!("{what}; cross-validated error on its own training rows: {}", all.join(", "))
+    let kept = comparison.judged[comparison.chosen]
+        .rival
+        .filter(|_| learnt);
+    let what = kept.map_or_else(
+        || "no correction was kept".to_string(),
+        |rival| format!("`{}` was kept", rival.name()),
+    );
+    format!(
+        "{what}; cross-validated error on its own training rows: {}",
+        all.join(", ")
+    )
 }
 
-pub(super) fn table(step: &str, contest: &RivalContest, comparison: &RivalComparison, learnt: bool) -> Corrections {
+pub(super) fn table(
+    step: &str,
+    contest: &RivalContest,
+    comparison: &RivalComparison,
+    learnt: bool,
+) -> Corrections {
     let chosen = if learnt { comparison.chosen } else { 0 };
     let best = &comparison.judged[chosen];
     let before = comparison.judged[0].mean() * 1e3;
     let row = |(j, judged): (usize, &JudgedRival)| {
-        let (gain, sigma, behind) = (judged.gain * 1e3, judged.sigma * 1e3, (judged.mean() - best.mean()) * 1e3);
+        let (gain, sigma, behind) = (
+            judged.gain * 1e3,
+            judged.sigma * 1e3,
+            (judged.mean() - best.mean()) * 1e3,
+        );
         let reason = match judged.rival {
             None if j == chosen => "nothing that was tried helps clearly".to_string(),
             None => format!("a correction gains {:.3} mm", best.gain * 1e3),
-            Some(_) if j == chosen => format!("smallest error of those that help: gains {gain:.3} +- {sigma:.3} mm"),
-            Some(_) if !judged.helps() => format!("does not help clearly: gains {gain:.3} +- {sigma:.3} mm"),
-            Some(_) => format!("{behind:.3} mm behind {}", best.rival.map_or("none", Rival::name)),
+            Some(_) if j == chosen => {
+                format!("smallest error of those that help: gains {gain:.3} +- {sigma:.3} mm")
+            }
+            Some(_) if !judged.helps() => {
+                format!("does not help clearly: gains {gain:.3} +- {sigma:.3} mm")
+            }
+            Some(_) => format!(
+                "{behind:.3} mm behind {}",
+                best.rival.map_or("none", Rival::name)
+            ),
         };
         CorrectionsRow {
             step: step.into(),
@@ -47,7 +71,12 @@ pub(super) fn table(step: &str, contest: &RivalContest, comparison: &RivalCompar
         }
     };
     let mut rows: Vec<CorrectionsRow> = comparison.judged.iter().enumerate().map(row).collect();
-    let untried = contest.rivals.iter().filter(|rival| comparison.judged.iter().all(|judged| judged.rival != Some(**rival)));
+    let untried = contest.rivals.iter().filter(|rival| {
+        comparison
+            .judged
+            .iter()
+            .all(|judged| judged.rival != Some(**rival))
+    });
     rows.extend(untried.map(|rival| CorrectionsRow {
         step: step.into(),
         rival: rival.name().into(),

@@ -15,13 +15,30 @@ const KINDS: [(FixtureKind, &str, &str); 3] = [
 ];
 
 /// Joints with the names of what the ball was brought to.
-pub(super) fn recording(robot: &RobotDescription, fixtures: &[Fixture], touches: &[Touch]) -> Recording {
+pub(super) fn recording(
+    robot: &RobotDescription,
+    fixtures: &[Fixture],
+    touches: &[Touch],
+) -> Recording {
     let of = |touch: &Touch| &fixtures[touch.fixture];
     let (mut readings, mut names) = (BTreeMap::new(), BTreeMap::new());
-    for (kind, setting, sigma) in KINDS.into_iter().filter(|(kind, ..)| fixtures.iter().any(|fixture| fixture.kind == *kind)) {
+    for (kind, setting, sigma) in KINDS
+        .into_iter()
+        .filter(|(kind, ..)| fixtures.iter().any(|fixture| fixture.kind == *kind))
+    {
         let own = |touch: &Touch| Some(of(touch)).filter(|fixture| fixture.kind == kind);
-        names.insert(setting, touches.iter().map(|touch| own(touch).map(|fixture| fixture.name.clone())).collect());
-        let noise = |touch: &Touch| own(touch).map_or(f64::NAN, |fixture| (1e-6 * fixture.sigma_um).max(LEAST_SIGMA));
+        names.insert(
+            setting,
+            touches
+                .iter()
+                .map(|touch| own(touch).map(|fixture| fixture.name.clone()))
+                .collect(),
+        );
+        let noise = |touch: &Touch| {
+            own(touch).map_or(f64::NAN, |fixture| {
+                (1e-6 * fixture.sigma_um).max(LEAST_SIGMA)
+            })
+        };
         readings.insert(sigma, touches.iter().map(noise).collect());
     }
     let mut counts = vec![0; fixtures.len()];
@@ -31,11 +48,21 @@ pub(super) fn recording(robot: &RobotDescription, fixtures: &[Fixture], touches:
     };
     Recording {
         joints: robot.joints.len(),
-        prismatic: robot.joints.iter().map(|joint| joint.kind == JointKind::Prismatic).collect(),
+        prismatic: robot
+            .joints
+            .iter()
+            .map(|joint| joint.kind == JointKind::Prismatic)
+            .collect(),
         sequence: (0..touches.len() as i64).collect(),
         point_id: touches.iter().map(&mut name).collect(),
-        usage: touches.iter().map(|touch| Some(of(touch).usage.clone())).collect(),
-        q: touches.iter().flat_map(|touch| touch.q.iter().copied()).collect(),
+        usage: touches
+            .iter()
+            .map(|touch| Some(of(touch).usage.clone()))
+            .collect(),
+        q: touches
+            .iter()
+            .flat_map(|touch| touch.q.iter().copied())
+            .collect(),
         position: vec![[f64::NAN; 3]; touches.len()],
         time: Some(touches.iter().map(|touch| touch.time_s).collect()),
         temperature: Some(touches.iter().map(|touch| touch.temperature_c).collect()),
@@ -56,6 +83,13 @@ pub(super) fn truth(fixture: &Fixture) -> Vec<TruthRow> {
     };
     let [x, y, z] = fixture.centre_mm;
     let centre = [row("x", x), row("y", y), row("z", z)];
-    let radius = fixture.radius_mm.filter(|_| fixture.kind == FixtureKind::Sphere).map(|radius| row("radius", radius));
-    centre.into_iter().filter(|_| fixture.kind != FixtureKind::Plane).chain(radius).collect()
+    let radius = fixture
+        .radius_mm
+        .filter(|_| fixture.kind == FixtureKind::Sphere)
+        .map(|radius| row("radius", radius));
+    centre
+        .into_iter()
+        .filter(|_| fixture.kind != FixtureKind::Plane)
+        .chain(radius)
+        .collect()
 }

@@ -9,7 +9,9 @@ pub(super) fn stops(recording: &Recording) -> Vec<Range<usize>> {
     let mut stops: Vec<Range<usize>> = Vec::new();
     for row in 0..recording.rows() {
         let joins = |stop: &Range<usize>| {
-            let Some(targets) = &recording.target else { return false };
+            let Some(targets) = &recording.target else {
+                return false;
+            };
             let new = stop.clone().all(|other| targets[other] != targets[row]);
             new && near(recording.q(stop.start), recording.q(row), NEAR)
         };

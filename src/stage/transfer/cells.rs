@@ -18,13 +18,19 @@ impl VisitedCells {
     pub fn of(data: &Measurements, rows: &[usize]) -> Self {
         let joint = |joint: usize| {
             let range = rows.iter().map(|row| data.q(*row)[joint]);
-            let [low, high] = range.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], q| [low.min(q), high.max(q)]);
+            let [low, high] = range.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], q| {
+                [low.min(q), high.max(q)]
+            });
             [low, ((high - low) / CELLS).max(1e-3)]
         };
-        let mut out = Self { grid: (0..data.joints).map(joint).collect(), cells: BTreeSet::new() };
+        let mut out = Self {
+            grid: (0..data.joints).map(joint).collect(),
+            cells: BTreeSet::new(),
+        };
         for row in rows {
             let own = out.cell(data.q(*row));
-            out.cells.extend(pairs(own.len()).map(|(a, b)| (a, b, own[a], own[b])));
+            out.cells
+                .extend(pairs(own.len()).map(|(a, b)| (a, b, own[a], own[b])));
         }
         out
     }
@@ -33,12 +39,17 @@ impl VisitedCells {
     pub fn has(&self, q: &[f64]) -> bool {
         let own = self.cell(q);
         let beside = |cell: i64| cell - 1..=cell + 1;
-        pairs(own.len())
-            .all(|(a, b)| beside(own[a]).any(|one| beside(own[b]).any(|other| self.cells.contains(&(a, b, one, other)))))
+        pairs(own.len()).all(|(a, b)| {
+            beside(own[a])
+                .any(|one| beside(own[b]).any(|other| self.cells.contains(&(a, b, one, other))))
+        })
     }
 
     fn cell(&self, q: &[f64]) -> Vec<i64> {
-        q.iter().zip(&self.grid).map(|(q, [low, width])| ((q - low) / width).floor() as i64).collect()
+        q.iter()
+            .zip(&self.grid)
+            .map(|(q, [low, width])| ((q - low) / width).floor() as i64)
+            .collect()
     }
 }
 
@@ -53,8 +64,15 @@ mod tests {
     #[test]
     fn a_corner_that_no_row_reached_is_unvisited_though_each_joint_has_been_there() {
         let all = (0..64).map(|k| [f64::from(k % 8), f64::from(k / 8)]);
-        let q: Vec<f64> = all.filter(|[one, other]| *one < 4.0 || *other < 4.0).flatten().collect();
-        let data = Measurements { joints: 2, q, ..Measurements::default() };
+        let q: Vec<f64> = all
+            .filter(|[one, other]| *one < 4.0 || *other < 4.0)
+            .flatten()
+            .collect();
+        let data = Measurements {
+            joints: 2,
+            q,
+            ..Measurements::default()
+        };
         let rows: Vec<usize> = (0..data.rows()).collect();
         let visited = VisitedCells::of(&data, &rows);
         assert!(visited.has(&[1.0, 1.0]) && visited.has(&[6.5, 0.5]));

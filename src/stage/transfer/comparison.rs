@@ -19,7 +19,10 @@ struct CarriedErrors {
 
 impl CarriedErrors {
     fn of(data: &Measurements, predicted: &[Vector3<f64>], rows: &[usize]) -> Self {
-        let errors = || rows.iter().map(|row| data.points.residual(*row, &predicted[*row]).norm() * 1e3);
+        let errors = || {
+            rows.iter()
+                .map(|row| data.points.residual(*row, &predicted[*row]).norm() * 1e3)
+        };
         let count = rows.len().max(1) as f64;
         Self {
             mean: errors().sum::<f64>() / count,
@@ -78,10 +81,17 @@ impl Comparison {
             geometry: CarriedErrors::of(data, geometry, rows),
         };
         let parts = visited.map(|visited| {
-            let (inside, outside): (Vec<usize>, Vec<usize>) = rows.judge.iter().partition(|row| visited.has(data.q(**row)));
+            let (inside, outside): (Vec<usize>, Vec<usize>) = rows
+                .judge
+                .iter()
+                .partition(|row| visited.has(data.q(**row)));
             [compared(&inside), compared(&outside)]
         });
-        Self { chosen_by: compared(&rows.choose), all: compared(&rows.judge), parts }
+        Self {
+            chosen_by: compared(&rows.choose),
+            all: compared(&rows.judge),
+            parts,
+        }
     }
 
     /// Whether the geometry alone is better at the points that choose.
@@ -97,12 +107,18 @@ impl Comparison {
     /// Whether it is better where the joints had not been.
     pub fn is_worse_outside(&self) -> bool {
         let outside = self.parts.as_ref().map(|[_, outside]| outside);
-        outside.is_some_and(|outside| outside.points >= FEWEST && outside.whole.is_worse(&outside.geometry))
+        outside.is_some_and(|outside| {
+            outside.points >= FEWEST && outside.whole.is_worse(&outside.geometry)
+        })
     }
 
     /// Both, with their figures.
     pub fn words(&self) -> String {
-        let Compared { points, whole, geometry } = &self.all;
+        let Compared {
+            points,
+            whole,
+            geometry,
+        } = &self.all;
         let mut text = format!(
             "the carried model leaves {} at {} of this recording, the geometry alone, carried likewise, {}",
             whole.words(),
@@ -114,7 +130,11 @@ impl Comparison {
             points => format!("{}, {}", counted(points, "point"), part.words()),
         };
         if let Some([inside, outside]) = &self.parts {
-            text += &format!(" (visited cells of the joint space: {}; unvisited: {})", part(inside), part(outside));
+            text += &format!(
+                " (visited cells of the joint space: {}; unvisited: {})",
+                part(inside),
+                part(outside)
+            );
         }
         text
     }

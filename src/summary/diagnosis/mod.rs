@@ -12,8 +12,9 @@ use crate::shell::typed;
 use crate::stage::{Diagnose, Stage};
 use crate::store::Store;
 use crate::table::{
-    CauseGrid, Cells, FindingNumbers, Findings, FormRow, Forms, RivalRow, Rivals, ShareRow, Shares, Suspects, SuspectsRow, Table,
-    Verdict, VerdictRow, VerdictSentences, VerdictTopic, formula_in_words, is_separable_by_poses,
+    CauseGrid, Cells, FindingNumbers, Findings, FormRow, Forms, RivalRow, Rivals, ShareRow, Shares,
+    Suspects, SuspectsRow, Table, Verdict, VerdictRow, VerdictSentences, VerdictTopic,
+    formula_in_words, is_separable_by_poses,
 };
 use serde_json::{Value, json};
 
@@ -47,11 +48,17 @@ const SHOWN: usize = 5;
 
 fn table<T: Table + Default>(stage: &StageReport, store: &Store) -> Result<T> {
     let own = stage.outputs.iter().find(|output| output.kind == T::KIND);
-    own.map_or_else(|| Ok(T::default()), |output| T::from_frame(&store.load(&output.table)?))
+    own.map_or_else(
+        || Ok(T::default()),
+        |output| T::from_frame(&store.load(&output.table)?),
+    )
 }
 
 fn rival_words(rival: &RivalRow) -> String {
-    let probability = rival.probability.map(|value| format!(" {value:.2}")).unwrap_or_default();
+    let probability = rival
+        .probability
+        .map(|value| format!(" {value:.2}"))
+        .unwrap_or_default();
     format!("{} at {}{probability}", rival.effect, rival.place)
 }
 
@@ -74,28 +81,55 @@ impl DiagnosisSummary {
 
     /// The proposed formula of a finding, of the first one that has one where none is named, as a file that declares it.
     pub fn effect_file(&self, finding: Option<i64>) -> Result<String> {
-        let mut all = self.forms.0.iter().filter(|row| row.proposed && finding.is_none_or(|rank| row.rank == rank));
+        let mut all = self
+            .forms
+            .0
+            .iter()
+            .filter(|row| row.proposed && finding.is_none_or(|rank| row.rank == rank));
         let row = all.next().ok_or_else(|| {
-            let which = finding.map_or("no finding has a formula".to_string(), |rank| format!("finding {rank} has no formula"));
-            Error::spec("--export-effect", format!("{which} that does what its curve does; findings without a name may have one"))
+            let which = finding.map_or("no finding has a formula".to_string(), |rank| {
+                format!("finding {rank} has no formula")
+            });
+            Error::spec(
+                "--export-effect",
+                format!(
+                    "{which} that does what its curve does; findings without a name may have one"
+                ),
+            )
         })?;
-        let told =
-            format!("a formula for {} at {}, found in run {}", self.effect_of(row.rank), self.place_of(row.rank), self.run);
+        let told = format!(
+            "a formula for {} at {}, found in run {}",
+            self.effect_of(row.rank),
+            self.place_of(row.rank),
+            self.run
+        );
         declared_in_yaml(&row.declaration, &told)
     }
 
     fn effect_of(&self, rank: i64) -> &str {
-        self.findings.0.iter().find(|finding| finding.rank == rank).map_or("-", |finding| &finding.effect)
+        self.findings
+            .0
+            .iter()
+            .find(|finding| finding.rank == rank)
+            .map_or("-", |finding| &finding.effect)
     }
 
     fn place_of(&self, rank: i64) -> &str {
-        self.findings.0.iter().find(|finding| finding.rank == rank).map_or("-", |finding| &finding.place)
+        self.findings
+            .0
+            .iter()
+            .find(|finding| finding.rank == rank)
+            .map_or("-", |finding| &finding.place)
     }
 
     /// What a stage `diagnose` of a run wrote. Fails where a table has left the store.
     pub fn read(run: &str, stage: &StageReport, store: &Store) -> Result<Self> {
         let verdict: Verdict = table(stage, store)?;
-        let verdict = verdict.0.into_iter().next().ok_or_else(|| Error::Bug("a diagnosis without a verdict".into()))?;
+        let verdict = verdict
+            .0
+            .into_iter()
+            .next()
+            .ok_or_else(|| Error::Bug("a diagnosis without a verdict".into()))?;
         let (findings, numbers) = (table(stage, store)?, table(stage, store)?);
         let (run, step) = (run.to_string(), stage.id.clone());
         Ok(Self {
@@ -111,7 +145,11 @@ impl DiagnosisSummary {
             forms: table(stage, store)?,
             suspects: table(stage, store)?,
             robot: robot_of(stage, store)?,
-            rows: stage.inputs.iter().find(|input| input.port == "recording").map_or(0, |input| input.table.rows),
+            rows: stage
+                .inputs
+                .iter()
+                .find(|input| input.port == "recording")
+                .map_or(0, |input| input.table.rows),
         })
     }
 
@@ -121,13 +159,31 @@ impl DiagnosisSummary {
 
     /// What to measure next, a sentence each, then what to type for poses that tell findings from their closest rivals.
     fn next(&self, store: &str) -> Option<Vec<String>> {
-        let mut lines: Vec<String> = self.said(VerdictTopic::NextMeasurement).into_iter().map(String::from).collect();
+        let mut lines: Vec<String> = self
+            .said(VerdictTopic::NextMeasurement)
+            .into_iter()
+            .map(String::from)
+            .collect();
         if lines.is_empty() {
             return None;
         }
-        let step = if self.step == Diagnose::NAME { String::new() } else { format!(" --step {}", typed(&self.step)) };
-        for finding in self.findings.0.iter().filter(|finding| is_separable_by_poses(&finding.effect)) {
-            let mut own: Vec<&RivalRow> = self.rivals.0.iter().filter(|rival| rival.rank == finding.rank).collect();
+        let step = if self.step == Diagnose::NAME {
+            String::new()
+        } else {
+            format!(" --step {}", typed(&self.step))
+        };
+        for finding in self
+            .findings
+            .0
+            .iter()
+            .filter(|finding| is_separable_by_poses(&finding.effect))
+        {
+            let mut own: Vec<&RivalRow> = self
+                .rivals
+                .0
+                .iter()
+                .filter(|rival| rival.rank == finding.rank)
+                .collect();
             own.retain(|rival| is_separable_by_poses(&rival.effect));
             own.sort_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic));
             for rival in own.iter().take(ASKED) {
@@ -148,7 +204,11 @@ impl DiagnosisSummary {
 
     /// What could explain the most of the residual before the findings, more than chance, largest first.
     fn located(&self, by: &str) -> Vec<&ShareRow> {
-        let all = self.shares.0.iter().filter(|row| row.moment == "before" && row.by == by && row.delta_bic > 0.0);
+        let all = self
+            .shares
+            .0
+            .iter()
+            .filter(|row| row.moment == "before" && row.by == by && row.delta_bic > 0.0);
         let mut all: Vec<&ShareRow> = all.collect();
         all.sort_by(|a, b| b.share.total_cmp(&a.share));
         all.truncate(SHOWN);
@@ -219,12 +279,28 @@ impl DiagnosisSummary {
     /// How many rows are not fitted, and the worst of them by name.
     fn set_aside(&self) -> Option<String> {
         let all = self.worst_aside();
-        let named: Vec<String> =
-            all.iter().take(ASIDE).map(|row| format!("{} of set {} {:.3} mm off", row.point_id, row.set, row.size_mm)).collect();
-        let more = if all.len() > ASIDE { ", the worst of them" } else { "" };
+        let named: Vec<String> = all
+            .iter()
+            .take(ASIDE)
+            .map(|row| {
+                format!(
+                    "{} of set {} {:.3} mm off",
+                    row.point_id, row.set, row.size_mm
+                )
+            })
+            .collect();
+        let more = if all.len() > ASIDE {
+            ", the worst of them"
+        } else {
+            ""
+        };
         let which = counted(all.len(), "row");
-        (!all.is_empty())
-            .then(|| format!("{which} (not fitted; figures include those that are held out){more}: {}", named.join(", ")))
+        (!all.is_empty()).then(|| {
+            format!(
+                "{which} (not fitted; figures include those that are held out){more}: {}",
+                named.join(", ")
+            )
+        })
     }
 
     fn located_json(&self, by: &str) -> Vec<Value> {
@@ -235,17 +311,30 @@ impl DiagnosisSummary {
     /// The diagnosis as one HTML file; `store` as in [`Self::document`].
     pub fn page(&self, store: &str) -> Result<String> {
         let v = &self.verdict;
-        let mm = |value: Option<f64>| value.map_or_else(|| "-".into(), |value| format!("{value:.3}"));
+        let mm =
+            |value: Option<f64>| value.map_or_else(|| "-".into(), |value| format!("{value:.3}"));
         diagnosed_page(&DiagnosedTables {
             title: self.robot.as_deref().unwrap_or("diagnosis"),
             origin: [&self.run, &self.step],
             verdict: (
                 v.verdict == VerdictKind::Explained.name(),
-                v.statement.clone().unwrap_or_else(|| v.verdict.replace('_', " ")),
+                v.statement
+                    .clone()
+                    .unwrap_or_else(|| v.verdict.replace('_', " ")),
             ),
             errors: vec![
-                ["before".into(), mm(v.before_mean_mm), mm(v.before_rms_mm), mm(v.before_max_mm)],
-                ["after".into(), mm(v.after_mean_mm), mm(v.after_rms_mm), mm(v.after_max_mm)],
+                [
+                    "before".into(),
+                    mm(v.before_mean_mm),
+                    mm(v.before_rms_mm),
+                    mm(v.before_max_mm),
+                ],
+                [
+                    "after".into(),
+                    mm(v.after_mean_mm),
+                    mm(v.after_rms_mm),
+                    mm(v.after_max_mm),
+                ],
                 ["noise".into(), "-".into(), mm(v.noise_floor_mm), "-".into()],
             ],
             cells: &self.cells,
@@ -257,24 +346,51 @@ impl DiagnosisSummary {
     /// All of the diagnosis, as `calib diagnose --details` prints it; `store` is the `--store` of the commands that it proposes.
     pub fn text(&self, store: &str) -> String {
         let v = &self.verdict;
-        let mm = |value: Option<f64>| value.map_or_else(|| "-".into(), |value| format!("{value:.3}"));
-        let rows = if v.held_out { "held-out points" } else { "fitted points (none are held out: flattered)" };
-        let basis = v.noise_basis.as_ref().map(|basis| format!(" (noise basis: {basis})")).unwrap_or_default();
+        let mm =
+            |value: Option<f64>| value.map_or_else(|| "-".into(), |value| format!("{value:.3}"));
+        let rows = if v.held_out {
+            "held-out points"
+        } else {
+            "fitted points (none are held out: flattered)"
+        };
+        let basis = v
+            .noise_basis
+            .as_ref()
+            .map(|basis| format!(" (noise basis: {basis})"))
+            .unwrap_or_default();
         let mut text = format!("{}{basis}\n", v.verdict.replace('_', " "));
-        v.statement.iter().for_each(|statement| text.push_str(&format!("{statement}\n")));
+        v.statement
+            .iter()
+            .for_each(|statement| text.push_str(&format!("{statement}\n")));
         text.push('\n');
         text.push_str(&format!("error in mm, {rows}: mean / rms / max\n"));
         for (name, mean, rms, max) in [
             ("before", v.before_mean_mm, v.before_rms_mm, v.before_max_mm),
             ("after", v.after_mean_mm, v.after_rms_mm, v.after_max_mm),
         ] {
-            text.push_str(&format!("  {name:6}  {:>8}  {:>8}  {:>8}\n", mm(mean), mm(rms), mm(max)));
+            text.push_str(&format!(
+                "  {name:6}  {:>8}  {:>8}  {:>8}\n",
+                mm(mean),
+                mm(rms),
+                mm(max)
+            ));
         }
-        let assumed = if v.is_noise_assumed() { "  assumed: none is recorded, and no `instrument` is stated" } else { "" };
-        text.push_str(&format!("  noise   {:>8}  {:>8}{assumed}\n\n", "", mm(v.noise_floor_mm)));
+        let assumed = if v.is_noise_assumed() {
+            "  assumed: none is recorded, and no `instrument` is stated"
+        } else {
+            ""
+        };
+        text.push_str(&format!(
+            "  noise   {:>8}  {:>8}{assumed}\n\n",
+            "",
+            mm(v.noise_floor_mm)
+        ));
         for (by, what) in [("place", "where"), ("variable", "depends on")] {
             let all = self.located(by);
-            let all: Vec<String> = all.iter().map(|row| format!("{} {:.0} %", row.name, row.share * 100.0)).collect();
+            let all: Vec<String> = all
+                .iter()
+                .map(|row| format!("{} {:.0} %", row.name, row.share * 100.0))
+                .collect();
             if !all.is_empty() {
                 text.push_str(&format!("{what:10}  {}\n", all.join(", ")));
             }
@@ -288,27 +404,44 @@ impl DiagnosisSummary {
         }
         for finding in &self.findings.0 {
             text.push_str(&format!("{}. {}\n", finding.rank, finding.statement));
-            if let (Some(name), Some(place), Some(none)) =
-                (finding.probability, finding.place_probability, finding.none_probability)
-            {
+            if let (Some(name), Some(place), Some(none)) = (
+                finding.probability,
+                finding.place_probability,
+                finding.none_probability,
+            ) {
                 let (effect, at) = (&finding.effect, &finding.place);
                 text.push_str(&format!("   probability: {effect} {name:.2}, at {at} {place:.2}, none of the names {none:.2}\n"));
             }
             for rows in self.forms.of_finding(finding.rank) {
-                let proposed = if rows.iter().any(|row| row.proposed) { ", proposed" } else { "" };
-                let (price, folds) = rows.first().map_or((0, 0.0), |row| (row.price, row.folds_rms_mm));
+                let proposed = if rows.iter().any(|row| row.proposed) {
+                    ", proposed"
+                } else {
+                    ""
+                };
+                let (price, folds) = rows
+                    .first()
+                    .map_or((0, 0.0), |row| (row.price, row.folds_rms_mm));
                 let words = formula_in_words(rows);
-                text.push_str(&format!("   formula: {words} ({price} parts, {folds:.4} mm cross-validated{proposed})\n"));
+                text.push_str(&format!(
+                    "   formula: {words} ({price} parts, {folds:.4} mm cross-validated{proposed})\n"
+                ));
             }
             let rivals: Vec<String> = self.rivals_of(finding).map(rival_words).collect();
             if !rivals.is_empty() {
-                text.push_str(&format!("   these data cannot separate it from: {}\n", rivals.join(", ")));
+                text.push_str(&format!(
+                    "   these data cannot separate it from: {}\n",
+                    rivals.join(", ")
+                ));
             }
         }
         for line in self.said(VerdictTopic::NotObservable) {
             text.push_str(&format!("not observable: {line}\n"));
         }
-        text.extend(v.signature.iter().map(|signature| format!("what is left: {signature}\n")));
+        text.extend(
+            v.signature
+                .iter()
+                .map(|signature| format!("what is left: {signature}\n")),
+        );
         text.extend(self.set_aside().map(|rows| format!("set aside: {rows}\n")));
         for line in self.next(store).into_iter().flatten() {
             text.push_str(&format!("measure next: {line}\n"));

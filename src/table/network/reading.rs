@@ -1,11 +1,15 @@
 //! From the table back to the correction, or what is wrong with it.
 
 use super::numbers::{Numbers, index};
-use super::{MILLI, Network, activation_name, coefficient_unit, feature_unit, map_name, place, source_unit};
+use super::{
+    MILLI, Network, activation_name, coefficient_unit, feature_unit, map_name, place, source_unit,
+};
 use crate::error::{Error, Result, counted};
 use crate::estimate::network::arm::{Hinge, ScrewArm};
 use crate::estimate::network::basis::{BasisTerm, OutputMotion, Wave};
-use crate::estimate::network::correction::{Body, Correction, Feature, JointMotion, Map, NetworkScaling, Networks, Scaling};
+use crate::estimate::network::correction::{
+    Body, Correction, Feature, JointMotion, Map, NetworkScaling, Networks, Scaling,
+};
 use crate::estimate::network::linear::Linear;
 use crate::estimate::network::process::Process;
 use crate::estimate::network::region::{Jointly, Region, Valid};
@@ -34,16 +38,28 @@ impl Network {
             let networks = networks(&numbers, dress.features.len(), prismatic)?;
             Body::Networks(dress, networks)
         };
-        Ok(Some(Correction { body, region, left: numbers.shared("left", 0)? / MILLI }))
+        Ok(Some(Correction {
+            body,
+            region,
+            left: numbers.shared("left", 0)? / MILLI,
+        }))
     }
 }
 
 fn region(numbers: &Numbers, prismatic: &[bool]) -> Result<Region> {
     let range = |source: usize| -> Result<Valid> {
-        let bound = |part: &str| Ok::<f64, Error>(numbers.shared(part, source + 1)? / source_unit(source, prismatic));
-        Ok(Valid { lower: bound("valid_lower")?, upper: bound("valid_upper")?, margin: bound("valid_margin")? })
+        let bound = |part: &str| {
+            Ok::<f64, Error>(numbers.shared(part, source + 1)? / source_unit(source, prismatic))
+        };
+        Ok(Valid {
+            lower: bound("valid_lower")?,
+            upper: bound("valid_upper")?,
+            margin: bound("valid_margin")?,
+        })
     };
-    let ranges = (0..numbers.count("valid_lower")).map(range).collect::<Result<Vec<Valid>>>()?;
+    let ranges = (0..numbers.count("valid_lower"))
+        .map(range)
+        .collect::<Result<Vec<Valid>>>()?;
     let joints = numbers.count("joint_mean");
     if joints > ranges.len() {
         return Err(Error::data("network", "more joints than sources"));
@@ -51,10 +67,14 @@ fn region(numbers: &Numbers, prismatic: &[bool]) -> Result<Region> {
     let mut jointly = None;
     if joints > 0 {
         let mean = |j: usize| Ok(numbers.shared("joint_mean", j + 1)? / source_unit(j, prismatic));
-        let factor = |i: usize, j: usize| Ok(numbers.of(0, "joint_factor", [0, i + 1, j + 1])? * source_unit(j, prismatic));
+        let factor = |i: usize, j: usize| {
+            Ok(numbers.of(0, "joint_factor", [0, i + 1, j + 1])? * source_unit(j, prismatic))
+        };
         jointly = Some(Jointly {
             mean: (0..joints).map(mean).collect::<Result<_>>()?,
-            factor: (0..joints).map(|i| (0..=i).map(|j| factor(i, j)).collect()).collect::<Result<_>>()?,
+            factor: (0..joints)
+                .map(|i| (0..=i).map(|j| factor(i, j)).collect())
+                .collect::<Result<_>>()?,
             limit: numbers.shared("joint_limit", 0)?,
             margin: numbers.shared("joint_margin", 0)?,
         });
@@ -66,7 +86,13 @@ fn dress(numbers: &Numbers, prismatic: &[bool], sources: usize) -> Result<Networ
     let mut features = BTreeMap::new();
     for map in [Map::Value, Map::Sin, Map::Cos] {
         for ((_, to, from), _) in numbers.all(map_name(map)) {
-            features.insert(to, Feature { source: index(from, 1)?, map });
+            features.insert(
+                to,
+                Feature {
+                    source: index(from, 1)?,
+                    map,
+                },
+            );
         }
     }
     let features: Vec<Feature> = features.into_values().collect();
@@ -75,32 +101,64 @@ fn dress(numbers: &Numbers, prismatic: &[bool], sources: usize) -> Result<Networ
     }
     let scaling = |what: &str, to: usize, unit: f64| -> Result<Scaling> {
         let scale = numbers.shared(&format!("{what}_scale"), to)? / unit;
-        Ok(Scaling { mean: numbers.shared(&format!("{what}_mean"), to)? / unit, scale })
+        Ok(Scaling {
+            mean: numbers.shared(&format!("{what}_mean"), to)? / unit,
+            scale,
+        })
     };
-    let inputs = features.iter().enumerate().map(|(i, f)| scaling("input", i + 1, feature_unit(*f, prismatic)));
+    let inputs = features
+        .iter()
+        .enumerate()
+        .map(|(i, f)| scaling("input", i + 1, feature_unit(*f, prismatic)));
     let inputs = inputs.collect::<Result<Vec<Scaling>>>()?;
-    let outputs = [scaling("output", 1, MILLI)?, scaling("output", 2, MILLI)?, scaling("output", 3, MILLI)?];
-    Ok(NetworkScaling { features, inputs, outputs })
+    let outputs = [
+        scaling("output", 1, MILLI)?,
+        scaling("output", 2, MILLI)?,
+        scaling("output", 3, MILLI)?,
+    ];
+    Ok(NetworkScaling {
+        features,
+        inputs,
+        outputs,
+    })
 }
 
 fn networks(numbers: &Numbers, inputs: usize, prismatic: &[bool]) -> Result<Networks> {
-    let activation = [Activation::Sigmoid, Activation::Tanh].into_iter().find(|a| numbers.has(activation_name(*a)));
-    let activation = activation.ok_or_else(|| Error::data("network", "neither `sigmoid` nor `tanh`"))?;
+    let activation = [Activation::Sigmoid, Activation::Tanh]
+        .into_iter()
+        .find(|a| numbers.has(activation_name(*a)));
+    let activation =
+        activation.ok_or_else(|| Error::data("network", "neither `sigmoid` nor `tanh`"))?;
     let mut joints = None;
     if numbers.has("joint_scale") {
         let arm = arm(numbers)?;
-        let scale = |joint: usize| Ok(numbers.shared("joint_scale", joint + 1)? / source_unit(joint, prismatic));
-        let scales = (0..arm.hinges.len()).map(scale).collect::<Result<Vec<f64>>>()?;
+        let scale = |joint: usize| {
+            Ok(numbers.shared("joint_scale", joint + 1)? / source_unit(joint, prismatic))
+        };
+        let scales = (0..arm.hinges.len())
+            .map(scale)
+            .collect::<Result<Vec<f64>>>()?;
         if scales.len() != prismatic.len() {
-            let message = format!("motions of {}, of a robot that has {}", counted(scales.len(), "joint"), prismatic.len());
+            let message = format!(
+                "motions of {}, of a robot that has {}",
+                counted(scales.len(), "joint"),
+                prismatic.len()
+            );
             return Err(Error::data("network", message));
         }
         joints = Some(JointMotion { arm, scales });
     }
-    let outputs = joints.as_ref().map_or(OUTPUTS, |motion: &JointMotion| motion.scales.len());
+    let outputs = joints
+        .as_ref()
+        .map_or(OUTPUTS, |motion: &JointMotion| motion.scales.len());
     // The first member's biases are those of the hidden layer and of the outputs.
     let hidden = numbers.first_member("bias").saturating_sub(outputs);
-    let shape = LayerSizes { inputs, hidden, outputs, activation };
+    let shape = LayerSizes {
+        inputs,
+        hidden,
+        outputs,
+        activation,
+    };
     let member = |member: usize| -> Result<Vec<f64>> {
         let value = |index: usize| {
             let (part, place) = place(shape, index);
@@ -108,25 +166,58 @@ fn networks(numbers: &Numbers, inputs: usize, prismatic: &[bool]) -> Result<Netw
         };
         (0..shape.parameters()).map(value).collect()
     };
-    Ok(Networks { shape, joints, members: (1..=numbers.members("bias")).map(member).collect::<Result<_>>()? })
+    Ok(Networks {
+        shape,
+        joints,
+        members: (1..=numbers.members("bias"))
+            .map(member)
+            .collect::<Result<_>>()?,
+    })
 }
 
 fn process(numbers: &Numbers, inputs: usize) -> Result<Process> {
-    let lengths = (0..inputs).map(|i| numbers.of(0, "length", [0, 0, i + 1])).collect::<Result<Vec<f64>>>()?;
+    let lengths = (0..inputs)
+        .map(|i| numbers.of(0, "length", [0, 0, i + 1]))
+        .collect::<Result<Vec<f64>>>()?;
     let rows = numbers.count("row") / inputs.max(1);
-    let row = |r: usize| (0..inputs).map(|i| numbers.of(0, "row", [0, r + 1, i + 1])).collect::<Result<Vec<f64>>>();
+    let row = |r: usize| {
+        (0..inputs)
+            .map(|i| numbers.of(0, "row", [0, r + 1, i + 1]))
+            .collect::<Result<Vec<f64>>>()
+    };
     let rows = (0..rows).map(row).collect::<Result<Vec<_>>>()?;
-    let alpha = (0..rows.len()).map(|r| numbers.row("alpha", r + 1)).collect::<Result<Vec<_>>>()?;
-    Process::remember(lengths, numbers.shared("signal", 0)?, numbers.shared("noise", 0)?, rows, alpha)
-        .ok_or_else(|| Error::data("network", "the rows of the process depend on each other"))
+    let alpha = (0..rows.len())
+        .map(|r| numbers.row("alpha", r + 1))
+        .collect::<Result<Vec<_>>>()?;
+    Process::remember(
+        lengths,
+        numbers.shared("signal", 0)?,
+        numbers.shared("noise", 0)?,
+        rows,
+        alpha,
+    )
+    .ok_or_else(|| Error::data("network", "the rows of the process depend on each other"))
 }
 
 fn linear(numbers: &Numbers, sources: usize) -> Result<Linear> {
-    let arm = if numbers.has("tool") { Some(arm(numbers)?) } else { None };
-    let joints = arm.as_ref().map_or(sources, |arm| arm.hinges.len().min(sources));
+    let arm = if numbers.has("tool") {
+        Some(arm(numbers)?)
+    } else {
+        None
+    };
+    let joints = arm
+        .as_ref()
+        .map_or(sources, |arm| arm.hinges.len().min(sources));
     let within = |value: i64, count: usize| -> Result<usize> {
         let found = index(value, 1)?;
-        if found < count { Ok(found) } else { Err(Error::data("network", format!("no joint, body or axis {value}"))) }
+        if found < count {
+            Ok(found)
+        } else {
+            Err(Error::data(
+                "network",
+                format!("no joint, body or axis {value}"),
+            ))
+        }
     };
     let mut terms: BTreeMap<i64, BasisTerm> = BTreeMap::new();
     for part in ["along", "turn", "shift", "tilt"] {
@@ -141,7 +232,13 @@ fn linear(numbers: &Numbers, sources: usize) -> Result<Linear> {
                 "shift" => OutputMotion::Shift(station, within(from, 3)?),
                 _ => OutputMotion::Tilt(station, within(from, 3)?),
             };
-            terms.insert(to, BasisTerm { way, waves: Vec::new() });
+            terms.insert(
+                to,
+                BasisTerm {
+                    way,
+                    waves: Vec::new(),
+                },
+            );
         }
     }
     for part in ["sin", "cos", "value", "torque"] {
@@ -153,7 +250,9 @@ fn linear(numbers: &Numbers, sources: usize) -> Result<Linear> {
                 "value" => Wave::Value(joint),
                 _ => Wave::Torque(joint, within(layer, joints)?),
             };
-            let term = terms.get_mut(&to).ok_or_else(|| Error::data("network", format!("a wave of term {to}, which is none")))?;
+            let term = terms.get_mut(&to).ok_or_else(|| {
+                Error::data("network", format!("a wave of term {to}, which is none"))
+            })?;
             term.waves.push(wave);
         }
     }
@@ -161,18 +260,41 @@ fn linear(numbers: &Numbers, sources: usize) -> Result<Linear> {
     let coefficient = |member: usize, t: usize, term: &BasisTerm| {
         Ok::<f64, Error>(numbers.of(member, "coefficient", [0, t + 1, 0])? / coefficient_unit(term))
     };
-    let member = |member: usize| terms.iter().enumerate().map(|(t, term)| coefficient(member, t, term)).collect::<Result<_>>();
-    let members = (1..=numbers.members("coefficient")).map(member).collect::<Result<Vec<Vec<f64>>>>()?;
-    Ok(Linear { arm, members, noise: numbers.shared("terms_noise", 0)? / MILLI, terms })
+    let member = |member: usize| {
+        terms
+            .iter()
+            .enumerate()
+            .map(|(t, term)| coefficient(member, t, term))
+            .collect::<Result<_>>()
+    };
+    let members = (1..=numbers.members("coefficient"))
+        .map(member)
+        .collect::<Result<Vec<Vec<f64>>>>()?;
+    Ok(Linear {
+        arm,
+        members,
+        noise: numbers.shared("terms_noise", 0)? / MILLI,
+        terms,
+    })
 }
 
 fn arm(numbers: &Numbers) -> Result<ScrewArm> {
     let hinge = |j: usize| -> Result<Hinge> {
         let slides = numbers.shared("slides", j + 1)? != 0.0;
         let point: [f64; 3] = numbers.row("point", j + 1)?;
-        Ok(Hinge { axis: numbers.row("axis", j + 1)?, point: point.map(|value| value / MILLI), slides })
+        Ok(Hinge {
+            axis: numbers.row("axis", j + 1)?,
+            point: point.map(|value| value / MILLI),
+            slides,
+        })
     };
-    let hinges = (0..numbers.count("slides")).map(hinge).collect::<Result<Vec<Hinge>>>()?;
+    let hinges = (0..numbers.count("slides"))
+        .map(hinge)
+        .collect::<Result<Vec<Hinge>>>()?;
     let tool: [f64; 3] = numbers.row("tool", 0)?;
-    Ok(ScrewArm { hinges, tool: tool.map(|value| value / MILLI), down: numbers.row("down", 0)? })
+    Ok(ScrewArm {
+        hinges,
+        tool: tool.map(|value| value / MILLI),
+        down: numbers.row("down", 0)?,
+    })
 }

@@ -91,32 +91,73 @@ impl Case {
         let truth = errors(&robot, &mut draw);
         let beyond_list = design.collection == Collection::Beyond;
         let tracker = instrument(design, kind, content, &mut draw);
-        let (play_rad, repeated) = if draw.chance(0.5) { (1e-6 * draw.uniform(4.0, 16.0), 0.1) } else { (0.0, 0.0) };
-        let fit = design.points.unwrap_or_else(|| draw.size(50.0, 400.0).round() as usize);
+        let (play_rad, repeated) = if draw.chance(0.5) {
+            (1e-6 * draw.uniform(4.0, 16.0), 0.1)
+        } else {
+            (0.0, 0.0)
+        };
+        let fit = design
+            .points
+            .unwrap_or_else(|| draw.size(50.0, 400.0).round() as usize);
         let validate = (draw.uniform(0.25, 0.5) * fit as f64).round().max(1.0) as usize;
         let climate = weather((fit + validate) as f64 * 19.0, beyond_list, &mut draw);
-        let ranges: Vec<[f64; 2]> =
-            robot.joints.iter().map(|joint| narrowed(joint.limits.unwrap_or_default(), &mut draw)).collect();
+        let ranges: Vec<[f64; 2]> = robot
+            .joints
+            .iter()
+            .map(|joint| narrowed(joint.limits.unwrap_or_default(), &mut draw))
+            .collect();
         let near = if beyond_list { NEAR } else { 0.0 };
-        let amount = Amount { fit, validate, repeated, near, loaded: !design.bare, layout: design.layout };
+        let amount = Amount {
+            fit,
+            validate,
+            repeated,
+            near,
+            loaded: !design.bare,
+            layout: design.layout,
+        };
         let points = points::plan(kind, &ranges, amount, &climate, seed)?;
         let to_fit = &points[..fit.min(points.len())];
-        let site = Site { robot: &robot, truth: &truth, tracker: &tracker, points: to_fit };
-        let held_out = Site { points: &points[fit.min(points.len())..], ..site };
+        let site = Site {
+            robot: &robot,
+            truth: &truth,
+            tracker: &tracker,
+            points: to_fit,
+        };
+        let held_out = Site {
+            points: &points[fit.min(points.len())..],
+            ..site
+        };
         let noise_mm = [&site, &held_out].map(|site| 1e3 * site.noise(play_rad));
         let shadow = site.shadow();
         let bench = Bench::new(&robot, &ranges, to_fit);
-        let sight = Sight { site: &site, shadow: &shadow, noise: 1e-3 * noise_mm[0] };
+        let sight = Sight {
+            site: &site,
+            shadow: &shadow,
+            noise: 1e-3 * noise_mm[0],
+        };
         let (drafts, concealed) = concealing(design, content, &bench, &sight, &mut draw);
         let mut hidden = hidden(&drafts, &mut draw);
         hidden.extend(design.bare.then_some(Column::Current));
-        let (payload_kg, warmth): (Vec<f64>, Vec<f64>) =
-            points.iter().map(|point| (point.payload_kg, point.temperature_c)).unzip();
+        let (payload_kg, warmth): (Vec<f64>, Vec<f64>) = points
+            .iter()
+            .map(|point| (point.payload_kg, point.temperature_c))
+            .unzip();
         let (friction, motors) = drives(&robot, &bench, &mut draw);
-        let effects: Vec<Physical> =
-            concealed.iter().flat_map(|one| one.cause.physical.clone()).chain(friction.iter().cloned()).collect();
-        let unseen_mm = 1e3 * Site { points: &points, ..site }.unseen(fit, &effects);
-        let (play, poses) = (vec![play_rad / ARCSEC; robot.joints.len()], Poses::default());
+        let effects: Vec<Physical> = concealed
+            .iter()
+            .flat_map(|one| one.cause.physical.clone())
+            .chain(friction.iter().cloned())
+            .collect();
+        let unseen_mm = 1e3
+            * Site {
+                points: &points,
+                ..site
+            }
+            .unseen(fit, &effects);
+        let (play, poses) = (
+            vec![play_rad / ARCSEC; robot.joints.len()],
+            Poses::default(),
+        );
         let experiment = Experiment {
             robot: &robot,
             truth: &truth,
@@ -129,13 +170,21 @@ impl Case {
             climate: &climate,
             seed,
         };
-        let carried = points.into_iter().map(|point| Point { payload_kg: point.payload_kg + design.tool_mass_kg, ..point });
+        let carried = points.into_iter().map(|point| Point {
+            payload_kg: point.payload_kg + design.tool_mass_kg,
+            ..point
+        });
         let mut shots = experiment.measure(carried.collect(), || ());
         let mut faults = Noise::new(seed, Purpose::Faults);
-        let thermometer_c = warmth.iter().map(|celsius| celsius + THERMOMETER_K * faults.normal()).collect();
+        let thermometer_c = warmth
+            .iter()
+            .map(|celsius| celsius + THERMOMETER_K * faults.normal())
+            .collect();
         let tampered = tamper(design, &mut shots, fit, &mut faults);
         if design.log_step_deg > 0.0 {
-            shots.iter_mut().for_each(|shot| round(&mut shot.q, &robot, design.log_step_deg));
+            shots
+                .iter_mut()
+                .for_each(|shot| round(&mut shot.q, &robot, design.log_step_deg));
         }
         Ok(Case {
             name: format!("c{:04}", number + 1),
@@ -143,7 +192,10 @@ impl Case {
             collection: design.collection,
             seed,
             kind,
-            accepted: drafts.iter().flat_map(|draft| draft.accepted.clone()).collect(),
+            accepted: drafts
+                .iter()
+                .flat_map(|draft| draft.accepted.clone())
+                .collect(),
             geometry_rank: shadow.rank(),
             robot,
             bare: design.bare,
@@ -178,8 +230,16 @@ impl Case {
     fn names(&self, which: fn(&Concealed) -> bool) -> Vec<(&'static str, String)> {
         let mut causes: Vec<&Concealed> = self.concealed.iter().filter(|one| which(one)).collect();
         causes.sort_by(|a, b| b.strength.total_cmp(&a.strength));
-        let named = causes.into_iter().map(|one| (one.cause.effect, one.cause.place.clone()));
-        named.chain(self.tampered.iter().map(|one| (one.effect, "recording".to_string()))).collect()
+        let named = causes
+            .into_iter()
+            .map(|one| (one.cause.effect, one.cause.place.clone()));
+        named
+            .chain(
+                self.tampered
+                    .iter()
+                    .map(|one| (one.effect, "recording".to_string())),
+            )
+            .collect()
     }
 }
 
@@ -187,12 +247,22 @@ impl Case {
 fn arm(design: &Design, draw: &mut Noise) -> (Kind, RobotDescription) {
     let kinds = design.kinds();
     let kind = kinds[draw.index(kinds.len())];
-    let aside = if draw.chance(0.5) { draw.vector(30.0, 80.0).map(f64::round) } else { [0.0; 3] };
+    let aside = if draw.chance(0.5) {
+        draw.vector(30.0, 80.0).map(f64::round)
+    } else {
+        [0.0; 3]
+    };
     (kind, kind.description(aside))
 }
 
 /// What the case conceals, each effect as visible as drawn.
-fn concealing(design: &Design, content: Content, bench: &Bench, sight: &Sight, draw: &mut Noise) -> (Vec<Draft>, Vec<Concealed>) {
+fn concealing(
+    design: &Design,
+    content: Content,
+    bench: &Bench,
+    sight: &Sight,
+    draw: &mut Noise,
+) -> (Vec<Draft>, Vec<Concealed>) {
     if content == Content::Foreign {
         return drawn(bench, sight, draw);
     }
@@ -207,20 +277,35 @@ fn concealing(design: &Design, content: Content, bench: &Bench, sight: &Sight, d
 /// Clock and temperature of a recording that lasts so many seconds: two time constants, more or less.
 fn weather(lasts_s: f64, swings: bool, draw: &mut Noise) -> Climate {
     let warm_up_h = lasts_s / draw.uniform(1.5, 3.5) / 3600.0;
-    let climate = Climate { pace_s: [12.0, 26.0], start_c: 20.0, rise_k: 15.0, warm_up_h, ..Climate::default() };
+    let climate = Climate {
+        pace_s: [12.0, 26.0],
+        start_c: 20.0,
+        rise_k: 15.0,
+        warm_up_h,
+        ..Climate::default()
+    };
     if !swings {
         return climate;
     }
     // Without a swing temperature is a function of time, and what lags it another one.
-    Climate { swing_k: draw.uniform(2.0, 4.0), swing_h: lasts_s / draw.uniform(2.0, 5.0) / 3600.0, ..climate }
+    Climate {
+        swing_k: draw.uniform(2.0, 4.0),
+        swing_h: lasts_s / draw.uniform(2.0, 5.0) / 3600.0,
+        ..climate
+    }
 }
 
 /// The tracker, with the scatter that the design asks for.
 fn instrument(design: &Design, kind: Kind, content: Content, draw: &mut Noise) -> Tracker {
     let tracker = tracker(kind, content == Content::Null, draw);
     let beyond_list = design.collection == Collection::Beyond;
-    let scatter = design.scatter.or_else(|| beyond_list.then(|| scatter(draw)));
-    Tracker { scatter: scatter.unwrap_or(tracker.scatter), ..tracker }
+    let scatter = design
+        .scatter
+        .or_else(|| beyond_list.then(|| scatter(draw)));
+    Tracker {
+        scatter: scatter.unwrap_or(tracker.scatter),
+        ..tracker
+    }
 }
 
 /// Friction, in half of the cases, and the motors that show it.
@@ -229,14 +314,18 @@ fn drives(robot: &RobotDescription, bench: &Bench, draw: &mut Noise) -> (Vec<Phy
     let mut friction = Vec::with_capacity(bench.peak.len());
     for (joint, peak) in bench.peak.iter().enumerate() {
         let torque_nm = share * draw.uniform(0.2, 1.0) * peak;
-        friction.push(Physical::HoldingFriction(HoldingFriction { joint: joint + 1, torque_nm }));
+        friction.push(Physical::HoldingFriction(HoldingFriction {
+            joint: joint + 1,
+            torque_nm,
+        }));
     }
-    let largest = robot
-        .joints
-        .iter()
-        .zip(&bench.peak)
-        .map(|(joint, peak)| peak / (joint.reduction_ratio.unwrap_or(1.0) * joint.motor_constant.unwrap_or(1.0)));
-    let motors = Motors { sign: Vec::new(), noise_a: 0.003 * largest.fold(0.0, f64::max) };
+    let largest = robot.joints.iter().zip(&bench.peak).map(|(joint, peak)| {
+        peak / (joint.reduction_ratio.unwrap_or(1.0) * joint.motor_constant.unwrap_or(1.0))
+    });
+    let motors = Motors {
+        sign: Vec::new(),
+        noise_a: 0.003 * largest.fold(0.0, f64::max),
+    };
     (friction, motors)
 }
 
@@ -244,21 +333,37 @@ fn drives(robot: &RobotDescription, bench: &Bench, draw: &mut Noise) -> (Vec<Phy
 fn errors(robot: &RobotDescription, draw: &mut Noise) -> TrueRobot {
     let joints = robot.joints.len();
     // A gear's error is a misjudged ratio: as large as the tool's turn allows to see, and larger on the big robot.
-    let gear = if joints == 6 && robot.payload_mass > 100.0 { 4e-4 } else { 1e-4 };
+    let gear = if joints == 6 && robot.payload_mass > 100.0 {
+        4e-4
+    } else {
+        1e-4
+    };
     TrueRobot {
-        offset_deg: (0..joints).map(|_| (5e-4 * draw.normal()).to_degrees()).collect(),
+        offset_deg: (0..joints)
+            .map(|_| (5e-4 * draw.normal()).to_degrees())
+            .collect(),
         ratio: (0..joints).map(|_| 1.0 + gear * draw.normal()).collect(),
         links: (1..=joints)
             .map(|link| LinkError {
                 link,
                 shift_mm: std::array::from_fn(|_| 0.4 * draw.normal()),
-                tilt_arcsec: std::array::from_fn(|_| if link == joints { 0.0 } else { 3e-4 / ARCSEC * draw.normal() }),
+                tilt_arcsec: std::array::from_fn(|_| {
+                    if link == joints {
+                        0.0
+                    } else {
+                        3e-4 / ARCSEC * draw.normal()
+                    }
+                }),
             })
             .collect(),
         couplings: robot
             .couplings
             .iter()
-            .map(|pair| CouplingError { moved: pair.moved + 1, by: pair.by + 1, error: 3e-4 * draw.normal() })
+            .map(|pair| CouplingError {
+                moved: pair.moved + 1,
+                by: pair.by + 1,
+                error: 3e-4 * draw.normal(),
+            })
             .collect(),
         ..TrueRobot::default()
     }
@@ -266,11 +371,23 @@ fn errors(robot: &RobotDescription, draw: &mut Noise) -> TrueRobot {
 
 /// A tracker somewhere around the robot, turned anyhow; nulls see other scatter, too.
 fn tracker(kind: Kind, null: bool, draw: &mut Noise) -> Tracker {
-    let (far, angle) = (kind.reach_m() * draw.uniform(1.2, 2.0), draw.uniform(-180.0, 180.0f64));
+    let (far, angle) = (
+        kind.reach_m() * draw.uniform(1.2, 2.0),
+        draw.uniform(-180.0, 180.0f64),
+    );
     let (sine, cosine) = angle.to_radians().sin_cos();
     Tracker {
-        position_mm: [1e3 * far * cosine, 1e3 * far * sine, 1e3 * draw.uniform(0.0, 1.5)].map(f64::round),
-        roll_pitch_yaw_deg: [draw.uniform(-10.0, 10.0), draw.uniform(-10.0, 10.0), draw.uniform(-180.0, 180.0)],
+        position_mm: [
+            1e3 * far * cosine,
+            1e3 * far * sine,
+            1e3 * draw.uniform(0.0, 1.5),
+        ]
+        .map(f64::round),
+        roll_pitch_yaw_deg: [
+            draw.uniform(-10.0, 10.0),
+            draw.uniform(-10.0, 10.0),
+            draw.uniform(-180.0, 180.0),
+        ],
         scatter: match (null, draw.index(3)) {
             (true, 1) => Scatter::Student,
             (true, 2) => Scatter::Uneven,
@@ -283,13 +400,20 @@ fn tracker(kind: Kind, null: bool, draw: &mut Noise) -> Tracker {
 /// Mostly Gaussian, else one of the other kinds.
 fn scatter(draw: &mut Noise) -> Scatter {
     let (plain, other) = (draw.chance(0.6), draw.index(SCATTERS.len() - 1));
-    if plain { Scatter::Gaussian } else { SCATTERS[1 + other] }
+    if plain {
+        Scatter::Gaussian
+    } else {
+        SCATTERS[1 + other]
+    }
 }
 
 /// Rounds angles (rad) of revolute joints to whole steps, as a controller's log does.
 fn round(q: &mut [f64], robot: &RobotDescription, step_deg: f64) {
     let step = step_deg.to_radians();
-    let angles = q.iter_mut().zip(&robot.joints).filter(|(_, joint)| joint.kind == JointKind::Revolute);
+    let angles = q
+        .iter_mut()
+        .zip(&robot.joints)
+        .filter(|(_, joint)| joint.kind == JointKind::Revolute);
     angles.for_each(|(angle, _)| *angle = (*angle / step).round() * step);
 }
 
@@ -303,9 +427,16 @@ fn narrowed(limits: [f64; 2], draw: &mut Noise) -> [f64; 2] {
 
 /// Columns that the recording lacks: what a form takes away, and now and then one that it can do without.
 fn hidden(drafts: &[Draft], draw: &mut Noise) -> BTreeSet<Column> {
-    let mut out: BTreeSet<Column> = drafts.iter().flat_map(|draft| draft.hides.iter().copied()).collect();
-    for (column, share) in [(Column::Temperature, 0.15), (Column::Current, 0.12), (Column::Direction, 0.08), (Column::Time, 0.05)]
-    {
+    let mut out: BTreeSet<Column> = drafts
+        .iter()
+        .flat_map(|draft| draft.hides.iter().copied())
+        .collect();
+    for (column, share) in [
+        (Column::Temperature, 0.15),
+        (Column::Current, 0.12),
+        (Column::Direction, 0.08),
+        (Column::Time, 0.05),
+    ] {
         let dropped = draw.chance(share);
         if dropped && !drafts.iter().any(|draft| draft.needs.contains(&column)) {
             out.insert(column);
@@ -317,7 +448,11 @@ fn hidden(drafts: &[Draft], draw: &mut Noise) -> BTreeSet<Column> {
 /// Gross errors at one to three points to fit, or two points exchanged.
 fn tamper(design: &Design, shots: &mut [Shot], fit: usize, draw: &mut Noise) -> Vec<Tampering> {
     let (faulty, exchanged) = (draw.chance(design.faulty), draw.chance(0.4));
-    let last = shots.iter().filter(|shot| shot.block == FIT).count().min(fit);
+    let last = shots
+        .iter()
+        .filter(|shot| shot.block == FIT)
+        .count()
+        .min(fit);
     if !faulty || last < 10 {
         return Vec::new();
     }
@@ -326,7 +461,10 @@ fn tamper(design: &Design, shots: &mut [Shot], fit: usize, draw: &mut Noise) -> 
         let second = first + 1 + draw.index(4);
         let (a, b) = (shots[first].position, shots[second].position);
         (shots[first].position, shots[second].position) = (b, a);
-        return vec![Tampering { effect: "mislabelled_point", rows: vec![first, second] }];
+        return vec![Tampering {
+            effect: "mislabelled_point",
+            rows: vec![first, second],
+        }];
     }
     let mut rows: Vec<usize> = (0..1 + draw.index(3)).map(|_| draw.index(last)).collect();
     rows.sort_unstable();
@@ -335,5 +473,8 @@ fn tamper(design: &Design, shots: &mut [Shot], fit: usize, draw: &mut Noise) -> 
         let jump = draw.vector(0.5e-3, 4e-3);
         shots[*row].position = std::array::from_fn(|axis| shots[*row].position[axis] + jump[axis]);
     }
-    vec![Tampering { effect: "outlier", rows }]
+    vec![Tampering {
+        effect: "outlier",
+        rows,
+    }]
 }

@@ -93,12 +93,18 @@ impl Design {
             false => self.families.iter().any(|name| name == family.name),
         };
         let families = self.collection.families();
-        (0..families.len()).filter(|row| chosen(&families[*row])).collect()
+        (0..families.len())
+            .filter(|row| chosen(&families[*row]))
+            .collect()
     }
 
     /// Robots to draw from.
     pub fn kinds(&self) -> Vec<Kind> {
-        if self.robots.is_empty() { self.collection.robots().to_vec() } else { self.robots.clone() }
+        if self.robots.is_empty() {
+            self.collection.robots().to_vec()
+        } else {
+            self.robots.clone()
+        }
     }
 
     /// What every case conceals: shares kept exactly, families in turn, in an order that says nothing.
@@ -107,8 +113,14 @@ impl Design {
         let count = |share: f64| (share * self.cases as f64).round() as usize;
         let listed = self.listed();
         let families = self.collection.families();
-        let open: Vec<usize> = (0..families.len()).filter(|row| families[*row].name == "unknown").collect();
-        let paired: Vec<usize> = listed.iter().copied().filter(|row| families[*row].paired).collect();
+        let open: Vec<usize> = (0..families.len())
+            .filter(|row| families[*row].name == "unknown")
+            .collect();
+        let paired: Vec<usize> = listed
+            .iter()
+            .copied()
+            .filter(|row| families[*row].paired)
+            .collect();
         let mut out = vec![Content::Null; count(self.nulls).min(self.cases)];
         let room = |out: &Vec<Content>, wanted: usize| wanted.min(self.cases - out.len());
         for turn in 0..room(&out, count(self.open)) {
@@ -116,7 +128,11 @@ impl Design {
         }
         let foreign = room(&out, count(self.foreign));
         out.extend(vec![Content::Foreign; foreign]);
-        let pairs = if paired.len() > 1 { room(&out, count(self.pairs)) } else { 0 };
+        let pairs = if paired.len() > 1 {
+            room(&out, count(self.pairs))
+        } else {
+            0
+        };
         for _ in 0..pairs {
             let first = draw.index(paired.len());
             let second = (first + 1 + draw.index(paired.len() - 1)) % paired.len();
@@ -137,7 +153,9 @@ impl Design {
 
     /// The seed of a case: splitmix64 of the design's seed and the case's number.
     pub fn seed_of(&self, case: usize) -> u64 {
-        let mut z = self.seed.wrapping_add((case as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15));
+        let mut z = self
+            .seed
+            .wrapping_add((case as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15));
         z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
         z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
         z ^ (z >> 31)

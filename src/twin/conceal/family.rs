@@ -67,7 +67,13 @@ pub struct Draft {
 
 impl Draft {
     fn new(form: &'static str, causes: Vec<Cause>) -> Draft {
-        Draft { form, causes, accepted: Vec::new(), needs: Vec::new(), hides: Vec::new() }
+        Draft {
+            form,
+            causes,
+            accepted: Vec::new(),
+            needs: Vec::new(),
+            hides: Vec::new(),
+        }
     }
     fn accepting(mut self, effect: &'static str, place: String) -> Draft {
         self.accepted.push((effect, place));
@@ -85,12 +91,24 @@ impl Draft {
 
 /// A cause whose size may be changed.
 fn sized(effect: &'static str, place: String, physical: Vec<Physical>) -> Cause {
-    Cause { effect, place, physical, sized: true, wanted: true }
+    Cause {
+        effect,
+        place,
+        physical,
+        sized: true,
+        wanted: true,
+    }
 }
 
 /// A cause of the size that it was drawn with.
 fn fixed(effect: &'static str, place: String, physical: Vec<Physical>) -> Cause {
-    Cause { effect, place, physical, sized: false, wanted: true }
+    Cause {
+        effect,
+        place,
+        physical,
+        sized: false,
+        wanted: true,
+    }
 }
 
 fn joint(number: usize) -> String {
@@ -129,7 +147,11 @@ pub struct Bench<'a> {
 
 impl<'a> Bench<'a> {
     /// Weighs the arm in every point to fit.
-    pub fn new(robot: &'a RobotDescription, ranges_deg: &'a [[f64; 2]], points: &[Point]) -> Bench<'a> {
+    pub fn new(
+        robot: &'a RobotDescription,
+        ranges_deg: &'a [[f64; 2]],
+        points: &[Point],
+    ) -> Bench<'a> {
         let arm = Arm::new(robot, &Default::default());
         let mut bench = Bench {
             robot,
@@ -137,7 +159,10 @@ impl<'a> Bench<'a> {
             peak: vec![0.0; robot.joints.len()],
             overturning: 0.0,
             end_s: points.last().map_or(0.0, |point| point.time_s),
-            change_s: points.iter().find(|point| point.payload_kg > 0.0).map_or(0.0, |point| point.time_s),
+            change_s: points
+                .iter()
+                .find(|point| point.payload_kg > 0.0)
+                .map_or(0.0, |point| point.time_s),
         };
         for point in points {
             let row = Row {
@@ -168,7 +193,9 @@ impl<'a> Bench<'a> {
     /// Joints (from 1) that gravity loads, but for the last, whose turn moves the tool little.
     fn loaded(&self) -> Vec<usize> {
         let most = self.peak.iter().copied().fold(0.0, f64::max);
-        (1..self.joints()).filter(|number| self.peak[number - 1] > 0.02 * most).collect()
+        (1..self.joints())
+            .filter(|number| self.peak[number - 1] > 0.02 * most)
+            .collect()
     }
 
     /// A joint that turns the tool: any but the last.
@@ -180,16 +207,36 @@ impl<'a> Bench<'a> {
     fn bearing(&self, draw: &mut Noise) -> Option<usize> {
         let loaded = self.loaded();
         let most = self.peak.iter().copied().fold(0.0, f64::max);
-        let heavy: Vec<usize> = loaded.iter().copied().filter(|number| self.peak[number - 1] > 0.2 * most).collect();
-        let list = if draw.chance(0.7) && !heavy.is_empty() { heavy } else { loaded };
+        let heavy: Vec<usize> = loaded
+            .iter()
+            .copied()
+            .filter(|number| self.peak[number - 1] > 0.2 * most)
+            .collect();
+        let list = if draw.chance(0.7) && !heavy.is_empty() {
+            heavy
+        } else {
+            loaded
+        };
         list.get(draw.index(list.len())).copied()
     }
 
     /// Links (from 1) with a length worth the name.
     fn long_links(&self) -> Vec<usize> {
-        let end = |index: usize| self.robot.joints.get(index + 1).map_or(self.robot.tool, |next| next.point);
-        let span = |index: usize| crate::matrix::norm(crate::matrix::minus(end(index), self.robot.joints[index].point));
-        (1..self.joints()).filter(|number| span(number - 1) > 0.15).collect()
+        let end = |index: usize| {
+            self.robot
+                .joints
+                .get(index + 1)
+                .map_or(self.robot.tool, |next| next.point)
+        };
+        let span = |index: usize| {
+            crate::matrix::norm(crate::matrix::minus(
+                end(index),
+                self.robot.joints[index].point,
+            ))
+        };
+        (1..self.joints())
+            .filter(|number| span(number - 1) > 0.15)
+            .collect()
     }
 
     /// Wind-up per torque (rad/Nm) that turns a joint by so much under its largest torque.
@@ -228,50 +275,210 @@ pub struct Family {
 
 /// Families in canonical names; several rows of one name are different causes.
 pub const FAMILIES: &[Family] = &[
-    Family { name: "joint_compliance", draw: gears::joint_compliance, paired: true },
-    Family { name: "joint_hardening", draw: gears::joint_hardening, paired: false },
-    Family { name: "gear_cyclic", draw: gears::gear_cyclic, paired: true },
-    Family { name: "gear_motor_cyclic", draw: gears::gear_motor_cyclic, paired: true },
-    Family { name: "backlash", draw: gears::backlash, paired: true },
-    Family { name: "axis_wobble", draw: gears::axis_wobble, paired: true },
-    Family { name: "zero_shift", draw: gears::zero_shift, paired: true },
-    Family { name: "cable_drag", draw: gears::cable_drag, paired: false },
-    Family { name: "link_compliance", draw: loads::link_compliance, paired: true },
-    Family { name: "base_compliance", draw: loads::base_compliance, paired: true },
-    Family { name: "counterbalance", draw: loads::counterbalance, paired: false },
-    Family { name: "link_mass", draw: loads::link_mass, paired: false },
-    Family { name: "payload_error", draw: loads::payload_error, paired: false },
-    Family { name: "thermal_growth", draw: mounts::thermal_growth, paired: true },
-    Family { name: "tool_shift", draw: mounts::tool_shift, paired: true },
-    Family { name: "base_shift", draw: mounts::base_shift, paired: true },
-    Family { name: "tracker_drift", draw: mounts::tracker_drift, paired: true },
-    Family { name: "joint_log_lag", draw: mounts::joint_log_lag, paired: false },
-    Family { name: "tracker_scale", draw: mounts::tracker_scale, paired: false },
-    Family { name: "unknown", draw: unlisted::bump, paired: false },
-    Family { name: "unknown", draw: unlisted::hinge, paired: false },
-    Family { name: "unknown", draw: unlisted::product, paired: false },
-    Family { name: "unknown", draw: unlisted::sway, paired: false },
+    Family {
+        name: "joint_compliance",
+        draw: gears::joint_compliance,
+        paired: true,
+    },
+    Family {
+        name: "joint_hardening",
+        draw: gears::joint_hardening,
+        paired: false,
+    },
+    Family {
+        name: "gear_cyclic",
+        draw: gears::gear_cyclic,
+        paired: true,
+    },
+    Family {
+        name: "gear_motor_cyclic",
+        draw: gears::gear_motor_cyclic,
+        paired: true,
+    },
+    Family {
+        name: "backlash",
+        draw: gears::backlash,
+        paired: true,
+    },
+    Family {
+        name: "axis_wobble",
+        draw: gears::axis_wobble,
+        paired: true,
+    },
+    Family {
+        name: "zero_shift",
+        draw: gears::zero_shift,
+        paired: true,
+    },
+    Family {
+        name: "cable_drag",
+        draw: gears::cable_drag,
+        paired: false,
+    },
+    Family {
+        name: "link_compliance",
+        draw: loads::link_compliance,
+        paired: true,
+    },
+    Family {
+        name: "base_compliance",
+        draw: loads::base_compliance,
+        paired: true,
+    },
+    Family {
+        name: "counterbalance",
+        draw: loads::counterbalance,
+        paired: false,
+    },
+    Family {
+        name: "link_mass",
+        draw: loads::link_mass,
+        paired: false,
+    },
+    Family {
+        name: "payload_error",
+        draw: loads::payload_error,
+        paired: false,
+    },
+    Family {
+        name: "thermal_growth",
+        draw: mounts::thermal_growth,
+        paired: true,
+    },
+    Family {
+        name: "tool_shift",
+        draw: mounts::tool_shift,
+        paired: true,
+    },
+    Family {
+        name: "base_shift",
+        draw: mounts::base_shift,
+        paired: true,
+    },
+    Family {
+        name: "tracker_drift",
+        draw: mounts::tracker_drift,
+        paired: true,
+    },
+    Family {
+        name: "joint_log_lag",
+        draw: mounts::joint_log_lag,
+        paired: false,
+    },
+    Family {
+        name: "tracker_scale",
+        draw: mounts::tracker_scale,
+        paired: false,
+    },
+    Family {
+        name: "unknown",
+        draw: unlisted::bump,
+        paired: false,
+    },
+    Family {
+        name: "unknown",
+        draw: unlisted::hinge,
+        paired: false,
+    },
+    Family {
+        name: "unknown",
+        draw: unlisted::product,
+        paired: false,
+    },
+    Family {
+        name: "unknown",
+        draw: unlisted::sway,
+        paired: false,
+    },
 ];
 
 /// Families of physics that no list of effects holds yet: instruments, memory, interactions.
 pub const BEYOND: &[Family] = &[
-    Family { name: "tracker_circle", draw: instruments::circle, paired: false },
-    Family { name: "tracker_elevation", draw: instruments::elevation, paired: false },
-    Family { name: "tracker_offset", draw: instruments::offset, paired: false },
-    Family { name: "tracker_refraction", draw: instruments::refraction, paired: false },
-    Family { name: "unknown", draw: instruments::swing, paired: false },
-    Family { name: "base_shift", draw: instruments::knock, paired: false },
-    Family { name: "presliding", draw: memories::presliding, paired: false },
-    Family { name: "joint_warming", draw: memories::own_heat, paired: false },
-    Family { name: "joint_warming", draw: memories::late_heat, paired: false },
-    Family { name: "thermal_growth", draw: memories::lagging_link, paired: false },
-    Family { name: "gear_load", draw: interactions::gear_load, paired: false },
-    Family { name: "gear_flank", draw: interactions::gear_flank, paired: false },
-    Family { name: "joint_warming", draw: interactions::warm_ratio, paired: false },
-    Family { name: "joint_warming", draw: interactions::warm_spring, paired: false },
-    Family { name: "backlash", draw: interactions::spring_by_direction, paired: false },
-    Family { name: "backlash", draw: interactions::growing_gap, paired: false },
-    Family { name: "unknown", draw: interactions::bent_link, paired: false },
+    Family {
+        name: "tracker_circle",
+        draw: instruments::circle,
+        paired: false,
+    },
+    Family {
+        name: "tracker_elevation",
+        draw: instruments::elevation,
+        paired: false,
+    },
+    Family {
+        name: "tracker_offset",
+        draw: instruments::offset,
+        paired: false,
+    },
+    Family {
+        name: "tracker_refraction",
+        draw: instruments::refraction,
+        paired: false,
+    },
+    Family {
+        name: "unknown",
+        draw: instruments::swing,
+        paired: false,
+    },
+    Family {
+        name: "base_shift",
+        draw: instruments::knock,
+        paired: false,
+    },
+    Family {
+        name: "presliding",
+        draw: memories::presliding,
+        paired: false,
+    },
+    Family {
+        name: "joint_warming",
+        draw: memories::own_heat,
+        paired: false,
+    },
+    Family {
+        name: "joint_warming",
+        draw: memories::late_heat,
+        paired: false,
+    },
+    Family {
+        name: "thermal_growth",
+        draw: memories::lagging_link,
+        paired: false,
+    },
+    Family {
+        name: "gear_load",
+        draw: interactions::gear_load,
+        paired: false,
+    },
+    Family {
+        name: "gear_flank",
+        draw: interactions::gear_flank,
+        paired: false,
+    },
+    Family {
+        name: "joint_warming",
+        draw: interactions::warm_ratio,
+        paired: false,
+    },
+    Family {
+        name: "joint_warming",
+        draw: interactions::warm_spring,
+        paired: false,
+    },
+    Family {
+        name: "backlash",
+        draw: interactions::spring_by_direction,
+        paired: false,
+    },
+    Family {
+        name: "backlash",
+        draw: interactions::growing_gap,
+        paired: false,
+    },
+    Family {
+        name: "unknown",
+        draw: interactions::bent_link,
+        paired: false,
+    },
 ];
 
 /// What a set of recordings is drawn from.

@@ -15,28 +15,40 @@ use serde_json::{Value, json};
 pub type File = (&'static str, String);
 
 /// A controller's display and a tracker's.
-const DECIMALS: Decimals = Decimals { angle: 4, length: 5, time: 2 };
+const DECIMALS: Decimals = Decimals {
+    angle: 4,
+    length: 5,
+    time: 2,
+};
 
 impl Case {
     /// The files that a user has; fails with what of the robot they cannot state.
     pub fn recording(&self) -> Result<[File; 3], String> {
         let log = self.log();
         let (controller, tracker) = (log.controller(DECIMALS), log.tracker(DECIMALS));
-        Ok([("robot.json", robot(&self.stated())?), ("controller.csv", controller), ("tracker.csv", tracker)])
+        Ok([
+            ("robot.json", robot(&self.stated())?),
+            ("controller.csv", controller),
+            ("tracker.csv", tracker),
+        ])
     }
 
     /// The robot as its file states it.
     fn stated(&self) -> RobotDescription {
         let mut stated = self.robot.clone();
         if self.bare {
-            stated.joints.iter_mut().for_each(|joint| (joint.mass, joint.centre) = (None, None));
+            stated
+                .joints
+                .iter_mut()
+                .for_each(|joint| (joint.mass, joint.centre) = (None, None));
         }
         stated
     }
 
     /// The truth.
     pub fn sealed(&self) -> String {
-        let pair = |(effect, place): &(&'static str, String)| json!({ "effect": effect, "where": place });
+        let pair =
+            |(effect, place): &(&'static str, String)| json!({ "effect": effect, "where": place });
         let hidden: Vec<&str> = self.hidden.iter().map(|column| title(*column)).collect();
         let tampered = self.tampered.iter().map(|one| {
             let points: Vec<String> = one.rows.iter().map(|row| id(*row)).collect();
@@ -84,8 +96,20 @@ impl Case {
     fn log(&self) -> Log {
         let shown = |column: Column| !self.hidden.contains(&column);
         let each = |value: fn(&Shot) -> f64| self.shots.iter().map(value).collect::<Vec<f64>>();
-        let joints = |value: fn(&Shot) -> &Vec<f64>| self.shots.iter().flat_map(value).copied().collect::<Vec<f64>>();
-        let usage = |shot: &Shot| if shot.block == FIT { "fit".to_string() } else { "validate".to_string() };
+        let joints = |value: fn(&Shot) -> &Vec<f64>| {
+            self.shots
+                .iter()
+                .flat_map(value)
+                .copied()
+                .collect::<Vec<f64>>()
+        };
+        let usage = |shot: &Shot| {
+            if shot.block == FIT {
+                "fit".to_string()
+            } else {
+                "validate".to_string()
+            }
+        };
         Log {
             joints: self.robot.joints.len(),
             id: (0..self.shots.len()).map(id).collect(),
@@ -121,12 +145,10 @@ fn pretty(value: &Value) -> String {
 }
 
 fn effect(one: &Concealed) -> Value {
-    let numbers = one
-        .cause
-        .physical
-        .iter()
-        .flat_map(Physical::truth)
-        .map(|number| json!({ "name": number.name, "value": number.value, "unit": number.unit }));
+    let numbers =
+        one.cause.physical.iter().flat_map(Physical::truth).map(
+            |number| json!({ "name": number.name, "value": number.value, "unit": number.unit }),
+        );
     let mut out = json!({
         "effect": one.cause.effect,
         "where": one.cause.place,

@@ -52,14 +52,20 @@ impl Layout {
         while out.len() < count {
             let (to, _) = plan::allowed(arm, poses, ranges, draw)?;
             let straight: Vec<f64> = from.iter().zip(&to).map(|(a, b)| 0.5 * (a + b)).collect();
-            let bend = if draw.chance(0.5) { plan::allowed(arm, poses, ranges, draw)?.0 } else { straight };
+            let bend = if draw.chance(0.5) {
+                plan::allowed(arm, poses, ranges, draw)?.0
+            } else {
+                straight
+            };
             let points = draw.size(POINTS[0], POINTS[1]).round() as usize;
             out.extend((0..points).map(|k| curve(&from, &bend, &to, k as f64 / points as f64)));
             from = to;
         }
         out.truncate(count);
         if self == Self::Shuffled {
-            blocks.iter().for_each(|block| shuffle(&mut out[block.clone()], draw));
+            blocks
+                .iter()
+                .for_each(|block| shuffle(&mut out[block.clone()], draw));
         }
         Ok(out)
     }
@@ -68,7 +74,9 @@ impl Layout {
 /// A parabola from one pose to another, straight where `bend` is midway (Bezier).
 fn curve(from: &[f64], bend: &[f64], to: &[f64], u: f64) -> Vec<f64> {
     let joints = from.iter().zip(bend).zip(to);
-    joints.map(|((a, b), c)| (1.0 - u).powi(2) * a + 2.0 * u * (1.0 - u) * b + u * u * c).collect()
+    joints
+        .map(|((a, b), c)| (1.0 - u).powi(2) * a + 2.0 * u * (1.0 - u) * b + u * u * c)
+        .collect()
 }
 
 /// Fisher and Yates.

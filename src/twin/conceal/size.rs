@@ -43,11 +43,19 @@ impl Sight<'_> {
 }
 
 fn causes(drafts: &[Draft]) -> Vec<(Cause, &'static str)> {
-    drafts.iter().flat_map(|draft| draft.causes.iter().map(|cause| (cause.clone(), draft.form))).collect()
+    drafts
+        .iter()
+        .flat_map(|draft| draft.causes.iter().map(|cause| (cause.clone(), draft.form)))
+        .collect()
 }
 
 /// Draws the families of a case; a pair does not sit twice in one place.
-pub(super) fn drafts(design: &Design, content: Content, bench: &Bench, draw: &mut Noise) -> Vec<Draft> {
+pub(super) fn drafts(
+    design: &Design,
+    content: Content,
+    bench: &Bench,
+    draw: &mut Noise,
+) -> Vec<Draft> {
     let rows = match content {
         Content::Null | Content::Foreign => vec![],
         Content::Single(row) => vec![row],
@@ -56,9 +64,19 @@ pub(super) fn drafts(design: &Design, content: Content, bench: &Bench, draw: &mu
     let mut out: Vec<Draft> = Vec::new();
     for row in rows {
         for _ in 0..50 {
-            let form = if draw.chance(design.other_forms) { Form::Other } else { Form::Obvious };
-            let Some(draft) = (design.collection.families()[row].draw)(bench, form, draw) else { continue };
-            let taken = |place: &str| out.iter().flat_map(|other| &other.causes).any(|cause| cause.place == place);
+            let form = if draw.chance(design.other_forms) {
+                Form::Other
+            } else {
+                Form::Obvious
+            };
+            let Some(draft) = (design.collection.families()[row].draw)(bench, form, draw) else {
+                continue;
+            };
+            let taken = |place: &str| {
+                out.iter()
+                    .flat_map(|other| &other.causes)
+                    .any(|cause| cause.place == place)
+            };
             let several = matches!(content, Content::Pair(..)) && draft.causes.len() > 1;
             if !several && !draft.causes.iter().any(|cause| taken(&cause.place)) {
                 out.push(draft);
@@ -86,7 +104,12 @@ const SMALLEST: f64 = 2e-3;
 const LARGEST: f64 = 4.0;
 
 /// Gives the causes their size and says how visible they are then.
-pub(super) fn size(design: &Design, drafts: &[Draft], sight: &Sight, draw: &mut Noise) -> Vec<Concealed> {
+pub(super) fn size(
+    design: &Design,
+    drafts: &[Draft],
+    sight: &Sight,
+    draw: &mut Noise,
+) -> Vec<Concealed> {
     let mut causes = causes(drafts);
     let Sight { site, shadow, .. } = *sight;
     let strength = |column: &[f64]| sight.strength(column);
@@ -101,7 +124,11 @@ pub(super) fn size(design: &Design, drafts: &[Draft], sight: &Sight, draw: &mut 
         let wanted = if natural { found.min(PLAINEST) } else { wanted };
         let factor = (wanted / found).sqrt().clamp(SMALLEST, LARGEST);
         let cause = &mut causes[index].0;
-        cause.physical = cause.physical.iter().map(|effect| effect.scaled(factor)).collect();
+        cause.physical = cause
+            .physical
+            .iter()
+            .map(|effect| effect.scaled(factor))
+            .collect();
     }
     seen(causes, sight)
 }
@@ -109,12 +136,18 @@ pub(super) fn size(design: &Design, drafts: &[Draft], sight: &Sight, draw: &mut 
 /// How visible causes of this size are.
 fn seen(causes: Vec<(Cause, &'static str)>, sight: &Sight) -> Vec<Concealed> {
     let Sight { site, shadow, .. } = *sight;
-    let columns: Vec<Vec<f64>> = (0..causes.len()).map(|index| alone(&causes, index, site)).collect();
+    let columns: Vec<Vec<f64>> = (0..causes.len())
+        .map(|index| alone(&causes, index, site))
+        .collect();
     let rms = |column: &[f64]| 1e3 * norm(column) / (column.len().max(1) as f64).sqrt();
     (causes.into_iter().enumerate())
         .map(|(index, (cause, form))| {
             let mut beside = shadow.clone();
-            columns.iter().enumerate().filter(|(other, _)| *other != index).for_each(|(_, column)| beside.add(column.clone()));
+            columns
+                .iter()
+                .enumerate()
+                .filter(|(other, _)| *other != index)
+                .for_each(|(_, column)| beside.add(column.clone()));
             let left = beside.outside(columns[index].clone());
             Concealed {
                 cause,
@@ -132,11 +165,21 @@ fn seen(causes: Vec<(Cause, &'static str)>, sight: &Sight) -> Vec<Concealed> {
 /// What one cause does beside all others: the displacement with all of them less that without it, m.
 fn alone(causes: &[(Cause, &'static str)], index: usize, site: &Site) -> Vec<f64> {
     let effects = |skipped: Option<usize>| -> Vec<Physical> {
-        let kept = causes.iter().enumerate().filter(|(other, _)| Some(*other) != skipped);
-        kept.flat_map(|(_, (cause, _))| cause.physical.clone()).collect()
+        let kept = causes
+            .iter()
+            .enumerate()
+            .filter(|(other, _)| Some(*other) != skipped);
+        kept.flat_map(|(_, (cause, _))| cause.physical.clone())
+            .collect()
     };
-    let (with, without) = (site.displacement(&effects(None)), site.displacement(&effects(Some(index))));
-    with.iter().zip(&without).map(|(with, without)| with - without).collect()
+    let (with, without) = (
+        site.displacement(&effects(None)),
+        site.displacement(&effects(Some(index))),
+    );
+    with.iter()
+        .zip(&without)
+        .map(|(with, without)| with - without)
+        .collect()
 }
 
 /// Visibility of what lies beyond the library.
@@ -153,11 +196,19 @@ pub(super) fn beyond(
     sight: &Sight,
     draw: &mut Noise,
 ) -> (Vec<Draft>, Vec<Concealed>) {
-    let Content::Single(row) = content else { return (Vec::new(), Vec::new()) };
-    let form = if draw.chance(design.other_forms) { Form::Other } else { Form::Obvious };
+    let Content::Single(row) = content else {
+        return (Vec::new(), Vec::new());
+    };
+    let form = if draw.chance(design.other_forms) {
+        Form::Other
+    } else {
+        Form::Obvious
+    };
     let mut out = (Vec::new(), Vec::new());
     for left in (0..DRAWS).rev() {
-        let Some(draft) = (design.collection.families()[row].draw)(bench, form, draw) else { continue };
+        let Some(draft) = (design.collection.families()[row].draw)(bench, form, draw) else {
+            continue;
+        };
         let wanted = draw.size(PLAIN[0], PLAIN[1]);
         let largest = if left == 0 { f64::INFINITY } else { LARGEST };
         let drafts = vec![draft];
@@ -167,11 +218,20 @@ pub(super) fn beyond(
             let found = seen(causes.clone(), sight)[index].strength.max(1e-9);
             let factor = (wanted / found).sqrt().clamp(SMALLEST, largest);
             let cause = &mut causes[index].0;
-            cause.physical = cause.physical.iter().map(|effect| effect.scaled(factor)).collect();
+            cause.physical = cause
+                .physical
+                .iter()
+                .map(|effect| effect.scaled(factor))
+                .collect();
         }
         let mut concealed = seen(causes, sight);
-        concealed.iter_mut().for_each(|one| one.strange = form == Form::Other);
-        let plain = concealed.iter().filter(|one| one.cause.sized).all(|one| one.strength >= PLAIN[0]);
+        concealed
+            .iter_mut()
+            .for_each(|one| one.strange = form == Form::Other);
+        let plain = concealed
+            .iter()
+            .filter(|one| one.cause.sized)
+            .all(|one| one.strength >= PLAIN[0]);
         out = (drafts, concealed);
         if plain {
             break;
@@ -184,7 +244,11 @@ pub(super) fn beyond(
 const FOREIGN: [f64; 2] = [2.0, 20.0];
 
 /// Draws an effect at random until geometry leaves enough of it to be seen; its whole displacement is made `FOREIGN` times the noise.
-pub(super) fn drawn(bench: &Bench, sight: &Sight, draw: &mut Noise) -> (Vec<Draft>, Vec<Concealed>) {
+pub(super) fn drawn(
+    bench: &Bench,
+    sight: &Sight,
+    draw: &mut Noise,
+) -> (Vec<Draft>, Vec<Concealed>) {
     let mut out = (Vec::new(), Vec::new());
     for _ in 0..DRAWS {
         let draft = foreign(bench, draw);
@@ -196,7 +260,11 @@ pub(super) fn drawn(bench: &Bench, sight: &Sight, draw: &mut Noise) -> (Vec<Draf
             let whole = alone(&causes, 0, sight.site);
             let found = norm(&whole) / (whole.len().max(1) as f64).sqrt() / sight.noise;
             let cause = &mut causes[0].0;
-            cause.physical = cause.physical.iter().map(|effect| effect.scaled(ratio / found.max(1e-6))).collect();
+            cause.physical = cause
+                .physical
+                .iter()
+                .map(|effect| effect.scaled(ratio / found.max(1e-6)))
+                .collect();
         }
         let mut concealed = seen(causes, sight);
         concealed.iter_mut().for_each(|one| one.strange = true);

@@ -36,37 +36,47 @@ impl Site<'_> {
         let (rest, base) = (Motion::none(arm.links.len()), tracker.base());
         let rows = self.points.iter().flat_map(|point| {
             let mut q = point.q.clone();
-            effects.iter().for_each(|effect| effect.log(&mut q, &point.before));
+            effects
+                .iter()
+                .for_each(|effect| effect.log(&mut q, &point.before));
             matrix::place(&base, arm.posture(&truth.drive(self.robot, &q), &rest).tool)
         });
         rows.collect()
     }
 
     /// Every row with the arm as it rests there under effects.
-    fn at_rest<'s>(&'s self, effects: &'s [Physical]) -> impl Iterator<Item = (Row, Equilibrium)> + 's {
+    fn at_rest<'s>(
+        &'s self,
+        effects: &'s [Physical],
+    ) -> impl Iterator<Item = (Row, Equilibrium)> + 's {
         let mut arm = Arm::new(self.robot, self.truth);
         effects.iter().for_each(|effect| effect.shape(&mut arm));
         let memories = effect::recall(effects, &memory::past(self.points));
-        self.points.iter().zip(memories).map(move |(point, memory)| {
-            let row = Row {
-                command: point.q.clone(),
-                drive: self.truth.drive(self.robot, &point.q),
-                direction: point.direction.clone(),
-                time_s: point.time_s,
-                temperature_c: point.temperature_c,
-                payload_kg: point.payload_kg,
-                velocity: Vec::new(),
-                memory,
-            };
-            let rest = settle(&arm, &row, effects);
-            (row, rest)
-        })
+        self.points
+            .iter()
+            .zip(memories)
+            .map(move |(point, memory)| {
+                let row = Row {
+                    command: point.q.clone(),
+                    drive: self.truth.drive(self.robot, &point.q),
+                    direction: point.direction.clone(),
+                    time_s: point.time_s,
+                    temperature_c: point.temperature_c,
+                    payload_kg: point.payload_kg,
+                    velocity: Vec::new(),
+                    memory,
+                };
+                let rest = settle(&arm, &row, effects);
+                (row, rest)
+            })
     }
 
     /// What the tracker sees with effects, less what it would see without them of the joints as logged.
     pub fn displacement(&self, effects: &[Physical]) -> Column {
         let base = self.tracker.base();
-        let seen = self.at_rest(effects).flat_map(|(row, rest)| sighted(&rest, &base, &row, effects));
+        let seen = self
+            .at_rest(effects)
+            .flat_map(|(row, rest)| sighted(&rest, &base, &row, effects));
         let bare = self.bare(self.truth, self.tracker, effects);
         seen.zip(bare).map(|(seen, bare)| seen - bare).collect()
     }
@@ -81,11 +91,18 @@ impl Site<'_> {
         let mut seen: Vec<Vec<Vec<f64>>> = vec![Vec::new(); effects.len()];
         let base = self.tracker.base();
         for (row, rest) in self.at_rest(effects).take(fit) {
-            let there = matrix::place(&matrix::times(&rest.motion.tracker, &base), rest.posture.tool);
+            let there = matrix::place(
+                &matrix::times(&rest.motion.tracker, &base),
+                rest.posture.tool,
+            );
             for (index, effect) in effects.iter().enumerate() {
                 if let Physical::Foreign(foreign) = effect {
                     let memory = row.memory.get(index).copied().unwrap_or(0.0);
-                    let point = if foreign.is_sighted() { there } else { rest.posture.tool };
+                    let point = if foreign.is_sighted() {
+                        there
+                    } else {
+                        rest.posture.tool
+                    };
                     seen[index].push(foreign.values(&row, memory, &rest.torque, point));
                 }
             }
@@ -96,7 +113,12 @@ impl Site<'_> {
         };
         let known: Vec<Physical> = effects.iter().zip(&seen).map(known).collect();
         let [all, known] = [effects, &known].map(|effects| self.displacement(effects));
-        let judged: Vec<f64> = all.iter().zip(&known).skip(3 * fit).map(|(all, known)| all - known).collect();
+        let judged: Vec<f64> = all
+            .iter()
+            .zip(&known)
+            .skip(3 * fit)
+            .map(|(all, known)| all - known)
+            .collect();
         norm(&judged) / (judged.len().max(1) as f64).sqrt()
     }
 
@@ -110,15 +132,30 @@ impl Site<'_> {
                 self.bare(&truth, &tracker, &[])
             };
             let (above, below) = (at(1.0), at(-1.0));
-            out.push(above.iter().zip(&below).map(|(a, b)| (a - b) / (2.0 * step)).collect());
+            out.push(
+                above
+                    .iter()
+                    .zip(&below)
+                    .map(|(a, b)| (a - b) / (2.0 * step))
+                    .collect(),
+            );
         };
         // Steps of about 1e-5 rad or m: truncation and rounding are both about 1e-10 of the difference.
         for joint in 0..self.robot.joints.len() {
-            push(&|truth, _, by| truth.offset_deg[joint] += by.to_degrees(), 1e-5);
+            push(
+                &|truth, _, by| truth.offset_deg[joint] += by.to_degrees(),
+                1e-5,
+            );
             push(&|truth, _, by| truth.ratio[joint] += by, 1e-5);
             for axis in 0..3 {
-                push(&|truth, _, by| truth.links[joint].shift_mm[axis] += by, 0.01);
-                push(&|truth, _, by| truth.links[joint].tilt_arcsec[axis] += by, 2.0);
+                push(
+                    &|truth, _, by| truth.links[joint].shift_mm[axis] += by,
+                    0.01,
+                );
+                push(
+                    &|truth, _, by| truth.links[joint].tilt_arcsec[axis] += by,
+                    2.0,
+                );
             }
         }
         for coupling in 0..self.truth.couplings.len() {
@@ -126,7 +163,10 @@ impl Site<'_> {
         }
         for axis in 0..3 {
             push(&|_, tracker, by| tracker.position_mm[axis] += by, 0.01);
-            push(&|_, tracker, by| tracker.roll_pitch_yaw_deg[axis] += by, 0.0005);
+            push(
+                &|_, tracker, by| tracker.roll_pitch_yaw_deg[axis] += by,
+                0.0005,
+            );
         }
         out
     }
@@ -134,14 +174,23 @@ impl Site<'_> {
     /// Root mean square of a coordinate's noise: the tracker's, and the joints' from move to move (rad), m.
     pub fn noise(&self, play_rad: f64) -> f64 {
         let bare = self.bare(self.truth, self.tracker, &[]);
-        let beam: f64 = bare.as_chunks::<3>().0.iter().map(|point| 3.0 * self.tracker.sigma(*point).powi(2)).sum();
+        let beam: f64 = bare
+            .as_chunks::<3>()
+            .0
+            .iter()
+            .map(|point| 3.0 * self.tracker.sigma(*point).powi(2))
+            .sum();
         let mut play = 0.0;
         if play_rad > 0.0 {
             for joint in 0..self.robot.joints.len() {
                 let mut truth = self.truth.clone();
                 truth.offset_deg[joint] += 1e-4f64.to_degrees();
                 let moved = self.bare(&truth, self.tracker, &[]);
-                play += moved.iter().zip(&bare).map(|(a, b)| ((a - b) / 1e-4 * play_rad).powi(2)).sum::<f64>();
+                play += moved
+                    .iter()
+                    .zip(&bare)
+                    .map(|(a, b)| ((a - b) / 1e-4 * play_rad).powi(2))
+                    .sum::<f64>();
             }
         }
         ((beam + play) / bare.len().max(1) as f64).sqrt()
@@ -152,7 +201,9 @@ impl Site<'_> {
         let mut shadow = Shadow { basis: Vec::new() };
         let mut left: Vec<Column> = self.geometry().into_iter().filter_map(unit).collect();
         // The column with most of its own comes first, so that what hardly differs from the others cannot pass on its rounding.
-        while let Some(most) = (0..left.len()).max_by(|a, b| norm(&left[*a]).total_cmp(&norm(&left[*b]))) {
+        while let Some(most) =
+            (0..left.len()).max_by(|a, b| norm(&left[*a]).total_cmp(&norm(&left[*b])))
+        {
             let column = left.swap_remove(most);
             if norm(&column) < OWN {
                 break;
@@ -193,7 +244,9 @@ impl Shadow {
     /// What of a column lies outside of the space.
     pub fn outside(&self, mut column: Column) -> Column {
         for _ in 0..2 {
-            self.basis.iter().for_each(|direction| take_out(&mut column, direction));
+            self.basis
+                .iter()
+                .for_each(|direction| take_out(&mut column, direction));
         }
         column
     }
@@ -207,7 +260,10 @@ pub fn norm(column: &[f64]) -> f64 {
 /// Takes what lies along a unit direction out of a column.
 fn take_out(column: &mut [f64], direction: &[f64]) {
     let along: f64 = direction.iter().zip(&*column).map(|(a, b)| a * b).sum();
-    column.iter_mut().zip(direction).for_each(|(x, d)| *x -= along * d);
+    column
+        .iter_mut()
+        .zip(direction)
+        .for_each(|(x, d)| *x -= along * d);
 }
 
 /// The column at length 1; none for one of no length.

@@ -30,13 +30,21 @@ impl Act for AxisWobble {
         let index = self.joint - 1;
         let axis = state.arm.links[index].axis;
         // The base direction that lies farthest from the axis makes the pair across it.
-        let aside = if axis[0].abs() < 0.7 { [1.0, 0.0, 0.0] } else { [0.0, 0.0, 1.0] };
+        let aside = if axis[0].abs() < 0.7 {
+            [1.0, 0.0, 0.0]
+        } else {
+            [0.0, 0.0, 1.0]
+        };
         let first = matrix::cross(axis, aside);
         let first = matrix::scale(first, 1.0 / matrix::norm(first));
         let second = matrix::cross(axis, first);
-        let (sine, cosine) = (self.order * state.row.command[index] + self.phase_deg.to_radians()).sin_cos();
+        let (sine, cosine) =
+            (self.order * state.row.command[index] + self.phase_deg.to_radians()).sin_cos();
         let size = self.amplitude_arcsec * ARCSEC;
-        let tilt = matrix::add(matrix::scale(first, size * cosine), matrix::scale(second, size * self.ellipse * sine));
+        let tilt = matrix::add(
+            matrix::scale(first, size * cosine),
+            matrix::scale(second, size * self.ellipse * sine),
+        );
         let tilt = matrix::turn_by(tilt);
         if index == 0 {
             let foot = state.arm.foot;

@@ -20,8 +20,15 @@ impl Act for BaseCompliance {
     fn act(&self, state: &State, motion: &mut Motion) {
         let pivot = matrix::scale(self.pivot_mm, 1e-3);
         let (_, moment) = state.loads.wrench(0, pivot);
-        let tilt = [self.rad_per_nm[0] * moment[0], self.rad_per_nm[1] * moment[1], 0.0];
-        let about = matrix::times(&matrix::turn_by(tilt), &matrix::shift(matrix::scale(pivot, -1.0)));
+        let tilt = [
+            self.rad_per_nm[0] * moment[0],
+            self.rad_per_nm[1] * moment[1],
+            0.0,
+        ];
+        let about = matrix::times(
+            &matrix::turn_by(tilt),
+            &matrix::shift(matrix::scale(pivot, -1.0)),
+        );
         motion.base = matrix::times(&motion.base, &matrix::times(&matrix::shift(pivot), &about));
     }
 }

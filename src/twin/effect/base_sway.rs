@@ -25,7 +25,9 @@ effect! {
 
 impl Act for BaseSway {
     fn act(&self, state: &State, motion: &mut Motion) {
-        let share = (std::f64::consts::TAU * state.row.time_s / self.period_s + self.phase_deg.to_radians()).sin();
+        let share = (std::f64::consts::TAU * state.row.time_s / self.period_s
+            + self.phase_deg.to_radians())
+        .sin();
         let by = step(self.shift_um, self.turn_arcsec, share);
         motion.base = matrix::times(&by, &motion.base);
     }

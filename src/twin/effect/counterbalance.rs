@@ -32,7 +32,8 @@ effect! {
 
 impl Act for Counterbalance {
     fn act(&self, state: &State, motion: &mut Motion) {
-        let (sine, cosine) = (state.row.command[self.joint - 1] + self.phase_deg.to_radians()).sin_cos();
+        let (sine, cosine) =
+            (state.row.command[self.joint - 1] + self.phase_deg.to_radians()).sin_cos();
         let course = match self.balancer {
             Balancer::Spring => sine,
             // sin u / (b - cos u) peaks at 1 / sqrt(b^2 - 1), 4/3 for b = 1.25.

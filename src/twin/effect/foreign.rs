@@ -83,9 +83,16 @@ impl ForeignCourse {
 
     /// The same as straight lines between its values at some of its variable, with the edge value beyond them.
     fn known_at(&self, values: impl Iterator<Item = f64>) -> Self {
-        let mut points: Vec<[f64; 2]> = values.map(|value| self.way(value)).map(|way| [way, self.shape.value(way)]).collect();
+        let mut points: Vec<[f64; 2]> = values
+            .map(|value| self.way(value))
+            .map(|way| [way, self.shape.value(way)])
+            .collect();
         points.sort_by(|a, b| a[0].total_cmp(&b[0]));
-        Self { over: self.over.clone(), shape: ForeignShape::Corners(points), ..*self }
+        Self {
+            over: self.over.clone(),
+            shape: ForeignShape::Corners(points),
+            ..*self
+        }
     }
 }
 
@@ -96,24 +103,42 @@ fn first() -> usize {
 impl Foreign {
     /// The variables of its courses at a row, with which `torque` (Nm) and with the measured `point` (m) as the motion has it.
     pub fn values(&self, row: &Row, memory: f64, torque: &[f64], point: Vector) -> Vec<f64> {
-        let seen = Seen { row, memory, torque, point };
-        self.courses.iter().map(|course| course.over.value(&seen)).collect()
+        let seen = Seen {
+            row,
+            memory,
+            torque,
+            point,
+        };
+        self.courses
+            .iter()
+            .map(|course| course.over.value(&seen))
+            .collect()
     }
 
     /// The same as far as rows show it at which the variables of its courses have these values: straight lines between them.
     pub fn known_at(&self, values: &[Vec<f64>]) -> Self {
-        let known = |(k, course): (usize, &ForeignCourse)| course.known_at(values.iter().map(|all| all[k]));
-        Self { courses: self.courses.iter().enumerate().map(known).collect(), ..self.clone() }
+        let known =
+            |(k, course): (usize, &ForeignCourse)| course.known_at(values.iter().map(|all| all[k]));
+        Self {
+            courses: self.courses.iter().enumerate().map(known).collect(),
+            ..self.clone()
+        }
     }
 
     /// Whether it acts in what the instrument reads, and not on the arm.
     pub fn is_sighted(&self) -> bool {
-        matches!(self.motion, ForeignMotion::Range | ForeignMotion::Azimuth | ForeignMotion::Elevation)
+        matches!(
+            self.motion,
+            ForeignMotion::Range | ForeignMotion::Azimuth | ForeignMotion::Elevation
+        )
     }
 
     /// Product of the shapes in what is seen.
     fn share(&self, seen: &Seen) -> f64 {
-        self.courses.iter().map(|course| course.shape.value(course.way(course.over.value(seen)))).product()
+        self.courses
+            .iter()
+            .map(|course| course.shape.value(course.way(course.over.value(seen))))
+            .product()
     }
 
     fn shift(&self, share: f64) -> Vector {
@@ -133,7 +158,12 @@ impl Foreign {
 
 impl Act for Foreign {
     fn act(&self, state: &State, motion: &mut Motion) {
-        let seen = Seen { row: state.row, memory: state.memory, torque: state.torque, point: state.posture.tool };
+        let seen = Seen {
+            row: state.row,
+            memory: state.memory,
+            torque: state.torque,
+            point: state.posture.tool,
+        };
         let share = self.share(&seen);
         let index = self.seat - 1;
         let end = |motion: &mut Motion, link: usize| {
@@ -144,8 +174,10 @@ impl Act for Foreign {
             ForeignMotion::JointShift | ForeignMotion::JointTilt if index == 0 => {
                 // The first axis stands on the base: about its own foot.
                 let foot = state.arm.foot;
-                let about = matrix::times(&self.step(share), &matrix::shift(matrix::scale(foot, -1.0)));
-                motion.base = matrix::times(&motion.base, &matrix::times(&matrix::shift(foot), &about));
+                let about =
+                    matrix::times(&self.step(share), &matrix::shift(matrix::scale(foot, -1.0)));
+                motion.base =
+                    matrix::times(&motion.base, &matrix::times(&matrix::shift(foot), &about));
             }
             ForeignMotion::JointShift | ForeignMotion::JointTilt => end(motion, index - 1),
             ForeignMotion::LinkShift | ForeignMotion::LinkBend => end(motion, index),
@@ -157,15 +189,39 @@ impl Act for Foreign {
         }
     }
     fn remember(&self, past: &[Moment]) -> Vec<f64> {
-        self.courses.iter().map(|course| course.over.remember(past)).find(|all| !all.is_empty()).unwrap_or_default()
+        self.courses
+            .iter()
+            .map(|course| course.over.remember(past))
+            .find(|all| !all.is_empty())
+            .unwrap_or_default()
     }
     fn sight(&self, row: &Row, memory: f64, point: Vector) -> Vector {
-        let by = || self.size * self.share(&Seen { row, memory, torque: &[], point });
+        let by = || {
+            self.size
+                * self.share(&Seen {
+                    row,
+                    memory,
+                    torque: &[],
+                    point,
+                })
+        };
         let polar = Polar::of(point);
         match self.motion {
-            ForeignMotion::Range => Polar { range: polar.range + 1e-6 * by(), ..polar }.point(),
-            ForeignMotion::Azimuth => Polar { azimuth: polar.azimuth + ARCSEC * by(), ..polar }.point(),
-            ForeignMotion::Elevation => Polar { elevation: polar.elevation + ARCSEC * by(), ..polar }.point(),
+            ForeignMotion::Range => Polar {
+                range: polar.range + 1e-6 * by(),
+                ..polar
+            }
+            .point(),
+            ForeignMotion::Azimuth => Polar {
+                azimuth: polar.azimuth + ARCSEC * by(),
+                ..polar
+            }
+            .point(),
+            ForeignMotion::Elevation => Polar {
+                elevation: polar.elevation + ARCSEC * by(),
+                ..polar
+            }
+            .point(),
             _ => point,
         }
     }
@@ -191,7 +247,9 @@ impl Stated for Foreign {
             Range => ("tracker".into(), "um"),
             Azimuth | Elevation => ("tracker".into(), "arcsec"),
         };
-        vec![true_value("unknown", "foreign", place, "size", unit, self.size)]
+        vec![true_value(
+            "unknown", "foreign", place, "size", unit, self.size,
+        )]
     }
 }
 
@@ -202,12 +260,27 @@ mod tests {
     #[test]
     fn what_rows_show_of_a_shape_is_exact_at_them_and_straight_between() {
         let shape = ForeignShape::Jumps(vec![[0.2, 1.0], [0.55, -1.0]]);
-        let course = ForeignCourse { over: ForeignVariable::Time, between: [10.0, 20.0], shape };
+        let course = ForeignCourse {
+            over: ForeignVariable::Time,
+            between: [10.0, 20.0],
+            shape,
+        };
         let known = course.known_at([18.0, 11.0, 13.0].into_iter());
         let at = |value: f64| known.shape.value(known.way(value));
-        let wanted = [(5.0, 0.0), (11.0, 0.0), (12.0, 0.5), (13.0, 1.0), (18.0, -1.0), (30.0, -1.0)];
+        let wanted = [
+            (5.0, 0.0),
+            (11.0, 0.0),
+            (12.0, 0.5),
+            (13.0, 1.0),
+            (18.0, -1.0),
+            (30.0, -1.0),
+        ];
         for (value, wanted) in wanted {
-            assert!((at(value) - wanted).abs() < 1e-12, "at {value}: {}", at(value));
+            assert!(
+                (at(value) - wanted).abs() < 1e-12,
+                "at {value}: {}",
+                at(value)
+            );
         }
     }
 }

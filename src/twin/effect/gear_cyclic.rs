@@ -61,6 +61,7 @@ impl Act for GearCyclic {
 impl Act for GearMotorCyclic {
     fn act(&self, state: &State, motion: &mut Motion) {
         let angle = state.row.command[self.joint - 1] * state.arm.links[self.joint - 1].gear;
-        motion.joint[self.joint - 1] += ripple(self.amplitude_arcsec, self.order, angle, self.phase_deg);
+        motion.joint[self.joint - 1] +=
+            ripple(self.amplitude_arcsec, self.order, angle, self.phase_deg);
     }
 }

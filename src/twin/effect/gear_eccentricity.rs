@@ -23,7 +23,10 @@ effect! {
 
 impl Act for GearEccentricity {
     fn act(&self, state: &State, motion: &mut Motion) {
-        let (sine, cosine) = (self.order * state.row.command[self.joint - 1] + self.phase_deg.to_radians()).sin_cos();
-        motion.joint[self.joint - 1] += self.amplitude_arcsec * ARCSEC * sine / (1.0 + self.skew * cosine);
+        let (sine, cosine) = (self.order * state.row.command[self.joint - 1]
+            + self.phase_deg.to_radians())
+        .sin_cos();
+        motion.joint[self.joint - 1] +=
+            self.amplitude_arcsec * ARCSEC * sine / (1.0 + self.skew * cosine);
     }
 }

@@ -23,7 +23,8 @@ effect! {
 impl Act for GearFlank {
     fn act(&self, state: &State, motion: &mut Motion) {
         let joint = self.joint - 1;
-        let run_out = self.amplitude_arcsec * (self.order * state.row.command[joint] + self.phase_deg.to_radians()).sin();
+        let run_out = self.amplitude_arcsec
+            * (self.order * state.row.command[joint] + self.phase_deg.to_radians()).sin();
         motion.joint[joint] += ARCSEC * run_out * state.row.direction[joint];
     }
 }

@@ -27,7 +27,11 @@ impl Act for GearLoad {
     fn act(&self, state: &State, motion: &mut Motion) {
         let joint = self.joint - 1;
         let torque = state.torque[joint];
-        let load = if self.full_nm > 0.0 { self.full_nm * (torque / self.full_nm).tanh() } else { torque };
+        let load = if self.full_nm > 0.0 {
+            self.full_nm * (torque / self.full_nm).tanh()
+        } else {
+            torque
+        };
         let wave = (self.order * state.row.command[joint] + self.phase_deg.to_radians()).sin();
         motion.joint[joint] += ARCSEC * self.arcsec_per_nm * load * wave;
     }

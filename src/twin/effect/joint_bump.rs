@@ -21,7 +21,8 @@ effect! {
 
 impl Act for JointBump {
     fn act(&self, state: &State, motion: &mut Motion) {
-        let away = (state.row.command[self.joint - 1].to_degrees() - self.centre_deg) / self.width_deg;
+        let away =
+            (state.row.command[self.joint - 1].to_degrees() - self.centre_deg) / self.width_deg;
         motion.joint[self.joint - 1] += self.amplitude_arcsec * ARCSEC * (-away * away).exp();
     }
 }

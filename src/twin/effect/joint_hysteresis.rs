@@ -16,6 +16,7 @@ effect! {
 impl Act for JointHysteresis {
     fn act(&self, state: &State, motion: &mut Motion) {
         let joint = self.joint - 1;
-        motion.joint[joint] += 0.5 * self.rad_per_nm * state.torque[joint] * state.row.direction[joint];
+        motion.joint[joint] +=
+            0.5 * self.rad_per_nm * state.torque[joint] * state.row.direction[joint];
     }
 }

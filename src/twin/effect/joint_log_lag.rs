@@ -42,8 +42,21 @@ impl Stated for JointLogLag {
         self.clock_ms *= by;
     }
     fn truth(&self) -> Vec<TrueValue> {
-        let number = |name, unit, value| true_value("joint_log_lag", "recording", "recording".into(), name, unit, value);
-        let share = (self.share != 0.0 || self.clock_ms == 0.0).then(|| number("share", "1", self.share));
-        share.into_iter().chain((self.clock_ms != 0.0).then(|| number("time", "s", self.later()))).collect()
+        let number = |name, unit, value| {
+            true_value(
+                "joint_log_lag",
+                "recording",
+                "recording".into(),
+                name,
+                unit,
+                value,
+            )
+        };
+        let share =
+            (self.share != 0.0 || self.clock_ms == 0.0).then(|| number("share", "1", self.share));
+        share
+            .into_iter()
+            .chain((self.clock_ms != 0.0).then(|| number("time", "s", self.later())))
+            .collect()
     }
 }

@@ -18,7 +18,15 @@ effect! {
 
 impl Act for JointProduct {
     fn act(&self, state: &State, motion: &mut Motion) {
-        let angle = |joint: usize| state.row.command.get(joint.saturating_sub(1)).copied().unwrap_or(0.0);
-        motion.joint[self.joint - 1] += self.arcsec_per_rad2 * ARCSEC * angle(self.of[0]) * angle(self.of[1]);
+        let angle = |joint: usize| {
+            state
+                .row
+                .command
+                .get(joint.saturating_sub(1))
+                .copied()
+                .unwrap_or(0.0)
+        };
+        motion.joint[self.joint - 1] +=
+            self.arcsec_per_rad2 * ARCSEC * angle(self.of[0]) * angle(self.of[1]);
     }
 }

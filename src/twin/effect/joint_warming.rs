@@ -72,8 +72,10 @@ fn room() -> f64 {
 impl Act for JointWarming {
     fn act(&self, state: &State, motion: &mut Motion) {
         let joint = self.joint - 1;
-        let zero = ARCSEC * (self.zero_arcsec + self.ratio_arcsec_per_rad * state.row.command[joint]);
-        motion.joint[joint] += state.memory * (zero + self.softening_rad_per_nm * state.torque[joint]);
+        let zero =
+            ARCSEC * (self.zero_arcsec + self.ratio_arcsec_per_rad * state.row.command[joint]);
+        motion.joint[joint] +=
+            state.memory * (zero + self.softening_rad_per_nm * state.torque[joint]);
     }
     fn remember(&self, past: &[Moment]) -> Vec<f64> {
         let warmth = match self.heat {
@@ -81,14 +83,27 @@ impl Act for JointWarming {
             Heat::Oil => {
                 let casing = memory::recent_travel(past, self.joint, self.time_s);
                 let oil = memory::recent_travel(past, self.joint, self.oil_s);
-                casing.iter().zip(oil).map(|(casing, oil)| 0.5 * (casing + oil)).collect()
+                casing
+                    .iter()
+                    .zip(oil)
+                    .map(|(casing, oil)| 0.5 * (casing + oil))
+                    .collect()
             }
             Heat::Temperature => {
                 let joint = memory::behind(past, self.time_s, self.reference_c);
-                joint.into_iter().map(|celsius| celsius - self.reference_c).collect::<Vec<f64>>()
+                joint
+                    .into_iter()
+                    .map(|celsius| celsius - self.reference_c)
+                    .collect::<Vec<f64>>()
             }
         };
-        let held = |w: f64| if self.full > 0.0 { self.full * (w / self.full).tanh() } else { w };
+        let held = |w: f64| {
+            if self.full > 0.0 {
+                self.full * (w / self.full).tanh()
+            } else {
+                w
+            }
+        };
         warmth.into_iter().map(held).collect()
     }
 }

@@ -38,8 +38,14 @@ impl Act for LinkCompliance {
         // `along x F` is the moment of the end force per unit of arm, so it bends the same way as `across`.
         let by_force = matrix::scale(matrix::cross(along, force), length);
         let soft = self.bending_rad_per_nm;
-        let bend = matrix::add(matrix::scale(across, soft), matrix::scale(by_force, soft / 2.0));
-        let lean = matrix::add(matrix::scale(across, soft / 2.0), matrix::scale(by_force, soft / 3.0));
+        let bend = matrix::add(
+            matrix::scale(across, soft),
+            matrix::scale(by_force, soft / 2.0),
+        );
+        let lean = matrix::add(
+            matrix::scale(across, soft / 2.0),
+            matrix::scale(by_force, soft / 3.0),
+        );
         let moved = matrix::scale(matrix::cross(lean, along), length);
         let turned = matrix::add(bend, matrix::scale(along, self.torsion_rad_per_nm * twist));
         let end = matrix::times(&matrix::shift(moved), &matrix::turn_by(turned));

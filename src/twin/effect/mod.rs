@@ -180,16 +180,33 @@ macro_rules! effect {
 use effect;
 
 /// A ripple as two amplitudes, as estimators write it.
-fn sine_and_cosine(order: f64, unit: &'static str, amplitude: f64, phase_deg: f64) -> [(String, &'static str, f64); 2] {
+fn sine_and_cosine(
+    order: f64,
+    unit: &'static str,
+    amplitude: f64,
+    phase_deg: f64,
+) -> [(String, &'static str, f64); 2] {
     let (sine, cosine) = phase_deg.to_radians().sin_cos();
-    [(format!("sin{order}"), unit, amplitude * cosine), (format!("cos{order}"), unit, amplitude * sine)]
+    [
+        (format!("sin{order}"), unit, amplitude * cosine),
+        (format!("cos{order}"), unit, amplitude * sine),
+    ]
 }
 
 /// A rigid step, axis by axis.
-fn by_axis(shift_um: Vector, turn_arcsec: Vector) -> impl Iterator<Item = (&'static str, &'static str, f64)> {
-    let names = [("shift_x", "turn_x"), ("shift_y", "turn_y"), ("shift_z", "turn_z")];
+fn by_axis(
+    shift_um: Vector,
+    turn_arcsec: Vector,
+) -> impl Iterator<Item = (&'static str, &'static str, f64)> {
+    let names = [
+        ("shift_x", "turn_x"),
+        ("shift_y", "turn_y"),
+        ("shift_z", "turn_z"),
+    ];
     let axes = names.into_iter().zip(shift_um.into_iter().zip(turn_arcsec));
-    axes.flat_map(|((shift, turn), (moved, turned))| [(shift, "um", moved), (turn, "arcsec", turned)])
+    axes.flat_map(|((shift, turn), (moved, turned))| {
+        [(shift, "um", moved), (turn, "arcsec", turned)]
+    })
 }
 
 /// Declares the list of effects: the name in the YAML is the type's name in snake case.
@@ -338,15 +355,25 @@ impl Physical {
     /// What is wrong with its seat on a robot of so many joints.
     pub fn fault(&self, joints: usize) -> Option<String> {
         let seat = self.inner().seat()?;
-        (!(1..=joints).contains(&seat)).then(|| format!("sits on joint or link {seat}; allowed: 1 to {joints}"))
+        (!(1..=joints).contains(&seat))
+            .then(|| format!("sits on joint or link {seat}; allowed: 1 to {joints}"))
     }
 }
 
 /// What every effect makes of the rows before, row by row: [`Row::memory`] of each.
 pub fn recall(effects: &[Physical], past: &[Moment]) -> Vec<Vec<f64>> {
-    let own: Vec<Vec<f64>> = effects.iter().map(|effect| effect.inner().remember(past)).collect();
+    let own: Vec<Vec<f64>> = effects
+        .iter()
+        .map(|effect| effect.inner().remember(past))
+        .collect();
     if own.iter().all(Vec::is_empty) {
         return vec![Vec::new(); past.len()];
     }
-    (0..past.len()).map(|row| own.iter().map(|all| all.get(row).copied().unwrap_or(0.0)).collect()).collect()
+    (0..past.len())
+        .map(|row| {
+            own.iter()
+                .map(|all| all.get(row).copied().unwrap_or(0.0))
+                .collect()
+        })
+        .collect()
 }

@@ -41,13 +41,23 @@ impl Presliding {
     }
 
     fn maxwell(&self, past: &[Moment]) -> Vec<f64> {
-        let limits: Vec<f64> = self.slip_deg.iter().map(|slip| slip.to_radians().max(f64::MIN_POSITIVE)).collect();
+        let limits: Vec<f64> = self
+            .slip_deg
+            .iter()
+            .map(|slip| slip.to_radians().max(f64::MIN_POSITIVE))
+            .collect();
         let mut stretch = vec![0.0; limits.len()];
         let live = |moment: &Moment| {
             for way in moment.travels(self.joint) {
-                stretch.iter_mut().zip(&limits).for_each(|(stretch, limit)| *stretch = (*stretch + way).clamp(-limit, *limit));
+                stretch
+                    .iter_mut()
+                    .zip(&limits)
+                    .for_each(|(stretch, limit)| *stretch = (*stretch + way).clamp(-limit, *limit));
             }
-            let forces = stretch.iter().zip(&limits).map(|(stretch, limit)| stretch / limit);
+            let forces = stretch
+                .iter()
+                .zip(&limits)
+                .map(|(stretch, limit)| stretch / limit);
             forces.sum::<f64>() / limits.len().max(1) as f64
         };
         past.iter().map(live).collect()
@@ -59,6 +69,10 @@ impl Act for Presliding {
         motion.joint[self.joint - 1] -= self.amplitude_arcsec * ARCSEC * state.memory;
     }
     fn remember(&self, past: &[Moment]) -> Vec<f64> {
-        if self.dahl_deg > 0.0 { self.dahl(past) } else { self.maxwell(past) }
+        if self.dahl_deg > 0.0 {
+            self.dahl(past)
+        } else {
+            self.maxwell(past)
+        }
     }
 }

@@ -22,7 +22,10 @@ impl Act for ThermalBow {
     fn act(&self, state: &State, motion: &mut Motion) {
         let index = self.link - 1;
         let next = state.row.command.get(self.link).copied().unwrap_or(0.0);
-        let strain = 1e-6 * self.um_per_m_k * (state.row.temperature_c - self.reference_c) * next.cos().powi(self.power);
+        let strain = 1e-6
+            * self.um_per_m_k
+            * (state.row.temperature_c - self.reference_c)
+            * next.cos().powi(self.power);
         let growth = matrix::shift(matrix::scale(state.arm.links[index].span, strain));
         motion.link_end[index] = matrix::times(&growth, &motion.link_end[index]);
     }

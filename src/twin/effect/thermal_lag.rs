@@ -32,6 +32,9 @@ impl Act for ThermalLag {
     fn remember(&self, past: &[Moment]) -> Vec<f64> {
         let skin = memory::behind(past, self.lag_s, self.reference_c);
         let core = memory::behind(past, self.lag_s + self.core_s, self.reference_c);
-        skin.iter().zip(core).map(|(skin, core)| 0.5 * (skin + core) - self.reference_c).collect()
+        skin.iter()
+            .zip(core)
+            .map(|(skin, core)| 0.5 * (skin + core) - self.reference_c)
+            .collect()
     }
 }

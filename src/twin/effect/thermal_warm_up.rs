@@ -19,7 +19,8 @@ effect! {
 impl Act for ThermalWarmUp {
     fn act(&self, state: &State, motion: &mut Motion) {
         let index = self.link - 1;
-        let strain = 1e-6 * self.um_per_m * (1.0 - (-state.row.time_s / (3600.0 * self.warm_up_h)).exp());
+        let strain =
+            1e-6 * self.um_per_m * (1.0 - (-state.row.time_s / (3600.0 * self.warm_up_h)).exp());
         let growth = matrix::shift(matrix::scale(state.arm.links[index].span, strain));
         motion.link_end[index] = matrix::times(&growth, &motion.link_end[index]);
     }

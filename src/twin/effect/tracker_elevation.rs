@@ -35,8 +35,14 @@ impl Act for TrackerElevation {
     fn sight(&self, _row: &Row, _memory: f64, point: Vector) -> Vector {
         let seen = Polar::of(point);
         let circle = self.circle_arcsec * (seen.elevation + self.phase_deg.to_radians()).sin();
-        let elevation = seen.elevation + ARCSEC * (self.index_arcsec + self.sag_arcsec * seen.elevation.cos() + circle);
+        let elevation = seen.elevation
+            + ARCSEC * (self.index_arcsec + self.sag_arcsec * seen.elevation.cos() + circle);
         let azimuth = seen.azimuth + ARCSEC * self.transit_arcsec * seen.elevation.tan();
-        Polar { azimuth, elevation, ..seen }.point()
+        Polar {
+            azimuth,
+            elevation,
+            ..seen
+        }
+        .point()
     }
 }

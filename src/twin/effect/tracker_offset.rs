@@ -27,7 +27,13 @@ effect! {
 
 impl Default for TrackerOffset {
     fn default() -> Self {
-        Self { constant_um: 0.0, cyclic_um: 0.0, wave_mm: 1000.0, phase_deg: 0.0, um_per_m2: 0.0 }
+        Self {
+            constant_um: 0.0,
+            cyclic_um: 0.0,
+            wave_mm: 1000.0,
+            phase_deg: 0.0,
+            um_per_m2: 0.0,
+        }
     }
 }
 
@@ -36,7 +42,12 @@ impl Act for TrackerOffset {
     fn sight(&self, _row: &Row, _memory: f64, point: Vector) -> Vector {
         let seen = Polar::of(point);
         let cycle = (TAU * 1e3 * seen.range / self.wave_mm + self.phase_deg.to_radians()).sin();
-        let off = self.constant_um + self.cyclic_um * cycle + self.um_per_m2 * seen.range * seen.range;
-        Polar { range: seen.range + 1e-6 * off, ..seen }.point()
+        let off =
+            self.constant_um + self.cyclic_um * cycle + self.um_per_m2 * seen.range * seen.range;
+        Polar {
+            range: seen.range + 1e-6 * off,
+            ..seen
+        }
+        .point()
     }
 }

@@ -34,11 +34,14 @@ impl Act for TrackerRefraction {
     fn act(&self, _state: &State, _motion: &mut Motion) {}
     fn remember(&self, past: &[Moment]) -> Vec<f64> {
         if self.own_rise_k != 0.0 {
-            let own = |time_s: f64| self.own_rise_k * (1.0 - (-time_s / (3600.0 * self.warm_up_h)).exp());
+            let own =
+                |time_s: f64| self.own_rise_k * (1.0 - (-time_s / (3600.0 * self.warm_up_h)).exp());
             return past.iter().map(|moment| own(moment.time_s)).collect();
         }
         let air = memory::behind(past, self.lag_s, self.reference_c);
-        air.into_iter().map(|celsius| celsius - self.reference_c).collect()
+        air.into_iter()
+            .map(|celsius| celsius - self.reference_c)
+            .collect()
     }
     fn sight(&self, _row: &Row, memory: f64, point: Vector) -> Vector {
         matrix::scale(point, 1.0 + 1e-6 * self.um_per_m_k * memory)

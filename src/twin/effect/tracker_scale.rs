@@ -14,7 +14,8 @@ effect! {
 impl Act for TrackerScale {
     fn act(&self, _state: &State, motion: &mut Motion) {
         for row in motion.tracker.iter_mut().take(3) {
-            row.iter_mut().for_each(|number| *number *= 1.0 + 1e-6 * self.um_per_m);
+            row.iter_mut()
+                .for_each(|number| *number *= 1.0 + 1e-6 * self.um_per_m);
         }
     }
 }

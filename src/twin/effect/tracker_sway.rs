@@ -30,7 +30,11 @@ effect! {
 impl Act for TrackerSway {
     fn act(&self, state: &State, motion: &mut Motion) {
         let time = state.row.time_s;
-        let left = if self.fading_s > 0.0 { (-time / self.fading_s).exp() } else { 1.0 };
+        let left = if self.fading_s > 0.0 {
+            (-time / self.fading_s).exp()
+        } else {
+            1.0
+        };
         let share = left * (TAU * time / self.period_s + self.phase_deg.to_radians()).sin();
         let by = step(self.shift_um, self.turn_arcsec, share);
         motion.tracker = matrix::times(&by, &motion.tracker);

@@ -32,7 +32,12 @@ impl ViscousWindup {
 
 impl Act for ViscousWindup {
     fn act(&self, state: &State, motion: &mut Motion) {
-        let speed = state.row.velocity.get(self.joint - 1).copied().unwrap_or(0.0);
+        let speed = state
+            .row
+            .velocity
+            .get(self.joint - 1)
+            .copied()
+            .unwrap_or(0.0);
         let friction = KNOWN_AT * (speed.abs() / KNOWN_AT).powf(self.exponent) * speed.signum();
         if speed != 0.0 {
             motion.joint[self.joint - 1] -= self.trail() * friction;

@@ -44,7 +44,10 @@ impl Counts {
     }
     /// Those that were named.
     pub fn exactly(&self) -> Share {
-        Share { count: self.exact, of: self.all() }
+        Share {
+            count: self.exact,
+            of: self.all(),
+        }
     }
 }
 
@@ -61,8 +64,14 @@ pub struct Board {
 
 /// Forms of the twin whose formula the library does not have: it approximates them. Every other form, of what is in no list too, is one that
 /// the library's laws can take.
-const OWN_FORMS: [&str; 6] =
-    ["eccentric wheel", "at the middle", "cantilever", "gas strut", "hung over two joints", "bent by two joints"];
+const OWN_FORMS: [&str; 6] = [
+    "eccentric wheel",
+    "at the middle",
+    "cantilever",
+    "gas strut",
+    "hung over two joints",
+    "bent by two joints",
+];
 
 /// What a set of effects is counted over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -75,7 +84,9 @@ pub enum Company {
 
 impl Board {
     fn causes(&self) -> impl Iterator<Item = (&Case, &Marked)> {
-        self.cases.iter().flat_map(|case| case.causes.iter().map(move |cause| (case, cause)))
+        self.cases
+            .iter()
+            .flat_map(|case| case.causes.iter().map(move |cause| (case, cause)))
     }
 
     /// Outcomes by bin of visibility.
@@ -85,27 +96,54 @@ impl Board {
         (0..BINS.len())
             .map(|bin| {
                 let within = |cause: &Marked| (BINS[bin]..upper(bin)).contains(&cause.strength);
-                Counts::of(self.causes().filter(|(case, cause)| alone(case) && within(cause)).map(|(_, cause)| cause))
+                Counts::of(
+                    self.causes()
+                        .filter(|(case, cause)| alone(case) && within(cause))
+                        .map(|(_, cause)| cause),
+                )
             })
             .collect()
     }
 
     /// Outcomes of due causes by effect.
     pub fn by_effect(&self) -> BTreeMap<&str, Counts> {
-        let mut names: Vec<&str> = self.causes().map(|(_, cause)| cause.effect.as_str()).collect();
+        let mut names: Vec<&str> = self
+            .causes()
+            .map(|(_, cause)| cause.effect.as_str())
+            .collect();
         names.sort_unstable();
         names.dedup();
         let due = |name: &str| {
-            Counts::of(self.causes().map(|(_, cause)| cause).filter(|cause| cause.effect == name && cause.strength >= DUE))
+            Counts::of(
+                self.causes()
+                    .map(|(_, cause)| cause)
+                    .filter(|cause| cause.effect == name && cause.strength >= DUE),
+            )
         };
-        names.into_iter().map(|name| (name, due(name))).filter(|(_, counts)| counts.all() > 0).collect()
+        names
+            .into_iter()
+            .map(|name| (name, due(name)))
+            .filter(|(_, counts)| counts.all() > 0)
+            .collect()
     }
 
     /// Places and names of due causes: of all, and by effect.
     pub fn places(&self) -> (Places, BTreeMap<&str, Places>) {
-        let due = || self.causes().map(|(_, cause)| cause).filter(|cause| cause.strength >= DUE);
-        let of = |name: &str| Places::of(due().filter(|cause| cause.effect == name).map(|cause| cause.placed));
-        let by_effect = due().map(|cause| (cause.effect.as_str(), of(&cause.effect))).collect();
+        let due = || {
+            self.causes()
+                .map(|(_, cause)| cause)
+                .filter(|cause| cause.strength >= DUE)
+        };
+        let of = |name: &str| {
+            Places::of(
+                due()
+                    .filter(|cause| cause.effect == name)
+                    .map(|cause| cause.placed),
+            )
+        };
+        let by_effect = due()
+            .map(|cause| (cause.effect.as_str(), of(&cause.effect)))
+            .collect();
         (Places::of(due().map(|cause| cause.placed)), by_effect)
     }
 
@@ -117,9 +155,14 @@ impl Board {
 
     /// Due causes whose formula the library has, or has not: outcomes, and the mean probability that the true name was given.
     pub fn by_formula(&self, shared: bool) -> (Counts, Option<f64>) {
-        let due = || self.causes().map(|(_, cause)| cause).filter(|cause| cause.strength >= DUE);
-        let own: Vec<&Marked> =
-            due().filter(|cause| (cause.strange || OWN_FORMS.contains(&cause.form.as_str())) != shared).collect();
+        let due = || {
+            self.causes()
+                .map(|(_, cause)| cause)
+                .filter(|cause| cause.strength >= DUE)
+        };
+        let own: Vec<&Marked> = due()
+            .filter(|cause| (cause.strange || OWN_FORMS.contains(&cause.form.as_str())) != shared)
+            .collect();
         let stated: Vec<f64> = own.iter().filter_map(|cause| cause.probability).collect();
         let mean = (!stated.is_empty()).then(|| stated.iter().sum::<f64>() / stated.len() as f64);
         (Counts::of(own.into_iter()), mean)
@@ -139,26 +182,44 @@ impl Board {
                 },
                 (Outcome::Wrong | Outcome::Silent, _) => "-".to_string(),
             };
-            *out.entry(&cause.effect).or_default().entry(called).or_default() += 1;
+            *out.entry(&cause.effect)
+                .or_default()
+                .entry(called)
+                .or_default() += 1;
         }
         out
     }
 
     /// Recordings without an effect in which one was declared.
     pub fn alarms(&self) -> Share {
-        Share::of(self.cases.iter().filter(|case| case.causes.is_empty()).map(|case| !case.strays.is_empty()))
+        Share::of(
+            self.cases
+                .iter()
+                .filter(|case| case.causes.is_empty())
+                .map(|case| !case.strays.is_empty()),
+        )
     }
 
     /// Recordings with effects in which something was named that is not there.
     pub fn strays(&self) -> Share {
-        Share::of(self.cases.iter().filter(|case| !case.causes.is_empty()).map(|case| !case.strays.is_empty()))
+        Share::of(
+            self.cases
+                .iter()
+                .filter(|case| !case.causes.is_empty())
+                .map(|case| !case.strays.is_empty()),
+        )
     }
 
     /// Recordings whose causes are all due: all named and nothing else; and the strongest named.
     pub fn whole(&self, content: &str) -> [Share; 2] {
-        let due = |case: &&Case| case.content == content && case.causes.iter().all(|cause| cause.strength >= DUE);
+        let due = |case: &&Case| {
+            case.content == content && case.causes.iter().all(|cause| cause.strength >= DUE)
+        };
         let strongest = |case: &Case| {
-            let most = case.causes.iter().max_by(|a, b| a.strength.total_cmp(&b.strength));
+            let most = case
+                .causes
+                .iter()
+                .max_by(|a, b| a.strength.total_cmp(&b.strength));
             most.is_none_or(|cause| cause.outcome == Outcome::Exact)
         };
         [
@@ -173,39 +234,60 @@ impl Board {
         for (kind, named) in self.cases.iter().flat_map(|case| &case.tampered) {
             out.entry(kind).or_default().push(*named);
         }
-        out.into_iter().map(|(kind, named)| (kind, Share::of(named))).collect()
+        out.into_iter()
+            .map(|(kind, named)| (kind, Share::of(named)))
+            .collect()
     }
 
     /// Held-out errors of recordings with a due effect.
     fn held_out_of_due(&self) -> impl Iterator<Item = HeldOut> {
-        let due = self.cases.iter().filter(|case| case.causes.iter().any(|cause| cause.strength >= DUE));
+        let due = self
+            .cases
+            .iter()
+            .filter(|case| case.causes.iter().any(|cause| cause.strength >= DUE));
         due.filter_map(|case| case.held_out)
     }
 
     /// Held-out errors over their bounds, ascending, where an effect is due, and in recordings without one.
     pub fn ratios(&self) -> [Vec<f64>; 2] {
-        let nulls = self.cases.iter().filter(|case| case.causes.is_empty()).filter_map(|case| case.held_out);
+        let nulls = self
+            .cases
+            .iter()
+            .filter(|case| case.causes.is_empty())
+            .filter_map(|case| case.held_out);
         let sorted = |all: Vec<HeldOut>| {
             let mut out: Vec<f64> = all.iter().map(HeldOut::ratio).collect();
             out.sort_by(f64::total_cmp);
             out
         };
-        [sorted(self.held_out_of_due().collect()), sorted(nulls.collect())]
+        [
+            sorted(self.held_out_of_due().collect()),
+            sorted(nulls.collect()),
+        ]
     }
 
     /// Recordings with a due effect whose held-out error is larger with the findings than before.
     pub fn worse(&self) -> Share {
-        Share::of(self.held_out_of_due().map(|held_out| held_out.after > held_out.before))
+        Share::of(
+            self.held_out_of_due()
+                .map(|held_out| held_out.after > held_out.before),
+        )
     }
 
     /// Recordings with a due effect whose held-out error is larger with the findings than before, and than its bound.
     pub fn worse_than_bound(&self) -> Share {
-        Share::of(self.held_out_of_due().map(|held_out| held_out.after > held_out.before.max(held_out.bound)))
+        Share::of(
+            self.held_out_of_due()
+                .map(|held_out| held_out.after > held_out.before.max(held_out.bound)),
+        )
     }
 
     /// Explained shares of held-out errors where an effect is due, ascending.
     pub fn explained(&self) -> Vec<f64> {
-        let mut out: Vec<f64> = self.held_out_of_due().filter_map(|held_out| held_out.explained()).collect();
+        let mut out: Vec<f64> = self
+            .held_out_of_due()
+            .filter_map(|held_out| held_out.explained())
+            .collect();
         out.sort_by(f64::total_cmp);
         out
     }
@@ -214,10 +296,19 @@ impl Board {
     /// else: the numbers of a wrong model are not those of the truth.
     pub fn intervals(&self) -> BTreeMap<&str, Share> {
         let mut out: BTreeMap<&str, Vec<bool>> = BTreeMap::new();
-        for interval in self.cases.iter().filter(|case| case.right(DUE)).flat_map(|case| &case.intervals) {
-            out.entry(&interval.effect).or_default().push(interval.holds);
+        for interval in self
+            .cases
+            .iter()
+            .filter(|case| case.right(DUE))
+            .flat_map(|case| &case.intervals)
+        {
+            out.entry(&interval.effect)
+                .or_default()
+                .push(interval.holds);
         }
-        out.into_iter().map(|(effect, holds)| (effect, Share::of(holds))).collect()
+        out.into_iter()
+            .map(|(effect, holds)| (effect, Share::of(holds)))
+            .collect()
     }
 
     /// Stated probabilities against what was true.
@@ -227,7 +318,10 @@ impl Board {
 
     /// Stated probabilities of recordings without their causes in which the data cannot tell that something is left out.
     pub fn untold_reliability(&self) -> Reliability {
-        let untold = self.left_out.iter().filter(|one| one.strength >= DUE && !one.tells);
+        let untold = self
+            .left_out
+            .iter()
+            .filter(|one| one.strength >= DUE && !one.tells);
         reliability(untold.flat_map(|one| &one.statements), Subject::Name)
     }
 
@@ -235,7 +329,8 @@ impl Board {
     pub fn verdicts(&self) -> BTreeMap<(&str, &str), usize> {
         let mut out = BTreeMap::new();
         for case in &self.cases {
-            *out.entry((case.content.as_str(), case.verdict.as_str())).or_default() += 1;
+            *out.entry((case.content.as_str(), case.verdict.as_str()))
+                .or_default() += 1;
         }
         out
     }

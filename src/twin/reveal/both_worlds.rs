@@ -27,7 +27,11 @@ impl Board {
     /// Stated probabilities of names of the recordings that were diagnosed with the whole list and without their causes.
     pub fn mixed_reliability(&self, unlisted: f64) -> Vec<MixedBin> {
         let due = || self.left_out.iter().filter(|one| one.strength >= DUE);
-        let listed = self.cases.iter().filter(|case| due().any(|one| one.name == case.name)).flat_map(|case| &case.statements);
+        let listed = self
+            .cases
+            .iter()
+            .filter(|case| due().any(|one| one.name == case.name))
+            .flat_map(|case| &case.statements);
         let without = due().flat_map(|one| &one.statements);
         mixed([listed.collect(), without.collect()], unlisted)
     }
@@ -38,12 +42,17 @@ fn mixed(statements: [Vec<&Statement>; 2], unlisted: f64) -> Vec<MixedBin> {
     let weights = [1.0 - unlisted, unlisted];
     let bin = |[from, to]: [f64; 2]| {
         let of_names = |all: &Vec<&Statement>| -> Vec<Statement> {
-            let own = all.iter().filter(|one| one.subject == Subject::Name && within(one.probability, [from, to]));
+            let own = all
+                .iter()
+                .filter(|one| one.subject == Subject::Name && within(one.probability, [from, to]));
             own.map(|one| **one).collect()
         };
         let own = [of_names(&statements[0]), of_names(&statements[1])];
         let sum = |of: &dyn Fn(&Statement) -> f64| -> f64 {
-            own.iter().zip(weights).map(|(all, weight)| weight * all.iter().map(of).sum::<f64>()).sum()
+            own.iter()
+                .zip(weights)
+                .map(|(all, weight)| weight * all.iter().map(of).sum::<f64>())
+                .sum()
         };
         let all = sum(&|_| 1.0);
         (all > 0.0).then(|| MixedBin {
@@ -63,15 +72,33 @@ mod tests {
 
     #[test]
     fn each_kind_of_recording_counts_by_its_share() {
-        let said = |subject, probability, right| Statement { subject, probability, right };
+        let said = |subject, probability, right| Statement {
+            subject,
+            probability,
+            right,
+        };
         let name = |probability, right| said(Subject::Name, probability, right);
-        let listed = [name(0.96, true), name(0.96, true), name(0.92, true), said(Subject::Place, 0.96, false)];
+        let listed = [
+            name(0.96, true),
+            name(0.96, true),
+            name(0.92, true),
+            said(Subject::Place, 0.96, false),
+        ];
         let without = [name(1.0, false), name(1.0, true)];
         let bins = mixed([listed.iter().collect(), without.iter().collect()], 0.25);
         let [second, first] = [bins[1], bins[0]];
-        assert_eq!((bins.len(), first.statements, first.right), (2, [1, 0], 1.0));
+        assert_eq!(
+            (bins.len(), first.statements, first.right),
+            (2, [1, 0], 1.0)
+        );
         // 0.75 x 2 + 0.25 x 1 of 0.75 x 2 + 0.25 x 2.
-        assert_eq!((second.from, second.to, second.statements), (0.95, 1.0, [2, 2]));
-        assert!((second.right - 0.875).abs() < 1e-12 && (second.stated - 0.97).abs() < 1e-12, "{second:?}");
+        assert_eq!(
+            (second.from, second.to, second.statements),
+            (0.95, 1.0, [2, 2])
+        );
+        assert!(
+            (second.right - 0.875).abs() < 1e-12 && (second.stated - 0.97).abs() < 1e-12,
+            "{second:?}"
+        );
     }
 }

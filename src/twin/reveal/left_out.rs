@@ -39,20 +39,48 @@ pub fn left_out(truth: &Truth, whole: &Answer, without: &Answer) -> Option<LeftO
     let cause = truth.effects.iter().find(|cause| cause.wanted)?;
     let held_out = |answer: &Answer| answer.after.as_ref()?.validate_rms_mm;
     // The place is right by `unknown`, a name that data cannot separate from what was left out is no wrong one.
-    let accepted = truth.accepted.iter().chain(&cause.same).filter(|name| name.effect != cause.effect);
-    let mut known: BTreeSet<(String, String)> = accepted.flat_map(|name| atoms(&name.effect, &name.place)).collect();
-    let places = truth.accepted.iter().chain(&cause.same).map(|name| name.place.as_str()).chain([cause.place.as_str()]);
+    let accepted = truth
+        .accepted
+        .iter()
+        .chain(&cause.same)
+        .filter(|name| name.effect != cause.effect);
+    let mut known: BTreeSet<(String, String)> = accepted
+        .flat_map(|name| atoms(&name.effect, &name.place))
+        .collect();
+    let places = truth
+        .accepted
+        .iter()
+        .chain(&cause.same)
+        .map(|name| name.place.as_str())
+        .chain([cause.place.as_str()]);
     known.extend(places.flat_map(|place| atoms(NAMELESS, place)));
-    known.extend(truth.tampered.iter().flat_map(|fault| atoms(&fault.effect, &fault.place)));
+    known.extend(
+        truth
+            .tampered
+            .iter()
+            .flat_map(|fault| atoms(&fault.effect, &fault.place)),
+    );
     // What else is concealed is no wrong name, wanted or not.
-    let others = truth.effects.iter().filter(|other| other.effect != cause.effect);
+    let others = truth
+        .effects
+        .iter()
+        .filter(|other| other.effect != cause.effect);
     known.extend(others.flat_map(|other| atoms(&other.effect, &other.place)));
-    let right: Vec<Atoms> = known.iter().map(|name| BTreeSet::from([name.clone()])).collect();
-    let said = without.findings.iter().filter(|finding| finding.effect != NAMELESS);
+    let right: Vec<Atoms> = known
+        .iter()
+        .map(|name| BTreeSet::from([name.clone()]))
+        .collect();
+    let said = without
+        .findings
+        .iter()
+        .filter(|finding| finding.effect != NAMELESS);
     let wrong = said.filter(|finding| atoms(&finding.effect, &finding.place).is_disjoint(&known));
     let strongest = wrong.map(|finding| {
         let name = format!("{} at {}", finding.effect, finding.place);
-        (name.chars().filter(|c| !c.is_control()).collect::<String>(), finding.probability.unwrap_or(1.0))
+        (
+            name.chars().filter(|c| !c.is_control()).collect::<String>(),
+            finding.probability.unwrap_or(1.0),
+        )
     });
     Some(LeftOut {
         name: truth.case.clone(),
@@ -61,7 +89,10 @@ pub fn left_out(truth: &Truth, whole: &Answer, without: &Answer) -> Option<LeftO
         tells: held_out(without)? > TELLS * held_out(whole)?,
         wrong: strongest.max_by(|a, b| a.1.total_cmp(&b.1)),
         verdict: without.verdict.clone(),
-        came_back: without.findings.iter().any(|finding| finding.effect == cause.effect),
+        came_back: without
+            .findings
+            .iter()
+            .any(|finding| finding.effect == cause.effect),
         statements: statements(&without.findings, &right, &right),
     })
 }
@@ -82,8 +113,15 @@ pub struct LeftOutShares {
 impl LeftOutShares {
     /// Shares over recordings of L from [`DUE`] on in which the data can tell, or cannot.
     pub fn of(all: &[LeftOut], tells: bool) -> LeftOutShares {
-        let own = || all.iter().filter(|one| one.strength >= DUE && one.tells == tells);
-        let stated = |one: &LeftOut, least: f64| one.wrong.as_ref().is_some_and(|(_, probability)| *probability >= least);
+        let own = || {
+            all.iter()
+                .filter(|one| one.strength >= DUE && one.tells == tells)
+        };
+        let stated = |one: &LeftOut, least: f64| {
+            one.wrong
+                .as_ref()
+                .is_some_and(|(_, probability)| *probability >= least)
+        };
         LeftOutShares {
             wrong: Share::of(own().map(|one| stated(one, GIVEN))),
             sure: Share::of(own().map(|one| stated(one, 0.9))),
@@ -98,7 +136,10 @@ impl LeftOutShares {
             (format!("a wrong name with {GIVEN} or more"), self.wrong),
             ("a wrong name with 0.9 or more".into(), self.sure),
             ("called explained, or nothing missing".into(), self.content),
-            ("the name that was left out was given".into(), self.came_back),
+            (
+                "the name that was left out was given".into(),
+                self.came_back,
+            ),
         ]
     }
 }
@@ -121,8 +162,14 @@ mod tests {
             "effects": [{ "effect": "backlash", "where": "joint 2", "form": "plain", "L": 80.0, "parameters": [] }],
         }))
         .expect("a truth");
-        let whole = answer("explained", 0.1, &json!([{ "effect": "backlash", "where": "joint 2", "probability": 0.9 }]));
-        let judge = |verdict, rms, findings: Value| left_out(&truth, &whole, &answer(verdict, rms, &findings)).expect("a mark");
+        let whole = answer(
+            "explained",
+            0.1,
+            &json!([{ "effect": "backlash", "where": "joint 2", "probability": 0.9 }]),
+        );
+        let judge = |verdict, rms, findings: Value| {
+            left_out(&truth, &whole, &answer(verdict, rms, &findings)).expect("a mark")
+        };
         let beside: Truth = serde_json::from_value(json!({
             "case": "c", "content": "single", "family": "payload_error", "robot": "r", "tampered": [], "points": { "fit": 50, "validate": 20 },
             "accepted": [],
@@ -130,19 +177,55 @@ mod tests {
                 { "effect": "joint_compliance", "where": "joint 2", "form": "mass", "L": 900.0, "parameters": [], "wanted": true }],
         }))
         .expect("a truth");
-        let true_name = json!([{ "effect": "joint_compliance", "where": "joint 2", "probability": 0.9 }]);
-        let mark = left_out(&beside, &whole, &answer("unexplained", 0.3, &true_name)).expect("a mark");
-        assert!(mark.effect == "payload_error" && mark.wrong.is_none(), "what is there is no wrong name");
-        let unknown = judge("unexplained", 0.12, json!([{ "effect": "unknown", "where": "joint 2", "probability": 0.8 }]));
-        assert!(unknown.tells && unknown.wrong.is_none() && unknown.statements.iter().all(|one| one.right));
-        let accepted = judge("explained", 0.1, json!([{ "effect": "joint_hardening", "where": "joint 2", "probability": 0.95 }]));
+        let true_name =
+            json!([{ "effect": "joint_compliance", "where": "joint 2", "probability": 0.9 }]);
+        let mark =
+            left_out(&beside, &whole, &answer("unexplained", 0.3, &true_name)).expect("a mark");
+        assert!(
+            mark.effect == "payload_error" && mark.wrong.is_none(),
+            "what is there is no wrong name"
+        );
+        let unknown = judge(
+            "unexplained",
+            0.12,
+            json!([{ "effect": "unknown", "where": "joint 2", "probability": 0.8 }]),
+        );
+        assert!(
+            unknown.tells
+                && unknown.wrong.is_none()
+                && unknown.statements.iter().all(|one| one.right)
+        );
+        let accepted = judge(
+            "explained",
+            0.1,
+            json!([{ "effect": "joint_hardening", "where": "joint 2", "probability": 0.95 }]),
+        );
         assert!(!accepted.tells && accepted.wrong.is_none());
-        let wrong = judge("explained", 0.3, json!([{ "effect": "zero_shift", "where": "joint 2", "probability": 0.6 }]));
-        let back = judge("unexplained", 0.3, json!([{ "effect": "backlash", "where": "joint 3", "probability": 0.4 }]));
+        let wrong = judge(
+            "explained",
+            0.3,
+            json!([{ "effect": "zero_shift", "where": "joint 2", "probability": 0.6 }]),
+        );
+        let back = judge(
+            "unexplained",
+            0.3,
+            json!([{ "effect": "backlash", "where": "joint 3", "probability": 0.4 }]),
+        );
         assert_eq!(wrong.wrong, Some(("zero_shift at joint 2".into(), 0.6)));
         let all = [unknown, accepted, wrong, back];
         let shares = LeftOutShares::of(&all, true);
-        assert_eq!([shares.wrong.count, shares.sure.count, shares.content.count, shares.came_back.count], [1, 0, 1, 1]);
-        assert_eq!([shares.wrong.of, LeftOutShares::of(&all, false).wrong.of], [3, 1]);
+        assert_eq!(
+            [
+                shares.wrong.count,
+                shares.sure.count,
+                shares.content.count,
+                shares.came_back.count
+            ],
+            [1, 0, 1, 1]
+        );
+        assert_eq!(
+            [shares.wrong.of, LeftOutShares::of(&all, false).wrong.of],
+            [3, 1]
+        );
     }
 }

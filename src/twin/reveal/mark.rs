@@ -77,7 +77,8 @@ impl HeldOut {
     /// Share of the squared error above the bound that is gone; none where there was next to nothing to explain.
     pub fn explained(&self) -> Option<f64> {
         let above = |rms: f64| rms.powi(2) - self.bound.powi(2);
-        (above(self.before) > 0.1 * self.bound.powi(2)).then(|| 1.0 - above(self.after).max(0.0) / above(self.before))
+        (above(self.before) > 0.1 * self.bound.powi(2))
+            .then(|| 1.0 - above(self.after).max(0.0) / above(self.before))
     }
 }
 
@@ -114,61 +115,114 @@ impl Case {
     /// Every cause of at least this strength named exactly, and nothing said that is not there.
     pub fn right(&self, strength: f64) -> bool {
         let due = |cause: &&Marked| cause.strength >= strength;
-        self.strays.is_empty() && self.causes.iter().filter(due).all(|cause| cause.outcome == Outcome::Exact)
+        self.strays.is_empty()
+            && self
+                .causes
+                .iter()
+                .filter(due)
+                .all(|cause| cause.outcome == Outcome::Exact)
     }
 }
 
 fn said(finding: &Finding) -> String {
     // The names come from a file and go to a terminal.
-    format!("{} at {}", finding.effect, finding.place).chars().filter(|c| !c.is_control()).collect()
+    format!("{} at {}", finding.effect, finding.place)
+        .chars()
+        .filter(|c| !c.is_control())
+        .collect()
 }
 
 /// Everything that a finding may mean: itself and its rivals.
 fn reach(finding: &Finding) -> BTreeSet<(String, String)> {
-    let rivals = finding.rivals.iter().flat_map(|rival| atoms(&rival.effect, &rival.place));
-    atoms(&finding.effect, &finding.place).into_iter().chain(rivals).collect()
+    let rivals = finding
+        .rivals
+        .iter()
+        .flat_map(|rival| atoms(&rival.effect, &rival.place));
+    atoms(&finding.effect, &finding.place)
+        .into_iter()
+        .chain(rivals)
+        .collect()
 }
 
 /// Marks a diagnosis of a case.
 pub fn mark(truth: &Truth, answer: &Answer) -> Case {
-    let found: BTreeSet<_> = answer.findings.iter().flat_map(|finding| atoms(&finding.effect, &finding.place)).collect();
+    let found: BTreeSet<_> = answer
+        .findings
+        .iter()
+        .flat_map(|finding| atoms(&finding.effect, &finding.place))
+        .collect();
     let reached: BTreeSet<_> = answer.findings.iter().flat_map(reach).collect();
-    let accepted: BTreeSet<_> = truth.accepted.iter().flat_map(|name| atoms(&name.effect, &name.place)).collect();
+    let accepted: BTreeSet<_> = truth
+        .accepted
+        .iter()
+        .flat_map(|name| atoms(&name.effect, &name.place))
+        .collect();
     let mut known = accepted.clone();
-    known.extend(truth.effects.iter().flat_map(|cause| atoms(&cause.effect, &cause.place)));
+    known.extend(
+        truth
+            .effects
+            .iter()
+            .flat_map(|cause| atoms(&cause.effect, &cause.place)),
+    );
     // Both kinds of tampering count as known where one is: a swapped pair is two outliers, too.
     if !truth.tampered.is_empty() {
-        known.extend(["outlier", "mislabelled_point"].into_iter().flat_map(|effect| atoms(effect, "recording")));
+        known.extend(
+            ["outlier", "mislabelled_point"]
+                .into_iter()
+                .flat_map(|effect| atoms(effect, "recording")),
+        );
     }
-    let tampered = truth.tampered.iter().map(|fault| atoms(&fault.effect, &fault.place));
-    let true_names: Vec<Atoms> = truth.effects.iter().map(|cause| atoms(&cause.effect, &cause.place)).chain(tampered).collect();
-    let accepted_names: Vec<Atoms> = truth.accepted.iter().map(|name| atoms(&name.effect, &name.place)).collect();
+    let tampered = truth
+        .tampered
+        .iter()
+        .map(|fault| atoms(&fault.effect, &fault.place));
+    let true_names: Vec<Atoms> = truth
+        .effects
+        .iter()
+        .map(|cause| atoms(&cause.effect, &cause.place))
+        .chain(tampered)
+        .collect();
+    let accepted_names: Vec<Atoms> = truth
+        .accepted
+        .iter()
+        .map(|name| atoms(&name.effect, &name.place))
+        .collect();
     let stray = |finding: &&Finding| reach(finding).is_disjoint(&known);
     let strays: Vec<String> = answer.findings.iter().filter(stray).map(said).collect();
-    let causes = truth.effects.iter().filter(|cause| cause.wanted).map(|cause| {
-        let own = atoms(&cause.effect, &cause.place);
-        let same: Atoms = cause.same.iter().flat_map(|name| atoms(&name.effect, &name.place)).collect();
-        let outcome = if own.is_subset(&found) || !same.is_disjoint(&found) {
-            Outcome::Exact
-        } else if own.is_subset(&reached) || !accepted.is_disjoint(&found) {
-            Outcome::InSet
-        } else if strays.is_empty() {
-            Outcome::Silent
-        } else {
-            Outcome::Wrong
-        };
-        Marked {
-            effect: cause.effect.clone(),
-            place: cause.place.clone(),
-            form: cause.form.clone(),
-            strange: cause.strange,
-            strength: cause.strength,
-            outcome,
-            placed: placed(cause, truth, &answer.findings, &known, reach),
-            said: (outcome == Outcome::Wrong).then(|| strays.first().cloned()).flatten(),
-            probability: probability_of(&own, &answer.findings),
-        }
-    });
+    let causes = truth
+        .effects
+        .iter()
+        .filter(|cause| cause.wanted)
+        .map(|cause| {
+            let own = atoms(&cause.effect, &cause.place);
+            let same: Atoms = cause
+                .same
+                .iter()
+                .flat_map(|name| atoms(&name.effect, &name.place))
+                .collect();
+            let outcome = if own.is_subset(&found) || !same.is_disjoint(&found) {
+                Outcome::Exact
+            } else if own.is_subset(&reached) || !accepted.is_disjoint(&found) {
+                Outcome::InSet
+            } else if strays.is_empty() {
+                Outcome::Silent
+            } else {
+                Outcome::Wrong
+            };
+            Marked {
+                effect: cause.effect.clone(),
+                place: cause.place.clone(),
+                form: cause.form.clone(),
+                strange: cause.strange,
+                strength: cause.strength,
+                outcome,
+                placed: placed(cause, truth, &answer.findings, &known, reach),
+                said: (outcome == Outcome::Wrong)
+                    .then(|| strays.first().cloned())
+                    .flatten(),
+                probability: probability_of(&own, &answer.findings),
+            }
+        });
     let named = |name: &str| answer.findings.iter().any(|finding| finding.effect == name);
     Case {
         name: truth.case.clone(),
@@ -178,9 +232,17 @@ pub fn mark(truth: &Truth, answer: &Answer) -> Case {
         points: truth.points.fit,
         verdict: answer.verdict.clone(),
         causes: causes.collect(),
-        tampered: truth.tampered.iter().map(|fault| (fault.effect.clone(), named(&fault.effect))).collect(),
+        tampered: truth
+            .tampered
+            .iter()
+            .map(|fault| (fault.effect.clone(), named(&fault.effect)))
+            .collect(),
         held_out: held_out(truth, answer),
-        intervals: truth.effects.iter().flat_map(|cause| intervals(cause, &answer.findings)).collect(),
+        intervals: truth
+            .effects
+            .iter()
+            .flat_map(|cause| intervals(cause, &answer.findings))
+            .collect(),
         statements: statements(&answer.findings, &true_names, &accepted_names),
         strays,
     }
@@ -188,22 +250,41 @@ pub fn mark(truth: &Truth, answer: &Answer) -> Case {
 
 /// The largest probability that a finding or a rival of this name was given.
 fn probability_of(name: &Atoms, findings: &[Finding]) -> Option<f64> {
-    let own = findings.iter().map(|finding| (&finding.effect, &finding.place, finding.probability));
+    let own = findings
+        .iter()
+        .map(|finding| (&finding.effect, &finding.place, finding.probability));
     let rivals = findings.iter().flat_map(|finding| &finding.rivals);
     let rivals = rivals.map(|rival| (&rival.effect, &rival.place, rival.probability));
-    let stated: Vec<(bool, f64)> =
-        own.chain(rivals).filter_map(|(effect, place, p)| Some((atoms(effect, place) == *name, p?))).collect();
-    let of_it = stated.iter().filter(|(same, _)| *same).map(|(_, p)| *p).fold(0.0, f64::max);
+    let stated: Vec<(bool, f64)> = own
+        .chain(rivals)
+        .filter_map(|(effect, place, p)| Some((atoms(effect, place) == *name, p?)))
+        .collect();
+    let of_it = stated
+        .iter()
+        .filter(|(same, _)| *same)
+        .map(|(_, p)| *p)
+        .fold(0.0, f64::max);
     (!stated.is_empty()).then_some(of_it)
 }
 
 fn held_out(truth: &Truth, answer: &Answer) -> Option<HeldOut> {
     let before = answer.before.as_ref()?.validate_rms_mm?;
     let after = answer.after.as_ref()?.validate_rms_mm?;
-    let found: usize = answer.findings.iter().map(|finding| finding.parameters.len()).sum();
-    let (p, n) = ((truth.geometry_rank + found) as f64, 3.0 * truth.points.fit as f64);
+    let found: usize = answer
+        .findings
+        .iter()
+        .map(|finding| finding.parameters.len())
+        .sum();
+    let (p, n) = (
+        (truth.geometry_rank + found) as f64,
+        3.0 * truth.points.fit as f64,
+    );
     let noise = truth.noise.as_ref()?;
     let square = noise.validate_rms_per_axis_mm.powi(2) * (1.0 + p / (n - p - 1.0).max(1.0));
     let bound = (3.0 * (square + noise.unseen_rms_per_axis_mm.powi(2))).sqrt();
-    Some(HeldOut { before, after, bound })
+    Some(HeldOut {
+        before,
+        after,
+        bound,
+    })
 }

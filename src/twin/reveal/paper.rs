@@ -169,10 +169,14 @@ pub type Atoms = BTreeSet<(String, String)>;
 
 /// One (effect, place) for each link of a run: `link 2-4` is links 2, 3 and 4.
 pub(super) fn atoms(effect: &str, place: &str) -> Atoms {
-    let run = place.strip_prefix("link ").and_then(|rest| rest.split_once('-'));
+    let run = place
+        .strip_prefix("link ")
+        .and_then(|rest| rest.split_once('-'));
     let ends = run.and_then(|(from, to)| Some((from.parse::<u8>().ok()?, to.parse::<u8>().ok()?)));
     match ends {
-        Some((from, to)) => (from..=to).map(|link| (effect.to_string(), format!("link {link}"))).collect(),
+        Some((from, to)) => (from..=to)
+            .map(|link| (effect.to_string(), format!("link {link}")))
+            .collect(),
         None => BTreeSet::from([(effect.to_string(), place.to_string())]),
     }
 }

@@ -38,25 +38,47 @@ pub(super) fn placed(
     reach: impl Fn(&Finding) -> Atoms,
 ) -> Placed {
     let own = atoms(&cause.effect, &cause.place);
-    let accepted: Atoms = truth.accepted.iter().flat_map(|name| atoms(&name.effect, &name.place)).collect();
+    let accepted: Atoms = truth
+        .accepted
+        .iter()
+        .flat_map(|name| atoms(&name.effect, &name.place))
+        .collect();
     let right: BTreeSet<&str> = places(&own).union(&places(&accepted)).copied().collect();
-    let others: Atoms = truth.effects.iter().flat_map(|other| atoms(&other.effect, &other.place)).collect();
+    let others: Atoms = truth
+        .effects
+        .iter()
+        .flat_map(|other| atoms(&other.effect, &other.place))
+        .collect();
     let elsewhere: BTreeSet<&str> = places(&others).difference(&right).copied().collect();
 
-    let said: Vec<(&Finding, Atoms)> = findings.iter().map(|finding| (finding, atoms(&finding.effect, &finding.place))).collect();
-    let physical = || said.iter().filter(|(finding, _)| !POINT_FAULTS.contains(&finding.effect.as_str()));
+    let said: Vec<(&Finding, Atoms)> = findings
+        .iter()
+        .map(|finding| (finding, atoms(&finding.effect, &finding.place)))
+        .collect();
+    let physical = || {
+        said.iter()
+            .filter(|(finding, _)| !POINT_FAULTS.contains(&finding.effect.as_str()))
+    };
     let there = |names: &Atoms| !places(names).is_disjoint(&right);
     let found: Atoms = said.iter().flat_map(|(_, names)| names.clone()).collect();
     let wrong = |finding: &Finding, names: &Atoms| {
-        finding.effect != NAMELESS && names.is_disjoint(known) && (there(names) || reach(finding).is_disjoint(known))
+        finding.effect != NAMELESS
+            && names.is_disjoint(known)
+            && (there(names) || reach(finding).is_disjoint(known))
     };
     Placed {
-        place: physical().find(|(_, names)| !places(names).is_subset(&elsewhere)).is_some_and(|(_, names)| there(names)),
+        place: physical()
+            .find(|(_, names)| !places(names).is_subset(&elsewhere))
+            .is_some_and(|(_, names)| there(names)),
         name_or_unknown: own.is_subset(&found)
             || !accepted.is_disjoint(&found)
-            || said.iter().any(|(finding, names)| finding.effect == NAMELESS && there(names)),
+            || said
+                .iter()
+                .any(|(finding, names)| finding.effect == NAMELESS && there(names)),
         wrong_name: said.iter().any(|(finding, names)| wrong(finding, names)),
-        wrong_given: said.iter().any(|(finding, names)| wrong(finding, names) && finding.probability.unwrap_or(1.0) >= GIVEN),
+        wrong_given: said.iter().any(|(finding, names)| {
+            wrong(finding, names) && finding.probability.unwrap_or(1.0) >= GIVEN
+        }),
     }
 }
 

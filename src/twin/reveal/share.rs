@@ -12,7 +12,11 @@ pub struct Share {
 impl Share {
     /// Counts what holds.
     pub fn of(all: impl IntoIterator<Item = bool>) -> Share {
-        all.into_iter().fold(Share::default(), |share, holds| Share { count: share.count + usize::from(holds), of: share.of + 1 })
+        all.into_iter()
+            .fold(Share::default(), |share, holds| Share {
+                count: share.count + usize::from(holds),
+                of: share.of + 1,
+            })
     }
     /// The fraction; none of nothing.
     pub fn value(&self) -> Option<f64> {
@@ -25,7 +29,13 @@ impl Share {
         }
         let (n, z) = (self.of as f64, 1.959_964f64);
         let p = self.count as f64 / n;
-        let (middle, wide) = (p + z * z / (2.0 * n), z * (p * (1.0 - p) / n + z * z / (4.0 * n * n)).sqrt());
-        [(middle - wide) / (1.0 + z * z / n), (middle + wide) / (1.0 + z * z / n)]
+        let (middle, wide) = (
+            p + z * z / (2.0 * n),
+            z * (p * (1.0 - p) / n + z * z / (4.0 * n * n)).sqrt(),
+        );
+        [
+            (middle - wide) / (1.0 + z * z / n),
+            (middle + wide) / (1.0 + z * z / n),
+        ]
     }
 }

@@ -12,15 +12,25 @@ use serde_json::{Value, json};
 use std::fmt::Write;
 
 /// Whether the library has the formula by which the twin makes an effect.
-const FORMULAS: [(&str, bool); 2] = [("formulas that the library has", true), ("formulas that it has not", false)];
+const FORMULAS: [(&str, bool); 2] = [
+    ("formulas that the library has", true),
+    ("formulas that it has not", false),
+];
 
 /// Whether the held-out error tells that a cause is left out.
-const TOLD: [(&str, bool); 2] = [("where the data can tell", true), ("where it cannot", false)];
+const TOLD: [(&str, bool); 2] = [
+    ("where the data can tell", true),
+    ("where it cannot", false),
+];
 
 impl Board {
     /// The scoreboard as text, mm and percent.
     pub fn text(&self) -> String {
-        let mut out = format!("{} recordings judged, {} without a verdict\n", self.cases.len(), self.missing.len());
+        let mut out = format!(
+            "{} recordings judged, {} without a verdict\n",
+            self.cases.len(),
+            self.missing.len()
+        );
         self.tell_strengths(&mut out);
         let by_effect = self.by_effect();
         if !by_effect.is_empty() {
@@ -36,15 +46,25 @@ impl Board {
         for (title, shared) in FORMULAS {
             let (counts, mean) = self.by_formula(shared);
             if counts.all() > 0 {
-                let mean = mean.map(|mean| format!(", mean probability of the true name {mean:.3}")).unwrap_or_default();
-                let _ = writeln!(out, "{title}: {} exact, {} in the set{mean}", percent(&counts.exactly()), counts.in_set);
+                let mean = mean
+                    .map(|mean| format!(", mean probability of the true name {mean:.3}"))
+                    .unwrap_or_default();
+                let _ = writeln!(
+                    out,
+                    "{title}: {} exact, {} in the set{mean}",
+                    percent(&counts.exactly()),
+                    counts.in_set
+                );
             }
         }
         let confusion = self.confusion();
         if !confusion.is_empty() {
             let _ = writeln!(out, "\ncalled (`=` rightly, `-` nothing)");
             for (effect, called) in confusion {
-                let called: Vec<String> = called.iter().map(|(name, count)| format!("{name} {count}")).collect();
+                let called: Vec<String> = called
+                    .iter()
+                    .map(|(name, count)| format!("{name} {count}"))
+                    .collect();
                 let _ = writeln!(out, "  {effect:<22}{}", called.join(", "));
             }
         }
@@ -55,10 +75,17 @@ impl Board {
             }
         }
         for (effect, share) in self.intervals() {
-            let _ = writeln!(out, "95 % intervals that hold the truth, {effect}: {}", percent(&share));
+            let _ = writeln!(
+                out,
+                "95 % intervals that hold the truth, {effect}: {}",
+                percent(&share)
+            );
         }
         let [due, null] = self.ratios();
-        for (title, ratios) in [(format!("with an L of {DUE} or more"), due), ("without an effect".into(), null)] {
+        for (title, ratios) in [
+            (format!("with an L of {DUE} or more"), due),
+            ("without an effect".into(), null),
+        ] {
             if let (Some(median), Some(late)) = (quantile(&ratios, 0.5), quantile(&ratios, 0.9)) {
                 let within = Share::of(ratios.iter().map(|ratio| *ratio <= 1.1));
                 let within = percent(&within);
@@ -69,7 +96,10 @@ impl Board {
             }
         }
         if let Some(median) = quantile(&self.explained(), 0.5) {
-            let _ = writeln!(out, "explained share of the held-out error: median {median:.4}");
+            let _ = writeln!(
+                out,
+                "explained share of the held-out error: median {median:.4}"
+            );
         }
         for subject in [Subject::Name, Subject::Place] {
             tell_reliability(&mut out, subject.name(), &self.reliability(subject));
@@ -80,7 +110,12 @@ impl Board {
         }
         let failures: Vec<String> = self.failures().map(failure).collect();
         if !failures.is_empty() {
-            let _ = writeln!(out, "\nnot right ({})\n{}", failures.len(), failures.join("\n"));
+            let _ = writeln!(
+                out,
+                "\nnot right ({})\n{}",
+                failures.len(),
+                failures.join("\n")
+            );
         }
         for (case, why) in &self.missing {
             let _ = writeln!(out, "no verdict: {case}: {why}");
@@ -90,12 +125,18 @@ impl Board {
 
     /// Effects by how strong they are, alone in their recording and beside others.
     fn tell_strengths(&self, out: &mut String) {
-        for (title, company) in [("alone in its recording", Company::Alone), ("beside others", Company::Beside)] {
+        for (title, company) in [
+            ("alone in its recording", Company::Alone),
+            ("beside others", Company::Beside),
+        ] {
             let bins = self.by_strength(company);
             if bins.iter().all(|counts| counts.all() == 0) {
                 continue;
             }
-            let _ = writeln!(out, "\neffects {title}\n  L             n  exact  in set  wrong  silent   exact");
+            let _ = writeln!(
+                out,
+                "\neffects {title}\n  L             n  exact  in set  wrong  silent   exact"
+            );
             for (bin, counts) in bins.iter().enumerate() {
                 let _ = writeln!(out, "  {:<9}{}", range(bin), line(counts));
             }
@@ -112,7 +153,16 @@ impl Board {
             out,
             "\nplaces and names of effects with L of {DUE} or more\n  effect                     n  place  name or unknown  wrong name"
         );
-        for (effect, Places { place, name_or_unknown, wrong_name, .. }) in by_effect {
+        for (
+            effect,
+            Places {
+                place,
+                name_or_unknown,
+                wrong_name,
+                ..
+            },
+        ) in by_effect
+        {
             let _ = writeln!(
                 out,
                 "  {effect:<22}{:>6}{:>7}{:>17}{:>12}",
@@ -124,9 +174,21 @@ impl Board {
         }
         let near = self.near_bound();
         if near.of > 0 {
-            let _ = writeln!(out, "held-out rms within {NEAR_BOUND} of its bound: {}", percent(&near));
-            let _ = writeln!(out, "held-out rms larger than before: {}", percent(&self.worse()));
-            let _ = writeln!(out, "held-out rms larger than before and than its bound: {}", percent(&self.worse_than_bound()));
+            let _ = writeln!(
+                out,
+                "held-out rms within {NEAR_BOUND} of its bound: {}",
+                percent(&near)
+            );
+            let _ = writeln!(
+                out,
+                "held-out rms larger than before: {}",
+                percent(&self.worse())
+            );
+            let _ = writeln!(
+                out,
+                "held-out rms larger than before and than its bound: {}",
+                percent(&self.worse_than_bound())
+            );
         }
     }
 
@@ -134,23 +196,59 @@ impl Board {
     fn tell_left_out(&self, out: &mut String) {
         for (title, tells) in TOLD.into_iter().filter(|_| !self.left_out.is_empty()) {
             let shares = LeftOutShares::of(&self.left_out, tells);
-            let _ = writeln!(out, "\ncauses of L {DUE} or more left out of the list, {title}: {} recordings", shares.wrong.of);
+            let _ = writeln!(
+                out,
+                "\ncauses of L {DUE} or more left out of the list, {title}: {} recordings",
+                shares.wrong.of
+            );
             for (what, share) in shares.titled() {
                 let _ = writeln!(out, "  {what}: {}", percent(&share));
             }
-            for one in self.left_out.iter().filter(|one| one.tells == tells && one.strength >= DUE) {
-                if let Some((name, probability)) = one.wrong.as_ref().filter(|(_, probability)| *probability >= GIVEN) {
-                    let _ = writeln!(out, "    {}: {} is called {name} with {probability:.2}", one.name, one.effect);
+            for one in self
+                .left_out
+                .iter()
+                .filter(|one| one.tells == tells && one.strength >= DUE)
+            {
+                if let Some((name, probability)) = one
+                    .wrong
+                    .as_ref()
+                    .filter(|(_, probability)| *probability >= GIVEN)
+                {
+                    let _ = writeln!(
+                        out,
+                        "    {}: {} is called {name} with {probability:.2}",
+                        one.name, one.effect
+                    );
                 }
             }
         }
         if !self.left_out.is_empty() {
-            tell_reliability(out, "names where the data cannot tell", &self.untold_reliability());
+            tell_reliability(
+                out,
+                "names where the data cannot tell",
+                &self.untold_reliability(),
+            );
             for unlisted in UNLISTED {
-                let _ = writeln!(out, "\nstated probabilities of names where {unlisted} of all causes are in no list");
-                let _ = writeln!(out, "  from  to    stated  right   statements with the whole list, and without the cause");
-                for MixedBin { from, to, stated, right, statements: [listed, without] } in self.mixed_reliability(unlisted) {
-                    let _ = writeln!(out, "  {from:<4}  {to:<4}  {stated:.3}   {right:.3}   {listed:>4}  {without:>4}");
+                let _ = writeln!(
+                    out,
+                    "\nstated probabilities of names where {unlisted} of all causes are in no list"
+                );
+                let _ = writeln!(
+                    out,
+                    "  from  to    stated  right   statements with the whole list, and without the cause"
+                );
+                for MixedBin {
+                    from,
+                    to,
+                    stated,
+                    right,
+                    statements: [listed, without],
+                } in self.mixed_reliability(unlisted)
+                {
+                    let _ = writeln!(
+                        out,
+                        "  {from:<4}  {to:<4}  {stated:.3}   {right:.3}   {listed:>4}  {without:>4}"
+                    );
                 }
             }
         }
@@ -159,12 +257,25 @@ impl Board {
     fn shares(&self) -> Vec<(String, Share)> {
         let [pairs, strongest] = self.whole("pair");
         let mut out = vec![
-            ("false alarms in recordings without an effect".to_string(), self.alarms()),
-            ("recordings with effects in which something was named that is not there".into(), self.strays()),
-            (format!("two effects of L {DUE} or more, both named and nothing else"), pairs),
+            (
+                "false alarms in recordings without an effect".to_string(),
+                self.alarms(),
+            ),
+            (
+                "recordings with effects in which something was named that is not there".into(),
+                self.strays(),
+            ),
+            (
+                format!("two effects of L {DUE} or more, both named and nothing else"),
+                pairs,
+            ),
             ("  the stronger one named".into(), strongest),
         ];
-        out.extend(self.tampered().into_iter().map(|(kind, share)| (format!("{kind} named"), share)));
+        out.extend(
+            self.tampered()
+                .into_iter()
+                .map(|(kind, share)| (format!("{kind} named"), share)),
+        );
         out
     }
 
@@ -177,7 +288,11 @@ impl Board {
         };
         let bins = |company| {
             let by_strength = self.by_strength(company);
-            by_strength.iter().enumerate().map(|(bin, of)| json!({ "L": range(bin), "outcomes": counts(of) })).collect::<Vec<_>>()
+            by_strength
+                .iter()
+                .enumerate()
+                .map(|(bin, of)| json!({ "L": range(bin), "outcomes": counts(of) }))
+                .collect::<Vec<_>>()
         };
         let by_formula = FORMULAS.map(|(_, shared)| {
             let (of, mean) = self.by_formula(shared);
@@ -187,7 +302,8 @@ impl Board {
             let bin = |bin: &Bin| json!({ "from": bin.from, "to": bin.to, "stated": bin.stated, "right": share(&bin.right) });
             json!({ "of": of, "brier": brier, "auc": auc, "bins": bins.iter().map(bin).collect::<Vec<_>>() })
         };
-        let reliability = [Subject::Name, Subject::Place].map(|subject| reliable(subject.name(), self.reliability(subject)));
+        let reliability = [Subject::Name, Subject::Place]
+            .map(|subject| reliable(subject.name(), self.reliability(subject)));
         let left_out = TOLD.map(|(title, tells)| {
             let shares = LeftOutShares::of(&self.left_out, tells).titled();
             json!({ "which": title, "shares": shares.iter().map(|(what, of)| json!({ "what": what, "share": share(of) })).collect::<Vec<_>>() })
@@ -199,11 +315,15 @@ impl Board {
                 ("wrong_name", of.wrong_name),
                 ("wrong_name_0.5", of.wrong_given),
             ];
-            each.iter().map(|(name, of)| (name.to_string(), share(of))).collect::<serde_json::Map<_, _>>()
+            each.iter()
+                .map(|(name, of)| (name.to_string(), share(of)))
+                .collect::<serde_json::Map<_, _>>()
         };
         let (placed, placed_by_effect) = self.places();
-        let placed_by_effect: serde_json::Map<_, _> =
-            placed_by_effect.iter().map(|(name, of)| (name.to_string(), json!(places(of)))).collect();
+        let placed_by_effect: serde_json::Map<_, _> = placed_by_effect
+            .iter()
+            .map(|(name, of)| (name.to_string(), json!(places(of))))
+            .collect();
         let [due, null] = self.ratios();
         let spread = |sorted: &[f64]| json!({ "n": sorted.len(), "median": quantile(sorted, 0.5), "p90": quantile(sorted, 0.9) });
         json!({
@@ -228,26 +348,50 @@ impl Board {
 }
 
 fn mixed_bin(bin: &MixedBin) -> Value {
-    let MixedBin { from, to, stated, right, statements: [listed, without] } = bin;
+    let MixedBin {
+        from,
+        to,
+        stated,
+        right,
+        statements: [listed, without],
+    } = bin;
     json!({ "from": from, "to": to, "stated": stated, "right": right, "statements_whole_list": listed, "statements_left_out": without })
 }
 
 /// Stated probabilities against what was true.
 fn tell_reliability(out: &mut String, of: &str, Reliability { bins, brier, auc }: &Reliability) {
     if let Some(brier) = brier {
-        let auc = auc.map(|auc| format!(", area under the ROC curve {auc:.3}")).unwrap_or_default();
-        let _ = writeln!(out, "\nstated probabilities of {of}: Brier score {brier:.4}{auc}");
+        let auc = auc
+            .map(|auc| format!(", area under the ROC curve {auc:.3}"))
+            .unwrap_or_default();
+        let _ = writeln!(
+            out,
+            "\nstated probabilities of {of}: Brier score {brier:.4}{auc}"
+        );
         let _ = writeln!(out, "  from  to    stated  right");
     }
-    for Bin { from, to, stated, right } in bins {
-        let _ = writeln!(out, "  {from:<4}  {to:<4}  {stated:.3}   {}", percent(right));
+    for Bin {
+        from,
+        to,
+        stated,
+        right,
+    } in bins
+    {
+        let _ = writeln!(
+            out,
+            "  {from:<4}  {to:<4}  {stated:.3}   {}",
+            percent(right)
+        );
     }
 }
 
 fn titled(all: &Places) -> [(&'static str, Share); 4] {
     [
         ("place right", all.place),
-        ("name right, or unknown at the right place", all.name_or_unknown),
+        (
+            "name right, or unknown at the right place",
+            all.name_or_unknown,
+        ),
         ("a wrong name at all", all.wrong_name),
         ("a wrong name with 0.5 or more", all.wrong_given),
     ]
@@ -262,25 +406,57 @@ fn range(bin: usize) -> String {
 }
 
 fn line(counts: &Counts) -> String {
-    let Counts { exact, in_set, wrong, silent } = counts;
-    format!("{:>6}{exact:>7}{in_set:>8}{wrong:>7}{silent:>8}   {}", counts.all(), percent(&counts.exactly()))
+    let Counts {
+        exact,
+        in_set,
+        wrong,
+        silent,
+    } = counts;
+    format!(
+        "{:>6}{exact:>7}{in_set:>8}{wrong:>7}{silent:>8}   {}",
+        counts.all(),
+        percent(&counts.exactly())
+    )
 }
 
 /// E.g. `39 of 40 = 97.5 % (87.1 to 99.6)`, in brackets the 95 % limits.
 fn percent(share: &Share) -> String {
     let [low, high] = share.limits().map(|limit| 100.0 * limit);
     match share.value() {
-        Some(value) => format!("{} of {} = {:.1} % ({low:.1} to {high:.1})", share.count, share.of, 100.0 * value),
+        Some(value) => format!(
+            "{} of {} = {:.1} % ({low:.1} to {high:.1})",
+            share.count,
+            share.of,
+            100.0 * value
+        ),
         None => "-".into(),
     }
 }
 
 fn failure(case: &Case) -> String {
     let wanted = case.causes.iter().map(|cause| {
-        format!("{} at {} [{}, L {:.0}: {}]", cause.effect, cause.place, cause.form, cause.strength, cause.outcome.name())
+        format!(
+            "{} at {} [{}, L {:.0}: {}]",
+            cause.effect,
+            cause.place,
+            cause.form,
+            cause.strength,
+            cause.outcome.name()
+        )
     });
     let wanted: Vec<String> = wanted.collect();
-    let wanted = if wanted.is_empty() { "nothing".into() } else { wanted.join(", ") };
-    let strays = if case.strays.is_empty() { "nothing else".into() } else { case.strays.join(", ") };
-    format!("  {} ({}, {} points): {wanted}; said besides: {strays}", case.name, case.robot, case.points)
+    let wanted = if wanted.is_empty() {
+        "nothing".into()
+    } else {
+        wanted.join(", ")
+    };
+    let strays = if case.strays.is_empty() {
+        "nothing else".into()
+    } else {
+        case.strays.join(", ")
+    };
+    format!(
+        "  {} ({}, {} points): {wanted}; said besides: {strays}",
+        case.name, case.robot, case.points
+    )
 }

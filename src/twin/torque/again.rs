@@ -15,12 +15,21 @@ impl TorqueCase {
 
     /// The same arm with friction of a joint (from 0) that is greater at low speed (Nm), until so fast (rad/s).
     pub fn with_stribeck(self, joint: usize, size: f64, speed: f64) -> Self {
-        self.with(Law::Stribeck { joint, size, speed, fall: Fall::Exponential(1.0) })
+        self.with(Law::Stribeck {
+            joint,
+            size,
+            speed,
+            fall: Fall::Exponential(1.0),
+        })
     }
 
     /// The same arm with so much more Coulomb friction at a joint (from 0), Nm.
     pub fn with_drag(self, joint: usize, size: f64) -> Self {
-        self.with(Law::Coulomb { joint, size, width: 0.008 })
+        self.with(Law::Coulomb {
+            joint,
+            size,
+            width: 0.008,
+        })
     }
 
     fn with(mut self, law: Law) -> Self {
@@ -40,7 +49,9 @@ impl TorqueCase {
     /// The same arm and physics on a motion that is given in even steps (s), to fit, and on its own paths that judge.
     pub fn on_motion(mut self, step: f64, states: Vec<JointState>) -> Self {
         let judging = self.paths.split_off(self.fitted);
-        self.paths = std::iter::once(Path::given(step, states)).chain(judging).collect();
+        self.paths = std::iter::once(Path::given(step, states))
+            .chain(judging)
+            .collect();
         self.fitted = 1;
         self
     }
@@ -55,7 +66,11 @@ impl TorqueCase {
         let (_, signal) = self.measured(rows);
         signal
             .chunks_exact(self.per_unit.len())
-            .flat_map(|row| row.iter().zip(&self.per_unit).map(|(value, unit)| value * unit))
+            .flat_map(|row| {
+                row.iter()
+                    .zip(&self.per_unit)
+                    .map(|(value, unit)| value * unit)
+            })
             .collect()
     }
 
@@ -68,11 +83,15 @@ impl TorqueCase {
     pub fn plain_friction(&self) -> Vec<[Option<f64>; 2]> {
         let of = |joint: usize| {
             let viscous = self.laws.iter().find_map(|law| match law {
-                Law::Viscous { joint: at, size, .. } if *at == joint => Some(*size),
+                Law::Viscous {
+                    joint: at, size, ..
+                } if *at == joint => Some(*size),
                 _ => None,
             });
             let coulomb = self.laws.iter().find_map(|law| match law {
-                Law::Coulomb { joint: at, size, .. } if *at == joint => Some(*size),
+                Law::Coulomb {
+                    joint: at, size, ..
+                } if *at == joint => Some(*size),
                 _ => None,
             });
             [viscous, coulomb]

@@ -7,7 +7,9 @@ use super::rigid::{Body, Machine};
 use crate::conceal::robots::Kind;
 use crate::matrix::{self, Vector};
 use crate::noise::{Noise, Purpose};
-use calib_foundation::description::{DeclaredInertias, InertiaMoments, MassTolerance, RobotDescription};
+use calib_foundation::description::{
+    DeclaredInertias, InertiaMoments, MassTolerance, RobotDescription,
+};
 
 /// What a set of recordings is drawn from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -61,7 +63,11 @@ impl TorqueDesign {
     fn content(&self, number: usize) -> TorqueContent {
         let begin = Noise::new(self.seed, Purpose::Design).uniform(0.0, 1.0);
         let at = (begin + number as f64 * 0.618_033_988_749_895).fract();
-        let shares = [(TorqueContent::Null, self.nulls), (TorqueContent::Pair, self.pairs), (TorqueContent::Open, self.open)];
+        let shares = [
+            (TorqueContent::Null, self.nulls),
+            (TorqueContent::Pair, self.pairs),
+            (TorqueContent::Open, self.open),
+        ];
         let mut end = 0.0;
         for (content, share) in shares {
             end += share;
@@ -122,21 +128,33 @@ const CARRIED: [f64; 2] = [0.2, 0.6];
 /// Shares of the recording of each stretch: sines and moves to fit, sines and moves that judge.
 const STRETCHES: [f64; 4] = [0.3, 0.25, 0.25, 0.2];
 const FITTED: usize = 2;
-const TOLERANCE: MassTolerance = MassTolerance { mass: 0.01, centre: 0.004, inertia: 0.05 };
+const TOLERANCE: MassTolerance = MassTolerance {
+    mass: 0.01,
+    centre: 0.004,
+    inertia: 0.05,
+};
 /// Standard deviations that the truth is off at most.
 const MOST_OFF: f64 = 2.0;
 
 impl TorqueCase {
     /// The case of this number.
     pub fn draw(design: &TorqueDesign, number: usize) -> Self {
-        let seed = design.seed.wrapping_mul(1_000_003).wrapping_add(number as u64);
+        let seed = design
+            .seed
+            .wrapping_mul(1_000_003)
+            .wrapping_add(number as u64);
         let mut noise = Noise::new(seed, Purpose::Design);
         let kind = ARMS[noise.index(ARMS.len())];
         let robot = declared(kind, &mut noise);
         let stated = machine(&robot);
         let scattered = scattered(&stated, &mut noise);
         let speed = noise.uniform(0.8, 1.5) * if kind == Kind::Sr210d { 0.9 } else { 1.2 };
-        let (paths, fitted) = paths(&robot, speed, design.seconds, &mut Noise::new(seed, Purpose::Poses));
+        let (paths, fitted) = paths(
+            &robot,
+            speed,
+            design.seconds,
+            &mut Noise::new(seed, Purpose::Poses),
+        );
         let sensors = kind == Kind::Seven7r;
         let n = robot.joints.len();
         let per_unit = robot.joints.iter().map(|joint| match sensors {
@@ -158,7 +176,11 @@ impl TorqueCase {
             lasting: vec![0.0; n],
             per_unit: per_unit.collect(),
             resolution: if sensors { 0.01 } else { 0.002 },
-            encoder_deg: if kind == Kind::Sr210d { 360.0 / f64::from(1 << 20) } else { 360.0 / f64::from(1 << 18) },
+            encoder_deg: if kind == Kind::Sr210d {
+                360.0 / f64::from(1 << 20)
+            } else {
+                360.0 / f64::from(1 << 18)
+            },
             sensors,
             robot,
         };
@@ -166,7 +188,10 @@ impl TorqueCase {
         let peak = peaks(&rows.rigid, n);
         let most = peak.iter().copied().fold(0.0, f64::max);
         let level = noise.uniform(0.7, 1.4);
-        case.white = peak.iter().map(|peak| level * (0.01 * peak + 0.001 * most)).collect();
+        case.white = peak
+            .iter()
+            .map(|peak| level * (0.01 * peak + 0.001 * most))
+            .collect();
         case.lasting = case.white.iter().map(|white| 0.27 * white).collect();
         case.conceal(design, number, &peak, &mut noise);
         case
@@ -181,8 +206,16 @@ impl TorqueCase {
             for (joint, scale) in scale.iter().enumerate() {
                 let other = noise.chance(design.other_forms * 0.3);
                 let exponent = if other { noise.uniform(0.6, 0.8) } else { 1.0 };
-                self.laws.push(Law::Viscous { joint, size: scale * noise.uniform(0.04, 0.12), exponent });
-                self.laws.push(Law::Coulomb { joint, size: scale * noise.uniform(0.05, 0.15), width });
+                self.laws.push(Law::Viscous {
+                    joint,
+                    size: scale * noise.uniform(0.04, 0.12),
+                    exponent,
+                });
+                self.laws.push(Law::Coulomb {
+                    joint,
+                    size: scale * noise.uniform(0.05, 0.15),
+                    width,
+                });
             }
         }
         self.common = self.laws.len();
@@ -209,7 +242,9 @@ impl TorqueCase {
             let law = pool.law(family, noise, other);
             // One of a kind, and one a joint: two hide each other.
             let apart = |law: &Law| {
-                drawn.iter().all(|(known, one)| *known != family && (one.joint().is_none() || one.joint() != law.joint()))
+                drawn.iter().all(|(known, one)| {
+                    *known != family && (one.joint().is_none() || one.joint() != law.joint())
+                })
             };
             let law = law.filter(apart);
             drawn.extend(law.map(|law| (family, law)));
@@ -225,8 +260,15 @@ const COMMON: f64 = 0.85;
 /// The arm with a payload, inertias and tolerances declared.
 fn declared(kind: Kind, noise: &mut Noise) -> RobotDescription {
     let mut robot = kind.description([0.0; 3]);
-    robot.payload_mass = (robot.payload_mass * noise.uniform(CARRIED[0], CARRIED[1]) * 10.0).round() / 10.0;
-    let ends = robot.joints.iter().skip(1).map(|joint| joint.point).chain([robot.tool]).collect::<Vec<_>>();
+    robot.payload_mass =
+        (robot.payload_mass * noise.uniform(CARRIED[0], CARRIED[1]) * 10.0).round() / 10.0;
+    let ends = robot
+        .joints
+        .iter()
+        .skip(1)
+        .map(|joint| joint.point)
+        .chain([robot.tool])
+        .collect::<Vec<_>>();
     let links = robot.joints.iter().zip(ends).map(|(joint, end)| {
         let span = matrix::minus(end, joint.point);
         Some(rod(joint.mass.unwrap_or(0.0), span))
@@ -234,7 +276,11 @@ fn declared(kind: Kind, noise: &mut Noise) -> RobotDescription {
     let links = links.collect();
     let across = 0.2 * matrix::norm(matrix::minus(robot.payload_centre, robot.tool)) + 0.1;
     let ball = 0.4 * robot.payload_mass * across * across;
-    robot.inertias = DeclaredInertias { links, payload: Some([ball, 0.0, 0.0, ball, 0.0, ball]), tolerance: Some(TOLERANCE) };
+    robot.inertias = DeclaredInertias {
+        links,
+        payload: Some([ball, 0.0, 0.0, ball, 0.0, ball]),
+        tolerance: Some(TOLERANCE),
+    };
     robot
 }
 
@@ -243,14 +289,28 @@ fn rod(mass: f64, span: Vector) -> InertiaMoments {
     let length = matrix::norm(span).max(0.08);
     let along = matrix::scale(span, 1.0 / matrix::norm(span).max(1e-9));
     let radius = 0.18 * length + 0.03;
-    let (axial, lateral) = (0.5 * mass * radius * radius, mass * (length * length / 12.0 + 0.25 * radius * radius));
-    let moment = |i: usize, j: usize| f64::from(i == j) * lateral + (axial - lateral) * along[i] * along[j];
-    [moment(0, 0), moment(0, 1), moment(0, 2), moment(1, 1), moment(1, 2), moment(2, 2)]
+    let (axial, lateral) = (
+        0.5 * mass * radius * radius,
+        mass * (length * length / 12.0 + 0.25 * radius * radius),
+    );
+    let moment =
+        |i: usize, j: usize| f64::from(i == j) * lateral + (axial - lateral) * along[i] * along[j];
+    [
+        moment(0, 0),
+        moment(0, 1),
+        moment(0, 2),
+        moment(1, 1),
+        moment(1, 2),
+        moment(2, 2),
+    ]
 }
 
 /// The bodies that a description declares.
 fn machine(robot: &RobotDescription) -> Machine {
-    let body = |(joint, moments): (&calib_foundation::description::JointDescription, &Option<InertiaMoments>)| Body {
+    let body = |(joint, moments): (
+        &calib_foundation::description::JointDescription,
+        &Option<InertiaMoments>,
+    )| Body {
         mass: joint.mass.unwrap_or(0.0),
         centre: joint.centre.unwrap_or(joint.point),
         inertia: moments.unwrap_or_default(),
@@ -259,7 +319,12 @@ fn machine(robot: &RobotDescription) -> Machine {
         axes: robot.joints.iter().map(|joint| joint.axis).collect(),
         points: robot.joints.iter().map(|joint| joint.point).collect(),
         tool: robot.tool,
-        links: robot.joints.iter().zip(&robot.inertias.links).map(body).collect(),
+        links: robot
+            .joints
+            .iter()
+            .zip(&robot.inertias.links)
+            .map(body)
+            .collect(),
         payload: (robot.payload_mass > 0.0).then(|| Body {
             mass: robot.payload_mass,
             centre: robot.payload_centre,
@@ -283,7 +348,12 @@ fn scattered(stated: &Machine, noise: &mut Noise) -> Machine {
 }
 
 /// Sines to fit, moves to fit, sines and moves that judge.
-pub(super) fn paths(robot: &RobotDescription, speed: f64, seconds: f64, noise: &mut Noise) -> (Vec<Path>, usize) {
+pub(super) fn paths(
+    robot: &RobotDescription,
+    speed: f64,
+    seconds: f64,
+    noise: &mut Noise,
+) -> (Vec<Path>, usize) {
     let ranges: Vec<[f64; 2]> = robot
         .joints
         .iter()
@@ -302,6 +372,12 @@ pub(super) fn paths(robot: &RobotDescription, speed: f64, seconds: f64, noise: &
 
 /// Largest rigid torque of each joint, Nm.
 fn peaks(rigid: &[f64], joints: usize) -> Vec<f64> {
-    let of_joint = |joint: usize| rigid.iter().skip(joint).step_by(joints).fold(0.0, |most: f64, x| most.max(x.abs()));
+    let of_joint = |joint: usize| {
+        rigid
+            .iter()
+            .skip(joint)
+            .step_by(joints)
+            .fold(0.0, |most: f64, x| most.max(x.abs()))
+    };
     (0..joints).map(of_joint).collect()
 }

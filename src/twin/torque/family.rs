@@ -46,24 +46,62 @@ impl Pool<'_> {
         match family {
             0 => {
                 let by_speed = if other { noise.uniform(0.3, 0.7) } else { 0.0 };
-                Law::Asymmetric { joint, size: scale * noise.uniform(0.04, 0.1), width, by_speed }
+                Law::Asymmetric {
+                    joint,
+                    size: scale * noise.uniform(0.04, 0.1),
+                    width,
+                    by_speed,
+                }
             }
             1 => {
-                let falls = [Fall::Exponential(2.0), Fall::Exponential(noise.uniform(0.5, 0.8)), Fall::Rational];
-                let fall = if other { falls[noise.index(falls.len())] } else { Fall::Exponential(1.0) };
-                Law::Stribeck { joint, size: scale * noise.uniform(0.08, 0.2), speed: noise.uniform(0.04, 0.12), fall }
+                let falls = [
+                    Fall::Exponential(2.0),
+                    Fall::Exponential(noise.uniform(0.5, 0.8)),
+                    Fall::Rational,
+                ];
+                let fall = if other {
+                    falls[noise.index(falls.len())]
+                } else {
+                    Fall::Exponential(1.0)
+                };
+                Law::Stribeck {
+                    joint,
+                    size: scale * noise.uniform(0.08, 0.2),
+                    speed: noise.uniform(0.04, 0.12),
+                    fall,
+                }
             }
             2 => {
                 let (size, travel) = (scale * noise.uniform(0.08, 0.2), noise.size(0.004, 0.03));
                 let others = [Bristles::Two, Bristles::Slipping];
-                let bristles = if other { others[noise.index(others.len())] } else { Bristles::One };
-                Law::Presliding { joint, size, travel, width, bristles }
+                let bristles = if other {
+                    others[noise.index(others.len())]
+                } else {
+                    Bristles::One
+                };
+                Law::Presliding {
+                    joint,
+                    size,
+                    travel,
+                    width,
+                    bristles,
+                }
             }
             3 => {
                 let exponent: f64 = if other { noise.uniform(0.7, 0.9) } else { 1.0 };
-                Law::Load { joint, share: noise.uniform(0.06, 0.2) * scale.powf(1.0 - exponent), exponent, width }
+                Law::Load {
+                    joint,
+                    share: noise.uniform(0.06, 0.2) * scale.powf(1.0 - exponent),
+                    exponent,
+                    width,
+                }
             }
-            _ => Law::Warmup { joint, share: noise.uniform(0.4, 1.0), time: noise.uniform(6.0, 14.0), slow: other },
+            _ => Law::Warmup {
+                joint,
+                share: noise.uniform(0.4, 1.0),
+                time: noise.uniform(6.0, 14.0),
+                slow: other,
+            },
         }
     }
 
@@ -75,41 +113,99 @@ impl Pool<'_> {
             5 => {
                 let last = self.scale.len() - 1;
                 let scale = self.scale[last].min(self.scale[last - 1]);
-                let (viscous, coulomb) = (scale * noise.uniform(0.1, 0.2), scale * noise.uniform(0.1, 0.2));
+                let (viscous, coulomb) = (
+                    scale * noise.uniform(0.1, 0.2),
+                    scale * noise.uniform(0.1, 0.2),
+                );
                 let exponent = if other { noise.uniform(0.6, 0.85) } else { 1.0 };
                 let by = last - 1;
-                Law::WristCoupling { joint: last, by, ratio: noise.sign(), viscous, coulomb, width: self.width, exponent }
+                Law::WristCoupling {
+                    joint: last,
+                    by,
+                    ratio: noise.sign(),
+                    viscous,
+                    coulomb,
+                    width: self.width,
+                    exponent,
+                }
             }
             6 | 7 if self.sensors => return None,
-            6 => Law::Rotor { joint, inertia: scale * noise.uniform(0.03, 0.08) },
+            6 => Law::Rotor {
+                joint,
+                inertia: scale * noise.uniform(0.03, 0.08),
+            },
             7 => {
                 let share = noise.sign() * noise.uniform(0.06, 0.15);
-                let (times, half) = if other { (2.0, scale) } else { (1.0, f64::INFINITY) };
-                Law::TorqueConstant { joint, share: times * share, half }
+                let (times, half) = if other {
+                    (2.0, scale)
+                } else {
+                    (1.0, f64::INFINITY)
+                };
+                Law::TorqueConstant {
+                    joint,
+                    share: times * share,
+                    half,
+                }
             }
             8 => {
                 let drift = if other { noise.uniform(0.2, 0.5) } else { 0.0 };
-                Law::Offset { joint, size: noise.sign() * scale * noise.uniform(0.03, 0.1), drift }
+                Law::Offset {
+                    joint,
+                    size: noise.sign() * scale * noise.uniform(0.03, 0.1),
+                    drift,
+                }
             }
             9 => {
                 let order = (1 + noise.index(6)) as f64;
                 let overtone = if other { noise.uniform(0.3, 0.6) } else { 0.0 };
-                Law::Ripple { joint, size: scale * noise.uniform(0.02, 0.06), order, phase: noise.uniform(0.0, 6.2), overtone }
+                Law::Ripple {
+                    joint,
+                    size: scale * noise.uniform(0.02, 0.06),
+                    order,
+                    phase: noise.uniform(0.0, 6.2),
+                    overtone,
+                }
             }
             10 => {
-                let gas = if other { noise.uniform(0.15, 0.35) } else { 0.0 };
+                let gas = if other {
+                    noise.uniform(0.15, 0.35)
+                } else {
+                    0.0
+                };
                 let size = self.scale[BALANCED] * noise.uniform(0.1, 0.25);
-                Law::Spring { joint: BALANCED, size, zero: angle(noise), gas }
+                Law::Spring {
+                    joint: BALANCED,
+                    size,
+                    zero: angle(noise),
+                    gas,
+                }
             }
             11 => {
                 let hardening = if other { noise.uniform(0.2, 0.5) } else { 0.0 };
-                Law::Cable { joint, stiffness: scale * noise.uniform(0.04, 0.12), zero: angle(noise), hardening }
+                Law::Cable {
+                    joint,
+                    stiffness: scale * noise.uniform(0.04, 0.12),
+                    zero: angle(noise),
+                    hardening,
+                }
             }
-            12 => Law::Latency { time: noise.uniform(0.006, 0.02), filter: other },
-            13 => Law::Elasticity { joint, frequency: noise.uniform(18.0, 35.0), damping: noise.uniform(0.05, 0.2) },
+            12 => Law::Latency {
+                time: noise.uniform(0.006, 0.02),
+                filter: other,
+            },
+            13 => Law::Elasticity {
+                joint,
+                frequency: noise.uniform(18.0, 35.0),
+                damping: noise.uniform(0.05, 0.2),
+            },
             _ => {
                 let time = noise.uniform(0.03, 0.08);
-                Law::Backlash { joint, size: scale * noise.uniform(0.06, 0.15), time, wave: other }
+                Law::Backlash {
+                    joint,
+                    size: scale * noise.uniform(0.06, 0.15),
+                    time,
+                    wave: other,
+                }
             }
         })
     }
@@ -120,22 +216,56 @@ impl Pool<'_> {
         Some(match family {
             15 => {
                 let start = noise.uniform(2.0, self.touched - 4.0);
-                let reach = matrix::norm(matrix::minus(self.machine.tool, self.machine.points[0])).max(0.3);
+                let reach =
+                    matrix::norm(matrix::minus(self.machine.tool, self.machine.points[0])).max(0.3);
                 let size = 0.1 * self.scale.iter().copied().fold(0.0, f64::max) / reach;
                 let end = start + noise.uniform(0.8, 1.6);
-                Law::Contact { start, end, force: noise.vector(size, 3.0 * size), held: other }
+                Law::Contact {
+                    start,
+                    end,
+                    force: noise.vector(size, 3.0 * size),
+                    held: other,
+                }
             }
             16 => {
-                let payload = self.machine.payload.as_ref().map_or(0.0, |payload| payload.mass);
-                let centre = if other { noise.vector(0.01, 0.03) } else { [0.0; 3] };
-                Law::Payload { mass: noise.sign() * payload * noise.uniform(0.1, 0.3), centre }
+                let payload = self
+                    .machine
+                    .payload
+                    .as_ref()
+                    .map_or(0.0, |payload| payload.mass);
+                let centre = if other {
+                    noise.vector(0.01, 0.03)
+                } else {
+                    [0.0; 3]
+                };
+                Law::Payload {
+                    mass: noise.sign() * payload * noise.uniform(0.1, 0.3),
+                    centre,
+                }
             }
             17 => {
-                let (link, share) = (1 + noise.index(n - 2), noise.sign() * noise.uniform(0.06, 0.15));
-                Law::LinkMass { link, share, away: if other { noise.vector(0.03, 0.1) } else { [0.0; 3] } }
+                let (link, share) = (
+                    1 + noise.index(n - 2),
+                    noise.sign() * noise.uniform(0.06, 0.15),
+                );
+                Law::LinkMass {
+                    link,
+                    share,
+                    away: if other {
+                        noise.vector(0.03, 0.1)
+                    } else {
+                        [0.0; 3]
+                    },
+                }
             }
-            18 => Law::LinkCentre { link: 1 + noise.index(n - 2), shift: noise.vector(0.02, 0.05) },
-            19 => Law::LinkInertia { link: noise.index(n - 1), share: noise.uniform(0.4, 1.0) },
+            18 => Law::LinkCentre {
+                link: 1 + noise.index(n - 2),
+                shift: noise.vector(0.02, 0.05),
+            },
+            19 => Law::LinkInertia {
+                link: noise.index(n - 1),
+                share: noise.uniform(0.4, 1.0),
+            },
             20 => {
                 let [x, y, _] = noise.vector(0.02, 0.05);
                 Law::Tilt { by: [x, y] }
@@ -143,9 +273,17 @@ impl Pool<'_> {
             _ if self.common => return None,
             21 => {
                 let exponent = if other { noise.uniform(0.6, 0.8) } else { 1.0 };
-                Law::Viscous { joint, size: self.scale[joint] * noise.uniform(0.04, 0.12), exponent }
+                Law::Viscous {
+                    joint,
+                    size: self.scale[joint] * noise.uniform(0.04, 0.12),
+                    exponent,
+                }
             }
-            _ => Law::Coulomb { joint, size: self.scale[joint] * noise.uniform(0.05, 0.15), width: self.width },
+            _ => Law::Coulomb {
+                joint,
+                size: self.scale[joint] * noise.uniform(0.05, 0.15),
+                width: self.width,
+            },
         })
     }
 
@@ -153,23 +291,56 @@ impl Pool<'_> {
     fn curve(&self, which: usize, joint: usize, noise: &mut Noise) -> Law {
         let (scale, n) = (self.scale[joint], self.scale.len());
         let waves = |noise: &mut Noise, [least, most]: [f64; 2]| {
-            std::array::from_fn(|_| [noise.uniform(least, most), noise.uniform(0.0, 6.2), noise.uniform(0.3, 1.0)])
+            std::array::from_fn(|_| {
+                [
+                    noise.uniform(least, most),
+                    noise.uniform(0.0, 6.2),
+                    noise.uniform(0.3, 1.0),
+                ]
+            })
         };
         match which {
             0 => {
                 let by = (joint + 1 + noise.index(n - 1)) % n;
-                Law::Meshing { joint, by, size: scale * noise.uniform(0.06, 0.15), order: (2 + noise.index(2)) as f64 }
+                Law::Meshing {
+                    joint,
+                    by,
+                    size: scale * noise.uniform(0.06, 0.15),
+                    order: (2 + noise.index(2)) as f64,
+                }
             }
             1 => {
                 let size = scale * noise.uniform(0.05, 0.12);
-                Law::SpeedCurve { joint, size, width: self.width, waves: waves(noise, [3.0, 9.0]) }
+                Law::SpeedCurve {
+                    joint,
+                    size,
+                    width: self.width,
+                    waves: waves(noise, [3.0, 9.0]),
+                }
             }
             3 => {
-                let (size, order) = (scale * noise.uniform(0.05, 0.12), (1 + noise.index(3)) as f64);
-                Law::AngleDrag { joint, size, width: self.width, order, phase: noise.uniform(0.0, 6.2) }
+                let (size, order) = (
+                    scale * noise.uniform(0.05, 0.12),
+                    (1 + noise.index(3)) as f64,
+                );
+                Law::AngleDrag {
+                    joint,
+                    size,
+                    width: self.width,
+                    order,
+                    phase: noise.uniform(0.0, 6.2),
+                }
             }
-            4 => Law::HoseDrag { joint, size: scale * noise.uniform(0.05, 0.15), travel: noise.uniform(0.1, 0.4) },
-            _ => Law::AngleCurve { joint, size: scale * noise.uniform(0.03, 0.08), waves: waves(noise, [1.3, 5.0]) },
+            4 => Law::HoseDrag {
+                joint,
+                size: scale * noise.uniform(0.05, 0.15),
+                travel: noise.uniform(0.1, 0.4),
+            },
+            _ => Law::AngleCurve {
+                joint,
+                size: scale * noise.uniform(0.03, 0.08),
+                waves: waves(noise, [1.3, 5.0]),
+            },
         }
     }
 }

@@ -14,7 +14,10 @@ impl TorqueCase {
     /// robot.json and recording.csv.
     pub fn recording(&self) -> [TorqueFile; 2] {
         let rows = self.all();
-        [("robot.json", pretty(&self.robot_json())), ("recording.csv", self.csv(&rows))]
+        [
+            ("robot.json", pretty(&self.robot_json())),
+            ("recording.csv", self.csv(&rows)),
+        ]
     }
 
     /// The truth: what is concealed, with its numbers and how visible each effect is.
@@ -26,7 +29,12 @@ impl TorqueCase {
         let mut effects = Vec::new();
         for (number, (law, seen)) in self.laws.iter().zip(&seen).enumerate() {
             let kin = law.kin().iter().map(|effect| pair(effect, &law.place()));
-            let same: Vec<Value> = seen.same.iter().map(|(effect, place)| pair(effect, place)).chain(kin).collect();
+            let same: Vec<Value> = seen
+                .same
+                .iter()
+                .map(|(effect, place)| pair(effect, place))
+                .chain(kin)
+                .collect();
             let other = law.is_of_another_form();
             accepted.extend(same.iter().cloned());
             effects.push(json!({
@@ -52,12 +60,33 @@ impl TorqueCase {
     fn csv(&self, rows: &TorqueRows) -> String {
         let n = self.stated.axes.len();
         let (angles, signal) = self.measured(rows);
-        let names = |name: &str| (1..=n).map(|j| name.replace("{j}", &j.to_string())).collect::<Vec<_>>().join(",");
-        let (signal_name, decimals) = if self.sensors { ("tau{j}_nm", 2) } else { ("i{j}_a", 3) };
-        let mut text = format!("time_s,traj,use,{},{}\n", names("q{j}_deg"), names(signal_name));
+        let names = |name: &str| {
+            (1..=n)
+                .map(|j| name.replace("{j}", &j.to_string()))
+                .collect::<Vec<_>>()
+                .join(",")
+        };
+        let (signal_name, decimals) = if self.sensors {
+            ("tau{j}_nm", 2)
+        } else {
+            ("i{j}_a", 3)
+        };
+        let mut text = format!(
+            "time_s,traj,use,{},{}\n",
+            names("q{j}_deg"),
+            names(signal_name)
+        );
         for row in 0..rows.time.len() {
-            let usage = if rows.validate[row] { "validate" } else { "fit" };
-            let _ = write!(text, "{:.3},{},{usage}", rows.time[row], rows.trajectory[row]);
+            let usage = if rows.validate[row] {
+                "validate"
+            } else {
+                "fit"
+            };
+            let _ = write!(
+                text,
+                "{:.3},{},{usage}",
+                rows.time[row], rows.trajectory[row]
+            );
             angles[row * n..(row + 1) * n].iter().for_each(|angle| {
                 let _ = write!(text, ",{angle:.5}");
             });
@@ -72,7 +101,8 @@ impl TorqueCase {
     fn robot_json(&self) -> Value {
         let robot: &RobotDescription = &self.robot;
         let mm = |point: [f64; 3]| point.map(|x| (x * 1e6).round() / 1e3);
-        let each = |of: &dyn Fn(usize) -> Value| (0..robot.joints.len()).map(of).collect::<Vec<Value>>();
+        let each =
+            |of: &dyn Fn(usize) -> Value| (0..robot.joints.len()).map(of).collect::<Vec<Value>>();
         let offset: [f64; 3] = std::array::from_fn(|k| robot.payload_centre[k] - robot.tool[k]);
         let tolerance = robot
             .inertias

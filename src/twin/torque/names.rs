@@ -68,23 +68,27 @@ impl Law {
     /// Where it sits, as people write it.
     pub fn place(&self) -> String {
         match self {
-            Self::LinkMass { link, .. } | Self::LinkCentre { link, .. } | Self::LinkInertia { link, .. } => {
+            Self::LinkMass { link, .. }
+            | Self::LinkCentre { link, .. }
+            | Self::LinkInertia { link, .. } => {
                 format!("link {}", link + 1)
             }
             Self::Payload { .. } => "tool".into(),
             Self::Tilt { .. } => "base".into(),
             Self::Latency { .. } => "recording".into(),
             Self::Contact { .. } => "arm".into(),
-            other => other.joint().map_or_else(|| "arm".into(), |joint| format!("joint {}", joint + 1)),
+            other => other
+                .joint()
+                .map_or_else(|| "arm".into(), |joint| format!("joint {}", joint + 1)),
         }
     }
 
     /// Whether it has another form than the usual formula.
     pub(super) fn is_of_another_form(&self) -> bool {
         match *self {
-            Self::Viscous { exponent, .. } | Self::Load { exponent, .. } | Self::WristCoupling { exponent, .. } => {
-                exponent != 1.0
-            }
+            Self::Viscous { exponent, .. }
+            | Self::Load { exponent, .. }
+            | Self::WristCoupling { exponent, .. } => exponent != 1.0,
             Self::Offset { drift, .. } => drift != 0.0,
             Self::Latency { filter, .. } => filter,
             Self::LinkMass { away, .. } => away != [0.0; 3],

@@ -14,7 +14,10 @@ pub(super) struct Path {
 #[derive(Debug, Clone, PartialEq)]
 enum Form {
     /// Joint by joint: middle, and amplitude, rad/s and phase of each sine.
-    Sines { middle: Vec<f64>, waves: Vec<Vec<[f64; 3]>> },
+    Sines {
+        middle: Vec<f64>,
+        waves: Vec<Vec<[f64; 3]>>,
+    },
     /// Where each move begins and how long it takes, s, from and to.
     Moves(Vec<Leg>),
     /// States at even steps, s.
@@ -46,38 +49,68 @@ impl Path {
                 .iter()
                 .map(|k| {
                     let rate = slowest * *k as f64 * noise.uniform(0.9, 1.1);
-                    [noise.uniform(0.2, 1.0) / *k as f64, rate, noise.uniform(0.0, std::f64::consts::TAU)]
+                    [
+                        noise.uniform(0.2, 1.0) / *k as f64,
+                        rate,
+                        noise.uniform(0.0, std::f64::consts::TAU),
+                    ]
                 })
                 .collect();
-            let (far, fast) = (own.iter().map(|w| w[0]).sum::<f64>(), own.iter().map(|w| w[0] * w[1]).sum::<f64>());
+            let (far, fast) = (
+                own.iter().map(|w| w[0]).sum::<f64>(),
+                own.iter().map(|w| w[0] * w[1]).sum::<f64>(),
+            );
             let share = (0.8 * reach / far).min(speed / fast);
             own.iter_mut().for_each(|wave| wave[0] *= share);
             let room = (reach - share * far).max(0.0);
             middle.push(0.5 * (lower + upper) + noise.uniform(-1.0, 1.0) * room);
             waves.push(own);
         }
-        Self { duration, form: Form::Sines { middle, waves } }
+        Self {
+            duration,
+            form: Form::Sines { middle, waves },
+        }
     }
 
     /// Moves between points inside `ranges`, each with a pause after it.
     pub(super) fn moves(noise: &mut Noise, ranges: &[[f64; 2]], speed: f64, duration: f64) -> Self {
-        let point = |noise: &mut Noise| ranges.iter().map(|[lower, upper]| noise.uniform(*lower, *upper)).collect::<Vec<f64>>();
+        let point = |noise: &mut Noise| {
+            ranges
+                .iter()
+                .map(|[lower, upper]| noise.uniform(*lower, *upper))
+                .collect::<Vec<f64>>()
+        };
         let (mut legs, mut start, mut from) = (Vec::new(), 0.4, point(noise));
         while start < duration {
             let to = point(noise);
-            let far = from.iter().zip(&to).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            let far = from
+                .iter()
+                .zip(&to)
+                .map(|(a, b)| (a - b).abs())
+                .fold(0.0, f64::max);
             // The peak of this profile is 1.875 times its mean.
             let takes = (1.875 * far / (speed * noise.uniform(0.4, 1.0))).max(0.5);
-            legs.push(Leg { start, takes, from, to: to.clone() });
+            legs.push(Leg {
+                start,
+                takes,
+                from,
+                to: to.clone(),
+            });
             start += takes + noise.uniform(0.3, 0.7);
             from = to;
         }
-        Self { duration, form: Form::Moves(legs) }
+        Self {
+            duration,
+            form: Form::Moves(legs),
+        }
     }
 
     /// A motion in even steps, s.
     pub(super) fn given(step: f64, states: Vec<JointState>) -> Self {
-        Self { duration: step * states.len() as f64, form: Form::Given(step, states) }
+        Self {
+            duration: step * states.len() as f64,
+            form: Form::Given(step, states),
+        }
     }
 
     /// The joints at a time from the stretch's begin, s.
@@ -104,13 +137,19 @@ impl Path {
                 let leg = legs.iter().rfind(|leg| leg.start <= time).or(legs.first());
                 leg.map_or_else(JointState::default, |leg| leg.at(time))
             }
-            Form::Given(step, states) => states[((time / step).round() as usize).min(states.len() - 1)].clone(),
+            Form::Given(step, states) => {
+                states[((time / step).round() as usize).min(states.len() - 1)].clone()
+            }
         }
     }
 
     /// 0 at both ends, 1 between, with its derivatives.
     fn gate(&self, time: f64) -> [f64; 3] {
-        let (near, sign) = if time < 0.5 * self.duration { (time, 1.0) } else { (self.duration - time, -1.0) };
+        let (near, sign) = if time < 0.5 * self.duration {
+            (time, 1.0)
+        } else {
+            (self.duration - time, -1.0)
+        };
         let [s, ds, dds] = smooth(near / RAMP);
         [s, sign * ds / RAMP, dds / (RAMP * RAMP)]
     }

@@ -47,8 +47,13 @@ impl TorqueCase {
         let fine_steps = (FINE / self.rate).ceil().max(1.0) as usize;
         let step = 1.0 / (self.rate * fine_steps as f64);
         let behind = |filtered: bool| {
-            let time =
-                |law: &&Law| if let Law::Latency { time, filter } = law { (*filter == filtered).then_some(*time) } else { None };
+            let time = |law: &&Law| {
+                if let Law::Latency { time, filter } = law {
+                    (*filter == filtered).then_some(*time)
+                } else {
+                    None
+                }
+            };
             laws.iter().filter_map(time).sum::<f64>()
         };
         let (late, filter) = (behind(false), behind(true));
@@ -65,18 +70,37 @@ impl TorqueCase {
                     past = laws.iter().map(|law| law.begin(&rigid)).collect();
                 }
                 let mut friction = vec![0.0; n];
-                laws.iter().filter_map(|law| law.plain_friction(&state)).for_each(|(joint, size)| friction[joint] += size);
+                laws.iter()
+                    .filter_map(|law| law.plain_friction(&state))
+                    .for_each(|(joint, size)| friction[joint] += size);
                 let mut torque = rigid.clone();
-                let now = Moment { time: begin + time, step, state: &state, rigid: &rigid, friction: &friction };
-                laws.iter().zip(&mut past).for_each(|(law, past)| law.add(&now, past, &mut torque));
+                let now = Moment {
+                    time: begin + time,
+                    step,
+                    state: &state,
+                    rigid: &rigid,
+                    friction: &friction,
+                };
+                laws.iter()
+                    .zip(&mut past)
+                    .for_each(|(law, past)| law.add(&now, past, &mut torque));
                 for law in &laws {
                     match law {
-                        Law::Contact { start, end, force, held } if (*start..*end).contains(&(begin + time)) => {
+                        Law::Contact {
+                            start,
+                            end,
+                            force,
+                            held,
+                        } if (*start..*end).contains(&(begin + time)) => {
                             let part = (begin + time - start) / (end - start);
                             let wave = (std::f64::consts::PI * part).sin();
-                            let push = force.map(|f| f * if *held { (3.0 * wave).min(1.0) } else { wave });
+                            let push =
+                                force.map(|f| f * if *held { (3.0 * wave).min(1.0) } else { wave });
                             let against = machine.against(&state.q, push);
-                            torque.iter_mut().zip(against).for_each(|(torque, against)| *torque += against);
+                            torque
+                                .iter_mut()
+                                .zip(against)
+                                .for_each(|(torque, against)| *torque += against);
                         }
                         Law::TorqueConstant { joint, share, half } => {
                             torque[*joint] *= 1.0 + share / (1.0 + torque[*joint].abs() / half);
@@ -101,7 +125,8 @@ impl TorqueCase {
                 let at = (k as f64 - late / step).clamp(0.0, (fine.len() - 1) as f64);
                 let (low, part) = (at.floor() as usize, at.fract());
                 let high = (low + 1).min(fine.len() - 1);
-                rows.torque.extend((0..n).map(|j| fine[low][j] * (1.0 - part) + fine[high][j] * part));
+                rows.torque
+                    .extend((0..n).map(|j| fine[low][j] * (1.0 - part) + fine[high][j] * part));
             }
             begin += path.duration + PAUSE;
         }
@@ -124,11 +149,19 @@ impl TorqueCase {
         let mut lasting = vec![0.0; n];
         let (mut angles, mut signal) = (Vec::new(), Vec::new());
         for (state, torque) in rows.state.iter().zip(rows.torque.chunks_exact(n)) {
-            angles.extend(state.q.iter().map(|q| (q.to_degrees() / self.encoder_deg).round() * self.encoder_deg));
+            angles.extend(
+                state
+                    .q
+                    .iter()
+                    .map(|q| (q.to_degrees() / self.encoder_deg).round() * self.encoder_deg),
+            );
             for j in 0..n {
                 lasting[j] = AR1_COEFFICIENT * lasting[j]
-                    + (1.0 - AR1_COEFFICIENT * AR1_COEFFICIENT).sqrt() * self.lasting[j] * noise.normal();
-                let stated = (torque[j] + lasting[j] + self.white[j] * noise.normal()) / self.per_unit[j];
+                    + (1.0 - AR1_COEFFICIENT * AR1_COEFFICIENT).sqrt()
+                        * self.lasting[j]
+                        * noise.normal();
+                let stated =
+                    (torque[j] + lasting[j] + self.white[j] * noise.normal()) / self.per_unit[j];
                 signal.push((stated / self.resolution).round() * self.resolution);
             }
         }
@@ -138,7 +171,9 @@ impl TorqueCase {
 
 /// Each joint's torque behind a filter of first order; steps in parts of its time.
 fn filtered(fine: &mut [Vec<f64>], step: f64) {
-    let Some(mut kept) = fine.first().cloned() else { return };
+    let Some(mut kept) = fine.first().cloned() else {
+        return;
+    };
     for torque in fine {
         for (kept, torque) in kept.iter_mut().zip(torque.iter_mut()) {
             *kept += (1.0 - (-step).exp()) * (*torque - *kept);
@@ -162,7 +197,8 @@ impl Law {
             Self::LinkMass { link, share, away } => {
                 let body = &mut machine.links[*link];
                 body.mass *= 1.0 + share;
-                body.centre = std::array::from_fn(|i| body.centre[i] + share / (1.0 + share) * away[i]);
+                body.centre =
+                    std::array::from_fn(|i| body.centre[i] + share / (1.0 + share) * away[i]);
             }
             Self::LinkCentre { link, shift } => {
                 let body = &mut machine.links[*link];
@@ -172,7 +208,9 @@ impl Law {
                 let body = &mut machine.links[*link];
                 body.inertia = body.inertia.map(|moment| moment * (1.0 + share));
             }
-            Self::Tilt { by: [about_x, about_y] } => {
+            Self::Tilt {
+                by: [about_x, about_y],
+            } => {
                 let turned = crate::matrix::turn_by([*about_x, *about_y, 0.0]);
                 machine.gravity = crate::matrix::see(&turned, machine.gravity);
             }

@@ -58,13 +58,20 @@ struct Pose {
 
 impl Machine {
     fn pose(&self, q: &[f64]) -> Pose {
-        let mut pose = Pose { axes: Vec::new(), points: Vec::new(), frames: Vec::new() };
+        let mut pose = Pose {
+            axes: Vec::new(),
+            points: Vec::new(),
+            frames: Vec::new(),
+        };
         let mut at = matrix::IDENTITY;
         for ((axis, point), angle) in self.axes.iter().zip(&self.points).zip(q) {
             pose.axes.push(matrix::direct(&at, *axis));
             pose.points.push(matrix::place(&at, *point));
             let about = matrix::times(&matrix::shift(*point), &matrix::turn(*axis, *angle));
-            at = matrix::times(&at, &matrix::times(&about, &matrix::shift(scale(*point, -1.0))));
+            at = matrix::times(
+                &at,
+                &matrix::times(&about, &matrix::shift(scale(*point, -1.0))),
+            );
             pose.frames.push(at);
         }
         pose
@@ -82,24 +89,44 @@ impl Machine {
             push = add(push, add(cross(turn, arm), cross(spin, cross(spin, arm))));
             before = pose.points[j];
             let rate = scale(pose.axes[j], state.v[j]);
-            turn = add(turn, add(scale(pose.axes[j], state.a[j]), cross(spin, rate)));
+            turn = add(
+                turn,
+                add(scale(pose.axes[j], state.a[j]), cross(spin, rate)),
+            );
             spin = add(spin, rate);
             let last = (j + 1 == n).then_some(self.payload.as_ref()).flatten();
             for body in std::iter::once(&self.links[j]).chain(last) {
-                loads.push((j, self.load(body, &pose.frames[j], pose.points[j], [spin, turn, push])));
+                loads.push((
+                    j,
+                    self.load(body, &pose.frames[j], pose.points[j], [spin, turn, push]),
+                ));
             }
         }
         let about = |j: usize| {
             let beyond = loads
                 .iter()
                 .filter(|(link, _)| *link >= j)
-                .map(|(_, load)| dot(pose.axes[j], add(load.moment, cross(minus(load.centre, pose.points[j]), load.force))));
+                .map(|(_, load)| {
+                    dot(
+                        pose.axes[j],
+                        add(
+                            load.moment,
+                            cross(minus(load.centre, pose.points[j]), load.force),
+                        ),
+                    )
+                });
             beyond.sum::<f64>()
         };
         (0..n).map(about).collect()
     }
 
-    fn load(&self, body: &Body, frame: &Matrix, point: Vector, [spin, turn, push]: [Vector; 3]) -> Load {
+    fn load(
+        &self,
+        body: &Body,
+        frame: &Matrix,
+        point: Vector,
+        [spin, turn, push]: [Vector; 3],
+    ) -> Load {
         let centre = matrix::place(frame, body.centre);
         let arm = minus(centre, point);
         let moves = add(push, add(cross(turn, arm), cross(spin, cross(spin, arm))));
@@ -107,18 +134,30 @@ impl Machine {
         let within = |v: Vector| matrix::see(frame, v);
         let (w, a) = (within(spin), within(turn));
         let moment = add(tensor(&body.inertia, a), cross(w, tensor(&body.inertia, w)));
-        Load { centre, force: scale(minus(moves, self.gravity), body.mass), moment: matrix::direct(frame, moment) }
+        Load {
+            centre,
+            force: scale(minus(moves, self.gravity), body.mass),
+            moment: matrix::direct(frame, moment),
+        }
     }
 
     /// Nm at each joint that hold against a force at the tool (N, base frame).
     pub fn against(&self, q: &[f64], force: Vector) -> Vec<f64> {
         let pose = self.pose(q);
-        let tool = pose.frames.last().map_or(self.tool, |frame| matrix::place(frame, self.tool));
+        let tool = pose
+            .frames
+            .last()
+            .map_or(self.tool, |frame| matrix::place(frame, self.tool));
         let own = pose.axes.iter().zip(&pose.points);
-        own.map(|(axis, point)| -dot(*axis, cross(minus(tool, *point), force))).collect()
+        own.map(|(axis, point)| -dot(*axis, cross(minus(tool, *point), force)))
+            .collect()
     }
 }
 
 fn tensor([xx, xy, xz, yy, yz, zz]: &[f64; 6], v: Vector) -> Vector {
-    [xx * v[0] + xy * v[1] + xz * v[2], xy * v[0] + yy * v[1] + yz * v[2], xz * v[0] + yz * v[1] + zz * v[2]]
+    [
+        xx * v[0] + xy * v[1] + xz * v[2],
+        xy * v[0] + yy * v[1] + yz * v[2],
+        xz * v[0] + yz * v[1] + zz * v[2],
+    ]
 }

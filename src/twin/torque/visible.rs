@@ -44,32 +44,59 @@ impl TorqueCase {
             if index < self.common {
                 return columns.of_law(&self.laws[index]);
             }
-            let others: Vec<usize> = all.iter().copied().filter(|other| *other != index).collect();
+            let others: Vec<usize> = all
+                .iter()
+                .copied()
+                .filter(|other| *other != index)
+                .collect();
             let less = self.rows(&others);
-            columns.of(rows.torque.iter().zip(&less.torque).map(|(with, less)| with - less))
+            columns.of(rows
+                .torque
+                .iter()
+                .zip(&less.torque)
+                .map(|(with, less)| with - less))
         };
         let effects: Vec<Vec<f64>> = all.iter().map(|index| effect(*index)).collect();
         let base = columns.inertial();
         // Masses cost what their tolerance says: their columns are in standard deviations, with 1 on the diagonal.
         let beside = |index: Option<usize>| -> Vec<(&[f64], f64)> {
-            let others = effects.iter().enumerate().filter(|(other, _)| Some(*other) != index).map(|(_, c)| c.as_slice());
-            base.iter().map(|c| (c.as_slice(), 1.0)).chain(others.map(|c| (c, 0.0))).collect()
+            let others = effects
+                .iter()
+                .enumerate()
+                .filter(|(other, _)| Some(*other) != index)
+                .map(|(_, c)| c.as_slice());
+            base.iter()
+                .map(|c| (c.as_slice(), 1.0))
+                .chain(others.map(|c| (c, 0.0)))
+                .collect()
         };
         let whole = Space::new(&beside(None));
-        let rivals = if self.common < self.laws.len() { columns.rivals() } else { Vec::new() };
+        let rivals = if self.common < self.laws.len() {
+            columns.rivals()
+        } else {
+            Vec::new()
+        };
         let seen = |index: usize| {
             let (l, before) = (whole.alone(base.len() + index), square(&effects[index]));
             if index < self.common {
-                return Visible { l, before, same: Vec::new() };
+                return Visible {
+                    l,
+                    before,
+                    same: Vec::new(),
+                };
             }
             let law = &self.laws[index];
             let known = (law.name().to_string(), law.place());
             let space = Space::new(&beside(Some(index)));
             let own = space.projected(&effects[index]);
             let l = space.dot(&own, &own);
-            let says_the_same =
-                |rival: &&(String, String, Vec<Vec<f64>>)| space.left(&own, &rival.2, l) < SAME.max(SAME_SHARE * l);
-            let same = rivals.iter().filter(says_the_same).map(|(name, place, _)| (name.clone(), place.clone()));
+            let says_the_same = |rival: &&(String, String, Vec<Vec<f64>>)| {
+                space.left(&own, &rival.2, l) < SAME.max(SAME_SHARE * l)
+            };
+            let same = rivals
+                .iter()
+                .filter(says_the_same)
+                .map(|(name, place, _)| (name.clone(), place.clone()));
             let same = same.filter(|rival| *rival != known).collect();
             Visible { l, before, same }
         };
@@ -83,17 +110,34 @@ impl<'a> Columns<'a> {
         let lasts = AR1_COEFFICIENT.powi(AVERAGED as i32);
         let lasting = (1.0 + lasts) / (1.0 - lasts);
         let weight = case.white.iter().zip(&case.lasting);
-        let weight = weight.map(|(white, own)| (white * white / AVERAGED as f64 + own * own * lasting).sqrt().recip());
+        let weight = weight.map(|(white, own)| {
+            (white * white / AVERAGED as f64 + own * own * lasting)
+                .sqrt()
+                .recip()
+        });
         let fit = rows.validate.iter().filter(|validate| !**validate).count();
-        let stated = rows.state[..fit].iter().flat_map(|state| case.stated.torque(state)).collect();
-        Self { case, rows, weight: weight.collect(), stated }
+        let stated = rows.state[..fit]
+            .iter()
+            .flat_map(|state| case.stated.torque(state))
+            .collect();
+        Self {
+            case,
+            rows,
+            weight: weight.collect(),
+            stated,
+        }
     }
 
     /// The column of torques in all rows.
     fn of(&self, torque: impl Iterator<Item = f64>) -> Vec<f64> {
         let n = self.weight.len();
         let torque: Vec<f64> = torque.collect();
-        let fit = self.rows.validate.iter().filter(|validate| !**validate).count();
+        let fit = self
+            .rows
+            .validate
+            .iter()
+            .filter(|validate| !**validate)
+            .count();
         let mut out = Vec::with_capacity(fit / AVERAGED * n);
         for block in torque[..fit * n].chunks_exact(AVERAGED * n) {
             for (joint, weight) in self.weight.iter().enumerate() {
@@ -108,21 +152,31 @@ impl<'a> Columns<'a> {
         let mut machine = self.case.stated.clone();
         change(&mut machine);
         let fit = self.stated.len() / self.weight.len();
-        let with = self.rows.state[..fit].iter().flat_map(|state| machine.torque(state));
+        let with = self.rows.state[..fit]
+            .iter()
+            .flat_map(|state| machine.torque(state));
         self.of(with.zip(&self.stated).map(|(with, less)| with - less))
     }
 
     /// Every number of every body changed by one standard deviation.
     fn inertial(&self) -> Vec<Vec<f64>> {
         let tolerance = self.case.robot.inertias.tolerance;
-        let (mass, centre, inertia) = tolerance.map_or((0.05, 0.01, 0.2), |one| (one.mass, one.centre, one.inertia));
+        let (mass, centre, inertia) =
+            tolerance.map_or((0.05, 0.01, 0.2), |one| (one.mass, one.centre, one.inertia));
         let mut columns = Vec::new();
         for link in 0..self.case.stated.links.len() {
             columns.push(self.of_machine(|machine| machine.links[link].mass *= 1.0 + mass));
-            columns.extend((0..3).map(|k| self.of_machine(|machine| machine.links[link].centre[k] += centre)));
+            columns.extend(
+                (0..3).map(|k| self.of_machine(|machine| machine.links[link].centre[k] += centre)),
+            );
             for k in 0..6 {
-                let most = self.case.stated.links[link].inertia.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
-                columns.push(self.of_machine(|machine| machine.links[link].inertia[k] += inertia * most));
+                let most = self.case.stated.links[link]
+                    .inertia
+                    .iter()
+                    .fold(0.0, |most: f64, x| most.max(x.abs()));
+                columns.push(
+                    self.of_machine(|machine| machine.links[link].inertia[k] += inertia * most),
+                );
             }
         }
         columns
@@ -132,7 +186,9 @@ impl<'a> Columns<'a> {
     fn rivals(&self) -> Vec<(String, String, Vec<Vec<f64>>)> {
         let n = self.weight.len();
         let mut rivals: Vec<(String, String, Vec<Vec<f64>>)> = Vec::new();
-        let mut add = |law: &Law, columns: Vec<Vec<f64>>| rivals.push((law.name().into(), law.place(), columns));
+        let mut add = |law: &Law, columns: Vec<Vec<f64>>| {
+            rivals.push((law.name().into(), law.place(), columns))
+        };
         for joint in 0..n {
             for law in per_joint(joint) {
                 add(&law, vec![self.of_law(&law)]);
@@ -140,29 +196,63 @@ impl<'a> Columns<'a> {
             for laws in waves(joint) {
                 add(&laws[0], laws.iter().map(|law| self.of_law(law)).collect());
             }
-            let law = Law::TorqueConstant { joint, share: 0.0, half: f64::INFINITY };
-            let own = self.rows.torque.iter().enumerate().map(|(k, torque)| if k % n == joint { *torque } else { 0.0 });
+            let law = Law::TorqueConstant {
+                joint,
+                share: 0.0,
+                half: f64::INFINITY,
+            };
+            let own = self
+                .rows
+                .torque
+                .iter()
+                .enumerate()
+                .map(|(k, torque)| if k % n == joint { *torque } else { 0.0 });
             if !self.case.sensors {
                 add(&law, vec![self.of(own)]);
             }
             add(
-                &Law::LinkMass { link: joint, share: 0.0, away: [0.0; 3] },
+                &Law::LinkMass {
+                    link: joint,
+                    share: 0.0,
+                    away: [0.0; 3],
+                },
                 vec![self.of_machine(|machine| machine.links[joint].mass += 1.0)],
             );
-            let centre = (0..3).map(|k| self.of_machine(|machine| machine.links[joint].centre[k] += 0.01));
-            add(&Law::LinkCentre { link: joint, shift: [0.0; 3] }, centre.collect());
-            let inertia = (0..6).map(|k| self.of_machine(|machine| machine.links[joint].inertia[k] += 0.1));
-            add(&Law::LinkInertia { link: joint, share: 0.0 }, inertia.collect());
+            let centre =
+                (0..3).map(|k| self.of_machine(|machine| machine.links[joint].centre[k] += 0.01));
+            add(
+                &Law::LinkCentre {
+                    link: joint,
+                    shift: [0.0; 3],
+                },
+                centre.collect(),
+            );
+            let inertia =
+                (0..6).map(|k| self.of_machine(|machine| machine.links[joint].inertia[k] += 0.1));
+            add(
+                &Law::LinkInertia {
+                    link: joint,
+                    share: 0.0,
+                },
+                inertia.collect(),
+            );
         }
-        let payload =
-            |change: fn(&mut super::rigid::Body)| self.of_machine(|machine| machine.payload.iter_mut().for_each(change));
+        let payload = |change: fn(&mut super::rigid::Body)| {
+            self.of_machine(|machine| machine.payload.iter_mut().for_each(change))
+        };
         let payload: Vec<Vec<f64>> = vec![
             payload(|body| body.mass += 1.0),
             payload(|body| body.centre[0] += 0.01),
             payload(|body| body.centre[1] += 0.01),
             payload(|body| body.centre[2] += 0.01),
         ];
-        add(&Law::Payload { mass: 0.0, centre: [0.0; 3] }, payload);
+        add(
+            &Law::Payload {
+                mass: 0.0,
+                centre: [0.0; 3],
+            },
+            payload,
+        );
         let tilt = [0, 1].map(|k| self.of_machine(|machine| machine.gravity[k] += 0.1));
         add(&Law::Tilt { by: [0.0; 2] }, tilt.into());
         rivals
@@ -177,7 +267,13 @@ impl<'a> Columns<'a> {
         for (row, state) in self.rows.state.iter().enumerate() {
             let rigid = &self.rows.rigid[row * n..(row + 1) * n];
             let mut torque = vec![0.0; n];
-            let now = Moment { time: self.rows.time[row], step: 1.0 / self.case.rate, state, rigid, friction: &friction };
+            let now = Moment {
+                time: self.rows.time[row],
+                step: 1.0 / self.case.rate,
+                state,
+                rigid,
+                friction: &friction,
+            };
             law.add(&now, &mut past, &mut torque);
             all.extend(torque);
         }
@@ -189,17 +285,67 @@ impl<'a> Columns<'a> {
 fn per_joint(joint: usize) -> Vec<Law> {
     let width = 0.008;
     vec![
-        Law::Viscous { joint, size: 1.0, exponent: 1.0 },
-        Law::Coulomb { joint, size: 1.0, width },
-        Law::Asymmetric { joint, size: 1.0, width, by_speed: 0.0 },
-        Law::Stribeck { joint, size: 1.0, speed: 0.05, fall: Fall::Exponential(1.0) },
-        Law::Stribeck { joint, size: 1.0, speed: 0.1, fall: Fall::Exponential(1.0) },
-        Law::Load { joint, share: 1.0, exponent: 1.0, width },
-        Law::Rotor { joint, inertia: 1.0 },
-        Law::Offset { joint, size: 1.0, drift: 0.0 },
-        Law::Cable { joint, stiffness: 1.0, zero: 0.0, hardening: 0.0 },
-        Law::Spring { joint, size: 1.0, zero: 0.0, gas: 0.0 },
-        Law::Spring { joint, size: 1.0, zero: std::f64::consts::FRAC_PI_2, gas: 0.0 },
+        Law::Viscous {
+            joint,
+            size: 1.0,
+            exponent: 1.0,
+        },
+        Law::Coulomb {
+            joint,
+            size: 1.0,
+            width,
+        },
+        Law::Asymmetric {
+            joint,
+            size: 1.0,
+            width,
+            by_speed: 0.0,
+        },
+        Law::Stribeck {
+            joint,
+            size: 1.0,
+            speed: 0.05,
+            fall: Fall::Exponential(1.0),
+        },
+        Law::Stribeck {
+            joint,
+            size: 1.0,
+            speed: 0.1,
+            fall: Fall::Exponential(1.0),
+        },
+        Law::Load {
+            joint,
+            share: 1.0,
+            exponent: 1.0,
+            width,
+        },
+        Law::Rotor {
+            joint,
+            inertia: 1.0,
+        },
+        Law::Offset {
+            joint,
+            size: 1.0,
+            drift: 0.0,
+        },
+        Law::Cable {
+            joint,
+            stiffness: 1.0,
+            zero: 0.0,
+            hardening: 0.0,
+        },
+        Law::Spring {
+            joint,
+            size: 1.0,
+            zero: 0.0,
+            gas: 0.0,
+        },
+        Law::Spring {
+            joint,
+            size: 1.0,
+            zero: std::f64::consts::FRAC_PI_2,
+            gas: 0.0,
+        },
     ]
 }
 
@@ -207,11 +353,26 @@ fn per_joint(joint: usize) -> Vec<Law> {
 fn waves(joint: usize) -> Vec<Vec<Law>> {
     let phases = [0.0, std::f64::consts::FRAC_PI_2];
     let ripple = |order: usize| {
-        let law = |phase| Law::Ripple { joint, size: 1.0, order: order as f64, phase, overtone: 0.0 };
+        let law = |phase| Law::Ripple {
+            joint,
+            size: 1.0,
+            order: order as f64,
+            phase,
+            overtone: 0.0,
+        };
         phases.map(law).to_vec()
     };
-    let balancer = phases.map(|zero| Law::Spring { joint, size: 1.0, zero, gas: 0.0 }).to_vec();
-    std::iter::once(balancer).chain((1..=LARGEST_ORDER).map(ripple)).collect()
+    let balancer = phases
+        .map(|zero| Law::Spring {
+            joint,
+            size: 1.0,
+            zero,
+            gas: 0.0,
+        })
+        .to_vec();
+    std::iter::once(balancer)
+        .chain((1..=LARGEST_ORDER).map(ripple))
+        .collect()
 }
 
 fn square(column: &[f64]) -> f64 {
@@ -239,19 +400,33 @@ impl<'a> Space<'a> {
     fn new(held: &[(&'a [f64], f64)]) -> Self {
         let gram = |i: usize, j: usize| {
             let own = product(held[i].0, held[j].0);
-            if i == j { own * (1.0 + HELD) + held[i].1 + f64::MIN_POSITIVE } else { own }
+            if i == j {
+                own * (1.0 + HELD) + held[i].1 + f64::MIN_POSITIVE
+            } else {
+                own
+            }
         };
         let mut factor: Vec<Vec<f64>> = Vec::with_capacity(held.len());
         for i in 0..held.len() {
             let mut row = Vec::with_capacity(i + 1);
             for j in 0..=i {
-                let sum: f64 = product(&row, &factor.get(j).map_or(&row[..], |other| other)[..j.min(row.len())]);
+                let sum: f64 = product(
+                    &row,
+                    &factor.get(j).map_or(&row[..], |other| other)[..j.min(row.len())],
+                );
                 let rest = gram(i, j) - sum;
-                row.push(if i == j { rest.max(HELD * gram(i, i)).max(f64::MIN_POSITIVE).sqrt() } else { rest / factor[j][j] });
+                row.push(if i == j {
+                    rest.max(HELD * gram(i, i)).max(f64::MIN_POSITIVE).sqrt()
+                } else {
+                    rest / factor[j][j]
+                });
             }
             factor.push(row);
         }
-        Self { held: held.iter().map(|(column, _)| *column).collect(), factor }
+        Self {
+            held: held.iter().map(|(column, _)| *column).collect(),
+            factor,
+        }
     }
 
     /// What a held column leaves beside all others: the inverse of its diagonal in the normal matrix's inverse.
@@ -270,7 +445,10 @@ impl<'a> Space<'a> {
             let rest = product(held, column) - product(&row[..seen.len()], &seen);
             seen.push(rest / row[seen.len()]);
         }
-        Projected { column: column.to_vec(), seen }
+        Projected {
+            column: column.to_vec(),
+            seen,
+        }
     }
 
     fn dot(&self, a: &Projected, b: &Projected) -> f64 {
@@ -286,8 +464,14 @@ impl<'a> Space<'a> {
             let before = square(column).max(f64::MIN_POSITIVE);
             for other in &basis {
                 let share = self.dot(&next, other) / self.dot(other, other);
-                next.column.iter_mut().zip(&other.column).for_each(|(x, y)| *x -= share * y);
-                next.seen.iter_mut().zip(&other.seen).for_each(|(x, y)| *x -= share * y);
+                next.column
+                    .iter_mut()
+                    .zip(&other.column)
+                    .for_each(|(x, y)| *x -= share * y);
+                next.seen
+                    .iter_mut()
+                    .zip(&other.seen)
+                    .for_each(|(x, y)| *x -= share * y);
             }
             let size = self.dot(&next, &next);
             if size > 1e-6 * before {

@@ -19,10 +19,14 @@ pub struct Cdr {
 
 impl Cdr {
     pub fn new(is_big: bool) -> Self {
-        Self { bytes: vec![0, u8::from(!is_big), 0, 0], is_big }
+        Self {
+            bytes: vec![0, u8::from(!is_big), 0, 0],
+            is_big,
+        }
     }
     fn put<const N: usize>(mut self, mut little: [u8; N]) -> Self {
-        self.bytes.resize(4 + (self.bytes.len() - 4).next_multiple_of(N), 0);
+        self.bytes
+            .resize(4 + (self.bytes.len() - 4).next_multiple_of(N), 0);
         if self.is_big {
             little.reverse();
         }
@@ -33,7 +37,8 @@ impl Cdr {
         self.put((number as u32).to_le_bytes())
     }
     pub fn stamp(self, ns: i64) -> Self {
-        self.put(((ns / 1_000_000_000) as i32).to_le_bytes()).put(((ns % 1_000_000_000) as u32).to_le_bytes())
+        self.put(((ns / 1_000_000_000) as i32).to_le_bytes())
+            .put(((ns % 1_000_000_000) as u32).to_le_bytes())
     }
     pub fn text(self, text: &str) -> Self {
         let mut own = self.count(text.len() + 1);
@@ -42,7 +47,9 @@ impl Cdr {
         own
     }
     pub fn numbers(self, numbers: &[f64]) -> Self {
-        numbers.iter().fold(self, |own, number| own.put(number.to_le_bytes()))
+        numbers
+            .iter()
+            .fold(self, |own, number| own.put(number.to_le_bytes()))
     }
     pub fn list(self, numbers: &[f64]) -> Self {
         self.count(numbers.len()).numbers(numbers)
@@ -52,33 +59,61 @@ impl Cdr {
     }
 }
 
-pub fn joint_state(is_big: bool, ns: i64, names: &[&str], [position, velocity, effort]: [&[f64]; 3]) -> Vec<u8> {
-    let head = Cdr::new(is_big).stamp(ns).text("base_link").count(names.len());
+pub fn joint_state(
+    is_big: bool,
+    ns: i64,
+    names: &[&str],
+    [position, velocity, effort]: [&[f64]; 3],
+) -> Vec<u8> {
+    let head = Cdr::new(is_big)
+        .stamp(ns)
+        .text("base_link")
+        .count(names.len());
     let named = names.iter().fold(head, |own, name| own.text(name));
     named.list(position).list(velocity).list(effort).done()
 }
 
 pub fn point(is_big: bool, ns: i64, point: [f64; 3]) -> Vec<u8> {
-    Cdr::new(is_big).stamp(ns).text("tracker").numbers(&point).done()
+    Cdr::new(is_big)
+        .stamp(ns)
+        .text("tracker")
+        .numbers(&point)
+        .done()
 }
 
 pub fn frames(ns: i64, all: &[(&str, &str, [f64; 7])]) -> Vec<u8> {
     let head = Cdr::new(false).count(all.len());
-    all.iter().fold(head, |own, (parent, child, pose)| own.stamp(ns).text(parent).text(child).numbers(pose)).done()
+    all.iter()
+        .fold(head, |own, (parent, child, pose)| {
+            own.stamp(ns).text(parent).text(child).numbers(pose)
+        })
+        .done()
 }
 
 /// A bag in MCAP; without compression also without chunks and index.
 pub fn mcap(compression: Option<Compression>, messages: &[Message]) -> Vec<u8> {
-    let options = WriteOptions::new().compression(compression).use_chunks(compression.is_some()).chunk_size(Some(4096));
+    let options = WriteOptions::new()
+        .compression(compression)
+        .use_chunks(compression.is_some())
+        .chunk_size(Some(4096));
     let mut writer = options.create(Cursor::new(Vec::new())).expect("a writer");
     let mut channels = BTreeMap::new();
     for (topic, kind, received, data) in messages {
         let channel = *channels.entry(*topic).or_insert_with(|| {
             let schema = writer.add_schema(kind, "ros2msg", b"").expect("a schema");
-            writer.add_channel(schema, topic, "cdr", &BTreeMap::new()).expect("a channel")
+            writer
+                .add_channel(schema, topic, "cdr", &BTreeMap::new())
+                .expect("a channel")
         });
-        let header = MessageHeader { channel_id: channel, sequence: 0, log_time: *received as u64, publish_time: 0 };
-        writer.write_to_known_channel(&header, data).expect("a message");
+        let header = MessageHeader {
+            channel_id: channel,
+            sequence: 0,
+            log_time: *received as u64,
+            publish_time: 0,
+        };
+        writer
+            .write_to_known_channel(&header, data)
+            .expect("a message");
     }
     writer.finish().expect("an end");
     writer.into_inner().into_inner()
@@ -106,7 +141,11 @@ pub fn db3(messages: &[Message]) -> Vec<u8> {
             .expect("a topic");
             all.last_insert_rowid()
         });
-        all.execute("INSERT INTO messages(topic_id,timestamp,data) VALUES (?1,?2,?3)", (id, received, data)).expect("a message");
+        all.execute(
+            "INSERT INTO messages(topic_id,timestamp,data) VALUES (?1,?2,?3)",
+            (id, received, data),
+        )
+        .expect("a message");
     }
     all.commit().expect("a commit");
     drop(base);

@@ -4,14 +4,17 @@
 
 use crate::desk::{Desk, table};
 use calib::compensate::{
-    CommandTarget, CorrectedCommand, CorrectionOptions, Corrector, Coverage, IdentifiedArm, Scatter, Uncertainty,
+    CommandTarget, CorrectedCommand, CorrectionOptions, Corrector, Coverage, IdentifiedArm,
+    Scatter, Uncertainty,
 };
 use calib::description::RobotDescription;
 use calib::effect::Load;
 use calib::estimate::Model;
 use calib::robot::{JointConvention, RobotModel};
 use calib::stage::{Diagnose, DiagnoseReads, Identify, IdentifyReads};
-use calib::table::{CovarianceTable, Findings, Parameters, Prediction, Recording, Robot, Split, SplitRow, Verdict};
+use calib::table::{
+    CovarianceTable, Findings, Parameters, Prediction, Recording, Robot, Split, SplitRow, Verdict,
+};
 use calib::twin::arm::Arm;
 use calib::twin::conceal::case::Case;
 use calib::twin::conceal::design::{Content, Design};
@@ -64,35 +67,62 @@ fn outcomes(case: &Case) -> (Vec<Outcome>, String) {
 }
 
 /// The same of these targets, each with whether it is outside of what was measured.
-pub fn outcomes_at(case: &Case, (targets, outside): (Vec<Point>, Vec<bool>)) -> (Vec<Outcome>, String) {
+pub fn outcomes_at(
+    case: &Case,
+    (targets, outside): (Vec<Point>, Vec<bool>),
+) -> (Vec<Outcome>, String) {
     let recording = recording(case);
     let split = split(case, &recording);
     let mut robot = case.robot.clone();
     if case.bare {
-        robot.joints.iter_mut().for_each(|joint| (joint.mass, joint.centre) = (None, None));
+        robot
+            .joints
+            .iter_mut()
+            .for_each(|joint| (joint.mass, joint.centre) = (None, None));
     }
     let table_of_robot = Robot::from_description(&robot);
-    let geometry: Identify = serde_json::from_value(json!({"effects": GEOMETRY})).expect("settings");
-    let reads = IdentifyReads { robot: table_of_robot.clone(), recording: recording.clone(), split: split.clone() };
-    let tables = Desk::default().run(&geometry, reads).expect("an identification");
+    let geometry: Identify =
+        serde_json::from_value(json!({"effects": GEOMETRY})).expect("settings");
+    let reads = IdentifyReads {
+        robot: table_of_robot.clone(),
+        recording: recording.clone(),
+        split: split.clone(),
+    };
+    let tables = Desk::default()
+        .run(&geometry, reads)
+        .expect("an identification");
     let plain = IdentifiedArm::new(model(&robot, &table::<Parameters>(&tables).remove(0)), None);
 
     let stage: Diagnose = serde_json::from_value(json!({})).expect("settings");
-    let reads = DiagnoseReads { robot: table_of_robot, recording: recording.clone(), split };
+    let reads = DiagnoseReads {
+        robot: table_of_robot,
+        recording: recording.clone(),
+        split,
+    };
     let tables = Desk::default().run(&stage, reads).expect("a diagnosis");
     let model = model(&robot, &table::<Parameters>(&tables).remove(0));
     let covariance = table::<CovarianceTable>(&tables).remove(0).of_model(&model);
     let verdict = table::<Verdict>(&tables).remove(0);
     if from_environment("CALIB_DETAILS", 0) == 1 {
         for row in &table::<Parameters>(&tables).remove(0).0 {
-            println!("  {} {} = {:.4} +- {:?} {} {}", row.name, row.place, row.change, row.sigma, row.unit, row.status);
+            println!(
+                "  {} {} = {:.4} +- {:?} {} {}",
+                row.name, row.place, row.change, row.sigma, row.unit, row.status
+            );
         }
         println!("  {:?}", verdict.0[0].statement);
     }
     let unexplained = table::<Prediction>(&tables).remove(0).unexplained_mm() * 1e-3;
     let findings = table::<Findings>(&tables).remove(0);
-    let named: Vec<String> = findings.0.iter().map(|row| format!("{} at {}", row.effect, row.place)).collect();
-    let scatter = Scatter { unexplained, repeatability: verdict.0[0].repeatability_rad };
+    let named: Vec<String> = findings
+        .0
+        .iter()
+        .map(|row| format!("{} at {}", row.effect, row.place))
+        .collect();
+    let scatter = Scatter {
+        unexplained,
+        repeatability: verdict.0[0].repeatability_rad,
+    };
     let arm = IdentifiedArm::new(model, None);
     let data = recording.measurements();
 
@@ -100,34 +130,52 @@ pub fn outcomes_at(case: &Case, (targets, outside): (Vec<Point>, Vec<bool>)) -> 
         clock: data.has_clock(),
         ..CorrectionOptions::counted_by(JointConvention::of_the_robot_file(robot.joints.len()))
     };
-    let uncertainty = covariance.map(|covariance| Uncertainty::new(&arm, covariance, scatter).beside(&arm, &data));
+    let uncertainty = covariance
+        .map(|covariance| Uncertainty::new(&arm, covariance, scatter).beside(&arm, &data));
     let mut corrector = Corrector::new(&arm, Some(Coverage::of(&data)), uncertainty, options());
     let commands = corrector.batch(targets.iter().map(|target| command(case, target)).collect());
-    let geometry = Corrector::new(&plain, None, None, options()).batch(targets.iter().map(|t| command(case, t)).collect());
+    let geometry = Corrector::new(&plain, None, None, options())
+        .batch(targets.iter().map(|t| command(case, t)).collect());
     let corrected = misses(case, &arm, &targets, &commands);
     let without = misses(case, &plain, &targets, &geometry);
     let outcome = |k: usize| Outcome {
         outside: outside[k],
         miss: corrected[k].unwrap_or(f64::NAN),
         plain: without[k].unwrap_or(f64::NAN),
-        u95: commands[k].uncertainty.map_or(f64::NAN, |uncertainty| uncertainty.u95 * 1e3),
+        u95: commands[k]
+            .uncertainty
+            .map_or(f64::NAN, |uncertainty| uncertainty.u95 * 1e3),
         remarked: !commands[k].remarks.is_empty(),
         refused: commands[k].q.is_none(),
     };
     ((0..targets.len()).map(outcome).collect(), named.join(", "))
 }
 
-const GEOMETRY: [&str; 6] = ["base_frame", "tool_offset", "joint_offset", "link_geometry", "reduction_ratio", "coupling_ratio"];
+const GEOMETRY: [&str; 6] = [
+    "base_frame",
+    "tool_offset",
+    "joint_offset",
+    "link_geometry",
+    "reduction_ratio",
+    "coupling_ratio",
+];
 
 pub fn model(robot: &RobotDescription, parameters: &Parameters) -> Model {
-    parameters.model(RobotModel::new(robot.clone()), &[], Load::GravityTorque).expect("a model")
+    parameters
+        .model(RobotModel::new(robot.clone()), &[], Load::GravityTorque)
+        .expect("a model")
 }
 
 pub fn split(case: &Case, recording: &Recording) -> Split {
     let row = |k: usize| SplitRow {
         sequence: k as i64,
         point_id: recording.point_id[k].clone(),
-        set: if case.shots[k].block == FIT { "fit" } else { "validate" }.into(),
+        set: if case.shots[k].block == FIT {
+            "fit"
+        } else {
+            "validate"
+        }
+        .into(),
     };
     Split((0..recording.rows()).map(row).collect())
 }
@@ -141,14 +189,28 @@ pub fn recording(case: &Case) -> Recording {
         sequence: (0..rows as i64).collect(),
         point_id: (0..rows).map(|row| format!("P{row}")).collect(),
         usage: vec![None; rows],
-        q: case.shots.iter().flat_map(|shot| shot.q.iter().copied()).collect(),
+        q: case
+            .shots
+            .iter()
+            .flat_map(|shot| shot.q.iter().copied())
+            .collect(),
         position: case.shots.iter().map(|shot| shot.position).collect(),
         position_sigma: Some(case.shots.iter().map(|shot| [shot.sigma; 3]).collect()),
         time: shown(Column::Time).then(|| case.shots.iter().map(|shot| shot.time_s).collect()),
         payload: Some(case.payload_kg.clone()),
         temperature: shown(Column::Temperature).then(|| case.thermometer_c.clone()),
-        current: shown(Column::Current).then(|| case.shots.iter().flat_map(|shot| shot.current.iter().copied()).collect()),
-        direction: shown(Column::Direction).then(|| case.shots.iter().flat_map(|shot| shot.direction.iter().copied()).collect()),
+        current: shown(Column::Current).then(|| {
+            case.shots
+                .iter()
+                .flat_map(|shot| shot.current.iter().copied())
+                .collect()
+        }),
+        direction: shown(Column::Direction).then(|| {
+            case.shots
+                .iter()
+                .flat_map(|shot| shot.direction.iter().copied())
+                .collect()
+        }),
         ..Recording::default()
     }
 }
@@ -160,14 +222,42 @@ pub fn targets(case: &Case) -> (Vec<Point>, Vec<bool>) {
     let recorded: Vec<[f64; 2]> = (0..joints)
         .map(|joint| {
             let all = fitted.iter().map(|shot| shot.q[joint].to_degrees());
-            all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], q| [low.min(q), high.max(q)])
+            all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], q| {
+                [low.min(q), high.max(q)]
+            })
         })
         .collect();
-    let whole: Vec<[f64; 2]> = case.robot.joints.iter().map(|joint| joint.limits.expect("limits").map(f64::to_degrees)).collect();
-    let amount = |fit| Amount { fit, validate: 0, repeated: 0.0, near: 0.0, loaded: !case.bare, layout: Layout::default() };
+    let whole: Vec<[f64; 2]> = case
+        .robot
+        .joints
+        .iter()
+        .map(|joint| joint.limits.expect("limits").map(f64::to_degrees))
+        .collect();
+    let amount = |fit| Amount {
+        fit,
+        validate: 0,
+        repeated: 0.0,
+        near: 0.0,
+        loaded: !case.bare,
+        layout: Layout::default(),
+    };
     let far = TARGETS / 3;
-    let mut inside = plan(case.kind, &recorded, amount(TARGETS - far), &case.climate, case.seed ^ 0xA5).expect("poses");
-    let mut outside = plan(case.kind, &whole, amount(far), &case.climate, case.seed ^ 0x5A).expect("poses");
+    let mut inside = plan(
+        case.kind,
+        &recorded,
+        amount(TARGETS - far),
+        &case.climate,
+        case.seed ^ 0xA5,
+    )
+    .expect("poses");
+    let mut outside = plan(
+        case.kind,
+        &whole,
+        amount(far),
+        &case.climate,
+        case.seed ^ 0x5A,
+    )
+    .expect("poses");
     for (k, target) in inside.iter_mut().enumerate() {
         let shot = fitted[k * 7 % fitted.len()];
         (target.time_s, target.temperature_c) = (shot.time_s, shot.temperature_c);
@@ -178,7 +268,11 @@ pub fn targets(case: &Case) -> (Vec<Point>, Vec<bool>) {
         target.temperature_c = case.climate.temperature(target.time_s);
         target.payload_kg *= 1.3;
     }
-    let is_outside = inside.iter().map(|_| false).chain(outside.iter().map(|_| true)).collect();
+    let is_outside = inside
+        .iter()
+        .map(|_| false)
+        .chain(outside.iter().map(|_| true))
+        .collect();
     inside.append(&mut outside);
     (inside, is_outside)
 }
@@ -196,10 +290,23 @@ fn command(case: &Case, target: &Point) -> CommandTarget {
 }
 
 /// By how much (mm) the true arm misses each target, in the base that was identified; none where there is no command.
-fn misses(case: &Case, arm: &IdentifiedArm, targets: &[Point], commands: &[CorrectedCommand]) -> Vec<Option<f64>> {
-    let effects: Vec<Physical> =
-        case.concealed.iter().flat_map(|one| one.cause.physical.clone()).chain(case.friction.iter().cloned()).collect();
-    let exact = Tracker { noise_um: 0.0, noise_um_per_m: 0.0, ..case.tracker.clone() };
+fn misses(
+    case: &Case,
+    arm: &IdentifiedArm,
+    targets: &[Point],
+    commands: &[CorrectedCommand],
+) -> Vec<Option<f64>> {
+    let effects: Vec<Physical> = case
+        .concealed
+        .iter()
+        .flat_map(|one| one.cause.physical.clone())
+        .chain(case.friction.iter().cloned())
+        .collect();
+    let exact = Tracker {
+        noise_um: 0.0,
+        noise_um_per_m: 0.0,
+        ..case.tracker.clone()
+    };
     let experiment = Experiment {
         robot: &case.robot,
         truth: &case.truth,
@@ -212,10 +319,10 @@ fn misses(case: &Case, arm: &IdentifiedArm, targets: &[Point], commands: &[Corre
         climate: &case.climate,
         seed: 1,
     };
-    let driven = targets
-        .iter()
-        .zip(commands)
-        .map(|(target, command)| Point { q: command.q.clone().unwrap_or_else(|| target.q.clone()), ..target.clone() });
+    let driven = targets.iter().zip(commands).map(|(target, command)| Point {
+        q: command.q.clone().unwrap_or_else(|| target.q.clone()),
+        ..target.clone()
+    });
     let shots = experiment.measure(driven.collect(), || ());
     let robot = RobotModel::new(case.robot.clone());
     let each = shots.iter().zip(targets).zip(commands);
@@ -228,7 +335,10 @@ fn misses(case: &Case, arm: &IdentifiedArm, targets: &[Point], commands: &[Corre
 }
 
 pub fn from_environment(name: &str, usual: u64) -> u64 {
-    std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(usual)
+    std::env::var(name)
+        .ok()
+        .and_then(|text| text.parse().ok())
+        .unwrap_or(usual)
 }
 
 /// Whether a target is missed by more than with geometry alone, and by more than the instrument scatters, without a word.
@@ -238,10 +348,18 @@ pub fn is_harmed(one: &Outcome, floor: f64) -> bool {
 
 /// A line of the table.
 fn print(case: &Case, floor: f64, outcomes: &[Outcome], named: &str) {
-    let want: Vec<String> = case.want().iter().map(|(effect, place)| format!("{effect} at {place}")).collect();
+    let want: Vec<String> = case
+        .want()
+        .iter()
+        .map(|(effect, place)| format!("{effect} at {place}"))
+        .collect();
     let harm = outcomes.iter().filter(|one| is_harmed(one, floor)).count();
     let rms = |outside: bool, of: fn(&Outcome) -> f64| {
-        let values: Vec<f64> = outcomes.iter().filter(|one| one.outside == outside && !one.refused).map(of).collect();
+        let values: Vec<f64> = outcomes
+            .iter()
+            .filter(|one| one.outside == outside && !one.refused)
+            .map(of)
+            .collect();
         (values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64).sqrt()
     };
     println!(
@@ -253,15 +371,24 @@ fn print(case: &Case, floor: f64, outcomes: &[Outcome], named: &str) {
         rms(false, |one| one.plain),
         rms(true, |one| one.miss),
         rms(true, |one| one.plain),
-        outcomes.iter().filter(|one| one.remarked && !one.outside).count(),
-        outcomes.iter().filter(|one| one.remarked && one.outside).count(),
+        outcomes
+            .iter()
+            .filter(|one| one.remarked && !one.outside)
+            .count(),
+        outcomes
+            .iter()
+            .filter(|one| one.remarked && one.outside)
+            .count(),
         outcomes.iter().filter(|one| one.refused).count()
     );
 }
 
 #[test]
 fn a_correction_never_harms_unless_it_says_so() {
-    let (count, seed) = (from_environment("CALIB_RECORDINGS", 3) as usize, from_environment("CALIB_SEED", 29));
+    let (count, seed) = (
+        from_environment("CALIB_RECORDINGS", 3) as usize,
+        from_environment("CALIB_SEED", 29),
+    );
     let design = Design {
         seed,
         cases: count,
@@ -280,9 +407,13 @@ fn a_correction_never_harms_unless_it_says_so() {
         all.extend(outcomes.into_iter().map(|one| (floor, one)));
     }
     for outside in [false, true] {
-        let these: Vec<&(f64, Outcome)> = all.iter().filter(|(_, one)| one.outside == outside && !one.refused).collect();
+        let these: Vec<&(f64, Outcome)> = all
+            .iter()
+            .filter(|(_, one)| one.outside == outside && !one.refused)
+            .collect();
         let share = |is: &dyn Fn(f64, &Outcome) -> bool| {
-            100.0 * these.iter().filter(|(floor, one)| is(*floor, one)).count() as f64 / these.len() as f64
+            100.0 * these.iter().filter(|(floor, one)| is(*floor, one)).count() as f64
+                / these.len() as f64
         };
         println!(
             "{}: {} targets, within u95 {:.1} %, remarked {:.1} %, harmed without a remark {:.2} %, by noise and 1.5 x {:.2} %",
@@ -293,8 +424,15 @@ fn a_correction_never_harms_unless_it_says_so() {
             share(&|_, one| one.miss > 1.5 * one.plain && !one.remarked),
             share(&|floor, one| is_harmed(one, floor)),
         );
-        let harmed = these.iter().filter(|(floor, one)| is_harmed(one, *floor)).count();
-        assert!(harmed * 500 <= these.len(), "{harmed} of {} targets", these.len());
+        let harmed = these
+            .iter()
+            .filter(|(floor, one)| is_harmed(one, *floor))
+            .count();
+        assert!(
+            harmed * 500 <= these.len(),
+            "{harmed} of {} targets",
+            these.len()
+        );
     }
 }
 
@@ -303,9 +441,19 @@ fn a_correction_never_harms_unless_it_says_so() {
 pub fn upright(seed: u64) -> Case {
     let case = nothing(seed, true);
     let mut draw = Noise::new(seed, Purpose::Design);
-    let limits: Vec<[f64; 2]> = case.robot.joints.iter().map(|joint| joint.limits.expect("limits")).collect();
+    let limits: Vec<[f64; 2]> = case
+        .robot
+        .joints
+        .iter()
+        .map(|joint| joint.limits.expect("limits"))
+        .collect();
     let arm = Arm::new(&case.robot, &case.truth);
-    let poses = Poses { range_deg: Vec::new(), floor_mm: 20.0, clearance_mm: 150.0, candidates: 1 };
+    let poses = Poses {
+        range_deg: Vec::new(),
+        floor_mm: 20.0,
+        clearance_mm: 150.0,
+        candidates: 1,
+    };
     let mut own = Noise::new(seed ^ 7, Purpose::Design);
     let q_of = |_: &Shot| loop {
         let (mut q, _) = allowed(&arm, &poses, &limits, &mut own).expect("a pose");
@@ -317,8 +465,9 @@ pub fn upright(seed: u64) -> Case {
             return q;
         }
     };
-    let yields = [(2, 6e-6), (3, 8e-6), (4, 1e-5)]
-        .map(|(joint, rad_per_nm)| Physical::JointCompliance(JointCompliance { joint, rad_per_nm }));
+    let yields = [(2, 6e-6), (3, 8e-6), (4, 1e-5)].map(|(joint, rad_per_nm)| {
+        Physical::JointCompliance(JointCompliance { joint, rad_per_nm })
+    });
     let gears = (1..=5).map(|joint| {
         Physical::GearCyclic(GearCyclic {
             joint,
@@ -334,20 +483,50 @@ pub fn upright(seed: u64) -> Case {
 
 /// A desktop arm with nothing concealed, unless without masses.
 pub fn nothing(seed: u64, bare: bool) -> Case {
-    let design = Design { seed, cases: 1, robots: vec![Kind::Compact6], nulls: 1.0, bare, faulty: 0.0, ..Design::default() };
+    let design = Design {
+        seed,
+        cases: 1,
+        robots: vec![Kind::Compact6],
+        nulls: 1.0,
+        bare,
+        faulty: 0.0,
+        ..Design::default()
+    };
     // Without currents, which no target states.
-    Case { hidden: [Column::Current].into(), tampered: Vec::new(), ..Case::make(&design, 0, Content::Null).expect("a case") }
+    Case {
+        hidden: [Column::Current].into(),
+        tampered: Vec::new(),
+        ..Case::make(&design, 0, Content::Null).expect("a case")
+    }
 }
 
 /// The case measured again with these effects, at the poses that `q_of` gives its rows; nothing is carried.
-pub fn again(mut case: Case, effects: Vec<Physical>, seed: u64, mut q_of: impl FnMut(&Shot) -> Vec<f64>) -> Case {
+pub fn again(
+    mut case: Case,
+    effects: Vec<Physical>,
+    seed: u64,
+    mut q_of: impl FnMut(&Shot) -> Vec<f64>,
+) -> Case {
     let mut before = vec![0.0; 6];
     let mut planned = Vec::new();
     for shot in std::mem::take(&mut case.shots) {
         let q = q_of(&shot);
         let direction = calib::twin::plan::direction(&q, &before);
-        let Shot { block, time_s, temperature_c, .. } = shot;
-        planned.push(Point { block, q: q.clone(), before, direction, time_s, temperature_c, payload_kg: 0.0 });
+        let Shot {
+            block,
+            time_s,
+            temperature_c,
+            ..
+        } = shot;
+        planned.push(Point {
+            block,
+            q: q.clone(),
+            before,
+            direction,
+            time_s,
+            temperature_c,
+            payload_kg: 0.0,
+        });
         before = q;
     }
     case.friction = effects;
@@ -378,10 +557,19 @@ fn what_no_row_shows_moves_no_robot() {
         print(&case, floor, &outcomes, &named);
         let kept = || outcomes.iter().filter(|one| !one.refused);
         let square = |of: fn(&Outcome) -> f64| kept().map(of).map(|miss| miss * miss).sum::<f64>();
-        assert!(square(|one| one.miss) < 0.25 * square(|one| one.plain), "seed {}: {named}", 500 + seed);
-        assert!(outcomes.iter().filter(|one| is_harmed(one, floor)).count() * 1000 <= outcomes.len(), "seed {}", 500 + seed);
+        assert!(
+            square(|one| one.miss) < 0.25 * square(|one| one.plain),
+            "seed {}: {named}",
+            500 + seed
+        );
+        assert!(
+            outcomes.iter().filter(|one| is_harmed(one, floor)).count() * 1000 <= outcomes.len(),
+            "seed {}",
+            500 + seed
+        );
         // Home, and all links in line upwards: the tool is level there, as in no row.
-        let away = [[0.0; 6], [0.0, 0.0, -90.0, 0.0, 0.0, 0.0]].map(|q: [f64; 6]| q.map(f64::to_radians).to_vec());
+        let away = [[0.0; 6], [0.0, 0.0, -90.0, 0.0, 0.0, 0.0]]
+            .map(|q: [f64; 6]| q.map(f64::to_radians).to_vec());
         let point = |q: Vec<f64>| Point {
             block: FIT,
             before: q.clone(),
@@ -393,7 +581,10 @@ fn what_no_row_shows_moves_no_robot() {
         };
         let (away, _) = outcomes_at(&case, (away.map(point).to_vec(), vec![true; 2]));
         for one in &away {
-            println!("    home and candle: {:.3} mm, with geometry alone {:.3}, remark {}", one.miss, one.plain, one.remarked);
+            println!(
+                "    home and candle: {:.3} mm, with geometry alone {:.3}, remark {}",
+                one.miss, one.plain, one.remarked
+            );
             assert!(one.refused || !is_harmed(one, floor), "seed {}", 500 + seed);
         }
     }

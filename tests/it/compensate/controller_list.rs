@@ -13,20 +13,32 @@ use std::path::Path;
 type ControllerList = BTreeMap<(String, String), (f64, Option<f64>)>;
 
 fn listed(text: &str) -> ControllerList {
-    let rows = text.lines().filter(|line| ["zero", "factor - 1", "coupling"].iter().any(|start| line.starts_with(start)));
+    let rows = text.lines().filter(|line| {
+        ["zero", "factor - 1", "coupling"]
+            .iter()
+            .any(|start| line.starts_with(start))
+    });
     let row = |line: &str| {
         let cells: Vec<&str> = line.split(',').collect();
-        ((cells[0].to_string(), cells[1].to_string()), (cells[2].parse().expect("a number"), cells[4].parse().ok()))
+        (
+            (cells[0].to_string(), cells[1].to_string()),
+            (cells[2].parse().expect("a number"), cells[4].parse().ok()),
+        )
     };
     rows.map(row).collect()
 }
 
 /// True joints (deg) of commanded ones, by the sentence in the file's head.
 fn true_joints(list: &ControllerList, commanded: &[f64]) -> Vec<f64> {
-    let value = |quantity: &str, place: String| list.get(&(quantity.to_string(), place)).map_or(0.0, |(value, _)| *value);
+    let value = |quantity: &str, place: String| {
+        list.get(&(quantity.to_string(), place))
+            .map_or(0.0, |(value, _)| *value)
+    };
     let of = |joint: usize| {
         let own = (1.0 + value("factor - 1", format!("joint {joint}"))) * commanded[joint - 1];
-        let coupled: f64 = (1..=6).map(|by| value("coupling", format!("joint {by}->{joint}")) * commanded[by - 1]).sum();
+        let coupled: f64 = (1..=6)
+            .map(|by| value("coupling", format!("joint {by}->{joint}")) * commanded[by - 1])
+            .sum();
         own + value("zero", format!("joint {joint}")) + coupled
     };
     (1..=6).map(of).collect()
@@ -35,19 +47,40 @@ fn true_joints(list: &ControllerList, commanded: &[f64]) -> Vec<f64> {
 /// The list as a maker counts that moves joints as the list of the robot file's counting does: read off at zero and at each joint alone.
 fn counted(maker: &Maker, own: &ControllerList) -> ControllerList {
     let off = |numbers: &[f64]| -> Vec<f64> {
-        let q: Vec<f64> = maker.driven(numbers).iter().map(|q| q.to_degrees()).collect();
-        let real: Vec<f64> = true_joints(own, &q).iter().map(|q| q.to_radians()).collect();
-        maker.counted(&real).iter().zip(numbers).map(|(real, number)| real - number).collect()
+        let q: Vec<f64> = maker
+            .driven(numbers)
+            .iter()
+            .map(|q| q.to_degrees())
+            .collect();
+        let real: Vec<f64> = true_joints(own, &q)
+            .iter()
+            .map(|q| q.to_radians())
+            .collect();
+        maker
+            .counted(&real)
+            .iter()
+            .zip(numbers)
+            .map(|(real, number)| real - number)
+            .collect()
     };
     let zero = off(&[0.0; 6]);
-    let mut out: ControllerList =
-        (0..6).map(|joint| (("zero".to_string(), format!("joint {}", joint + 1)), (zero[joint], None))).collect();
+    let mut out: ControllerList = (0..6)
+        .map(|joint| {
+            (
+                ("zero".to_string(), format!("joint {}", joint + 1)),
+                (zero[joint], None),
+            )
+        })
+        .collect();
     for by in 1..=6 {
         let mut numbers = [0.0; 6];
         numbers[by - 1] = 100.0;
         for (joint, (off, zero)) in (1..=6).zip(off(&numbers).iter().zip(&zero)) {
-            let (quantity, place) =
-                if joint == by { ("factor - 1", format!("joint {by}")) } else { ("coupling", format!("joint {by}->{joint}")) };
+            let (quantity, place) = if joint == by {
+                ("factor - 1", format!("joint {by}"))
+            } else {
+                ("coupling", format!("joint {by}->{joint}"))
+            };
             out.insert((quantity.into(), place), ((off - zero) / 100.0, None));
         }
     }
@@ -56,8 +89,12 @@ fn counted(maker: &Maker, own: &ControllerList) -> ControllerList {
 
 /// Each number by a unit of each parameter, and the parameters' covariance (deg): what sigma has to be.
 fn sigmas(maker: &Maker, tables: &Path) -> BTreeMap<(String, String), f64> {
-    let parameters = from_file::<Parameters>(&tables.join("identify.parameters.parquet")).expect("parameters").table;
-    let covariance = from_file::<CovarianceTable>(&tables.join("identify.covariance.parquet")).expect("a covariance").table;
+    let parameters = from_file::<Parameters>(&tables.join("identify.parameters.parquet"))
+        .expect("parameters")
+        .table;
+    let covariance = from_file::<CovarianceTable>(&tables.join("identify.covariance.parquet"))
+        .expect("a covariance")
+        .table;
     let none = counted(maker, &ControllerList::new());
     let mut by: BTreeMap<String, ControllerList> = BTreeMap::new();
     for row in &parameters.0 {
@@ -67,7 +104,11 @@ fn sigmas(maker: &Maker, tables: &Path) -> BTreeMap<(String, String), f64> {
             "coupling_ratio" => "coupling",
             _ => continue,
         };
-        let size = if row.unit == "rad" { 1f64.to_degrees() } else { 1.0 };
+        let size = if row.unit == "rad" {
+            1f64.to_degrees()
+        } else {
+            1.0
+        };
         let unit = [((quantity.to_string(), row.place.clone()), (size, None))].into();
         by.insert(row.name.clone(), counted(maker, &unit));
     }
@@ -78,41 +119,88 @@ fn sigmas(maker: &Maker, tables: &Path) -> BTreeMap<(String, String), f64> {
             let twice = if row.parameter == row.other { 1.0 } else { 2.0 };
             share(&row.parameter) * share(&row.other) * row.covariance * twice
         };
-        out.insert(number.clone(), covariance.0.iter().map(part).sum::<f64>().sqrt());
+        out.insert(
+            number.clone(),
+            covariance.0.iter().map(part).sum::<f64>().sqrt(),
+        );
     }
     out
 }
 
 #[test]
 fn numbers_for_the_controller_move_its_joints_as_the_model_does() {
-    let text = ROBOT.to_string() + "couplings:\n  - {moved: 3, by: 2}\n  - {moved: 6, by: 5}\n  - {moved: 4, by: 1}\n";
-    let robot = read_calib(RobotFileText { label: "robot.yaml", text: &text }, None).expect("a robot").robot;
+    let text = ROBOT.to_string()
+        + "couplings:\n  - {moved: 3, by: 2}\n  - {moved: 6, by: 5}\n  - {moved: 4, by: 1}\n";
+    let robot = read_calib(
+        RobotFileText {
+            label: "robot.yaml",
+            text: &text,
+        },
+        None,
+    )
+    .expect("a robot")
+    .robot;
     let cell = Cell::of(robot, 1.2, [100.0, 200.0], Vec::new());
     let points = cell.points(60, &[0.0], 5);
     let stages = "  - uses: identify\n    with: {on: [fit], effects: [base_frame, tool_offset, joint_offset, link_geometry, reduction_ratio, coupling_ratio]}\n";
-    let mixed = ["signs 1, 4, 6", "zeros", "ABB, parallelogram", "all at once"];
-    for maker in makers().into_iter().filter(|maker| mixed.contains(&maker.name)).chain([PLAIN]) {
+    let mixed = [
+        "signs 1, 4, 6",
+        "zeros",
+        "ABB, parallelogram",
+        "all at once",
+    ];
+    for maker in makers()
+        .into_iter()
+        .filter(|maker| mixed.contains(&maker.name))
+        .chain([PLAIN])
+    {
         let folder = recorded(&maker, &cell, &points, &text, stages);
-        let export =
-            |model: &[&str]| listed(&ran(folder.path(), &[&["export", "--format", "controller", "--quiet"], model].concat(), ""));
+        let export = |model: &[&str]| {
+            listed(&ran(
+                folder.path(),
+                &[&["export", "--format", "controller", "--quiet"], model].concat(),
+                "",
+            ))
+        };
         let list = export(&["latest"]);
         // A table of parameters alone does not know the controller: its numbers are in the robot file's counting.
-        let own = export(&[".calib/tables/counted/identify.parameters.parquet", "--robot", "robot.yaml"]);
+        let own = export(&[
+            ".calib/tables/counted/identify.parameters.parquet",
+            "--robot",
+            "robot.yaml",
+        ]);
         let mut apart = 0f64;
         for k in 0..200 {
-            let q: Vec<f64> = (0..6).map(|j| 2.0 * (1.3 * f64::from(k) + 0.7 * f64::from(j)).sin()).collect();
+            let q: Vec<f64> = (0..6)
+                .map(|j| 2.0 * (1.3 * f64::from(k) + 0.7 * f64::from(j)).sin())
+                .collect();
             let degrees: Vec<f64> = q.iter().map(|q| q.to_degrees()).collect();
-            let real: Vec<f64> = true_joints(&own, &degrees).iter().map(|q| q.to_radians()).collect();
+            let real: Vec<f64> = true_joints(&own, &degrees)
+                .iter()
+                .map(|q| q.to_radians())
+                .collect();
             let shown = maker.driven(&true_joints(&list, &maker.counted(&q)));
-            apart = shown.iter().zip(&real).map(|(a, b)| (a - b).abs()).fold(apart, f64::max);
+            apart = shown
+                .iter()
+                .zip(&real)
+                .map(|(a, b)| (a - b).abs())
+                .fold(apart, f64::max);
         }
         println!("{}: {apart:.1e} rad apart at most", maker.name);
         assert!(apart < 1e-9, "{}: {apart} rad", maker.name);
         let expected = sigmas(&maker, &folder.path().join(".calib/tables/counted"));
-        assert!(list.values().any(|(value, sigma)| value.abs() > 1e-3 && sigma.is_some()), "{list:?}");
+        assert!(
+            list.values()
+                .any(|(value, sigma)| value.abs() > 1e-3 && sigma.is_some()),
+            "{list:?}"
+        );
         for (number, (_, sigma)) in &list {
             let sigma = sigma.unwrap_or_default();
-            assert!((sigma - expected[number]).abs() <= 1e-3 * expected[number], "{}: {number:?}: {sigma}", maker.name);
+            assert!(
+                (sigma - expected[number]).abs() <= 1e-3 * expected[number],
+                "{}: {number:?}: {sigma}",
+                maker.name
+            );
         }
     }
 }

@@ -10,7 +10,17 @@ use calib::twin::effect::{JointCompliance, Physical};
 use std::path::Path;
 
 fn robot() -> RobotModel {
-    RobotModel::new(read_calib(RobotFileText { label: "robot.yaml", text: ROBOT }, None).expect("a robot").robot)
+    RobotModel::new(
+        read_calib(
+            RobotFileText {
+                label: "robot.yaml",
+                text: ROBOT,
+            },
+            None,
+        )
+        .expect("a robot")
+        .robot,
+    )
 }
 
 fn all_at_once() -> Maker {
@@ -21,8 +31,15 @@ fn all_at_once() -> Maker {
 fn poses(file: &Path) -> Vec<[Vec<f64>; 3]> {
     let text = std::fs::read_to_string(file).expect("poses");
     let row = |line: &str| {
-        let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().expect("a number")).collect();
-        [cells[1..7].to_vec(), cells[8..14].to_vec(), cells[14..17].to_vec()]
+        let cells: Vec<f64> = line
+            .split(',')
+            .map(|cell| cell.parse().expect("a number"))
+            .collect();
+        [
+            cells[1..7].to_vec(),
+            cells[8..14].to_vec(),
+            cells[14..17].to_vec(),
+        ]
     };
     text.lines().skip(1).map(row).collect()
 }
@@ -30,7 +47,11 @@ fn poses(file: &Path) -> Vec<[Vec<f64>; 3]> {
 fn within_limits(robot: &RobotModel, q: &[f64]) {
     for (joint, q) in robot.description().joints.iter().zip(q) {
         let [low, high] = joint.limits.expect("limits");
-        assert!((low - 1e-12..=high + 1e-12).contains(q), "{}: {q} in {low} to {high}", joint.name);
+        assert!(
+            (low - 1e-12..=high + 1e-12).contains(q),
+            "{}: {q} in {low} to {high}",
+            joint.name
+        );
     }
 }
 
@@ -38,7 +59,12 @@ fn within_limits(robot: &RobotModel, q: &[f64]) {
 fn poses_in_the_controllers_counting_keep_the_joints_within_their_limits() {
     let (robot, maker) = (robot(), all_at_once());
     let convention = maker.convention();
-    let ranges: Vec<[f64; 2]> = robot.description().joints.iter().map(|joint| joint.limits.expect("limits")).collect();
+    let ranges: Vec<[f64; 2]> = robot
+        .description()
+        .joints
+        .iter()
+        .map(|joint| joint.limits.expect("limits"))
+        .collect();
     // Corners of the travel, where rounding can leave it, and poses within.
     let pose = |k: usize| -> Vec<f64> {
         let at = |(joint, [low, high]): (usize, &[f64; 2])| match k {
@@ -48,18 +74,28 @@ fn poses_in_the_controllers_counting_keep_the_joints_within_their_limits() {
         ranges.iter().enumerate().map(at).collect()
     };
     let q: Vec<Vec<f64>> = (0..200).map(pose).collect();
-    let direction: Vec<f64> = (0..1200).map(|k| if k % 5 < 2 { -1.0 } else { 1.0 }).collect();
+    let direction: Vec<f64> = (0..1200)
+        .map(|k| if k % 5 < 2 { -1.0 } else { 1.0 })
+        .collect();
     let data = Measurements {
         joints: 6,
         q: q.concat(),
-        points: PointReadings::new(q.iter().map(|q| robot.forward(q).translation).collect(), 0.0),
+        points: PointReadings::new(
+            q.iter().map(|q| robot.forward(q).translation).collect(),
+            0.0,
+        ),
         payload: vec![0.0; 200],
         ..Measurements::default()
     };
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("poses.csv");
-    let drive =
-        Drive { robot: robot.description(), ranges: &ranges, poses: &data, direction: &direction, convention: &convention };
+    let drive = Drive {
+        robot: robot.description(),
+        ranges: &ranges,
+        poses: &data,
+        direction: &direction,
+        convention: &convention,
+    };
     write(&file, &drive).expect("a file");
     for (k, [numbers, sides, _]) in poses(&file).iter().enumerate() {
         let driven = maker.driven(numbers);
@@ -76,8 +112,16 @@ fn poses_in_the_controllers_counting_keep_the_joints_within_their_limits() {
 #[test]
 fn poses_comparisons_and_report_of_a_run_say_in_which_counting_joints_stand() {
     let robot = robot();
-    let compliance = Physical::JointCompliance(JointCompliance { joint: 2, rad_per_nm: 4e-6 });
-    let cell = Cell::of(robot.description().clone(), 1.2, [100.0, 200.0], vec![compliance]);
+    let compliance = Physical::JointCompliance(JointCompliance {
+        joint: 2,
+        rad_per_nm: 4e-6,
+    });
+    let cell = Cell::of(
+        robot.description().clone(),
+        1.2,
+        [100.0, 200.0],
+        vec![compliance],
+    );
     let points = cell.points(80, &[0.0, 30.0], 5);
     let stages = "  - uses: diagnose\n  - uses: validate\n  - uses: report\n";
     for maker in [PLAIN, all_at_once()] {
@@ -86,48 +130,103 @@ fn poses_comparisons_and_report_of_a_run_say_in_which_counting_joints_stand() {
         let difference = "sign [-1, 1, 1, -1, 1, -1], zero [10, -90, 90, 30, -45, 180] deg, joint 3 with -1 times joint 2, joint 6 with 0.5 times joint 5";
         let otherwise = maker.name != PLAIN.name;
 
-        let separate = ["poses", "--run", "HEAD", "--separate", "1", "link_compliance@link 2"];
+        let separate = [
+            "poses",
+            "--run",
+            "HEAD",
+            "--separate",
+            "1",
+            "link_compliance@link 2",
+        ];
         let few = ["--count", "12", "--candidates", "100", "--out", "poses.csv"];
         let text = ran(here, &[&separate[..], &few].concat(), "");
-        let sentence = format!("joints and directions of the poses are counted as at the controller: {difference}\n");
+        let sentence = format!(
+            "joints and directions of the poses are counted as at the controller: {difference}\n"
+        );
         assert_eq!(text.contains(&sentence), otherwise, "{text}");
         assert_eq!(text.contains("counted as"), otherwise, "{text}");
         let document: serde_json::Value =
-            serde_json::from_str(&ran(here, &[&separate[..], &few, &["--json"]].concat(), "")).expect("JSON");
-        let counting = if otherwise { format!("controller: {difference}") } else { "robot file".into() };
+            serde_json::from_str(&ran(here, &[&separate[..], &few, &["--json"]].concat(), ""))
+                .expect("JSON");
+        let counting = if otherwise {
+            format!("controller: {difference}")
+        } else {
+            "robot file".into()
+        };
         assert_eq!(document["counting"], counting.as_str());
         let rows = poses(&here.join("poses.csv"));
         assert_eq!(rows.len(), 12);
-        for ([numbers, _, point], object) in rows.iter().zip(document["poses"].as_array().expect("poses")) {
+        for ([numbers, _, point], object) in rows
+            .iter()
+            .zip(document["poses"].as_array().expect("poses"))
+        {
             assert_eq!(object["q3_deg"].as_f64(), Some(numbers[2]));
             let driven = maker.driven(numbers);
             within_limits(&robot, &driven);
             let reached = robot.forward(&driven).translation * 1e3;
-            let apart = (0..3).map(|axis| (reached[axis] - point[axis]).abs()).fold(0.0, f64::max);
-            assert!(apart < 0.02, "{}: {numbers:?} reaches {reached:?}, not {point:?}", maker.name);
+            let apart = (0..3)
+                .map(|axis| (reached[axis] - point[axis]).abs())
+                .fold(0.0, f64::max);
+            assert!(
+                apart < 0.02,
+                "{}: {numbers:?} reaches {reached:?}, not {point:?}",
+                maker.name
+            );
         }
 
-        let said = format!("joints stand in the robot file's counting; both controllers count otherwise ({difference})");
-        let tables = ["latest/ingest/recording", "latest/ingest/recording"].map(|name| name.replace("latest", "HEAD"));
+        let said = format!(
+            "joints stand in the robot file's counting; both controllers count otherwise ({difference})"
+        );
+        let tables = ["latest/ingest/recording", "latest/ingest/recording"]
+            .map(|name| name.replace("latest", "HEAD"));
         for pair in [["HEAD", "HEAD"], [tables[0].as_str(), tables[1].as_str()]] {
             let text = ran(here, &["diff", pair[0], pair[1]], "");
-            assert_eq!(text.lines().filter(|line| **line == said).count(), usize::from(otherwise), "{text}");
+            assert_eq!(
+                text.lines().filter(|line| **line == said).count(),
+                usize::from(otherwise),
+                "{text}"
+            );
             assert_eq!(text.contains("counting"), otherwise, "{text}");
             let document: serde_json::Value =
-                serde_json::from_str(&ran(here, &["diff", pair[0], pair[1], "--json"], "")).expect("JSON");
-            assert_eq!(document["counting"].as_str(), otherwise.then_some(said.as_str()));
+                serde_json::from_str(&ran(here, &["diff", pair[0], pair[1], "--json"], ""))
+                    .expect("JSON");
+            assert_eq!(
+                document["counting"].as_str(),
+                otherwise.then_some(said.as_str())
+            );
         }
-        let parameters =
-            String::from_utf8(calib(here, &["diff", "HEAD/diagnose/parameters", "HEAD/diagnose/parameters"], "").stdout);
-        assert!(!parameters.expect("UTF-8").contains("counting"), "joints are said of where they stand");
+        let parameters = String::from_utf8(
+            calib(
+                here,
+                &[
+                    "diff",
+                    "HEAD/diagnose/parameters",
+                    "HEAD/diagnose/parameters",
+                ],
+                "",
+            )
+            .stdout,
+        );
+        assert!(
+            !parameters.expect("UTF-8").contains("counting"),
+            "joints are said of where they stand"
+        );
 
-        let page = std::fs::read_to_string(here.join(".calib/documents/counted/report.html")).expect("a page");
-        let sentence =
-            "Zeros, ratios and couplings of joints stand in the robot file&#x27;s counting; the controller counts otherwise";
+        let page = std::fs::read_to_string(here.join(".calib/documents/counted/report.html"))
+            .expect("a page");
+        let sentence = "Zeros, ratios and couplings of joints stand in the robot file&#x27;s counting; the controller counts otherwise";
         assert_eq!(page.matches(sentence).count(), usize::from(otherwise));
-        let report = std::fs::read_to_string(here.join(".calib/documents/counted/report.json")).expect("a document");
+        let report = std::fs::read_to_string(here.join(".calib/documents/counted/report.json"))
+            .expect("a document");
         let report: serde_json::Value = serde_json::from_str(&report).expect("JSON");
         let counting = report["parameters_counting"].as_str().expect("a text");
-        assert_eq!((counting.starts_with("robot file"), counting.contains(difference)), (true, otherwise), "{counting}");
+        assert_eq!(
+            (
+                counting.starts_with("robot file"),
+                counting.contains(difference)
+            ),
+            (true, otherwise),
+            "{counting}"
+        );
     }
 }

@@ -1,7 +1,9 @@
 //! One rule of doubt: a held-out point has a remark where its correction is uncertain by more than half of itself and by more than the
 //! instrument leaves open; such points are counted and named. A small finding beyond its range is none, and harms no target in silence.
 
-use super::concealed::{Outcome, again, is_harmed, model, nothing, outcomes_at, recording, split, targets, upright};
+use super::concealed::{
+    Outcome, again, is_harmed, model, nothing, outcomes_at, recording, split, targets, upright,
+};
 use crate::desk::{Desk, table};
 use calib::compensate::{Chain, Circumstance, IdentifiedArm, Nominal};
 use calib::robot::{Posture, RobotModel};
@@ -10,7 +12,9 @@ use calib::table::{Parameters, Prediction, Robot, Statistics, StatisticsRow, Ver
 use calib::twin::arm::Arm;
 use calib::twin::conceal::case::Case;
 use calib::twin::conceal::points::FIT;
-use calib::twin::effect::{Curve, Foreign, ForeignCourse, ForeignMotion, ForeignShape, ForeignVariable};
+use calib::twin::effect::{
+    Curve, Foreign, ForeignCourse, ForeignMotion, ForeignShape, ForeignVariable,
+};
 use calib::twin::effect::{JointCompliance, JointHardening, Physical};
 use calib::twin::noise::{Noise, Purpose};
 use calib::twin::plan::{Poses, allowed};
@@ -22,33 +26,62 @@ fn judged(case: &Case) -> (Verdict, Prediction, StatisticsRow) {
     let recording = recording(case);
     let split = split(case, &recording);
     let stage: Diagnose = serde_json::from_value(json!({})).expect("settings");
-    let reads = DiagnoseReads { robot: Robot::from_description(&case.robot), recording, split };
+    let reads = DiagnoseReads {
+        robot: Robot::from_description(&case.robot),
+        recording,
+        split,
+    };
     let tables = Desk::default().run(&stage, reads).expect("a diagnosis");
     let prediction = table::<Prediction>(&tables).remove(0);
-    let labelled = Labelled { stage: "diagnose".into(), table: prediction.clone() };
-    let reads = ValidateReads { prediction: vec![labelled], observability: Vec::new() };
-    let stated = Desk::default().run(&Validate::default(), reads).expect("statistics");
-    let held_out = table::<Statistics>(&stated).remove(0).0.into_iter().find(|row| row.held_out).expect("held-out rows");
+    let labelled = Labelled {
+        stage: "diagnose".into(),
+        table: prediction.clone(),
+    };
+    let reads = ValidateReads {
+        prediction: vec![labelled],
+        observability: Vec::new(),
+    };
+    let stated = Desk::default()
+        .run(&Validate::default(), reads)
+        .expect("statistics");
+    let held_out = table::<Statistics>(&stated)
+        .remove(0)
+        .0
+        .into_iter()
+        .find(|row| row.held_out)
+        .expect("held-out rows");
     (table::<Verdict>(&tables).remove(0), prediction, held_out)
 }
 
 /// Every remark of a held-out row; table, figures and verdict count alike.
 fn counted(case: &Case) -> Vec<Option<String>> {
     let (verdict, prediction, held_out) = judged(case);
-    let remarks: Vec<Option<String>> = prediction.0.iter().filter(|row| row.held_out).map(|row| row.remark.clone()).collect();
+    let remarks: Vec<Option<String>> = prediction
+        .0
+        .iter()
+        .filter(|row| row.held_out)
+        .map(|row| row.remark.clone())
+        .collect();
     let remarked = remarks.iter().flatten().count();
     assert_eq!(held_out.remarked, Some(remarked as i64));
     let statement = verdict.0[0].statement.clone().expect("a statement");
     println!("{statement}\n{:?}", held_out.doubts());
     assert_eq!(remarked > 0, held_out.doubts().is_some());
-    assert_eq!(remarked > 0, statement.contains("uncertain by more than half of itself"), "{statement}");
+    assert_eq!(
+        remarked > 0,
+        statement.contains("uncertain by more than half of itself"),
+        "{statement}"
+    );
     remarks
 }
 
 fn unharmed(case: &Case) -> Vec<Outcome> {
     let floor = case.noise_mm[0] * 3f64.sqrt();
     let (outcomes, named) = outcomes_at(case, targets(case));
-    let harmed = outcomes.iter().filter(|one| !one.refused && is_harmed(one, floor)).count();
+    let harmed = outcomes
+        .iter()
+        .filter(|one| !one.refused && is_harmed(one, floor))
+        .count();
     println!("{named}: harmed {harmed} of {}", outcomes.len());
     assert!(harmed * 500 <= outcomes.len(), "{named}: {harmed}");
     outcomes
@@ -63,11 +96,22 @@ fn a_zero_that_wanders_leaves_most_corrections_without_doubt_later() {
         between: [0.0, last],
         shape: ForeignShape::Smooth(vec![[1.0, 7.0, 0.4], [0.5, 13.0, 2.0]]),
     };
-    let wanders = Foreign { motion: ForeignMotion::JointTurn, seat: 2, direction: [0.0; 3], size: 60.0, courses: vec![course] };
-    let case = again(case, vec![Physical::Foreign(wanders)], 41, |shot| shot.q.clone());
+    let wanders = Foreign {
+        motion: ForeignMotion::JointTurn,
+        seat: 2,
+        direction: [0.0; 3],
+        size: 60.0,
+        courses: vec![course],
+    };
+    let case = again(case, vec![Physical::Foreign(wanders)], 41, |shot| {
+        shot.q.clone()
+    });
     // 60 arcsec at a lever of a metre are 0.3 mm, of corrections of some mm: only small ones are in doubt.
     let remarks = counted(&case);
-    assert!(5 * remarks.iter().flatten().count() < remarks.len(), "{remarks:?}");
+    assert!(
+        5 * remarks.iter().flatten().count() < remarks.len(),
+        "{remarks:?}"
+    );
     unharmed(&case);
 }
 
@@ -77,27 +121,53 @@ fn what_depends_on_motor_currents_is_refused_to_targets_that_state_none() {
     case.hidden.clear();
     let (outcomes, named) = outcomes_at(&case, targets(&case));
     assert!(named.contains("joint_compliance"), "{named}");
-    assert!(outcomes.iter().all(|one| one.refused && one.remarked), "{named}");
+    assert!(
+        outcomes.iter().all(|one| one.refused && one.remarked),
+        "{named}"
+    );
 }
 
 #[test]
 fn loads_on_the_other_side_than_was_fitted_harm_no_target() {
     let case = nothing(43, false);
-    let limits: Vec<[f64; 2]> = case.robot.joints.iter().map(|joint| joint.limits.expect("limits")).collect();
+    let limits: Vec<[f64; 2]> = case
+        .robot
+        .joints
+        .iter()
+        .map(|joint| joint.limits.expect("limits"))
+        .collect();
     let arm = Arm::new(&case.robot, &case.truth);
-    let poses = Poses { range_deg: Vec::new(), floor_mm: 20.0, clearance_mm: 150.0, candidates: 1 };
+    let poses = Poses {
+        range_deg: Vec::new(),
+        floor_mm: 20.0,
+        clearance_mm: 150.0,
+        candidates: 1,
+    };
     let mut draw = Noise::new(43, Purpose::Design);
     // The arm leans forward in fitted rows, backward in the others.
     let lean = |shot: &Shot| {
-        let [low, high] = if shot.block == FIT { [15.0, 75.0] } else { [-75.0, -15.0] }.map(f64::to_radians);
+        let [low, high] = if shot.block == FIT {
+            [15.0, 75.0]
+        } else {
+            [-75.0, -15.0]
+        }
+        .map(f64::to_radians);
         let mut ranges = limits.clone();
         ranges[1] = [limits[1][0].max(low), limits[1][1].min(high)];
         ranges[2] = [-10f64, 10.0].map(f64::to_radians);
         allowed(&arm, &poses, &ranges, &mut draw).expect("a pose").0
     };
     let effects = vec![
-        Physical::JointCompliance(JointCompliance { joint: 2, rad_per_nm: 6e-6 }),
-        Physical::JointHardening(JointHardening { joint: 2, curve: Curve::Tanh, amplitude_arcsec: 80.0, scale_nm: 12.0 }),
+        Physical::JointCompliance(JointCompliance {
+            joint: 2,
+            rad_per_nm: 6e-6,
+        }),
+        Physical::JointHardening(JointHardening {
+            joint: 2,
+            curve: Curve::Tanh,
+            amplitude_arcsec: 80.0,
+            scale_nm: 12.0,
+        }),
     ];
     let case = again(case.clone(), effects, 43, lean);
     counted(&case);
@@ -108,15 +178,31 @@ fn loads_on_the_other_side_than_was_fitted_harm_no_target() {
 /// above half of their correction and three times the instrument, those of them without a remark, and all remarks.
 ///
 /// The joint yields by `yields` to its largest load and by `amplitude` of `curve` with its scale at a share `scale` of that, mrad.
-fn asked_beyond_small_loads(curve: Curve, [yields, amplitude, scale]: [f64; 3], seed: u64) -> [usize; 3] {
+fn asked_beyond_small_loads(
+    curve: Curve,
+    [yields, amplitude, scale]: [f64; 3],
+    seed: u64,
+) -> [usize; 3] {
     let case = nothing(seed, false);
     let robot = RobotModel::new(case.robot.clone());
-    let limits: Vec<[f64; 2]> = case.robot.joints.iter().map(|joint| joint.limits.expect("limits")).collect();
+    let limits: Vec<[f64; 2]> = case
+        .robot
+        .joints
+        .iter()
+        .map(|joint| joint.limits.expect("limits"))
+        .collect();
     let arm = Arm::new(&case.robot, &case.truth);
-    let poses = Poses { range_deg: Vec::new(), floor_mm: 20.0, clearance_mm: 150.0, candidates: 1 };
+    let poses = Poses {
+        range_deg: Vec::new(),
+        floor_mm: 20.0,
+        clearance_mm: 150.0,
+        candidates: 1,
+    };
     let mut draw = Noise::new(seed, Purpose::Design);
     let load = |q: &[f64]| Posture::as_stated(&robot, q, 0.0).torque[1].abs();
-    let drawn: Vec<Vec<f64>> = (0..200).map(|_| allowed(&arm, &poses, &limits, &mut draw).expect("a pose").0).collect();
+    let drawn: Vec<Vec<f64>> = (0..200)
+        .map(|_| allowed(&arm, &poses, &limits, &mut draw).expect("a pose").0)
+        .collect();
     let most = drawn.iter().map(|q| load(q)).fold(0.0, f64::max);
     let pose = |shot: &Shot| loop {
         let (q, _) = allowed(&arm, &poses, &limits, &mut draw).expect("a pose");
@@ -125,7 +211,10 @@ fn asked_beyond_small_loads(curve: Curve, [yields, amplitude, scale]: [f64; 3], 
         }
     };
     let effects = vec![
-        Physical::JointCompliance(JointCompliance { joint: 2, rad_per_nm: 1e-3 * yields / most }),
+        Physical::JointCompliance(JointCompliance {
+            joint: 2,
+            rad_per_nm: 1e-3 * yields / most,
+        }),
         Physical::JointHardening(JointHardening {
             joint: 2,
             curve,
@@ -138,18 +227,39 @@ fn asked_beyond_small_loads(curve: Curve, [yields, amplitude, scale]: [f64; 3], 
     let data = recording.measurements();
     let split = split(&case, &recording);
     let stage: Diagnose = serde_json::from_value(json!({})).expect("settings");
-    let reads = DiagnoseReads { robot: Robot::from_description(&case.robot), recording, split };
+    let reads = DiagnoseReads {
+        robot: Robot::from_description(&case.robot),
+        recording,
+        split,
+    };
     let tables = Desk::default().run(&stage, reads).expect("a diagnosis");
-    let arm = IdentifiedArm::new(model(&case.robot, &table::<Parameters>(&tables).remove(0)), None);
+    let arm = IdentifiedArm::new(
+        model(&case.robot, &table::<Parameters>(&tables).remove(0)),
+        None,
+    );
     let (mut reach, mut nominal) = (arm.reach(), Nominal::new(&robot));
     let instrument = case.noise_mm[0] * 3f64.sqrt();
     let mut counts = [0; 3];
-    for (row, prediction) in table::<Prediction>(&tables).remove(0).0.iter().enumerate().filter(|(_, row)| row.held_out) {
+    for (row, prediction) in table::<Prediction>(&tables)
+        .remove(0)
+        .0
+        .iter()
+        .enumerate()
+        .filter(|(_, row)| row.held_out)
+    {
         reach.under(&Circumstance::of_row(&data, row));
-        let correction = 1e3 * (reach.place(data.q(row)).translation - nominal.place(data.q(row)).translation).norm();
-        let (is_off, remarked) = (prediction.error_mm > (0.5 * correction).max(3.0 * instrument), prediction.remark.is_some());
+        let correction = 1e3
+            * (reach.place(data.q(row)).translation - nominal.place(data.q(row)).translation)
+                .norm();
+        let (is_off, remarked) = (
+            prediction.error_mm > (0.5 * correction).max(3.0 * instrument),
+            prediction.remark.is_some(),
+        );
         let add = [is_off, is_off && !remarked, remarked].map(usize::from);
-        counts.iter_mut().zip(add).for_each(|(sum, one)| *sum += one);
+        counts
+            .iter_mut()
+            .zip(add)
+            .for_each(|(sum, one)| *sum += one);
     }
     println!("{curve:?}: off, without a remark, remarked {counts:?}");
     counts

@@ -13,16 +13,26 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 /// mm and deg, as KUKA states frames.
 type Numbers = [f64; 6];
 
-const BASES: [Numbers; 3] = [[0.0; 6], [812.5, -240.0, 310.25, 35.0, -4.0, 2.5], [-150.0, 600.0, 120.0, 90.0, 0.0, 180.0]];
+const BASES: [Numbers; 3] = [
+    [0.0; 6],
+    [812.5, -240.0, 310.25, 35.0, -4.0, 2.5],
+    [-150.0, 600.0, 120.0, 90.0, 0.0, 180.0],
+];
 const GUN: Numbers = [12.0, -64.5, 181.25, 30.0, 20.0, -10.0];
 
 fn frame([x, y, z, a, b, c]: Numbers) -> Pose {
-    Pose::new(turns(a.to_radians(), b.to_radians(), c.to_radians()), Vector3::new(x, y, z) * 1e-3)
+    Pose::new(
+        turns(a.to_radians(), b.to_radians(), c.to_radians()),
+        Vector3::new(x, y, z) * 1e-3,
+    )
 }
 
 /// The flange of the arm at its zero pose: 80 mm from the wrist centre, z along axis 6.
 fn flange() -> Pose {
-    Pose::new(Matrix3::new(0.0, 0.0, 1.0, 0.0, 1.0, 0.0, -1.0, 0.0, 0.0), Vector3::new(0.78, 0.0, 0.9))
+    Pose::new(
+        Matrix3::new(0.0, 0.0, 1.0, 0.0, 1.0, 0.0, -1.0, 0.0, 0.0),
+        Vector3::new(0.78, 0.0, 0.9),
+    )
 }
 
 /// The robot file's tool at the flange: 50, 40 and 30 mm off it in the base's axes, and turned as the base.
@@ -43,7 +53,10 @@ fn aggregate([x, y, z, a, b, c]: Numbers) -> String {
 fn list(pose: &Pose) -> String {
     let turn = UnitQuaternion::from_matrix(&pose.rotation);
     let [x, y, z]: [f64; 3] = (pose.translation * 1e3).into();
-    format!("[[{x:.7},{y:.7},{z:.7}],[{:.12},{:.12},{:.12},{:.12}]]", turn.w, turn.i, turn.j, turn.k)
+    format!(
+        "[[{x:.7},{y:.7},{z:.7}],[{:.12},{:.12},{:.12},{:.12}]]",
+        turn.w, turn.i, turn.j, turn.k
+    )
 }
 
 /// A target: its joints, the number of its base, and whether the gun goes there.
@@ -56,7 +69,11 @@ struct Target {
 impl Target {
     /// From the pose of the robot file's tool to the numbers of the program, and back.
     fn tool(&self, trip: &Trip) -> Pose {
-        if self.gun { own_tool(trip).inverse() * frame(GUN) } else { Pose::identity() }
+        if self.gun {
+            own_tool(trip).inverse() * frame(GUN)
+        } else {
+            Pose::identity()
+        }
     }
 
     fn stated(&self, trip: &Trip) -> Pose {
@@ -69,17 +86,32 @@ impl Target {
 }
 
 fn targets(trip: &Trip, maker: &Maker) -> Vec<Target> {
-    let of = |(k, q): (usize, Vec<f64>)| Target { q, base: k % 3, gun: k % 5 < 2 };
-    poses(trip, maker, 24).into_iter().enumerate().map(of).collect()
+    let of = |(k, q): (usize, Vec<f64>)| Target {
+        q,
+        base: k % 3,
+        gun: k % 5 < 2,
+    };
+    poses(trip, maker, 24)
+        .into_iter()
+        .enumerate()
+        .map(of)
+        .collect()
 }
 
 /// The system's data: frames and tools by their numbers.
 fn configuration(trip: &Trip) -> String {
-    let bases: String =
-        BASES.iter().enumerate().map(|(k, base)| format!("BASE_DATA[{}]={}\n", k + 1, aggregate(*base))).collect();
+    let bases: String = BASES
+        .iter()
+        .enumerate()
+        .map(|(k, base)| format!("BASE_DATA[{}]={}\n", k + 1, aggregate(*base)))
+        .collect();
     let tools = [numbers(&own_tool(trip)), GUN].into_iter().enumerate();
-    let tools: String = tools.map(|(k, tool)| format!("TOOL_DATA[{}]={}\n", k + 1, aggregate(tool))).collect();
-    format!("DEFDAT $CONFIG PUBLIC\n{bases}{tools}LOAD_DATA[1]={{M 0.0}}\nLOAD_DATA[2]={{M 0.0}}\nENDDAT\n")
+    let tools: String = tools
+        .map(|(k, tool)| format!("TOOL_DATA[{}]={}\n", k + 1, aggregate(tool)))
+        .collect();
+    format!(
+        "DEFDAT $CONFIG PUBLIC\n{bases}{tools}LOAD_DATA[1]={{M 0.0}}\nLOAD_DATA[2]={{M 0.0}}\nENDDAT\n"
+    )
 }
 
 fn posture(maker: &Maker, q: &[f64]) -> String {
@@ -108,13 +140,16 @@ fn programs(trip: &Trip, maker: &Maker, targets: &[Target]) -> Vec<Written> {
         .enumerate()
         .map(|(k, target)| {
             let (tool, base) = number(target);
-            let data = format!("DECL FDAT FP{k}={{TOOL_NO {tool},BASE_NO {base},IPO_FRAME #BASE,POINT2[] \" \"}}\n");
+            let data = format!(
+                "DECL FDAT FP{k}={{TOOL_NO {tool},BASE_NO {base},IPO_FRAME #BASE,POINT2[] \" \"}}\n"
+            );
             point(target).replace("PTP ", &format!("DECL E6POS XP{k}=")) + &data
         })
         .collect();
     let data = format!("DEFDAT WELD\n{data}ENDDAT\n");
-    let inline: String =
-        (0..targets.len()).map(|k| format!("PDAT_ACT=PPDAT1\nFDAT_ACT=FP{k}\nBAS(#PTP_PARAMS,100)\nPTP XP{k}\n")).collect();
+    let inline: String = (0..targets.len())
+        .map(|k| format!("PDAT_ACT=PPDAT1\nFDAT_ACT=FP{k}\nBAS(#PTP_PARAMS,100)\nPTP XP{k}\n"))
+        .collect();
     let with: String = (0..targets.len())
         .map(|k| format!("SPTP XP{k} WITH $VEL_AXIS[1]=SVEL_JOINT(100.0), $TOOL=STOOL2(FP{k}), $BASE=SBASE(FP{k}.BASE_NO), $IPO_MODE=SIPO_MODE(FP{k}.IPO_FRAME), $LOAD=SLOAD(FP{k}.TOOL_NO)\n"))
         .collect();
@@ -131,53 +166,127 @@ fn programs(trip: &Trip, maker: &Maker, targets: &[Target]) -> Vec<Written> {
         .map(|(k, base)| {
             let user = frame([5.0, -7.0, 9.0, 10.0, 0.0, 0.0]);
             let own = user.inverse() * frame(*base);
-            format!("PERS wobjdata bench{k}:=[FALSE,TRUE,\"\",{},{}];\n", list(&user), list(&own))
+            format!(
+                "PERS wobjdata bench{k}:=[FALSE,TRUE,\"\",{},{}];\n",
+                list(&user),
+                list(&own)
+            )
         })
         .collect();
     let moves: String = targets
         .iter()
         .map(|target| {
-            let names = format!("{}\\WObj:=bench{};", if target.gun { "gun" } else { "own" }, target.base);
+            let names = format!(
+                "{}\\WObj:=bench{};",
+                if target.gun { "gun" } else { "own" },
+                target.base
+            );
             rapid(&target.stated(trip), confdata(maker, &target.q)).replace("t;", &names)
         })
         .collect();
-    let module = |declared: &str| format!("MODULE m\n{declared}PROC main()\n{moves}ENDPROC\nENDMODULE\n");
+    let module =
+        |declared: &str| format!("MODULE m\n{declared}PROC main()\n{moves}ENDPROC\nENDMODULE\n");
     let system = format!("MODULE system\n{tools}{objects}ENDMODULE\n");
     vec![
-        ("KRL, lines that set frames", Language::Krl, source(set), vec![config()]),
-        ("KRL, inline forms", Language::Krl, data.clone(), vec![("weld.src", source(inline)), config()]),
-        ("KRL, inline forms of splines", Language::Krl, data, vec![("weld.src", source(with)), config()]),
-        ("RAPID", Language::Rapid, module(&format!("{tools}{objects}")), vec![]),
-        ("RAPID, two modules", Language::Rapid, module(""), vec![("system.mod", system)]),
+        (
+            "KRL, lines that set frames",
+            Language::Krl,
+            source(set),
+            vec![config()],
+        ),
+        (
+            "KRL, inline forms",
+            Language::Krl,
+            data.clone(),
+            vec![("weld.src", source(inline)), config()],
+        ),
+        (
+            "KRL, inline forms of splines",
+            Language::Krl,
+            data,
+            vec![("weld.src", source(with)), config()],
+        ),
+        (
+            "RAPID",
+            Language::Rapid,
+            module(&format!("{tools}{objects}")),
+            vec![],
+        ),
+        (
+            "RAPID, two modules",
+            Language::Rapid,
+            module(""),
+            vec![("system.mod", system)],
+        ),
     ]
 }
 
 #[test]
 fn every_target_stands_in_its_frame_and_is_reached_with_its_tool() {
     let trip = Trip::new();
-    let of = |name: &str| makers().into_iter().find(|maker| maker.name == name).expect("a maker");
+    let of = |name: &str| {
+        makers()
+            .into_iter()
+            .find(|maker| maker.name == name)
+            .expect("a maker")
+    };
     for maker in [PLAIN, of("KUKA"), of("signs 1, 4, 6"), of("zeros")] {
         let targets = targets(&trip, &maker);
         let wanted: Vec<Vec<f64>> = targets.iter().map(|target| target.q.clone()).collect();
-        let joints =
-            |q: &[f64]| maker.counted(q).iter().zip(1..).map(|(c, j)| format!("A{j} {c:.9}")).collect::<Vec<_>>().join(",");
-        let joints: String = wanted.iter().map(|q| format!("PTP {{{}}}\n", joints(q))).collect();
-        let own = trip.compensated(&maker, Language::Krl, &joints).expect("corrected");
-        let own: Vec<Vec<f64>> = read(Language::Krl, &own.bytes).iter().map(|one| maker.driven(&one.values)).collect();
+        let joints = |q: &[f64]| {
+            maker
+                .counted(q)
+                .iter()
+                .zip(1..)
+                .map(|(c, j)| format!("A{j} {c:.9}"))
+                .collect::<Vec<_>>()
+                .join(",")
+        };
+        let joints: String = wanted
+            .iter()
+            .map(|q| format!("PTP {{{}}}\n", joints(q)))
+            .collect();
+        let own = trip
+            .compensated(&maker, Language::Krl, &joints)
+            .expect("corrected");
+        let own: Vec<Vec<f64>> = read(Language::Krl, &own.bytes)
+            .iter()
+            .map(|one| maker.driven(&one.values))
+            .collect();
         let own = trip.misses(&wanted, &own);
         for (name, language, text, others) in programs(&trip, &maker, &targets) {
-            let companions: Vec<Companion> =
-                others.iter().map(|(place, text)| Companion { place, text: text.as_bytes() }).collect();
-            let tool = RobotTool::parse(if language == Language::Krl { "1" } else { "own" }).expect("a tool");
+            let companions: Vec<Companion> = others
+                .iter()
+                .map(|(place, text)| Companion {
+                    place,
+                    text: text.as_bytes(),
+                })
+                .collect();
+            let tool = RobotTool::parse(if language == Language::Krl {
+                "1"
+            } else {
+                "own"
+            })
+            .expect("a tool");
             let written = trip.compensated_by(&maker, language, &text, &companions, Some(tool));
-            let written = written.unwrap_or_else(|refused| panic!("{} {name}: {refused}", maker.name));
+            let written =
+                written.unwrap_or_else(|refused| panic!("{} {name}: {refused}", maker.name));
             let literals = read(language, &written.bytes);
             assert_eq!(literals.len(), targets.len(), "{name}");
-            let driven =
-                literals.iter().zip(&targets).map(|(one, target)| trip.driven(target.meant(&trip, pose(one)), &target.q));
+            let driven = literals
+                .iter()
+                .zip(&targets)
+                .map(|(one, target)| trip.driven(target.meant(&trip, pose(one)), &target.q));
             let misses = trip.misses(&wanted, &driven.collect::<Vec<_>>());
-            let apart = misses.iter().zip(&own).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-            println!("{}: {name}: {apart:.6} mm from the same targets as joints", maker.name);
+            let apart = misses
+                .iter()
+                .zip(&own)
+                .map(|(a, b)| (a - b).abs())
+                .fold(0.0, f64::max);
+            println!(
+                "{}: {name}: {apart:.6} mm from the same targets as joints",
+                maker.name
+            );
             assert!(apart < 1e-3, "{} {name}: {apart} mm", maker.name);
         }
     }
@@ -192,28 +301,57 @@ fn files_beside_a_program_are_read_with_it_in_capitals_too() {
         .expect("folders");
     let at = |name: &str| here.join("R1").join(name);
     let write = |name: &str, text: &str| std::fs::write(at(name), text).expect("a file");
-    write("System/$CONFIG.DAT", "BASE_DATA[3]={X 300,Y 40,Z 500,A 0,B 0,C 0}\nTOOL_DATA[2]={X 40,Y 30,Z 130,A 0,B 0,C 0}\n");
-    write("Program/WELD.SRC", "DEF WELD()\nFDAT_ACT=FP1\nBAS(#PTP_PARAMS,100)\nPTP XP1\nEND\n");
+    write(
+        "System/$CONFIG.DAT",
+        "BASE_DATA[3]={X 300,Y 40,Z 500,A 0,B 0,C 0}\nTOOL_DATA[2]={X 40,Y 30,Z 130,A 0,B 0,C 0}\n",
+    );
+    write(
+        "Program/WELD.SRC",
+        "DEF WELD()\nFDAT_ACT=FP1\nBAS(#PTP_PARAMS,100)\nPTP XP1\nEND\n",
+    );
     write(
         "Program/Weld.dat",
         "DEFDAT WELD\nDECL E6POS XP1={X 600,Y 0,Z 430,A 0,B 0,C 0}\nDECL FDAT FP1={TOOL_NO 2,BASE_NO 3,IPO_FRAME #BASE}\nENDDAT\n",
     );
     let program = at("Program/Weld.dat").display().to_string();
     let run = |more: &[&str]| {
-        let output = calib(cell(), &[&["compensate", "latest", program.as_str()], more].concat(), "");
-        let [out, err] = [output.stdout, output.stderr].map(|text| String::from_utf8(text).expect("UTF-8"));
+        let output = calib(
+            cell(),
+            &[&["compensate", "latest", program.as_str()], more].concat(),
+            "",
+        );
+        let [out, err] =
+            [output.stdout, output.stderr].map(|text| String::from_utf8(text).expect("UTF-8"));
         (output.status.code(), out, err)
     };
     let (code, _, err) = run(&[]);
     assert_eq!(code, Some(0), "{err}");
-    assert!(err.contains("read with the program: ") && err.contains("WELD.SRC") && err.contains("$CONFIG.DAT"), "{err}");
-    assert!(err.contains("BASE_DATA[3] by FP1 at") && err.contains("is applied, in the robot's base"), "{err}");
-    assert!(err.contains("the tool TOOL_DATA[2] is taken as the robot file's"), "{err}");
+    assert!(
+        err.contains("read with the program: ")
+            && err.contains("WELD.SRC")
+            && err.contains("$CONFIG.DAT"),
+        "{err}"
+    );
+    assert!(
+        err.contains("BASE_DATA[3] by FP1 at") && err.contains("is applied, in the robot's base"),
+        "{err}"
+    );
+    assert!(
+        err.contains("the tool TOOL_DATA[2] is taken as the robot file's"),
+        "{err}"
+    );
     std::fs::remove_file(at("System/$CONFIG.DAT")).expect("removed");
     let (code, out, err) = run(&[]);
     assert_eq!((code, out.as_str()), (Some(10), ""), "{err}");
-    assert!(err.contains("Weld.dat:2:") && err.contains("BASE_DATA[3], which no file that was read declares"), "{err}");
-    write("frames.dat", "BASE_DATA[3]={X 300,Y 40,Z 500,A 0,B 0,C 0}\nTOOL_DATA[2]={X 40,Y 30,Z 130,A 0,B 0,C 0}\n");
+    assert!(
+        err.contains("Weld.dat:2:")
+            && err.contains("BASE_DATA[3], which no file that was read declares"),
+        "{err}"
+    );
+    write(
+        "frames.dat",
+        "BASE_DATA[3]={X 300,Y 40,Z 500,A 0,B 0,C 0}\nTOOL_DATA[2]={X 40,Y 30,Z 130,A 0,B 0,C 0}\n",
+    );
     let (code, _, err) = run(&["--with", &at("frames.dat").display().to_string()]);
     assert_eq!(code, Some(0), "{err}");
     let (code, _, err) = run(&["--tool", "1,2"]);
@@ -227,44 +365,92 @@ fn tools_are_related_where_the_program_says_how_and_refused_where_it_does_not() 
     let text = |tools: &[&str]| -> String {
         let at = trip.robot.forward(&[0.2, 0.1, -0.3, 0.4, 0.5, 0.6]);
         let moves = tools.iter().map(|tool| format!("{tool}\n{}", krl(&at, "")));
-        format!("DEF A()\n$BASE=$NULLFRAME\n{}END\n", moves.collect::<String>())
+        format!(
+            "DEF A()\n$BASE=$NULLFRAME\n{}END\n",
+            moves.collect::<String>()
+        )
     };
     let config = configuration(&trip);
-    let config = [Companion { place: "$config.dat", text: config.as_bytes() }];
+    let config = [Companion {
+        place: "$config.dat",
+        text: config.as_bytes(),
+    }];
     let run = |text: &str, tool: Option<&str>| {
         let tool = tool.map(|tool| RobotTool::parse(tool).expect("a tool"));
         trip.compensated_by(&PLAIN, Language::Krl, text, &config, tool)
     };
     let one = run(&text(&["BAS(#TOOL,1)"]), None).expect("corrected");
     assert!(
-        one.warnings.iter().any(|note| note.message.contains("TOOL_DATA[1] is taken as the robot file's")),
+        one.warnings.iter().any(|note| note
+            .message
+            .contains("TOOL_DATA[1] is taken as the robot file's")),
         "{:?}",
         one.warnings
     );
     let refused = run(&text(&["BAS(#TOOL,2)"]), None).expect_err("another tool");
-    assert!(refused.contains("the tool stands 65.6 mm from axis 6, the robot file's 50.0 mm"), "{refused}");
+    assert!(
+        refused.contains("the tool stands 65.6 mm from axis 6, the robot file's 50.0 mm"),
+        "{refused}"
+    );
     let two = text(&["BAS(#TOOL,1)", "BAS(#TOOL,2)"]);
     let refused = run(&two, None).expect_err("two tools");
-    assert!(refused.contains("program:6:") && refused.contains("--tool says which of them is the robot file's"), "{refused}");
+    assert!(
+        refused.contains("program:6:")
+            && refused.contains("--tool says which of them is the robot file's"),
+        "{refused}"
+    );
     let by_number = run(&two, Some("1")).expect("corrected");
-    let far = |note: &calib::program::Note| note.line == 6 && note.message.contains("its tool stands 172.9 mm");
-    assert!(by_number.warnings.iter().any(far), "{:?}", by_number.warnings);
+    let far = |note: &calib::program::Note| {
+        note.line == 6 && note.message.contains("its tool stands 172.9 mm")
+    };
+    assert!(
+        by_number.warnings.iter().any(far),
+        "{:?}",
+        by_number.warnings
+    );
     let by_number = by_number.bytes;
-    let joints = two.replace("END\n", "BAS(#TOOL,2)\nPTP {A1 1,A2 2,A3 3,A4 4,A5 5,A6 6}\nEND\n");
+    let joints = two.replace(
+        "END\n",
+        "BAS(#TOOL,2)\nPTP {A1 1,A2 2,A3 3,A4 4,A5 5,A6 6}\nEND\n",
+    );
     let joints = run(&joints, Some("1")).expect("corrected").warnings;
     assert!(
-        joints.iter().any(|note| note.message.contains("joints with the tool TOOL_DATA[2]: they are corrected")),
+        joints.iter().any(|note| note
+            .message
+            .contains("joints with the tool TOOL_DATA[2]: they are corrected")),
         "{joints:?}"
     );
-    let by_frame = numbers(&own_tool(&trip)).map(|number| format!("{number:.9}")).join(",");
-    assert_eq!(run(&two, Some(&by_frame)).expect("corrected").bytes, by_number);
+    let by_frame = numbers(&own_tool(&trip))
+        .map(|number| format!("{number:.9}"))
+        .join(",");
+    assert_eq!(
+        run(&two, Some(&by_frame)).expect("corrected").bytes,
+        by_number
+    );
     let refused = run(&two, Some("7")).expect_err("no such tool");
-    assert!(refused.contains("TOOL_DATA[7]") && refused.contains("declared: TOOL_DATA[1], TOOL_DATA[2]"), "{refused}");
-    let refused = run(&text(&["BAS(#TOOL,1)", "BAS(#TOOL,9)"]), Some("1")).expect_err("a tool without a frame");
-    assert!(refused.contains("TOOL_DATA[9], whose frame no file that was read declares"), "{refused}");
+    assert!(
+        refused.contains("TOOL_DATA[7]")
+            && refused.contains("declared: TOOL_DATA[1], TOOL_DATA[2]"),
+        "{refused}"
+    );
+    let refused = run(&text(&["BAS(#TOOL,1)", "BAS(#TOOL,9)"]), Some("1"))
+        .expect_err("a tool without a frame");
+    assert!(
+        refused.contains("TOOL_DATA[9], whose frame no file that was read declares"),
+        "{refused}"
+    );
     let none = run(&text(&[""]), None).expect("corrected");
-    assert!(none.warnings.iter().any(|note| note.message.contains("no tool is set before this target")), "{:?}", none.warnings);
+    assert!(
+        none.warnings
+            .iter()
+            .any(|note| note.message.contains("no tool is set before this target")),
+        "{:?}",
+        none.warnings
+    );
     for faulty in ["", "1,2,3", "a b", "1,2,3,4,5,x"] {
-        assert!(RobotTool::parse(faulty).is_err_and(|said| said.contains("X,Y,Z,A,B,C")), "{faulty}");
+        assert!(
+            RobotTool::parse(faulty).is_err_and(|said| said.contains("X,Y,Z,A,B,C")),
+            "{faulty}"
+        );
     }
 }

@@ -17,56 +17,131 @@ pub struct Maker {
     coupled: &'static [(usize, usize, f64)],
 }
 
-pub const PLAIN: Maker = Maker { name: "robot file", sign: [1.0; 6], zero: [0.0; 6], coupled: &[] };
+pub const PLAIN: Maker = Maker {
+    name: "robot file",
+    sign: [1.0; 6],
+    zero: [0.0; 6],
+    coupled: &[],
+};
 
 pub fn makers() -> Vec<Maker> {
     let mut all: Vec<Maker> = (0..6)
         .map(|joint| {
             let mut sign = [1.0; 6];
             sign[joint] = -1.0;
-            Maker { name: ["sign 1", "sign 2", "sign 3", "sign 4", "sign 5", "sign 6"][joint], sign, ..PLAIN }
+            Maker {
+                name: ["sign 1", "sign 2", "sign 3", "sign 4", "sign 5", "sign 6"][joint],
+                sign,
+                ..PLAIN
+            }
         })
         .collect();
     let swivel = [-1.0, 1.0, 1.0, -1.0, 1.0, -1.0];
-    all.push(Maker { name: "signs 1, 4, 6", sign: swivel, ..PLAIN });
-    all.push(Maker { name: "zeros", zero: [0.0, -90.0, 90.0, 0.0, 12.5, 180.0], ..PLAIN });
-    all.push(Maker { name: "coupled", coupled: &[(3, 2, -1.0), (6, 5, 0.5)], ..PLAIN });
+    all.push(Maker {
+        name: "signs 1, 4, 6",
+        sign: swivel,
+        ..PLAIN
+    });
+    all.push(Maker {
+        name: "zeros",
+        zero: [0.0, -90.0, 90.0, 0.0, 12.5, 180.0],
+        ..PLAIN
+    });
+    all.push(Maker {
+        name: "coupled",
+        coupled: &[(3, 2, -1.0), (6, 5, 0.5)],
+        ..PLAIN
+    });
     // As KUKA, ABB (a parallelogram) and FANUC (joint 3 against the horizon) count an upright arm.
-    all.push(Maker { name: "KUKA", sign: swivel, zero: [0.0, -90.0, 90.0, 0.0, 0.0, 0.0], ..PLAIN });
-    all.push(Maker { name: "ABB, parallelogram", coupled: &[(3, 2, 1.0)], ..PLAIN });
-    all.push(Maker { name: "FANUC", sign: [1.0, 1.0, -1.0, -1.0, 1.0, -1.0], coupled: &[(3, 2, -1.0)], ..PLAIN });
+    all.push(Maker {
+        name: "KUKA",
+        sign: swivel,
+        zero: [0.0, -90.0, 90.0, 0.0, 0.0, 0.0],
+        ..PLAIN
+    });
+    all.push(Maker {
+        name: "ABB, parallelogram",
+        coupled: &[(3, 2, 1.0)],
+        ..PLAIN
+    });
+    all.push(Maker {
+        name: "FANUC",
+        sign: [1.0, 1.0, -1.0, -1.0, 1.0, -1.0],
+        coupled: &[(3, 2, -1.0)],
+        ..PLAIN
+    });
     let zero = [10.0, -90.0, 90.0, 30.0, -45.0, 180.0];
-    all.push(Maker { name: "all at once", sign: swivel, zero, coupled: &[(3, 2, -1.0), (6, 5, 0.5)] });
+    all.push(Maker {
+        name: "all at once",
+        sign: swivel,
+        zero,
+        coupled: &[(3, 2, -1.0), (6, 5, 0.5)],
+    });
     all
 }
 
 impl Maker {
     pub fn counted(&self, q: &[f64]) -> Vec<f64> {
         let own: Vec<f64> = q.iter().map(|q| q.to_degrees()).collect();
-        let held = |joint: usize| self.parts(joint).map(|(by, ratio)| ratio * own[by]).sum::<f64>();
-        (0..6).map(|joint| self.sign[joint] * (own[joint] + held(joint)) + self.zero[joint]).collect()
+        let held = |joint: usize| {
+            self.parts(joint)
+                .map(|(by, ratio)| ratio * own[by])
+                .sum::<f64>()
+        };
+        (0..6)
+            .map(|joint| self.sign[joint] * (own[joint] + held(joint)) + self.zero[joint])
+            .collect()
     }
 
     /// What the controller's numbers (deg) make of the joints, rad: no joint that is in another one's number holds a third.
     pub fn driven(&self, numbers: &[f64]) -> Vec<f64> {
-        let plain: Vec<f64> = (0..6).map(|joint| self.sign[joint] * (numbers[joint] - self.zero[joint])).collect();
-        let held = |joint: usize| self.parts(joint).map(|(by, ratio)| ratio * plain[by]).sum::<f64>();
-        (0..6).map(|joint| (plain[joint] - held(joint)).to_radians()).collect()
+        let plain: Vec<f64> = (0..6)
+            .map(|joint| self.sign[joint] * (numbers[joint] - self.zero[joint]))
+            .collect();
+        let held = |joint: usize| {
+            self.parts(joint)
+                .map(|(by, ratio)| ratio * plain[by])
+                .sum::<f64>()
+        };
+        (0..6)
+            .map(|joint| (plain[joint] - held(joint)).to_radians())
+            .collect()
     }
 
     pub fn convention(&self) -> JointConvention {
-        let coupled =
-            self.coupled.iter().map(|(joint, by, ratio)| CountedCoupling { joint: joint - 1, by: by - 1, ratio: *ratio });
-        JointConvention::new(self.sign.to_vec(), self.zero.map(f64::to_radians).to_vec(), coupled.collect())
+        let coupled = self
+            .coupled
+            .iter()
+            .map(|(joint, by, ratio)| CountedCoupling {
+                joint: joint - 1,
+                by: by - 1,
+                ratio: *ratio,
+            });
+        JointConvention::new(
+            self.sign.to_vec(),
+            self.zero.map(f64::to_radians).to_vec(),
+            coupled.collect(),
+        )
     }
 
     fn parts(&self, joint: usize) -> impl Iterator<Item = (usize, f64)> {
-        self.coupled.iter().filter(move |(moved, ..)| *moved == joint + 1).map(|(_, by, ratio)| (by - 1, *ratio))
+        self.coupled
+            .iter()
+            .filter(move |(moved, ..)| *moved == joint + 1)
+            .map(|(_, by, ratio)| (by - 1, *ratio))
     }
 
     fn settings(&self) -> String {
-        let coupled = self.coupled.iter().map(|(joint, by, ratio)| format!("{{joint: {joint}, by: {by}, ratio: {ratio}}}"));
-        format!("sign: {:?}, zero: {:?}, coupled: [{}]", self.sign, self.zero, coupled.collect::<Vec<_>>().join(", "))
+        let coupled = self
+            .coupled
+            .iter()
+            .map(|(joint, by, ratio)| format!("{{joint: {joint}, by: {by}, ratio: {ratio}}}"));
+        format!(
+            "sign: {:?}, zero: {:?}, coupled: [{}]",
+            self.sign,
+            self.zero,
+            coupled.collect::<Vec<_>>().join(", ")
+        )
     }
 }
 
@@ -74,19 +149,41 @@ impl Maker {
 pub const IDENTIFY: &str = "  - uses: identify\n    with: {on: [fit]}\n";
 
 /// A folder with a run of the cell as its maker counts: a recording of the points, then `stages`.
-pub fn recorded(maker: &Maker, cell: &Cell, points: &[Point], robot: &str, stages: &str) -> TempDir {
+pub fn recorded(
+    maker: &Maker,
+    cell: &Cell,
+    points: &[Point],
+    robot: &str,
+    stages: &str,
+) -> TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     let here = folder.path();
     std::fs::write(here.join("robot.yaml"), robot).expect("a file");
     let recorded = cell.recorded_by(points.to_vec(), 77).recording;
-    let rows = points.iter().zip(&recorded.position).enumerate().map(|(k, (point, position))| {
-        let numbers = maker.counted(&point.q).iter().map(|c| format!("{c:.9}")).collect::<Vec<_>>().join(",");
-        let [x, y, z] = position.map(|x| Unit::Millimetre.from_si(x));
-        format!("P{k},{numbers},{},{x:.6},{y:.6},{z:.6}\n", point.payload_kg)
-    });
+    let rows = points
+        .iter()
+        .zip(&recorded.position)
+        .enumerate()
+        .map(|(k, (point, position))| {
+            let numbers = maker
+                .counted(&point.q)
+                .iter()
+                .map(|c| format!("{c:.9}"))
+                .collect::<Vec<_>>()
+                .join(",");
+            let [x, y, z] = position.map(|x| Unit::Millimetre.from_si(x));
+            format!("P{k},{numbers},{},{x:.6},{y:.6},{z:.6}\n", point.payload_kg)
+        });
     let header = "id,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,kg,x,y,z\n";
-    std::fs::write(here.join("log.csv"), header.to_string() + &rows.collect::<String>()).expect("a file");
-    let q = format!("{{column: \"q{{j}}_deg\", unit: deg, {}}}", maker.settings());
+    std::fs::write(
+        here.join("log.csv"),
+        header.to_string() + &rows.collect::<String>(),
+    )
+    .expect("a file");
+    let q = format!(
+        "{{column: \"q{{j}}_deg\", unit: deg, {}}}",
+        maker.settings()
+    );
     let pipeline = format!(
         "calib: 1\nname: counted\nseed: 3\nstages:\n  - uses: robot\n    with: {{file: robot.yaml}}\n  - uses: ingest\n    with:\n      files:\n        - file: log.csv\n          columns:\n            point_id: {{column: id}}\n            usage: {{value: fit}}\n            q: {q}\n            payload: {{column: kg, unit: kg}}\n            x: {{column: x, unit: mm}}\n            y: {{column: y, unit: mm}}\n            z: {{column: z, unit: mm}}\n      instrument: leica_at960\n  - uses: split\n    with: {{by: usage}}\n{stages}"
     );
@@ -97,6 +194,10 @@ pub fn recorded(maker: &Maker, cell: &Cell, points: &[Point], robot: &str, stage
 
 pub fn ran(here: &Path, arguments: &[&str], input: &str) -> String {
     let output = calib(here, arguments, input);
-    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    assert!(
+        output.status.success(),
+        "{arguments:?}: {}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     String::from_utf8(output.stdout).expect("UTF-8")
 }

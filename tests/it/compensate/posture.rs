@@ -2,7 +2,9 @@
 
 use super::maker::{Maker, makers};
 use super::{ROBOT, calib, cell};
-use calib::compensate::{CommandTarget, CorrectionOptions, Corrector, IdentifiedArm, StatedPosture};
+use calib::compensate::{
+    CommandTarget, CorrectionOptions, Corrector, IdentifiedArm, StatedPosture,
+};
 use calib::effect::EffectStack;
 use calib::estimate::Model;
 use calib::robot::RobotModel;
@@ -16,26 +18,65 @@ fn poses(robot: &RobotModel, maker: &Maker) -> Vec<Vec<f64>> {
             let [low, high] = joint.limits.expect("limits");
             low + (high - low) * (0.5 + 0.48 * (1.7 * k as f64 + 2.3 * j as f64 + 0.1).sin())
         };
-        robot.description().joints.iter().enumerate().map(at).collect()
+        robot
+            .description()
+            .joints
+            .iter()
+            .enumerate()
+            .map(at)
+            .collect()
     };
-    let clear = |q: &Vec<f64>| maker.counted(q).iter().all(|c| (5.0..85.0).contains(&c.rem_euclid(90.0)));
+    let clear = |q: &Vec<f64>| {
+        maker
+            .counted(q)
+            .iter()
+            .all(|c| (5.0..85.0).contains(&c.rem_euclid(90.0)))
+    };
     (0..4000).map(pose).filter(clear).take(40).collect()
 }
 
 #[test]
 fn a_pose_is_reached_in_the_posture_that_it_states() {
-    let robot = RobotModel::new(read_calib(RobotFileText { label: "robot.yaml", text: ROBOT }, None).expect("a robot").robot);
+    let robot = RobotModel::new(
+        read_calib(
+            RobotFileText {
+                label: "robot.yaml",
+                text: ROBOT,
+            },
+            None,
+        )
+        .expect("a robot")
+        .robot,
+    );
     let stack = EffectStack::new(&robot, Pose::identity(), Vec::new());
     let arm = IdentifiedArm::new(Model::nominal(robot.clone(), stack), None);
-    for maker in makers().into_iter().filter(|maker| ["sign 1", "zeros", "KUKA", "all at once"].contains(&maker.name)) {
+    for maker in makers()
+        .into_iter()
+        .filter(|maker| ["sign 1", "zeros", "KUKA", "all at once"].contains(&maker.name))
+    {
         let poses = poses(&robot, &maker);
         assert!(poses.len() > 20, "{}: {} poses", maker.name, poses.len());
         let quadrant = |c: f64| (c / 90.0).floor() as i32;
         let by_quadrants = |q: &[f64]| {
             let c = maker.counted(q);
-            StatedPosture::of_quadrants(6, &[(0, quadrant(c[0])), (3, quadrant(c[3])), (5, quadrant(c[5]))])
+            StatedPosture::of_quadrants(
+                6,
+                &[
+                    (0, quadrant(c[0])),
+                    (3, quadrant(c[3])),
+                    (5, quadrant(c[5])),
+                ],
+            )
         };
-        let by_signs = |q: &[f64]| StatedPosture::of_signs(&maker.counted(q).iter().map(|c| *c < 0.0).collect::<Vec<_>>());
+        let by_signs = |q: &[f64]| {
+            StatedPosture::of_signs(
+                &maker
+                    .counted(q)
+                    .iter()
+                    .map(|c| *c < 0.0)
+                    .collect::<Vec<_>>(),
+            )
+        };
         let solved = |posture: &dyn Fn(&[f64]) -> Option<StatedPosture>| -> Vec<Option<Vec<f64>>> {
             let target = |q: &Vec<f64>| {
                 let pose = robot.forward(q);
@@ -46,49 +87,104 @@ fn a_pose_is_reached_in_the_posture_that_it_states() {
                     ..CommandTarget::default()
                 }
             };
-            let manner = CorrectionOptions { cartesian: true, ..CorrectionOptions::counted_by(maker.convention()) };
-            let answers = Corrector::new(&arm, None, None, manner).batch(poses.iter().map(target).collect());
-            answers.into_iter().map(|answer| answer.q.map(|q| q.iter().map(|q| q.to_degrees()).collect())).collect()
+            let manner = CorrectionOptions {
+                cartesian: true,
+                ..CorrectionOptions::counted_by(maker.convention())
+            };
+            let answers =
+                Corrector::new(&arm, None, None, manner).batch(poses.iter().map(target).collect());
+            answers
+                .into_iter()
+                .map(|answer| answer.q.map(|q| q.iter().map(|q| q.to_degrees()).collect()))
+                .collect()
         };
         let [mut other, mut reached] = [0, 0];
         for (q, found) in poses.iter().zip(solved(&|_| None)) {
             let (c, found) = (maker.counted(q), found.expect("a solution"));
-            other += usize::from([0, 3, 5].iter().any(|j| quadrant(c[*j]) != quadrant(found[*j])));
+            other += usize::from(
+                [0, 3, 5]
+                    .iter()
+                    .any(|j| quadrant(c[*j]) != quadrant(found[*j])),
+            );
         }
-        assert!(other > 5, "{}: the nearest posture is the one that is stated anyway", maker.name);
+        assert!(
+            other > 5,
+            "{}: the nearest posture is the one that is stated anyway",
+            maker.name
+        );
         for (q, found) in poses.iter().zip(solved(&|q| Some(by_quadrants(q)))) {
             let Some(found) = found else { continue };
             let c = maker.counted(q);
-            assert!([0, 3, 5].iter().all(|j| quadrant(c[*j]) == quadrant(found[*j])), "{}: {c:?}, found {found:?}", maker.name);
-            assert!((robot.forward(&maker.driven(&found)).translation - robot.forward(q).translation).norm() < 1e-6);
+            assert!(
+                [0, 3, 5]
+                    .iter()
+                    .all(|j| quadrant(c[*j]) == quadrant(found[*j])),
+                "{}: {c:?}, found {found:?}",
+                maker.name
+            );
+            assert!(
+                (robot.forward(&maker.driven(&found)).translation - robot.forward(q).translation)
+                    .norm()
+                    < 1e-6
+            );
             reached += 1;
         }
         assert_eq!(reached, poses.len(), "{}", maker.name);
         for (q, found) in poses.iter().zip(solved(&|q| Some(by_signs(q)))) {
             let (c, found) = (maker.counted(q), found.expect("a solution"));
-            assert!(c.iter().zip(&found).all(|(a, b)| (*a < 0.0) == (*b < 0.0)), "{}: {c:?}, found {found:?}", maker.name);
+            assert!(
+                c.iter().zip(&found).all(|(a, b)| (*a < 0.0) == (*b < 0.0)),
+                "{}: {c:?}, found {found:?}",
+                maker.name
+            );
         }
-        println!("{}: {other} of {} in another posture where none is stated, none where it is", maker.name, poses.len());
+        println!(
+            "{}: {other} of {} in another posture where none is stated, none where it is",
+            maker.name,
+            poses.len()
+        );
     }
 }
 
 fn run(name: &str, text: &str) -> (Option<i32>, String, String) {
     std::fs::write(cell().join(name), text).expect("a file");
-    let output = calib(cell(), &["compensate", "latest", name, "--start", "2,3,4,5,40,0"], "");
-    let [out, err] = [output.stdout, output.stderr].map(|text| String::from_utf8(text).expect("UTF-8"));
+    let output = calib(
+        cell(),
+        &["compensate", "latest", name, "--start", "2,3,4,5,40,0"],
+        "",
+    );
+    let [out, err] =
+        [output.stdout, output.stderr].map(|text| String::from_utf8(text).expect("UTF-8"));
     (output.status.code(), out, err)
 }
 
 #[test]
 fn programs_state_postures_and_are_told_once_where_they_do_not() {
-    let robot = RobotModel::new(read_calib(RobotFileText { label: "robot.yaml", text: ROBOT }, None).expect("a robot").robot);
+    let robot = RobotModel::new(
+        read_calib(
+            RobotFileText {
+                label: "robot.yaml",
+                text: ROBOT,
+            },
+            None,
+        )
+        .expect("a robot")
+        .robot,
+    );
     let q = [10.0f64, 15.0, -20.0, 25.0, 40.0, 30.0].map(f64::to_radians);
     let pose = robot.forward(&q);
     let turn = nalgebra::UnitQuaternion::from_matrix(&pose.rotation);
-    let at: Vec<String> = pose.translation.iter().map(|x| format!("{:.6}", x * 1e3)).collect();
+    let at: Vec<String> = pose
+        .translation
+        .iter()
+        .map(|x| format!("{:.6}", x * 1e3))
+        .collect();
     let rapid = |configuration: &str| {
         let turn = format!("{:.9},{:.9},{:.9},{:.9}", turn.w, turn.i, turn.j, turn.k);
-        format!("MODULE m\nMoveL [[{}],[{turn}],[{configuration}],[9E9,9E9,9E9,9E9,9E9,9E9]],v1,z1,t;\nENDMODULE\n", at.join(","))
+        format!(
+            "MODULE m\nMoveL [[{}],[{turn}],[{configuration}],[9E9,9E9,9E9,9E9,9E9,9E9]],v1,z1,t;\nENDMODULE\n",
+            at.join(",")
+        )
     };
     let (code, own, err) = run("own.mod", &rapid("0,0,0,0"));
     assert_eq!(code, Some(0), "{err}");
@@ -99,12 +195,18 @@ fn programs_state_postures_and_are_told_once_where_they_do_not() {
     assert_ne!(own, over);
     let (code, out, err) = run("none.mod", &rapid("1,0,0,0"));
     assert_eq!((code, out.as_str()), (Some(10), ""), "{err}");
-    assert!(err.contains("none.mod:2:") && err.contains("not reached in the posture that is stated"), "{err}");
+    assert!(
+        err.contains("none.mod:2:") && err.contains("not reached in the posture that is stated"),
+        "{err}"
+    );
 
     let (c, b, a) = turn.euler_angles();
     let krl = |posture: &str| {
         let angles = [a, b, c].map(|angle| format!("{:.9}", angle.to_degrees()));
-        format!("LIN {{X {},Y {},Z {},A {},B {},C {}{posture}}}\n", at[0], at[1], at[2], angles[0], angles[1], angles[2])
+        format!(
+            "LIN {{X {},Y {},Z {},A {},B {},C {}{posture}}}\n",
+            at[0], at[1], at[2], angles[0], angles[1], angles[2]
+        )
     };
     // Joint 3 below 0, by number and by bits.
     let (code, by_number, err) = run("t.src", &krl(",S 2,T 4"));
@@ -114,15 +216,30 @@ fn programs_state_postures_and_are_told_once_where_they_do_not() {
     assert!(!err.contains("posture"), "{err}");
     let (code, _, err) = run("s.src", &krl(",S 3,T 4"));
     assert_eq!(code, Some(10), "{err}");
-    assert!(err.contains("not reached in the posture that is stated (S 3, T 4)"), "{err}");
-    let targets =
-        |text: &str| text.lines().filter(|line| line.starts_with("LIN")).map(|line| line[..60].to_string()).collect::<Vec<_>>();
+    assert!(
+        err.contains("not reached in the posture that is stated (S 3, T 4)"),
+        "{err}"
+    );
+    let targets = |text: &str| {
+        text.lines()
+            .filter(|line| line.starts_with("LIN"))
+            .map(|line| line[..60].to_string())
+            .collect::<Vec<_>>()
+    };
     assert_eq!(targets(&by_number), targets(&by_bits));
     let (code, _, err) = run("below.src", &krl(",T 'B000101'"));
     assert_eq!(code, Some(10), "{err}");
-    assert!(err.contains("not reached in the posture that is stated"), "{err}");
+    assert!(
+        err.contains("not reached in the posture that is stated"),
+        "{err}"
+    );
     let (code, _, err) = run("open.src", &(krl("") + &krl("")));
     assert_eq!(code, Some(0), "{err}");
-    assert_eq!(err.matches("posture not stated: taken nearest to the target before").count(), 1, "{err}");
+    assert_eq!(
+        err.matches("posture not stated: taken nearest to the target before")
+            .count(),
+        1,
+        "{err}"
+    );
     assert!(err.contains("open.src:1:"), "{err}");
 }

@@ -3,10 +3,12 @@
 use super::ROBOT;
 use super::maker::Maker;
 use super::true_error::Cell;
-use calib::compensate::{CorrectionOptions, Corrector, Gate, IdentifiedArm, Nominal, ToolGoal, least_change, turns};
+use calib::compensate::{
+    CorrectionOptions, Corrector, Gate, IdentifiedArm, Nominal, ToolGoal, least_change, turns,
+};
 use calib::program::{
-    Companion, Frames, Language, Literal, Partial, Program, ProgramFile, ProgramLoad, ProgramRules, Rewritten, RobotTool,
-    corrected,
+    Companion, Frames, Language, Literal, Partial, Program, ProgramFile, ProgramLoad, ProgramRules,
+    Rewritten, RobotTool, corrected,
 };
 use calib::robot::RobotModel;
 use calib::robot::import::{RobotFileText, read_calib};
@@ -30,15 +32,34 @@ impl Trip {
             ("[-80, 75]", "[-260, 80]"),
             ("[-170, 170]", "[-350, 350]"),
         ];
-        let text = wide.into_iter().fold(ROBOT.to_string(), |text, (from, to)| text.replace(from, to));
-        let robot = read_calib(RobotFileText { label: "robot.yaml", text: &text }, None).expect("a robot").robot;
+        let text = wide
+            .into_iter()
+            .fold(ROBOT.to_string(), |text, (from, to)| text.replace(from, to));
+        let robot = read_calib(
+            RobotFileText {
+                label: "robot.yaml",
+                text: &text,
+            },
+            None,
+        )
+        .expect("a robot")
+        .robot;
         let cell = Cell::of(robot.clone(), 1.2, [100.0, 200.0], Vec::new());
         let arm = IdentifiedArm::new(cell.identified(), None);
-        Self { cell, arm, robot: RobotModel::new(robot) }
+        Self {
+            cell,
+            arm,
+            robot: RobotModel::new(robot),
+        }
     }
 
     /// A program as `calib compensate` writes it; the reasons where it is refused.
-    pub fn compensated(&self, maker: &Maker, language: Language, text: &str) -> Result<Rewritten, String> {
+    pub fn compensated(
+        &self,
+        maker: &Maker,
+        language: Language,
+        text: &str,
+    ) -> Result<Rewritten, String> {
         self.compensated_by(maker, language, text, &[], None)
     }
 
@@ -54,20 +75,46 @@ impl Trip {
         let manner = CorrectionOptions {
             oriented: true,
             uncertainty: false,
-            gate: Gate { insisted: true, ..Gate::default() },
+            gate: Gate {
+                insisted: true,
+                ..Gate::default()
+            },
             ..CorrectionOptions::counted_by(maker.convention())
         };
         let mut corrector = Corrector::new(&self.arm, None, None, manner);
         // What the letters of a configuration mean stands in no listing.
-        let frames = if language == Language::Fanuc { Frames::Assumed } else { Frames::Refused };
-        let rules = ProgramRules { partial: Partial::Refused, frames, load: ProgramLoad::Optional, tool };
-        let source = ProgramFile { place: "program", text: text.as_bytes(), language, companions };
-        corrected(&source, rules, self.robot.description(), &mut corrector).map_err(|error| error.to_string())
+        let frames = if language == Language::Fanuc {
+            Frames::Assumed
+        } else {
+            Frames::Refused
+        };
+        let rules = ProgramRules {
+            partial: Partial::Refused,
+            frames,
+            load: ProgramLoad::Optional,
+            tool,
+        };
+        let source = ProgramFile {
+            place: "program",
+            text: text.as_bytes(),
+            language,
+            companions,
+        };
+        corrected(&source, rules, self.robot.description(), &mut corrector)
+            .map_err(|error| error.to_string())
     }
 
     /// Joints by which the controller reaches a pose of the robot file's tool, near to `near` (rad).
     pub fn driven(&self, pose: Pose, near: &[f64]) -> Vec<f64> {
-        let found = least_change(&mut Nominal::new(&self.robot), &ToolGoal { pose, oriented: true }, near, near);
+        let found = least_change(
+            &mut Nominal::new(&self.robot),
+            &ToolGoal {
+                pose,
+                oriented: true,
+            },
+            near,
+            near,
+        );
         assert!(found.residual < 1e-6, "{}", found.residual);
         found.q
     }
@@ -75,9 +122,20 @@ impl Trip {
     /// How far (mm) the true robot is from where each target's joints should bring a point of the tool, with the joints that are driven; the
     /// point as its place (m) in the tool frame of the robot file.
     pub fn misses(&self, wanted: &[Vec<f64>], driven: &[Vec<f64>]) -> Vec<f64> {
-        let points = driven.iter().map(|q| Point { q: q.clone(), ..self.still() }).collect();
+        let points = driven
+            .iter()
+            .map(|q| Point {
+                q: q.clone(),
+                ..self.still()
+            })
+            .collect();
         let goal = |q: &Vec<f64>| self.arm.base().point(&self.robot.forward(q).translation);
-        self.cell.places(points).iter().zip(wanted).map(|(at, q)| (at - goal(q)).norm() * 1e3).collect()
+        self.cell
+            .places(points)
+            .iter()
+            .zip(wanted)
+            .map(|(at, q)| (at - goal(q)).norm() * 1e3)
+            .collect()
     }
 
     fn still(&self) -> Point {
@@ -87,7 +145,10 @@ impl Trip {
 
 /// The targets of a program, values and postures.
 pub fn read(language: Language, bytes: &[u8]) -> Vec<Literal> {
-    Program::parse(bytes, language, Partial::Refused).expect("accepted").literals().to_vec()
+    Program::parse(bytes, language, Partial::Refused)
+        .expect("accepted")
+        .literals()
+        .to_vec()
 }
 
 /// What the numbers of a Cartesian target say.
@@ -96,7 +157,9 @@ pub fn pose(literal: &Literal) -> Pose {
     let rotation = if v.len() == 6 {
         turns(v[3].to_radians(), v[4].to_radians(), v[5].to_radians())
     } else {
-        UnitQuaternion::from_quaternion(Quaternion::new(v[3], v[4], v[5], v[6])).to_rotation_matrix().into_inner()
+        UnitQuaternion::from_quaternion(Quaternion::new(v[3], v[4], v[5], v[6]))
+            .to_rotation_matrix()
+            .into_inner()
     };
     Pose::new(rotation, Vector3::new(v[0], v[1], v[2]) * 1e-3)
 }

@@ -13,12 +13,19 @@ use std::f64::consts::TAU;
 /// 0: by the lengths of the arm, 500 and 700 mm.
 fn sides(maker: &Maker, q: &[f64]) -> [bool; 3] {
     let x = 500.0 * q[1].sin() + 700.0 * (q[1] + q[2]).cos();
-    [x > 0.0, q[2].cos() * maker.sign[2] > 0.0, q[4].sin() * maker.sign[4] > 0.0]
+    [
+        x > 0.0,
+        q[2].cos() * maker.sign[2] > 0.0,
+        q[4].sin() * maker.sign[4] > 0.0,
+    ]
 }
 
 fn is_clear(maker: &Maker, q: &[f64]) -> bool {
     let x = 500.0 * q[1].sin() + 700.0 * (q[1] + q[2]).cos();
-    let off = maker.counted(q).iter().all(|c| (5.0..85.0).contains(&c.rem_euclid(90.0)));
+    let off = maker
+        .counted(q)
+        .iter()
+        .all(|c| (5.0..85.0).contains(&c.rem_euclid(90.0)));
     off && x.abs() > 60.0 && q[2].cos().abs() > 0.1 && q[4].sin().abs() > 0.1
 }
 
@@ -31,7 +38,13 @@ pub fn poses(trip: &Trip, maker: &Maker, count: usize) -> Vec<Vec<f64>> {
             let [low, high] = joint.limits.expect("limits");
             low + (high - low) * (k as f64 * root.sqrt()).fract()
         };
-        trip.robot.description().joints.iter().zip(ROOTS).map(at).collect()
+        trip.robot
+            .description()
+            .joints
+            .iter()
+            .zip(ROOTS)
+            .map(at)
+            .collect()
     };
     let mut found: BTreeMap<[bool; 3], usize> = BTreeMap::new();
     let mut wanted = |q: &Vec<f64>| {
@@ -40,13 +53,26 @@ pub fn poses(trip: &Trip, maker: &Maker, count: usize) -> Vec<Vec<f64>> {
         *so_far <= count / 8
     };
     // A turn more of a joint has another sign, or is beyond its limits.
-    let limits = |joint: usize| trip.robot.description().joints[joint].limits.expect("limits");
+    let limits = |joint: usize| {
+        trip.robot.description().joints[joint]
+            .limits
+            .expect("limits")
+    };
     let told = |q: &Vec<f64>, joint: usize, more: f64| {
-        let (turned, [low, high], c) = (q[joint] + more * TAU, limits(joint), maker.counted(q)[joint]);
+        let (turned, [low, high], c) = (
+            q[joint] + more * TAU,
+            limits(joint),
+            maker.counted(q)[joint],
+        );
         !(low..=high).contains(&turned) || (c + maker.sign[joint] * more * 360.0 < 0.0) != (c < 0.0)
     };
     let is_told = |q: &Vec<f64>| (0..6).all(|joint| told(q, joint, 1.0) && told(q, joint, -1.0));
-    (1..20000).map(pose).filter(|q| is_clear(maker, q) && is_told(q)).filter(|q| wanted(q)).take(count).collect()
+    (1..20000)
+        .map(pose)
+        .filter(|q| is_clear(maker, q) && is_told(q))
+        .filter(|q| wanted(q))
+        .take(count)
+        .collect()
 }
 
 pub fn status(maker: &Maker, q: &[f64]) -> u32 {
@@ -55,13 +81,24 @@ pub fn status(maker: &Maker, q: &[f64]) -> u32 {
 }
 
 pub fn turn(maker: &Maker, q: &[f64]) -> u32 {
-    maker.counted(q).iter().enumerate().filter(|(_, c)| **c < 0.0).map(|(joint, _)| 1 << joint).sum()
+    maker
+        .counted(q)
+        .iter()
+        .enumerate()
+        .filter(|(_, c)| **c < 0.0)
+        .map(|(joint, _)| 1 << joint)
+        .sum()
 }
 
 pub fn confdata(maker: &Maker, q: &[f64]) -> [i32; 4] {
     let [front, beyond, above] = sides(maker, q);
     let quadrant = |joint: usize| (maker.counted(q)[joint] / 90.0).floor() as i32;
-    [quadrant(0), quadrant(3), quadrant(5), 4 * i32::from(!front) + 2 * i32::from(!beyond) + i32::from(!above)]
+    [
+        quadrant(0),
+        quadrant(3),
+        quadrant(5),
+        4 * i32::from(!front) + 2 * i32::from(!beyond) + i32::from(!above),
+    ]
 }
 
 pub fn krl(pose: &Pose, posture: &str) -> String {
@@ -86,7 +123,11 @@ fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
 
 /// Whether a maker's RAPID says on which side the arm is: not with a parallelogram.
 fn uses_cfx(maker: &Maker) -> bool {
-    let parallelogram = maker.convention().coupled().iter().any(|coupling| (coupling.joint, coupling.by) == (2, 1));
+    let parallelogram = maker
+        .convention()
+        .coupled()
+        .iter()
+        .any(|coupling| (coupling.joint, coupling.by) == (2, 1));
     !parallelogram
 }
 
@@ -100,38 +141,73 @@ fn every_posture_that_a_program_states_is_reached_as_its_joints_are() {
         let joints: String = poses
             .iter()
             .map(|q| {
-                let named = maker.counted(q).iter().zip(1..).map(|(c, j)| format!("A{j} {c:.9}")).collect::<Vec<_>>().join(",");
+                let named = maker
+                    .counted(q)
+                    .iter()
+                    .zip(1..)
+                    .map(|(c, j)| format!("A{j} {c:.9}"))
+                    .collect::<Vec<_>>()
+                    .join(",");
                 format!("PTP {{{named}}}\n")
             })
             .collect();
         let placed = |text: fn(&Maker, &[f64], &Pose) -> String| -> String {
-            poses.iter().map(|q| text(&maker, q, &trip.robot.forward(q))).collect()
+            poses
+                .iter()
+                .map(|q| text(&maker, q, &trip.robot.forward(q)))
+                .collect()
         };
-        let by_joints = trip.compensated(&maker, Language::Krl, &joints).expect("corrected");
-        let own: Vec<Vec<f64>> = read(Language::Krl, &by_joints.bytes).iter().map(|one| maker.driven(&one.values)).collect();
+        let by_joints = trip
+            .compensated(&maker, Language::Krl, &joints)
+            .expect("corrected");
+        let own: Vec<Vec<f64>> = read(Language::Krl, &by_joints.bytes)
+            .iter()
+            .map(|one| maker.driven(&one.values))
+            .collect();
         let own = trip.misses(&poses, &own);
-        let status_turn = placed(|maker, q, at| krl(at, &format!(",S {},T {}", status(maker, q), turn(maker, q))));
-        let bits = placed(|maker, q, at| krl(at, &format!(",S 'B{:03b}',T 'B{:06b}'", status(maker, q), turn(maker, q))));
+        let status_turn = placed(|maker, q, at| {
+            krl(at, &format!(",S {},T {}", status(maker, q), turn(maker, q)))
+        });
+        let bits = placed(|maker, q, at| {
+            krl(
+                at,
+                &format!(",S 'B{:03b}',T 'B{:06b}'", status(maker, q), turn(maker, q)),
+            )
+        });
         let configured = placed(|maker, q, at| rapid(at, confdata(maker, q)));
-        let mut programs = vec![("KRL", Language::Krl, status_turn), ("KRL, bits", Language::Krl, bits)];
+        let mut programs = vec![
+            ("KRL", Language::Krl, status_turn),
+            ("KRL, bits", Language::Krl, bits),
+        ];
         if uses_cfx(&maker) {
             programs.push(("RAPID", Language::Rapid, configured));
         }
         for (name, language, text) in programs {
-            let written =
-                trip.compensated(&maker, language, &text).unwrap_or_else(|refused| panic!("{} {name}: {refused}", maker.name));
+            let written = trip
+                .compensated(&maker, language, &text)
+                .unwrap_or_else(|refused| panic!("{} {name}: {refused}", maker.name));
             let targets = read(language, &written.bytes);
-            let driven: Vec<Vec<f64>> = targets.iter().zip(&poses).map(|(target, q)| trip.driven(pose(target), q)).collect();
+            let driven: Vec<Vec<f64>> = targets
+                .iter()
+                .zip(&poses)
+                .map(|(target, q)| trip.driven(pose(target), q))
+                .collect();
             for (target, q) in targets.iter().zip(&driven) {
                 let stated = match language {
-                    Language::Krl => {
-                        PostureStatement::StatusTurn { status: Some(status(&maker, q)), turn: Some(turn(&maker, q)) }
-                    }
+                    Language::Krl => PostureStatement::StatusTurn {
+                        status: Some(status(&maker, q)),
+                        turn: Some(turn(&maker, q)),
+                    },
                     _ => PostureStatement::Configuration(confdata(&maker, q)),
                 };
                 assert_eq!(target.posture, stated, "{} {name}: {q:?}", maker.name);
             }
-            let apart = trip.misses(&poses, &driven).iter().zip(&own).map(|(a, b)| (a - b).abs()).collect::<Vec<_>>();
+            let apart = trip
+                .misses(&poses, &driven)
+                .iter()
+                .zip(&own)
+                .map(|(a, b)| (a - b).abs())
+                .collect::<Vec<_>>();
             println!(
                 "{}: {name}: {:.6} mm from the same targets as joints, of 48 in 8 postures",
                 maker.name,
@@ -148,20 +224,37 @@ fn a_posture_that_no_joints_have_is_refused_with_its_line() {
     let trip = Trip::new();
     let q = [10.0f64, 15.0, -20.0, 25.0, 40.0, 30.0].map(f64::to_radians);
     let at = trip.robot.forward(&q);
-    assert_eq!((status(&PLAIN, &q), turn(&PLAIN, &q), confdata(&PLAIN, &q)), (2, 4, [0, 0, 0, 0]));
-    let said = |language: Language, text: String| trip.compensated(&PLAIN, language, &text).expect_err("refused");
+    assert_eq!(
+        (status(&PLAIN, &q), turn(&PLAIN, &q), confdata(&PLAIN, &q)),
+        (2, 4, [0, 0, 0, 0])
+    );
+    let said = |language: Language, text: String| {
+        trip.compensated(&PLAIN, language, &text)
+            .expect_err("refused")
+    };
     let sound = krl(&at, ",S 2,T 4");
     // Joint 5 below 0 by S, above by T.
     let refused = said(Language::Krl, format!("{sound}{}", krl(&at, ",S 6,T 4")));
     assert!(
-        refused.contains("program:2:") && refused.contains("not reached in the posture that is stated (S 6, T 4)"),
+        refused.contains("program:2:")
+            && refused.contains("not reached in the posture that is stated (S 6, T 4)"),
         "{refused}"
     );
     let refused = said(Language::Rapid, rapid(&at, [0, 0, 0, 1]));
-    assert!(refused.contains("not reached in the posture that is stated ([0,0,0,1])"), "{refused}");
+    assert!(
+        refused.contains("not reached in the posture that is stated ([0,0,0,1])"),
+        "{refused}"
+    );
     // S alone, of which the wrist turned over is another solution.
-    let over = trip.compensated(&PLAIN, Language::Krl, &krl(&at, ",S 6")).expect("corrected");
-    assert_ne!(over.bytes, trip.compensated(&PLAIN, Language::Krl, &krl(&at, ",S 2")).expect("corrected").bytes);
+    let over = trip
+        .compensated(&PLAIN, Language::Krl, &krl(&at, ",S 6"))
+        .expect("corrected");
+    assert_ne!(
+        over.bytes,
+        trip.compensated(&PLAIN, Language::Krl, &krl(&at, ",S 2"))
+            .expect("corrected")
+            .bytes
+    );
 }
 
 #[test]
@@ -175,17 +268,33 @@ fn a_joint_that_the_correction_takes_over_its_zero_is_stated_anew() {
         (Language::Krl, krl(&at, ",S 'B010',T 'B000100'")),
         (Language::Rapid, rapid(&at, [0, 0, 0, 0])),
     ] {
-        let written = trip.compensated(&PLAIN, language, &text).expect("corrected");
+        let written = trip
+            .compensated(&PLAIN, language, &text)
+            .expect("corrected");
         let target = read(language, &written.bytes).remove(0);
         let driven = trip.driven(pose(&target), &q);
-        assert!([0, 3, 5].iter().any(|joint| driven[*joint] < -1e-5), "{driven:?}");
+        assert!(
+            [0, 3, 5].iter().any(|joint| driven[*joint] < -1e-5),
+            "{driven:?}"
+        );
         let stated = match language {
-            Language::Krl => PostureStatement::StatusTurn { status: Some(2), turn: Some(turn(&PLAIN, &driven)) },
+            Language::Krl => PostureStatement::StatusTurn {
+                status: Some(2),
+                turn: Some(turn(&PLAIN, &driven)),
+            },
             _ => PostureStatement::Configuration(confdata(&PLAIN, &driven)),
         };
-        assert_eq!(target.posture, stated, "{}", String::from_utf8_lossy(&written.bytes));
+        assert_eq!(
+            target.posture,
+            stated,
+            "{}",
+            String::from_utf8_lossy(&written.bytes)
+        );
         assert!(
-            written.warnings.iter().any(|note| note.message.contains("of the corrected joints, was")),
+            written
+                .warnings
+                .iter()
+                .any(|note| note.message.contains("of the corrected joints, was")),
             "{:?}",
             written.warnings
         );

@@ -16,48 +16,98 @@ fn a_worse_last_step_is_withdrawn_by_run_report_compensate_and_export() {
     std::fs::write(here.join("pipeline.yaml"), format!("{PIPELINE}{POOR}")).expect("a file");
     let said = |arguments: &[&str], input: &str| -> (String, String) {
         let output = calib(here, arguments, input);
-        let [out, err] = [output.stdout, output.stderr].map(|text| String::from_utf8(text).expect("UTF-8"));
+        let [out, err] =
+            [output.stdout, output.stderr].map(|text| String::from_utf8(text).expect("UTF-8"));
         assert!(output.status.success(), "{arguments:?}: {err}");
         (out, err)
     };
     let (out, err) = said(&["run", "pipeline.yaml", "--details"], "");
-    assert!(out.contains("\nwarning   poor withdrawn, identify used: "), "{out}");
-    assert!(out.contains(" at 60 points unseen by either fit\n"), "{out}");
+    assert!(
+        out.contains("\nwarning   poor withdrawn, identify used: "),
+        "{out}"
+    );
+    assert!(
+        out.contains(" at 60 points unseen by either fit\n"),
+        "{out}"
+    );
     assert!(out.contains("  poor (withdrawn)  validate"), "{out}");
-    assert!(err.contains("`poor` is withdrawn and `identify` used instead: "), "{err}");
-    let document: Value = serde_json::from_str(&said(&["run", "pipeline.yaml", "--json", "--quiet"], "").0).expect("JSON");
-    assert_eq!((&document["standing"]["step"], &document["standing"]["model"]), (&"identify".into(), &"identify".into()));
+    assert!(
+        err.contains("`poor` is withdrawn and `identify` used instead: "),
+        "{err}"
+    );
+    let document: Value =
+        serde_json::from_str(&said(&["run", "pipeline.yaml", "--json", "--quiet"], "").0)
+            .expect("JSON");
+    assert_eq!(
+        (
+            &document["standing"]["step"],
+            &document["standing"]["model"]
+        ),
+        (&"identify".into(), &"identify".into())
+    );
     let gone = &document["standing"]["withdrawn"][0];
-    assert_eq!((&gone["step"], &gone["than"], &gone["points"]), (&"poor".into(), &"identify".into(), &60.into()));
+    assert_eq!(
+        (&gone["step"], &gone["than"], &gone["points"]),
+        (&"poor".into(), &"identify".into(), &60.into())
+    );
     // The figures are those of the statistics.
     let rms = |step: &str| {
         let rows = document["statistics"].as_array().expect("rows");
-        let row = rows.iter().find(|row| row["step"] == step && row["held_out"] == false).expect("a row");
+        let row = rows
+            .iter()
+            .find(|row| row["step"] == step && row["held_out"] == false)
+            .expect("a row");
         row["fold_rms_mm"].as_f64().expect("mm")
     };
     for (figure, step) in [("rms_mm", "poor"), ("than_rms_mm", "identify")] {
-        assert!((gone[figure].as_f64().expect("mm") - rms(step)).abs() < 1e-9, "{gone}");
+        assert!(
+            (gone[figure].as_f64().expect("mm") - rms(step)).abs() < 1e-9,
+            "{gone}"
+        );
     }
     let documents = document["documents"].as_array().expect("files");
     let read = |ending: &str| {
-        let file = documents.iter().filter_map(Value::as_str).find(|file| file.ends_with(ending)).expect("a file");
+        let file = documents
+            .iter()
+            .filter_map(Value::as_str)
+            .find(|file| file.ends_with(ending))
+            .expect("a file");
         std::fs::read_to_string(here.join(file)).expect("a report")
     };
     let report: Value = serde_json::from_str(&read("report.json")).expect("JSON");
-    assert_eq!((&report["standing"], &report["withdrawn"][0]["step"]), (&"identify".into(), &"poor".into()));
-    assert!(report["parameters"].as_array().expect("rows").iter().any(|row| row["name"] == "joint_offset.j2"));
+    assert_eq!(
+        (&report["standing"], &report["withdrawn"][0]["step"]),
+        (&"identify".into(), &"poor".into())
+    );
+    assert!(
+        report["parameters"]
+            .as_array()
+            .expect("rows")
+            .iter()
+            .any(|row| row["name"] == "joint_offset.j2")
+    );
     let page = read("report.html");
     assert!(
-        page.contains("poor</span> <span>(withdrawn)</span>") && page.contains("`poor` is withdrawn and `identify` used instead"),
+        page.contains("poor</span> <span>(withdrawn)</span>")
+            && page.contains("`poor` is withdrawn and `identify` used instead"),
         "the page is silent"
     );
     for model in ["pipeline.yaml", "HEAD"] {
         let targets = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n10,20,-30,5,40,0\n";
         let (taken, err) = said(&["compensate", model, "--quiet"], targets);
-        assert!(err.contains("warning: `poor` is withdrawn and `identify` used instead"), "{err}");
-        let (asked, err) = said(&["compensate", model, "--quiet", "--step", "identify"], targets);
+        assert!(
+            err.contains("warning: `poor` is withdrawn and `identify` used instead"),
+            "{err}"
+        );
+        let (asked, err) = said(
+            &["compensate", model, "--quiet", "--step", "identify"],
+            targets,
+        );
         assert_eq!((taken, err.as_str()), (asked, ""));
         let (out, err) = said(&["export", model, "--format", "json"], "");
-        assert!(out.contains("stage identify\"") && err.contains("warning: `poor` is withdrawn"), "{err}");
+        assert!(
+            out.contains("stage identify\"") && err.contains("warning: `poor` is withdrawn"),
+            "{err}"
+        );
     }
 }

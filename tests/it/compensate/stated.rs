@@ -7,26 +7,56 @@ const HEADER: &str = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg";
 
 /// Code, stderr and stdout of targets on stdin.
 fn corrected(input: &str, more: &[&str]) -> (Option<i32>, String, String) {
-    let output = calib(cell(), &[&["compensate", "latest", "--quiet"], more].concat(), input);
-    (output.status.code(), text(&output.stderr), text(&output.stdout))
+    let output = calib(
+        cell(),
+        &[&["compensate", "latest", "--quiet"], more].concat(),
+        input,
+    );
+    (
+        output.status.code(),
+        text(&output.stderr),
+        text(&output.stdout),
+    )
 }
 
 #[test]
 fn what_no_target_can_state_is_a_fault_with_row_and_column_and_nothing_is_written() {
     for (name, value, allowed) in [
-        ("payload_kg", "-5", "expected a mass of 0 or more, kg, found -5"),
-        ("temp_c", "-500", "expected a temperature above -273.15 C, found -500"),
-        ("dir1", "7", "expected a direction: 1, -1, or 0 where it is not known, found 7"),
+        (
+            "payload_kg",
+            "-5",
+            "expected a mass of 0 or more, kg, found -5",
+        ),
+        (
+            "temp_c",
+            "-500",
+            "expected a temperature above -273.15 C, found -500",
+        ),
+        (
+            "dir1",
+            "7",
+            "expected a direction: 1, -1, or 0 where it is not known, found 7",
+        ),
     ] {
-        let (code, said, written) = corrected(&format!("{HEADER},{name}\n10,20,-30,5,40,0,1\n10,20,-30,5,40,0,{value}\n"), &[]);
+        let (code, said, written) = corrected(
+            &format!("{HEADER},{name}\n10,20,-30,5,40,0,1\n10,20,-30,5,40,0,{value}\n"),
+            &[],
+        );
         assert_eq!((code, written.as_str()), (Some(10), ""), "{said}");
-        assert!(said.contains(&format!("stdin:3: column 18: field 7: {allowed}")), "{said}");
-        let (code, said, _) = corrected(&format!("{HEADER},{name}\n10,20,-30,5,40,0,0\n10,20,-30,5,40,0,\n"), &[]);
+        assert!(
+            said.contains(&format!("stdin:3: column 18: field 7: {allowed}")),
+            "{said}"
+        );
+        let (code, said, _) = corrected(
+            &format!("{HEADER},{name}\n10,20,-30,5,40,0,0\n10,20,-30,5,40,0,\n"),
+            &[],
+        );
         assert_eq!(code, Some(0), "{said}");
     }
-    for (option, allowed) in
-        [("--payload=-5", "--payload: expected a mass"), ("--temperature=-500", "--temperature: expected a temp")]
-    {
+    for (option, allowed) in [
+        ("--payload=-5", "--payload: expected a mass"),
+        ("--temperature=-500", "--temperature: expected a temp"),
+    ] {
         let (code, said, _) = corrected(&format!("{HEADER}\n10,20,-30,5,40,0\n"), &[option]);
         assert_eq!(code, Some(2), "{said}");
         assert!(said.contains(allowed), "{said}");
@@ -37,14 +67,29 @@ fn what_no_target_can_state_is_a_fault_with_row_and_column_and_nothing_is_writte
 fn a_column_of_parquet_is_held_to_the_same() {
     use arrow::array::{ArrayRef, Float64Array, RecordBatch};
     let column = |value: f64| -> ArrayRef { std::sync::Arc::new(Float64Array::from(vec![value])) };
-    let columns = [("x_mm", 800.0), ("y_mm", 40.0), ("z_mm", 900.0), ("payload_kg", -5.0)];
-    let batch = RecordBatch::try_from_iter(columns.map(|(name, value)| (name, column(value)))).expect("a batch");
+    let columns = [
+        ("x_mm", 800.0),
+        ("y_mm", 40.0),
+        ("z_mm", 900.0),
+        ("payload_kg", -5.0),
+    ];
+    let batch = RecordBatch::try_from_iter(columns.map(|(name, value)| (name, column(value))))
+        .expect("a batch");
     let file = std::fs::File::create(cell().join("loads.parquet")).expect("a file");
-    let mut writer = parquet::arrow::ArrowWriter::try_new(file, batch.schema(), None).expect("a writer");
-    writer.write(&batch).and_then(|()| writer.close().map(|_| ())).expect("written");
+    let mut writer =
+        parquet::arrow::ArrowWriter::try_new(file, batch.schema(), None).expect("a writer");
+    writer
+        .write(&batch)
+        .and_then(|()| writer.close().map(|_| ()))
+        .expect("written");
     let (code, said, _) = corrected("", &["loads.parquet", "--out", "loads_c.parquet"]);
     assert_eq!(code, Some(10), "{said}");
-    assert!(said.contains("loads.parquet: row 1: column `payload_kg`: expected a mass of 0 or more, kg, found -5"), "{said}");
+    assert!(
+        said.contains(
+            "loads.parquet: row 1: column `payload_kg`: expected a mass of 0 or more, kg, found -5"
+        ),
+        "{said}"
+    );
     assert!(!cell().join("loads_c.parquet").exists());
 }
 
@@ -52,7 +97,12 @@ fn a_column_of_parquet_is_held_to_the_same() {
 fn a_quaternion_of_zeros_is_no_orientation() {
     let (code, said, written) = corrected("x_mm,y_mm,z_mm,qw,qx,qy,qz\n800,40,900,0,0,0,0\n", &[]);
     assert_eq!((code, written.as_str()), (Some(10), ""), "{said}");
-    assert!(said.contains("stdin:2: columns qw, qx, qy, qz: the quaternion has length 0.0000, expected 1"), "{said}");
+    assert!(
+        said.contains(
+            "stdin:2: columns qw, qx, qy, qz: the quaternion has length 0.0000, expected 1"
+        ),
+        "{said}"
+    );
     // Angles of zero are one.
     let (_, said, written) = corrected("x_mm,y_mm,z_mm,a_deg,b_deg,c_deg\n800,40,900,0,0,0\n", &[]);
     assert_eq!(written.lines().count(), 2, "{said}");
@@ -64,9 +114,15 @@ fn degrees_under_a_header_in_rad_are_found_by_the_turns_of_most_rows() {
     let (code, said, written) = corrected(&format!("{header}\n10,20,30,40,50,60\n"), &[]);
     assert_eq!((code, written.as_str()), (Some(10), ""), "{said}");
     let turned = "stdin:2: in 1 of 1 row a joint is beyond one and a half turns, here joint 1 at 10 rad; allowed: up to 9.42 rad";
-    assert!(said.contains(turned) && said.contains("if these are degrees"), "{said}");
+    assert!(
+        said.contains(turned) && said.contains("if these are degrees"),
+        "{said}"
+    );
     let sound = "0.1,0.2,-0.3,0.1,0.4,0\n";
-    let (code, said, _) = corrected(&format!("{header}\n{sound}{sound}0.1,0.2,-0.3,0.1,0.4,10\n"), &[]);
+    let (code, said, _) = corrected(
+        &format!("{header}\n{sound}{sound}0.1,0.2,-0.3,0.1,0.4,10\n"),
+        &[],
+    );
     assert_eq!(code, Some(0), "one row of three may be odd: {said}");
 }
 
@@ -76,25 +132,47 @@ fn files_that_cannot_be_read_or_written_are_named_before_a_pipeline_is_run_for_t
     for file in ["robot.yaml", "pipeline.yaml"] {
         std::fs::copy(cell().join(file), folder.path().join(file)).expect("a copy");
     }
-    std::fs::write(folder.path().join("t.csv"), format!("{HEADER}\n10,20,-30,5,40,0\n")).expect("a file");
+    std::fs::write(
+        folder.path().join("t.csv"),
+        format!("{HEADER}\n10,20,-30,5,40,0\n"),
+    )
+    .expect("a file");
     let refused = |arguments: &[&str]| {
-        let output = calib(folder.path(), &[&["compensate", "pipeline.yaml", "-q"], arguments].concat(), "");
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", text(&output.stderr));
+        let output = calib(
+            folder.path(),
+            &[&["compensate", "pipeline.yaml", "-q"], arguments].concat(),
+            "",
+        );
+        assert_eq!(
+            output.status.code(),
+            Some(2),
+            "{arguments:?}: {}",
+            text(&output.stderr)
+        );
         assert!(!folder.path().join(".calib").exists(), "{arguments:?}");
         text(&output.stderr)
     };
     let said = refused(&["nofile.csv", "--out", "nodir/x.csv"]);
     assert!(
-        said.contains("nofile.csv: cannot be read: ") && said.contains("--out: nodir/x.csv: there is no folder nodir;"),
+        said.contains("nofile.csv: cannot be read: ")
+            && said.contains("--out: nodir/x.csv: there is no folder nodir;"),
         "{said}"
     );
     assert!(refused(&["t.csv", "--out", "."]).contains("--out: . is a folder: name a file"));
-    assert!(refused(&["t.csv", "--out", "x.parquet"]).contains("--out: must have the format of the targets"));
+    assert!(
+        refused(&["t.csv", "--out", "x.parquet"])
+            .contains("--out: must have the format of the targets")
+    );
 }
 
 #[test]
 fn one_of_the_targets_is_told_as_one() {
-    let totals = CorrectionTotals { turned: 2, beyond_limits: 2, beyond_measured: 1, ..CorrectionTotals::default() };
+    let totals = CorrectionTotals {
+        turned: 2,
+        beyond_limits: 2,
+        beyond_measured: 1,
+        ..CorrectionTotals::default()
+    };
     let said: Vec<String> = totals.warnings().collect();
     assert_eq!(
         said,

@@ -1,17 +1,24 @@
 //! The true robot, a twin that shares no kinematics with the model, goes where it was wanted: every kind of effect that acts.
 
 use crate::desk::{Desk, table};
-use calib::compensate::{Circumstance, IdentifiedArm as Identified, Nominal, Reach, SETTLED, ToolGoal, least_change, one_step};
+use calib::compensate::{
+    Circumstance, IdentifiedArm as Identified, Nominal, Reach, SETTLED, ToolGoal, least_change,
+    one_step,
+};
 use calib::description::{JointKind, RobotDescription};
 use calib::effect::Load;
 use calib::estimate::Model;
 use calib::estimate::network::Correction;
 use calib::robot::{RobotModel, RowTime};
 use calib::stage::{Diagnose, DiagnoseReads, Identify, IdentifyReads, Learn, LearnReads};
-use calib::table::{Findings, Network, Parameters, Prediction, Recording, Robot, Split, SplitRow, Verdict};
+use calib::table::{
+    Findings, Network, Parameters, Prediction, Recording, Robot, Split, SplitRow, Verdict,
+};
 use calib::twin::arm::Arm;
 use calib::twin::conceal::robots::Kind;
-use calib::twin::effect::{Backlash, GearCyclic, JointCompliance, Physical, ThermalGrowth, ZeroShift};
+use calib::twin::effect::{
+    Backlash, GearCyclic, JointCompliance, Physical, ThermalGrowth, ZeroShift,
+};
 use calib::twin::plan::{Block, Climate, Point, Poses, plan};
 use calib::twin::recorder::{Experiment, Motors, Shot};
 use calib::twin::tracker::Tracker;
@@ -37,11 +44,21 @@ pub struct Recorded {
 
 impl Cell {
     pub fn new(kind: Kind, effects: Vec<Physical>) -> Self {
-        Self::of(kind.description([60.0, -45.0, 35.0]), kind.reach_m(), kind.room_mm(), effects)
+        Self::of(
+            kind.description([60.0, -45.0, 35.0]),
+            kind.reach_m(),
+            kind.room_mm(),
+            effects,
+        )
     }
 
     /// A cell of a robot of this reach, with room around it.
-    pub fn of(robot: RobotDescription, reach_m: f64, room_mm: [f64; 2], effects: Vec<Physical>) -> Self {
+    pub fn of(
+        robot: RobotDescription,
+        reach_m: f64,
+        room_mm: [f64; 2],
+        effects: Vec<Physical>,
+    ) -> Self {
         let n = robot.joints.len();
         let scale = reach_m;
         let link = |link: usize| LinkError {
@@ -56,18 +73,39 @@ impl Cell {
             ratio: (0..n).map(|j| 1.0 + 1e-4 * (j as f64 - 2.0)).collect(),
             ..TrueRobot::default()
         };
-        let poses = Poses { floor_mm, clearance_mm, candidates: 3, ..Poses::default() };
-        let tracker = Tracker { position_mm: [3000.0 * scale / 2.0, -1500.0, 900.0], ..Tracker::default() };
-        Self { robot, truth, effects, tracker, poses, climate: Climate::default() }
+        let poses = Poses {
+            floor_mm,
+            clearance_mm,
+            candidates: 3,
+            ..Poses::default()
+        };
+        let tracker = Tracker {
+            position_mm: [3000.0 * scale / 2.0, -1500.0, 900.0],
+            ..Tracker::default()
+        };
+        Self {
+            robot,
+            truth,
+            effects,
+            tracker,
+            poses,
+            climate: Climate::default(),
+        }
     }
 
     pub fn points(&self, count: usize, payload_kg: &[f64], seed: u64) -> Vec<Point> {
         let blocks: Vec<Block> = payload_kg
             .iter()
-            .map(|kg| Block { usage: "fit".into(), points: count / payload_kg.len(), payload_kg: *kg, given: vec![] })
+            .map(|kg| Block {
+                usage: "fit".into(),
+                points: count / payload_kg.len(),
+                payload_kg: *kg,
+                given: vec![],
+            })
             .collect();
         let arm = Arm::new(&self.robot, &self.truth);
-        plan(&self.robot, &arm, &self.poses, &blocks, &self.climate, seed).expect("poses are allowed")
+        plan(&self.robot, &arm, &self.poses, &blocks, &self.climate, seed)
+            .expect("poses are allowed")
     }
 
     fn measure(&self, points: Vec<Point>, tracker: &Tracker, seed: u64) -> Vec<Shot> {
@@ -98,75 +136,161 @@ impl Cell {
         let shots = self.measure(points, &self.tracker, seed);
         let recording = Recording {
             joints: self.robot.joints.len(),
-            prismatic: self.robot.joints.iter().map(|joint| joint.kind == JointKind::Prismatic).collect(),
+            prismatic: self
+                .robot
+                .joints
+                .iter()
+                .map(|joint| joint.kind == JointKind::Prismatic)
+                .collect(),
             sequence: (0..shots.len() as i64).collect(),
             point_id: (0..shots.len()).map(|k| format!("p{k}")).collect(),
             usage: vec![None; shots.len()],
-            q: shots.iter().flat_map(|shot| shot.q.iter().copied()).collect(),
+            q: shots
+                .iter()
+                .flat_map(|shot| shot.q.iter().copied())
+                .collect(),
             position: shots.iter().map(|shot| shot.position).collect(),
             position_sigma: None,
             time: Some(shots.iter().map(|shot| shot.time_s).collect()),
             payload: Some(payload),
             temperature: Some(shots.iter().map(|shot| shot.temperature_c).collect()),
             current: None,
-            direction: Some(shots.iter().flat_map(|shot| shot.direction.iter().copied()).collect()),
+            direction: Some(
+                shots
+                    .iter()
+                    .flat_map(|shot| shot.direction.iter().copied())
+                    .collect(),
+            ),
             ..Recording::default()
         };
         let set = |k: usize| if k % 4 == 3 { "validate" } else { "fit" };
-        let row = |k: usize| SplitRow { sequence: k as i64, point_id: format!("p{k}"), set: set(k).into() };
+        let row = |k: usize| SplitRow {
+            sequence: k as i64,
+            point_id: format!("p{k}"),
+            set: set(k).into(),
+        };
         let split = Split((0..shots.len()).map(row).collect());
-        Recorded { robot: Robot::from_description(&self.robot), recording, split }
+        Recorded {
+            robot: Robot::from_description(&self.robot),
+            recording,
+            split,
+        }
     }
 
     /// The model of a recording of 80 points, with the geometry alone.
     pub fn identified(&self) -> Model {
-        let Recorded { robot, recording, split } = self.recorded(80, &[0.0]);
+        let Recorded {
+            robot,
+            recording,
+            split,
+        } = self.recorded(80, &[0.0]);
         let rigid: Identify = serde_json::from_value(json!({
             "effects": ["base_frame", "tool_offset", "joint_offset", "link_geometry", "reduction_ratio"], "folds": 0,
         }))
         .expect("settings");
-        let tables = Desk::default().run(&rigid, IdentifyReads { robot, recording, split }).expect("an identification");
+        let tables = Desk::default()
+            .run(
+                &rigid,
+                IdentifyReads {
+                    robot,
+                    recording,
+                    split,
+                },
+            )
+            .expect("an identification");
         let parameters: Parameters = table(&tables).remove(0);
-        parameters.model(RobotModel::new(self.robot.clone()), &[], Load::GravityTorque).expect("a model")
+        parameters
+            .model(
+                RobotModel::new(self.robot.clone()),
+                &[],
+                Load::GravityTorque,
+            )
+            .expect("a model")
     }
 
     /// What `diagnose` makes of it: the model, its findings, the noise of a measured point, mm.
     fn diagnosed(&self, recorded: Recorded) -> (Model, Findings, f64) {
         let stage: Diagnose = serde_json::from_value(serde_json::json!({})).expect("settings");
-        let Recorded { robot, recording, split } = recorded;
-        let reads = DiagnoseReads { robot, recording, split };
+        let Recorded {
+            robot,
+            recording,
+            split,
+        } = recorded;
+        let reads = DiagnoseReads {
+            robot,
+            recording,
+            split,
+        };
         let tables = Desk::default().run(&stage, reads).expect("a diagnosis");
         let parameters: Parameters = table(&tables).remove(0);
         let verdict: Verdict = table(&tables).remove(0);
         let findings: Findings = table(&tables).remove(0);
-        let model = parameters.model(RobotModel::new(self.robot.clone()), &[], Load::GravityTorque).expect("a model");
-        (model, findings, verdict.0[0].noise_floor_mm.expect("lengths"))
+        let model = parameters
+            .model(
+                RobotModel::new(self.robot.clone()),
+                &[],
+                Load::GravityTorque,
+            )
+            .expect("a model");
+        (
+            model,
+            findings,
+            verdict.0[0].noise_floor_mm.expect("lengths"),
+        )
     }
 
     /// The rigid model, and the joint curves that are learned on top of it.
     fn learned(&self, recorded: Recorded) -> (Model, Option<Correction>) {
-        let Recorded { robot, recording, split } = recorded;
+        let Recorded {
+            robot,
+            recording,
+            split,
+        } = recorded;
         let desk = Desk::default();
         let rigid: Identify = serde_json::from_value(json!({
             "effects": ["base_frame", "tool_offset", "joint_offset", "link_geometry", "reduction_ratio"], "folds": 0,
         }))
         .expect("settings");
-        let reads = IdentifyReads { robot: robot.clone(), recording: recording.clone(), split: split.clone() };
+        let reads = IdentifyReads {
+            robot: robot.clone(),
+            recording: recording.clone(),
+            split: split.clone(),
+        };
         let tables = desk.run(&rigid, reads).expect("an identification");
         let parameters: Parameters = table(&tables).remove(0);
         let prediction: Prediction = table(&tables).remove(0);
-        let learn: Learn = serde_json::from_value(json!({"rivals": ["curves"], "folds": 2})).expect("settings");
+        let learn: Learn =
+            serde_json::from_value(json!({"rivals": ["curves"], "folds": 2})).expect("settings");
         let prismatic = recording.prismatic.clone();
-        let reads = LearnReads { robot: Some(robot), recording, split, parameters: Some(parameters.clone()), prediction };
+        let reads = LearnReads {
+            robot: Some(robot),
+            recording,
+            split,
+            parameters: Some(parameters.clone()),
+            prediction,
+        };
         let network: Network = table(&desk.run(&learn, reads).expect("a correction")).remove(0);
-        let model = parameters.model(RobotModel::new(self.robot.clone()), &[], Load::GravityTorque).expect("a model");
+        let model = parameters
+            .model(
+                RobotModel::new(self.robot.clone()),
+                &[],
+                Load::GravityTorque,
+            )
+            .expect("a model");
         (model, network.correction(&prismatic).expect("a correction"))
     }
 
     /// Where (m) the true robot puts its tool in its own base, without the noise of measurement; `base` as it was identified or set up.
     pub fn places(&self, points: Vec<Point>) -> Vec<Vector3<f64>> {
-        let exact = Tracker { noise_um: 0.0, noise_um_per_m: 0.0, ..self.tracker.clone() };
-        self.measure(points, &exact, 77).iter().map(|shot| Vector3::from(shot.position)).collect()
+        let exact = Tracker {
+            noise_um: 0.0,
+            noise_um_per_m: 0.0,
+            ..self.tracker.clone()
+        };
+        self.measure(points, &exact, 77)
+            .iter()
+            .map(|shot| Vector3::from(shot.position))
+            .collect()
     }
 
     /// Unseen targets: later than the recording, with another seed.
@@ -181,8 +305,17 @@ impl Cell {
     }
 
     /// Rms (mm) of where the true robot goes, with the commands that `solve` makes of each target.
-    fn true_error(&self, arm: &Identified, targets: &[Point], solve: impl Fn(&mut Reach, &ToolGoal, &[f64]) -> Vec<f64>) -> f64 {
-        let square = self.misses(arm, targets, solve).into_iter().map(|miss| miss * miss).sum::<f64>();
+    fn true_error(
+        &self,
+        arm: &Identified,
+        targets: &[Point],
+        solve: impl Fn(&mut Reach, &ToolGoal, &[f64]) -> Vec<f64>,
+    ) -> f64 {
+        let square = self
+            .misses(arm, targets, solve)
+            .into_iter()
+            .map(|miss| miss * miss)
+            .sum::<f64>();
         (square / targets.len() as f64).sqrt() * 1e3
     }
 
@@ -193,7 +326,11 @@ impl Cell {
         targets: &[Point],
         mut solve: impl FnMut(&mut Reach, &ToolGoal, &[f64]) -> Vec<f64>,
     ) -> Vec<f64> {
-        let exact = Tracker { noise_um: 0.0, noise_um_per_m: 0.0, ..self.tracker.clone() };
+        let exact = Tracker {
+            noise_um: 0.0,
+            noise_um_per_m: 0.0,
+            ..self.tracker.clone()
+        };
         let robot = RobotModel::new(self.robot.clone());
         let mut reach = arm.reach();
         let mut commands = Vec::new();
@@ -205,12 +342,22 @@ impl Cell {
                 direction: target.direction.clone(),
                 current: None,
             });
-            let wanted = ToolGoal { pose: robot.forward(&target.q), oriented: false };
-            commands.push(Point { q: solve(&mut reach, &wanted, &target.q), ..target.clone() });
+            let wanted = ToolGoal {
+                pose: robot.forward(&target.q),
+                oriented: false,
+            };
+            commands.push(Point {
+                q: solve(&mut reach, &wanted, &target.q),
+                ..target.clone()
+            });
         }
         let shots = self.measure(commands, &exact, 77);
         let wanted = |target: &Point| arm.base().point(&robot.forward(&target.q).translation);
-        shots.iter().zip(targets).map(|(shot, target)| (Vector3::from(shot.position) - wanted(target)).norm()).collect()
+        shots
+            .iter()
+            .zip(targets)
+            .map(|(shot, target)| (Vector3::from(shot.position) - wanted(target)).norm())
+            .collect()
     }
 }
 
@@ -227,18 +374,32 @@ fn proof_of(cell: &Cell) {
     let before = cell.true_error(&arm, &targets, |_, _, q| q.to_vec());
     let after = cell.true_error(&arm, &targets, |reach, wanted, q| {
         let found = least_change(reach, wanted, q, q);
-        assert!(found.residual <= SETTLED, "round trip {} m after {} steps", found.residual, found.iterations);
+        assert!(
+            found.residual <= SETTLED,
+            "round trip {} m after {} steps",
+            found.residual,
+            found.iterations
+        );
         found.q
     });
-    let step =
-        cell.true_error(&arm, &targets, |reach, wanted, q| one_step(reach, &mut Nominal::new(&arm.model().robot), wanted, q).q);
-    let named: Vec<String> = findings.0.iter().map(|row| format!("{} at {}", row.effect, row.place)).collect();
+    let step = cell.true_error(&arm, &targets, |reach, wanted, q| {
+        one_step(reach, &mut Nominal::new(&arm.model().robot), wanted, q).q
+    });
+    let named: Vec<String> = findings
+        .0
+        .iter()
+        .map(|row| format!("{} at {}", row.effect, row.place))
+        .collect();
     println!(
         "{}: {before:.4} mm -> {after:.4} mm (one step {step:.4}), floor {floor:.4} mm, {:.2} floors; {named:?}",
         name,
         after / floor
     );
-    assert!(after < 1.5 * floor, "{}: {after:.4} mm above {floor:.4} mm; found {named:?}", name);
+    assert!(
+        after < 1.5 * floor,
+        "{}: {after:.4} mm above {floor:.4} mm; found {named:?}",
+        name
+    );
     assert!(after > 0.05 * floor, "too good: the truth leaked");
     assert!(step < 0.2 * before && step >= 0.99 * after);
 }
@@ -255,7 +416,11 @@ fn a_spherical_wrist_goes_where_it_is_wanted() {
                 arcsec_per_nm: 0.0,
                 phase_deg: 40.0,
             }),
-            Physical::ZeroShift(ZeroShift { joint: 3, step_arcsec: 40.0, at_s: 1500.0 }),
+            Physical::ZeroShift(ZeroShift {
+                joint: 3,
+                step_arcsec: 40.0,
+                at_s: 1500.0,
+            }),
         ],
     );
 }
@@ -291,8 +456,14 @@ fn a_redundant_arm_goes_where_it_is_wanted() {
 #[test]
 fn wind_up_and_lost_motion_are_made_up_for_with_a_spherical_wrist() {
     let effects = vec![
-        Physical::JointCompliance(JointCompliance { joint: 2, rad_per_nm: 6e-8 }),
-        Physical::JointCompliance(JointCompliance { joint: 3, rad_per_nm: 9e-8 }),
+        Physical::JointCompliance(JointCompliance {
+            joint: 2,
+            rad_per_nm: 6e-8,
+        }),
+        Physical::JointCompliance(JointCompliance {
+            joint: 3,
+            rad_per_nm: 9e-8,
+        }),
         backlash(1, 90.0),
     ];
     proof(Kind::Sr210d, effects);
@@ -300,22 +471,41 @@ fn wind_up_and_lost_motion_are_made_up_for_with_a_spherical_wrist() {
 
 #[test]
 fn heat_and_lost_motion_are_made_up_for_with_an_offset_wrist() {
-    let growth = Physical::ThermalGrowth(ThermalGrowth { link: 2, um_per_m_k: 12.0, reference_c: 20.0 });
+    let growth = Physical::ThermalGrowth(ThermalGrowth {
+        link: 2,
+        um_per_m_k: 12.0,
+        reference_c: 20.0,
+    });
     let mut cell = Cell::new(Kind::Compact6, vec![growth, backlash(1, 150.0)]);
-    cell.climate = Climate { rise_k: 20.0, warm_up_h: 0.7, ..Climate::default() };
+    cell.climate = Climate {
+        rise_k: 20.0,
+        warm_up_h: 0.7,
+        ..Climate::default()
+    };
     proof_of(&cell);
 }
 
 #[test]
 fn wind_up_and_lost_motion_are_made_up_for_with_seven_joints() {
-    let effects = vec![Physical::JointCompliance(JointCompliance { joint: 2, rad_per_nm: 4e-6 }), backlash(3, 200.0)];
+    let effects = vec![
+        Physical::JointCompliance(JointCompliance {
+            joint: 2,
+            rad_per_nm: 4e-6,
+        }),
+        backlash(3, 200.0),
+    ];
     proof(Kind::Seven7r, effects);
 }
 
 #[test]
 fn a_learned_correction_is_made_up_for() {
-    let wave =
-        Physical::GearCyclic(GearCyclic { joint: 2, order: 3.0, amplitude_arcsec: 60.0, arcsec_per_nm: 0.0, phase_deg: 70.0 });
+    let wave = Physical::GearCyclic(GearCyclic {
+        joint: 2,
+        order: 3.0,
+        amplitude_arcsec: 60.0,
+        arcsec_per_nm: 0.0,
+        phase_deg: 70.0,
+    });
     for kind in [Kind::Sr210d, Kind::Compact6, Kind::Seven7r] {
         let cell = Cell::new(kind, vec![wave.clone()]);
         let (model, correction) = cell.learned(cell.recorded(200, &[0.0]));
@@ -328,14 +518,32 @@ fn a_learned_correction_is_made_up_for() {
             assert!(found.residual <= SETTLED, "round trip {} m", found.residual);
             found.q
         };
-        let (before, after) = (cell.true_error(&rigid, &targets, solve), cell.true_error(&arm, &targets, solve));
-        let shot = cell.measure(cell.points(1, &[0.0], 3), &cell.tracker, 77).remove(0);
+        let (before, after) = (
+            cell.true_error(&rigid, &targets, solve),
+            cell.true_error(&arm, &targets, solve),
+        );
+        let shot = cell
+            .measure(cell.points(1, &[0.0], 3), &cell.tracker, 77)
+            .remove(0);
         let floor = 3f64.sqrt() * shot.sigma * 1e3;
-        println!("{}: geometry alone {before:.4} mm, learned {after:.4} mm, {:.2} floors", cell.robot.name, after / floor);
-        assert!(after < 1.5 * floor && after < 0.5 * before, "{before:.4} -> {after:.4} mm, floor {floor:.4} mm");
+        println!(
+            "{}: geometry alone {before:.4} mm, learned {after:.4} mm, {:.2} floors",
+            cell.robot.name,
+            after / floor
+        );
+        assert!(
+            after < 1.5 * floor && after < 0.5 * before,
+            "{before:.4} -> {after:.4} mm, floor {floor:.4} mm"
+        );
     }
 }
 
 fn backlash(joint: usize, gap_arcsec: f64) -> Physical {
-    Physical::Backlash(Backlash { joint, gap_arcsec, arcsec_per_nm: 0.0, closing_nm: 0.0, soft_nm: 0.0 })
+    Physical::Backlash(Backlash {
+        joint,
+        gap_arcsec,
+        arcsec_per_nm: 0.0,
+        closing_nm: 0.0,
+        soft_nm: 0.0,
+    })
 }

@@ -23,15 +23,26 @@ fn within(cell: &Cell, effects: &[&str], payload_kg: &[f64]) -> f64 {
     let mut hits = 0;
     for seed in 0..RECORDINGS {
         let recorded = cell.recorded_by(cell.points(80, payload_kg, 1000 + seed), 2000 + seed);
-        let reads = IdentifyReads { robot: recorded.robot, recording: recorded.recording, split: recorded.split };
-        let tables = Desk::default().run(&stage, reads).expect("an identification");
+        let reads = IdentifyReads {
+            robot: recorded.robot,
+            recording: recorded.recording,
+            split: recorded.split,
+        };
+        let tables = Desk::default()
+            .run(&stage, reads)
+            .expect("an identification");
         let parameters: Parameters = table(&tables).remove(0);
         let covariance: CovarianceTable = table(&tables).remove(0);
         let prediction: Prediction = table(&tables).remove(0);
-        let model = parameters.model(robot.clone(), &[], Load::GravityTorque).expect("a model");
+        let model = parameters
+            .model(robot.clone(), &[], Load::GravityTorque)
+            .expect("a model");
         let covariance = covariance.of_model(&model).expect("a covariance");
         let arm = IdentifiedArm::new(model, None);
-        let scatter = Scatter { unexplained: prediction.unexplained_mm() * 1e-3, repeatability: 0.0 };
+        let scatter = Scatter {
+            unexplained: prediction.unexplained_mm() * 1e-3,
+            repeatability: 0.0,
+        };
         let uncertainty = Uncertainty::new(&arm, covariance, scatter);
         let targets = cell.targets_by(TARGETS, &payload_kg[payload_kg.len() - 1..], 3000 + seed);
         let mut radius = Vec::new();
@@ -41,12 +52,22 @@ fn within(cell: &Cell, effects: &[&str], payload_kg: &[f64]) -> f64 {
             radius.push(uncertainty.at(reach, &found.q).u95);
             found.q
         });
-        hits += misses.iter().zip(&radius).filter(|(miss, radius)| miss <= radius).count();
+        hits += misses
+            .iter()
+            .zip(&radius)
+            .filter(|(miss, radius)| miss <= radius)
+            .count();
     }
     hits as f64 / (RECORDINGS as usize * TARGETS) as f64
 }
 
-const GEOMETRY: [&str; 5] = ["base_frame", "tool_offset", "joint_offset", "link_geometry", "reduction_ratio"];
+const GEOMETRY: [&str; 5] = [
+    "base_frame",
+    "tool_offset",
+    "joint_offset",
+    "link_geometry",
+    "reduction_ratio",
+];
 
 #[test]
 fn of_500_targets_95_of_100_are_hit_within_the_stated_radius_of_an_offset_wrist() {
@@ -57,7 +78,12 @@ fn of_500_targets_95_of_100_are_hit_within_the_stated_radius_of_an_offset_wrist(
 
 #[test]
 fn of_500_targets_95_of_100_are_hit_within_the_stated_radius_of_a_loaded_arm() {
-    let effects = [2, 3].map(|joint| Physical::JointCompliance(JointCompliance { joint, rad_per_nm: 8e-8 }));
+    let effects = [2, 3].map(|joint| {
+        Physical::JointCompliance(JointCompliance {
+            joint,
+            rad_per_nm: 8e-8,
+        })
+    });
     let cell = Cell::new(Kind::Sr210d, effects.into());
     let effects: Vec<&str> = GEOMETRY.into_iter().chain(["joint_compliance"]).collect();
     let share = within(&cell, &effects, &[0.0, 150.0]);
@@ -75,10 +101,16 @@ fn a_finding_by_what_no_target_states_is_named_and_one_without_a_size_is_not() {
         model.x[0] = size;
         IdentifiedArm::new(model, None).by_what_is_not_stated()
     };
-    let stretch = Variable::Stretch { joint: 2, limit: 0.2 };
+    let stretch = Variable::Stretch {
+        joint: 2,
+        limit: 0.2,
+    };
     assert_eq!(arm(stretch, 1e-4), ["unknown at joint 3"]);
     assert_eq!(arm(stretch, 0.0), [""; 0]);
     assert_eq!(arm(Variable::Angle { joint: 2 }, 1e-4), [""; 0]);
-    let humidity = Variable::Circumstance { column: CircumstanceName::of("humidity").expect("a column"), joint: None };
+    let humidity = Variable::Circumstance {
+        column: CircumstanceName::of("humidity").expect("a column"),
+        joint: None,
+    };
     assert_eq!(arm(humidity, 1e-4), ["unknown at joint 3"]);
 }

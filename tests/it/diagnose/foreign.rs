@@ -12,32 +12,64 @@ fn is_there(found: &str, place: &str) -> bool {
     let span = |text: &str| {
         let (kind, numbers) = text.split_once(' ')?;
         let (from, to) = numbers.split_once('-').unwrap_or((numbers, numbers));
-        Some((kind.to_string(), from.parse::<usize>().ok()?, to.parse::<usize>().ok()?))
+        Some((
+            kind.to_string(),
+            from.parse::<usize>().ok()?,
+            to.parse::<usize>().ok()?,
+        ))
     };
     match (span(found), span(place)) {
-        (Some((kind, from, to)), Some((wanted, number, _))) => kind == wanted && (from..=to).contains(&number),
+        (Some((kind, from, to)), Some((wanted, number, _))) => {
+            kind == wanted && (from..=to).contains(&number)
+        }
         _ => found == place,
     }
 }
 
 #[test]
 fn what_is_in_no_list_is_diagnosed_and_counted() {
-    let (count, seed) = (from_environment("CALIB_RECORDINGS", 2) as usize, from_environment("CALIB_SEED", 31));
-    let design = Design { seed, cases: count, foreign: 1.0, faulty: 0.0, ..Design::default() };
-    let (mut silent, mut placed, mut misplaced, mut wrong, mut sound, mut bound, mut worse, mut harmed) =
-        (0, 0, 0, 0, 0, 0, 0, 0);
+    let (count, seed) = (
+        from_environment("CALIB_RECORDINGS", 2) as usize,
+        from_environment("CALIB_SEED", 31),
+    );
+    let design = Design {
+        seed,
+        cases: count,
+        foreign: 1.0,
+        faulty: 0.0,
+        ..Design::default()
+    };
+    let (
+        mut silent,
+        mut placed,
+        mut misplaced,
+        mut wrong,
+        mut sound,
+        mut bound,
+        mut worse,
+        mut harmed,
+    ) = (0, 0, 0, 0, 0, 0, 0, 0);
     for (number, content) in design.contents().into_iter().enumerate() {
         assert_eq!(content, Content::Foreign);
         let case = Case::make(&design, number, content).expect("a case");
         let one = &case.concealed[0];
         let said = said(&case, &[]);
-        let places: Vec<&str> =
-            std::iter::once(&one.cause.place).chain(case.accepted.iter().map(|(_, place)| place)).map(String::as_str).collect();
+        let places: Vec<&str> = std::iter::once(&one.cause.place)
+            .chain(case.accepted.iter().map(|(_, place)| place))
+            .map(String::as_str)
+            .collect();
         let first = said.found.iter().max_by(|a, b| a.3.total_cmp(&b.3));
         let right = first.map(|(_, place, ..)| places.iter().any(|wanted| is_there(place, wanted)));
-        let named = said.found.iter().any(|(name, _, probability, _)| name != "unknown" && *probability >= 0.5);
+        let named = said
+            .found
+            .iter()
+            .any(|(name, _, probability, _)| name != "unknown" && *probability >= 0.5);
         let floor = 3f64.sqrt() * case.noise_mm[1];
-        let (within, is_worse, is_harmed) = (said.after < 1.15 * floor, said.after > said.before, said.after > 1.2 * said.before);
+        let (within, is_worse, is_harmed) = (
+            said.after < 1.15 * floor,
+            said.after > said.before,
+            said.after > 1.2 * said.before,
+        );
         match right {
             None => silent += 1,
             Some(true) => placed += 1,
@@ -48,7 +80,11 @@ fn what_is_in_no_list_is_diagnosed_and_counted() {
         bound += usize::from(within);
         worse += usize::from(is_worse);
         harmed += usize::from(is_harmed);
-        let numbers = one.cause.physical.iter().map(|effect| format!("{effect:?}").chars().take(400).collect::<String>());
+        let numbers = one
+            .cause
+            .physical
+            .iter()
+            .map(|effect| format!("{effect:?}").chars().take(400).collect::<String>());
         println!(
             "{} {} at {} ({places:?}), L {:.0}, {} rows, raw {:.3} mm, held out {:.4} -> {:.4} (noise {floor:.4}), {}{}{}{}{}: {:?}\n    {}",
             case.name,

@@ -28,10 +28,23 @@ const SIGMA_IMAGE: f64 = 5e-6;
 const APART: f64 = 0.5;
 
 /// deg: where a level on the tool stands upright more often than not.
-const UPRIGHT: [[f64; 2]; 6] = [[-90.0, 90.0], [-60.0, 40.0], [-50.0, 60.0], [-90.0, 90.0], [-90.0, 90.0], [-120.0, 120.0]];
+const UPRIGHT: [[f64; 2]; 6] = [
+    [-90.0, 90.0],
+    [-60.0, 40.0],
+    [-50.0, 60.0],
+    [-90.0, 90.0],
+    [-90.0, 90.0],
+    [-120.0, 120.0],
+];
 
 fn gear(joint: usize, order: f64, amplitude_arcsec: f64, phase_deg: f64) -> Physical {
-    Physical::GearCyclic(GearCyclic { joint, order, amplitude_arcsec, arcsec_per_nm: 0.0, phase_deg })
+    Physical::GearCyclic(GearCyclic {
+        joint,
+        order,
+        amplitude_arcsec,
+        arcsec_per_nm: 0.0,
+        phase_deg,
+    })
 }
 
 fn spring(joint: usize, rad_per_nm: f64) -> Physical {
@@ -39,11 +52,20 @@ fn spring(joint: usize, rad_per_nm: f64) -> Physical {
 }
 
 fn play(joint: usize, gap_arcsec: f64) -> Physical {
-    Physical::Backlash(Backlash { joint, gap_arcsec, arcsec_per_nm: 0.0, closing_nm: 0.0, soft_nm: 0.0 })
+    Physical::Backlash(Backlash {
+        joint,
+        gap_arcsec,
+        arcsec_per_nm: 0.0,
+        closing_nm: 0.0,
+        soft_nm: 0.0,
+    })
 }
 
 fn named(causes: &[(&str, &str)]) -> Named {
-    causes.iter().map(|(effect, place)| ((*effect).into(), (*place).into())).collect()
+    causes
+        .iter()
+        .map(|(effect, place)| ((*effect).into(), (*place).into()))
+        .collect()
 }
 
 /// What the twin's arm did, without noise.
@@ -58,23 +80,46 @@ struct Recorded {
 }
 
 /// Poses under two payloads, with the arm off nominal as it is made.
-fn recorded(effects: &[Physical], points: usize, range_deg: &[[f64; 2]], repeatability_arcsec: f64) -> Recorded {
+fn recorded(
+    effects: &[Physical],
+    points: usize,
+    range_deg: &[[f64; 2]],
+    repeatability_arcsec: f64,
+) -> Recorded {
     let robot = sr210d();
     let joints = robot.joints.len();
     let link = |link: usize| LinkError {
         link,
         shift_mm: [0, 1, 2].map(|axis| 0.3 * normal(71 * link + axis)),
-        tilt_arcsec: [0, 1, 2].map(|axis| if link == joints { 0.0 } else { 60.0 * normal(71 * link + 3 + axis) }),
+        tilt_arcsec: [0, 1, 2].map(|axis| {
+            if link == joints {
+                0.0
+            } else {
+                60.0 * normal(71 * link + 3 + axis)
+            }
+        }),
     };
     let truth = TrueRobot {
         links: (1..=joints).map(link).collect(),
-        offset_deg: (0..joints).map(|joint| 0.02 * normal(977 + joint)).collect(),
+        offset_deg: (0..joints)
+            .map(|joint| 0.02 * normal(977 + joint))
+            .collect(),
         ..TrueRobot::default()
     };
     let seen = |robot: &RobotDescription, blocks: &[Block]| -> Vec<Shot> {
-        let (tracker, motors, climate) =
-            (Tracker { noise_um: 0.0, noise_um_per_m: 0.0, ..Tracker::default() }, Motors::default(), Climate::default());
-        let poses = Poses { range_deg: range_deg.to_vec(), ..Poses::default() };
+        let (tracker, motors, climate) = (
+            Tracker {
+                noise_um: 0.0,
+                noise_um_per_m: 0.0,
+                ..Tracker::default()
+            },
+            Motors::default(),
+            Climate::default(),
+        );
+        let poses = Poses {
+            range_deg: range_deg.to_vec(),
+            ..Poses::default()
+        };
         let experiment = Experiment {
             robot,
             truth: &truth,
@@ -89,7 +134,11 @@ fn recorded(effects: &[Physical], points: usize, range_deg: &[[f64; 2]], repeata
         };
         experiment.record(|| ()).expect("poses")
     };
-    let drawn = [0.0, 120.0].map(|payload_kg| Block { points: points / 2, payload_kg, ..Block::default() });
+    let drawn = [0.0, 120.0].map(|payload_kg| Block {
+        points: points / 2,
+        payload_kg,
+        ..Block::default()
+    });
     let shots = seen(&robot, &drawn);
     let given = |shot: &Shot| GivenPose {
         joints_deg: shot.q.iter().map(|q| q.to_degrees()).collect(),
@@ -101,7 +150,11 @@ fn recorded(effects: &[Physical], points: usize, range_deg: &[[f64; 2]], repeata
         .enumerate()
         .map(|(block, drawn)| Block {
             points: 0,
-            given: shots.iter().filter(|shot| shot.block == block).map(given).collect(),
+            given: shots
+                .iter()
+                .filter(|shot| shot.block == block)
+                .map(given)
+                .collect(),
             ..drawn.clone()
         })
         .collect();
@@ -111,7 +164,9 @@ fn recorded(effects: &[Physical], points: usize, range_deg: &[[f64; 2]], repeata
         seen(&moved, &again)
     });
     let at = |shots: &[Shot], row: usize| Vector3::from(shots[row].position);
-    let turn = |row: usize| Matrix3::from_columns(&[&x, &y, &z].map(|moved| (at(moved, row) - at(&own, row)) / APART));
+    let turn = |row: usize| {
+        Matrix3::from_columns(&[&x, &y, &z].map(|moved| (at(moved, row) - at(&own, row)) / APART))
+    };
     let rows = own.len();
     Recorded {
         rows: Measurements {
@@ -134,20 +189,42 @@ impl Recorded {
     /// Adds what a level on the tool reads where it stands upright.
     fn with_a_level(self) -> Self {
         let tilt = |turn: &Matrix3<f64>, row: usize, axis: usize| {
-            if turn[(2, 2)] > 0.3 { turn[(2, axis)].asin() + SIGMA_TILT * normal(2 * row + axis) } else { f64::NAN }
+            if turn[(2, 2)] > 0.3 {
+                turn[(2, axis)].asin() + SIGMA_TILT * normal(2 * row + axis)
+            } else {
+                f64::NAN
+            }
         };
-        let values = self.turn.iter().enumerate().flat_map(|(row, turn)| [0, 1].map(|axis| tilt(turn, row, axis)));
+        let values = self
+            .turn
+            .iter()
+            .enumerate()
+            .flat_map(|(row, turn)| [0, 1].map(|axis| tilt(turn, row, axis)));
         let (values, sigma) = (values.collect(), vec![SIGMA_TILT; self.point.len()]);
-        self.read(Readings { kind: "inclination", width: 2, values, sigma, anchor: None })
+        self.read(Readings {
+            kind: "inclination",
+            width: 2,
+            values,
+            sigma,
+            anchor: None,
+        })
     }
 
     /// Adds distances from four draw-wires in turn.
     fn with_wires(self) -> Self {
-        let anchors: Vec<Vector3<f64>> =
-            [[3.0, 1.0, 0.0], [5.5, -2.5, 0.1], [3.0, -3.0, 2.0], [6.0, 0.5, 2.5]].map(Vector3::from).to_vec();
+        let anchors: Vec<Vector3<f64>> = [
+            [3.0, 1.0, 0.0],
+            [5.5, -2.5, 0.1],
+            [3.0, -3.0, 2.0],
+            [6.0, 0.5, 2.5],
+        ]
+        .map(Vector3::from)
+        .to_vec();
         let names = ["A", "B", "C", "D"];
         let rows = 0..self.point.len();
-        let length = |row: usize| (self.point[row] - anchors[row % 4]).norm() + SIGMA_WIRE * normal(50_000 + row);
+        let length = |row: usize| {
+            (self.point[row] - anchors[row % 4]).norm() + SIGMA_WIRE * normal(50_000 + row)
+        };
         let readings = Readings {
             kind: "distance",
             width: 1,
@@ -167,18 +244,27 @@ impl Recorded {
         let down = along.cross(&right);
         let image = |row: usize, axis: usize| {
             let point = self.point[row] - centre - away;
-            [right, down][axis].dot(&point) / along.dot(&point) + SIGMA_IMAGE * normal(30_000 + 2 * row + axis)
+            [right, down][axis].dot(&point) / along.dot(&point)
+                + SIGMA_IMAGE * normal(30_000 + 2 * row + axis)
         };
-        let values = (0..self.point.len()).flat_map(|row| [0, 1].map(|axis| image(row, axis))).collect();
+        let values = (0..self.point.len())
+            .flat_map(|row| [0, 1].map(|axis| image(row, axis)))
+            .collect();
         let sigma = vec![SIGMA_IMAGE; self.point.len()];
-        self.read(Readings { kind: "planar", width: 2, values, sigma, anchor: None })
+        self.read(Readings {
+            kind: "planar",
+            width: 2,
+            values,
+            sigma,
+            anchor: None,
+        })
     }
 
     /// Adds points of every other row, by a coarse tracker.
     fn with_some_points(mut self) -> Self {
         for row in (0..self.point.len()).step_by(2) {
-            self.rows.points.position[row] =
-                self.point[row] + Vector3::from_fn(|axis, _| SIGMA_POINT * normal(90_000 + 3 * row + axis));
+            self.rows.points.position[row] = self.point[row]
+                + Vector3::from_fn(|axis, _| SIGMA_POINT * normal(90_000 + 3 * row + axis));
             self.rows.points.sigma[row] = Vector3::repeat(SIGMA_POINT);
         }
         self
@@ -192,9 +278,18 @@ impl Recorded {
     /// Diagnosed on four of five measured rows; what is said, and whether a wrong set-up is.
     fn diagnosed(&self) -> Diagnosis {
         let data = &self.rows;
-        let measured: Vec<usize> = (0..data.rows()).filter(|row| calib::observation::values(data, *row) > 0).collect();
-        let (validate, fit): (Vec<usize>, Vec<usize>) = measured.iter().partition(|row| *row % 5 == 4);
-        let (robot, _) = gauge(RobotModel::new(self.robot.clone()), data, &fit, &BTreeMap::new()).expect("anchors");
+        let measured: Vec<usize> = (0..data.rows())
+            .filter(|row| calib::observation::values(data, *row) > 0)
+            .collect();
+        let (validate, fit): (Vec<usize>, Vec<usize>) =
+            measured.iter().partition(|row| *row % 5 == 4);
+        let (robot, _) = gauge(
+            RobotModel::new(self.robot.clone()),
+            data,
+            &fit,
+            &BTreeMap::new(),
+        )
+        .expect("anchors");
         let question = Question {
             robot: &robot,
             data,
@@ -215,13 +310,33 @@ impl Recorded {
 
 /// Names and places found are those concealed, and what is left is noise.
 fn explains(said: &Diagnosis, concealed: &Named) {
-    let found: Named = said.findings.iter().map(|finding| (finding.effect.to_string(), finding.place.to_string())).collect();
-    assert_eq!(&found, concealed, "{}: {:#?}", said.statement, said.findings.iter().map(|f| &f.statement).collect::<Vec<_>>());
+    let found: Named = said
+        .findings
+        .iter()
+        .map(|finding| (finding.effect.to_string(), finding.place.to_string()))
+        .collect();
+    assert_eq!(
+        &found,
+        concealed,
+        "{}: {:#?}",
+        said.statement,
+        said.findings
+            .iter()
+            .map(|f| &f.statement)
+            .collect::<Vec<_>>()
+    );
     // A noise that is taken from what is left explains nothing.
     let inferred = said.noise_basis == NoiseBasis::Inferred;
-    let verdict = if inferred { VerdictKind::Unexplained } else { VerdictKind::Explained };
+    let verdict = if inferred {
+        VerdictKind::Unexplained
+    } else {
+        VerdictKind::Explained
+    };
     assert_eq!(said.verdict, verdict, "{}", said.statement);
-    let (before, after) = (said.before.expect("rows").rms, said.after.expect("rows").rms);
+    let (before, after) = (
+        said.before.expect("rows").rms,
+        said.after.expect("rows").rms,
+    );
     assert!(
         after < 0.5 * before && (0.7..1.3).contains(&(after / said.noise_floor)),
         "{before:e} {after:e} {:e}",
@@ -232,40 +347,91 @@ fn explains(said: &Diagnosis, concealed: &Named) {
 #[test]
 fn causes_are_named_from_inclinations_alone() {
     let concealed = [gear(2, 3.0, 60.0, 25.0), spring(3, 2.5e-7), play(5, 70.0)];
-    let said = recorded(&concealed, 700, &UPRIGHT, 0.0).with_a_level().diagnosed();
-    explains(&said, &named(&[("gear_cyclic", "joint 2"), ("joint_compliance", "joint 3"), ("backlash", "joint 5")]));
+    let said = recorded(&concealed, 700, &UPRIGHT, 0.0)
+        .with_a_level()
+        .diagnosed();
+    explains(
+        &said,
+        &named(&[
+            ("gear_cyclic", "joint 2"),
+            ("joint_compliance", "joint 3"),
+            ("backlash", "joint 5"),
+        ]),
+    );
     assert_eq!(said.dimension, Dimension::Angle);
-    assert!(said.statement.contains("arcsec") && !said.statement.contains(" um"), "{}", said.statement);
+    assert!(
+        said.statement.contains("arcsec") && !said.statement.contains(" um"),
+        "{}",
+        said.statement
+    );
 }
 
 #[test]
 fn a_level_shows_how_well_joints_repeat_beside_the_causes() {
     let concealed = [gear(3, 2.0, 60.0, 80.0), spring(2, 2.5e-7), play(4, 70.0)];
-    let said = recorded(&concealed, 700, &UPRIGHT, 4.0).with_a_level().diagnosed();
-    explains(&said, &named(&[("gear_cyclic", "joint 3"), ("joint_compliance", "joint 2"), ("backlash", "joint 4")]));
+    let said = recorded(&concealed, 700, &UPRIGHT, 4.0)
+        .with_a_level()
+        .diagnosed();
+    explains(
+        &said,
+        &named(&[
+            ("gear_cyclic", "joint 3"),
+            ("joint_compliance", "joint 2"),
+            ("backlash", "joint 4"),
+        ]),
+    );
     let repeatability = said.repeatability.sigma.to_degrees() * 3600.0;
-    assert!((3.0..5.2).contains(&repeatability), "{repeatability} arcsec");
+    assert!(
+        (3.0..5.2).contains(&repeatability),
+        "{repeatability} arcsec"
+    );
 }
 
 #[test]
 fn causes_are_named_from_distances_alone() {
     let concealed = [gear(1, 2.0, 40.0, 70.0), spring(2, 2e-7), play(3, 60.0)];
     let said = recorded(&concealed, 480, &[], 1.5).with_wires().diagnosed();
-    explains(&said, &named(&[("gear_cyclic", "joint 1"), ("joint_compliance", "joint 2"), ("backlash", "joint 3")]));
+    explains(
+        &said,
+        &named(&[
+            ("gear_cyclic", "joint 1"),
+            ("joint_compliance", "joint 2"),
+            ("backlash", "joint 3"),
+        ]),
+    );
     assert_eq!(said.dimension, Dimension::Length);
 }
 
 #[test]
 fn causes_are_named_from_points_and_distances() {
     let concealed = [gear(4, 2.0, 60.0, 10.0), spring(2, 2e-7), play(1, 50.0)];
-    let said = recorded(&concealed, 240, &[], 2.0).with_wires().with_some_points().diagnosed();
-    explains(&said, &named(&[("gear_cyclic", "joint 4"), ("joint_compliance", "joint 2"), ("backlash", "joint 1")]));
+    let said = recorded(&concealed, 240, &[], 2.0)
+        .with_wires()
+        .with_some_points()
+        .diagnosed();
+    explains(
+        &said,
+        &named(&[
+            ("gear_cyclic", "joint 4"),
+            ("joint_compliance", "joint 2"),
+            ("backlash", "joint 1"),
+        ]),
+    );
 }
 
 #[test]
 fn causes_are_named_from_the_images_of_one_camera_alone() {
     let concealed = [gear(3, 2.0, 60.0, 40.0), spring(2, 2e-7), play(1, 50.0)];
-    let said = recorded(&concealed, 480, &[], 0.0).with_a_camera().diagnosed();
-    explains(&said, &named(&[("gear_cyclic", "joint 3"), ("joint_compliance", "joint 2"), ("backlash", "joint 1")]));
+    let said = recorded(&concealed, 480, &[], 0.0)
+        .with_a_camera()
+        .diagnosed();
+    explains(
+        &said,
+        &named(&[
+            ("gear_cyclic", "joint 3"),
+            ("joint_compliance", "joint 2"),
+            ("backlash", "joint 1"),
+        ]),
+    );
     assert_eq!(said.dimension, Dimension::Angle);
 }

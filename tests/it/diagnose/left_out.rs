@@ -27,11 +27,19 @@ struct Bins([(usize, f64, usize); 3]);
 impl Bins {
     fn add(&mut self, said: &Said, case: &Case) {
         let true_names = |name: &str, place: &str| {
-            let true_places = case.want_all().into_iter().chain(case.accepted.iter().cloned());
-            true_places.into_iter().any(|(effect, there)| effect == name && there == place)
+            let true_places = case
+                .want_all()
+                .into_iter()
+                .chain(case.accepted.iter().cloned());
+            true_places
+                .into_iter()
+                .any(|(effect, there)| effect == name && there == place)
         };
-        for (name, place, probability, _) in said.found.iter().filter(|(name, ..)| name != "unknown") {
-            let bin = &mut self.0[usize::from(*probability >= 0.5) + usize::from(*probability >= 0.9)];
+        for (name, place, probability, _) in
+            said.found.iter().filter(|(name, ..)| name != "unknown")
+        {
+            let bin =
+                &mut self.0[usize::from(*probability >= 0.5) + usize::from(*probability >= 0.9)];
             bin.0 += 1;
             bin.1 += probability;
             bin.2 += usize::from(true_names(name, place));
@@ -39,9 +47,15 @@ impl Bins {
     }
 
     fn print(&self, of: &str) {
-        for (bin, (count, stated, right)) in ["0 to 0.5", "0.5 to 0.9", "0.9 to 1"].iter().zip(&self.0) {
+        for (bin, (count, stated, right)) in
+            ["0 to 0.5", "0.5 to 0.9", "0.9 to 1"].iter().zip(&self.0)
+        {
             let share = |sum: f64| sum / (*count).max(1) as f64;
-            println!("{of}, {bin}: {count} names, stated {:.2}, right {:.2}", share(*stated), share(*right as f64));
+            println!(
+                "{of}, {bin}: {count} names, stated {:.2}, right {:.2}",
+                share(*stated),
+                share(*right as f64)
+            );
         }
     }
 }
@@ -50,14 +64,25 @@ pub fn said(case: &Case, without: &[&str]) -> Said {
     let recording = recording(case);
     let split = split(case, &recording);
     let stage: Diagnose = serde_json::from_value(json!({"without": without})).expect("settings");
-    let reads = DiagnoseReads { robot: Robot::from_description(&case.robot), recording, split };
+    let reads = DiagnoseReads {
+        robot: Robot::from_description(&case.robot),
+        recording,
+        split,
+    };
     let tables = Desk::default().run(&stage, reads).expect("a diagnosis");
     let verdict = table::<Verdict>(&tables).remove(0).0.remove(0);
     let findings = table::<Findings>(&tables).remove(0);
     let found = findings.0.iter().filter(|row| row.forms != "[]");
     Said {
         found: found
-            .map(|row| (row.effect.clone(), row.place.clone(), row.probability.unwrap_or(0.0), row.delta_bic.unwrap_or(0.0)))
+            .map(|row| {
+                (
+                    row.effect.clone(),
+                    row.place.clone(),
+                    row.probability.unwrap_or(0.0),
+                    row.delta_bic.unwrap_or(0.0),
+                )
+            })
             .collect(),
         verdict: verdict.verdict,
         before: verdict.before_rms_mm.unwrap_or(f64::NAN),
@@ -68,10 +93,26 @@ pub fn said(case: &Case, without: &[&str]) -> Said {
 
 #[test]
 fn what_is_left_out_is_never_named() {
-    let (count, seed) = (from_environment("CALIB_RECORDINGS", 2) as usize, from_environment("CALIB_SEED", 31));
-    let design = Design { seed, cases: 6 * count, faulty: 0.0, ..Design::default() };
-    let (mut tellable, mut wrong, mut sound, mut other, mut confident, mut listed, mut right, mut back) =
-        (0, 0, 0, 0, 0, 0, 0, 0);
+    let (count, seed) = (
+        from_environment("CALIB_RECORDINGS", 2) as usize,
+        from_environment("CALIB_SEED", 31),
+    );
+    let design = Design {
+        seed,
+        cases: 6 * count,
+        faulty: 0.0,
+        ..Design::default()
+    };
+    let (
+        mut tellable,
+        mut wrong,
+        mut sound,
+        mut other,
+        mut confident,
+        mut listed,
+        mut right,
+        mut back,
+    ) = (0, 0, 0, 0, 0, 0, 0, 0);
     let (mut of_whole, mut of_others) = (Bins::default(), Bins::default());
     for (number, content) in design.contents().into_iter().enumerate() {
         if !matches!(content, Content::Single(_)) || listed >= count {
@@ -89,10 +130,18 @@ fn what_is_left_out_is_never_named() {
         }
         listed += 1;
         of_whole.add(&whole, &case);
-        right += usize::from(whole.found.iter().any(|(name, _, probability, _)| name == cause && *probability >= 0.5));
+        right += usize::from(
+            whole
+                .found
+                .iter()
+                .any(|(name, _, probability, _)| name == cause && *probability >= 0.5),
+        );
         let left_out = said(&case, &[cause]);
-        let named: Vec<_> =
-            left_out.found.iter().filter(|(name, _, probability, _)| name != "unknown" && *probability >= 0.5).collect();
+        let named: Vec<_> = left_out
+            .found
+            .iter()
+            .filter(|(name, _, probability, _)| name != "unknown" && *probability >= 0.5)
+            .collect();
         let can_tell = left_out.after > 1.1 * whole.after;
         let floor = 3f64.sqrt() * case.noise_mm[1];
         println!(
@@ -115,7 +164,11 @@ fn what_is_left_out_is_never_named() {
         } else {
             other += 1;
             of_others.add(&left_out, &case);
-            confident += usize::from(named.iter().any(|(_, _, probability, _)| *probability >= 0.9));
+            confident += usize::from(
+                named
+                    .iter()
+                    .any(|(_, _, probability, _)| *probability >= 0.9),
+            );
         }
         back += usize::from(left_out.found.iter().any(|(name, ..)| name == cause));
     }
@@ -124,5 +177,8 @@ fn what_is_left_out_is_never_named() {
     );
     of_whole.print("in the list");
     of_others.print("left out, not tellable");
-    assert!(listed == count && back == 0, "{listed} recordings, {back} come back");
+    assert!(
+        listed == count && back == 0,
+        "{listed} recordings, {back} come back"
+    );
 }

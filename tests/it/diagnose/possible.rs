@@ -15,7 +15,11 @@ fn recorded(robot: &RobotModel) -> Measurements {
         q: (0..rows * robot.joints()).map(angle).collect(),
         points: PointReadings::new(vec![Vector3::new(1.0, 0.2, 0.7); rows], 2e-5),
         payload: vec![10.0; rows],
-        time: Some((0..rows).map(|row| 1000.0 * row as f64 / (rows - 1) as f64).collect()),
+        time: Some(
+            (0..rows)
+                .map(|row| 1000.0 * row as f64 / (rows - 1) as f64)
+                .collect(),
+        ),
         ..Measurements::default()
     }
 }
@@ -43,7 +47,10 @@ fn a_bend_lies_within_the_loads_that_were_recorded() {
         // The model's loads reach 5 Nm, and those of the robot file more.
         assert_eq!(why(bent(shape, 4.9), &[1e-6, 1e-6], 0.0, 5.0), None);
         let said = why(bent(shape, 14.0), &[1e-6, 1e-6], 0.0, 5.0).expect("beyond");
-        assert_eq!(said, "its bend at 14 Nm lies beyond the largest recorded load of 5.0 Nm");
+        assert_eq!(
+            said,
+            "its bend at 14 Nm lies beyond the largest recorded load of 5.0 Nm"
+        );
         // A load that only a model makes is not recorded.
         assert!(why(bent(shape, 9e5), &[1e-6, 1e-6], 0.0, 1e6).is_some());
     }
@@ -52,8 +59,14 @@ fn a_bend_lies_within_the_loads_that_were_recorded() {
         json!({ "joint": { "joint": 1 } }), json!({ "push": { "joint": 1, "friction_nm": friction } }), json!("sign")) })
     };
     assert_eq!(why(pushed(4.0), &[1e-5], 0.0, 5.0), None);
-    assert!(why(pushed(-6.0), &[1e-5], 0.0, 5.0).is_some_and(|said| said.contains("threshold of 6.0 Nm")));
-    assert_eq!(why(pushed(4.0), &[-1e-5], 4e-6, 5.0).as_deref(), Some("its gap is negative"));
+    assert!(
+        why(pushed(-6.0), &[1e-5], 0.0, 5.0)
+            .is_some_and(|said| said.contains("threshold of 6.0 Nm"))
+    );
+    assert_eq!(
+        why(pushed(4.0), &[-1e-5], 4e-6, 5.0).as_deref(),
+        Some("its gap is negative")
+    );
 }
 
 #[test]
@@ -64,25 +77,40 @@ fn a_time_constant_is_less_than_ten_recordings() {
     };
     assert_eq!(why(growing(5000.0), &[3e-4], 0.0, 5.0), None);
     let said = why(growing(10_000.0), &[3e-4], 0.0, 5.0).expect("at the bound");
-    assert_eq!(said, "its time constant of 10000 s is ten times as long as the recording (1000 s)");
+    assert_eq!(
+        said,
+        "its time constant of 10000 s is ten times as long as the recording (1000 s)"
+    );
 }
 
 #[test]
 fn nothing_grows_by_more_than_its_material_and_nothing_lags_by_less_than_nothing() {
     let linear = json!({ "linear": { "zero": 20.0, "per": 1.0 } });
-    let link =
-        json!({ "thermal_growth": law(json!({ "links": { "first": 1, "last": 1 } }), json!("temperature"), linear.clone()) });
+    let link = json!({ "thermal_growth": law(json!({ "links": { "first": 1, "last": 1 } }), json!("temperature"), linear.clone()) });
     assert_eq!(why(link.clone(), &[24e-6], 1e-6, 5.0), None);
     let said = why(link.clone(), &[85e-6], 1e-6, 5.0).expect("more");
-    assert_eq!(said, "85 um/m for each kelvin is more than the 70 of any material of links");
-    assert_eq!(why(link, &[-12e-6], 1e-6, 5.0).as_deref(), Some("links do not shrink as they warm up"));
+    assert_eq!(
+        said,
+        "85 um/m for each kelvin is more than the 70 of any material of links"
+    );
+    assert_eq!(
+        why(link, &[-12e-6], 1e-6, 5.0).as_deref(),
+        Some("links do not shrink as they warm up")
+    );
     let mut air = json!({ "tracker_refraction": law(json!({ "instrument": { "of": "range" } }), json!("temperature"), linear) });
-    air["tracker_refraction"]["law"]["times"] = json!({ "of": "range", "basis": { "linear": { "zero": 0.0, "per": 1.0 } } });
+    air["tracker_refraction"]["law"]["times"] =
+        json!({ "of": "range", "basis": { "linear": { "zero": 0.0, "per": 1.0 } } });
     assert_eq!(why(air.clone(), &[-1.2e-6], 1e-7, 5.0), None);
-    assert!(why(air, &[-76e-6], 1e-6, 5.0).is_some_and(|said| said.starts_with("76 um/m for each kelvin is more than the 5")));
+    assert!(
+        why(air, &[-76e-6], 1e-6, 5.0)
+            .is_some_and(|said| said.starts_with("76 um/m for each kelvin is more than the 5"))
+    );
     let lag = |by: &str| json!({ "joint_log_lag": { "each": false, "by": by } });
     assert_eq!(why(lag("move"), &[1e-3], 1e-4, 5.0), None);
-    assert!(why(lag("move"), &[-1e-3], 1e-4, 5.0).is_some() && why(lag("synchronous"), &[-1e-3], 1e-4, 5.0).is_some());
+    assert!(
+        why(lag("move"), &[-1e-3], 1e-4, 5.0).is_some()
+            && why(lag("synchronous"), &[-1e-3], 1e-4, 5.0).is_some()
+    );
     // Which of two clocks is early is nobody's law.
     assert_eq!(why(lag("clock"), &[-1e-3], 1e-4, 5.0), None);
 }
@@ -91,14 +119,37 @@ fn nothing_grows_by_more_than_its_material_and_nothing_lags_by_less_than_nothing
 fn joints_that_lag_by_less_than_nothing_have_no_name_and_the_model_is_the_same() {
     let said = simulated("{joint_log_lag: {share: -0.002}}", 3, 120);
     let finding = &said["findings"][0];
-    assert_eq!((&finding["effect"], &finding["where"]), (&"unknown".into(), &"recording".into()), "{said:#}");
+    assert_eq!(
+        (&finding["effect"], &finding["where"]),
+        (&"unknown".into(), &"recording".into()),
+        "{said:#}"
+    );
     let statement = finding["statement"].as_str().expect("a sentence");
-    assert!(statement.starts_with("something unknown acts at recording") && statement.contains("joint_log_lag"), "{statement}");
+    assert!(
+        statement.starts_with("something unknown acts at recording")
+            && statement.contains("joint_log_lag"),
+        "{statement}"
+    );
     let rivals = finding["rivals"].as_array().expect("a list");
-    assert!(rivals.iter().all(|rival| rival["effect"] != "joint_log_lag"), "{said:#}");
+    assert!(
+        rivals
+            .iter()
+            .all(|rival| rival["effect"] != "joint_log_lag"),
+        "{said:#}"
+    );
     // What has no name still reproduces the error.
-    let rms = |when: &str| said[when]["validate_rms_mm"].as_f64().expect("held-out rows");
-    assert!(rms("after") < 0.5 * rms("before") && said["verdict"] == "unexplained", "{said:#}");
+    let rms = |when: &str| {
+        said[when]["validate_rms_mm"]
+            .as_f64()
+            .expect("held-out rows")
+    };
+    assert!(
+        rms("after") < 0.5 * rms("before") && said["verdict"] == "unexplained",
+        "{said:#}"
+    );
     let same = simulated("{joint_log_lag: {share: 0.002}}", 3, 120);
-    assert!(wanted(&same["findings"]).contains(&("joint_log_lag".into(), "recording".into())), "{same:#}");
+    assert!(
+        wanted(&same["findings"]).contains(&("joint_log_lag".into(), "recording".into())),
+        "{same:#}"
+    );
 }

@@ -19,7 +19,10 @@ fn rewritten(folder: &Path, mut change: impl FnMut(usize, &mut Vec<String>)) {
 }
 
 fn diagnosed(folder: &Path) -> Value {
-    let said = calib(&[&["diagnose", "p.yaml", "--quiet", "--json"], &CASE[..]].concat(), folder);
+    let said = calib(
+        &[&["diagnose", "p.yaml", "--quiet", "--json"], &CASE[..]].concat(),
+        folder,
+    );
     serde_json::from_str(&said).expect("JSON")
 }
 
@@ -30,14 +33,27 @@ fn without_a_clock_nothing_is_said_in_seconds() {
     case_with(here, &[]);
     let timed = diagnosed(here);
     assert_eq!(timed["clock"], "s");
-    assert!(timed["findings"][0]["statement"].as_str().expect("a sentence").contains(" s ("), "{timed:#}");
+    assert!(
+        timed["findings"][0]["statement"]
+            .as_str()
+            .expect("a sentence")
+            .contains(" s ("),
+        "{timed:#}"
+    );
     let findings: Findings = table_of(here, "diagnose.findings.parquet");
     let forms: Value = serde_json::from_str(&findings.0[0].forms).expect("JSON");
-    let step = forms[0]["zero_shift"]["law"]["basis"]["after"]["at"].as_f64().expect("s");
+    let step = forms[0]["zero_shift"]["law"]["basis"]["after"]["at"]
+        .as_f64()
+        .expect("s");
     let mut times: Vec<f64> = Vec::new();
     let mut column = None;
     rewritten(here, |row, cells| {
-        let at = *column.get_or_insert_with(|| cells.iter().position(|name| name == "time_s").expect("time_s"));
+        let at = *column.get_or_insert_with(|| {
+            cells
+                .iter()
+                .position(|name| name == "time_s")
+                .expect("time_s")
+        });
         let cell = cells.remove(at);
         if row > 0 {
             times.push(cell.parse().expect("s"));
@@ -45,13 +61,31 @@ fn without_a_clock_nothing_is_said_in_seconds() {
     });
     let rows = diagnosed(here);
     assert_eq!(rows["clock"], "row");
-    let first = times.iter().position(|time| *time > step).expect("a row after the step") + 1;
-    let statement = rows["findings"][0]["statement"].as_str().expect("a sentence");
-    assert!(statement.contains(&format!(" from row {first} (")), "{statement}");
+    let first = times
+        .iter()
+        .position(|time| *time > step)
+        .expect("a row after the step")
+        + 1;
+    let statement = rows["findings"][0]["statement"]
+        .as_str()
+        .expect("a sentence");
+    assert!(
+        statement.contains(&format!(" from row {first} (")),
+        "{statement}"
+    );
     let unseen = rows["not_observable"].as_array().expect("a list");
-    assert!(unseen.iter().any(|line| line == "time: none was recorded; the order of the rows is used instead"), "{unseen:?}");
+    assert!(
+        unseen
+            .iter()
+            .any(|line| line == "time: none was recorded; the order of the rows is used instead"),
+        "{unseen:?}"
+    );
     let goes_with = rows["located"]["variables"].as_array().expect("a list");
-    assert!(goes_with.iter().any(|by| by["name"] == "row") && goes_with.iter().all(|by| by["name"] != "time"), "{goes_with:?}");
+    assert!(
+        goes_with.iter().any(|by| by["name"] == "row")
+            && goes_with.iter().all(|by| by["name"] != "time"),
+        "{goes_with:?}"
+    );
     calib(&[&["run", "p.yaml", "--quiet"], &CASE[..]].concat(), here);
     let curves: Curves = table_of(here, "report.curves.parquet");
     let own: Vec<_> = curves.0.iter().filter(|point| point.rank == 1).collect();
@@ -63,7 +97,10 @@ fn without_a_clock_nothing_is_said_in_seconds() {
     }
     std::fs::write(here.join("t.csv"), "x_mm,y_mm,z_mm\n600,0,700\n").expect("written");
     let (code, said) = refused(&["compensate", "HEAD", "t.csv", "--time", "100"], here);
-    assert!(code == Some(2) && said.contains("--time: the recording of the model has no clock"), "{said}");
+    assert!(
+        code == Some(2) && said.contains("--time: the recording of the model has no clock"),
+        "{said}"
+    );
 }
 
 #[test]
@@ -71,23 +108,39 @@ fn a_diagnosis_that_cannot_make_up_for_missing_masses_does_not_stand_for_the_run
     let folder = concealed("joint_compliance", "12", "120");
     let here = folder.path();
     let file = here.join("sealed/recordings/c0001/robot.json");
-    let mut robot: Value = serde_json::from_str(&std::fs::read_to_string(&file).expect("the robot")).expect("JSON");
+    let mut robot: Value =
+        serde_json::from_str(&std::fs::read_to_string(&file).expect("the robot")).expect("JSON");
     let fields = robot.as_object_mut().expect("a robot");
     assert!(fields.remove("mass").is_some() && fields.remove("com").is_some());
     std::fs::write(&file, robot.to_string()).expect("written");
     case_with(here, &[]);
-    let run: Value =
-        serde_json::from_str(&calib(&[&["run", "p.yaml", "--quiet", "--json"], &CASE[..]].concat(), here)).expect("JSON");
+    let run: Value = serde_json::from_str(&calib(
+        &[&["run", "p.yaml", "--quiet", "--json"], &CASE[..]].concat(),
+        here,
+    ))
+    .expect("JSON");
     let rms = |step: &Value| {
         let rows = run["statistics"].as_array().expect("rows");
-        let row = rows.iter().find(|row| row["step"] == *step && row["held_out"] == true).expect("a row");
+        let row = rows
+            .iter()
+            .find(|row| row["step"] == *step && row["held_out"] == true)
+            .expect("a row");
         row["rms_mm"].as_f64().expect("mm")
     };
     // The payload alone winds up the joints of `joint`, which is all that the file lets one know.
     let standing = &run["standing"]["step"];
-    assert!(rms(standing) <= 1.03 * rms(&"joint".into()), "{standing}: {} mm, joint {} mm", rms(standing), rms(&"joint".into()));
+    assert!(
+        rms(standing) <= 1.03 * rms(&"joint".into()),
+        "{standing}: {} mm, joint {} mm",
+        rms(standing),
+        rms(&"joint".into())
+    );
     let (_, said) = refused(&["compensate", "HEAD", "--quiet", "p.yaml"], here);
-    assert_eq!(said.contains("warning: `diagnose` is withdrawn"), *standing != "diagnose", "{said}");
+    assert_eq!(
+        said.contains("warning: `diagnose` is withdrawn"),
+        *standing != "diagnose",
+        "{said}"
+    );
 }
 
 #[test]
@@ -96,7 +149,8 @@ fn of_few_rows_nothing_is_asked_and_the_report_is_written_all_the_same() {
     let here = folder.path();
     let (mut column, mut kept) = (None, 0);
     rewritten(here, |_, cells| {
-        let at = *column.get_or_insert_with(|| cells.iter().position(|name| name == "use").expect("use"));
+        let at = *column
+            .get_or_insert_with(|| cells.iter().position(|name| name == "use").expect("use"));
         if cells[at] == "fit" {
             kept += 1;
             if kept > 12 {
@@ -107,12 +161,18 @@ fn of_few_rows_nothing_is_asked_and_the_report_is_written_all_the_same() {
     case_with(here, &[]);
     calib(&[&["run", "p.yaml", "--quiet"], &CASE[..]].concat(), here);
     let said = diagnosed(here);
-    assert_eq!((&said["verdict"], &said["findings"]), (&"not_asked".into(), &serde_json::json!([])));
+    assert_eq!(
+        (&said["verdict"], &said["findings"]),
+        (&"not_asked".into(), &serde_json::json!([]))
+    );
     assert_eq!(said["leftover"]["p_value"], Value::Null);
     assert_eq!(
         said["not_observable"][0],
         "what the simulation lacks: 12 rows were fitted, at least 15 are needed to separate it from geometry"
     );
     let text = calib(&["diagnose", "HEAD", "--details"], here);
-    assert!(text.starts_with("not asked (noise basis: instrument)\ntoo few rows were fitted"), "{text}");
+    assert!(
+        text.starts_with("not asked (noise basis: instrument)\ntoo few rows were fitted"),
+        "{text}"
+    );
 }

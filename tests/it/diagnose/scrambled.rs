@@ -3,7 +3,9 @@
 use crate::desk::{Desk, table};
 use crate::suspects::{Inputs, pipeline};
 use calib::stage::{Diagnose, DiagnoseReads};
-use calib::table::{CovarianceTable, FindingRow, Findings, Frame, Parameters, Prediction, Rivals, Table, Verdict};
+use calib::table::{
+    CovarianceTable, FindingRow, Findings, Frame, Parameters, Prediction, Rivals, Table, Verdict,
+};
 use std::collections::BTreeMap;
 
 /// Moves the measured points of held-out rows by 0.3 mm, to and fro.
@@ -16,8 +18,13 @@ fn scattered(inputs: &mut Inputs) {
 
 /// Gives the measured points of held-out rows to one another.
 fn exchanged(inputs: &mut Inputs) {
-    let held: Vec<usize> = (0..inputs.split.0.len()).filter(|row| inputs.split.0[*row].set != "fit").collect();
-    let points: Vec<[f64; 3]> = held.iter().map(|row| inputs.recording.position[*row]).collect();
+    let held: Vec<usize> = (0..inputs.split.0.len())
+        .filter(|row| inputs.split.0[*row].set != "fit")
+        .collect();
+    let points: Vec<[f64; 3]> = held
+        .iter()
+        .map(|row| inputs.recording.position[*row])
+        .collect();
     for (k, row) in held.iter().enumerate() {
         inputs.recording.position[*row] = points[(k + 1) % points.len()];
     }
@@ -26,26 +33,50 @@ fn exchanged(inputs: &mut Inputs) {
 /// Findings that explain something: that held-out rows themselves are wrong is said, too.
 fn causes(tables: &BTreeMap<&'static str, Vec<Frame>>) -> Vec<FindingRow> {
     let findings: Findings = table(tables).remove(0);
-    findings.0.into_iter().filter(|row| row.delta_bic.is_some()).collect()
+    findings
+        .0
+        .into_iter()
+        .filter(|row| row.delta_bic.is_some())
+        .collect()
 }
 
 #[test]
 fn every_choice_of_a_diagnosis_is_the_same_whatever_held_out_rows_say() {
-    for (family, seed) in [("gear_cyclic", "41"), ("backlash", "42"), ("joint_hardening", "43")] {
+    for (family, seed) in [
+        ("gear_cyclic", "41"),
+        ("backlash", "42"),
+        ("joint_hardening", "43"),
+    ] {
         let folder = super::concealed(family, seed, "120");
-        let case = folder.path().join("sealed/recordings/c0001").display().to_string();
+        let case = folder
+            .path()
+            .join("sealed/recordings/c0001")
+            .display()
+            .to_string();
         let diagnosed = |change: fn(&mut Inputs)| -> BTreeMap<&'static str, Vec<Frame>> {
-            let (mut inputs, stage): (Inputs, Diagnose) = pipeline("case", &[("case", &case)], "diagnose");
+            let (mut inputs, stage): (Inputs, Diagnose) =
+                pipeline("case", &[("case", &case)], "diagnose");
             change(&mut inputs);
-            let reads = DiagnoseReads { recording: inputs.recording, robot: inputs.robot, split: inputs.split };
+            let reads = DiagnoseReads {
+                recording: inputs.recording,
+                robot: inputs.robot,
+                split: inputs.split,
+            };
             Desk::default().run(&stage, reads).expect("a diagnosis")
         };
-        let (sound, other, mixed) = (diagnosed(|_| ()), diagnosed(scattered), diagnosed(exchanged));
+        let (sound, other, mixed) = (
+            diagnosed(|_| ()),
+            diagnosed(scattered),
+            diagnosed(exchanged),
+        );
         let after = |tables: &BTreeMap<&'static str, Vec<Frame>>| {
             let verdict: Verdict = table(tables).remove(0);
             verdict.0[0].after_rms_mm.expect("held-out rows")
         };
-        assert!(after(&other) > 2.0 * after(&sound), "{family}: nothing was scattered");
+        assert!(
+            after(&other) > 2.0 * after(&sound),
+            "{family}: nothing was scattered"
+        );
         fn same<T: Table + PartialEq + std::fmt::Debug>(
             a: &BTreeMap<&'static str, Vec<Frame>>,
             b: &BTreeMap<&'static str, Vec<Frame>>,

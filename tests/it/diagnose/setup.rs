@@ -14,8 +14,22 @@ use std::f64::consts::{FRAC_PI_2, PI};
 /// A small 6R arm with a lateral shoulder, an elbow beside it and a spherical wrist.
 fn shouldered() -> RobotDescription {
     let mut out = fixture::spherical();
-    let points = [[0.0; 3], [50.0, 0.0, 0.0], [50.0, 50.0, 425.0], [50.0, 50.0, 425.0], [50.0, 50.0, 850.0], [50.0, 50.0, 850.0]];
-    let axes = [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let points = [
+        [0.0; 3],
+        [50.0, 0.0, 0.0],
+        [50.0, 50.0, 425.0],
+        [50.0, 50.0, 425.0],
+        [50.0, 50.0, 850.0],
+        [50.0, 50.0, 850.0],
+    ];
+    let axes = [
+        [0.0, 0.0, 1.0],
+        [0.0, 1.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [0.0, 0.0, 1.0],
+        [0.0, 1.0, 0.0],
+        [0.0, 0.0, 1.0],
+    ];
     for ((joint, point), axis) in out.joints.iter_mut().zip(points).zip(axes) {
         (joint.point, joint.axis) = (point.map(|value| value * 1e-3), axis);
         (joint.mass, joint.centre) = (joint.mass.map(|mass| 0.05 * mass), Some(joint.point));
@@ -37,8 +51,14 @@ struct Inputs {
 
 /// Seventy-two points of the twin of an arm: zeros, lengths, gears and the tool differ as they do in a real one, and `effects`.
 fn recorded(robot: &RobotDescription, seed: u64, effects: Value) -> Inputs {
-    let range: Vec<[f64; 2]> =
-        vec![[-110.0, 120.0], [-70.0, 65.0], [-60.0, 75.0], [-130.0, 140.0], [-100.0, 95.0], [-150.0, 160.0]];
+    let range: Vec<[f64; 2]> = vec![
+        [-110.0, 120.0],
+        [-70.0, 65.0],
+        [-60.0, 75.0],
+        [-130.0, 140.0],
+        [-100.0, 95.0],
+        [-150.0, 160.0],
+    ];
     let settings = json!({
         "truth": {
             "offset_deg": [0.1, -0.12, 0.2, 0.08, -0.15, 0.3],
@@ -53,8 +73,18 @@ fn recorded(robot: &RobotDescription, seed: u64, effects: Value) -> Inputs {
         "seed": seed,
     });
     let stage: Simulate = serde_json::from_value(settings).expect("settings");
-    let tables = Desk::default().run(&stage, SimulateReads { robot: Robot::from_description(robot) }).expect("a recording");
-    Inputs { robot: robot.clone(), recording: table(&tables).remove(0) }
+    let tables = Desk::default()
+        .run(
+            &stage,
+            SimulateReads {
+                robot: Robot::from_description(robot),
+            },
+        )
+        .expect("a recording");
+    Inputs {
+        robot: robot.clone(),
+        recording: table(&tables).remove(0),
+    }
 }
 
 struct Said {
@@ -66,31 +96,63 @@ struct Said {
 
 fn diagnosed(inputs: &Inputs) -> Result<Said, Error> {
     let desk = Desk::default();
-    let split: SplitBy = serde_json::from_value(json!({"by": "usage", "blank": "fit"})).expect("settings");
-    let split: Split = table(&desk.run(&split, SplitReads { recording: inputs.recording.clone() })?).remove(0);
+    let split: SplitBy =
+        serde_json::from_value(json!({"by": "usage", "blank": "fit"})).expect("settings");
+    let split: Split = table(&desk.run(
+        &split,
+        SplitReads {
+            recording: inputs.recording.clone(),
+        },
+    )?)
+    .remove(0);
     let stage: Diagnose = serde_json::from_value(json!({})).expect("settings");
     let robot = Robot::from_description(&inputs.robot);
-    let tables = desk.run(&stage, DiagnoseReads { robot, recording: inputs.recording.clone(), split })?;
+    let tables = desk.run(
+        &stage,
+        DiagnoseReads {
+            robot,
+            recording: inputs.recording.clone(),
+            split,
+        },
+    )?;
     let verdict: Verdict = table(&tables).remove(0);
     let findings: Findings = table(&tables).remove(0);
     let statement = verdict.0[0].statement.clone().unwrap_or_default();
     let warnings = desk.warnings.lock().expect("warnings").clone();
-    Ok(Said { verdict: verdict.0[0].verdict.clone(), statement, findings: findings.0, warnings })
+    Ok(Said {
+        verdict: verdict.0[0].verdict.clone(),
+        statement,
+        findings: findings.0,
+        warnings,
+    })
 }
 
 /// Sets the joints of every row anew.
 fn joints(inputs: &mut Inputs, change: impl Fn(&mut [f64])) {
-    inputs.recording.q.chunks_mut(inputs.robot.joints.len()).for_each(change);
+    inputs
+        .recording
+        .q
+        .chunks_mut(inputs.robot.joints.len())
+        .for_each(change);
 }
 
 fn points(inputs: &mut Inputs, change: impl Fn([f64; 3]) -> [f64; 3]) {
-    inputs.recording.position.iter_mut().for_each(|point| *point = change(*point));
+    inputs
+        .recording
+        .position
+        .iter_mut()
+        .for_each(|point| *point = change(*point));
 }
 
 /// Gives every row the point of another one.
 fn paired(inputs: &mut Inputs, partner: impl Fn(usize) -> usize) {
     let all = inputs.recording.position.clone();
-    inputs.recording.position.iter_mut().enumerate().for_each(|(row, point)| *point = all[partner(row)]);
+    inputs
+        .recording
+        .position
+        .iter_mut()
+        .enumerate()
+        .for_each(|(row, point)| *point = all[partner(row)]);
 }
 
 /// What is done wrong, what the first finding is to say of it, and how it is done.
@@ -98,43 +160,105 @@ type Wrong = (&'static str, &'static str, fn(&mut Inputs));
 
 /// The frozen cases. Positions are what `mm` and `deg` of the settings make of what stands in the files.
 const WRONG: [Wrong; 20] = [
-    ("points in inches", "unit: in}", |i| points(i, |p| p.map(|x| x / 25.4))),
-    ("points in metres", "unit: m}", |i| points(i, |p| p.map(|x| x / 1000.0))),
-    ("points in micrometres", "unit: um}", |i| points(i, |p| p.map(|x| x * 1000.0))),
-    ("joints in rad", "unit: rad", |i| joints(i, |q| q.iter_mut().for_each(|q| *q *= PI / 180.0))),
-    ("sign of joint 3", "joint 3 turns the other way", |i| joints(i, |q| q[2] = -q[2])),
-    ("sign of joint 5", "joint 5 turns the other way", |i| joints(i, |q| q[4] = -q[4])),
-    ("signs of joints 1, 4 and 6", "joints 1, 4, 6 turn the other way", |i| {
-        joints(i, |q| [0, 3, 5].into_iter().for_each(|k| q[k] = -q[k]))
+    ("points in inches", "unit: in}", |i| {
+        points(i, |p| p.map(|x| x / 25.4))
     }),
-    ("signs of joints 2 and 3", "joints 2, 3 turn the other way", |i| joints(i, |q| (q[1], q[2]) = (-q[1], -q[2]))),
-    ("signs of all joints", "joints 1, 2, 3, 4, 5, 6 turn the other way", |i| joints(i, |q| q.iter_mut().for_each(|q| *q = -*q))),
-    ("zeros of joints 2 and 3 against each other", "90 deg at the zero of joint 2 and ", |i| {
-        joints(i, |q| (q[1], q[2]) = (q[1] - FRAC_PI_2, q[2] + FRAC_PI_2));
+    ("points in metres", "unit: m}", |i| {
+        points(i, |p| p.map(|x| x / 1000.0))
     }),
-    ("points in metres and sign of joint 3", "joint 3 turns the other way", |i| {
-        points(i, |p| p.map(|x| x / 1000.0));
-        joints(i, |q| q[2] = -q[2]);
+    ("points in micrometres", "unit: um}", |i| {
+        points(i, |p| p.map(|x| x * 1000.0))
     }),
-    ("joints 4 and 5 exchanged", "joints 4 and 5 are exchanged", |i| joints(i, |q| q.swap(3, 4))),
-    ("zero of joint 2 at 90 deg", "90 deg at the zero of joint 2", |i| joints(i, |q| q[1] += FRAC_PI_2)),
-    ("zero of joint 4 at 180 deg", "180 deg at the zero of joint 4", |i| joints(i, |q| q[3] += PI)),
-    ("joint 3 less joint 2", "joint 3 is reported minus the angle of joint 2", |i| joints(i, |q| q[2] -= q[1])),
-    ("joint 3 plus joint 2", "joint 3 is reported plus the angle of joint 2", |i| joints(i, |q| q[2] += q[1])),
-    ("x and y exchanged", "mirror image", |i| points(i, |[x, y, z]| [y, x, z])),
-    ("points two rows late", "2 rows behind", |i| paired(i, |row| (row + 70) % 72)),
-    ("points sorted by name as text", "sorted by name as text", |i| {
-        let mut names: Vec<usize> = (1..=72).collect();
-        names.sort_by_key(usize::to_string);
-        paired(i, move |row| names[row] - 1)
+    ("joints in rad", "unit: rad", |i| {
+        joints(i, |q| q.iter_mut().for_each(|q| *q *= PI / 180.0))
     }),
+    ("sign of joint 3", "joint 3 turns the other way", |i| {
+        joints(i, |q| q[2] = -q[2])
+    }),
+    ("sign of joint 5", "joint 5 turns the other way", |i| {
+        joints(i, |q| q[4] = -q[4])
+    }),
+    (
+        "signs of joints 1, 4 and 6",
+        "joints 1, 4, 6 turn the other way",
+        |i| joints(i, |q| [0, 3, 5].into_iter().for_each(|k| q[k] = -q[k])),
+    ),
+    (
+        "signs of joints 2 and 3",
+        "joints 2, 3 turn the other way",
+        |i| joints(i, |q| (q[1], q[2]) = (-q[1], -q[2])),
+    ),
+    (
+        "signs of all joints",
+        "joints 1, 2, 3, 4, 5, 6 turn the other way",
+        |i| joints(i, |q| q.iter_mut().for_each(|q| *q = -*q)),
+    ),
+    (
+        "zeros of joints 2 and 3 against each other",
+        "90 deg at the zero of joint 2 and ",
+        |i| {
+            joints(i, |q| (q[1], q[2]) = (q[1] - FRAC_PI_2, q[2] + FRAC_PI_2));
+        },
+    ),
+    (
+        "points in metres and sign of joint 3",
+        "joint 3 turns the other way",
+        |i| {
+            points(i, |p| p.map(|x| x / 1000.0));
+            joints(i, |q| q[2] = -q[2]);
+        },
+    ),
+    (
+        "joints 4 and 5 exchanged",
+        "joints 4 and 5 are exchanged",
+        |i| joints(i, |q| q.swap(3, 4)),
+    ),
+    (
+        "zero of joint 2 at 90 deg",
+        "90 deg at the zero of joint 2",
+        |i| joints(i, |q| q[1] += FRAC_PI_2),
+    ),
+    (
+        "zero of joint 4 at 180 deg",
+        "180 deg at the zero of joint 4",
+        |i| joints(i, |q| q[3] += PI),
+    ),
+    (
+        "joint 3 less joint 2",
+        "joint 3 is reported minus the angle of joint 2",
+        |i| joints(i, |q| q[2] -= q[1]),
+    ),
+    (
+        "joint 3 plus joint 2",
+        "joint 3 is reported plus the angle of joint 2",
+        |i| joints(i, |q| q[2] += q[1]),
+    ),
+    ("x and y exchanged", "mirror image", |i| {
+        points(i, |[x, y, z]| [y, x, z])
+    }),
+    ("points two rows late", "2 rows behind", |i| {
+        paired(i, |row| (row + 70) % 72)
+    }),
+    (
+        "points sorted by name as text",
+        "sorted by name as text",
+        |i| {
+            let mut names: Vec<usize> = (1..=72).collect();
+            names.sort_by_key(usize::to_string);
+            paired(i, move |row| names[row] - 1)
+        },
+    ),
     ("a link 100 mm short", "from joint 2 to joint 3", |i| {
         // The upper arm: all behind it stands 100 mm too near.
         let [from, to] = [1, 2].map(|joint| i.robot.joints[joint].point);
         let along: [f64; 3] = std::array::from_fn(|k| to[k] - from[k]);
-        let axis = (0..3).max_by(|a, b| along[*a].abs().total_cmp(&along[*b].abs())).expect("three");
+        let axis = (0..3)
+            .max_by(|a, b| along[*a].abs().total_cmp(&along[*b].abs()))
+            .expect("three");
         let by = 0.1 * along[axis].signum();
-        i.robot.joints[2..].iter_mut().for_each(|joint| joint.point[axis] -= by);
+        i.robot.joints[2..]
+            .iter_mut()
+            .for_each(|joint| joint.point[axis] -= by);
         i.robot.tool[axis] -= by;
     }),
 ];
@@ -148,25 +272,55 @@ fn twenty_wrong_set_ups_of_three_arms_are_named_before_any_physics() {
             let mut inputs = sound.clone();
             make(&mut inputs);
             let said = diagnosed(&inputs);
-            let first = said.as_ref().ok().and_then(|said| said.findings.first()).filter(|first| first.effect == "setup");
-            let forms: Option<Value> = first.map(|first| serde_json::from_str(&first.forms).expect("JSON"));
+            let first = said
+                .as_ref()
+                .ok()
+                .and_then(|said| said.findings.first())
+                .filter(|first| first.effect == "setup");
+            let forms: Option<Value> =
+                first.map(|first| serde_json::from_str(&first.forms).expect("JSON"));
             // What explains as well does not count.
-            let said_first = first.and_then(|first| first.statement.split("These data are explained equally well").next());
+            let said_first = first.and_then(|first| {
+                first
+                    .statement
+                    .split("These data are explained equally well")
+                    .next()
+            });
             let named = said_first.is_some_and(|statement| statement.contains(text));
             // Whatever is said first: nothing physical has a size, and nothing is explained.
             if let Ok(said) = &said {
                 assert_eq!(said.verdict, "wrong_setup", "{}: {name}", robot.name);
-                assert!(said.findings.iter().all(|finding| finding.effect == "setup"), "{}: {name}", robot.name);
-                assert!(said.warnings.iter().any(|warning| warning.contains("set-up")), "{:?}", said.warnings);
+                assert!(
+                    said.findings
+                        .iter()
+                        .all(|finding| finding.effect == "setup"),
+                    "{}: {name}",
+                    robot.name
+                );
+                assert!(
+                    said.warnings
+                        .iter()
+                        .any(|warning| warning.contains("set-up")),
+                    "{:?}",
+                    said.warnings
+                );
                 assert!(said.statement.contains("set-up"), "{}", said.statement);
             }
             assert_eq!(forms.unwrap_or_else(|| json!([])), json!([]));
             right += usize::from(named);
             let heard = match &said {
-                Ok(said) => said.findings.first().map_or("-", |first| &first.statement).to_string(),
+                Ok(said) => said
+                    .findings
+                    .first()
+                    .map_or("-", |first| &first.statement)
+                    .to_string(),
                 Err(error) => format!("code {}: {error}", error.exit_code()),
             };
-            lines.push(format!("{} {:14} {name:30} {heard}", if named { "ok   " } else { "WRONG" }, robot.name));
+            lines.push(format!(
+                "{} {:14} {name:30} {heard}",
+                if named { "ok   " } else { "WRONG" },
+                robot.name
+            ));
         }
     }
     println!("{}\n{right} of {}", lines.join("\n"), 3 * WRONG.len());
@@ -182,9 +336,9 @@ fn sound_recordings_say_nothing_of_the_set_up() {
         }
         inputs
     };
-    let gear = json!([{"gear_cyclic": {"joint": 2, "order": 3, "amplitude_arcsec": 60, "phase_deg": 30}}]);
-    let wound_up =
-        json!([{"joint_compliance": {"joint": 2, "rad_per_nm": 4e-7}}, {"joint_compliance": {"joint": 3, "rad_per_nm": 8e-7}}]);
+    let gear =
+        json!([{"gear_cyclic": {"joint": 2, "order": 3, "amplitude_arcsec": 60, "phase_deg": 30}}]);
+    let wound_up = json!([{"joint_compliance": {"joint": 2, "rad_per_nm": 4e-7}}, {"joint_compliance": {"joint": 3, "rad_per_nm": 8e-7}}]);
     for (name, inputs) in [
         ("nothing, spherical wrist", recorded(&heavy, 101, json!([]))),
         ("nothing, offset wrist", recorded(&cobot, 102, json!([]))),
@@ -194,8 +348,20 @@ fn sound_recordings_say_nothing_of_the_set_up() {
     ] {
         let said = diagnosed(&inputs).expect(name);
         assert_ne!(said.verdict, "wrong_setup", "{name}: {}", said.statement);
-        assert!(said.findings.iter().all(|finding| finding.effect != "setup"), "{name}");
-        assert!(!said.warnings.iter().any(|line| line.contains("rounded") || line.contains("payload")), "{:?}", said.warnings);
+        assert!(
+            said.findings
+                .iter()
+                .all(|finding| finding.effect != "setup"),
+            "{name}"
+        );
+        assert!(
+            !said
+                .warnings
+                .iter()
+                .any(|line| line.contains("rounded") || line.contains("payload")),
+            "{:?}",
+            said.warnings
+        );
     }
 }
 
@@ -203,24 +369,56 @@ fn sound_recordings_say_nothing_of_the_set_up() {
 fn a_rounded_log_is_named_with_its_step_and_what_it_makes() {
     let rounded = |value: f64, step: f64| (value / step).round() * step;
     let mut coarse = recorded(&fixture::spherical(), 48, json!([]));
-    joints(&mut coarse, |q| q.iter_mut().for_each(|q| *q = rounded(q.to_degrees(), 0.1).to_radians()));
+    joints(&mut coarse, |q| {
+        q.iter_mut()
+            .for_each(|q| *q = rounded(q.to_degrees(), 0.1).to_radians())
+    });
     let said = diagnosed(&coarse).expect("a diagnosis");
-    let line = said.warnings.iter().find(|line| line.starts_with("joint positions are rounded to 0.1 deg, which makes up to"));
-    let up_to = line.and_then(|line| line.split("up to ").nth(1)?.split(" mm").next()?.parse::<f64>().ok());
+    let line = said
+        .warnings
+        .iter()
+        .find(|line| line.starts_with("joint positions are rounded to 0.1 deg, which makes up to"));
+    let up_to = line.and_then(|line| {
+        line.split("up to ")
+            .nth(1)?
+            .split(" mm")
+            .next()?
+            .parse::<f64>()
+            .ok()
+    });
     // Half a step of every joint at once, at an arm of some 2.5 m: a few millimetres.
-    assert!(up_to.is_some_and(|mm| (1.0..15.0).contains(&mm)), "{:?}", said.warnings);
-    assert!(said.statement.contains("rounded to 0.1 deg"), "{}", said.statement);
+    assert!(
+        up_to.is_some_and(|mm| (1.0..15.0).contains(&mm)),
+        "{:?}",
+        said.warnings
+    );
+    assert!(
+        said.statement.contains("rounded to 0.1 deg"),
+        "{}",
+        said.statement
+    );
     let mut coarse = recorded(&fixture::spherical(), 49, json!([]));
     points(&mut coarse, |p| p.map(|x| rounded(x, 1e-3)));
     let said = diagnosed(&coarse).expect("a diagnosis");
     let line = "measured points are rounded to 1 mm, which makes up to 0.87 mm";
-    assert!(said.warnings.iter().any(|own| own.starts_with(line)), "{:?}", said.warnings);
+    assert!(
+        said.warnings.iter().any(|own| own.starts_with(line)),
+        "{:?}",
+        said.warnings
+    );
     // Digits that are finer than the noise cost nothing.
     let mut fine = recorded(&fixture::spherical(), 50, json!([]));
-    joints(&mut fine, |q| q.iter_mut().for_each(|q| *q = rounded(q.to_degrees(), 1e-4).to_radians()));
+    joints(&mut fine, |q| {
+        q.iter_mut()
+            .for_each(|q| *q = rounded(q.to_degrees(), 1e-4).to_radians())
+    });
     points(&mut fine, |p| p.map(|x| rounded(x, 1e-6)));
     let said = diagnosed(&fine).expect("a diagnosis");
-    assert!(!said.warnings.iter().any(|line| line.contains("rounded")), "{:?}", said.warnings);
+    assert!(
+        !said.warnings.iter().any(|line| line.contains("rounded")),
+        "{:?}",
+        said.warnings
+    );
 }
 
 #[test]
@@ -232,9 +430,15 @@ fn a_payload_column_that_is_never_or_seldom_filled_is_said() {
         diagnosed(&inputs).expect("a diagnosis").warnings.join("\n")
     };
     let empty = said(|_| f64::NAN);
-    assert!(empty.contains("the payload column is empty in all 72 rows"), "{empty}");
+    assert!(
+        empty.contains("the payload column is empty in all 72 rows"),
+        "{empty}"
+    );
     let half = said(|row| if row % 2 == 0 { 10.0 } else { f64::NAN });
-    assert!(half.contains("the payload column is empty in 36 of 72 rows"), "{half}");
+    assert!(
+        half.contains("the payload column is empty in 36 of 72 rows"),
+        "{half}"
+    );
     assert!(!said(|_| 0.0).contains("payload column"));
 }
 
@@ -244,56 +448,102 @@ fn two_set_up_errors_are_named_together_and_two_reflectors_hide_none() {
     joints(&mut both, |q| (q[1], q[3]) = (-q[1], -q[3]));
     let said = diagnosed(&both).expect("a diagnosis");
     let statement = &said.findings[0].statement;
-    assert!(statement.starts_with("joints 2, 4 turn the other way"), "{statement}");
-    assert!(statement.contains("sign: [1, -1, 1, -1, 1, 1]"), "{statement}");
+    assert!(
+        statement.starts_with("joints 2, 4 turn the other way"),
+        "{statement}"
+    );
+    assert!(
+        statement.contains("sign: [1, -1, 1, -1, 1, 1]"),
+        "{statement}"
+    );
     // Two of different kinds.
     let mut both = recorded(&fixture::offset_wrist(), 44, json!([]));
     joints(&mut both, |q| (q[2], q[4]) = (-q[2], q[4] + FRAC_PI_2));
     let said = diagnosed(&both).expect("a diagnosis");
     let statement = &said.findings[0].statement;
     assert!(
-        statement.contains("joint 3 turns the other way") && statement.contains("90 deg at the zero of joint 5"),
+        statement.contains("joint 3 turns the other way")
+            && statement.contains("90 deg at the zero of joint 5"),
         "{statement}"
     );
 
     let mut named = recorded(&shouldered(), 45, json!([]));
-    named.recording.target = Some((0..72).map(|row| Some(if row % 2 == 0 { "A" } else { "B" }.to_string())).collect());
+    named.recording.target = Some(
+        (0..72)
+            .map(|row| Some(if row % 2 == 0 { "A" } else { "B" }.to_string()))
+            .collect(),
+    );
     joints(&mut named, |q| q[2] = -q[2]);
     let said = diagnosed(&named).expect("a diagnosis");
-    assert!(said.findings[0].statement.starts_with("joint 3 turns the other way"), "{}", said.findings[0].statement);
+    assert!(
+        said.findings[0]
+            .statement
+            .starts_with("joint 3 turns the other way"),
+        "{}",
+        said.findings[0].statement
+    );
 }
 
 #[test]
 fn a_length_by_which_no_arm_is_made_is_an_error_of_the_robot_file() {
     let mut short = recorded(&fixture::spherical(), 46, json!([]));
     let by = 0.03;
-    short.robot.joints[2..].iter_mut().for_each(|joint| joint.point[2] -= by);
+    short.robot.joints[2..]
+        .iter_mut()
+        .for_each(|joint| joint.point[2] -= by);
     short.robot.tool[2] -= by;
     let said = diagnosed(&short).expect("a diagnosis");
     assert_eq!(said.verdict, "wrong_setup", "{}", said.statement);
     let statement = &said.findings[0].statement;
-    assert!(statement.starts_with("a length in the robot file from joint 2 to joint 3 is wrong"), "{statement}");
+    assert!(
+        statement.starts_with("a length in the robot file from joint 2 to joint 3 is wrong"),
+        "{statement}"
+    );
     // Two of them at once, of which no one explains the other: each is named as the identified robot has it.
     let by = 0.04;
-    short.robot.joints[4..].iter_mut().for_each(|joint| joint.point[0] -= by);
+    short.robot.joints[4..]
+        .iter_mut()
+        .for_each(|joint| joint.point[0] -= by);
     short.robot.tool[0] -= by;
     let said = diagnosed(&short).expect("a diagnosis");
     assert_eq!(said.verdict, "wrong_setup", "{}", said.statement);
-    assert!(said.findings.iter().all(|finding| finding.effect == "setup"));
-    assert!(said.findings[0].statement.contains("link_geometry.l"), "{}", said.findings[0].statement);
+    assert!(
+        said.findings
+            .iter()
+            .all(|finding| finding.effect == "setup")
+    );
+    assert!(
+        said.findings[0].statement.contains("link_geometry.l"),
+        "{}",
+        said.findings[0].statement
+    );
 }
 
 #[test]
 fn a_robot_file_in_another_unit_is_blamed_and_not_the_points() {
     let mut inputs = recorded(&fixture::offset_wrist(), 47, json!([]));
     let small = |point: [f64; 3]| point.map(|value| value * 1e-3);
-    inputs.robot.joints.iter_mut().for_each(|joint| (joint.point, joint.centre) = (small(joint.point), joint.centre.map(small)));
+    inputs.robot.joints.iter_mut().for_each(|joint| {
+        (joint.point, joint.centre) = (small(joint.point), joint.centre.map(small))
+    });
     inputs.robot.tool = small(inputs.robot.tool);
     let said = diagnosed(&inputs).expect("a diagnosis");
     let statement = &said.findings[0].statement;
-    assert!(statement.starts_with("the lengths of the robot file are in metres and were read in millimetres"), "{statement}");
-    let after = statement.split("without it ").nth(1).and_then(|text| text.split(" mm").next()).expect("a length");
-    assert!((0.3..3.0).contains(&after.parse::<f64>().expect("mm")), "{statement}");
+    assert!(
+        statement.starts_with(
+            "the lengths of the robot file are in metres and were read in millimetres"
+        ),
+        "{statement}"
+    );
+    let after = statement
+        .split("without it ")
+        .nth(1)
+        .and_then(|text| text.split(" mm").next())
+        .expect("a length");
+    assert!(
+        (0.3..3.0).contains(&after.parse::<f64>().expect("mm")),
+        "{statement}"
+    );
 }
 
 #[test]
@@ -303,7 +553,10 @@ fn a_robot_file_of_another_arm_is_refused_with_what_to_look_at() {
     let error = diagnosed(&inputs).err().expect("no diagnosis");
     assert_eq!(error.exit_code(), 10, "{error}");
     let said = error.to_string();
-    assert!(said.contains("% of its reach") && said.contains("REPLACE") && said.contains("robot file"), "{said}");
+    assert!(
+        said.contains("% of its reach") && said.contains("REPLACE") && said.contains("robot file"),
+        "{said}"
+    );
 }
 
 #[test]
@@ -313,37 +566,82 @@ fn points_in_inches_are_not_accepted_and_the_line_that_is_named_mends_them() {
     let file = here.join("sealed/recordings/c0001/tracker.csv");
     let text = std::fs::read_to_string(&file).expect("the log");
     let inches = |line: &str| -> String {
-        let cells = line.split(',').map(|cell| cell.parse::<f64>().map_or(cell.into(), |mm| (mm / 25.4).to_string()));
+        let cells = line.split(',').map(|cell| {
+            cell.parse::<f64>()
+                .map_or(cell.into(), |mm| (mm / 25.4).to_string())
+        });
         cells.collect::<Vec<String>>().join(",")
     };
-    std::fs::write(&file, text.lines().map(inches).collect::<Vec<_>>().join("\n")).expect("written");
+    std::fs::write(
+        &file,
+        text.lines().map(inches).collect::<Vec<_>>().join("\n"),
+    )
+    .expect("written");
     case_with(here, &[]);
     let (code, told) = ended(&[&["run", "p.yaml"], &CASE[..]].concat(), here);
     assert_eq!(code, Some(10), "{told}");
-    assert!(told.contains("verdict   wrong set-up") && told.contains("the points are in inches"), "{told}");
-    assert!(!told.lines().any(|line| line.starts_with("after")), "{told}");
+    assert!(
+        told.contains("verdict   wrong set-up") && told.contains("the points are in inches"),
+        "{told}"
+    );
+    assert!(
+        !told.lines().any(|line| line.starts_with("after")),
+        "{told}"
+    );
     let (code, said) = refused(&["compensate", "HEAD", "p.yaml"], here);
-    assert!(code == Some(10) && said.contains("the set-up is wrong: the points are in inches"), "{code:?} {said}");
+    assert!(
+        code == Some(10) && said.contains("the set-up is wrong: the points are in inches"),
+        "{code:?} {said}"
+    );
     // A step that is asked for by its name is refused as well; one who insists is told what it warned of when it ran.
-    let step = ["export", "HEAD", "--step", "joint", "--format", "json", "--quiet"];
+    let step = [
+        "export", "HEAD", "--step", "joint", "--format", "json", "--quiet",
+    ];
     let (code, said) = refused(&step, here);
-    assert!(code == Some(10) && said.contains("refused: the set-up is wrong: the points are in inches"), "{code:?} {said}");
+    assert!(
+        code == Some(10) && said.contains("refused: the set-up is wrong: the points are in inches"),
+        "{code:?} {said}"
+    );
     let (code, said) = refused(&[&step[..], &["--force"]].concat(), here);
-    assert!(code == Some(0) && said.contains("warning: joint: the set-up is wrong: the points are in inches"), "{code:?} {said}");
-    let said: Value = serde_json::from_str(&ended(&["diagnose", "HEAD", "--json"], here).1).expect("JSON");
-    assert_eq!((&said["verdict"], &said["findings"][0]["effect"]), (&"wrong_setup".into(), &"setup".into()));
-    let (code, run) = ended(&[&["run", "p.yaml", "--json", "--quiet"], &CASE[..]].concat(), here);
+    assert!(
+        code == Some(0)
+            && said.contains("warning: joint: the set-up is wrong: the points are in inches"),
+        "{code:?} {said}"
+    );
+    let said: Value =
+        serde_json::from_str(&ended(&["diagnose", "HEAD", "--json"], here).1).expect("JSON");
+    assert_eq!(
+        (&said["verdict"], &said["findings"][0]["effect"]),
+        (&"wrong_setup".into(), &"setup".into())
+    );
+    let (code, run) = ended(
+        &[&["run", "p.yaml", "--json", "--quiet"], &CASE[..]].concat(),
+        here,
+    );
     assert_eq!(code, Some(10), "{run}");
     let run: Value = serde_json::from_str(&run).expect("JSON");
-    let page = std::fs::read_to_string(here.join(run["report"].as_str().expect("a report"))).expect("the page");
+    let page = std::fs::read_to_string(here.join(run["report"].as_str().expect("a report")))
+        .expect("the page");
     assert!(
-        page.contains("Not accepted: the set-up is wrong") && !page.contains("The mean position error fell"),
+        page.contains("Not accepted: the set-up is wrong")
+            && !page.contains("The mean position error fell"),
         "what is said first"
     );
-    let axes = ["x", "y", "z"].map(|axis| (format!("column: {axis}_mm, unit: mm"), format!("column: {axis}_mm, unit: in")));
-    let axes: Vec<(&str, &str)> = axes.iter().map(|(from, to)| (from.as_str(), to.as_str())).collect();
+    let axes = ["x", "y", "z"].map(|axis| {
+        (
+            format!("column: {axis}_mm, unit: mm"),
+            format!("column: {axis}_mm, unit: in"),
+        )
+    });
+    let axes: Vec<(&str, &str)> = axes
+        .iter()
+        .map(|(from, to)| (from.as_str(), to.as_str()))
+        .collect();
     case_with(here, &axes);
-    let mended = calib(&[&["diagnose", "p.yaml", "--json", "--quiet"], &CASE[..]].concat(), here);
+    let mended = calib(
+        &[&["diagnose", "p.yaml", "--json", "--quiet"], &CASE[..]].concat(),
+        here,
+    );
     let mended: Value = serde_json::from_str(&mended).expect("JSON");
     assert_eq!(mended["findings"][0]["effect"], "zero_shift", "{mended:#}");
 }
@@ -352,13 +650,31 @@ fn points_in_inches_are_not_accepted_and_the_line_that_is_named_mends_them() {
 fn without_link_masses_a_loaded_recording_says_what_is_lost() {
     let mut inputs = recorded(&fixture::spherical(), 5, json!([]));
     let known = diagnosed(&inputs).expect("a diagnosis");
-    assert!(!known.statement.contains("link masses") && known.warnings.is_empty(), "{:?}", known.warnings);
-    inputs.robot.joints.iter_mut().for_each(|joint| joint.mass = None);
-    inputs.recording.payload = Some((0..72).map(|row| if row % 2 == 0 { 10.0 } else { 0.0 }).collect());
+    assert!(
+        !known.statement.contains("link masses") && known.warnings.is_empty(),
+        "{:?}",
+        known.warnings
+    );
+    inputs
+        .robot
+        .joints
+        .iter_mut()
+        .for_each(|joint| joint.mass = None);
+    inputs.recording.payload = Some(
+        (0..72)
+            .map(|row| if row % 2 == 0 { 10.0 } else { 0.0 })
+            .collect(),
+    );
     let said = diagnosed(&inputs).expect("a diagnosis");
     let lost = "the robot file gives no link masses, yet gravity loads joints in these poses (24 rows of 48 carry a payload)";
     assert!(said.statement.contains(lost), "{}", said.statement);
-    assert!(said.warnings.iter().any(|warning| warning.starts_with(lost)), "{:?}", said.warnings);
+    assert!(
+        said.warnings
+            .iter()
+            .any(|warning| warning.starts_with(lost)),
+        "{:?}",
+        said.warnings
+    );
 }
 
 #[test]
@@ -366,26 +682,56 @@ fn two_set_ups_in_one_recording_are_named_with_the_rows_of_each() {
     let sound = recorded(&fixture::spherical(), 52, json!([]));
     let said = |other: fn(usize) -> bool, first: &str, second: &str| {
         let mut inputs = sound.clone();
-        for (row, point) in inputs.recording.position.iter_mut().enumerate().filter(|(row, _)| other(*row)) {
+        for (row, point) in inputs
+            .recording
+            .position
+            .iter_mut()
+            .enumerate()
+            .filter(|(row, _)| other(*row))
+        {
             // Half a metre aside, and turned by 40 deg.
             let (sin, cos) = 0.7f64.sin_cos();
             assert!(row < 72);
-            *point = [cos * point[0] - sin * point[1] + 0.5, sin * point[0] + cos * point[1], point[2]];
+            *point = [
+                cos * point[0] - sin * point[1] + 0.5,
+                sin * point[0] + cos * point[1],
+                point[2],
+            ];
         }
         let said = diagnosed(&inputs).expect("a diagnosis");
         assert_eq!(said.verdict, "wrong_setup", "{}", said.statement);
         let statement = &said.findings[0].statement;
-        assert!(statement.starts_with("two set-ups are in one recording"), "{statement}");
-        assert!(statement.contains(first) && statement.contains(second), "{statement}");
-        assert!(said.findings.iter().all(|finding| finding.effect == "setup"));
+        assert!(
+            statement.starts_with("two set-ups are in one recording"),
+            "{statement}"
+        );
+        assert!(
+            statement.contains(first) && statement.contains(second),
+            "{statement}"
+        );
+        assert!(
+            said.findings
+                .iter()
+                .all(|finding| finding.effect == "setup")
+        );
     };
     said(|row| row >= 30, "1 to 30 (30 rows)", "31 to 72 (42 rows)");
-    said(|row| row % 2 == 1, "1, 3, 5, 7, ... (36 rows)", "2, 4, 6, 8, ... (36 rows)");
+    said(
+        |row| row % 2 == 1,
+        "1, 3, 5, 7, ... (36 rows)",
+        "2, 4, 6, 8, ... (36 rows)",
+    );
 }
 
 /// A maker's counting: signs, what is shown at the robot file's zeros in quarters of a turn, and whether joint 3 holds joint 2's angle; what is
 /// said of it where no other counting is the same by kinematics.
-type MakersCounting = (&'static str, [f64; 6], [f64; 6], f64, &'static [&'static str]);
+type MakersCounting = (
+    &'static str,
+    [f64; 6],
+    [f64; 6],
+    f64,
+    &'static [&'static str],
+);
 
 #[test]
 fn a_makers_counting_is_found_whole_and_no_healthy_joint_is_mastered_again() {
@@ -397,9 +743,27 @@ fn a_makers_counting_is_found_whole_and_no_healthy_joint_is_mastered_again() {
             0.0,
             &["sign: [1, -1, -1, 1, -1, 1]", "zero: [0, 90, 0, 0, 0, 0]"],
         ),
-        ("signs of 1, 4 and 6, zeros of 2 and 3", [-1.0, 1.0, 1.0, -1.0, 1.0, -1.0], [0.0, -1.0, 1.0, 0.0, 0.0, 0.0], 0.0, &[]),
-        ("sign of 3, joint 3 plus joint 2", [1.0, 1.0, -1.0, 1.0, 1.0, 1.0], [0.0; 6], 1.0, &[]),
-        ("zeros of 2, 3 and 5", [1.0; 6], [0.0, 1.0, 2.0, 0.0, -1.0, 0.0], 0.0, &[]),
+        (
+            "signs of 1, 4 and 6, zeros of 2 and 3",
+            [-1.0, 1.0, 1.0, -1.0, 1.0, -1.0],
+            [0.0, -1.0, 1.0, 0.0, 0.0, 0.0],
+            0.0,
+            &[],
+        ),
+        (
+            "sign of 3, joint 3 plus joint 2",
+            [1.0, 1.0, -1.0, 1.0, 1.0, 1.0],
+            [0.0; 6],
+            1.0,
+            &[],
+        ),
+        (
+            "zeros of 2, 3 and 5",
+            [1.0; 6],
+            [0.0, 1.0, 2.0, 0.0, -1.0, 0.0],
+            0.0,
+            &[],
+        ),
     ];
     for (robot, seed) in arms().iter().zip([61, 62, 63]) {
         let sound = recorded(robot, seed, json!([]));
@@ -407,19 +771,42 @@ fn a_makers_counting_is_found_whole_and_no_healthy_joint_is_mastered_again() {
             let mut inputs = sound.clone();
             joints(&mut inputs, |q| {
                 q[2] += coupled * q[1];
-                q.iter_mut().zip(sign.iter().zip(zero)).for_each(|(q, (sign, zero))| *q = sign * *q + zero * FRAC_PI_2);
+                q.iter_mut()
+                    .zip(sign.iter().zip(zero))
+                    .for_each(|(q, (sign, zero))| *q = sign * *q + zero * FRAC_PI_2);
             });
             // Two wrong points of 72 change nothing.
             inputs.recording.position[5][0] += 0.4;
             inputs.recording.position[30][2] -= 0.9;
-            let said = diagnosed(&inputs).unwrap_or_else(|error| panic!("{} {name}: {error}", robot.name));
-            assert_eq!(said.verdict, "wrong_setup", "{} {name}: {}", robot.name, said.statement);
+            let said =
+                diagnosed(&inputs).unwrap_or_else(|error| panic!("{} {name}: {error}", robot.name));
+            assert_eq!(
+                said.verdict, "wrong_setup",
+                "{} {name}: {}",
+                robot.name, said.statement
+            );
             let statement = &said.findings[0].statement;
             println!("{} {name}: {statement}", robot.name);
-            assert!(!statement.contains("master"), "{} {name}: {statement}", robot.name);
-            assert!(texts.iter().all(|text| statement.contains(text)), "{} {name}: {statement}", robot.name);
-            let after = statement.split("without it ").nth(1).and_then(|text| text.split(" mm").next()).expect("a length");
-            assert!(after.parse::<f64>().expect("mm") < 12.0, "{} {name}: {statement}", robot.name);
+            assert!(
+                !statement.contains("master"),
+                "{} {name}: {statement}",
+                robot.name
+            );
+            assert!(
+                texts.iter().all(|text| statement.contains(text)),
+                "{} {name}: {statement}",
+                robot.name
+            );
+            let after = statement
+                .split("without it ")
+                .nth(1)
+                .and_then(|text| text.split(" mm").next())
+                .expect("a length");
+            assert!(
+                after.parse::<f64>().expect("mm") < 12.0,
+                "{} {name}: {statement}",
+                robot.name
+            );
         }
     }
 }
@@ -428,9 +815,21 @@ fn a_makers_counting_is_found_whole_and_no_healthy_joint_is_mastered_again() {
 fn a_wrong_unit_does_not_hide_how_a_controller_counts_its_joints() {
     let sound = recorded(&fixture::spherical(), 61, json!([]));
     let units: [(&str, f64, f64); 3] = [
-        ("the points are in inches and were read in millimetres", 1.0 / 25.4, 1.0),
-        ("the points are in metres and were read in millimetres", 1e-3, 1.0),
-        ("the joints are in rad and were read in deg", 1.0, PI / 180.0),
+        (
+            "the points are in inches and were read in millimetres",
+            1.0 / 25.4,
+            1.0,
+        ),
+        (
+            "the points are in metres and were read in millimetres",
+            1e-3,
+            1.0,
+        ),
+        (
+            "the joints are in rad and were read in deg",
+            1.0,
+            PI / 180.0,
+        ),
     ];
     for (unit, length, angle) in units {
         let mut inputs = sound.clone();
@@ -440,10 +839,19 @@ fn a_wrong_unit_does_not_hide_how_a_controller_counts_its_joints() {
             q[1] += FRAC_PI_2;
             q.iter_mut().for_each(|q| *q *= angle);
         });
-        inputs.recording.position.iter_mut().flatten().for_each(|x| *x *= length);
+        inputs
+            .recording
+            .position
+            .iter_mut()
+            .flatten()
+            .for_each(|x| *x *= length);
         let said = diagnosed(&inputs).unwrap_or_else(|error| panic!("{unit}: {error}"));
         let statement = &said.findings[0].statement;
-        for text in [unit, "sign: [1, -1, -1, 1, -1, 1]", "zero: [0, 90, 0, 0, 0, 0]"] {
+        for text in [
+            unit,
+            "sign: [1, -1, -1, 1, -1, 1]",
+            "zero: [0, 90, 0, 0, 0, 0]",
+        ] {
             assert!(statement.contains(text), "{unit}: {statement}");
         }
     }

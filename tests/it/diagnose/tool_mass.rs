@@ -7,21 +7,54 @@ use serde_json::Value;
 fn an_unstated_tool_is_named_beside_the_compliance_that_shows_it() {
     let folder = tempfile::tempdir().expect("a folder");
     let here = folder.path();
-    let design = ["simulate", "conceal", "--out", "sealed", "--cases", "1", "--seed", "8203", "--points", "120", "--faulty", "0"];
-    let effects =
-        ["--family", "joint_compliance", "--robot", "sr210d", "--natural", "1", "--other-forms", "0", "--tool-mass", "40"];
+    let design = [
+        "simulate", "conceal", "--out", "sealed", "--cases", "1", "--seed", "8203", "--points",
+        "120", "--faulty", "0",
+    ];
+    let effects = [
+        "--family",
+        "joint_compliance",
+        "--robot",
+        "sr210d",
+        "--natural",
+        "1",
+        "--other-forms",
+        "0",
+        "--tool-mass",
+        "40",
+    ];
     calib(&[&design[..], &effects].concat(), here);
     case_with(here, &[]);
-    let said = calib(&[&["diagnose", "p.yaml", "--quiet", "--json"], &CASE[..]].concat(), here);
+    let said = calib(
+        &[&["diagnose", "p.yaml", "--quiet", "--json"], &CASE[..]].concat(),
+        here,
+    );
     let said: Value = serde_json::from_str(&said).expect("JSON");
     let findings = said["findings"].as_array().expect("findings");
-    let names: Vec<&str> = findings.iter().filter_map(|finding| finding["effect"].as_str()).collect();
-    assert!(names.contains(&"joint_compliance") && names.contains(&"payload_error"), "{names:?}");
-    for other in ["joint_hardening", "cable_drag", "link_compliance", "link_mass"] {
+    let names: Vec<&str> = findings
+        .iter()
+        .filter_map(|finding| finding["effect"].as_str())
+        .collect();
+    assert!(
+        names.contains(&"joint_compliance") && names.contains(&"payload_error"),
+        "{names:?}"
+    );
+    for other in [
+        "joint_hardening",
+        "cable_drag",
+        "link_compliance",
+        "link_mass",
+    ] {
         assert!(!names.contains(&other), "{names:?}");
     }
-    let numbers = findings.iter().flat_map(|finding| finding["parameters"].as_array().into_iter().flatten());
-    let mass = numbers.filter(|number| number["name"].as_str().is_some_and(|name| name.ends_with("tool_mass")));
+    let numbers = findings
+        .iter()
+        .flat_map(|finding| finding["parameters"].as_array().into_iter().flatten());
+    let mass = numbers.filter(|number| {
+        number["name"]
+            .as_str()
+            .is_some_and(|name| name.ends_with("tool_mass"))
+    });
     let mass: Vec<f64> = mass.filter_map(|number| number["value"].as_f64()).collect();
     assert!(mass.iter().any(|kg| (kg - 40.0).abs() < 6.0), "{mass:?} kg");
 }

@@ -7,8 +7,17 @@ use std::path::Path;
 
 /// What the pipeline of cases says without some causes.
 fn said(without: &str, folder: &Path) -> Value {
-    case_with(folder, &[("  - uses: diagnose\n", &format!("  - uses: diagnose\n    with: {{without: [{without}]}}\n"))]);
-    let said = calib(&[&["diagnose", "p.yaml", "--quiet", "--json"], &CASE[..]].concat(), folder);
+    case_with(
+        folder,
+        &[(
+            "  - uses: diagnose\n",
+            &format!("  - uses: diagnose\n    with: {{without: [{without}]}}\n"),
+        )],
+    );
+    let said = calib(
+        &[&["diagnose", "p.yaml", "--quiet", "--json"], &CASE[..]].concat(),
+        folder,
+    );
     serde_json::from_str(&said).expect("JSON")
 }
 
@@ -33,7 +42,11 @@ fn an_excluded_correction_of_geometry_leaves_the_robot_file_as_it_is() {
     let ratios = |without: &str| {
         said(without, here);
         let parameters: Parameters = table_of(here, "diagnose.parameters.parquet");
-        parameters.0.iter().filter(|row| row.effect == "reduction_ratio").count()
+        parameters
+            .0
+            .iter()
+            .filter(|row| row.effect == "reduction_ratio")
+            .count()
     };
     assert_eq!((ratios("backlash"), ratios("reduction_ratio")), (6, 0));
 }
@@ -41,8 +54,20 @@ fn an_excluded_correction_of_geometry_leaves_the_robot_file_as_it_is() {
 #[test]
 fn nothing_is_diagnosed_without_the_frame_of_the_base() {
     let folder = concealed("zero_shift", "923", "40");
-    case_with(folder.path(), &[("  - uses: diagnose\n", "  - uses: diagnose\n    with: {without: [base_frame]}\n")]);
-    let (code, said) = refused(&[&["diagnose", "p.yaml", "--quiet"], &CASE[..]].concat(), folder.path());
+    case_with(
+        folder.path(),
+        &[(
+            "  - uses: diagnose\n",
+            "  - uses: diagnose\n    with: {without: [base_frame]}\n",
+        )],
+    );
+    let (code, said) = refused(
+        &[&["diagnose", "p.yaml", "--quiet"], &CASE[..]].concat(),
+        folder.path(),
+    );
     assert_eq!(code, Some(2), "{said}");
-    assert!(said.contains("`base_frame` places the robot before the instrument"), "{said}");
+    assert!(
+        said.contains("`base_frame` places the robot before the instrument"),
+        "{said}"
+    );
 }

@@ -10,11 +10,19 @@ fn row(number: usize) -> FleetRow {
     let after = 0.02 + (number * 7919 % 5000) as f64 * 1e-5;
     let some = |value: f64| Some(value);
     FleetRow {
-        robot: if number == 7 { "<b>7</b>".into() } else { format!("robot {number}") },
+        robot: if number == 7 {
+            "<b>7</b>".into()
+        } else {
+            format!("robot {number}")
+        },
         model: Some("sr210d".into()),
         plant: None,
         campaign: Some("2026-10-01".into()),
-        status: if number % 50 == 3 { "rejected".into() } else { "done".into() },
+        status: if number % 50 == 3 {
+            "rejected".into()
+        } else {
+            "done".into()
+        },
         reason: (number % 50 == 3).then(|| "tracker.csv:4: not a number".into()),
         points: Some(30),
         held_out: Some(true),
@@ -37,7 +45,9 @@ fn row(number: usize) -> FleetRow {
 
 fn page() -> String {
     let table = FleetTable((0..5000).map(row).collect());
-    let links: BTreeMap<String, String> = (0..5000).map(|k| (format!("robot {k}"), format!("../line.{k}/report.html"))).collect();
+    let links: BTreeMap<String, String> = (0..5000)
+        .map(|k| (format!("robot {k}"), format!("../line.{k}/report.html")))
+        .collect();
     html("line", &table, &FleetChanges::default(), &links).unwrap()
 }
 
@@ -47,7 +57,10 @@ fn five_thousand_robots_make_a_page_of_a_few_megabytes() {
     assert!(page.len() < 6_000_000, "{}", page.len());
     assert_eq!(page.matches("<tr>").count(), 5001);
     assert!(page.contains("&lt;b&gt;7&lt;&#x2f;b&gt;") && !page.contains("<b>7"));
-    assert!(page.contains("href=\"..&#x2f;line.12&#x2f;report.html\"") || page.contains("href=\"../line.12/report.html\""));
+    assert!(
+        page.contains("href=\"..&#x2f;line.12&#x2f;report.html\"")
+            || page.contains("href=\"../line.12/report.html\"")
+    );
 }
 
 #[test]
@@ -57,7 +70,10 @@ fn robots_that_need_a_technician_come_first_with_the_reason() {
     table.0[4].flags = Some("zero of joint 2".into());
     table.0[5].after_rms_mm = Some(2.5);
     let page = html("line", &table, &FleetChanges::default(), &BTreeMap::new()).unwrap();
-    let at = |text: &str| page.find(text).unwrap_or_else(|| panic!("{text} is not there"));
+    let at = |text: &str| {
+        page.find(text)
+            .unwrap_or_else(|| panic!("{text} is not there"))
+    };
     let told = [
         "<li>robot 3: was not calibrated: tracker.csv:4: not a number</li>",
         "<li>robot 5: the calibration did not make it more accurate</li>",
@@ -65,14 +81,18 @@ fn robots_that_need_a_technician_come_first_with_the_reason() {
         "<li>robot 2: its error is not explained: gear_cyclic at joint 2</li>",
     ];
     assert!(told.windows(2).all(|pair| at(pair[0]) < at(pair[1])));
-    let rows =
-        ["robot 3", "robot 5", "robot 4", "robot 2", "robot 0", "robot 1"].map(|name| at(&format!("<td class=\"name\">{name}<")));
+    let rows = [
+        "robot 3", "robot 5", "robot 4", "robot 2", "robot 0", "robot 1",
+    ]
+    .map(|name| at(&format!("<td class=\"name\">{name}<")));
     assert!(rows.is_sorted(), "{rows:?}");
 }
 
 fn chromium() -> Option<PathBuf> {
     let path = std::env::var_os("PATH")?;
-    std::env::split_paths(&path).map(|folder| folder.join("chromium")).find(|file| file.is_file())
+    std::env::split_paths(&path)
+        .map(|folder| folder.join("chromium"))
+        .find(|file| file.is_file())
 }
 
 #[test]
@@ -90,17 +110,40 @@ fn a_browser_sorts_and_filters_the_page_without_a_request() {
     let file = folder.path().join("fleet.html");
     std::fs::write(&file, page).unwrap();
     let output = Command::new(chromium)
-        .args(["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"])
-        .args(["--disable-background-networking", "--proxy-server=127.0.0.1:9", "--enable-logging=stderr", "--dump-dom"])
-        .arg(format!("--user-data-dir={}", folder.path().join("profile").display()))
+        .args([
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--disable-quic",
+            "--no-first-run",
+        ])
+        .args([
+            "--disable-background-networking",
+            "--proxy-server=127.0.0.1:9",
+            "--enable-logging=stderr",
+            "--dump-dom",
+        ])
+        .arg(format!(
+            "--user-data-dir={}",
+            folder.path().join("profile").display()
+        ))
         .arg(format!("file://{}", file.display()))
         .output()
         .unwrap();
-    let (dom, log) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
-    let console: Vec<&str> = log.lines().filter(|line| line.contains(":CONSOLE")).collect();
+    let (dom, log) = (
+        String::from_utf8_lossy(&output.stdout),
+        String::from_utf8_lossy(&output.stderr),
+    );
+    let console: Vec<&str> = log
+        .lines()
+        .filter(|line| line.contains(":CONSOLE"))
+        .collect();
     assert_eq!(console, Vec::<&str>::new());
     assert!(dom.contains(">100 of 5000<"), "the filter counts");
     let best = dom.find("data-v=\"0.02\"").unwrap();
     let other = dom.find("data-v=\"0.0699").unwrap();
-    assert!(dom.contains("aria-sort=\"ascending\"") && best < other, "sorted by the error after");
+    assert!(
+        dom.contains("aria-sort=\"ascending\"") && best < other,
+        "sorted by the error after"
+    );
 }

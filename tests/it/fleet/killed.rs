@@ -11,7 +11,13 @@ pub fn records(store: &Path, name: &str) -> Vec<PathBuf> {
     let folder = store.join("fleets").join(name).join("records");
     let mut found = Vec::new();
     for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
-        found.extend(std::fs::read_dir(entry.path()).into_iter().flatten().flatten().map(|entry| entry.path()));
+        found.extend(
+            std::fs::read_dir(entry.path())
+                .into_iter()
+                .flatten()
+                .flatten()
+                .map(|entry| entry.path()),
+        );
     }
     found.sort();
     found
@@ -19,8 +25,14 @@ pub fn records(store: &Path, name: &str) -> Vec<PathBuf> {
 
 /// The claims on the last `count` robots that are recorded in a store where nothing was disturbed, taken in another store.
 pub fn hold(undisturbed: &Path, store: &Path, name: &str, count: usize) -> Vec<Held> {
-    let keys = records(undisturbed, name).into_iter().rev().map(|path| path.file_stem().unwrap().to_string_lossy().into_owned());
-    let held: Vec<Held> = keys.take(count).map(|key| held_locks::robot(store, name, &key)).collect();
+    let keys = records(undisturbed, name)
+        .into_iter()
+        .rev()
+        .map(|path| path.file_stem().unwrap().to_string_lossy().into_owned());
+    let held: Vec<Held> = keys
+        .take(count)
+        .map(|key| held_locks::robot(store, name, &key))
+        .collect();
     assert_eq!(held.len(), count);
     held
 }
@@ -32,7 +44,11 @@ fn a_fleet_killed_three_times_ends_as_an_undisturbed_one() {
     let cases = folder.path().join("cases");
     recordings(&cases, ROBOTS);
     std::fs::remove_file(cases.join("recordings/c0004/tracker.csv")).unwrap();
-    let file = file(folder.path(), "line", "robots:\n  - folders: cases/recordings/*\n");
+    let file = file(
+        folder.path(),
+        "line",
+        "robots:\n  - folders: cases/recordings/*\n",
+    );
     let undisturbed = folder.path().join("undisturbed");
     run(&file, &undisturbed, 10);
 
@@ -41,8 +57,14 @@ fn a_fleet_killed_three_times_ends_as_an_undisturbed_one() {
     let held = hold(&undisturbed, &store, "line", 4);
     let mut stood: Vec<(PathBuf, std::time::SystemTime)> = Vec::new();
     for kill in 1..=3 {
-        let mut child = fleet("run", &file, &store).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
-        held_locks::until(&mut child, || records(&store, "line").len() >= kill * ROBOTS / 5);
+        let mut child = fleet("run", &file, &store)
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        held_locks::until(&mut child, || {
+            records(&store, "line").len() >= kill * ROBOTS / 5
+        });
         std::thread::sleep(Duration::from_millis(7 * kill as u64));
         child.kill().unwrap();
         child.wait().unwrap();
@@ -54,11 +76,18 @@ fn a_fleet_killed_three_times_ends_as_an_undisturbed_one() {
             .into_iter()
             .map(|path| (path.clone(), path.metadata().unwrap().modified().unwrap()))
             .collect();
-        assert!((kill * ROBOTS / 5..=ROBOTS - held.len()).contains(&stood.len()), "{} records", stood.len());
+        assert!(
+            (kill * ROBOTS / 5..=ROBOTS - held.len()).contains(&stood.len()),
+            "{} records",
+            stood.len()
+        );
     }
     drop(held);
     let told = run(&file, &store, 10);
-    assert_eq!(told["computed"].as_u64(), Some((ROBOTS - stood.len()) as u64));
+    assert_eq!(
+        told["computed"].as_u64(),
+        Some((ROBOTS - stood.len()) as u64)
+    );
     for (path, modified) in &stood {
         assert_eq!(path.metadata().unwrap().modified().unwrap(), *modified);
     }
@@ -71,14 +100,27 @@ fn two_runs_at_once_share_the_robots() {
     let folder = tempfile::tempdir().unwrap();
     let (cases, store) = (folder.path().join("cases"), folder.path().join("store"));
     recordings(&cases, 8);
-    let file = file(folder.path(), "line", "robots:\n  - folders: cases/recordings/*\n");
+    let file = file(
+        folder.path(),
+        "line",
+        "robots:\n  - folders: cases/recordings/*\n",
+    );
     let start = || {
         let mut run = fleet("run", &file, &store);
-        run.args(["--json", "--quiet", "-j", "1"]).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+        run.args(["--json", "--quiet", "-j", "1"])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap()
     };
     let computed = [start(), start()].map(|child| {
         let output = child.wait_with_output().unwrap();
-        assert!(output.status.success(), "{}: {}", output.status, String::from_utf8_lossy(&output.stderr));
+        assert!(
+            output.status.success(),
+            "{}: {}",
+            output.status,
+            String::from_utf8_lossy(&output.stderr)
+        );
         let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
         told["computed"].as_u64().unwrap()
     });

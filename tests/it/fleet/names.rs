@@ -28,14 +28,23 @@ fn every_file(folder: &Path, found: &mut Vec<String>) {
 #[test]
 fn names_never_become_paths_commands_or_markup() {
     let folder = tempfile::tempdir().unwrap();
-    let (cases, store, robots) = (folder.path().join("cases"), folder.path().join("store"), folder.path().join("robots"));
+    let (cases, store, robots) = (
+        folder.path().join("cases"),
+        folder.path().join("store"),
+        folder.path().join("robots"),
+    );
     recordings(&cases, 1);
     for name in NAMES {
         copy(&cases.join("recordings/c0001"), &robots.join(name));
     }
     let file = file(folder.path(), "line", "robots:\n  - folders: robots/*\n");
     // Rendered before any is done, so that all are in it.
-    let (result, said) = output(fleet("render", &file, &store).args(["--engine", "slurm", "--robots-per-task", "3"]));
+    let (result, said) = output(fleet("render", &file, &store).args([
+        "--engine",
+        "slurm",
+        "--robots-per-task",
+        "3",
+    ]));
     assert!(result.status.success(), "{said}");
     let script = String::from_utf8(result.stdout).unwrap();
     assert!(script.contains("#SBATCH --array=0-3\n"), "{script}");
@@ -43,16 +52,29 @@ fn names_never_become_paths_commands_or_markup() {
         assert!(!script.contains(part), "{part}: {script}");
     }
     let told = run(&file, &store, 0);
-    let mut names: Vec<&str> = told["robots"].as_array().unwrap().iter().map(|robot| robot["robot"].as_str().unwrap()).collect();
+    let mut names: Vec<&str> = told["robots"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|robot| robot["robot"].as_str().unwrap())
+        .collect();
     names.sort_unstable();
     let mut wanted = NAMES.to_vec();
     wanted.sort_unstable();
     assert_eq!(names, wanted);
     let mut files = Vec::new();
     every_file(&store, &mut files);
-    assert!(files.iter().all(|name| name.chars().all(|c| c.is_ascii_alphanumeric() || "._-".contains(c))), "{files:?}");
+    assert!(
+        files.iter().all(|name| name
+            .chars()
+            .all(|c| c.is_ascii_alphanumeric() || "._-".contains(c))),
+        "{files:?}"
+    );
     let page = std::fs::read_to_string(told["page"].as_str().unwrap()).unwrap();
-    assert!(!page.contains("<img") && page.contains("&lt;img src=x"), "the name is markup");
+    assert!(
+        !page.contains("<img") && page.contains("&lt;img src=x"),
+        "the name is markup"
+    );
     assert!(!page.contains('\u{1b}') && !page.contains('\u{202e}'));
     let (result, _) = output(fleet("status", &file, &store).args(["--robot", NAMES[9]]));
     assert!(!String::from_utf8(result.stdout).unwrap().contains('\u{1b}'));
@@ -67,13 +89,29 @@ fn names_never_become_paths_commands_or_markup() {
 fn what_would_need_quoting_in_a_job_file_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     recordings(&folder.path().join("cases"), 1);
-    let file = file(folder.path(), "line", "robots:\n  - folders: cases/recordings/*\n");
+    let file = file(
+        folder.path(),
+        "line",
+        "robots:\n  - folders: cases/recordings/*\n",
+    );
     let store = folder.path().join("a store");
-    let (result, said) = output(fleet("render", &file, &store).args(["--engine", "slurm", "--partition", "main\n#SBATCH x"]));
+    let (result, said) = output(fleet("render", &file, &store).args([
+        "--engine",
+        "slurm",
+        "--partition",
+        "main\n#SBATCH x",
+    ]));
     assert_eq!(result.status.code(), Some(2));
-    assert!(said.contains("--partition: ") && said.contains("--store: "), "{said}");
-    let (result, said) = output(fleet("render", &file, &store).args(["--engine", "k8s", "--image", "calib:0.1"]));
+    assert!(
+        said.contains("--partition: ") && said.contains("--store: "),
+        "{said}"
+    );
+    let (result, said) =
+        output(fleet("render", &file, &store).args(["--engine", "k8s", "--image", "calib:0.1"]));
     assert!(result.status.success(), "{said}");
     let text = String::from_utf8(result.stdout).unwrap();
-    assert!(text.contains("completionMode: Indexed") && text.contains("completions: 1\n"), "{text}");
+    assert!(
+        text.contains("completionMode: Indexed") && text.contains("completions: 1\n"),
+        "{text}"
+    );
 }

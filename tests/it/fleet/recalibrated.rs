@@ -16,11 +16,18 @@ fn list(folder: &Path, name: &str, campaign: usize, shift: impl Fn(usize, usize)
             .to_string();
     let noise = |robot: usize, k: usize| 2.0 * crate::fixture::spread(robot * 31 + k, k) - 1.0;
     for robot in 0..ROBOTS {
-        let offsets: Vec<String> = (0..6).map(|j| format!("{:.6}", 0.1 * noise(robot, j) + shift(robot, j + 1))).collect();
+        let offsets: Vec<String> = (0..6)
+            .map(|j| format!("{:.6}", 0.1 * noise(robot, j) + shift(robot, j + 1)))
+            .collect();
         let links: Vec<String> = (1..=5)
             .map(|link| {
                 let at = |k: usize| 0.5 * noise(robot, 6 + 3 * link + k);
-                format!("{{link: {link}, shift_mm: [{:.5}, {:.5}, {:.5}]}}", at(0), at(1), at(2))
+                format!(
+                    "{{link: {link}, shift_mm: [{:.5}, {:.5}, {:.5}]}}",
+                    at(0),
+                    at(1),
+                    at(2)
+                )
             })
             .collect();
         let place = 4500 + 37 * robot * (campaign + 1);
@@ -55,7 +62,8 @@ fn campaign(folder: &Path, name: &str, date: &str, rest: &str) -> Value {
         "calib: 1\nname: {name}\npipeline: twins.yaml\ngroups: {{campaign: {date}}}\nrobots:\n  - list: {name}.csv\n{rest}"
     );
     let file = write(folder.join(format!("{name}.yaml")), &text);
-    let (result, said) = output(fleet("run", &file, &folder.join("store")).args(["--json", "--quiet"]));
+    let (result, said) =
+        output(fleet("run", &file, &folder.join("store")).args(["--json", "--quiet"]));
     assert!(result.status.success(), "{said}");
     serde_json::from_slice(&result.stdout).unwrap()
 }
@@ -67,10 +75,19 @@ fn changed_robots_are_flagged_with_the_joint_and_the_others_are_not() {
     pipeline(folder);
     list(folder, "spring", 0, |_, _| 0.0);
     list(folder, "autumn", 1, |robot, joint| {
-        CHANGED.iter().filter(|(r, j, _)| (*r, *j) == (robot, joint)).map(|(_, _, by)| by).sum()
+        CHANGED
+            .iter()
+            .filter(|(r, j, _)| (*r, *j) == (robot, joint))
+            .map(|(_, _, by)| by)
+            .sum()
     });
     campaign(folder, "spring", "2026-04-01", "");
-    let told = campaign(folder, "autumn", "2026-10-01", "previous: {fleet: spring}\n");
+    let told = campaign(
+        folder,
+        "autumn",
+        "2026-10-01",
+        "previous: {fleet: spring}\n",
+    );
     let flags: Vec<(usize, String)> = (0..)
         .zip(told["robots"].as_array().unwrap())
         .filter_map(|(k, robot)| Some((k, robot["flags"].as_str()?.to_string())))
@@ -79,8 +96,16 @@ fn changed_robots_are_flagged_with_the_joint_and_the_others_are_not() {
     for ((robot, joint, by), (flagged, reason)) in CHANGED.iter().zip(&flags) {
         assert_eq!(flagged, robot, "{flags:?}");
         let opening = format!("zero_shift joint {joint} since 2026-04-01: ");
-        assert!(reason.starts_with(&opening) && !reason.contains(';'), "{reason}");
-        let value: f64 = reason[opening.len()..].split(' ').next().unwrap().parse().unwrap();
+        assert!(
+            reason.starts_with(&opening) && !reason.contains(';'),
+            "{reason}"
+        );
+        let value: f64 = reason[opening.len()..]
+            .split(' ')
+            .next()
+            .unwrap()
+            .parse()
+            .unwrap();
         assert!((value - by).abs() < 0.2 * by.abs(), "{reason}: {by}");
     }
 }
@@ -91,19 +116,40 @@ fn a_robot_whose_diagnosis_changed_is_flagged_with_the_reason() {
     let folder = folder.path();
     pipeline(folder);
     let text = std::fs::read_to_string(folder.join("twins.yaml")).unwrap();
-    write(folder.join("twins.yaml"), &text.replace("  - uses: compare\n", "  - uses: diagnose\n  - uses: compare\n"));
+    write(
+        folder.join("twins.yaml"),
+        &text.replace(
+            "  - uses: compare\n",
+            "  - uses: diagnose\n  - uses: compare\n",
+        ),
+    );
     for name in ["spring", "autumn"] {
         list(folder, name, usize::from(name == "autumn"), |_, _| 0.0);
         let rows = std::fs::read_to_string(folder.join(format!("{name}.csv"))).unwrap();
-        write(folder.join(format!("{name}.csv")), &rows.lines().take(3).fold(String::new(), |text, line| text + line + "\n"));
+        write(
+            folder.join(format!("{name}.csv")),
+            &rows
+                .lines()
+                .take(3)
+                .fold(String::new(), |text, line| text + line + "\n"),
+        );
     }
     campaign(folder, "spring", "2026-04-01", "");
     let gear = "{gear_cyclic: {joint: 3, order: 1, amplitude_arcsec: 60, phase_deg: 40}}";
-    let worn = format!("overrides:\n  - {{robots: [robot 1], set: {{simulate.effects: [{gear}]}}}}\n");
-    let told = campaign(folder, "autumn", "2026-10-01", &format!("previous: {{fleet: spring}}\n{worn}"));
+    let worn =
+        format!("overrides:\n  - {{robots: [robot 1], set: {{simulate.effects: [{gear}]}}}}\n");
+    let told = campaign(
+        folder,
+        "autumn",
+        "2026-10-01",
+        &format!("previous: {{fleet: spring}}\n{worn}"),
+    );
     let flags = |robot: usize| told["robots"][robot]["flags"].as_str().unwrap_or_default();
     assert_eq!(flags(0), "", "{told}");
-    assert!(flags(1).contains("gear_cyclic joint 3 since 2026-04-01: diagnosed, it was not before"), "{told}");
+    assert!(
+        flags(1).contains("gear_cyclic joint 3 since 2026-04-01: diagnosed, it was not before"),
+        "{told}"
+    );
 }
 
 #[test]
@@ -118,11 +164,28 @@ fn robots_with_few_points_borrow_from_those_of_their_model() {
     let few = "set: {simulate.blocks: [{usage: fit, points: 20}, {usage: validate, points: 40}]}\n";
     let prior = "prior: {fleet: many, stage: joint, by: model, effects: [joint_offset, link_geometry, tool_offset]}\n";
     let rms = |told: Value| -> Vec<f64> {
-        told["robots"].as_array().unwrap().iter().map(|robot| robot["after_rms_mm"].as_f64().unwrap()).collect()
+        told["robots"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|robot| robot["after_rms_mm"].as_f64().unwrap())
+            .collect()
     };
     let plain = rms(campaign(folder, "plain", "2026-10-01", few));
-    let pooled = rms(campaign(folder, "pooled", "2026-10-01", &format!("{few}{prior}")));
-    let better = plain.iter().zip(&pooled).filter(|(plain, pooled)| pooled < plain).count();
+    let pooled = rms(campaign(
+        folder,
+        "pooled",
+        "2026-10-01",
+        &format!("{few}{prior}"),
+    ));
+    let better = plain
+        .iter()
+        .zip(&pooled)
+        .filter(|(plain, pooled)| pooled < plain)
+        .count();
     let mean = |errors: &[f64]| errors.iter().sum::<f64>() / errors.len() as f64;
-    assert!(better * 3 > ROBOTS * 2 && mean(&pooled) < mean(&plain), "{better} of {ROBOTS}: {plain:?} {pooled:?}");
+    assert!(
+        better * 3 > ROBOTS * 2 && mean(&pooled) < mean(&plain),
+        "{better} of {ROBOTS}: {plain:?} {pooled:?}"
+    );
 }

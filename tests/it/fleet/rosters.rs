@@ -17,39 +17,87 @@ fn a_list_names_robots_their_folders_groups_and_settings() {
         overrides:\n  - robots: ['r;*']\n    set: {joint.effects: [base_frame, tool_offset], joint.screen: false}\n    groups: {model: other}\n";
     let file = file(folder.path(), "line", rest);
     let told = run(&file, &store, 10);
-    assert_eq!((told["done"].as_u64(), told["rejected"].as_u64()), (Some(2), Some(1)));
-    assert!(told["robots"][2]["reason"].as_str().unwrap().contains("no such file"), "{told}");
+    assert_eq!(
+        (told["done"].as_u64(), told["rejected"].as_u64()),
+        (Some(2), Some(1))
+    );
+    assert!(
+        told["robots"][2]["reason"]
+            .as_str()
+            .unwrap()
+            .contains("no such file"),
+        "{told}"
+    );
     let manifest = |robot: usize| -> serde_json::Value {
         let run = told["robots"][robot]["run"].as_str().unwrap();
-        serde_json::from_slice(&std::fs::read(store.join("runs").join(run).join("manifest.json")).unwrap()).unwrap()
+        serde_json::from_slice(
+            &std::fs::read(store.join("runs").join(run).join("manifest.json")).unwrap(),
+        )
+        .unwrap()
     };
     let effects = |robot: usize| {
         let stages = manifest(robot)["stages"].clone();
-        let joint = stages.as_array().unwrap().iter().find(|stage| stage["id"] == "joint").unwrap().clone();
+        let joint = stages
+            .as_array()
+            .unwrap()
+            .iter()
+            .find(|stage| stage["id"] == "joint")
+            .unwrap()
+            .clone();
         joint["key"]["settings"]["effects"].clone()
     };
     assert_eq!(effects(0), serde_json::json!(["base_frame", "tool_offset"]));
-    assert_eq!(effects(1), serde_json::json!(["base_frame", "joint_offset"]));
+    assert_eq!(
+        effects(1),
+        serde_json::json!(["base_frame", "joint_offset"])
+    );
     let page = std::fs::read_to_string(told["page"].as_str().unwrap()).unwrap();
-    for group in ["other, Linz, 2026-10-01", "c6, Graz, 2026-10-01", "c6, Wien, 2026-10-01"] {
+    for group in [
+        "other, Linz, 2026-10-01",
+        "c6, Graz, 2026-10-01",
+        "c6, Wien, 2026-10-01",
+    ] {
         assert!(page.contains(group), "{group}");
     }
 }
 
 /// The rows of all cases in one CSV, with the robot's name in a column.
 fn together(cases: &Path, names: &[(&str, &str)]) -> String {
-    const CONTROLLER: [&str; 9] = ["point_id", "use", "payload_kg", "q1_deg", "q2_deg", "q3_deg", "q4_deg", "q5_deg", "q6_deg"];
+    const CONTROLLER: [&str; 9] = [
+        "point_id",
+        "use",
+        "payload_kg",
+        "q1_deg",
+        "q2_deg",
+        "q3_deg",
+        "q4_deg",
+        "q5_deg",
+        "q6_deg",
+    ];
     const TRACKER: [&str; 3] = ["x_mm", "y_mm", "z_mm"];
     let mut text = format!("cell,{},{}\n", CONTROLLER.join(","), TRACKER.join(","));
     for (case, robot) in names {
         let columns = |file: &str, wanted: &[&str]| -> Vec<String> {
-            let text = std::fs::read_to_string(cases.join("recordings").join(case).join(file)).unwrap();
+            let text =
+                std::fs::read_to_string(cases.join("recordings").join(case).join(file)).unwrap();
             let header: Vec<&str> = text.lines().next().unwrap().split(',').collect();
-            let places: Vec<usize> = wanted.iter().map(|name| header.iter().position(|other| other == name).unwrap()).collect();
-            let pick = |line: &str| places.iter().map(|place| line.split(',').nth(*place).unwrap()).collect::<Vec<_>>().join(",");
+            let places: Vec<usize> = wanted
+                .iter()
+                .map(|name| header.iter().position(|other| other == name).unwrap())
+                .collect();
+            let pick = |line: &str| {
+                places
+                    .iter()
+                    .map(|place| line.split(',').nth(*place).unwrap())
+                    .collect::<Vec<_>>()
+                    .join(",")
+            };
             text.lines().skip(1).map(pick).collect()
         };
-        for (a, b) in columns("controller.csv", &CONTROLLER).into_iter().zip(columns("tracker.csv", &TRACKER)) {
+        for (a, b) in columns("controller.csv", &CONTROLLER)
+            .into_iter()
+            .zip(columns("tracker.csv", &TRACKER))
+        {
             text.push_str(&format!("\"{robot}\",{a},{b}\n"));
         }
     }
@@ -69,22 +117,47 @@ fn one_big_table_is_parted_by_robot_once() {
     let join = text.find("      join: {by: id}\n").unwrap();
     let xyz = "            x: {column: x_mm, unit: mm}\n            y: {column: y_mm, unit: mm}\n            z: {column: z_mm, unit: mm}\n";
     let one = text[start..end].replace("${case}/controller.csv", "${part}");
-    let text = format!("{}{one}{xyz}{}", &text[..start], &text[join + "      join: {by: id}\n".len()..]);
-    let text = text.replace("${case}/robot.json", &cases.join("recordings/c0001/robot.json").display().to_string());
+    let text = format!(
+        "{}{one}{xyz}{}",
+        &text[..start],
+        &text[join + "      join: {by: id}\n".len()..]
+    );
+    let text = text.replace(
+        "${case}/robot.json",
+        &cases
+            .join("recordings/c0001/robot.json")
+            .display()
+            .to_string(),
+    );
     write(folder.path().join("one.yaml"), &text);
     let rest = "robots:\n  - {recording: all.csv, by: cell, variable: part}\n";
     let file = file(folder.path(), "line", rest);
-    let text = std::fs::read_to_string(&file).unwrap().replace(&super::pipeline().display().to_string(), "one.yaml");
+    let text = std::fs::read_to_string(&file)
+        .unwrap()
+        .replace(&super::pipeline().display().to_string(), "one.yaml");
     std::fs::write(&file, text).unwrap();
     let told = run(&file, &store, 0);
-    let names: Vec<&str> = told["robots"].as_array().unwrap().iter().map(|robot| robot["robot"].as_str().unwrap()).collect();
+    let names: Vec<&str> = told["robots"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|robot| robot["robot"].as_str().unwrap())
+        .collect();
     assert_eq!(names, ["../a", "b, c", "d"]);
     // The same as the robot's own files give.
-    assert!(told["robots"][0]["after_rms_mm"].as_f64().unwrap() < 0.2, "{told}");
+    assert!(
+        told["robots"][0]["after_rms_mm"].as_f64().unwrap() < 0.2,
+        "{told}"
+    );
     assert_eq!(run(&file, &store, 0)["computed"].as_u64(), Some(0));
     // A row more of one robot is another recording of that one alone.
     let mut all = std::fs::read_to_string(folder.path().join("all.csv")).unwrap();
-    let last = all.lines().next_back().unwrap().replacen("d\",", "d\",x", 1) + "\n";
+    let last = all
+        .lines()
+        .next_back()
+        .unwrap()
+        .replacen("d\",", "d\",x", 1)
+        + "\n";
     all.push_str(&last);
     write(folder.path().join("all.csv"), &all);
     assert_eq!(run(&file, &store, 0)["computed"].as_u64(), Some(1));

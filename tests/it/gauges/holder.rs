@@ -20,7 +20,13 @@ fn cell(seed: usize) -> (Cell, Measurements) {
 fn said(cell: &Cell, mut data: Measurements) -> Diagnosis {
     cell.disturb(&mut data);
     let all: Vec<usize> = (0..ROWS).collect();
-    let (robot, _) = gauge(RobotModel::new(cell.description.clone()), &data, &all, &BTreeMap::new()).expect("a robot");
+    let (robot, _) = gauge(
+        RobotModel::new(cell.description.clone()),
+        &data,
+        &all,
+        &BTreeMap::new(),
+    )
+    .expect("a robot");
     let question = Question {
         robot: &robot,
         data: &data,
@@ -46,15 +52,37 @@ fn a_holder_that_turns_about_the_flange_is_one_step_with_two_names() {
         data.points.position = cell.truth.predict(&data);
         data.q = logged;
         let said = said(&cell, data);
-        let statements: Vec<&str> = said.findings.iter().map(|finding| finding.statement.as_str()).collect();
+        let statements: Vec<&str> = said
+            .findings
+            .iter()
+            .map(|finding| finding.statement.as_str())
+            .collect();
         assert_eq!(statements.len(), 1, "{statements:?}");
-        let size = format!("the holder has turned by {:.2} deg about the flange", degrees.abs());
-        assert!(statements[0].starts_with(&size) && statements[0].contains("from row 71"), "{}", statements[0]);
+        let size = format!(
+            "the holder has turned by {:.2} deg about the flange",
+            degrees.abs()
+        );
+        assert!(
+            statements[0].starts_with(&size) && statements[0].contains("from row 71"),
+            "{}",
+            statements[0]
+        );
         let found = &said.findings[0];
-        let mut names: Vec<(&str, Place)> = found.rivals.iter().map(|rival| (rival.effect, rival.place)).collect();
+        let mut names: Vec<(&str, Place)> = found
+            .rivals
+            .iter()
+            .map(|rival| (rival.effect, rival.place))
+            .collect();
         names.push((found.effect, found.place));
-        for name in [("zero_shift", Place::Joint(joints - 1)), ("tool_shift", Place::Tool)] {
-            assert_eq!(names.iter().filter(|other| **other == name).count(), 1, "{names:?}");
+        for name in [
+            ("zero_shift", Place::Joint(joints - 1)),
+            ("tool_shift", Place::Tool),
+        ] {
+            assert_eq!(
+                names.iter().filter(|other| **other == name).count(),
+                1,
+                "{names:?}"
+            );
         }
     }
 }
@@ -69,5 +97,11 @@ fn a_target_that_moves_along_the_last_axis_has_not_turned() {
     }
     let said = said(&cell, data);
     assert_eq!(said.findings.len(), 1, "{}", said.statement);
-    assert!(said.findings[0].statement.starts_with("the target on the tool has moved"), "{}", said.findings[0].statement);
+    assert!(
+        said.findings[0]
+            .statement
+            .starts_with("the target on the tool has moved"),
+        "{}",
+        said.findings[0].statement
+    );
 }

@@ -17,17 +17,24 @@ fn lagging(poses: usize, rest: impl Fn(f64, f64) -> f64) -> (Cell, Measurements)
     let mut data = cell.rows(poses, 0);
     let (logged, joints) = (data.q.clone(), data.joints);
     for pose in 1..poses {
-        let moves: Vec<f64> =
-            (0..joints).map(|joint| logged[3 * pose * joints + joint] - logged[3 * (pose - 1) * joints + joint]).collect();
+        let moves: Vec<f64> = (0..joints)
+            .map(|joint| {
+                logged[3 * pose * joints + joint] - logged[3 * (pose - 1) * joints + joint]
+            })
+            .collect();
         let largest = moves.iter().map(|moved| moved.abs()).fold(0.0, f64::max);
         for row in 3 * pose..3 * (pose + 1) {
-            (0..joints).for_each(|joint| data.q[row * joints + joint] += rest(moves[joint], largest));
+            (0..joints)
+                .for_each(|joint| data.q[row * joints + joint] += rest(moves[joint], largest));
         }
     }
     data.points.position = cell.truth.predict(&data);
     data.q = logged;
     // Encoders of a halted arm show other last digits every time.
-    data.q.iter_mut().enumerate().for_each(|(k, q)| *q += 2e-6 * normal(7_000_000 + k));
+    data.q
+        .iter_mut()
+        .enumerate()
+        .for_each(|(k, q)| *q += 2e-6 * normal(7_000_000 + k));
     data.time = Some((0..data.rows()).map(|row| 20.0 * row as f64).collect());
     cell.disturb(&mut data);
     (cell, data)
@@ -35,7 +42,13 @@ fn lagging(poses: usize, rest: impl Fn(f64, f64) -> f64) -> (Cell, Measurements)
 
 fn said(cell: &Cell, data: &Measurements) -> Diagnosis {
     let all: Vec<usize> = (0..data.rows()).collect();
-    let (robot, _) = gauge(RobotModel::new(cell.description.clone()), data, &all, &BTreeMap::new()).expect("a robot");
+    let (robot, _) = gauge(
+        RobotModel::new(cell.description.clone()),
+        data,
+        &all,
+        &BTreeMap::new(),
+    )
+    .expect("a robot");
     let question = Question {
         robot: &robot,
         data,
@@ -58,9 +71,16 @@ fn lag_alone(said: &Diagnosis, what: &str) -> (String, f64) {
         named,
         ["joint_log_lag"],
         "{what}: {}",
-        said.findings.iter().map(|f| f.statement.as_str()).collect::<Vec<_>>().join(" ")
+        said.findings
+            .iter()
+            .map(|f| f.statement.as_str())
+            .collect::<Vec<_>>()
+            .join(" ")
     );
-    (said.findings[0].statement.clone(), said.findings[0].parameters[0].value)
+    (
+        said.findings[0].statement.clone(),
+        said.findings[0].parameters[0].value,
+    )
 }
 
 #[test]
@@ -68,7 +88,10 @@ fn a_lag_of_the_last_move_is_found_with_three_targets_a_pose() {
     let (cell, data) = lagging(60, |moved, _| 0.002 * moved);
     let (statement, share) = lag_alone(&said(&cell, &data), "in order");
     assert!((share / 0.002 - 1.0).abs() < 0.05, "{statement}");
-    assert!(statement.contains("of the last move was still to come"), "{statement}");
+    assert!(
+        statement.contains("of the last move was still to come"),
+        "{statement}"
+    );
 }
 
 #[test]
@@ -76,25 +99,41 @@ fn a_lag_of_a_synchronous_motion_is_shared_out_as_the_moves_are() {
     let (cell, data) = lagging(60, |moved, largest| 90.0 * ARCSEC * moved / largest);
     let (statement, rest) = lag_alone(&said(&cell, &data), "in order");
     assert!((rest / 90.0 - 1.0).abs() < 0.05, "{statement}");
-    assert!(statement.contains("the joint that moved most had 90 arcsec still to come"), "{statement}");
+    assert!(
+        statement.contains("the joint that moved most had 90 arcsec still to come"),
+        "{statement}"
+    );
 }
 
 /// One target after the other, and rows by name in no order at all: the way to a pose is that of time.
 #[test]
 fn rows_in_another_order_than_their_times_lag_by_their_times() {
     let (cell, data) = lagging(60, |moved, largest| 90.0 * ARCSEC * moved / largest);
-    let by_target: Vec<usize> = (0..3).flat_map(|target| (0..60).map(move |pose| 3 * pose + target)).collect();
+    let by_target: Vec<usize> = (0..3)
+        .flat_map(|target| (0..60).map(move |pose| 3 * pose + target))
+        .collect();
     let by_name: Vec<usize> = (0..180).map(|k| (k * 77) % 180).collect();
     for (what, order) in [("by target", by_target), ("by name", by_name)] {
         let mut sorted = select(&data, &order);
         sorted.target = Some(Named::of(order.iter().map(|row| data.target(*row))));
-        sorted.time = data.time.as_ref().map(|time| order.iter().map(|row| time[*row]).collect());
+        sorted.time = data
+            .time
+            .as_ref()
+            .map(|time| order.iter().map(|row| time[*row]).collect());
         let times = sorted.time.clone().expect("times");
         sorted.sequence = Sequence::by_time(&times, |a, b| sorted.near_pose(a, b));
         for (row, own) in order.iter().enumerate() {
             for joint in 0..data.joints {
-                assert_eq!(sorted.last_move(row, joint), data.last_move(*own, joint), "{what}, row {row}, joint {joint}");
-                assert_eq!(sorted.direction(row, joint), data.direction(*own, joint), "{what}, row {row}, joint {joint}");
+                assert_eq!(
+                    sorted.last_move(row, joint),
+                    data.last_move(*own, joint),
+                    "{what}, row {row}, joint {joint}"
+                );
+                assert_eq!(
+                    sorted.direction(row, joint),
+                    data.direction(*own, joint),
+                    "{what}, row {row}, joint {joint}"
+                );
             }
         }
         let (statement, rest) = lag_alone(&said(&cell, &sorted), what);

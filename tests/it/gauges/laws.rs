@@ -6,7 +6,9 @@ use crate::identify::{GEOMETRY, model, normal};
 use calib::description::RobotDescription;
 use calib::estimate::{FitOptions, Fitted, Model, ParameterStatus, fit, gauge};
 use calib::observation::{KINDS, MeasurementKind, Weight, rank};
-use calib::robot::{Anchor, MeasurementSetup, Measurements, PointReadings, Readings, RobotModel, Target};
+use calib::robot::{
+    Anchor, MeasurementSetup, Measurements, PointReadings, Readings, RobotModel, Target,
+};
 use calib::spatial::{Pose, Twist};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
@@ -23,9 +25,16 @@ impl Truth {
         let home = *robot.home();
         let offset = Vector3::from(THREE[0].1) * 1e-3;
         let rotation = home.rotation * Pose::from_rotation_vector(askew, Vector3::zeros()).rotation;
-        let target = Target { name: String::new(), mounting: Pose::new(rotation, home.point(&offset)), oriented: true };
+        let target = Target {
+            name: String::new(),
+            mounting: Pose::new(rotation, home.point(&offset)),
+            oriented: true,
+        };
         let anchor = Anchor::point("", Vector3::new(4.6, -2.5, 0.8));
-        let robot = robot.measured_by(MeasurementSetup { targets: vec![target], anchors: vec![anchor] });
+        let robot = robot.measured_by(MeasurementSetup {
+            targets: vec![target],
+            anchors: vec![anchor],
+        });
         let base = Pose::exp(&Twist::new(3.0, -1.5, 0.4, 0.0, 0.0, 0.0));
         let mut model = model(&robot, base, &[&["anchor"][..], &GEOMETRY].concat());
         for (k, spec) in model.stack.specs().to_vec().iter().enumerate() {
@@ -50,7 +59,8 @@ impl Truth {
         data.points.position = self.model.predict(&data);
         let rotations = self.rotations(&data);
         for kind in read().skip(1) {
-            data.readings.push(self.readings(kind.about().name, &data, &rotations));
+            data.readings
+                .push(self.readings(kind.about().name, &data, &rotations));
         }
         data
     }
@@ -58,10 +68,25 @@ impl Truth {
     /// A fit of the parameters that are `asked` for by name, from the nominal robot.
     pub fn fit(&self, data: &Measurements, asked: impl Fn(&str) -> bool) -> (Model, Fitted) {
         let rows: Vec<usize> = (0..data.rows()).collect();
-        let (robot, base) = gauge(RobotModel::new(self.description.clone()), data, &rows, &BTreeMap::new()).unwrap();
+        let (robot, base) = gauge(
+            RobotModel::new(self.description.clone()),
+            data,
+            &rows,
+            &BTreeMap::new(),
+        )
+        .unwrap();
         let model = model(&robot, base, &[&["anchor"][..], &GEOMETRY].concat());
-        let candidates: Vec<usize> = (0..model.x.len()).filter(|k| asked(&model.stack.specs()[*k].name)).collect();
-        fit(&model, data, &FitOptions { rows: &rows, candidates: &candidates })
+        let candidates: Vec<usize> = (0..model.x.len())
+            .filter(|k| asked(&model.stack.specs()[*k].name))
+            .collect();
+        fit(
+            &model,
+            data,
+            &FitOptions {
+                rows: &rows,
+                candidates: &candidates,
+            },
+        )
     }
 
     /// How the target is turned in every row, by differences of points.
@@ -70,35 +95,73 @@ impl Truth {
         let beside = [0, 1, 2].map(|axis: usize| {
             let mut setup = self.model.robot.setup().clone();
             setup.targets[0].mounting.translation += seat.rotation.column(axis) * 0.5;
-            Model { robot: self.model.robot.clone().measured_by(setup), ..self.model.clone() }.predict(data)
+            Model {
+                robot: self.model.robot.clone().measured_by(setup),
+                ..self.model.clone()
+            }
+            .predict(data)
         });
         let rows = 0..data.rows();
-        rows.map(|row| Matrix3::from_columns(&[0, 1, 2].map(|axis: usize| (beside[axis][row] - data.points.position[row]) / 0.5)))
-            .collect()
+        rows.map(|row| {
+            Matrix3::from_columns(
+                &[0, 1, 2].map(|axis: usize| (beside[axis][row] - data.points.position[row]) / 0.5),
+            )
+        })
+        .collect()
     }
 
-    fn readings(&self, kind: &'static str, data: &Measurements, rotations: &[Matrix3<f64>]) -> Readings {
+    fn readings(
+        &self,
+        kind: &'static str,
+        data: &Measurements,
+        rotations: &[Matrix3<f64>],
+    ) -> Readings {
         let (stack, x) = (&self.model.stack, &self.model.x);
-        let named = |axis: &str| stack.specs().iter().position(|spec| spec.name == format!("anchor.{axis}")).expect("an axis");
+        let named = |axis: &str| {
+            stack
+                .specs()
+                .iter()
+                .position(|spec| spec.name == format!("anchor.{axis}"))
+                .expect("an axis")
+        };
         let moved = Vector3::new(x[named("x")], x[named("y")], x[named("z")]);
         let anchor = self.model.robot.setup().anchors[0].place + moved;
         let row: &dyn Fn(usize) -> Vec<f64> = match kind {
             "orientation" => &|row| rotations[row].iter().copied().collect(),
-            "inclination" => &|row| [0, 1].map(|axis: usize| rotations[row][(2, axis)].asin()).to_vec(),
-            "planar" => &|row| [1, 2].map(|axis: usize| -data.points.position[row][axis] / data.points.position[row].x).to_vec(),
+            "inclination" => &|row| {
+                [0, 1]
+                    .map(|axis: usize| rotations[row][(2, axis)].asin())
+                    .to_vec()
+            },
+            "planar" => &|row| {
+                [1, 2]
+                    .map(|axis: usize| {
+                        -data.points.position[row][axis] / data.points.position[row].x
+                    })
+                    .to_vec()
+            },
             "distance" => &|row| vec![(data.points.position[row] - anchor).norm()],
             other => panic!("say what `{other}` measures"),
         };
         let values: Vec<f64> = (0..data.rows()).flat_map(row).collect();
         let anchor = (kind == "distance").then(Default::default);
-        Readings { kind, width: values.len() / data.rows(), values, sigma: vec![SIGMA; data.rows()], anchor }
+        Readings {
+            kind,
+            width: values.len() / data.rows(),
+            values,
+            sigma: vec![SIGMA; data.rows()],
+            anchor,
+        }
     }
 }
 
 /// Some of the rows.
 pub(super) fn select(data: &Measurements, rows: &[usize]) -> Measurements {
     let taken = |all: &Readings| Readings {
-        values: rows.iter().flat_map(|row| all.values[row * all.width..(row + 1) * all.width].to_vec()).collect(),
+        values: rows
+            .iter()
+            .flat_map(|row| all.values[row * all.width..(row + 1) * all.width].to_vec())
+            .collect(),
         sigma: rows.iter().map(|row| all.sigma[*row]).collect(),
         ..all.clone()
     };
@@ -120,10 +183,19 @@ fn read() -> impl Iterator<Item = &'static dyn MeasurementKind> {
 }
 
 /// Residual of a kind under the model with parameters `x`.
-fn residual(kind: &dyn MeasurementKind, truth: &Model, data: &Measurements, row: usize, x: &[f64]) -> Vector3<f64> {
+fn residual(
+    kind: &dyn MeasurementKind,
+    truth: &Model,
+    data: &Measurements,
+    row: usize,
+    x: &[f64],
+) -> Vector3<f64> {
     let mut scratch = truth.stack.scratch(&truth.robot);
     let placed = truth.stack.place(&truth.robot, data, row, x, &mut scratch);
-    kind.residual(data, row, &placed).expect("measured").0.first_three()
+    kind.residual(data, row, &placed)
+        .expect("measured")
+        .0
+        .first_three()
 }
 
 #[test]
@@ -139,10 +211,14 @@ fn every_kind_leaves_nothing_at_the_truth_and_its_derivatives_are_central_differ
             assert!(left.norm() < 1e-9, "{name}: {left} is left");
             assert_eq!(kind.axes(&data, row), kind.about().axes, "{name}");
             let mut scratch = model.stack.scratch(&model.robot);
-            let mut placed = model.stack.place(&model.robot, &data, row, &model.x, &mut scratch);
+            let mut placed = model
+                .stack
+                .place(&model.robot, &data, row, &model.x, &mut scratch);
             let mut partials = vec![Vector3::zeros(); model.x.len()];
             let sensitivity = kind.sensitivity(&data, row, &placed, Weight::uniform(1.0));
-            sensitivity.derivatives(&mut placed, |k, own| partials[k] += Vector3::from_column_slice(own));
+            sensitivity.derivatives(&mut placed, |k, own| {
+                partials[k] += Vector3::from_column_slice(own)
+            });
             for (k, partial) in partials.iter().enumerate() {
                 let moved = |step: f64| {
                     let mut x = model.x.clone();
@@ -151,7 +227,10 @@ fn every_kind_leaves_nothing_at_the_truth_and_its_derivatives_are_central_differ
                 };
                 let central = (moved(-STEP) - moved(STEP)) / (2.0 * STEP);
                 let (spec, off) = (&model.stack.specs()[k].name, (central - partial).norm());
-                assert!(off < 2e-6 * (1.0 + partial.norm()), "{name}, {spec}: {central} by differences, {partial} by formula");
+                assert!(
+                    off < 2e-6 * (1.0 + partial.norm()),
+                    "{name}, {spec}: {central} by differences, {partial} by formula"
+                );
             }
         }
     }
@@ -171,20 +250,33 @@ fn alone(data: &Measurements, kind: &dyn MeasurementKind) -> Measurements {
 
 #[test]
 fn the_rank_of_every_kind_is_that_of_theory() {
-    for description in [fixture::offset_wrist(), fixture::seven(), fixture::on_track()] {
+    for description in [
+        fixture::offset_wrist(),
+        fixture::seven(),
+        fixture::on_track(),
+    ] {
         let truth = Truth::new(description, Vector3::from(ASKEW));
         let all = truth.rows(600);
         // A level is read where it is upright.
-        let upright: Vec<usize> =
-            (0..all.rows()).filter(|row| all.reading("orientation", *row).expect("all").values[8] > 0.0).collect();
+        let upright: Vec<usize> = (0..all.rows())
+            .filter(|row| all.reading("orientation", *row).expect("all").values[8] > 0.0)
+            .collect();
         let all = select(&all, &upright);
         for kind in read() {
             let data = alone(&all, kind);
             let rows: Vec<usize> = (0..data.rows()).collect();
             let (model, fitted) = truth.fit(&data, |_| true);
-            let free = fitted.statuses.iter().filter(|fate| matches!(fate, ParameterStatus::Free(_))).count();
+            let free = fitted
+                .statuses
+                .iter()
+                .filter(|fate| matches!(fate, ParameterStatus::Free(_)))
+                .count();
             let name = format!("{}, {}", truth.description.name, kind.about().name);
-            assert_eq!(Some(free), rank(&model.robot, &data, &rows, false, 0), "{name}");
+            assert_eq!(
+                Some(free),
+                rank(&model.robot, &data, &rows, false, 0),
+                "{name}"
+            );
         }
     }
 }

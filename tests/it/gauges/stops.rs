@@ -5,7 +5,9 @@ use super::{Cell, SIGMA, THREE};
 use crate::fixture;
 use crate::identify::{GEOMETRY, model, normal};
 use calib::diagnose::{Question, diagnose};
-use calib::estimate::{FitOptions, Poses, Session, SuspectKind, cross_validate, fit_screened, gauge};
+use calib::estimate::{
+    FitOptions, Poses, Session, SuspectKind, cross_validate, fit_screened, gauge,
+};
 use calib::robot::{Measurements, Named, NoiseBasis, RobotModel};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
@@ -17,7 +19,9 @@ const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
 fn stops(poses: usize, visits: usize, joint_sigma: f64, jitter: f64) -> (Cell, Measurements) {
     let cell = Cell::new(fixture::offset_wrist(), &THREE, 11);
     let once = cell.rows(poses, 0);
-    let order: Vec<usize> = (0..poses * visits * 3).map(|row| row / (3 * visits) * 3 + row % 3).collect();
+    let order: Vec<usize> = (0..poses * visits * 3)
+        .map(|row| row / (3 * visits) * 3 + row % 3)
+        .collect();
     let mut data = select(&once, &order);
     data.target = Some(Named::of(order.iter().map(|row| once.target(*row))));
     let joints = data.joints;
@@ -47,7 +51,10 @@ fn targets_of_one_pose_are_no_repeats_of_each_other() {
     let (_, twice) = stops(40, 2, 0.0, 2e-6);
     let poses = Poses::of(&twice, &rows(&twice));
     assert_eq!((poses.all().len(), poses.repeated().count()), (40, 120));
-    let same = |rows: &Vec<usize>| rows.iter().all(|row| twice.target(*row) == twice.target(rows[0]));
+    let same = |rows: &Vec<usize>| {
+        rows.iter()
+            .all(|row| twice.target(*row) == twice.target(rows[0]))
+    };
     assert!(poses.repeated().all(same));
 }
 
@@ -55,7 +62,13 @@ fn targets_of_one_pose_are_no_repeats_of_each_other() {
 fn a_diagnosis_learns_the_repeatability_from_the_same_target_again() {
     let (cell, data) = stops(40, 2, 6.0 * ARCSEC, 0.0);
     let all = rows(&data);
-    let (robot, _) = gauge(RobotModel::new(cell.description.clone()), &data, &all, &BTreeMap::new()).expect("a robot");
+    let (robot, _) = gauge(
+        RobotModel::new(cell.description.clone()),
+        &data,
+        &all,
+        &BTreeMap::new(),
+    )
+    .expect("a robot");
     let question = Question {
         robot: &robot,
         data: &data,
@@ -70,10 +83,17 @@ fn a_diagnosis_learns_the_repeatability_from_the_same_target_again() {
         seed: 1,
     };
     let found = diagnose(&question, |_| ());
-    assert_eq!((found.repeatability.repeats, found.noise_basis), (120, NoiseBasis::Repeats));
+    assert_eq!(
+        (found.repeatability.repeats, found.noise_basis),
+        (120, NoiseBasis::Repeats)
+    );
     let ratio = found.repeatability.sigma / (6.0 * ARCSEC);
     assert!((0.8..1.25).contains(&ratio), "{ratio} of the truth");
-    assert!(found.statement.contains("the noise that 120 repeats show"), "{}", found.statement);
+    assert!(
+        found.statement.contains("the noise that 120 repeats show"),
+        "{}",
+        found.statement
+    );
 }
 
 #[test]
@@ -85,11 +105,22 @@ fn the_way_to_a_pose_is_that_of_all_its_targets() {
         let first = row / 6 * 6;
         for joint in 0..data.joints {
             let moved = data.q(first)[joint] - data.q(first - 1)[joint];
-            assert_eq!(data.last_move(row, joint), moved, "row {row}, joint {joint}");
-            assert_eq!(data.direction(row, joint), moved.signum(), "row {row}, joint {joint}");
+            assert_eq!(
+                data.last_move(row, joint),
+                moved,
+                "row {row}, joint {joint}"
+            );
+            assert_eq!(
+                data.direction(row, joint),
+                moved.signum(),
+                "row {row}, joint {joint}"
+            );
         }
     }
-    let alone = Measurements { target: None, ..data.clone() };
+    let alone = Measurements {
+        target: None,
+        ..data.clone()
+    };
     assert!((6..alone.rows()).all(|row| alone.last_move(row, 0) == data.last_move(row, 0)));
 }
 
@@ -99,16 +130,26 @@ fn folds_never_part_the_targets_of_a_pose() {
         let (cell, data) = stops(60, 1, 20.0 * ARCSEC, jitter);
         let (model, fitted) = cell.fit(&data, |_| BTreeMap::new());
         let fit_rows = rows(&data);
-        let session = Session { data: &data, rows: &fit_rows, model: &model, fitted: &fitted };
+        let session = Session {
+            data: &data,
+            rows: &fit_rows,
+            model: &model,
+            fitted: &fitted,
+        };
         let folds = cross_validate(&session, 5, 3).expect("enough poses");
-        let rms = |errors: &[f64]| (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt();
+        let rms = |errors: &[f64]| {
+            (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt()
+        };
         [rms(&folds.random), rms(&folds.blocks)]
     };
     // Rows of a pose share what its joints missed: seen beside the row, it would be predicted better. Logs that differ in the last
     // digits part none.
     let (plain, jittered) = (folds(0.0), folds(2e-6));
     for (plain, jittered) in plain.into_iter().zip(jittered) {
-        assert!((jittered / plain - 1.0).abs() < 0.02, "{jittered:e} and {plain:e}");
+        assert!(
+            (jittered / plain - 1.0).abs() < 0.02,
+            "{jittered:e} and {plain:e}"
+        );
     }
 }
 
@@ -124,15 +165,34 @@ fn a_pose_with_wrong_joints_is_set_aside_with_all_its_targets_and_no_event() {
         data.points.position[row] += Vector3::new(0.0, 3e-4, 1e-4);
     }
     let all = rows(&data);
-    let (robot, base) = gauge(RobotModel::new(cell.description.clone()), &data, &all, &BTreeMap::new()).expect("a robot");
+    let (robot, base) = gauge(
+        RobotModel::new(cell.description.clone()),
+        &data,
+        &all,
+        &BTreeMap::new(),
+    )
+    .expect("a robot");
     let model = model(&robot, base, &GEOMETRY);
     let candidates: Vec<usize> = (0..model.x.len()).collect();
-    let options = FitOptions { rows: &all, candidates: &candidates };
+    let options = FitOptions {
+        rows: &all,
+        candidates: &candidates,
+    };
     let (_, _, screening) = fit_screened(&model, &data, &options, &vec![0; all.len()]);
     let of = |kind: SuspectKind| -> Vec<usize> {
-        screening.suspects.iter().filter(|suspect| suspect.kind == kind).map(|suspect| suspect.row).collect()
+        screening
+            .suspects
+            .iter()
+            .filter(|suspect| suspect.kind == kind)
+            .map(|suspect| suspect.row)
+            .collect()
     };
-    assert_eq!(of(SuspectKind::Outlier), wrong.collect::<Vec<_>>(), "{:?}", screening.suspects);
+    assert_eq!(
+        of(SuspectKind::Outlier),
+        wrong.collect::<Vec<_>>(),
+        "{:?}",
+        screening.suspects
+    );
     assert_eq!(of(SuspectKind::Event), (3 * 40..3 * 44).collect::<Vec<_>>());
     assert_eq!(screening.kept.len(), all.len() - 3);
 }
@@ -163,15 +223,24 @@ fn near_repeats_count_less_the_known_motion() {
     let poses = Poses::of(&data, &rows(&data));
     assert_eq!((poses.all().len(), poses.repeated().count()), (60, 60));
     let (model, fitted) = cell.fit(&data, |_| BTreeMap::new());
-    let found = poses.joint_repeatability(&model, &data).expect("it is there") / (5.0 * ARCSEC);
+    let found = poses
+        .joint_repeatability(&model, &data)
+        .expect("it is there")
+        / (5.0 * ARCSEC);
     assert!((0.8..1.2).contains(&found), "{found} of the truth");
     let repeated = fitted.repeated.expect("repeats");
-    assert_eq!((repeated.poses, repeated.freedom, repeated.revisited), (60, 180, true));
+    assert_eq!(
+        (repeated.poses, repeated.freedom, repeated.revisited),
+        (60, 180, true)
+    );
     let still = returns(5e-4, 0.0);
     let (model, fitted) = cell.fit(&still, |_| BTreeMap::new());
     let noise = fitted.repeated.expect("repeats").noise;
     assert!((noise / SIGMA - 1.0).abs() < 0.15, "{noise:e} m");
-    assert_eq!(Poses::of(&still, &rows(&still)).joint_repeatability(&model, &still), None);
+    assert_eq!(
+        Poses::of(&still, &rows(&still)).joint_repeatability(&model, &still),
+        None
+    );
     let question_rows = rows(&data);
     let robot = RobotModel::new(cell.description.clone());
     let set = vec![0; data.rows()];
@@ -189,7 +258,11 @@ fn near_repeats_count_less_the_known_motion() {
         seed: 1,
     };
     let said = diagnose(&question, |_| ());
-    assert!(said.repeatability.repeats >= 30 && said.noise_basis == NoiseBasis::Repeats, "{:?}", said.repeatability);
+    assert!(
+        said.repeatability.repeats >= 30 && said.noise_basis == NoiseBasis::Repeats,
+        "{:?}",
+        said.repeatability
+    );
     let ratio = said.repeatability.sigma / (5.0 * ARCSEC);
     assert!((0.75..1.3).contains(&ratio), "{ratio} of the truth");
 }

@@ -7,7 +7,9 @@ use calib::effect::Load;
 use calib::robot::{Measurements, Named, RobotModel};
 use calib::spatial::Pose;
 use calib::stage::{Identify, IdentifyReads};
-use calib::table::{Observability, Parameters, Prediction, Recording, Robot, Split, SplitRow, Table};
+use calib::table::{
+    Observability, Parameters, Prediction, Recording, Robot, Split, SplitRow, Table,
+};
 use nalgebra::{Matrix3, Vector3};
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -16,12 +18,24 @@ use std::collections::BTreeMap;
 fn tables(cell: &Cell, data: &Measurements) -> IdentifyReads {
     let rows = data.rows();
     let measured = |row: usize| {
-        [0, 1, 2].map(|k| if data.points.sigma[row][k].is_finite() { data.points.position[row][k] } else { f64::NAN })
+        [0, 1, 2].map(|k| {
+            if data.points.sigma[row][k].is_finite() {
+                data.points.position[row][k]
+            } else {
+                f64::NAN
+            }
+        })
     };
     let vector = |rotation: &[f64]| -> [f64; 3] {
-        Pose::new(Matrix3::from_column_slice(rotation), Vector3::zeros()).rotation_vector().into()
+        Pose::new(Matrix3::from_column_slice(rotation), Vector3::zeros())
+            .rotation_vector()
+            .into()
     };
-    let names = |named: &Named| (0..rows).map(|row| Some(named.name(row).to_string())).collect();
+    let names = |named: &Named| {
+        (0..rows)
+            .map(|row| Some(named.name(row).to_string()))
+            .collect()
+    };
     let recording = Recording {
         joints: data.joints,
         prismatic: vec![false; data.joints],
@@ -32,20 +46,40 @@ fn tables(cell: &Cell, data: &Measurements) -> IdentifyReads {
         position: (0..rows).map(measured).collect(),
         target: data.target.as_ref().map(names),
         readings: readings(data, vector),
-        names: data.readings.iter().filter_map(|all| Some(("anchor", names(all.anchor.as_ref()?)))).collect(),
+        names: data
+            .readings
+            .iter()
+            .filter_map(|all| Some(("anchor", names(all.anchor.as_ref()?))))
+            .collect(),
         ..Recording::default()
     };
-    let recording = Recording::from_frame(&recording.to_frame().expect("a sound table")).expect("the same table");
-    let split = |row: usize| SplitRow { sequence: row as i64, point_id: format!("P{row}"), set: "fit".into() };
-    IdentifyReads { robot: Robot::from_description(&cell.description), recording, split: Split((0..rows).map(split).collect()) }
+    let recording = Recording::from_frame(&recording.to_frame().expect("a sound table"))
+        .expect("the same table");
+    let split = |row: usize| SplitRow {
+        sequence: row as i64,
+        point_id: format!("P{row}"),
+        set: "fit".into(),
+    };
+    IdentifyReads {
+        robot: Robot::from_description(&cell.description),
+        recording,
+        split: Split((0..rows).map(split).collect()),
+    }
 }
 
 /// What is beside points, by setting.
-fn readings(data: &Measurements, vector: impl Fn(&[f64]) -> [f64; 3]) -> BTreeMap<&'static str, Vec<f64>> {
+fn readings(
+    data: &Measurements,
+    vector: impl Fn(&[f64]) -> [f64; 3],
+) -> BTreeMap<&'static str, Vec<f64>> {
     let mut out = BTreeMap::new();
     for all in &data.readings {
         let (name, sigma, values) = match all.kind {
-            "orientation" => ("orientation", "sigma_orientation", all.values.chunks(9).flat_map(&vector).collect()),
+            "orientation" => (
+                "orientation",
+                "sigma_orientation",
+                all.values.chunks(9).flat_map(&vector).collect(),
+            ),
             "distance" => ("distance", "sigma_distance", all.values.clone()),
             other => panic!("{other}"),
         };
@@ -60,7 +94,14 @@ fn a_model_read_back_from_its_table_measures_what_was_measured() {
     let mut data = cell.rows(40, 0);
     cell.disturb(&mut data);
     cell.turn(&mut data);
-    cell.reach(&mut data, &[("N", Vector3::new(4.0, 1.0, 0.3)), ("S", Vector3::new(1.0, -3.0, 0.2))], 3e-5);
+    cell.reach(
+        &mut data,
+        &[
+            ("N", Vector3::new(4.0, 1.0, 0.3)),
+            ("S", Vector3::new(1.0, -3.0, 0.2)),
+        ],
+        3e-5,
+    );
     for row in 90..120 {
         data.points.sigma[row] = Vector3::repeat(f64::INFINITY);
         data.points.position[row] = Vector3::zeros();
@@ -69,15 +110,31 @@ fn a_model_read_back_from_its_table_measures_what_was_measured() {
     let (description, recording) = (cell.description.clone(), reads.recording.clone());
     let desk = Desk::default();
     let stage: Identify =
-        serde_json::from_value(json!({"targets": {"A": [119.0, 1.0, 30.0]}, "screen": false})).expect("settings");
+        serde_json::from_value(json!({"targets": {"A": [119.0, 1.0, 30.0]}, "screen": false}))
+            .expect("settings");
     let tables = desk.run(&stage, reads).expect("identify runs");
     let parameters = table::<Parameters>(&tables).remove(0);
-    let placed = |name: &str| parameters.0.iter().find(|row| row.name == name).map_or(f64::NAN, |row| row.value);
+    let placed = |name: &str| {
+        parameters
+            .0
+            .iter()
+            .find(|row| row.name == name)
+            .map_or(f64::NAN, |row| row.value)
+    };
     // The tool frame lies along the base at the zero pose.
     let [x, y] = ["tool_offset.B.x", "tool_offset.C.y"].map(placed);
-    assert!((x + 60.0).abs() < 1.5 && (y + 80.0).abs() < 1.5, "{x} mm, {y} mm");
-    assert!((placed("anchor.N.x") - 4000.0).abs() < 0.5, "{} mm", placed("anchor.N.x"));
-    let model = parameters.model(RobotModel::new(description), &[], Load::GravityTorque).expect("a model");
+    assert!(
+        (x + 60.0).abs() < 1.5 && (y + 80.0).abs() < 1.5,
+        "{x} mm, {y} mm"
+    );
+    assert!(
+        (placed("anchor.N.x") - 4000.0).abs() < 0.5,
+        "{} mm",
+        placed("anchor.N.x")
+    );
+    let model = parameters
+        .model(RobotModel::new(description), &[], Load::GravityTorque)
+        .expect("a model");
     let own = recording.measurements();
     let errors = model.row_errors(&own);
     let prediction = table::<Prediction>(&tables).remove(0);
@@ -90,20 +147,39 @@ fn a_model_read_back_from_its_table_measures_what_was_measured() {
             error.length * 1e3
         );
         assert!((row.turn_rad.expect("turned") - error.angle.expect("turned")).abs() < 1e-9);
-        assert_eq!(row.measured.as_deref(), (row.sequence >= 90).then_some("rotation distance"));
+        assert_eq!(
+            row.measured.as_deref(),
+            (row.sequence >= 90).then_some("rotation distance")
+        );
     }
     let rank = |quantity: &str| {
         let table = table::<Observability>(&tables).remove(0);
-        table.0.iter().find(|row| row.quantity == quantity).map(|row| row.value)
+        table
+            .0
+            .iter()
+            .find(|row| row.quantity == quantity)
+            .map(|row| row.value)
     };
-    assert_eq!((rank("rank"), rank("rank_expected")), (Some(24.0 + 18.0 + 6.0), Some(24.0 + 18.0 + 6.0)));
+    assert_eq!(
+        (rank("rank"), rank("rank_expected")),
+        (Some(24.0 + 18.0 + 6.0), Some(24.0 + 18.0 + 6.0))
+    );
 }
 
 #[test]
 fn a_target_that_the_recording_does_not_have_is_named_with_those_it_has() {
     let cell = Cell::new(fixture::offset_wrist(), &THREE, 9);
-    let stage: Identify = serde_json::from_value(json!({"targets": {"D": [1.0, 2.0, 3.0]}})).expect("settings");
-    let error = Desk::default().run(&stage, tables(&cell, &cell.rows(20, 0))).map(|_| ()).expect_err("no such target");
+    let stage: Identify =
+        serde_json::from_value(json!({"targets": {"D": [1.0, 2.0, 3.0]}})).expect("settings");
+    let error = Desk::default()
+        .run(&stage, tables(&cell, &cell.rows(20, 0)))
+        .map(|_| ())
+        .expect_err("no such target");
     assert_eq!(error.exit_code(), 2);
-    assert!(error.to_string().contains("with.targets.D: the recording has no such target; it has: A, B, C"), "{error}");
+    assert!(
+        error
+            .to_string()
+            .contains("with.targets.D: the recording has no such target; it has: A, B, C"),
+        "{error}"
+    );
 }

@@ -10,7 +10,10 @@ const ROWS: usize = 20_000;
 /// What every so many rows of a file is odd, and why it is refused, if it is.
 const ODD: [(&str, Option<&str>); 9] = [
     ("\"P\r\n{n}\";1,5;-2,5;{n},25;200;3", None),
-    ("\"P;{n} \"\"left\"\"\";1,5;-2,5;{n},25;200;3\r\n\r\n# \"no row", None),
+    (
+        "\"P;{n} \"\"left\"\"\";1,5;-2,5;{n},25;200;3\r\n\r\n# \"no row",
+        None,
+    ),
     ("5\" pipe {n};1,5;-2,5;{n},25;200;3", None),
     ("P{n};1,5;abc;{n},25;200;3", Some("not_a_number")),
     ("\"P\r\n{n}\";1,5;-2,5;;200;3", Some("blank")),
@@ -47,44 +50,104 @@ fn text() -> (String, Vec<Row>) {
 }
 
 fn on(threads: usize, read: impl FnOnce() -> Taken + Send) -> Taken {
-    ThreadPoolBuilder::new().num_threads(threads).build().expect("threads").install(read)
+    ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .expect("threads")
+        .install(read)
 }
 
 #[test]
 fn oddities_at_any_place_of_a_long_file_are_those_of_a_short_one() {
     let (text, rows) = text();
-    let yaml =
-        TWO.replace("  - file: a.csv\n", "  - file: a.csv\n    delimiter: \";\"\n    decimal: comma\n    comment: \"#\"\n");
+    let yaml = TWO.replace(
+        "  - file: a.csv\n",
+        "  - file: a.csv\n    delimiter: \";\"\n    decimal: comma\n    comment: \"#\"\n",
+    );
     for threads in [1, 2, 3] {
         let desk = Desk::default().with("a.csv", text.as_str());
         let taken = on(threads, || take(&desk, &yaml, robot("rr", 1.0)).unwrap());
-        let used: Vec<(i64, &str)> =
-            (1..).zip(&rows).filter(|(_, row)| row.2.is_none()).map(|(number, row)| (number, row.1.as_str())).collect();
-        let found: Vec<(i64, &str)> =
-            taken.recording.sequence.iter().copied().zip(taken.recording.point_id.iter().map(String::as_str)).collect();
-        assert!(found == used, "{threads}: {:?}", found.iter().zip(&used).find(|(found, used)| found != used));
-        for (sequence, point) in taken.recording.sequence.iter().zip(&taken.recording.position) {
-            assert_eq!(*point, [(*sequence as f64 + 0.25) * 1e-3, 200.0 * 1e-3, 3.0 * 1e-3]);
+        let used: Vec<(i64, &str)> = (1..)
+            .zip(&rows)
+            .filter(|(_, row)| row.2.is_none())
+            .map(|(number, row)| (number, row.1.as_str()))
+            .collect();
+        let found: Vec<(i64, &str)> = taken
+            .recording
+            .sequence
+            .iter()
+            .copied()
+            .zip(taken.recording.point_id.iter().map(String::as_str))
+            .collect();
+        assert!(
+            found == used,
+            "{threads}: {:?}",
+            found.iter().zip(&used).find(|(found, used)| found != used)
+        );
+        for (sequence, point) in taken
+            .recording
+            .sequence
+            .iter()
+            .zip(&taken.recording.position)
+        {
+            assert_eq!(
+                *point,
+                [(*sequence as f64 + 0.25) * 1e-3, 200.0 * 1e-3, 3.0 * 1e-3]
+            );
         }
-        let refused: Vec<(i64, &str)> = rows.iter().filter_map(|row| Some((row.0, row.2?))).collect();
-        let found: Vec<(i64, &str)> = taken.rejected.0.iter().map(|row| (row.line, row.reason.as_str())).collect();
-        assert!(found == refused, "{threads}: {:?}", found.iter().zip(&refused).find(|(found, refused)| found != refused));
-        let shown = |reason: &str| taken.rejected.0.iter().find(|row| row.reason == reason).map(|row| row.text.as_str());
+        let refused: Vec<(i64, &str)> = rows
+            .iter()
+            .filter_map(|row| Some((row.0, row.2?)))
+            .collect();
+        let found: Vec<(i64, &str)> = taken
+            .rejected
+            .0
+            .iter()
+            .map(|row| (row.line, row.reason.as_str()))
+            .collect();
+        assert!(
+            found == refused,
+            "{threads}: {:?}",
+            found
+                .iter()
+                .zip(&refused)
+                .find(|(found, refused)| found != refused)
+        );
+        let shown = |reason: &str| {
+            taken
+                .rejected
+                .0
+                .iter()
+                .find(|row| row.reason == reason)
+                .map(|row| row.text.as_str())
+        };
         assert_eq!(shown("short_row"), Some("P222;1,5;-2,5"));
-        assert_eq!(taken.intake.0[0].lines, text.matches('\n').count() as i64 + 1);
+        assert_eq!(
+            taken.intake.0[0].lines,
+            text.matches('\n').count() as i64 + 1
+        );
     }
 }
 
 #[test]
 fn numbers_of_rows_ascend_over_the_borders_of_blocks() {
     let mut text = "id,s,q1,q2,x,y,z\n".to_string();
-    let numbers: Vec<usize> = (1..=ROWS).map(|n| if n % 5000 == 0 { n - 2 } else { n }).collect();
-    numbers.iter().for_each(|n| text.push_str(&format!("P{n:<20},{n},1.5,-2.5,{n}.25,200,3\n")));
+    let numbers: Vec<usize> = (1..=ROWS)
+        .map(|n| if n % 5000 == 0 { n - 2 } else { n })
+        .collect();
+    numbers
+        .iter()
+        .for_each(|n| text.push_str(&format!("P{n:<20},{n},1.5,-2.5,{n}.25,200,3\n")));
     let yaml = TWO.replace("      q:", "      sequence: {column: s}\n      q:");
     for threads in [1, 3] {
         let desk = Desk::default().with("a.csv", text.as_str());
         let taken = on(threads, || take(&desk, &yaml, robot("rr", 1.0)).unwrap());
-        let refused: Vec<(i64, &str)> = taken.rejected.0.iter().map(|row| (row.line, row.reason.as_str())).collect();
+        let refused: Vec<(i64, &str)> = taken
+            .rejected
+            .0
+            .iter()
+            .map(|row| (row.line, row.reason.as_str()))
+            .collect();
         let lines = (1..=ROWS as i64 / 5000).map(|k| (5000 * k + 1, "out_of_order"));
         assert_eq!(refused, lines.collect::<Vec<_>>());
         assert_eq!(taken.recording.rows(), ROWS - 4);
@@ -94,13 +157,30 @@ fn numbers_of_rows_ascend_over_the_borders_of_blocks() {
 #[test]
 fn what_is_wrong_with_a_late_row_is_an_error_of_its_line() {
     let (text, _) = text();
-    let yaml =
-        TWO.replace("  - file: a.csv\n", "  - file: a.csv\n    delimiter: \";\"\n    decimal: comma\n    comment: \"#\"\n");
+    let yaml = TWO.replace(
+        "  - file: a.csv\n",
+        "  - file: a.csv\n    delimiter: \";\"\n    decimal: comma\n    comment: \"#\"\n",
+    );
     let lines = text.matches('\n').count() + 2;
     for threads in [1, 2] {
-        let desk = Desk::default().with("a.csv", format!("{text}\r\n\"never closed;1;2;3;4;5\r\nP;1;2;3;4;5\r\n"));
-        let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-        let said = pool.install(|| take(&desk, &yaml, robot("rr", 1.0)).err().expect("a fault").to_string());
-        assert!(said.contains(&format!("a.csv:{lines}")) && said.contains("a quoted field is not closed"), "{said}");
+        let desk = Desk::default().with(
+            "a.csv",
+            format!("{text}\r\n\"never closed;1;2;3;4;5\r\nP;1;2;3;4;5\r\n"),
+        );
+        let pool = ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .expect("threads");
+        let said = pool.install(|| {
+            take(&desk, &yaml, robot("rr", 1.0))
+                .err()
+                .expect("a fault")
+                .to_string()
+        });
+        assert!(
+            said.contains(&format!("a.csv:{lines}"))
+                && said.contains("a quoted field is not closed"),
+            "{said}"
+        );
     }
 }

@@ -15,30 +15,54 @@ files:
 
 fn desk(header: &str, axis: impl Fn(usize) -> String) -> Desk {
     let rows = (0..12).map(|row| format!("{},{},{},1,2,3\n", 5 * row, 7 * row, axis(row)));
-    Desk::default().with("a.csv", format!("q1,q2,{header},x,y,z\n{}", rows.collect::<String>()))
+    Desk::default().with(
+        "a.csv",
+        format!("q1,q2,{header},x,y,z\n{}", rows.collect::<String>()),
+    )
 }
 
 #[test]
 fn an_axis_that_moves_and_that_the_robot_file_does_not_have_is_refused() {
     for (header, name) in [("eax_a", "eax_a"), ("E1", "E1"), ("track_mm", "track_mm")] {
-        let said = refusal(&desk(header, |row| format!("{}", 100 * row)), YAML, robot("rr", 1.0));
-        let sentence =
-            format!("a.csv: column `{name}` is an external axis, in addition to the robot's 2 joints, and moves from 0 to 1100");
+        let said = refusal(
+            &desk(header, |row| format!("{}", 100 * row)),
+            YAML,
+            robot("rr", 1.0),
+        );
+        let sentence = format!(
+            "a.csv: column `{name}` is an external axis, in addition to the robot's 2 joints, and moves from 0 to 1100"
+        );
         assert!(said.starts_with(&sentence), "{said}");
     }
     for (header, value) in [("eax_a", "9E9"), ("E1", "0.004"), ("rail", "")] {
-        take(&desk(header, |_| value.into()), YAML, robot("rr", 1.0)).unwrap_or_else(|error| panic!("{header}: {error}"));
+        take(&desk(header, |_| value.into()), YAML, robot("rr", 1.0))
+            .unwrap_or_else(|error| panic!("{header}: {error}"));
     }
     // What is called otherwise is none of calib's business.
-    take(&desk("speed", |row| format!("{row}")), YAML, robot("rr", 1.0)).expect("a recording");
+    take(
+        &desk("speed", |row| format!("{row}")),
+        YAML,
+        robot("rr", 1.0),
+    )
+    .expect("a recording");
     // An axis that is mapped is the robot's.
-    let mapped = YAML.replace("{column: \"q{j}\", unit: deg}", "{columns: [eax_a, q1, q2], unit: deg, linear_unit: mm}");
-    take(&desk("eax_a", |row| format!("{}", 100 * row)), &mapped, robot("prr", 1.0)).expect("a recording");
+    let mapped = YAML.replace(
+        "{column: \"q{j}\", unit: deg}",
+        "{columns: [eax_a, q1, q2], unit: deg, linear_unit: mm}",
+    );
+    take(
+        &desk("eax_a", |row| format!("{}", 100 * row)),
+        &mapped,
+        robot("prr", 1.0),
+    )
+    .expect("a recording");
 }
 
 #[test]
 fn joints_beyond_the_limits_are_a_hint_of_their_counting() {
-    let text: String = (0..12).map(|row| format!("{},{},1,2,3\n", 120 + 5 * row, 7 * row)).collect();
+    let text: String = (0..12)
+        .map(|row| format!("{},{},1,2,3\n", 120 + 5 * row, 7 * row))
+        .collect();
     let desk = Desk::default().with("a.csv", format!("q1,q2,x,y,z\n{text}"));
     take(&desk, YAML, robot("rr", 0.5)).expect("a recording");
     let warnings = desk.warnings.lock().expect("warnings").join("\n");

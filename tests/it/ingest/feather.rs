@@ -15,15 +15,33 @@ fn feather(text: &str, compression: Option<CompressionType>) -> Vec<u8> {
     let (names, rows) = (lines.next().unwrap(), lines.collect::<Vec<_>>());
     let column = |k: usize| -> ArrayRef {
         let cells = || rows.iter().map(|row| row[k]);
-        match cells().map(|cell| if cell.is_empty() { Ok(None) } else { cell.parse().map(Some) }).collect::<Result<Vec<_>, _>>() {
+        match cells()
+            .map(|cell| {
+                if cell.is_empty() {
+                    Ok(None)
+                } else {
+                    cell.parse().map(Some)
+                }
+            })
+            .collect::<Result<Vec<_>, _>>()
+        {
             Ok(numbers) => Arc::new(Float64Array::from(numbers)),
             Err(_) => Arc::new(StringArray::from_iter_values(cells())),
         }
     };
-    let batch = RecordBatch::try_from_iter(names.iter().enumerate().map(|(k, name)| (*name, column(k)))).unwrap();
-    let options = IpcWriteOptions::default().try_with_compression(compression).unwrap();
-    let mut writer = FileWriter::try_new_with_options(Vec::new(), &batch.schema(), options).unwrap();
-    (0..batch.num_rows()).step_by(50).for_each(|row| writer.write(&batch.slice(row, 50.min(batch.num_rows() - row))).unwrap());
+    let batch =
+        RecordBatch::try_from_iter(names.iter().enumerate().map(|(k, name)| (*name, column(k))))
+            .unwrap();
+    let options = IpcWriteOptions::default()
+        .try_with_compression(compression)
+        .unwrap();
+    let mut writer =
+        FileWriter::try_new_with_options(Vec::new(), &batch.schema(), options).unwrap();
+    (0..batch.num_rows()).step_by(50).for_each(|row| {
+        writer
+            .write(&batch.slice(row, 50.min(batch.num_rows() - row)))
+            .unwrap()
+    });
     writer.into_inner().unwrap()
 }
 
@@ -45,7 +63,9 @@ fn case(here: &Path, written: impl Fn(&str) -> Vec<u8>) {
         let text = std::fs::read_to_string(example.join(name).with_extension("csv")).unwrap();
         std::fs::write(here.join(name).with_extension("feather"), written(&text)).unwrap();
     }
-    let pipeline = std::fs::read_to_string(root.join("pipeline.yaml")).unwrap().replace(".csv", ".feather");
+    let pipeline = std::fs::read_to_string(root.join("pipeline.yaml"))
+        .unwrap()
+        .replace(".csv", ".feather");
     std::fs::write(here.join("p.yaml"), pipeline.replace("example/r01", ".")).unwrap();
 }
 
@@ -53,17 +73,36 @@ fn case(here: &Path, written: impl Fn(&str) -> Vec<u8>) {
 fn a_recording_in_feather_files_is_diagnosed_as_its_text_is() {
     let said = |compression: Option<Option<CompressionType>>| {
         let folder = tempfile::tempdir().unwrap();
-        case(folder.path(), |text| compression.map_or_else(|| text.into(), |compression| feather(text, compression)));
+        case(folder.path(), |text| {
+            compression.map_or_else(|| text.into(), |compression| feather(text, compression))
+        });
         let run = calib(folder.path(), &["run", "p.yaml", "--until", "split"]);
-        assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
-        let recording = from_file::<Recording>(&folder.path().join("s/tables/case/ingest.recording.parquet")).unwrap().table;
+        assert!(
+            run.status.success(),
+            "{}",
+            String::from_utf8_lossy(&run.stderr)
+        );
+        let recording =
+            from_file::<Recording>(&folder.path().join("s/tables/case/ingest.recording.parquet"))
+                .unwrap()
+                .table;
         let output = calib(folder.path(), &["diagnose", "p.yaml", "--json"]);
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        assert!(
+            output.status.success(),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
         let mut said: Value = serde_json::from_slice(&output.stdout).unwrap();
         (recording, said["findings"].take())
     };
     let (text, plain) = (said(None), said(Some(None)));
-    assert!(text.1.as_array().is_some_and(|findings| !findings.is_empty()), "{:#}", text.1);
+    assert!(
+        text.1
+            .as_array()
+            .is_some_and(|findings| !findings.is_empty()),
+        "{:#}",
+        text.1
+    );
     assert!(text == plain && text == said(Some(Some(CompressionType::ZSTD))));
 }
 
@@ -77,9 +116,15 @@ fn a_feather_file_that_cannot_be_read_is_refused_with_a_reason() {
         String::from_utf8(output.stderr).unwrap()
     };
     let said = refused(&|bytes| bytes[..bytes.len() / 2].to_vec());
-    assert!(said.contains("controller.feather: is a Feather file that cannot be read: "), "{said}");
+    assert!(
+        said.contains("controller.feather: is a Feather file that cannot be read: "),
+        "{said}"
+    );
     let said = refused(&|bytes| [b"FEA1", &bytes[4..]].concat());
-    assert!(said.contains("is a Feather file of version 1; allowed: version 2"), "{said}");
+    assert!(
+        said.contains("is a Feather file of version 1; allowed: version 2"),
+        "{said}"
+    );
 }
 
 /// An array of NumPy, version 1, as `numpy.save` writes it.
@@ -87,7 +132,13 @@ fn npy(kind: &str, shape: &str, data: &[u8]) -> Vec<u8> {
     let mut head = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}");
     let length = (head.len() + 11).next_multiple_of(64) - 10;
     head = format!("{head:<0$}\n", length - 1);
-    [b"\x93NUMPY\x01\x00", &(length as u16).to_le_bytes()[..], head.as_bytes(), data].concat()
+    [
+        b"\x93NUMPY\x01\x00",
+        &(length as u16).to_le_bytes()[..],
+        head.as_bytes(),
+        data,
+    ]
+    .concat()
 }
 
 #[test]
@@ -96,45 +147,93 @@ fn a_stream_of_arrow_and_arrays_of_numpy_are_read_as_columns() {
     use std::io::Write;
     let rows = |bytes: &[u8]| {
         assert!(has_columns(bytes) && !is_workbook(bytes));
-        let (mut reader, mut record, mut rows) = (ColumnRows::open(bytes, "run").unwrap(), Record::default(), Vec::new());
+        let (mut reader, mut record, mut rows) = (
+            ColumnRows::open(bytes, "run").unwrap(),
+            Record::default(),
+            Vec::new(),
+        );
         while reader.next(&mut record).unwrap() {
             rows.push(record.cells());
         }
         (rows, reader.remark())
     };
-    let batch = RecordBatch::try_from_iter([("q", Arc::new(Float64Array::from(vec![0.5, -1.25])) as ArrayRef)]).unwrap();
+    let batch = RecordBatch::try_from_iter([(
+        "q",
+        Arc::new(Float64Array::from(vec![0.5, -1.25])) as ArrayRef,
+    )])
+    .unwrap();
     let mut stream = arrow_ipc::writer::StreamWriter::try_new(Vec::new(), &batch.schema()).unwrap();
     stream.write(&batch).unwrap();
     let stream = stream.into_inner().unwrap();
     assert_eq!(rows(&stream).0, [["q"], ["0.5"], ["-1.25"]]);
 
-    let floats = |numbers: &[f64]| numbers.iter().flat_map(|number| number.to_le_bytes()).collect::<Vec<u8>>();
+    let floats = |numbers: &[f64]| {
+        numbers
+            .iter()
+            .flat_map(|number| number.to_le_bytes())
+            .collect::<Vec<u8>>()
+    };
     let mut archive = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
     let names: Vec<u8> = ["P1", "P\u{e4}2"]
         .iter()
-        .flat_map(|name| name.chars().chain(std::iter::repeat('\0')).take(3).flat_map(|letter| (letter as u32).to_le_bytes()))
+        .flat_map(|name| {
+            name.chars()
+                .chain(std::iter::repeat('\0'))
+                .take(3)
+                .flat_map(|letter| (letter as u32).to_le_bytes())
+        })
         .collect();
-    let big: Vec<u8> = [7i32, -2].iter().flat_map(|number| number.to_be_bytes()).collect();
+    let big: Vec<u8> = [7i32, -2]
+        .iter()
+        .flat_map(|number| number.to_be_bytes())
+        .collect();
     for (name, array) in [
-        ("q", npy("<f8", "(2, 3)", &floats(&[0.1, 0.2, 0.3, 1.1, 1.2, 1.3]))),
-        ("time_ns", npy("<i8", "(2,)", &[1_700_000_000_123_456_789i64, -1].map(i64::to_le_bytes).concat())),
+        (
+            "q",
+            npy("<f8", "(2, 3)", &floats(&[0.1, 0.2, 0.3, 1.1, 1.2, 1.3])),
+        ),
+        (
+            "time_ns",
+            npy(
+                "<i8",
+                "(2,)",
+                &[1_700_000_000_123_456_789i64, -1]
+                    .map(i64::to_le_bytes)
+                    .concat(),
+            ),
+        ),
         ("name", npy("<U3", "(2,)", &names)),
         ("count", npy(">i4", "(2,)", &big)),
         ("rate", npy("<f8", "()", &floats(&[125.0]))),
     ] {
-        archive.start_file(format!("{name}.npy"), zip::write::SimpleFileOptions::default()).unwrap();
+        archive
+            .start_file(
+                format!("{name}.npy"),
+                zip::write::SimpleFileOptions::default(),
+            )
+            .unwrap();
         archive.write_all(&array).unwrap();
     }
     let bytes = archive.finish().unwrap().into_inner();
     let (found, remark) = rows(&bytes);
-    assert_eq!(found[0], ["q[1]", "q[2]", "q[3]", "time_ns", "name", "count"]);
-    assert_eq!(found[1], ["0.1", "0.2", "0.3", "1700000000123456789", "P1", "7"]);
+    assert_eq!(
+        found[0],
+        ["q[1]", "q[2]", "q[3]", "time_ns", "name", "count"]
+    );
+    assert_eq!(
+        found[1],
+        ["0.1", "0.2", "0.3", "1700000000123456789", "P1", "7"]
+    );
     assert_eq!(found[2], ["1.1", "1.2", "1.3", "-1", "P\u{e4}2", "-2"]);
-    assert_eq!(remark.as_deref(), Some("arrays of another length than 2 left out: `rate` (0 rows)"));
+    assert_eq!(
+        remark.as_deref(),
+        Some("arrays of another length than 2 left out: `rate` (0 rows)")
+    );
     // Damaged bytes are a fault of the file.
     for at in 0..bytes.len() {
         let mut changed = bytes.clone();
         changed[at] ^= 0x5a;
-        let _ = ColumnRows::open(&changed[..], "run").map(|mut reader| reader.next(&mut Record::default()));
+        let _ = ColumnRows::open(&changed[..], "run")
+            .map(|mut reader| reader.next(&mut Record::default()));
     }
 }

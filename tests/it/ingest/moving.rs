@@ -33,7 +33,12 @@ fn one_file(more: &str) -> String {
 #[test]
 fn velocities_arrive_in_the_unit_that_the_settings_say() {
     let yaml = one_file("      velocity: {column: \"dq{j}\", unit: deg/s}\n");
-    let taken = take(&Desk::default().with("a.csv", controller(0.01, 50, |_| false)), &yaml, robot("rr", 1.0)).unwrap();
+    let taken = take(
+        &Desk::default().with("a.csv", controller(0.01, 50, |_| false)),
+        &yaml,
+        robot("rr", 1.0),
+    )
+    .unwrap();
     let velocity = taken.recording.velocity.unwrap();
     for row in 0..50 {
         for number in 0..2 {
@@ -42,7 +47,12 @@ fn velocities_arrive_in_the_unit_that_the_settings_say() {
     }
     let wrong = yaml.replace("deg/s", "deg");
     let faults = settings(&wrong).check();
-    assert!(faults.iter().any(|fault| fault.message.contains("allowed: rad/s, deg/s")), "{faults:?}");
+    assert!(
+        faults
+            .iter()
+            .any(|fault| fault.message.contains("allowed: rad/s, deg/s")),
+        "{faults:?}"
+    );
 }
 
 #[test]
@@ -52,7 +62,10 @@ fn velocities_follow_from_the_joints_over_time_but_never_across_gaps() {
     let left_out = |row: usize| (20..40).contains(&row) && row != 30;
     let desk = Desk::default().with("a.csv", controller(0.01, 80, left_out));
     let taken = take(&desk, &yaml, robot("rr", 1.0)).unwrap();
-    let (time, velocity) = (taken.recording.time.unwrap(), taken.recording.velocity.unwrap());
+    let (time, velocity) = (
+        taken.recording.time.unwrap(),
+        taken.recording.velocity.unwrap(),
+    );
     for (row, time) in time.iter().enumerate() {
         for number in 0..2 {
             let (found, expected) = (velocity[2 * row + number], joint(number, *time).1);
@@ -60,13 +73,17 @@ fn velocities_follow_from_the_joints_over_time_but_never_across_gaps() {
                 assert!(found.is_nan(), "nothing is known of a row between two gaps");
             } else {
                 // h2/6 of the third derivative in the middle, twice that at the ends of a stretch: 4e-4 of 1.2 rad/s.
-                assert!((found - expected).abs() < 5e-4, "{time}: {found} against {expected}");
+                assert!(
+                    (found - expected).abs() < 5e-4,
+                    "{time}: {found} against {expected}"
+                );
             }
         }
     }
     let said = desk.notes.lock().unwrap().join("\n");
     assert!(
-        said.contains("10.0 ms apart, never across gaps above 50 ms") && said.contains("none for 1 row between gaps"),
+        said.contains("10.0 ms apart, never across gaps above 50 ms")
+            && said.contains("none for 1 row between gaps"),
         "{said}"
     );
 }
@@ -76,9 +93,15 @@ fn standing_points_are_refused_where_velocities_are_asked_for() {
     let yaml = one_file("motion: {}\n");
     let desk = Desk::default().with("a.csv", controller(1.6, 60, |_| false));
     let text = refusal(&desk, &yaml, robot("rr", 1.0));
-    assert!(text.contains("1600.0 ms apart, too far") && text.contains("leave `motion` out"), "{text}");
+    assert!(
+        text.contains("1600.0 ms apart, too far") && text.contains("leave `motion` out"),
+        "{text}"
+    );
     let faults = settings(&yaml.replace("      time: {column: t, unit: s}\n", "")).check();
-    assert!(faults.iter().any(|fault| fault.place == "motion"), "{faults:?}");
+    assert!(
+        faults.iter().any(|fault| fault.place == "motion"),
+        "{faults:?}"
+    );
 }
 
 #[test]
@@ -86,9 +109,20 @@ fn velocities_in_another_unit_than_the_settings_say_are_refused() {
     let yaml = one_file("      velocity: {column: \"dq{j}\", unit: rad/s}\nmotion: {}\n");
     let desk = Desk::default().with("a.csv", controller(0.01, 50, |_| false));
     let text = refusal(&desk, &yaml, robot("rr", 1.0));
-    assert!(text.contains("the velocities of joint 1 are 57.") && text.contains("state the unit and sign"), "{text}");
+    assert!(
+        text.contains("the velocities of joint 1 are 57.")
+            && text.contains("state the unit and sign"),
+        "{text}"
+    );
     let yaml = yaml.replace("rad/s", "deg/s");
-    assert!(take(&Desk::default().with("a.csv", controller(0.01, 50, |_| false)), &yaml, robot("rr", 1.0)).is_ok());
+    assert!(
+        take(
+            &Desk::default().with("a.csv", controller(0.01, 50, |_| false)),
+            &yaml,
+            robot("rr", 1.0)
+        )
+        .is_ok()
+    );
 }
 
 /// A controller at 250 Hz and a tracker at 60 Hz whose clock is 1 s ahead: without carrying, joints are up to 2 ms from their point.
@@ -98,12 +132,17 @@ fn two_clocks_become_one_recording_with_the_joints_at_the_moment_of_the_point() 
     for row in 0..100 {
         writeln!(tracker, "{:.6},1,2,3", 1.0 + 0.0033 + row as f64 / 60.0).unwrap();
     }
-    let controller_columns = "      time: {column: t, unit: s}\n      q: {column: \"q{j}\", unit: deg}\n";
+    let controller_columns =
+        "      time: {column: t, unit: s}\n      q: {column: \"q{j}\", unit: deg}\n";
     let tracker_columns = format!("      time: {{column: stamp, unit: s}}\n{POINT}");
     let files = |tracker_first: bool, velocity: &str| {
         let a = format!("  - file: a.csv\n    columns:\n{controller_columns}{velocity}");
         let b = format!("  - file: b.csv\n    columns:\n{tracker_columns}");
-        let (first, second, offset) = if tracker_first { (b, a, -1.0) } else { (a, b, 1.0) };
+        let (first, second, offset) = if tracker_first {
+            (b, a, -1.0)
+        } else {
+            (a, b, 1.0)
+        };
         format!(
             "files:\n{first}{second}join: {{by: time, tolerance_s: 0.0021, offset_s: {offset}}}\nmax_rejected_fraction: 0.9\n"
         )
@@ -111,31 +150,59 @@ fn two_clocks_become_one_recording_with_the_joints_at_the_moment_of_the_point() 
     for (tracker_first, velocity, motion) in [
         (false, "", "motion: {}\n"),
         (true, "", "motion: {}\n"),
-        (false, "      velocity: {column: \"dq{j}\", unit: deg/s}\n", ""),
+        (
+            false,
+            "      velocity: {column: \"dq{j}\", unit: deg/s}\n",
+            "",
+        ),
     ] {
-        let desk = Desk::default().with("a.csv", controller(0.004, 430, |_| false)).with("b.csv", tracker.as_str());
-        let taken = take(&desk, &format!("{}{motion}", files(tracker_first, velocity)), robot("rr", 1.0)).unwrap();
+        let desk = Desk::default()
+            .with("a.csv", controller(0.004, 430, |_| false))
+            .with("b.csv", tracker.as_str());
+        let taken = take(
+            &desk,
+            &format!("{}{motion}", files(tracker_first, velocity)),
+            robot("rr", 1.0),
+        )
+        .unwrap();
         assert_eq!(taken.recording.rows(), 100);
         for row in 0..100 {
             let moment = 0.0033 + row as f64 / 60.0;
             for number in 0..2 {
                 let (q, velocity) = joint(number, moment);
                 let found = taken.recording.q(row)[number];
-                assert!((found - q).abs() < 1e-6, "{tracker_first}: {found} against {q}");
-                assert!((taken.recording.velocity.as_ref().unwrap()[2 * row + number] - velocity).abs() < 2e-3);
+                assert!(
+                    (found - q).abs() < 1e-6,
+                    "{tracker_first}: {found} against {q}"
+                );
+                assert!(
+                    (taken.recording.velocity.as_ref().unwrap()[2 * row + number] - velocity).abs()
+                        < 2e-3
+                );
             }
         }
         let said = desk.notes.lock().unwrap().join("\n");
-        assert!(said.contains("extrapolated by their velocity to the time of their point"), "{said}");
+        assert!(
+            said.contains("extrapolated by their velocity to the time of their point"),
+            "{said}"
+        );
     }
 }
 
 #[test]
 fn points_that_are_known_to_be_late_take_their_joints_with_them() {
     let yaml = one_file("motion: {later_s: 0.002}\n");
-    let taken = take(&Desk::default().with("a.csv", controller(0.01, 50, |_| false)), &yaml, robot("rr", 1.0)).unwrap();
+    let taken = take(
+        &Desk::default().with("a.csv", controller(0.01, 50, |_| false)),
+        &yaml,
+        robot("rr", 1.0),
+    )
+    .unwrap();
     for row in 0..50 {
         let expected = joint(1, 0.01 * row as f64 + 0.002).0;
-        assert!((taken.recording.q(row)[1] - expected).abs() < 2e-6, "row {row}");
+        assert!(
+            (taken.recording.q(row)[1] - expected).abs() < 2e-6,
+            "row {row}"
+        );
     }
 }

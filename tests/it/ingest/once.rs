@@ -22,30 +22,53 @@ join: {by: id}
 
 /// What a measurement gives, and how often each file was opened.
 fn read(arm: &str, tracker: &str, yaml: &str) -> (Taken, [usize; 2]) {
-    let desk = Desk::default().with("arm.csv", format!("k,q1\n{arm}")).with("tracker.csv", format!("k,x,y,z\n{tracker}"));
+    let desk = Desk::default()
+        .with("arm.csv", format!("k,q1\n{arm}"))
+        .with("tracker.csv", format!("k,x,y,z\n{tracker}"));
     let taken = take(&desk, yaml, robot("r", 2.0)).unwrap();
     let opened = desk.opened.lock().unwrap().clone();
-    (taken, ["arm.csv", "tracker.csv"].map(|name| opened.iter().filter(|file| *file == name).count()))
+    (
+        taken,
+        ["arm.csv", "tracker.csv"].map(|name| opened.iter().filter(|file| *file == name).count()),
+    )
 }
 
 fn refused(taken: &Taken) -> Vec<(&str, i64, &str)> {
-    taken.rejected.0.iter().map(|row| (row.file.as_str(), row.line, row.reason.as_str())).collect()
+    taken
+        .rejected
+        .0
+        .iter()
+        .map(|row| (row.file.as_str(), row.line, row.reason.as_str()))
+        .collect()
 }
 
 #[test]
 fn rows_that_are_used_as_they_come_are_read_once() {
-    let (taken, opened) = read("A,1\nB,2\nC,bad\nD,3\n", "D,4,4,4\nB,2,2,2\nA,1,1,1\n", JOINED);
+    let (taken, opened) = read(
+        "A,1\nB,2\nC,bad\nD,3\n",
+        "D,4,4,4\nB,2,2,2\nA,1,1,1\n",
+        JOINED,
+    );
     assert_eq!(opened, [1, 1]);
     assert_eq!(taken.recording.point_id, ["A", "B", "D"]);
     assert_eq!(taken.recording.sequence, [1, 2, 4]);
     assert_eq!(refused(&taken), [("arm.csv", 4, "not_a_number")]);
     let columns = "  - file: tracker.csv\n    columns:\n";
-    let ordered = JOINED.replace("by: id", "by: order").replace(&format!("{columns}      point_id: {{column: k}}\n"), columns);
+    let ordered = JOINED.replace("by: id", "by: order").replace(
+        &format!("{columns}      point_id: {{column: k}}\n"),
+        columns,
+    );
     let (taken, opened) = read("A,1\nB,2\nC,3\n", "a,1,1,1\nb,,2,2\nc,3,3,3\n", &ordered);
     assert_eq!(opened, [1, 1]);
-    assert_eq!(refused(&taken), [("arm.csv", 3, "unmatched"), ("tracker.csv", 3, "blank")]);
+    assert_eq!(
+        refused(&taken),
+        [("arm.csv", 3, "unmatched"), ("tracker.csv", 3, "blank")]
+    );
     let desk = Desk::default().with("a.csv", format!("{HEAD}{}", good(3)));
-    assert_eq!(take(&desk, TWO, robot("rr", 1.0)).unwrap().recording.rows(), 3);
+    assert_eq!(
+        take(&desk, TWO, robot("rr", 1.0)).unwrap().recording.rows(),
+        3
+    );
     assert_eq!(*desk.opened.lock().unwrap(), ["a.csv"]);
 }
 
@@ -64,23 +87,43 @@ fn an_id_that_stands_twice_is_known_before_anything_is_written() {
     let (taken, opened) = read("A,1\nB,2\nA,3\n", "A,1,1,1\nB,3,3,3\n", &yaml);
     assert_eq!(opened, [1, 1]);
     assert_eq!(taken.recording.point_id, ["B"]);
-    let places = [("arm.csv", 2, "duplicate_id"), ("arm.csv", 4, "duplicate_id"), ("tracker.csv", 2, "unmatched")];
+    let places = [
+        ("arm.csv", 2, "duplicate_id"),
+        ("arm.csv", 4, "duplicate_id"),
+        ("tracker.csv", 2, "unmatched"),
+    ];
     assert_eq!(refused(&taken), places);
 }
 
 #[test]
 fn files_that_do_not_fit_into_memory_are_read_twice_and_give_the_same_tables() {
-    let (arm, tracker) = ("A,1\nB,2\nA,3\nC,bad\nD,4\nE,5\n", "E,5,5,5\nX,1,1,1\nB,3,3,3\nD,4,4,4\n");
+    let (arm, tracker) = (
+        "A,1\nB,2\nA,3\nC,bad\nD,4\nE,5\n",
+        "E,5,5,5\nX,1,1,1\nB,3,3,3\nD,4,4,4\n",
+    );
     let yaml = format!("{JOINED}max_rejected_fraction: 0.9\n");
-    for (tracker, times) in [(tracker, [2, 2]), (&tracker.replace("X,1,1,1\n", ""), [2, 1])] {
+    for (tracker, times) in [
+        (tracker, [2, 2]),
+        (&tracker.replace("X,1,1,1\n", ""), [2, 1]),
+    ] {
         let (held, opened) = read(arm, tracker, &yaml);
         assert_eq!(opened, [1, 1]);
-        let desk = Desk::default().with("arm.csv", format!("k,q1\n{arm}")).with("tracker.csv", format!("k,x,y,z\n{tracker}"));
-        let reads = IngestReads { robot: robot("r", 2.0) };
-        let tables = desk.written(&IngestWrites::ports(), |context| settings(&yaml).run_holding(0, reads, context)?.give());
+        let desk = Desk::default()
+            .with("arm.csv", format!("k,q1\n{arm}"))
+            .with("tracker.csv", format!("k,x,y,z\n{tracker}"));
+        let reads = IngestReads {
+            robot: robot("r", 2.0),
+        };
+        let tables = desk.written(&IngestWrites::ports(), |context| {
+            settings(&yaml).run_holding(0, reads, context)?.give()
+        });
         let again = taken(tables.unwrap()).unwrap();
         let opened = desk.opened.lock().unwrap().clone();
-        assert_eq!(["arm.csv", "tracker.csv"].map(|name| opened.iter().filter(|file| *file == name).count()), times);
+        assert_eq!(
+            ["arm.csv", "tracker.csv"]
+                .map(|name| opened.iter().filter(|file| *file == name).count()),
+            times
+        );
         assert_eq!(again.recording, held.recording);
         assert_eq!(again.rejected, held.rejected);
         assert_eq!(again.recording.point_id, ["B", "D", "E"]);

@@ -10,7 +10,9 @@ fn with(file: &str, yaml: &str) -> String {
 #[test]
 fn a_missing_column_is_named_with_those_that_are_there() {
     let desk = Desk::default().with("a.csv", "id,q1,q2,x,y_m,depth\nP,1,2,3,4,5\n");
-    let yaml = TWO.replace("column: y,", "column: y_mm,").replace("column: z,", "column: height,");
+    let yaml = TWO
+        .replace("column: y,", "column: y_mm,")
+        .replace("column: z,", "column: height,");
     let expected = "a.csv:1: no column `y_mm`, mapped to `y`; did you mean `y_m`?\n\
                     a.csv:1: no column `height`, mapped to `z`; found: id, q1, q2, x, y_m, depth";
     assert_eq!(refusal(&desk, &yaml, robot("rr", 1.0)), expected);
@@ -18,38 +20,78 @@ fn a_missing_column_is_named_with_those_that_are_there() {
 
 #[test]
 fn a_file_that_is_none_says_what_it_is() {
-    assert_eq!(with("", TWO), "a.csv: is empty; allowed: a header and at least one data row");
-    assert_eq!(with(HEAD, TWO), "a.csv: has a header but no data row; allowed: at least one");
-    assert_eq!(with("\n\n", TWO), "a.csv: has no header: 2 lines, all empty, comments or skipped");
-    let open = with(&format!("{HEAD}P1,1,2,3,4,5\n\"P2,1,2,3,4,5\nP3,1,2,3,4,5\n"), TWO);
+    assert_eq!(
+        with("", TWO),
+        "a.csv: is empty; allowed: a header and at least one data row"
+    );
+    assert_eq!(
+        with(HEAD, TWO),
+        "a.csv: has a header but no data row; allowed: at least one"
+    );
+    assert_eq!(
+        with("\n\n", TWO),
+        "a.csv: has no header: 2 lines, all empty, comments or skipped"
+    );
+    let open = with(
+        &format!("{HEAD}P1,1,2,3,4,5\n\"P2,1,2,3,4,5\nP3,1,2,3,4,5\n"),
+        TWO,
+    );
     assert_eq!(open, "a.csv:3: a quoted field is not closed");
     let endless = with(&format!("{HEAD}P1,1,2,3,4,{}", "5".repeat(1 << 21)), TWO);
-    assert_eq!(endless, "a.csv:2: a row of more than 1 MiB; allowed: rows ending in LF or CRLF, every quote closed");
+    assert_eq!(
+        endless,
+        "a.csv:2: a row of more than 1 MiB; allowed: rows ending in LF or CRLF, every quote closed"
+    );
 }
 
 #[test]
 fn a_file_whose_lines_end_in_cr_alone_says_how_to_convert_it() {
     let expected = "a.csv: the lines end in CR alone; allowed: LF or CRLF. Save it again with such line ends, or convert it: \
                     `tr '\\r' '\\n' < a.csv > converted.csv`";
-    assert_eq!(with(&format!("{HEAD}P1,1,2,3,4,5\nP2,1,2,3,4,6\n").replace('\n', "\r"), TWO), expected);
+    assert_eq!(
+        with(
+            &format!("{HEAD}P1,1,2,3,4,5\nP2,1,2,3,4,6\n").replace('\n', "\r"),
+            TWO
+        ),
+        expected
+    );
     // A CRLF that was cut is none.
-    assert_eq!(with("id,q1,q2,x,y,z\r", TWO), "a.csv: has a header but no data row; allowed: at least one");
+    assert_eq!(
+        with("id,q1,q2,x,y,z\r", TWO),
+        "a.csv: has a header but no data row; allowed: at least one"
+    );
 }
 
 #[test]
 fn a_column_of_two_measured_quantities_or_joints_is_a_fault() {
-    let faults = |yaml: &str| calib::stage::Stage::check(&settings(yaml)).iter().map(ToString::to_string).collect::<Vec<_>>();
+    let faults = |yaml: &str| {
+        calib::stage::Stage::check(&settings(yaml))
+            .iter()
+            .map(ToString::to_string)
+            .collect::<Vec<_>>()
+    };
     let own = "allowed: a column for each";
     assert_eq!(
         faults(&TWO.replace("column: y", "column: \" x\"")),
-        [format!("files[0].columns.y.column: column ` x` is mapped to `x` and `y`; {own}")]
+        [format!(
+            "files[0].columns.y.column: column ` x` is mapped to `x` and `y`; {own}"
+        )]
     );
     assert_eq!(
         faults(&TWO.replace("column: \"q{j}\"", "columns: [q1, q1]")),
-        [format!("files[0].columns.q.columns[1]: column `q1` is mapped to joint 1 of `q` and joint 2 of `q`; {own}")]
+        [format!(
+            "files[0].columns.q.columns[1]: column `q1` is mapped to joint 1 of `q` and joint 2 of `q`; {own}"
+        )]
     );
-    let target = TWO.replace("column: x", "column: xt, minus: xd").replace("column: y", "column: yt, minus: xd");
-    assert_eq!(faults(&target), [format!("files[0].columns.y.minus: column `xd` is mapped to `x` and `y`; {own}")]);
+    let target = TWO
+        .replace("column: x", "column: xt, minus: xd")
+        .replace("column: y", "column: yt, minus: xd");
+    assert_eq!(
+        faults(&target),
+        [format!(
+            "files[0].columns.y.minus: column `xd` is mapped to `x` and `y`; {own}"
+        )]
+    );
     // A target is also the simulated point; one uncertainty is that of all axes.
     let more = "      sim_x: {column: xt, unit: mm}\n      sim_y: {column: yt, unit: mm}\n      sim_z: {column: zt, unit: mm}\n      \
                 sigma_x: {column: s, unit: mm}\n      sigma_y: {column: s, unit: mm}\n      sigma_z: {column: s, unit: mm}\n";
@@ -60,7 +102,10 @@ fn a_column_of_two_measured_quantities_or_joints_is_a_fault() {
 #[test]
 fn a_header_of_another_shape_gets_a_hint() {
     let semicolons = with("id;q1;q2;x;y;z\n", TWO);
-    assert!(semicolons.ends_with("found: id;q1;q2;x;y;z (one column; `delimiter: \";\"`?)"), "{semicolons}");
+    assert!(
+        semicolons.ends_with("found: id;q1;q2;x;y;z (one column; `delimiter: \";\"`?)"),
+        "{semicolons}"
+    );
     assert!(with("1,2,3,4,5,6\n", TWO).ends_with("(all numbers; `header: false`?)"));
     let twice = with("id,q1,q2,x,y,z,x\n", TWO);
     assert!(twice.starts_with("a.csv:1: column `x`, mapped to `x`, stands twice in the header (4 and 7); name it by number"));
@@ -70,35 +115,65 @@ fn a_header_of_another_shape_gets_a_hint() {
 fn another_number_of_joints_is_an_error_of_the_file() {
     let desk = || rows(&good(3));
     let more = refusal(&desk(), TWO, robot("rrr", 1.0));
-    assert!(more.starts_with("a.csv:1: `q` has 2 of its columns; the robot has 3 joints\na.csv:1: no column `q3`"), "{more}");
+    assert!(
+        more.starts_with(
+            "a.csv:1: `q` has 2 of its columns; the robot has 3 joints\na.csv:1: no column `q3`"
+        ),
+        "{more}"
+    );
     let fewer = refusal(&desk(), TWO, robot("r", 1.0));
-    assert!(fewer.starts_with("a.csv:1: column `q2`, by the pattern of `q`: the robot has 1 joint only"), "{fewer}");
-    let listed = refusal(&desk(), &TWO.replace("column: \"q{j}\"", "columns: [q1, q2]"), robot("rrr", 1.0));
-    assert!(listed.starts_with("a.csv:1: `q` lists 2 columns; the robot has 3 joints"), "{listed}");
+    assert!(
+        fewer
+            .starts_with("a.csv:1: column `q2`, by the pattern of `q`: the robot has 1 joint only"),
+        "{fewer}"
+    );
+    let listed = refusal(
+        &desk(),
+        &TWO.replace("column: \"q{j}\"", "columns: [q1, q2]"),
+        robot("rrr", 1.0),
+    );
+    assert!(
+        listed.starts_with("a.csv:1: `q` lists 2 columns; the robot has 3 joints"),
+        "{listed}"
+    );
     let linear = refusal(&desk(), TWO, robot("pr", 1.0));
-    assert!(linear.starts_with("a.csv:1: joint 1 is prismatic; say `linear_unit` for `q`"), "{linear}");
+    assert!(
+        linear.starts_with("a.csv:1: joint 1 is prismatic; say `linear_unit` for `q`"),
+        "{linear}"
+    );
 }
 
 #[test]
 fn an_unannounced_decimal_comma_is_an_error_that_says_so() {
-    let yaml = TWO.replace("  - file: a.csv\n", "  - file: a.csv\n    delimiter: \";\"\n");
+    let yaml = TWO.replace(
+        "  - file: a.csv\n",
+        "  - file: a.csv\n    delimiter: \";\"\n",
+    );
     let file = "id;q1;q2;x;y;z\nP1;0,365;1;2;3;4\nP2;1;2,5;2;3;4\n";
     let expected = "a.csv:2: no row is left; allowed: up to 50 % (`max_rejected_fraction`); reasons: 2 not_a_number \
                     (line 2: q1: `0,365` has a decimal comma; allowed: `decimal: comma` in the settings)";
     assert_eq!(with(file, &yaml), expected);
     let announced = yaml.replace("delimiter", "decimal: comma\n    delimiter");
     let points = with("id;q1;q2;x;y;z\nP1;0.365;1;2;3;4\n", &announced);
-    assert!(points.contains("q1: `0.365` has a decimal point; allowed: `decimal: point` in the settings"), "{points}");
+    assert!(
+        points
+            .contains("q1: `0.365` has a decimal point; allowed: `decimal: point` in the settings"),
+        "{points}"
+    );
 }
 
 #[test]
 fn degrees_declared_as_rad_are_an_error_that_says_so() {
-    let text: String = (1..=10).map(|row| format!("P{row},{},20,1,2,3\n", 15 * row)).collect();
+    let text: String = (1..=10)
+        .map(|row| format!("P{row},{},20,1,2,3\n", 15 * row))
+        .collect();
     let message = refusal(&rows(&text), &TWO.replace("deg", "rad"), robot("rr", 1.0));
     let expected = "a.csv:2: `q` is declared in rad, but 10 of 10 rows hold a joint beyond one and a half turns, \
                     here joint 1 at 15.0000 rad; allowed: up to 9.42 rad; if the file holds degrees, say `unit: deg`";
     assert_eq!(message, expected);
-    let small: String = (1..=10).map(|row| format!("P{row},0.{row},5,1,2,3\n")).collect();
+    let small: String = (1..=10)
+        .map(|row| format!("P{row},0.{row},5,1,2,3\n"))
+        .collect();
     let message = refusal(&rows(&small), &TWO.replace("deg", "rad"), robot("rr", 1.0));
     assert!(
         message.starts_with(
@@ -107,7 +182,11 @@ fn degrees_declared_as_rad_are_an_error_that_says_so() {
         "{message}"
     );
     assert!(message.ends_with("say `unit: deg`"), "{message}");
-    let desk = rows(&(1..=10).map(|row| format!("P{row},{row}e-1,1.5,1,2,3\n")).collect::<String>());
+    let desk = rows(
+        &(1..=10)
+            .map(|row| format!("P{row},{row}e-1,1.5,1,2,3\n"))
+            .collect::<String>(),
+    );
     take(&desk, TWO, robot("rr", 1.0)).unwrap();
     let warning = "a.csv: no joint is ever beyond 1.50 deg; if the file holds rad, say `unit: rad`";
     assert_eq!(desk.warnings.lock().unwrap().as_slice(), [warning]);
@@ -115,11 +194,19 @@ fn degrees_declared_as_rad_are_an_error_that_says_so() {
 
 #[test]
 fn too_few_usable_rows_are_an_error_with_the_reasons() {
-    let text = format!("{}B1,,2,3,4,5\nB2,,2,3,4,5\nB3,1,2\ng1,1,2,3,4,5\n", good(3));
+    let text = format!(
+        "{}B1,,2,3,4,5\nB2,,2,3,4,5\nB3,1,2\ng1,1,2,3,4,5\n",
+        good(3)
+    );
     let expected = "a.csv:5: 5 of 7 rows are rejected; allowed: up to 50 % (`max_rejected_fraction`); reasons: 2 blank (line 5: q1 is blank); \
                     2 duplicate_id (line 2: point ids that occur more than once); 1 short_row (line 7: 3 fields; allowed: 6)";
     assert_eq!(refusal(&rows(&text), TWO, robot("rr", 1.0)), expected);
-    take(&rows(&text), &format!("{TWO}max_rejected_fraction: 0.8\n"), robot("rr", 1.0)).unwrap();
+    take(
+        &rows(&text),
+        &format!("{TWO}max_rejected_fraction: 0.8\n"),
+        robot("rr", 1.0),
+    )
+    .unwrap();
 }
 
 #[test]
@@ -137,7 +224,10 @@ files:
       z: {unit: mm}
       sigma_x: {column: 3}
 "#;
-    let found = calib::stage::Stage::check(&settings(yaml)).iter().map(ToString::to_string).collect::<Vec<_>>();
+    let found = calib::stage::Stage::check(&settings(yaml))
+        .iter()
+        .map(ToString::to_string)
+        .collect::<Vec<_>>();
     assert_eq!(
         found,
         [
@@ -162,29 +252,53 @@ fn files_that_do_not_fit_together_are_faults_of_the_settings() {
     let q = "q: {column: \"q{j}\", unit: deg}";
     let xyz = "x: {column: x, unit: mm}, y: {column: y, unit: mm}, z: {column: z, unit: mm}";
     let faults = |first: &str, second: &str, rest: &str| {
-        let yaml = format!("files:\n{}{}{rest}", file(first), if second.is_empty() { String::new() } else { file(second) });
-        calib::stage::Stage::check(&settings(&yaml)).iter().map(ToString::to_string).collect::<Vec<_>>()
+        let yaml = format!(
+            "files:\n{}{}{rest}",
+            file(first),
+            if second.is_empty() {
+                String::new()
+            } else {
+                file(second)
+            }
+        );
+        calib::stage::Stage::check(&settings(&yaml))
+            .iter()
+            .map(ToString::to_string)
+            .collect::<Vec<_>>()
     };
-    let without =
-        "join: several files; say how they belong together: {by: id}, {by: time, tolerance_s: 0.5}, {by: order} or {by: append}";
+    let without = "join: several files; say how they belong together: {by: id}, {by: time, tolerance_s: 0.5}, {by: order} or {by: append}";
     assert_eq!(faults(q, xyz, ""), [without]);
     assert_eq!(faults(q, "", ""), ["files[0].columns: not mapped: x, y, z"]);
     assert_eq!(
         faults(q, xyz, "join: {by: append}"),
-        ["files[0].columns: not mapped: x, y, z", "files[1].columns: not mapped: q"]
+        [
+            "files[0].columns: not mapped: x, y, z",
+            "files[1].columns: not mapped: q"
+        ]
     );
-    assert_eq!(faults(q, "", "join: {by: order}"), ["join: joins two files or more, not 1"]);
+    assert_eq!(
+        faults(q, "", "join: {by: order}"),
+        ["join: joins two files or more, not 1"]
+    );
     assert_eq!(
         faults(&format!("{id}{q}"), xyz, "join: {by: id}"),
         ["files[1].columns.point_id: not mapped; the files are joined by point_id"]
     );
     assert_eq!(
-        faults(&format!("{id}{time}{q}"), &format!("{id}{time}{xyz}"), "join: {by: id}\nduplicates: keep"),
+        faults(
+            &format!("{id}{time}{q}"),
+            &format!("{id}{time}{xyz}"),
+            "join: {by: id}\nduplicates: keep"
+        ),
         [
             "files[1].columns.time: mapped in two files; map it in one",
             "duplicates: `keep` cannot be combined with a join by id; allowed: reject, first, last"
         ]
     );
-    let clock = faults(&format!("{time}{q}"), &format!("{time}{xyz}"), "join: {by: time, tolerance_s: -1}");
+    let clock = faults(
+        &format!("{time}{q}"),
+        &format!("{time}{xyz}"),
+        "join: {by: time, tolerance_s: -1}",
+    );
     assert_eq!(clock, ["join.tolerance_s: allowed: 0 and above"]);
 }

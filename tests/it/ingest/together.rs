@@ -6,47 +6,90 @@ use calib::stage::ingest::IngestReads;
 use calib::table::{Recording, Rejected};
 
 fn refused(rejected: &Rejected) -> Vec<(&str, i64, &str, &str)> {
-    rejected.0.iter().map(|row| (row.file.as_str(), row.line, row.reason.as_str(), row.detail.as_str())).collect()
+    rejected
+        .0
+        .iter()
+        .map(|row| {
+            (
+                row.file.as_str(),
+                row.line,
+                row.reason.as_str(),
+                row.detail.as_str(),
+            )
+        })
+        .collect()
 }
 
 #[test]
 fn joints_beyond_the_limits_are_counted_rejected_or_ignored() {
     let text = format!("{}B,190,20,1,2,3\n", good(3));
     let desk = rows(&text);
-    assert_eq!(take(&desk, TWO, robot("rr", 1.0)).unwrap().recording.rows(), 4);
+    assert_eq!(
+        take(&desk, TWO, robot("rr", 1.0)).unwrap().recording.rows(),
+        4
+    );
     let warning = "a.csv: 1 row with a joint beyond the robot's limits, used all the same; first line 5, joint 1 (`J1`) at \
                    190.0000 deg, above its upper limit of 180.0000 deg";
     assert_eq!(desk.warnings.lock().unwrap().as_slice(), [warning]);
-    let rejecting = take(&rows(&text), &format!("{TWO}limits: reject\n"), robot("rr", 1.0)).unwrap();
+    let rejecting = take(
+        &rows(&text),
+        &format!("{TWO}limits: reject\n"),
+        robot("rr", 1.0),
+    )
+    .unwrap();
     let detail = "joint 1 at 190.0000 deg; allowed: -180.0000 to 180.0000 deg";
-    assert_eq!(refused(&rejecting.rejected), [("a.csv", 5, "out_of_range", detail)]);
+    assert_eq!(
+        refused(&rejecting.rejected),
+        [("a.csv", 5, "out_of_range", detail)]
+    );
     let desk = rows(&text);
-    assert_eq!(take(&desk, &format!("{TWO}limits: ignore\n"), robot("rr", 1.0)).unwrap().recording.rows(), 4);
+    assert_eq!(
+        take(&desk, &format!("{TWO}limits: ignore\n"), robot("rr", 1.0))
+            .unwrap()
+            .recording
+            .rows(),
+        4
+    );
     assert!(desk.warnings.lock().unwrap().is_empty());
 }
 
 #[test]
 fn a_prismatic_joint_beyond_its_limits_is_told_in_millimetres() {
     let desk = rows(&format!("{}B,4000,20,1,2,3\n", good(3)));
-    take(&desk, &TWO.replace("unit: deg", "unit: deg, linear_unit: mm"), robot("pr", 1.0)).unwrap();
+    take(
+        &desk,
+        &TWO.replace("unit: deg", "unit: deg, linear_unit: mm"),
+        robot("pr", 1.0),
+    )
+    .unwrap();
     let warnings = desk.warnings.lock().unwrap();
-    assert!(warnings[0].ends_with("joint 1 (`J1`) at 4000.0000 mm, above its upper limit of 3000.0000 mm"), "{warnings:?}");
+    assert!(
+        warnings[0]
+            .ends_with("joint 1 (`J1`) at 4000.0000 mm, above its upper limit of 3000.0000 mm"),
+        "{warnings:?}"
+    );
 }
 
 #[test]
 fn ids_without_a_partner_are_shown_with_an_example_of_each_file() {
-    let yaml = PAIR.replace("KEY", "point_id").replace("LEFT", "").replace("RIGHT", "") + "join: {by: id}\n";
+    let yaml = PAIR
+        .replace("KEY", "point_id")
+        .replace("LEFT", "")
+        .replace("RIGHT", "")
+        + "join: {by: id}\n";
     let said = |ids: [&str; 2]| {
         let points = format!("k,x,y,z\n{},1,1,1\n{},2,2,2\n", ids[0], ids[1]);
-        let desk = Desk::default().with("run/z_arm.csv", "k,q1\nP1,1\nP2,2\n").with("run/b_tracker.csv", points);
+        let desk = Desk::default()
+            .with("run/z_arm.csv", "k,q1\nP1,1\nP2,2\n")
+            .with("run/b_tracker.csv", points);
         refusal(&desk, &yaml, robot("r", 2.0))
     };
     let other = said(["XP1", "XP2"]);
-    let expected =
-        "2 unmatched (no partner in run/b_tracker.csv, e.g. `P1` here and `XP1` there: ids must be the same in both files)";
+    let expected = "2 unmatched (no partner in run/b_tracker.csv, e.g. `P1` here and `XP1` there: ids must be the same in both files)";
     assert!(other.contains(expected), "{other}");
     let lower = said(["q7", "p2"]);
-    let expected = "e.g. `P2` here and `p2` there: ids that differ in upper and lower case are different ids";
+    let expected =
+        "e.g. `P2` here and `p2` there: ids that differ in upper and lower case are different ids";
     assert!(lower.contains(expected), "{lower}");
 }
 
@@ -54,15 +97,34 @@ fn ids_without_a_partner_are_shown_with_an_example_of_each_file() {
 fn of_duplicated_ids_none_the_first_the_last_or_all_are_used() {
     let text = "A,1,2,3,4,1\nB,1,2,3,4,2\nA,1,2,,4,3\nA,1,2,3,4,4\nC,1,2,3,4,5\nD,1,2,3,4,6\n";
     let used = |word: &str| {
-        let taken = take(&rows(text), &format!("{TWO}duplicates: {word}\n"), robot("rr", 1.0)).unwrap();
-        let lines = taken.rejected.0.iter().map(|row| (row.line, row.detail.clone())).collect::<Vec<_>>();
+        let taken = take(
+            &rows(text),
+            &format!("{TWO}duplicates: {word}\n"),
+            robot("rr", 1.0),
+        )
+        .unwrap();
+        let lines = taken
+            .rejected
+            .0
+            .iter()
+            .map(|row| (row.line, row.detail.clone()))
+            .collect::<Vec<_>>();
         (taken.recording.sequence, lines)
     };
     let blank = (4, "x is blank".to_string());
     let twin = |line, other: i64| (line, format!("point id `A` also stands on line {other}"));
-    assert_eq!(used("reject"), (vec![2, 5, 6], vec![twin(2, 5), blank.clone(), twin(5, 2)]));
-    assert_eq!(used("first"), (vec![1, 2, 5, 6], vec![blank.clone(), twin(5, 2)]));
-    assert_eq!(used("last"), (vec![2, 4, 5, 6], vec![twin(2, 5), blank.clone()]));
+    assert_eq!(
+        used("reject"),
+        (vec![2, 5, 6], vec![twin(2, 5), blank.clone(), twin(5, 2)])
+    );
+    assert_eq!(
+        used("first"),
+        (vec![1, 2, 5, 6], vec![blank.clone(), twin(5, 2)])
+    );
+    assert_eq!(
+        used("last"),
+        (vec![2, 4, 5, 6], vec![twin(2, 5), blank.clone()])
+    );
     assert_eq!(used("keep"), (vec![1, 2, 4, 5, 6], vec![blank]));
 }
 
@@ -86,8 +148,15 @@ files:
 fn rows_join_by_id_in_the_order_of_the_first_file() {
     let desk = Desk::default()
         .with("run/z_arm.csv", "k,q1\nC,3\nA,1\nlost,4\nA2,\nB,2\n")
-        .with("run/b_tracker.csv", "k,use,x,y,z\nA,fit,1,1,1\nB,,2,2,2\nC,validate,3,3,3\nA2,fit,4,4,4\nmore,fit,5,5,5\n");
-    let yaml = PAIR.replace("KEY", "point_id").replace("LEFT", "").replace("RIGHT", "") + "join: {by: id}\n";
+        .with(
+            "run/b_tracker.csv",
+            "k,use,x,y,z\nA,fit,1,1,1\nB,,2,2,2\nC,validate,3,3,3\nA2,fit,4,4,4\nmore,fit,5,5,5\n",
+        );
+    let yaml = PAIR
+        .replace("KEY", "point_id")
+        .replace("LEFT", "")
+        .replace("RIGHT", "")
+        + "join: {by: id}\n";
     let taken = take(&desk, &yaml, robot("r", 2.0)).unwrap();
     let recording = &taken.recording;
     assert_eq!(
@@ -95,14 +164,32 @@ fn rows_join_by_id_in_the_order_of_the_first_file() {
         (&["C", "A", "B"].map(String::from)[..], &[1, 2, 5][..])
     );
     assert_eq!(recording.position, [[3.0; 3], [1.0; 3], [2.0; 3]]);
-    assert_eq!(recording.usage, [Some("validate".into()), Some("fit".into()), None]);
+    assert_eq!(
+        recording.usage,
+        [Some("validate".into()), Some("fit".into()), None]
+    );
     assert_eq!(recording.payload.as_deref(), Some(&[5000.0; 3][..]));
     assert_eq!(
         refused(&taken.rejected),
         [
-            ("b_tracker.csv", 5, "unmatched", "no usable row of z_arm.csv has the point id `A2`"),
-            ("b_tracker.csv", 6, "unmatched", "no usable row of z_arm.csv has the point id `more`"),
-            ("z_arm.csv", 4, "unmatched", "no usable row of b_tracker.csv has the point id `lost`"),
+            (
+                "b_tracker.csv",
+                5,
+                "unmatched",
+                "no usable row of z_arm.csv has the point id `A2`"
+            ),
+            (
+                "b_tracker.csv",
+                6,
+                "unmatched",
+                "no usable row of z_arm.csv has the point id `more`"
+            ),
+            (
+                "z_arm.csv",
+                4,
+                "unmatched",
+                "no usable row of b_tracker.csv has the point id `lost`"
+            ),
             ("z_arm.csv", 5, "blank", "q1 is blank"),
         ]
     );
@@ -119,58 +206,134 @@ fn a_simulation_joins_as_a_third_file_by_id_by_time_and_by_order() {
       sim_z: {column: z, unit: m}
 "#;
     let desk = |arm: &str, tracker: &str, model: &str| {
-        let desk = Desk::default().with("run/z_arm.csv", arm).with("run/b_tracker.csv", tracker);
+        let desk = Desk::default()
+            .with("run/z_arm.csv", arm)
+            .with("run/b_tracker.csv", tracker);
         desk.with("sim/model.csv", model)
     };
-    let by =
-        |key: &str, join: &str| third.replace("KEY", key).replace("LEFT", "").replace("RIGHT", "").replace("THIRD", "") + join;
+    let by = |key: &str, join: &str| {
+        third
+            .replace("KEY", key)
+            .replace("LEFT", "")
+            .replace("RIGHT", "")
+            .replace("THIRD", "")
+            + join
+    };
     let arm = "k,q1\nC,3\nA,1\nB,2\nD,1\n";
     let tracker = "k,x,y,z\nA,1,1,1\nB,2,2,2\nC,3,3,3\n";
     let ids = desk(arm, tracker, "k,x,y,z\nC,3,3,4\nA,1,1,2\nD,5,5,5\n");
     let taken = take(&ids, &by("point_id", "join: {by: id}\n"), robot("r", 2.0)).unwrap();
     assert_eq!(taken.recording.position, [[3.0; 3], [1.0; 3]]);
-    assert_eq!(taken.recording.simulated, Some(vec![[3.0, 3.0, 4.0], [1.0, 1.0, 2.0]]));
+    assert_eq!(
+        taken.recording.simulated,
+        Some(vec![[3.0, 3.0, 4.0], [1.0, 1.0, 2.0]])
+    );
     assert_eq!(
         refused(&taken.rejected),
         [
-            ("b_tracker.csv", 3, "unmatched", "no usable row of z_arm.csv (joined to all files) has the point id `B`"),
-            ("model.csv", 4, "unmatched", "no usable row of z_arm.csv (joined to all files) has the point id `D`"),
-            ("z_arm.csv", 4, "unmatched", "no usable row of model.csv has the point id `B`"),
-            ("z_arm.csv", 5, "unmatched", "no usable row of b_tracker.csv has the point id `D`"),
+            (
+                "b_tracker.csv",
+                3,
+                "unmatched",
+                "no usable row of z_arm.csv (joined to all files) has the point id `B`"
+            ),
+            (
+                "model.csv",
+                4,
+                "unmatched",
+                "no usable row of z_arm.csv (joined to all files) has the point id `D`"
+            ),
+            (
+                "z_arm.csv",
+                4,
+                "unmatched",
+                "no usable row of model.csv has the point id `B`"
+            ),
+            (
+                "z_arm.csv",
+                5,
+                "unmatched",
+                "no usable row of b_tracker.csv has the point id `D`"
+            ),
         ]
     );
     let sound = |row: &calib::table::IntakeRow| row.read == row.accepted + row.rejected;
-    assert!(taken.intake.0.iter().all(sound) && taken.intake.0.len() == 3, "{:?}", taken.intake.0);
+    assert!(
+        taken.intake.0.iter().all(sound) && taken.intake.0.len() == 3,
+        "{:?}",
+        taken.intake.0
+    );
     // The tracker's clock is 1.5 s ahead, the simulation has the controller's.
-    let clocks = desk("k,q1\n10,1\n20,2\n", "k,x,y,z\n11.5,1,1,1\n21.5,2,2,2\n", "k,x,y,z\n20,2,2,3\n10,1,1,2\n");
-    let seconds = by("time", "join: {by: time, tolerance_s: 0.1, offset_s: 1.5}\n");
-    let seconds = ["k"; 3].iter().fold(seconds, |text, _| text.replacen("time: {column: k}", "time: {column: k, unit: s}", 1));
+    let clocks = desk(
+        "k,q1\n10,1\n20,2\n",
+        "k,x,y,z\n11.5,1,1,1\n21.5,2,2,2\n",
+        "k,x,y,z\n20,2,2,3\n10,1,1,2\n",
+    );
+    let seconds = by(
+        "time",
+        "join: {by: time, tolerance_s: 0.1, offset_s: 1.5}\n",
+    );
+    let seconds = ["k"; 3].iter().fold(seconds, |text, _| {
+        text.replacen("time: {column: k}", "time: {column: k, unit: s}", 1)
+    });
     let taken = take(&clocks, &seconds, robot("r", 2.0)).unwrap();
     assert_eq!(taken.recording.position, [[1.0; 3], [2.0; 3]]);
-    assert_eq!(taken.recording.simulated, Some(vec![[1.0, 1.0, 2.0], [2.0, 2.0, 3.0]]));
-    let order: String =
-        by("KEY", "join: {by: order}\n").lines().filter(|l| !l.contains("KEY")).map(|l| format!("{l}\n")).collect();
-    let rows = desk("k,q1\na,1\nb,\nc,2\n", "k,x,y,z\n,1,1,1\n,2,2,2\n,3,3,3\n", "k,x,y,z\n,1,1,2\n,2,2,3\n,3,3,4\n");
+    assert_eq!(
+        taken.recording.simulated,
+        Some(vec![[1.0, 1.0, 2.0], [2.0, 2.0, 3.0]])
+    );
+    let order: String = by("KEY", "join: {by: order}\n")
+        .lines()
+        .filter(|l| !l.contains("KEY"))
+        .map(|l| format!("{l}\n"))
+        .collect();
+    let rows = desk(
+        "k,q1\na,1\nb,\nc,2\n",
+        "k,x,y,z\n,1,1,1\n,2,2,2\n,3,3,3\n",
+        "k,x,y,z\n,1,1,2\n,2,2,3\n,3,3,4\n",
+    );
     let taken = take(&rows, &order, robot("r", 2.0)).unwrap();
     assert_eq!(taken.recording.position, [[1.0; 3], [3.0; 3]]);
-    assert_eq!(taken.recording.simulated, Some(vec![[1.0, 1.0, 2.0], [3.0, 3.0, 4.0]]));
+    assert_eq!(
+        taken.recording.simulated,
+        Some(vec![[1.0, 1.0, 2.0], [3.0, 3.0, 4.0]])
+    );
 }
 
 #[test]
 fn rows_join_by_time_within_the_tolerance_and_across_clocks() {
     let desk = Desk::default()
         .with("run/z_arm.csv", "k,q1\n10,1\n20,2\n30,3\n40,1\n")
-        .with("run/b_tracker.csv", "k,x,y,z\n31500,3,3,3\n11400,1,1,1\n21600,2,2,2\n46000,4,4,4\n");
-    let yaml = PAIR.replace("KEY", "time").replace("kLEFT", "k, unit: s").replace("kRIGHT", "k, unit: ms");
+        .with(
+            "run/b_tracker.csv",
+            "k,x,y,z\n31500,3,3,3\n11400,1,1,1\n21600,2,2,2\n46000,4,4,4\n",
+        );
+    let yaml = PAIR
+        .replace("KEY", "time")
+        .replace("kLEFT", "k, unit: s")
+        .replace("kRIGHT", "k, unit: ms");
     let yaml = yaml + "join: {by: time, tolerance_s: 0.2, offset_s: 1.5}\n";
     let taken = take(&desk, &yaml, robot("r", 2.0)).unwrap();
     assert_eq!(taken.recording.position, [[1.0; 3], [2.0; 3], [3.0; 3]]);
-    assert_eq!(taken.recording.time.as_deref(), Some(&[10.0, 20.0, 30.0][..]));
+    assert_eq!(
+        taken.recording.time.as_deref(),
+        Some(&[10.0, 20.0, 30.0][..])
+    );
     assert_eq!(
         refused(&taken.rejected),
         [
-            ("b_tracker.csv", 5, "unmatched", "z_arm.csv has no row within 0.2 s of 46 s"),
-            ("z_arm.csv", 5, "unmatched", "b_tracker.csv has no row within 0.2 s of 40 s"),
+            (
+                "b_tracker.csv",
+                5,
+                "unmatched",
+                "z_arm.csv has no row within 0.2 s of 46 s"
+            ),
+            (
+                "z_arm.csv",
+                5,
+                "unmatched",
+                "b_tracker.csv has no row within 0.2 s of 40 s"
+            ),
         ]
     );
 }
@@ -179,15 +342,26 @@ fn rows_join_by_time_within_the_tolerance_and_across_clocks() {
 fn rows_join_by_order_and_a_bad_row_takes_its_partner_along() {
     let desk = Desk::default()
         .with("run/z_arm.csv", "q1\n1\nbad\n3\n4\n")
-        .with("run/b_tracker.csv", "k,x,y,z\nA,1,1,1\nB,2,2,2\nC,3,3,3\nD,4,4,4\n,,,\n");
-    let yaml = PAIR.replace("      KEY: {column: kLEFT}\n", "").replace("KEY", "point_id").replace("RIGHT", "");
+        .with(
+            "run/b_tracker.csv",
+            "k,x,y,z\nA,1,1,1\nB,2,2,2\nC,3,3,3\nD,4,4,4\n,,,\n",
+        );
+    let yaml = PAIR
+        .replace("      KEY: {column: kLEFT}\n", "")
+        .replace("KEY", "point_id")
+        .replace("RIGHT", "");
     let taken = take(&desk, &(yaml + "join: {by: order}\n"), robot("r", 2.0)).unwrap();
     assert_eq!(taken.recording.point_id, ["A", "C", "D"]);
     assert_eq!(taken.recording.position, [[1.0; 3], [3.0; 3], [4.0; 3]]);
     assert_eq!(
         refused(&taken.rejected),
         [
-            ("b_tracker.csv", 3, "unmatched", "data row 2 of z_arm.csv is missing or rejected"),
+            (
+                "b_tracker.csv",
+                3,
+                "unmatched",
+                "data row 2 of z_arm.csv is missing or rejected"
+            ),
             ("b_tracker.csv", 6, "blank", "the whole row is blank"),
             ("z_arm.csv", 3, "not_a_number", "q1: `bad` is not a number"),
         ]
@@ -199,7 +373,10 @@ fn files_of_unequal_length_are_not_joined_by_order() {
     let desk = Desk::default()
         .with("run/z_arm.csv", "q1\n1\n2\n3\n4\n")
         .with("run/b_tracker.csv", "k,x,y,z\nA,1,1,1\nB,2,2,2\nC,3,3,3\n");
-    let yaml = PAIR.replace("      KEY: {column: kLEFT}\n", "").replace("KEY", "point_id").replace("RIGHT", "");
+    let yaml = PAIR
+        .replace("      KEY: {column: kLEFT}\n", "")
+        .replace("KEY", "point_id")
+        .replace("RIGHT", "");
     let message = refusal(&desk, &(yaml + "join: {by: order}\n"), robot("r", 2.0));
     let expected = "run/b_tracker.csv: 3 data rows, run/z_arm.csv has 4: rows cannot be joined by order; allowed: as many rows in each \
                     file, or `join: {by: id}` or `{by: time, tolerance_s: ...}`";
@@ -210,25 +387,71 @@ fn files_of_unequal_length_are_not_joined_by_order() {
 fn of_rows_that_are_copies_of_each_other_one_is_used() {
     let text = "A,1,2,3,4,1\nB,1,2,3,4,2\nA,1.0, 2,3,4,1\nC,1,2,3,4,5\nC,1,2,3,4,6\nC,1,2,3,4,5\nD,1,2,3,4,5\nE,1,2,3,4,5\nF,1,2,3,4,5\n";
     let used = |word: &str| {
-        let taken = take(&rows(text), &format!("{TWO}duplicates: {word}\n"), robot("rr", 1.0)).unwrap();
-        let lines = taken.rejected.0.iter().map(|row| (row.line, row.reason.clone(), row.detail.clone())).collect::<Vec<_>>();
+        let taken = take(
+            &rows(text),
+            &format!("{TWO}duplicates: {word}\n"),
+            robot("rr", 1.0),
+        )
+        .unwrap();
+        let lines = taken
+            .rejected
+            .0
+            .iter()
+            .map(|row| (row.line, row.reason.clone(), row.detail.clone()))
+            .collect::<Vec<_>>();
         (taken.recording.sequence, lines)
     };
     let copy = |line: i64, other: i64| {
-        (line, "duplicate_row".to_string(), format!("a copy of line {other}: the same id, the same values"))
+        (
+            line,
+            "duplicate_row".to_string(),
+            format!("a copy of line {other}: the same id, the same values"),
+        )
     };
-    let twin = |line: i64, other: i64| (line, "duplicate_id".to_string(), format!("point id `C` also stands on line {other}"));
-    assert_eq!(used("reject"), (vec![1, 2, 7, 8, 9], vec![copy(4, 2), twin(5, 7), twin(6, 5), twin(7, 5)]));
-    assert_eq!(used("first"), (vec![1, 2, 4, 7, 8, 9], vec![copy(4, 2), twin(6, 5), copy(7, 5)]));
+    let twin = |line: i64, other: i64| {
+        (
+            line,
+            "duplicate_id".to_string(),
+            format!("point id `C` also stands on line {other}"),
+        )
+    };
+    assert_eq!(
+        used("reject"),
+        (
+            vec![1, 2, 7, 8, 9],
+            vec![copy(4, 2), twin(5, 7), twin(6, 5), twin(7, 5)]
+        )
+    );
+    assert_eq!(
+        used("first"),
+        (
+            vec![1, 2, 4, 7, 8, 9],
+            vec![copy(4, 2), twin(6, 5), copy(7, 5)]
+        )
+    );
     assert_eq!(used("keep"), (vec![1, 2, 3, 4, 5, 6, 7, 8, 9], vec![]));
 }
 
 #[test]
 fn a_cut_file_is_blamed_for_the_partners_that_it_lacks() {
-    let arm = |rows: usize| "k,q1\n".to_string() + &(0..rows).map(|k| format!("P{k},{}\n", k % 3)).collect::<String>();
-    let points = "k,x,y,z\n".to_string() + &(0..20).map(|k| format!("P{k},1,{k},1\n")).collect::<String>();
-    let yaml = PAIR.replace("KEY", "point_id").replace("LEFT", "").replace("RIGHT", "") + "join: {by: id}\n";
-    let desk = Desk::default().with("run/z_arm.csv", arm(5)).with("run/b_tracker.csv", points);
+    let arm = |rows: usize| {
+        "k,q1\n".to_string()
+            + &(0..rows)
+                .map(|k| format!("P{k},{}\n", k % 3))
+                .collect::<String>()
+    };
+    let points = "k,x,y,z\n".to_string()
+        + &(0..20)
+            .map(|k| format!("P{k},1,{k},1\n"))
+            .collect::<String>();
+    let yaml = PAIR
+        .replace("KEY", "point_id")
+        .replace("LEFT", "")
+        .replace("RIGHT", "")
+        + "join: {by: id}\n";
+    let desk = Desk::default()
+        .with("run/z_arm.csv", arm(5))
+        .with("run/b_tracker.csv", points);
     let message = refusal(&desk, &yaml, robot("r", 2.0));
     let expected = "run/z_arm.csv: has partners for 5 of the 20 rows of run/b_tracker.csv, 15 of which are rejected; allowed: up to 50 % \
                     (`max_rejected_fraction`); reasons: 15 unmatched (no partner in run/z_arm.csv)";
@@ -238,17 +461,34 @@ fn a_cut_file_is_blamed_for_the_partners_that_it_lacks() {
 #[test]
 fn files_that_continue_each_other_share_their_ids() {
     let part = TWO.replace("files:\n", "");
-    let yaml = format!("files:{}{}join: {{by: append}}\n", part, part.replace("a.csv", "b/a.csv"));
+    let yaml = format!(
+        "files:{}{}join: {{by: append}}\n",
+        part,
+        part.replace("a.csv", "b/a.csv")
+    );
     let desk = Desk::default()
         .with("a.csv", format!("{HEAD}{}", good(3)))
-        .with("b/a.csv", format!("{HEAD}N,1,2,3,4,5\ng2,1,2,3,4,5\nM,1,2,3,4,5\n"));
+        .with(
+            "b/a.csv",
+            format!("{HEAD}N,1,2,3,4,5\ng2,1,2,3,4,5\nM,1,2,3,4,5\n"),
+        );
     let taken = take(&desk, &yaml, robot("rr", 1.0)).unwrap();
     assert_eq!(taken.recording.sequence, [1, 3, 4, 6]);
     assert_eq!(
         refused(&taken.rejected),
         [
-            ("a.csv", 3, "duplicate_id", "point id `g2` also stands on line 3 of a.csv (2)"),
-            ("a.csv (2)", 3, "duplicate_id", "point id `g2` also stands on line 3 of a.csv"),
+            (
+                "a.csv",
+                3,
+                "duplicate_id",
+                "point id `g2` also stands on line 3 of a.csv (2)"
+            ),
+            (
+                "a.csv (2)",
+                3,
+                "duplicate_id",
+                "point id `g2` also stands on line 3 of a.csv"
+            ),
         ]
     );
 }
@@ -273,20 +513,44 @@ files:
 "#;
     let taken = take(&Desk::default().with("a.txt", text), yaml, robot("p", 1.0)).unwrap();
     let recording = &taken.recording;
-    assert_eq!((recording.sequence.as_slice(), recording.point_id[0].as_str()), (&[7, 9][..], "row 1"));
-    assert_eq!((recording.position[0], recording.q(0)), ([0.0254, 0.002, 3.0], &[1.5][..]));
+    assert_eq!(
+        (
+            recording.sequence.as_slice(),
+            recording.point_id[0].as_str()
+        ),
+        (&[7, 9][..], "row 1")
+    );
+    assert_eq!(
+        (recording.position[0], recording.q(0)),
+        ([0.0254, 0.002, 3.0], &[1.5][..])
+    );
     let temperature = recording.temperature.as_ref().unwrap();
     assert!((temperature[0] - 27.0).abs() < 1e-12 && temperature[1].is_nan());
-    assert_eq!(refused(&taken.rejected), [("a.txt", 8, "out_of_order", "sequence 8 does not follow 9")]);
+    assert_eq!(
+        refused(&taken.rejected),
+        [("a.txt", 8, "out_of_order", "sequence 8 does not follow 9")]
+    );
 }
 
 #[test]
 fn a_file_without_header_is_read_by_numbers() {
-    let yaml =
-        TWO.replace("columns:\n", "header: false\n    delimiter: whitespace\n    columns:\n").replace("column: id", "column: 1");
+    let yaml = TWO
+        .replace(
+            "columns:\n",
+            "header: false\n    delimiter: whitespace\n    columns:\n",
+        )
+        .replace("column: id", "column: 1");
     let yaml = yaml.replace("column: \"q{j}\"", "columns: [2, 3]");
-    let yaml = yaml.replace("column: x", "column: 4").replace("column: y", "column: 5").replace("column: z", "column: 6");
-    let taken = take(&Desk::default().with("a.csv", "  \"P 1\" 1 2  3 4 5\nP2 1 2 3\t4 5\n"), &yaml, robot("rr", 1.0)).unwrap();
+    let yaml = yaml
+        .replace("column: x", "column: 4")
+        .replace("column: y", "column: 5")
+        .replace("column: z", "column: 6");
+    let taken = take(
+        &Desk::default().with("a.csv", "  \"P 1\" 1 2  3 4 5\nP2 1 2 3\t4 5\n"),
+        &yaml,
+        robot("rr", 1.0),
+    )
+    .unwrap();
     assert_eq!(taken.recording.point_id, ["P 1", "P2"]);
 }
 
@@ -296,10 +560,16 @@ fn a_parquet_file_gives_what_its_text_gives() {
     use std::sync::Arc;
     let column = |values: Vec<Option<f64>>| Arc::new(Float64Array::from(values)) as ArrayRef;
     let batch = RecordBatch::try_from_iter([
-        ("id", Arc::new(StringArray::from(vec!["A, 1", "B", "C"])) as ArrayRef),
+        (
+            "id",
+            Arc::new(StringArray::from(vec!["A, 1", "B", "C"])) as ArrayRef,
+        ),
         ("q1", Arc::new(Int64Array::from(vec![1, 2, 3])) as ArrayRef),
         ("q2", column(vec![Some(0.1 + 0.2), Some(-1e-7), Some(12.0)])),
-        ("x", column(vec![Some(1_234.567_890_123_456_7), None, Some(f64::NAN)])),
+        (
+            "x",
+            column(vec![Some(1_234.567_890_123_456_7), None, Some(f64::NAN)]),
+        ),
         ("y", column(vec![Some(2.0); 3])),
         ("z", column(vec![Some(3.0); 3])),
     ])
@@ -309,25 +579,54 @@ fn a_parquet_file_gives_what_its_text_gives() {
     writer.write(&batch).unwrap();
     writer.close().unwrap();
     let yaml = TWO.to_string() + "max_rejected_fraction: 0.9\n";
-    let binary = take(&Desk::default().with("a.csv", file.clone()), &yaml, robot("rr", 1.0)).unwrap();
-    let text = "\"A, 1\",1,0.30000000000000004,1234.5678901234567,2,3\nB,2,-1e-7,,2,3\nC,3,12,NaN,2,3\n";
+    let binary = take(
+        &Desk::default().with("a.csv", file.clone()),
+        &yaml,
+        robot("rr", 1.0),
+    )
+    .unwrap();
+    let text =
+        "\"A, 1\",1,0.30000000000000004,1234.5678901234567,2,3\nB,2,-1e-7,,2,3\nC,3,12,NaN,2,3\n";
     let text = take(&rows(text), &yaml, robot("rr", 1.0)).unwrap();
     assert_eq!(binary.recording, text.recording);
     assert_eq!(
         refused(&binary.rejected),
-        [("a.csv", 2, "blank", "x is blank"), ("a.csv", 3, "not_a_number", "x: `NaN` is not a finite number")]
+        [
+            ("a.csv", 2, "blank", "x is blank"),
+            (
+                "a.csv",
+                3,
+                "not_a_number",
+                "x: `NaN` is not a finite number"
+            )
+        ]
     );
     assert_eq!(binary.rejected.0[0].text, "B,2,-1e-7,,2.0,3.0");
     let mapped = yaml.replace("column: z", "column: depth");
-    let message = super::refusal(&Desk::default().with("a.csv", file), &mapped, robot("rr", 1.0));
-    assert_eq!(message, "a.csv: no column `depth`, mapped to `z`; found: id, q1, q2, x, y, z");
-    let message = super::refusal(&Desk::default().with("a.csv", "PAR1 and nothing else"), TWO, robot("rr", 1.0));
-    assert!(message.starts_with("a.csv: is a Parquet file that cannot be read: "), "{message}");
+    let message = super::refusal(
+        &Desk::default().with("a.csv", file),
+        &mapped,
+        robot("rr", 1.0),
+    );
+    assert_eq!(
+        message,
+        "a.csv: no column `depth`, mapped to `z`; found: id, q1, q2, x, y, z"
+    );
+    let message = super::refusal(
+        &Desk::default().with("a.csv", "PAR1 and nothing else"),
+        TWO,
+        robot("rr", 1.0),
+    );
+    assert!(
+        message.starts_with("a.csv: is a Parquet file that cannot be read: "),
+        "{message}"
+    );
 }
 
 #[test]
 fn what_the_schema_refuses_is_refused_row_by_row() {
-    let schema: serde_json::Value = serde_json::from_str(include_str!("../../../schemas/recording.json")).unwrap();
+    let schema: serde_json::Value =
+        serde_json::from_str(include_str!("../../../schemas/recording.json")).unwrap();
     let fields = [
         ("x_mm", "x"),
         ("y_mm", "y"),
@@ -342,13 +641,24 @@ fn what_the_schema_refuses_is_refused_row_by_row() {
         ("i{j}_a", "i1"),
         ("dir{j}", "d1"),
     ];
-    let names: Vec<&str> = fields.iter().map(|field| field.1).chain(["i2", "d2"]).collect();
+    let names: Vec<&str> = fields
+        .iter()
+        .map(|field| field.1)
+        .chain(["i2", "d2"])
+        .collect();
     let mut text = format!("{}\n", names.join(","));
     let mut wanted = Vec::new();
     for (index, (column, name)) in fields.iter().enumerate() {
-        let field = schema["fields"].as_array().unwrap().iter().find(|field| field["name"] == *column).unwrap();
+        let field = schema["fields"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .find(|field| field["name"] == *column)
+            .unwrap();
         for (limit, beyond) in [("min", -1.0), ("max", 1.0)] {
-            let limit = field["constraints"][limit].as_f64().unwrap_or_else(|| panic!("{column} has a {limit}"));
+            let limit = field["constraints"][limit]
+                .as_f64()
+                .unwrap_or_else(|| panic!("{column} has a {limit}"));
             for value in [limit, limit + beyond] {
                 let mut cells = vec!["1".to_string(); names.len()];
                 cells[index] = format!("{value}");
@@ -375,9 +685,20 @@ files:
       direction: {column: "d{j}"}
 "#;
     let taken = take(&Desk::default().with("a.csv", text), yaml, robot("rp", 1.0)).unwrap();
-    let found: Vec<&str> = taken.rejected.0.iter().map(|row| row.detail.split(';').next().unwrap()).collect();
+    let found: Vec<&str> = taken
+        .rejected
+        .0
+        .iter()
+        .map(|row| row.detail.split(';').next().unwrap())
+        .collect();
     assert_eq!(found, wanted);
-    assert!(taken.rejected.0.iter().all(|row| row.reason == "out_of_range"));
+    assert!(
+        taken
+            .rejected
+            .0
+            .iter()
+            .all(|row| row.reason == "out_of_range")
+    );
 }
 
 #[test]
@@ -386,18 +707,37 @@ fn a_long_file_streams_in_chunks_and_equal_content_gives_equal_tables() {
     let mut text = String::from(HEAD);
     for row in 0..count {
         let id = if row % 1000 == 999 { row - 1 } else { row };
-        text += &format!("P{id},{},{},{}.25,-20.5,{}\n", row % 170, row % 90, row % 3000, 1 + row % 7);
+        text += &format!(
+            "P{id},{},{},{}.25,-20.5,{}\n",
+            row % 170,
+            row % 90,
+            row % 3000,
+            1 + row % 7
+        );
     }
     let run = |folder: &str| {
         let desk = Desk::default().with(&format!("{folder}/a.csv"), text.clone());
-        desk.run(&settings(&TWO.replace("a.csv", &format!("{folder}/a.csv"))), IngestReads { robot: robot("rr", 1.0) }).unwrap()
+        desk.run(
+            &settings(&TWO.replace("a.csv", &format!("{folder}/a.csv"))),
+            IngestReads {
+                robot: robot("rr", 1.0),
+            },
+        )
+        .unwrap()
     };
     let tables = run("here");
     assert_eq!(tables, run("there"));
     let chunks = table::<Recording>(&tables);
-    let rejected: usize = table::<Rejected>(&tables).iter().map(|chunk| chunk.0.len()).sum();
+    let rejected: usize = table::<Rejected>(&tables)
+        .iter()
+        .map(|chunk| chunk.0.len())
+        .sum();
     assert_eq!(rejected, 600);
     assert_eq!(chunks.iter().map(Recording::rows).sum::<usize>(), 299_400);
     assert!(chunks.iter().all(|chunk| chunk.rows() <= 65_536) && chunks.len() == 5);
-    assert!(chunks.windows(2).all(|pair| pair[0].sequence.last() < pair[1].sequence.first()));
+    assert!(
+        chunks
+            .windows(2)
+            .all(|pair| pair[0].sequence.last() < pair[1].sequence.first())
+    );
 }

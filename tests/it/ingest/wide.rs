@@ -27,7 +27,12 @@ fn seen(recording: &calib::table::Recording) -> Vec<(i64, &str, &str, [f64; 3])>
     let millimetres = |row: usize| recording.position[row].map(|value| (value * 1e6).round() / 1e3);
     let row = |row: usize| {
         let target = targets[row].as_deref().expect("a target");
-        (recording.sequence[row], recording.point_id[row].as_str(), target, millimetres(row))
+        (
+            recording.sequence[row],
+            recording.point_id[row].as_str(),
+            target,
+            millimetres(row),
+        )
     };
     (0..recording.rows()).map(row).collect()
 }
@@ -44,11 +49,24 @@ const SEEN: [(i64, &str, &str, [f64; 3]); 6] = [
 
 #[test]
 fn a_wide_row_is_a_row_for_each_target_that_was_seen() {
-    let yaml = WIDE.replace("OWN", JOINTS).replace("[7, 8, 9]", "[X3, 8, 9]") + "max_rejected_fraction: 0.6\n";
-    let taken = take(&Desk::default().with("a.csv", ROWS), &yaml, robot("rr", 1.0)).expect("a recording");
+    let yaml = WIDE
+        .replace("OWN", JOINTS)
+        .replace("[7, 8, 9]", "[X3, 8, 9]")
+        + "max_rejected_fraction: 0.6\n";
+    let taken = take(
+        &Desk::default().with("a.csv", ROWS),
+        &yaml,
+        robot("rr", 1.0),
+    )
+    .expect("a recording");
     assert_eq!(seen(&taken.recording), SEEN);
     assert_eq!(taken.recording.q(4), taken.recording.q(3), "P2 stands once");
-    let refused: Vec<(i64, &str)> = taken.rejected.0.iter().map(|row| (row.line, row.detail.as_str())).collect();
+    let refused: Vec<(i64, &str)> = taken
+        .rejected
+        .0
+        .iter()
+        .map(|row| (row.line, row.detail.as_str()))
+        .collect();
     assert_eq!(
         refused,
         [
@@ -66,22 +84,51 @@ fn a_wide_file_of_points_is_joined_to_the_joints_by_its_rows() {
     let joints = "n,q1,q2\nP3,12,22\nP2,11,21\nP1,10,20\n";
     let other = "  - file: joints.csv\n    columns:\n      point_id: {column: n}\n";
     let of_points = WIDE.replace("OWN", "");
-    let desk = || Desk::default().with("a.csv", ROWS).with("joints.csv", joints);
+    let desk = || {
+        Desk::default()
+            .with("a.csv", ROWS)
+            .with("joints.csv", joints)
+    };
     let first = format!("{of_points}{other}{JOINTS}join: {{by: id}}\nmax_rejected_fraction: 0.6\n");
-    let taken = take(&desk(), &first.replace("[7, 8, 9]", "[X3, 8, 9]"), robot("rr", 1.0)).expect("a recording");
+    let taken = take(
+        &desk(),
+        &first.replace("[7, 8, 9]", "[X3, 8, 9]"),
+        robot("rr", 1.0),
+    )
+    .expect("a recording");
     assert_eq!(seen(&taken.recording), SEEN);
-    let body = of_points.trim_start().strip_prefix("files:\n").expect("files");
-    let second = format!("files:\n{other}{JOINTS}{body}join: {{by: id}}\nmax_rejected_fraction: 0.6\n");
+    let body = of_points
+        .trim_start()
+        .strip_prefix("files:\n")
+        .expect("files");
+    let second =
+        format!("files:\n{other}{JOINTS}{body}join: {{by: id}}\nmax_rejected_fraction: 0.6\n");
     let taken = take(&desk(), &second, robot("rr", 1.0)).expect("a recording");
-    let (ids, targets): (Vec<&str>, Vec<&str>) = seen(&taken.recording).iter().map(|row| (row.1, row.2)).unzip();
-    assert_eq!(ids, ["P3", "P2", "P2", "P1", "P1", "P1"], "in the order of the joints");
+    let (ids, targets): (Vec<&str>, Vec<&str>) = seen(&taken.recording)
+        .iter()
+        .map(|row| (row.1, row.2))
+        .unzip();
+    assert_eq!(
+        ids,
+        ["P3", "P2", "P2", "P1", "P1", "P1"],
+        "in the order of the joints"
+    );
     assert_eq!(targets, ["smr2", "smr1", "smr3", "smr1", "smr2", "smr3"]);
-    assert_eq!(taken.recording.q(0), [12f64.to_radians(), 22f64.to_radians()]);
+    assert_eq!(
+        taken.recording.q(0),
+        [12f64.to_radians(), 22f64.to_radians()]
+    );
 }
 
 #[test]
 fn faults_of_targets_have_their_places() {
-    let faults = |yaml: &str| settings(yaml).check().iter().map(ToString::to_string).collect::<Vec<_>>();
+    let faults = |yaml: &str| {
+        settings(yaml)
+            .check()
+            .iter()
+            .map(ToString::to_string)
+            .collect::<Vec<_>>()
+    };
     let whole = WIDE.replace("OWN", JOINTS);
     assert_eq!(faults(&whole), [""; 0]);
     assert_eq!(
@@ -95,7 +142,17 @@ fn faults_of_targets_have_their_places() {
         ),
     );
     assert_eq!(faults(&twice).len(), 3);
-    assert_eq!(faults(&twice)[0], "files[0].columns.x: also in `targets`; map it in one of them");
-    let missing = refusal(&Desk::default().with("a.csv", ROWS.replace("Y2", "YY2")), &whole, robot("rr", 1.0));
-    assert!(missing.starts_with("a.csv:1: no column `Y2`, mapped to `smr2`"), "{missing}");
+    assert_eq!(
+        faults(&twice)[0],
+        "files[0].columns.x: also in `targets`; map it in one of them"
+    );
+    let missing = refusal(
+        &Desk::default().with("a.csv", ROWS.replace("Y2", "YY2")),
+        &whole,
+        robot("rr", 1.0),
+    );
+    assert!(
+        missing.starts_with("a.csv:1: no column `Y2`, mapped to `smr2`"),
+        "{missing}"
+    );
 }

@@ -18,21 +18,35 @@ fn book(sheets: &[(&str, &str)]) -> Desk {
 
 #[test]
 fn a_sheet_is_read_below_its_title_with_its_units_and_blank_rows() {
-    let taken = take(&book(&[("Notes", "by hand"), ("Data", DATA)]), &titled(), robot("rr", 1.0)).expect("a recording");
+    let taken = take(
+        &book(&[("Notes", "by hand"), ("Data", DATA)]),
+        &titled(),
+        robot("rr", 1.0),
+    )
+    .expect("a recording");
     let recording = &taken.recording;
     assert_eq!(recording.point_id, ["P1", "P3"]);
-    assert_eq!(recording.q(0), [std::f64::consts::PI, -std::f64::consts::FRAC_PI_2]);
+    assert_eq!(
+        recording.q(0),
+        [std::f64::consts::PI, -std::f64::consts::FRAC_PI_2]
+    );
     assert_eq!(recording.position[0], [1.0, -2.0005, 0.003]);
     assert_eq!(recording.position[1][0], 1e-10);
     let rejected = &taken.rejected.0[0];
-    assert_eq!((rejected.file.as_str(), rejected.line), ("a.csv sheet `Data`", 7));
+    assert_eq!(
+        (rejected.file.as_str(), rejected.line),
+        ("a.csv sheet `Data`", 7)
+    );
     assert_eq!(rejected.detail, "y: `five` is not a number");
     assert_eq!(taken.intake.0[0].read, 3);
 }
 
 #[test]
 fn dates_and_times_of_day_in_cells_are_clock_times() {
-    let timed = titled().replace("      q:", "      time: {column: at, unit: clock}\n      q:");
+    let timed = titled().replace(
+        "      q:",
+        "      time: {column: at, unit: clock}\n      q:",
+    );
     let data = DATA.replace("five", "5").replace(":0.25", "@45943.75");
     let taken = take(&book(&[("Data", &data)]), &timed, robot("rr", 1.0)).expect("a recording");
     // 2025-10-13 is day 20,374 after 1970-01-01 (45943 less 25569, the number of 1970-01-01 in a workbook).
@@ -41,7 +55,10 @@ fn dates_and_times_of_day_in_cells_are_clock_times() {
     for (time, expected) in times.iter().zip(expected) {
         assert!((time - expected).abs() < 1e-5, "{time} for {expected}");
     }
-    let of_day = DATA.replace("five", "5").replace("@45943.5421", ":0.2").replace("@45943.541", ":0.125");
+    let of_day = DATA
+        .replace("five", "5")
+        .replace("@45943.5421", ":0.2")
+        .replace("@45943.541", ":0.125");
     let taken = take(&book(&[("Data", &of_day)]), &timed, robot("rr", 1.0)).expect("a recording");
     let times = taken.recording.time.expect("times");
     assert_eq!(times, [10_800.0, 17_280.0, 21_600.0]);
@@ -49,19 +66,41 @@ fn dates_and_times_of_day_in_cells_are_clock_times() {
 
 #[test]
 fn of_several_sheets_with_numbers_one_is_named() {
-    let sheets = [("One", DATA), ("Two", &DATA.replace("five", "5")), ("_spare", DATA)];
+    let sheets = [
+        ("One", DATA),
+        ("Two", &DATA.replace("five", "5")),
+        ("_spare", DATA),
+    ];
     let message = refusal(&book(&sheets), &titled(), robot("rr", 1.0));
-    assert_eq!(message, "a.csv: has numbers in several sheets; say which, `sheet: NAME`; allowed: `One`, `Two`");
+    assert_eq!(
+        message,
+        "a.csv: has numbers in several sheets; say which, `sheet: NAME`; allowed: `One`, `Two`"
+    );
     let two = titled().replace("  - file: a.csv\n", "  - file: a.csv\n    sheet: Two\n");
-    assert_eq!(take(&book(&sheets), &two, robot("rr", 1.0)).expect("a recording").recording.rows(), 3);
+    assert_eq!(
+        take(&book(&sheets), &two, robot("rr", 1.0))
+            .expect("a recording")
+            .recording
+            .rows(),
+        3
+    );
     let three = two.replace("Two", "Three");
     let message = refusal(&book(&sheets), &three, robot("rr", 1.0));
-    assert_eq!(message, "a.csv: has no sheet `Three`; allowed: `One`, `Two`, `_spare`");
+    assert_eq!(
+        message,
+        "a.csv: has no sheet `Three`; allowed: `One`, `Two`, `_spare`"
+    );
     let none = refusal(&book(&[("Notes", "a|b|c\n1|2")]), TWO, robot("rr", 1.0));
-    assert_eq!(none, "a.csv: has no sheet with rows of numbers; its sheets: `Notes`");
+    assert_eq!(
+        none,
+        "a.csv: has no sheet with rows of numbers; its sheets: `Notes`"
+    );
     let text = Desk::default().with("a.csv", "id,q1,q2,x,y,z\nP1,1,2,3,4,5\n");
     let message = refusal(&text, &two, robot("rr", 1.0));
-    assert!(message.starts_with("a.csv: is no workbook, and has no sheet `Two`"), "{message}");
+    assert!(
+        message.starts_with("a.csv: is no workbook, and has no sheet `Two`"),
+        "{message}"
+    );
     assert_eq!(settings(&two).check(), []);
 }
 
@@ -69,42 +108,97 @@ fn of_several_sheets_with_numbers_one_is_named() {
 fn texts_in_cells_keep_quotes_and_lose_line_ends_and_numbers_have_the_stated_mark() {
     let data = "id|q1|q2|x|y|z\nthe \"A\" of\rB|1.5|2,5|3|4|5\n";
     let comma = TWO.replace("  - file: a.csv\n", "  - file: a.csv\n    decimal: comma\n");
-    let taken = take(&book(&[("Data", &format!("{data}B|1|2|3|4|5\n"))]), &comma, robot("rr", 1.0)).expect("a recording");
+    let taken = take(
+        &book(&[("Data", &format!("{data}B|1|2|3|4|5\n"))]),
+        &comma,
+        robot("rr", 1.0),
+    )
+    .expect("a recording");
     assert_eq!(taken.recording.point_id[0], "the \"A\" of B");
-    assert_eq!(taken.recording.q(0), [1.5f64.to_radians(), 2.5f64.to_radians()]);
+    assert_eq!(
+        taken.recording.q(0),
+        [1.5f64.to_radians(), 2.5f64.to_radians()]
+    );
 }
 
 #[test]
 fn what_is_no_workbook_is_refused_in_words() {
-    let refused = |content: Vec<u8>| refusal(&Desk::default().with("a.csv", content), TWO, robot("rr", 1.0));
-    let older = refused([&[0xd0, 0xcf, 0x11, 0xe0, 0xa1, 0xb1, 0x1a, 0xe1][..], &[0; 600]].concat());
+    let refused = |content: Vec<u8>| {
+        refusal(
+            &Desk::default().with("a.csv", content),
+            TWO,
+            robot("rr", 1.0),
+        )
+    };
+    let older = refused(
+        [
+            &[0xd0, 0xcf, 0x11, 0xe0, 0xa1, 0xb1, 0x1a, 0xe1][..],
+            &[0; 600],
+        ]
+        .concat(),
+    );
     assert_eq!(
         older,
         "a.csv: is a workbook of the older kind (.xls), or has a password; allowed: .xlsx, .xlsm, or the sheet saved as CSV"
     );
     let other = refused(archive(&[("content.xml", b"<office/>")]));
-    assert_eq!(other, "a.csv: is an archive or a workbook of another kind; allowed: .xlsx, .xlsm, or the sheet saved as CSV");
+    assert_eq!(
+        other,
+        "a.csv: is an archive or a workbook of another kind; allowed: .xlsx, .xlsm, or the sheet saved as CSV"
+    );
     let whole = workbook(&[("Data", DATA)]);
     for cut in (8..whole.len()).step_by(97) {
-        assert!(refused(whole[..cut].to_vec()).starts_with("a.csv: is a"), "{cut}");
+        assert!(
+            refused(whole[..cut].to_vec()).starts_with("a.csv: is a"),
+            "{cut}"
+        );
     }
     for at in (4..whole.len()).step_by(13) {
         let mut flipped = whole.clone();
         flipped[at] ^= 0x41;
         // Whatever a wrong byte makes of it: no panic, and no more than a refusal.
-        let _ = take(&Desk::default().with("a.csv", flipped), &titled(), robot("rr", 1.0));
+        let _ = take(
+            &Desk::default().with("a.csv", flipped),
+            &titled(),
+            robot("rr", 1.0),
+        );
     }
 }
 
 #[test]
 fn a_workbook_that_unpacks_to_too_much_is_refused_before_it_is_decoded() {
-    let refused = |content: Vec<u8>| refusal(&Desk::default().with("a.csv", content), TWO, robot("rr", 1.0));
+    let refused = |content: Vec<u8>| {
+        refusal(
+            &Desk::default().with("a.csv", content),
+            TWO,
+            robot("rr", 1.0),
+        )
+    };
     let body = "<worksheet><sheetData/></worksheet>".to_string();
     let long = format!("<sst>{}</sst>", " ".repeat(70 << 20));
-    let message = refused(with_texts(&[("Data", "")], std::slice::from_ref(&body), &long));
-    assert!(message.starts_with("a.csv: is too large at `xl/sharedStrings.xml`; allowed: up to 512 MB unpacked"), "{message}");
-    let message = refused(with_texts(&[("Data", "")], &[body], r#"<sst uniqueCount="900000000000"></sst>"#));
-    assert!(message.starts_with("a.csv: is damaged: `xl/sharedStrings.xml` says that it has more texts"), "{message}");
+    let message = refused(with_texts(
+        &[("Data", "")],
+        std::slice::from_ref(&body),
+        &long,
+    ));
+    assert!(
+        message.starts_with(
+            "a.csv: is too large at `xl/sharedStrings.xml`; allowed: up to 512 MB unpacked"
+        ),
+        "{message}"
+    );
+    let message = refused(with_texts(
+        &[("Data", "")],
+        &[body],
+        r#"<sst uniqueCount="900000000000"></sst>"#,
+    ));
+    assert!(
+        message
+            .starts_with("a.csv: is damaged: `xl/sharedStrings.xml` says that it has more texts"),
+        "{message}"
+    );
     let far = r#"<worksheet><sheetData><row r="1048577"><c r="A1048577"><v>1</v></c><c r="B1048577"><v>1</v></c><c r="C1048577"><v>1</v></c></row></sheetData></worksheet>"#;
-    assert!(refused(with_texts(&[("Data", "")], &[far.into()], "<sst></sst>")).starts_with("a.csv: "));
+    assert!(
+        refused(with_texts(&[("Data", "")], &[far.into()], "<sst></sst>")).starts_with("a.csv: ")
+    );
 }

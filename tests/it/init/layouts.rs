@@ -40,7 +40,9 @@ fn comma(text: &str) -> String {
 
 /// Windows-1252 of what fits into Latin-1.
 fn latin(text: &str) -> Vec<u8> {
-    text.chars().map(|letter| u8::try_from(u32::from(letter)).expect("a letter of Latin-1")).collect()
+    text.chars()
+        .map(|letter| u8::try_from(u32::from(letter)).expect("a letter of Latin-1"))
+        .collect()
 }
 
 /// What `init` made of files.
@@ -56,12 +58,25 @@ pub(super) fn made(files: &[(&str, Vec<u8>)]) -> Made {
         std::fs::write(folder.path().join(name), content).expect("a file");
     }
     let names: Vec<&str> = files.iter().map(|(name, _)| *name).collect();
-    let output = calib(folder.path(), &[&["init", ".", "--data"], names.as_slice()].concat(), "");
+    let output = calib(
+        folder.path(),
+        &[&["init", ".", "--data"], names.as_slice()].concat(),
+        "",
+    );
     // 1 where nothing was understood: the files to fill in are written all the same.
-    assert!(output.status.code().is_some_and(|code| code <= 1), "{}", String::from_utf8_lossy(&output.stderr));
-    let pipeline = std::fs::read_to_string(folder.path().join("pipeline.yaml")).expect("a pipeline");
+    assert!(
+        output.status.code().is_some_and(|code| code <= 1),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let pipeline =
+        std::fs::read_to_string(folder.path().join("pipeline.yaml")).expect("a pipeline");
     assert!(folder.path().join("robot.yaml").is_file());
-    Made { folder, pipeline, said: String::from_utf8_lossy(&output.stdout).into_owned() }
+    Made {
+        folder,
+        pipeline,
+        said: String::from_utf8_lossy(&output.stdout).into_owned(),
+    }
 }
 
 fn one(text: impl Into<Vec<u8>>) -> Made {
@@ -69,7 +84,10 @@ fn one(text: impl Into<Vec<u8>>) -> Made {
 }
 
 fn two(controller: impl Into<Vec<u8>>, tracker: impl Into<Vec<u8>>) -> Made {
-    made(&[("controller.csv", controller.into()), ("tracker.txt", tracker.into())])
+    made(&[
+        ("controller.csv", controller.into()),
+        ("tracker.txt", tracker.into()),
+    ])
 }
 
 impl Made {
@@ -79,7 +97,10 @@ impl Made {
     /// The pipeline holds these, and each in a line that counts.
     pub fn has(&self, parts: &[&str]) -> &Self {
         for part in parts {
-            let there = self.pipeline.lines().any(|line| line.contains(part) && !line.trim_start().starts_with('#'));
+            let there = self
+                .pipeline
+                .lines()
+                .any(|line| line.contains(part) && !line.trim_start().starts_with('#'));
             assert!(there, "{part} in\n{}", self.pipeline);
         }
         self
@@ -87,7 +108,10 @@ impl Made {
     /// No line that counts holds one of these.
     pub fn lacks(&self, parts: &[&str]) -> &Self {
         for part in parts {
-            let there = self.pipeline.lines().any(|line| line.contains(part) && !line.trim_start().starts_with('#'));
+            let there = self
+                .pipeline
+                .lines()
+                .any(|line| line.contains(part) && !line.trim_start().starts_with('#'));
             assert!(!there, "{part} in\n{}", self.pipeline);
         }
         self
@@ -103,13 +127,35 @@ impl Made {
         let check = calib(self.path(), &["check", "pipeline.yaml"], "");
         let told = String::from_utf8_lossy(&check.stderr).into_owned();
         assert!(check.status.success(), "{told}\n{}", self.pipeline);
-        let run = calib(self.path(), &["run", "pipeline.yaml", "--until", "split", "--json", "--quiet"], "");
-        assert!(run.status.success(), "{}\n{}", String::from_utf8_lossy(&run.stderr), self.pipeline);
+        let run = calib(
+            self.path(),
+            &[
+                "run",
+                "pipeline.yaml",
+                "--until",
+                "split",
+                "--json",
+                "--quiet",
+            ],
+            "",
+        );
+        assert!(
+            run.status.success(),
+            "{}\n{}",
+            String::from_utf8_lossy(&run.stderr),
+            self.pipeline
+        );
         let run: serde_json::Value = serde_json::from_slice(&run.stdout).expect("JSON");
         let stages = run["stages"].as_array().expect("stages");
-        let ingest = stages.iter().find(|stage| stage["id"] == "ingest").expect("ingest");
+        let ingest = stages
+            .iter()
+            .find(|stage| stage["id"] == "ingest")
+            .expect("ingest");
         let outputs = ingest["outputs"].as_array().expect("outputs");
-        let recording = outputs.iter().find(|output| output["port"] == "recording").expect("a recording");
+        let recording = outputs
+            .iter()
+            .find(|output| output["port"] == "recording")
+            .expect("a recording");
         assert_eq!(recording["rows"], rows, "{}", self.pipeline);
         self
     }
@@ -118,9 +164,15 @@ impl Made {
 #[test]
 fn a_german_controller_in_latin_1_joins_a_spatial_analyzer_export_by_its_points() {
     let header = "Punktname;J1 [Grad];J2 [Grad];J3 [Grad];J4 [Grad];J5 [Grad];J6 [Grad];Nutzlast [kg];Temperatur [\u{b0}C];Bemerkung (gepr\u{fc}ft)";
-    let controller =
-        table(header, |k| format!("M\u{fc}-{k};{};{};21,5;ok", comma(&joints(k, ";")), if k % 2 == 0 { "0" } else { "165" }));
-    let mut tracker = "// SpatialAnalyzer, Einheit mm\n// Collection Group Target X Y Z\n".to_string();
+    let controller = table(header, |k| {
+        format!(
+            "M\u{fc}-{k};{};{};21,5;ok",
+            comma(&joints(k, ";")),
+            if k % 2 == 0 { "0" } else { "165" }
+        )
+    });
+    let mut tracker =
+        "// SpatialAnalyzer, Einheit mm\n// Collection Group Target X Y Z\n".to_string();
     for k in (0..30).rev() {
         writeln!(tracker, "A Main M\u{fc}-{k}   {}", point(k, "  ")).expect("text");
         if k == 15 {
@@ -139,29 +191,57 @@ fn a_german_controller_in_latin_1_joins_a_spatial_analyzer_export_by_its_points(
         "x: {column: \"X\", unit: mm}",
         "join: {by: id}",
     ]);
-    made.says(&["not used: \"Bemerkung (gepr\u{fc}ft)\""]).runs(30);
+    made.says(&["not used: \"Bemerkung (gepr\u{fc}ft)\""])
+        .runs(30);
 }
 
 #[test]
 fn a_spatial_analyzer_export_with_commas_is_understood_too() {
-    let controller = table("pt,A1,A2,A3,A4,A5,A6", |k| format!("P{k},{}", joints(k, ",")));
-    let mut tracker = table("// Collection, Group, Target, X, Y, Z", |k| format!("A, Main, P{k}, {}", point(k, ", ")));
+    let controller = table("pt,A1,A2,A3,A4,A5,A6", |k| {
+        format!("P{k},{}", joints(k, ","))
+    });
+    let mut tracker = table("// Collection, Group, Target, X, Y, Z", |k| {
+        format!("A, Main, P{k}, {}", point(k, ", "))
+    });
     tracker.push_str("// end\n// of the export\n");
     let made = two(controller, tracker);
-    made.has(&["point_id: {column: \"pt\"}", "point_id: {column: \"Target\"}", "comment: \"//\"", "join: {by: id}"]);
+    made.has(&[
+        "point_id: {column: \"pt\"}",
+        "point_id: {column: \"Target\"}",
+        "comment: \"//\"",
+        "join: {by: id}",
+    ]);
     made.lacks(&["// Collection"]).runs(30);
-    let again = calib(made.path(), &["run", "pipeline.yaml", "--until", "split", "--json", "--quiet"], "");
+    let again = calib(
+        made.path(),
+        &[
+            "run",
+            "pipeline.yaml",
+            "--until",
+            "split",
+            "--json",
+            "--quiet",
+        ],
+        "",
+    );
     let again: serde_json::Value = serde_json::from_slice(&again.stdout).expect("JSON");
     assert_eq!(again["rejected_rows"], 0, "a line of remarks is no row");
 }
 
 #[test]
 fn two_time_columns_are_joined_by_time() {
-    let controller =
-        table("t [s],q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg", |k| format!("{:.2},{}", 12.0 * k as f64, joints(k, ",")));
-    let tracker = table("Zeit [s];X [mm];Y [mm];Z [mm]", |k| format!("{:.2};{}", 12.0 * k as f64 + 0.4, point(k, ";")));
+    let controller = table("t [s],q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg", |k| {
+        format!("{:.2},{}", 12.0 * k as f64, joints(k, ","))
+    });
+    let tracker = table("Zeit [s];X [mm];Y [mm];Z [mm]", |k| {
+        format!("{:.2};{}", 12.0 * k as f64 + 0.4, point(k, ";"))
+    });
     let made = two(controller, tracker);
-    made.has(&["time: {column: \"t [s]\", unit: s}", "time: {column: \"Zeit [s]\", unit: s}", "join: {by: time, tolerance_s: "]);
+    made.has(&[
+        "time: {column: \"t [s]\", unit: s}",
+        "time: {column: \"Zeit [s]\", unit: s}",
+        "join: {by: time, tolerance_s: ",
+    ]);
     made.lacks(&["by: order"]).says(&["CHECK"]).runs(30);
 }
 
@@ -170,8 +250,11 @@ fn clock_times_are_times() {
     let head = "Timestamp,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,x_mm,y_mm,z_mm";
     for date in ["", "2026-11-22T", "2026-11-22 "] {
         let time = |k: usize| format!("{date}08:{:02}:{:02}.5", 15 + k / 5, 12 * (k % 5));
-        let made = one(table(head, |k| format!("{},{},{}", time(k), joints(k, ","), point(k, ","))));
-        made.has(&["time: {column: \"Timestamp\", unit: clock}"]).runs(30);
+        let made = one(table(head, |k| {
+            format!("{},{},{}", time(k), joints(k, ","), point(k, ","))
+        }));
+        made.has(&["time: {column: \"Timestamp\", unit: clock}"])
+            .runs(30);
     }
 }
 
@@ -179,20 +262,34 @@ fn clock_times_are_times() {
 fn a_fast_log_beside_few_points_runs() {
     let controller = {
         let mut text = "time_s,A1,A2,A3,A4,A5,A6\n".to_string();
-        (0..2000).for_each(|k| writeln!(text, "{:.3},{}", 0.1 * k as f64, joints(k, ",")).expect("text"));
+        (0..2000).for_each(|k| {
+            writeln!(text, "{:.3},{}", 0.1 * k as f64, joints(k, ",")).expect("text")
+        });
         text
     };
-    let tracker = table("time_s,x,y,z", |k| format!("{:.3},{}", 6.02 * k as f64 + 0.01, point(k, ",")));
-    two(controller, tracker).has(&["join: {by: time", "max_rejected_fraction: "]).runs(30);
+    let tracker = table("time_s,x,y,z", |k| {
+        format!("{:.3},{}", 6.02 * k as f64 + 0.01, point(k, ","))
+    });
+    two(controller, tracker)
+        .has(&["join: {by: time", "max_rejected_fraction: "])
+        .runs(30);
 }
 
 #[test]
 fn names_of_points_are_found_by_their_values_whatever_the_header() {
-    for (left, right) in [("Bezeichnung", "pt"), ("Nom", "Punktname"), ("Foo", "Bar"), ("Denominaci\u{f3}n", "Messung")] {
-        let controller = table(&format!("{left};Axe 1;Axe 2;Axe 3;Axe 4;Axe 5;Axe 6;operator"), |k| {
-            format!("N{k:03};{};Smith", joints(k, ";"))
+    for (left, right) in [
+        ("Bezeichnung", "pt"),
+        ("Nom", "Punktname"),
+        ("Foo", "Bar"),
+        ("Denominaci\u{f3}n", "Messung"),
+    ] {
+        let controller = table(
+            &format!("{left};Axe 1;Axe 2;Axe 3;Axe 4;Axe 5;Axe 6;operator"),
+            |k| format!("N{k:03};{};Smith", joints(k, ";")),
+        );
+        let tracker = table(&format!("count;{right};x;y;z"), |k| {
+            format!("{};N{:03};{}", k + 1, 29 - k, point(k, ";"))
         });
-        let tracker = table(&format!("count;{right};x;y;z"), |k| format!("{};N{:03};{}", k + 1, 29 - k, point(k, ";")));
         let made = two(controller, tracker);
         made.has(&[
             &format!("point_id: {{column: \"{left}\"}}"),
@@ -205,19 +302,28 @@ fn names_of_points_are_found_by_their_values_whatever_the_header() {
 
 #[test]
 fn of_two_columns_that_name_points_alike_both_are_listed() {
-    let controller = table("Name;Label;A1;A2;A3;A4;A5;A6", |k| format!("N{k};N{k};{}", joints(k, ";")));
+    let controller = table("Name;Label;A1;A2;A3;A4;A5;A6", |k| {
+        format!("N{k};N{k};{}", joints(k, ";"))
+    });
     let tracker = table("Target;X;Y;Z", |k| format!("N{k};{}", point(k, ";")));
     let made = two(controller, tracker);
-    made.has(&["point_id: {column: \"Name\"}   # CHECK"]).says(&["# point_id: {column: \"Label\"}   # CHECK"]).runs(30);
+    made.has(&["point_id: {column: \"Name\"}   # CHECK"])
+        .says(&["# point_id: {column: \"Label\"}   # CHECK"])
+        .runs(30);
 }
 
 #[test]
 fn running_numbers_of_files_of_unequal_length_are_asked_about() {
-    let controller = table("Nr;A1;A2;A3;A4;A5;A6", |k| format!("{};{}", k + 1, joints(k, ";")));
-    let tracker = table("Index;X;Y;Z", |k| format!("{};{}", k + 1, point(k, ";"))) + "31;1500,0;1;2\n";
+    let controller = table("Nr;A1;A2;A3;A4;A5;A6", |k| {
+        format!("{};{}", k + 1, joints(k, ";"))
+    });
+    let tracker =
+        table("Index;X;Y;Z", |k| format!("{};{}", k + 1, point(k, ";"))) + "31;1500,0;1;2\n";
     let tracker = tracker.replace("31;1500,0", "31;1500.0");
     let made = two(controller, tracker);
-    made.lacks(&["by: order"]).says(&["running numbers"]).runs(30);
+    made.lacks(&["by: order"])
+        .says(&["running numbers"])
+        .runs(30);
 }
 
 #[test]
@@ -226,22 +332,41 @@ fn rows_of_unequal_number_are_never_joined_by_order_in_silence() {
     let tracker = table("x,y,z", |k| point(k, ",")) + "1,2,3\n";
     let made = two(controller.clone(), tracker);
     made.says(&["join: {by: order}", "REPLACE", "30 and 31 rows"]);
-    let check = calib(made.path(), &["run", "pipeline.yaml", "--until", "split", "--quiet"], "");
+    let check = calib(
+        made.path(),
+        &["run", "pipeline.yaml", "--until", "split", "--quiet"],
+        "",
+    );
     assert_eq!(check.status.code(), Some(10));
     let told = String::from_utf8_lossy(&check.stderr).into_owned();
-    assert!(told.contains("31 data rows, controller.csv has 30"), "{told}");
+    assert!(
+        told.contains("31 data rows, controller.csv has 30"),
+        "{told}"
+    );
     let equal = two(controller, table("x,y,z", |k| point(k, ",")));
     equal.says(&["join: {by: order}", "CHECK"]).runs(30);
 }
 
 #[test]
 fn a_target_with_its_difference_is_never_the_measured_point() {
-    let header = "step_order,x_t,y_t,z_t,x_dif,y_dif,z_dif,joint_1,joint_2,joint_3,joint_4,joint_5,joint_6";
-    let made = one(table(header, |k| format!("{k},{},0.12,-0.3,0.05,{}", point(k, ","), joints(k, ","))));
-    made.has(&["x: {column: \"x_t\", minus: \"x_dif\", unit: mm}   # CHECK", "z: {column: \"z_t\", minus: \"z_dif\", unit: mm}"]);
-    made.has(&["q: {column: \"joint_{j}\", unit: deg}"]).runs(30);
-    let plain = one(table("x,y,z,dx,dy,dz,q1,q2,q3,q4,q5,q6", |k| format!("{},0.1,0.2,0.3,{}", point(k, ","), joints(k, ","))));
-    plain.has(&["x: {column: \"x\", unit: mm}   # CHECK"]).says(&["# x: {column: \"x\", plus: \"dx\", unit: mm}"]).runs(30);
+    let header =
+        "step_order,x_t,y_t,z_t,x_dif,y_dif,z_dif,joint_1,joint_2,joint_3,joint_4,joint_5,joint_6";
+    let made = one(table(header, |k| {
+        format!("{k},{},0.12,-0.3,0.05,{}", point(k, ","), joints(k, ","))
+    }));
+    made.has(&[
+        "x: {column: \"x_t\", minus: \"x_dif\", unit: mm}   # CHECK",
+        "z: {column: \"z_t\", minus: \"z_dif\", unit: mm}",
+    ]);
+    made.has(&["q: {column: \"joint_{j}\", unit: deg}"])
+        .runs(30);
+    let plain = one(table("x,y,z,dx,dy,dz,q1,q2,q3,q4,q5,q6", |k| {
+        format!("{},0.1,0.2,0.3,{}", point(k, ","), joints(k, ","))
+    }));
+    plain
+        .has(&["x: {column: \"x\", unit: mm}   # CHECK"])
+        .says(&["# x: {column: \"x\", plus: \"dx\", unit: mm}"])
+        .runs(30);
 }
 
 #[test]
@@ -250,9 +375,13 @@ fn goals_and_urdf_joints_are_told_from_what_was_measured() {
                   wrist_1_joint;wrist_2_joint;wrist_3_joint;measurement_temperature;measurement_x;measurement_std_x;measurement_y;\
                   measurement_std_y;measurement_z;measurement_std_z;measurement_rx;measurement_ry;measurement_rz";
     let made = one(table(header, |k| {
-        let radians = cells(6, ";", |joint| format!("{:.6}", angle(k, joint).to_radians()));
+        let radians = cells(6, ";", |joint| {
+            format!("{:.6}", angle(k, joint).to_radians())
+        });
         let measured = cells(3, ";", |axis| format!("{:.4};0.02", coordinate(k, axis)));
-        comma(&format!("2.02011E+13;0.1;0.2;0.3;1.5;1.5;1.5;{radians};21.7;{measured};-90.1;1.2;3.4"))
+        comma(&format!(
+            "2.02011E+13;0.1;0.2;0.3;1.5;1.5;1.5;{radians};21.7;{measured};-90.1;1.2;3.4"
+        ))
     }));
     made.has(&[
         "q: {columns: [\"shoulder_pan_joint\", \"shoulder_lift_joint\", \"elbow_joint\", \"wrist_1_joint\", \"wrist_2_joint\", \"wrist_3_joint\"], unit: rad}",
@@ -263,7 +392,10 @@ fn goals_and_urdf_joints_are_told_from_what_was_measured() {
     let beside = one(table("Goal x,Goal y,Goal z,x,y,z,J1,J2,J3,J4,J5,J6", |k| {
         format!("{},{},{}", point(k + 1, ","), point(k, ","), joints(k, ","))
     }));
-    beside.has(&["x: {column: \"x\", unit: mm}"]).lacks(&["Goal"]).runs(30);
+    beside
+        .has(&["x: {column: \"x\", unit: mm}"])
+        .lacks(&["Goal"])
+        .runs(30);
 }
 
 #[test]
@@ -273,13 +405,22 @@ fn nominal_and_actual_points_are_told_apart_in_every_order() {
         ("X Ist,Y Ist,Z Ist,X Soll,Y Soll,Z Soll", "X Ist"),
         ("x_mes,y_mes,z_mes,x_theo,y_theo,z_theo", "x_mes"),
     ] {
-        let made = one(table(&format!("Axis_1,Axis_2,Axis_3,Axis_4,Axis_5,Axis_6,{header}"), |k| {
-            format!("{},{},{}", joints(k, ","), point(k, ","), point(k, ","))
-        }));
-        made.has(&[&format!("x: {{column: \"{measured}\", unit: mm}}"), "q: {column: \"Axis_{j}\", unit: deg}"]).runs(30);
+        let made = one(table(
+            &format!("Axis_1,Axis_2,Axis_3,Axis_4,Axis_5,Axis_6,{header}"),
+            |k| format!("{},{},{}", joints(k, ","), point(k, ","), point(k, ",")),
+        ));
+        made.has(&[
+            &format!("x: {{column: \"{measured}\", unit: mm}}"),
+            "q: {column: \"Axis_{j}\", unit: deg}",
+        ])
+        .runs(30);
     }
-    let targets = one(table("A1,A2,A3,A4,A5,A6,x_soll,y_soll,z_soll", |k| format!("{},{}", joints(k, ","), point(k, ","))));
-    targets.lacks(&["x_soll"]).says(&["REPLACE", "only a target is there, no measured point"]);
+    let targets = one(table("A1,A2,A3,A4,A5,A6,x_soll,y_soll,z_soll", |k| {
+        format!("{},{}", joints(k, ","), point(k, ","))
+    }));
+    targets
+        .lacks(&["x_soll"])
+        .says(&["REPLACE", "only a target is there, no measured point"]);
 }
 
 #[test]
@@ -301,19 +442,33 @@ fn of_two_points_that_fit_alike_both_are_listed() {
 
 #[test]
 fn the_sixth_axis_of_a_yaskawa_is_no_time() {
-    let made = one(table("No,S,L,U,R,B,T,X,Y,Z", |k| format!("{k},{},{}", joints(k, ","), point(k, ","))));
-    made.has(&["q: {columns: [\"S\", \"L\", \"U\", \"R\", \"B\", \"T\"], unit: deg}"]).lacks(&["time:"]).runs(30);
+    let made = one(table("No,S,L,U,R,B,T,X,Y,Z", |k| {
+        format!("{k},{},{}", joints(k, ","), point(k, ","))
+    }));
+    made.has(&["q: {columns: [\"S\", \"L\", \"U\", \"R\", \"B\", \"T\"], unit: deg}"])
+        .lacks(&["time:"])
+        .runs(30);
     let falling = one(table("T,A1,A2,A3,A4,A5,A6,X,Y,Z", |k| {
-        format!("{:.1},{},{}", 21.0 + (k as f64).sin(), joints(k, ","), point(k, ","))
+        format!(
+            "{:.1},{},{}",
+            21.0 + (k as f64).sin(),
+            joints(k, ","),
+            point(k, ",")
+        )
     }));
     falling.lacks(&["time:", "point_id"]).runs(30);
 }
 
 #[test]
 fn a_file_without_a_header_gets_both_files_with_what_was_seen() {
-    let bare: String = (0..30).map(|k| format!("{},{}\n", joints(k, ","), point(k, ","))).collect();
+    let bare: String = (0..30)
+        .map(|k| format!("{},{}\n", joints(k, ","), point(k, ",")))
+        .collect();
     let made = one(bare);
-    made.has(&["header: false", "q: {columns: [1, 2, 3, 4, 5, 6], unit: deg}   # REPLACE"]);
+    made.has(&[
+        "header: false",
+        "q: {columns: [1, 2, 3, 4, 5, 6], unit: deg}   # REPLACE",
+    ]);
     made.says(&["column 7: ", " to "]);
     let sheet = one(&b"PK\x03\x04\x14\x00\x06\x00binary"[..]);
     sheet.says(&["REPLACE", "saved as CSV"]);
@@ -324,11 +479,20 @@ fn a_file_without_a_header_gets_both_files_with_what_was_seen() {
 
 #[test]
 fn units_in_a_row_of_their_own_and_micrometres_in_latin_1_are_read() {
-    let below = one(table("Point,A1,A2,A3,A4,A5,A6,X,Y,Z\n,deg,deg,deg,deg,deg,deg,m,m,m", |k| {
-        let metres = cells(3, ",", |axis| format!("{:.7}", coordinate(k, axis) * 1e-3));
-        format!("P{k},{},{metres}", joints(k, ","))
-    }));
-    below.has(&["skip_below_header: 1", "q: {column: \"A{j}\", unit: deg}", "x: {column: \"X\", unit: m}"]).runs(30);
+    let below = one(table(
+        "Point,A1,A2,A3,A4,A5,A6,X,Y,Z\n,deg,deg,deg,deg,deg,deg,m,m,m",
+        |k| {
+            let metres = cells(3, ",", |axis| format!("{:.7}", coordinate(k, axis) * 1e-3));
+            format!("P{k},{},{metres}", joints(k, ","))
+        },
+    ));
+    below
+        .has(&[
+            "skip_below_header: 1",
+            "q: {column: \"A{j}\", unit: deg}",
+            "x: {column: \"X\", unit: m}",
+        ])
+        .runs(30);
     let micro = table(
         "Point;A1 [\u{b0}];A2 [\u{b0}];A3 [\u{b0}];A4 [\u{b0}];A5 [\u{b0}];A6 [\u{b0}];X [\u{b5}m];Y [\u{b5}m];Z [\u{b5}m]",
         |k| {
@@ -336,14 +500,25 @@ fn units_in_a_row_of_their_own_and_micrometres_in_latin_1_are_read() {
             format!("P{k};{};{micrometres}", joints(k, ";"))
         },
     );
-    one(latin(&micro)).has(&["q: {column: \"A{j} [\u{b0}]\", unit: deg}", "x: {column: \"X [\u{b5}m]\", unit: um}"]).runs(30);
+    one(latin(&micro))
+        .has(&[
+            "q: {column: \"A{j} [\u{b0}]\", unit: deg}",
+            "x: {column: \"X [\u{b5}m]\", unit: um}",
+        ])
+        .runs(30);
 }
 
 #[test]
 fn french_and_spanish_headers_are_read() {
     let french = table(
         "Nom;Axe1 (deg);Axe2 (deg);Axe3 (deg);Axe4 (deg);Axe5 (deg);Axe6 (deg);Charge utile (kg);Temp\u{e9}rature (\u{b0}C);Temps (s);X mesur\u{e9};Y mesur\u{e9};Z mesur\u{e9}",
-        |k| comma(&format!("P{k};{};10.5;20.1;{k};{}", joints(k, ";"), point(k, ";"))),
+        |k| {
+            comma(&format!(
+                "P{k};{};10.5;20.1;{k};{}",
+                joints(k, ";"),
+                point(k, ";")
+            ))
+        },
     );
     one(latin(&french))
         .has(&[
@@ -354,33 +529,64 @@ fn french_and_spanish_headers_are_read() {
             "x: {column: \"X mesur\u{e9}\", unit: mm}",
         ])
         .runs(30);
-    let spanish = table("Nombre,Eje 1,Eje 2,Eje 3,Eje 4,Eje 5,Eje 6,Carga [kg],Tiempo [s],X medido,Y medido,Z medido", |k| {
-        format!("P{k},{},5,{k},{}", joints(k, ","), point(k, ","))
-    });
-    one(spanish).has(&["point_id: {column: \"Nombre\"}", "payload: {column: \"Carga [kg]\", unit: kg}"]).runs(30);
+    let spanish = table(
+        "Nombre,Eje 1,Eje 2,Eje 3,Eje 4,Eje 5,Eje 6,Carga [kg],Tiempo [s],X medido,Y medido,Z medido",
+        |k| format!("P{k},{},5,{k},{}", joints(k, ","), point(k, ",")),
+    );
+    one(spanish)
+        .has(&[
+            "point_id: {column: \"Nombre\"}",
+            "payload: {column: \"Carga [kg]\", unit: kg}",
+        ])
+        .runs(30);
 }
 
 #[test]
 fn the_controllers_own_point_is_not_taken_beside_the_trackers() {
     let header = "Name;A1;A2;A3;A4;A5;A6;X;Y;Z;A;B;C;Last [kg]";
-    let controller = table(header, |k| format!("P{k};{};{};1;2;3;10", joints(k, ";"), point(k + 1, ";")));
-    let tracker = table("Name;Time;X;Y;Z;Temp", |k| format!("P{k};{k};{};20.5", point(k, ";")));
+    let controller = table(header, |k| {
+        format!("P{k};{};{};1;2;3;10", joints(k, ";"), point(k + 1, ";"))
+    });
+    let tracker = table("Name;Time;X;Y;Z;Temp", |k| {
+        format!("P{k};{k};{};20.5", point(k, ";"))
+    });
     let made = two(controller, tracker);
-    let places: Vec<&str> = made.pipeline.lines().filter(|line| line.trim_start().starts_with("x: {column")).collect();
+    let places: Vec<&str> = made
+        .pipeline
+        .lines()
+        .filter(|line| line.trim_start().starts_with("x: {column"))
+        .collect();
     assert_eq!(places.len(), 1, "{}", made.pipeline);
     let joints = made.pipeline.find("q: {column").expect("joints");
-    assert!(made.pipeline.find(places[0]).expect("a point") > joints, "{}", made.pipeline);
+    assert!(
+        made.pipeline.find(places[0]).expect("a point") > joints,
+        "{}",
+        made.pipeline
+    );
     made.runs(30);
 }
 
 #[test]
 fn the_identity_that_init_comments_out_is_nobodys() {
-    let made = one(table("Point,A1,A2,A3,A4,A5,A6,X,Y,Z", |k| format!("P{k},{},{}", joints(k, ","), point(k, ","))));
-    assert!(!made.pipeline.contains("A. Meier") && !made.pipeline.contains("AT960"), "{}", made.pipeline);
+    let made = one(table("Point,A1,A2,A3,A4,A5,A6,X,Y,Z", |k| {
+        format!("P{k},{},{}", joints(k, ","), point(k, ","))
+    }));
+    assert!(
+        !made.pipeline.contains("A. Meier") && !made.pipeline.contains("AT960"),
+        "{}",
+        made.pipeline
+    );
     let identified = made.pipeline.replace("# identity:", "identity:");
     std::fs::write(made.path().join("pipeline.yaml"), identified).expect("a file");
     let check = calib(made.path(), &["check", "pipeline.yaml"], "");
-    assert!(check.status.success(), "{}", String::from_utf8_lossy(&check.stderr));
+    assert!(
+        check.status.success(),
+        "{}",
+        String::from_utf8_lossy(&check.stderr)
+    );
     let said = String::from_utf8_lossy(&check.stdout).into_owned();
-    assert!(said.contains("replace   ") && said.contains("          pipeline.yaml:"), "{said}");
+    assert!(
+        said.contains("replace   ") && said.contains("          pipeline.yaml:"),
+        "{said}"
+    );
 }

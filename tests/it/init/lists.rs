@@ -6,10 +6,15 @@ use std::fmt::Write;
 
 #[test]
 fn a_list_of_points_without_a_header_joins_by_the_numbers_in_its_names() {
-    let controller = table("Punkt;A1;A2;A3;A4;A5;A6", |k| format!("Pose {k};{}", joints(k, ";")));
+    let controller = table("Punkt;A1;A2;A3;A4;A5;A6", |k| {
+        format!("Pose {k};{}", joints(k, ";"))
+    });
     let mut tracker = String::new();
     (0..30).for_each(|k| writeln!(tracker, "pt_{k:03} {}", point(k, " ")).expect("text"));
-    let made = made(&[("controller.csv", controller.into()), ("tracker.txt", tracker.into())]);
+    let made = made(&[
+        ("controller.csv", controller.into()),
+        ("tracker.txt", tracker.into()),
+    ]);
     made.has(&[
         "point_id: {column: \"Punkt\", match: number}",
         "header: false",
@@ -28,24 +33,55 @@ fn a_text_in_utf_16_with_marks_of_thousands_is_read() {
             let text = format!("{:.2}", 1234.5 + 100.0 * axis as f64 + k as f64);
             format!("{}.{}", &text[..1], text[1..].replace('.', ","))
         };
-        format!("P{k};{};{};{};{}", joints(k, ";").replace('.', ","), number(0), number(1), number(2))
+        format!(
+            "P{k};{};{};{};{}",
+            joints(k, ";").replace('.', ","),
+            number(0),
+            number(1),
+            number(2)
+        )
     };
     let text = table("Punkt;A1;A2;A3;A4;A5;A6;X [mm];Y [mm];Z [mm]", german);
-    let bytes: Vec<u8> = std::iter::once(0xfeff).chain(text.encode_utf16()).flat_map(u16::to_le_bytes).collect();
+    let bytes: Vec<u8> = std::iter::once(0xfeff)
+        .chain(text.encode_utf16())
+        .flat_map(u16::to_le_bytes)
+        .collect();
     let made = made(&[("data.csv", bytes)]);
-    made.has(&["decimal: comma", "point_id: {column: \"Punkt\"}", "x: {column: \"X [mm]\", unit: mm}"]);
+    made.has(&[
+        "decimal: comma",
+        "point_id: {column: \"Punkt\"}",
+        "x: {column: \"X [mm]\", unit: mm}",
+    ]);
     made.runs(30);
 }
 
 #[test]
 fn what_cannot_be_told_ends_with_code_1_and_a_sentence_and_too_many_files_with_2() {
     let folder = tempfile::tempdir().expect("a folder");
-    std::fs::write(folder.path().join("notes.csv"), "day,weather,mood\nmon,rain,good\ntue,sun,good\n").expect("a file");
+    std::fs::write(
+        folder.path().join("notes.csv"),
+        "day,weather,mood\nmon,rain,good\ntue,sun,good\n",
+    )
+    .expect("a file");
     let output = calib(folder.path(), &["init", ".", "--data", "notes.csv"], "");
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(1), "{told}");
-    assert!(told.starts_with("error: neither joints nor a measured point were recognised in notes.csv"), "{told}");
-    let output = calib(folder.path(), &["init", "more", "--data", "notes.csv", "notes.csv", "notes.csv"], "");
+    assert!(
+        told.starts_with("error: neither joints nor a measured point were recognised in notes.csv"),
+        "{told}"
+    );
+    let output = calib(
+        folder.path(),
+        &[
+            "init",
+            "more",
+            "--data",
+            "notes.csv",
+            "notes.csv",
+            "notes.csv",
+        ],
+        "",
+    );
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(2), "{told}");
     assert!(told.contains("--data: 3 files; allowed: one recording, the controller's and the tracker's, the controller's and a list of points in one layout for each of several reflectors, or recordings that have joints and points each"), "{told}");
@@ -58,21 +94,32 @@ fn a_wide_file_takes_time_in_proportion_to_its_width() {
         let mut header = String::from("Punkt,A1,A2,A3,A4,A5,A6,X,Y,Z");
         (0..columns).for_each(|k| write!(header, ",channel {k}").expect("text"));
         let blank = ",0.5".repeat(columns);
-        let text = table(&header, |k| format!("P{k},{},{}{blank}", joints(k, ","), point(k, ",")));
+        let text = table(&header, |k| {
+            format!("P{k},{},{}{blank}", joints(k, ","), point(k, ","))
+        });
         let begun = std::time::Instant::now();
         made(&[("data.csv", text.into())]).has(&["q: {column: \"A{j}\"", "x: {column: \"X\""]);
         begun.elapsed().as_secs_f64()
     };
     let [narrow, broad] = [2_000, 16_000].map(wide);
     // Eight times the width: 64 times the time would be quadratic.
-    assert!(broad < 24.0 * narrow.max(0.05), "{narrow} s for 2,000 columns, {broad} s for 16,000");
+    assert!(
+        broad < 24.0 * narrow.max(0.05),
+        "{narrow} s for 2,000 columns, {broad} s for 16,000"
+    );
 }
 
 #[test]
 fn a_grid_and_a_check_set_are_two_recordings_of_which_the_second_judges() {
-    let recording =
-        |name: &str| table("Punkt;A1;A2;A3;A4;A5;A6;X;Y;Z", |k| format!("{name}{k};{};{}", joints(k, ";"), point(k, ";")));
-    let made = made(&[("grid.csv", recording("G").into()), ("check.csv", recording("C").into())]);
+    let recording = |name: &str| {
+        table("Punkt;A1;A2;A3;A4;A5;A6;X;Y;Z", |k| {
+            format!("{name}{k};{};{}", joints(k, ";"), point(k, ";"))
+        })
+    };
+    let made = made(&[
+        ("grid.csv", recording("G").into()),
+        ("check.csv", recording("C").into()),
+    ]);
     made.has(&[
         "usage: {value: fit}   # CHECK: every row of this file",
         "usage: {value: validate}   # CHECK: every row of this file",
@@ -85,7 +132,9 @@ fn a_grid_and_a_check_set_are_two_recordings_of_which_the_second_judges() {
 
 #[test]
 fn several_reflectors_from_several_files_are_targets_of_the_same_poses() {
-    let controller = table("Punkt;A1;A2;A3;A4;A5;A6", |k| format!("P{k};{}", joints(k, ";")));
+    let controller = table("Punkt;A1;A2;A3;A4;A5;A6", |k| {
+        format!("P{k};{}", joints(k, ";"))
+    });
     let list = |by: usize| table("Punkt;X;Y;Z", |k| format!("P{k};{}", point(k + by, ";")));
     // In any order: which file has the joints is seen.
     let made = made(&[
@@ -112,40 +161,81 @@ const CELL: &str = r#"<robot name="cell"><link name="world"/><link name="carriag
 #[test]
 fn the_chain_of_a_urdf_is_read_from_its_first_link_with_joints_that_slide() {
     let folder = tempfile::tempdir().expect("a folder");
-    let data = table("Punkt,J1_mm,J2_deg,X,Y,Z", |k| format!("P{k},{},{},{}", 40 * k, 3 * k, point(k, ",")));
+    let data = table("Punkt,J1_mm,J2_deg,X,Y,Z", |k| {
+        format!("P{k},{},{},{}", 40 * k, 3 * k, point(k, ","))
+    });
     std::fs::write(folder.path().join("data.csv"), data).expect("a file");
     std::fs::write(folder.path().join("cell.urdf"), CELL).expect("a file");
     let told = |arguments: &[&str]| {
         let output = calib(folder.path(), arguments, "");
-        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+        (
+            output.status.code(),
+            String::from_utf8_lossy(&output.stderr).into_owned(),
+        )
     };
-    let start = ["init", ".", "--data", "data.csv", "--urdf", "cell.urdf", "--tip"];
-    assert_eq!(told(&[&start[..], &["holder"]].concat()), (Some(0), String::new()));
+    let start = [
+        "init",
+        ".",
+        "--data",
+        "data.csv",
+        "--urdf",
+        "cell.urdf",
+        "--tip",
+    ];
+    assert_eq!(
+        told(&[&start[..], &["holder"]].concat()),
+        (Some(0), String::new())
+    );
     let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).expect("a file");
-    assert!(read("robot.yaml").contains("urdf: {base: \"world\", tip: \"holder\"}"), "{}", read("robot.yaml"));
+    assert!(
+        read("robot.yaml").contains("urdf: {base: \"world\", tip: \"holder\"}"),
+        "{}",
+        read("robot.yaml")
+    );
     let pipeline = read("pipeline.yaml");
-    assert!(pipeline.contains("q: {columns: [\"J1_mm\", \"J2_deg\"], unit: deg, linear_unit: mm}"), "{pipeline}");
+    assert!(
+        pipeline.contains("q: {columns: [\"J1_mm\", \"J2_deg\"], unit: deg, linear_unit: mm}"),
+        "{pipeline}"
+    );
     std::fs::remove_file(folder.path().join("robot.yaml")).expect("a file");
     std::fs::remove_file(folder.path().join("pipeline.yaml")).expect("a file");
     let (code, said) = told(&[&start[..], &["carriage"]].concat());
     assert_eq!(code, Some(2));
-    assert!(said.contains("--tip: the chain from `world` to `carriage` has 1 joint, the recording 2"), "{said}");
+    assert!(
+        said.contains("--tip: the chain from `world` to `carriage` has 1 joint, the recording 2"),
+        "{said}"
+    );
     let (code, said) = told(&[&start[..], &["tool0"]].concat());
-    assert!(code == Some(2) && said.contains("no link `tool0`") && said.contains("carriage, holder, world"), "{said}");
+    assert!(
+        code == Some(2)
+            && said.contains("no link `tool0`")
+            && said.contains("carriage, holder, world"),
+        "{said}"
+    );
 }
 
 #[test]
 fn quaternions_are_orientations_to_take_in_and_u95_is_two_standard_deviations() {
-    let controller = table("Punkt;A1;A2;A3;A4;A5;A6", |k| format!("P{k};{}", joints(k, ";")));
-    let list = table("Punkt;X;Y;Z;qw;qx;qy;qz;U95 X;U95 Y;U95 Z", |k| format!("P{k};{};1;0;0;0;0.03;0.03;0.04", point(k, ";")));
-    let made = made(&[("controller.csv", controller.into()), ("tracker.csv", list.into())]);
+    let controller = table("Punkt;A1;A2;A3;A4;A5;A6", |k| {
+        format!("P{k};{}", joints(k, ";"))
+    });
+    let list = table("Punkt;X;Y;Z;qw;qx;qy;qz;U95 X;U95 Y;U95 Z", |k| {
+        format!("P{k};{};1;0;0;0;0.03;0.03;0.04", point(k, ";"))
+    });
+    let made = made(&[
+        ("controller.csv", controller.into()),
+        ("tracker.csv", list.into()),
+    ]);
     made.says(&[
         "# orientation: {quaternion: [\"qw\", \"qx\", \"qy\", \"qz\"]}   # CHECK: full poses",
         "# sigma_orientation: {value: 30, unit: arcsec}",
         "# u95_x: {column: \"U95 X\", unit: mm}   # CHECK: two standard deviations, if rows are to be weighted by it",
     ]);
     // The lines taken in are understood.
-    let taken = made.pipeline.replace("# orientation:", "orientation:").replace("# sigma_orientation:", "sigma_orientation:");
+    let taken = made
+        .pipeline
+        .replace("# orientation:", "orientation:")
+        .replace("# sigma_orientation:", "sigma_orientation:");
     std::fs::write(made.path().join("pipeline.yaml"), taken).expect("a file");
     made.runs(30);
 }

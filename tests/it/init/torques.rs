@@ -11,7 +11,13 @@ use std::sync::Arc;
 fn log(header: &str, count: usize, row: impl Fn(usize, usize) -> String) -> String {
     let mut text = format!("time_s,{header}\n");
     for k in 0..40 {
-        writeln!(text, "{:.3},{}", 0.008 * k as f64, cells(count, ",", |column| row(k, column))).expect("text");
+        writeln!(
+            text,
+            "{:.3},{}",
+            0.008 * k as f64,
+            cells(count, ",", |column| row(k, column))
+        )
+        .expect("text");
     }
     text
 }
@@ -21,37 +27,73 @@ fn names(pattern: &str, count: usize) -> String {
 }
 
 fn wave(row: usize, column: usize) -> String {
-    format!("{:.5}", (0.5 + 0.1 * column as f64) * (0.1 * row as f64 + column as f64).sin())
+    format!(
+        "{:.5}",
+        (0.5 + 0.1 * column as f64) * (0.1 * row as f64 + column as f64).sin()
+    )
 }
 
 #[test]
 fn torques_under_any_name_make_a_pipeline_that_reads_torques() {
     for (pattern, quantity) in [
         ("tau#", "torque: {column: \"tau{j}\", unit: Nm}"),
-        ("joint_torque_#", "torque: {column: \"joint_torque_{j}\", unit: Nm}"),
-        ("Drehmoment A# [Nm]", "torque: {column: \"Drehmoment A{j} [Nm]\", unit: Nm}"),
+        (
+            "joint_torque_#",
+            "torque: {column: \"joint_torque_{j}\", unit: Nm}",
+        ),
+        (
+            "Drehmoment A# [Nm]",
+            "torque: {column: \"Drehmoment A{j} [Nm]\", unit: Nm}",
+        ),
         ("effort_#", "torque: {column: \"effort_{j}\", unit: Nm}"),
-        ("actual_current_#", "current: {column: \"actual_current_{j}\", unit: A}"),
+        (
+            "actual_current_#",
+            "current: {column: \"actual_current_{j}\", unit: A}",
+        ),
         ("I# [mA]", "current: {column: \"I{j} [mA]\", unit: mA}"),
     ] {
         let header = [names("q#", 6), names("dq#", 6), names(pattern, 6)].join(",");
         let made = made(&[("log.csv", log(&header, 18, wave).into())]);
-        made.has(&["uses: ingest_torques", "uses: diagnose_torques", "uses: report_torques", "q: {column: \"q{j}\", unit: rad}"]);
-        made.has(&[quantity, "velocity: {column: \"dq{j}\", unit: rad/s}", "time: {column: \"time_s\", unit: s}"]);
+        made.has(&[
+            "uses: ingest_torques",
+            "uses: diagnose_torques",
+            "uses: report_torques",
+            "q: {column: \"q{j}\", unit: rad}",
+        ]);
+        made.has(&[
+            quantity,
+            "velocity: {column: \"dq{j}\", unit: rad/s}",
+            "time: {column: \"time_s\", unit: s}",
+        ]);
         made.lacks(&["uses: ingest\n", "instrument", "split"]);
         let check = calib(made.path(), &["check", "pipeline.yaml"], "");
-        assert!(check.status.success(), "{}\n{}", String::from_utf8_lossy(&check.stderr), made.pipeline);
+        assert!(
+            check.status.success(),
+            "{}\n{}",
+            String::from_utf8_lossy(&check.stderr),
+            made.pipeline
+        );
     }
 }
 
 #[test]
 fn joint_states_of_ros_are_told_by_their_names_and_an_effort_may_be_a_current() {
-    let arm = ["shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3"];
+    let arm = [
+        "shoulder_pan",
+        "shoulder_lift",
+        "elbow",
+        "wrist_1",
+        "wrist_2",
+        "wrist_3",
+    ];
     let of = |what: &str| arm.map(|joint| format!("{joint}_joint_{what}")).join(",");
     // Efforts before positions: the first column of a joint is not its position.
     let header = [of("effort"), of("velocity"), of("position")].join(",");
     let made = made(&[("log.csv", log(&header, 18, wave).into())]);
-    made.has(&["q: {columns: [\"shoulder_pan_joint_position\"", "velocity: {columns: [\"shoulder_pan_joint_velocity\""]);
+    made.has(&[
+        "q: {columns: [\"shoulder_pan_joint_position\"",
+        "velocity: {columns: [\"shoulder_pan_joint_velocity\"",
+    ]);
     made.has(&["torque: {columns: [\"shoulder_pan_joint_effort\""])
         .says(&["# current: {columns: [\"shoulder_pan_joint_effort\""]);
 }
@@ -66,14 +108,27 @@ fn columns_that_are_no_joints_are_not_taken_for_joints() {
         (names("dq#", 6), 6),
         (names("R#", 5), 5),
     ] {
-        let row = |k: usize| format!("{},{}", cells(count, ",", |column| wave(k, column)), point(k, ","));
+        let row = |k: usize| {
+            format!(
+                "{},{}",
+                cells(count, ",", |column| wave(k, column)),
+                point(k, ",")
+            )
+        };
         let made = made(&[("data.csv", table(&format!("{header},X,Y,Z"), row).into())]);
         assert!(!made.said.contains("joints ("), "{header}: {}", made.said);
-        made.has(&["q: {column: \"A{j}\", unit: deg}   # REPLACE: no columns of joints were recognised"]);
+        made.has(&[
+            "q: {column: \"A{j}\", unit: deg}   # REPLACE: no columns of joints were recognised",
+        ]);
     }
     let turned = |k: usize| {
         let angle = 0.1 * k as f64;
-        format!("{:.6},{:.6},0,0,{}", angle.cos(), angle.sin(), point(k, ","))
+        format!(
+            "{:.6},{:.6},0,0,{}",
+            angle.cos(),
+            angle.sin(),
+            point(k, ",")
+        )
     };
     let made = made(&[("data.csv", table("q1,q2,q3,q4,X,Y,Z", turned).into())]);
     assert!(!made.said.contains("joints ("), "{}", made.said);
@@ -82,18 +137,39 @@ fn columns_that_are_no_joints_are_not_taken_for_joints() {
 /// A file of columns: times, a list of the state with so many numbers, and a point as a list.
 fn lists(count: usize) -> Vec<u8> {
     let rows = 0..30;
-    let state = |k: usize| Some((0..count).map(|j| Some(wave(k, j).parse::<f32>().expect("a number"))).collect::<Vec<_>>());
+    let state = |k: usize| {
+        Some(
+            (0..count)
+                .map(|j| Some(wave(k, j).parse::<f32>().expect("a number")))
+                .collect::<Vec<_>>(),
+        )
+    };
     let state = ListArray::from_iter_primitive::<Float32Type, _, _>(rows.clone().map(state));
-    let points: Vec<f64> =
-        rows.clone().flat_map(|k| point(k, ",").split(',').map(|x| x.parse().expect("a number")).collect::<Vec<f64>>()).collect();
-    let field = Arc::new(Field::new("item", arrow::datatypes::DataType::Float64, true));
+    let points: Vec<f64> = rows
+        .clone()
+        .flat_map(|k| {
+            point(k, ",")
+                .split(',')
+                .map(|x| x.parse().expect("a number"))
+                .collect::<Vec<f64>>()
+        })
+        .collect();
+    let field = Arc::new(Field::new(
+        "item",
+        arrow::datatypes::DataType::Float64,
+        true,
+    ));
     let points = FixedSizeListArray::new(field, 3, Arc::new(Float64Array::from(points)), None);
     let time: Float64Array = rows.map(|k| 0.1 * k as f64).collect::<Vec<f64>>().into();
-    let columns: [(&str, ArrayRef); 3] =
-        [("timestamp", Arc::new(time)), ("observation.state", Arc::new(state)), ("point", Arc::new(points))];
+    let columns: [(&str, ArrayRef); 3] = [
+        ("timestamp", Arc::new(time)),
+        ("observation.state", Arc::new(state)),
+        ("point", Arc::new(points)),
+    ];
     let batch = RecordBatch::try_from_iter(columns).expect("columns");
     let mut bytes = Vec::new();
-    let mut writer = parquet::arrow::ArrowWriter::try_new(&mut bytes, batch.schema(), None).expect("a writer");
+    let mut writer =
+        parquet::arrow::ArrowWriter::try_new(&mut bytes, batch.schema(), None).expect("a writer");
     writer.write(&batch).expect("rows");
     writer.close().expect("a file");
     bytes
@@ -102,11 +178,23 @@ fn lists(count: usize) -> Vec<u8> {
 #[test]
 fn lists_of_a_parquet_file_are_columns_of_which_the_first_are_the_joints() {
     let made = made(&[("episode.parquet", lists(7))]);
-    made.has(&["q: {columns: [\"observation.state[1]\", \"observation.state[2]\"", "time: {column: \"timestamp\", unit: s}"]);
-    made.says(&["of the 7 numbers of the list the first 6", "# not used: \"observation.state[7]\"", "# not used: \"point[1]\""]);
-    let mapped = (1..).zip(["x", "y", "z"]).fold(made.pipeline.clone(), |text, (k, axis)| {
-        text.replace(&format!("{axis}: {{column: {axis},"), &format!("{axis}: {{column: \"point[{k}]\","))
-    });
+    made.has(&[
+        "q: {columns: [\"observation.state[1]\", \"observation.state[2]\"",
+        "time: {column: \"timestamp\", unit: s}",
+    ]);
+    made.says(&[
+        "of the 7 numbers of the list the first 6",
+        "# not used: \"observation.state[7]\"",
+        "# not used: \"point[1]\"",
+    ]);
+    let mapped = (1..)
+        .zip(["x", "y", "z"])
+        .fold(made.pipeline.clone(), |text, (k, axis)| {
+            text.replace(
+                &format!("{axis}: {{column: {axis},"),
+                &format!("{axis}: {{column: \"point[{k}]\","),
+            )
+        });
     std::fs::write(made.path().join("pipeline.yaml"), mapped).expect("a file");
     made.runs(30);
 }
@@ -124,14 +212,25 @@ fn programs_and_bags_are_named_as_what_they_are_by_init_and_by_check() {
             b"MODULE Measure\n  CONST jointtarget p1:=[[0,0,0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n",
             "is an ABB program in RAPID: name it .mod or .prg",
         ),
-        ("run.db3", b"SQLite format 3\0\x10\x00\x01\x01\x00", "its first page is damaged"),
-        ("run.mcap", b"\x89MCAP0\r\n\x01\x00", "it has no end: a recorder that was stopped, or a copy that was cut"),
+        (
+            "run.db3",
+            b"SQLite format 3\0\x10\x00\x01\x01\x00",
+            "its first page is damaged",
+        ),
+        (
+            "run.mcap",
+            b"\x89MCAP0\r\n\x01\x00",
+            "it has no end: a recorder that was stopped, or a copy that was cut",
+        ),
     ] {
         let made = made(&[(name, content.to_vec())]);
         assert!(made.said.contains(said), "{name}: {}", made.said);
         let check = calib(made.path(), &["check", "pipeline.yaml"], "");
         let told = String::from_utf8_lossy(&check.stderr).into_owned();
-        assert!(check.status.code() == Some(10) && told.contains(said), "{name}: {told}");
+        assert!(
+            check.status.code() == Some(10) && told.contains(said),
+            "{name}: {told}"
+        );
     }
 }
 
@@ -140,26 +239,52 @@ fn a_folder_with_a_robot_file_keeps_it_and_joints_are_counted_by_it() {
     let folder = tempfile::tempdir().expect("a folder");
     let told = |arguments: &[&str]| {
         let output = calib(folder.path(), arguments, "");
-        (output.status.code(), [output.stdout, output.stderr].map(|text| String::from_utf8_lossy(&text).into_owned()).concat())
+        (
+            output.status.code(),
+            [output.stdout, output.stderr]
+                .map(|text| String::from_utf8_lossy(&text).into_owned())
+                .concat(),
+        )
     };
     std::fs::write(
         folder.path().join("data.csv"),
-        table("A1,A2,A3,A4,A5,A6,X,Y,Z", |k| format!("{},{}", joints(k, ","), point(k, ","))),
+        table("A1,A2,A3,A4,A5,A6,X,Y,Z", |k| {
+            format!("{},{}", joints(k, ","), point(k, ","))
+        }),
     )
     .expect("a file");
     let robot = told(&["robots", "lrmate_200id"]).1;
     std::fs::write(folder.path().join("robot.yaml"), &robot).expect("a file");
     let (code, said) = told(&["init", ".", "--data", "data.csv", "--robot", "ur10e"]);
-    assert!(code == Some(2) && said.contains("robot.yaml: is already there and would be used"), "{said}");
+    assert!(
+        code == Some(2) && said.contains("robot.yaml: is already there and would be used"),
+        "{said}"
+    );
     let (code, said) = told(&["init", ".", "--data", "data.csv"]);
-    assert!(code == Some(0) && said.contains("wrote ./pipeline.yaml beside ./robot.yaml, which is used as it is"), "{said}");
+    assert!(
+        code == Some(0)
+            && said.contains("wrote ./pipeline.yaml beside ./robot.yaml, which is used as it is"),
+        "{said}"
+    );
     let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).expect("a file");
     assert_eq!(read("robot.yaml"), robot);
     // What its controller counts otherwise goes along.
-    assert!(read("pipeline.yaml").contains("coupled: [{joint: 3, by: 2"), "{}", read("pipeline.yaml"));
+    assert!(
+        read("pipeline.yaml").contains("coupled: [{joint: 3, by: 2"),
+        "{}",
+        read("pipeline.yaml")
+    );
     assert_eq!(told(&["check", "pipeline.yaml"]).0, Some(0));
     std::fs::remove_file(folder.path().join("pipeline.yaml")).expect("a file");
-    std::fs::write(folder.path().join("robot.yaml"), told(&["robots", "panda"]).1).expect("a file");
+    std::fs::write(
+        folder.path().join("robot.yaml"),
+        told(&["robots", "panda"]).1,
+    )
+    .expect("a file");
     let (code, said) = told(&["init", ".", "--data", "data.csv"]);
-    assert!(code == Some(2) && said.contains("has 7 joints, the recording 6; put the robot of the recording there"), "{said}");
+    assert!(
+        code == Some(2)
+            && said.contains("has 7 joints, the recording 6; put the robot of the recording there"),
+        "{said}"
+    );
 }

@@ -4,7 +4,9 @@ use calib::robot::{Measurements, RobotModel};
 /// What the rigid model of an arm leaves out: every fourth row is held out, and only judges in the end.
 pub fn missing_physics(robot: &RobotModel, data: &Measurements) -> Diagnosis {
     let (validate, fit): (Vec<usize>, Vec<usize>) = (0..data.rows()).partition(|row| row % 4 == 3);
-    let set: Vec<usize> = (0..data.rows()).map(|row| usize::from(row % 4 == 3)).collect();
+    let set: Vec<usize> = (0..data.rows())
+        .map(|row| usize::from(row % 4 == 3))
+        .collect();
     let question = Question {
         robot,
         data,
@@ -19,5 +21,6 @@ pub fn missing_physics(robot: &RobotModel, data: &Measurements) -> Diagnosis {
         seed: 1,
     };
     // A wrong unit, sign or zero comes before physics.
-    wrong_setup(&question).unwrap_or_else(|| diagnose(&question, |progress| eprintln!("{progress}")))
+    wrong_setup(&question)
+        .unwrap_or_else(|| diagnose(&question, |progress| eprintln!("{progress}")))
 }

@@ -4,10 +4,18 @@ use super::blocks::cell;
 use calib::effect::CAUSES;
 
 pub fn text() -> String {
-    let mut text =
-        String::from("| cause | place | formula | usual size | needs | confounded with |\n|---|---|---|---|---|---|\n");
+    let mut text = String::from(
+        "| cause | place | formula | usual size | needs | confounded with |\n|---|---|---|---|---|---|\n",
+    );
     for cause in CAUSES {
-        let cells = [cause.place, cause.formula, cause.size, cause.needs, cause.confounded].map(cell);
+        let cells = [
+            cause.place,
+            cause.formula,
+            cause.size,
+            cause.needs,
+            cause.confounded,
+        ]
+        .map(cell);
         text.push_str(&format!("| `{}` | {} |\n", cause.name, cells.join(" | ")));
     }
     text
@@ -16,7 +24,9 @@ pub fn text() -> String {
 /// The walk: the row of a cause as a test compiles and fits it.
 pub fn walk() -> String {
     let file = include_str!("seat_compliance.rs");
-    let (code, _) = file.split_once("\n#[cfg(test)]\n").expect("a row, then its test");
+    let (code, _) = file
+        .split_once("\n#[cfg(test)]\n")
+        .expect("a row, then its test");
     let (_, row) = code.split_once("\n\n").expect("imports, then the row");
     format!(
         "1. **Write a row** into [`table.rs`](table.rs), behind the causes that a model has before it, as `&Cause {{ .. }}`. A test compiles the one below as it \

@@ -9,11 +9,16 @@ const WIDTH: usize = 118;
 
 /// Every command that does something, with the words that lead to it.
 pub fn leaves(command: &Command, words: &[String]) -> Vec<(Vec<String>, Command)> {
-    let own: Vec<&Command> = command.get_subcommands().filter(|verb| verb.get_name() != "help" && !verb.is_hide_set()).collect();
+    let own: Vec<&Command> = command
+        .get_subcommands()
+        .filter(|verb| verb.get_name() != "help" && !verb.is_hide_set())
+        .collect();
     if own.is_empty() {
         return vec![(words.to_vec(), command.clone())];
     }
-    own.into_iter().flat_map(|verb| leaves(verb, &[words, &[verb.get_name().to_string()]].concat())).collect()
+    own.into_iter()
+        .flat_map(|verb| leaves(verb, &[words, &[verb.get_name().to_string()]].concat()))
+        .collect()
 }
 
 fn built() -> Command {
@@ -26,7 +31,10 @@ pub fn text() -> String {
     let all = leaves(&built(), &[]);
     let mut text = String::from("| command | what it does |\n|---|---|\n");
     for (words, command) in &all {
-        let about = command.get_about().map(ToString::to_string).unwrap_or_default();
+        let about = command
+            .get_about()
+            .map(ToString::to_string)
+            .unwrap_or_default();
         text.push_str(&format!(
             "| [`calib {}`](#calib-{}) | {} |\n",
             words.join(" "),
@@ -41,7 +49,11 @@ pub fn text() -> String {
         let name = words.join(" ");
         let help = command.render_long_help().to_string();
         let help: Vec<&str> = help.lines().map(str::trim_end).collect();
-        text.push_str(&format!("\n### calib {name}\n\n{}\n\n```text\n{}\n```\n", example(&name), squeezed(&help)));
+        text.push_str(&format!(
+            "\n### calib {name}\n\n{}\n\n```text\n{}\n```\n",
+            example(&name),
+            squeezed(&help)
+        ));
     }
     text
 }
@@ -53,7 +65,9 @@ fn squeezed(lines: &[&str]) -> String {
     for (at, line) in lines.iter().enumerate() {
         let between = line.is_empty()
             && out.last().is_some_and(|last| indented(last))
-            && lines.get(at + 1).is_some_and(|next| indented(next) || next.is_empty());
+            && lines
+                .get(at + 1)
+                .is_some_and(|next| indented(next) || next.is_empty());
         if !between {
             out.push(line);
         }

@@ -20,23 +20,48 @@ pub fn settings(schema: &Value) -> String {
 
 /// A structure: its fields, its variants, or nothing where its description says all.
 pub fn definition(schema: &Value) -> String {
-    if schema["properties"].as_object().is_some_and(|fields| !fields.is_empty()) {
+    if schema["properties"]
+        .as_object()
+        .is_some_and(|fields| !fields.is_empty())
+    {
         return table(schema);
     }
     let variants = variants(schema);
-    let words: Vec<&Value> = variants.iter().copied().filter(|variant| variant.get("const").is_some()).collect();
+    let words: Vec<&Value> = variants
+        .iter()
+        .copied()
+        .filter(|variant| variant.get("const").is_some())
+        .collect();
     let mut text = String::new();
     if !words.is_empty() {
         text.push_str("| value | means |\n|---|---|\n");
         for word in &words {
-            text.push_str(&format!("| `{}` | {} |\n", plain(&word["const"]), about(word)));
+            text.push_str(&format!(
+                "| `{}` | {} |\n",
+                plain(&word["const"]),
+                about(word)
+            ));
         }
     }
-    for variant in variants.iter().filter(|variant| variant["properties"].is_object()) {
-        let fixed = variant["properties"].as_object().into_iter().flatten().find(|(_, field)| field.get("const").is_some());
-        let head = fixed.map_or_else(|| keys(variant), |(key, field)| format!("`{key}: {}`", plain(&field["const"])));
+    for variant in variants
+        .iter()
+        .filter(|variant| variant["properties"].is_object())
+    {
+        let fixed = variant["properties"]
+            .as_object()
+            .into_iter()
+            .flatten()
+            .find(|(_, field)| field.get("const").is_some());
+        let head = fixed.map_or_else(
+            || keys(variant),
+            |(key, field)| format!("`{key}: {}`", plain(&field["const"])),
+        );
         let description = about(variant);
-        let after = if description.is_empty() { String::new() } else { format!(": {description}") };
+        let after = if description.is_empty() {
+            String::new()
+        } else {
+            format!(": {description}")
+        };
         text.push_str(&format!("\n{head}{after}\n\n{}", table(variant)));
     }
     text.trim_start_matches('\n').to_string()
@@ -44,7 +69,10 @@ pub fn definition(schema: &Value) -> String {
 
 /// The alternatives of a schema, those of alternatives included, without variables.
 fn variants(schema: &Value) -> Vec<&Value> {
-    let all = ["oneOf", "anyOf"].into_iter().filter_map(|key| schema[key].as_array()).flatten();
+    let all = ["oneOf", "anyOf"]
+        .into_iter()
+        .filter_map(|key| schema[key].as_array())
+        .flatten();
     let mut out = Vec::new();
     for variant in all.filter(|variant| reference(variant) != Some(VARIABLE)) {
         match variants(variant) {
@@ -56,25 +84,49 @@ fn variants(schema: &Value) -> Vec<&Value> {
 }
 
 fn keys(variant: &Value) -> String {
-    let names = variant["properties"].as_object().into_iter().flatten().map(|(key, _)| format!("`{key}`"));
+    let names = variant["properties"]
+        .as_object()
+        .into_iter()
+        .flatten()
+        .map(|(key, _)| format!("`{key}`"));
     names.collect::<Vec<_>>().join(", ")
 }
 
 fn table(schema: &Value) -> String {
-    let required: BTreeSet<&str> = schema["required"].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
-    let fields: Vec<(&String, &Value)> = schema["properties"].as_object().into_iter().flatten().collect();
+    let required: BTreeSet<&str> = schema["required"]
+        .as_array()
+        .into_iter()
+        .flatten()
+        .filter_map(Value::as_str)
+        .collect();
+    let fields: Vec<(&String, &Value)> = schema["properties"]
+        .as_object()
+        .into_iter()
+        .flatten()
+        .collect();
     let rows: Vec<String> = fields
         .iter()
         .filter(|(_, field)| field.get("const").is_none())
         .map(|(name, field)| {
-            let default = if required.contains(name.as_str()) { "required".into() } else { default(field) };
-            format!("| `{name}` | {} | {default} | {} |\n", kind(field), about(field))
+            let default = if required.contains(name.as_str()) {
+                "required".into()
+            } else {
+                default(field)
+            };
+            format!(
+                "| `{name}` | {} | {default} | {} |\n",
+                kind(field),
+                about(field)
+            )
         })
         .collect();
     if rows.is_empty() {
         String::new()
     } else {
-        format!("| setting | type | default | meaning |\n|---|---|---|---|\n{}", rows.concat())
+        format!(
+            "| setting | type | default | meaning |\n|---|---|---|---|\n{}",
+            rows.concat()
+        )
     }
 }
 
@@ -84,7 +136,11 @@ fn about(schema: &Value) -> String {
 
 /// What a setting is when it is not given.
 fn default(field: &Value) -> String {
-    let inner = || variants(field).into_iter().find_map(|variant| variant.get("default"));
+    let inner = || {
+        variants(field)
+            .into_iter()
+            .find_map(|variant| variant.get("default"))
+    };
     match field.get("default").or_else(inner) {
         None | Some(Value::Null) => "-".into(),
         Some(Value::Array(items)) if items.is_empty() => "none".into(),
@@ -97,22 +153,38 @@ fn default(field: &Value) -> String {
 fn plain(value: &Value) -> String {
     match value {
         Value::String(text) => text.clone(),
-        Value::Array(items) => format!("[{}]", items.iter().map(plain).collect::<Vec<_>>().join(", ")),
+        Value::Array(items) => format!(
+            "[{}]",
+            items.iter().map(plain).collect::<Vec<_>>().join(", ")
+        ),
         Value::Object(fields) => {
-            format!("{{{}}}", fields.iter().map(|(key, value)| format!("{key}: {}", plain(value))).collect::<Vec<_>>().join(", "))
+            format!(
+                "{{{}}}",
+                fields
+                    .iter()
+                    .map(|(key, value)| format!("{key}: {}", plain(value)))
+                    .collect::<Vec<_>>()
+                    .join(", ")
+            )
         }
         other => other.to_string(),
     }
 }
 
 fn reference(schema: &Value) -> Option<&str> {
-    schema["$ref"].as_str().map(|path| path.trim_start_matches("#/definitions/"))
+    schema["$ref"]
+        .as_str()
+        .map(|path| path.trim_start_matches("#/definitions/"))
 }
 
 /// What may stand there, in words; structures as links.
 pub fn kind(schema: &Value) -> String {
     if let Some(name) = reference(schema) {
-        return if name == FILE { "file".into() } else { format!("[{name}](#{})", name.to_lowercase()) };
+        return if name == FILE {
+            "file".into()
+        } else {
+            format!("[{name}](#{})", name.to_lowercase())
+        };
     }
     if let Some(word) = schema.get("const") {
         return format!("`{}`", plain(word));
@@ -123,7 +195,11 @@ pub fn kind(schema: &Value) -> String {
     let variants = variants(schema);
     if !variants.is_empty() {
         let mut words: Vec<String> = Vec::new();
-        for word in variants.iter().filter(|variant| variant["type"] != "null").map(|variant| kind(variant)) {
+        for word in variants
+            .iter()
+            .filter(|variant| variant["type"] != "null")
+            .map(|variant| kind(variant))
+        {
             if !words.contains(&word) {
                 words.push(word);
             }
@@ -132,10 +208,18 @@ pub fn kind(schema: &Value) -> String {
     }
     let types: Vec<&str> = match &schema["type"] {
         Value::String(one) => vec![one],
-        Value::Array(some) => some.iter().filter_map(Value::as_str).filter(|one| *one != "null").collect(),
+        Value::Array(some) => some
+            .iter()
+            .filter_map(Value::as_str)
+            .filter(|one| *one != "null")
+            .collect(),
         _ => Vec::new(),
     };
-    types.into_iter().map(|one| simple(one, schema)).collect::<Vec<_>>().join(" or ")
+    types
+        .into_iter()
+        .map(|one| simple(one, schema))
+        .collect::<Vec<_>>()
+        .join(" or ")
 }
 
 fn simple(kind_of: &str, schema: &Value) -> String {
@@ -143,10 +227,14 @@ fn simple(kind_of: &str, schema: &Value) -> String {
         "string" => "text".into(),
         "boolean" => "`true` or `false`".into(),
         "array" => match (schema["minItems"].as_u64(), schema["maxItems"].as_u64()) {
-            (Some(low), Some(high)) if low == high => format!("{low} {}", several(&kind(&schema["items"]))),
+            (Some(low), Some(high)) if low == high => {
+                format!("{low} {}", several(&kind(&schema["items"])))
+            }
             _ => format!("list of {}", several(&kind(&schema["items"]))),
         },
-        "object" if schema["additionalProperties"].is_object() => format!("name: {}", kind(&schema["additionalProperties"])),
+        "object" if schema["additionalProperties"].is_object() => {
+            format!("name: {}", kind(&schema["additionalProperties"]))
+        }
         "object" => keys(schema),
         other => other.into(),
     }
@@ -154,7 +242,11 @@ fn simple(kind_of: &str, schema: &Value) -> String {
 
 /// More than one of a kind.
 fn several(kind: &str) -> String {
-    if ["number", "integer", "text", "file"].contains(&kind) { format!("{kind}s") } else { kind.into() }
+    if ["number", "integer", "text", "file"].contains(&kind) {
+        format!("{kind}s")
+    } else {
+        kind.into()
+    }
 }
 
 /// Adds the structures that a schema refers to.

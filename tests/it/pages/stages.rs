@@ -12,14 +12,33 @@ pub fn text() -> String {
     let definitions = &schema["definitions"];
     let mut text = String::from("| stage | what it does |\n|---|---|\n");
     for stage in STAGES {
-        text.push_str(&format!("| [`{0}`](#{0}) | {1} |\n", stage.name, cell(stage.summary)));
+        text.push_str(&format!(
+            "| [`{0}`](#{0}) | {1} |\n",
+            stage.name,
+            cell(stage.summary)
+        ));
     }
     let mut wanted = BTreeSet::new();
-    for (stage, entry) in STAGES.iter().zip(schema["properties"]["stages"]["items"]["oneOf"].as_array().expect("stages")) {
+    for (stage, entry) in STAGES.iter().zip(
+        schema["properties"]["stages"]["items"]["oneOf"]
+            .as_array()
+            .expect("stages"),
+    ) {
         assert_eq!(entry["title"], stage.name);
-        let name = entry["properties"]["with"]["$ref"].as_str().expect("settings").trim_start_matches("#/definitions/");
-        text.push_str(&format!("\n### {}\n\n{}.\n\n", stage.name, sentence(stage.summary)));
-        text.push_str(&format!("Reads {}. Writes {}.\n\n", ports(&(stage.reads)()), ports(&(stage.writes)())));
+        let name = entry["properties"]["with"]["$ref"]
+            .as_str()
+            .expect("settings")
+            .trim_start_matches("#/definitions/");
+        text.push_str(&format!(
+            "\n### {}\n\n{}.\n\n",
+            stage.name,
+            sentence(stage.summary)
+        ));
+        text.push_str(&format!(
+            "Reads {}. Writes {}.\n\n",
+            ports(&(stage.reads)()),
+            ports(&(stage.writes)())
+        ));
         let own = &definitions[name];
         text.push_str(&settings(own));
         links(own, &mut wanted);
@@ -35,11 +54,16 @@ fn structures(definitions: &Value, mut wanted: BTreeSet<String>) -> String {
         links(&definitions[&name], &mut wanted);
         said.insert(name);
     }
-    let mut text = String::from("\n### Parts of settings\n\nWhat the settings above refer to, in the order of the alphabet.\n");
+    let mut text = String::from(
+        "\n### Parts of settings\n\nWhat the settings above refer to, in the order of the alphabet.\n",
+    );
     for name in said {
         let own = &definitions[&name];
         let body = definition(own);
-        let says = own["description"].as_str().map(cell).unwrap_or_else(|| kind(own));
+        let says = own["description"]
+            .as_str()
+            .map(cell)
+            .unwrap_or_else(|| kind(own));
         text.push_str(&format!("\n#### {name}\n\n{says}\n\n{body}"));
     }
     text
@@ -47,12 +71,18 @@ fn structures(definitions: &Value, mut wanted: BTreeSet<String>) -> String {
 
 fn sentence(summary: &str) -> String {
     let mut letters = summary.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+    letters.next().map_or_else(String::new, |first| {
+        first.to_uppercase().chain(letters).collect()
+    })
 }
 
 fn ports(ports: &[Port]) -> String {
     let say = |port: &Port| {
-        let name = if port.name == port.kind { String::new() } else { format!("`{}`: ", port.name) };
+        let name = if port.name == port.kind {
+            String::new()
+        } else {
+            format!("`{}`: ", port.name)
+        };
         let how = match port.arity {
             Arity::One => "",
             Arity::Optional => " (if there is one)",
@@ -60,5 +90,9 @@ fn ports(ports: &[Port]) -> String {
         };
         format!("{name}[{0}](../schemas/README.md#{0}){how}", port.kind)
     };
-    if ports.is_empty() { "no table".into() } else { ports.iter().map(say).collect::<Vec<_>>().join(", ") }
+    if ports.is_empty() {
+        "no table".into()
+    } else {
+        ports.iter().map(say).collect::<Vec<_>>().join(", ")
+    }
 }

@@ -19,7 +19,10 @@ fn words(line: &str) -> Vec<Vec<String>> {
             ('#', None) if word.is_empty() && !open => break,
             (' ' | '\n' | '|' | '>' | '<' | ';' | '&', None) => {
                 if (!word.is_empty() || open) && !std::mem::take(&mut skip) {
-                    commands.last_mut().expect("one").push(std::mem::take(&mut word));
+                    commands
+                        .last_mut()
+                        .expect("one")
+                        .push(std::mem::take(&mut word));
                 }
                 (word, open) = (String::new(), false);
                 match letter {
@@ -49,7 +52,10 @@ fn fault(line: &str, whole: bool) -> Option<String> {
         if words.first().map(String::as_str) != Some("calib") {
             return None;
         }
-        let kept: Vec<String> = words.into_iter().filter(|word| word != "..." && word != "…").collect();
+        let kept: Vec<String> = words
+            .into_iter()
+            .filter(|word| word != "..." && word != "…")
+            .collect();
         let error = cli::command().try_get_matches_from(&kept).err()?;
         let partial = [
             ErrorKind::MissingRequiredArgument,
@@ -57,7 +63,8 @@ fn fault(line: &str, whole: bool) -> Option<String> {
             ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand,
         ];
         let help = [ErrorKind::DisplayHelp, ErrorKind::DisplayVersion].contains(&error.kind());
-        (!help && (whole || !partial.contains(&error.kind()))).then(|| format!("{}: {error}", kept.join(" ")))
+        (!help && (whole || !partial.contains(&error.kind())))
+            .then(|| format!("{}: {error}", kept.join(" ")))
     })
 }
 
@@ -65,7 +72,9 @@ fn fault(line: &str, whole: bool) -> Option<String> {
 fn lines(block: &[&str]) -> Vec<String> {
     let mut out: Vec<String> = Vec::new();
     for line in block {
-        let unfinished = out.last().is_some_and(|last| last.ends_with('\\') || last.matches('\'').count() % 2 == 1);
+        let unfinished = out
+            .last()
+            .is_some_and(|last| last.ends_with('\\') || last.matches('\'').count() % 2 == 1);
         match out.last_mut().filter(|_| unfinished) {
             Some(last) => *last = format!("{last}\n{line}"),
             None => out.push(line.to_string()),
@@ -82,16 +91,28 @@ fn command_lines_of_the_pages_are_understood() {
             let typed: Vec<String> = match block.kind {
                 "sh" => lines(&block.lines),
                 "console" => {
-                    let prompts = block.lines.iter().filter_map(|line| line.strip_prefix("$ ").or(line.strip_prefix("> ")));
+                    let prompts = block
+                        .lines
+                        .iter()
+                        .filter_map(|line| line.strip_prefix("$ ").or(line.strip_prefix("> ")));
                     lines(&prompts.collect::<Vec<_>>())
                 }
                 _ => continue,
             };
             count += typed.len();
-            faults.extend(typed.iter().filter_map(|line| Some(format!("{page}: {}", fault(line, true)?))));
+            faults.extend(
+                typed
+                    .iter()
+                    .filter_map(|line| Some(format!("{page}: {}", fault(line, true)?))),
+            );
         }
         let prose: String = text.split("```").step_by(2).collect();
-        for code in prose.split('`').skip(1).step_by(2).filter(|code| code.starts_with("calib ")) {
+        for code in prose
+            .split('`')
+            .skip(1)
+            .step_by(2)
+            .filter(|code| code.starts_with("calib "))
+        {
             count += 1;
             faults.extend(fault(code, false).map(|fault| format!("{page}: {fault}")));
         }
@@ -104,9 +125,18 @@ fn command_lines_of_the_pages_are_understood() {
 fn examples_of_the_help_are_understood() {
     let (mut faults, mut count) = (Vec::new(), 0);
     for (words, command) in leaves(&cli::command(), &[]) {
-        let Some(after) = command.get_after_help().map(ToString::to_string) else { continue };
-        let Some((_, examples)) = after.split_once("Examples:") else { continue };
-        let typed: Vec<&str> = examples.lines().skip(1).take_while(|line| line.starts_with("  ")).map(str::trim).collect();
+        let Some(after) = command.get_after_help().map(ToString::to_string) else {
+            continue;
+        };
+        let Some((_, examples)) = after.split_once("Examples:") else {
+            continue;
+        };
+        let typed: Vec<&str> = examples
+            .lines()
+            .skip(1)
+            .take_while(|line| line.starts_with("  "))
+            .map(str::trim)
+            .collect();
         for line in lines(&typed) {
             count += 1;
             faults.extend(fault(&line, true).map(|fault| format!("{}: {fault}", words.join(" "))));
@@ -118,9 +148,20 @@ fn examples_of_the_help_are_understood() {
 
 #[test]
 fn a_line_of_a_shell_is_split_as_a_shell_splits_it() {
-    let own = |line: &str| words(line).into_iter().map(|words| words.join("|")).collect::<Vec<_>>();
-    assert_eq!(own("calib query HEAD 'SELECT a, b' > x.csv  # why"), ["calib|query|HEAD|SELECT a, b"]);
-    assert_eq!(own("calib tag HEAD released && calib verify"), ["calib|tag|HEAD|released", "", "calib|verify"]);
+    let own = |line: &str| {
+        words(line)
+            .into_iter()
+            .map(|words| words.join("|"))
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(
+        own("calib query HEAD 'SELECT a, b' > x.csv  # why"),
+        ["calib|query|HEAD|SELECT a, b"]
+    );
+    assert_eq!(
+        own("calib tag HEAD released && calib verify"),
+        ["calib|tag|HEAD|released", "", "calib|verify"]
+    );
     assert!(fault("calib run pipeline.yaml --frce", true).is_some());
     assert!(fault("calib run", true).is_some() && fault("calib run", false).is_none());
     assert!(fault("calibrate --frce", true).is_none());

@@ -24,14 +24,22 @@ impl Writer {
 
     fn say(&mut self, text: &str) {
         for c in text.chars() {
-            let other = if self.rng.random_bool(0.2) { c.to_ascii_lowercase() } else { c };
+            let other = if self.rng.random_bool(0.2) {
+                c.to_ascii_lowercase()
+            } else {
+                c
+            };
             self.text.push(other);
         }
     }
 
     /// Blanks, of RAPID line ends and comments too; at least one where words would run together.
     fn gap(&mut self, needed: bool) {
-        let some: &[&str] = if self.rapid { &[" ", "  ", "\t", "\r\n ", "\n", " ! [1,2 ;\n"] } else { &[" ", "  ", "\t"] };
+        let some: &[&str] = if self.rapid {
+            &[" ", "  ", "\t", "\r\n ", "\n", " ! [1,2 ;\n"]
+        } else {
+            &[" ", "  ", "\t"]
+        };
         let blank = self.pick(some);
         if needed || self.rng.random_bool(0.15) {
             self.text.push_str(blank);
@@ -71,7 +79,11 @@ impl Writer {
             self.gap(false);
             self.text.push(':');
         }
-        let names = if axes { ["A1", "A2", "A3", "A4", "A5", "A6"] } else { ["X", "Y", "Z", "A", "B", "C"] };
+        let names = if axes {
+            ["A1", "A2", "A3", "A4", "A5", "A6"]
+        } else {
+            ["X", "Y", "Z", "A", "B", "C"]
+        };
         let mut values = Vec::new();
         for (k, name) in names.into_iter().enumerate() {
             if k > 0 {
@@ -83,18 +95,34 @@ impl Writer {
             values.push(self.number(-180.0, 180.0));
         }
         if prefix.is_some_and(|prefix| prefix.starts_with("E6")) {
-            let end = if axes { ",E1 0.0" } else { ",S 2,T 'B101010',E1 0" };
+            let end = if axes {
+                ",E1 0.0"
+            } else {
+                ",S 2,T 'B101010',E1 0"
+            };
             self.text.push_str(end);
         }
         self.text.push('}');
-        self.wanted.push((if axes { TargetKind::Joints } else { TargetKind::Frame }, values));
+        self.wanted.push((
+            if axes {
+                TargetKind::Joints
+            } else {
+                TargetKind::Frame
+            },
+            values,
+        ));
     }
 
     fn krl(&mut self) {
-        self.text.push_str("&ACCESS RVP\r\n&PARAM X = {\r\nDEF weld( )\r\n");
+        self.text
+            .push_str("&ACCESS RVP\r\n&PARAM X = {\r\nDEF weld( )\r\n");
         for k in 0..self.rng.random_range(1..8) {
             let axes = self.rng.random_bool(0.5);
-            let kind = if axes { self.pick(&["E6AXIS", "AXIS"]) } else { self.pick(&["E6POS", "POS"]) };
+            let kind = if axes {
+                self.pick(&["E6AXIS", "AXIS"])
+            } else {
+                self.pick(&["E6POS", "POS"])
+            };
             match self.rng.random_range(0..5) {
                 0 => {
                     self.say("DECL ");
@@ -131,7 +159,8 @@ impl Writer {
             ]);
             self.text.push_str(end);
         }
-        self.text.push_str("LIN_REL {X 5}\nDECL FRAME F={X 1,Y 2,Z 3,A 4,B 5,C 6}\nEND\n");
+        self.text
+            .push_str("LIN_REL {X 5}\nDECL FRAME F={X 1,Y 2,Z 3,A 4,B 5,C 6}\nEND\n");
     }
 
     fn list(&mut self, values: &mut Vec<f64>, count: usize) {
@@ -164,7 +193,14 @@ impl Writer {
         }
         self.text.push_str("[9E9,9E+09,9e9,9E9,9E9,9E9]]");
         self.gap(false);
-        self.wanted.push((if pose { TargetKind::Quaternion } else { TargetKind::Joints }, values));
+        self.wanted.push((
+            if pose {
+                TargetKind::Quaternion
+            } else {
+                TargetKind::Joints
+            },
+            values,
+        ));
     }
 
     fn rapid(&mut self) {
@@ -176,7 +212,8 @@ impl Writer {
             self.say(if pose { "ROBTARGET" } else { "JOINTTARGET" });
             self.gap(true);
             let array = self.rng.random_bool(0.3);
-            self.text.push_str(&format!("p{k}{}:=", if array { "{2}" } else { "" }));
+            self.text
+                .push_str(&format!("p{k}{}:=", if array { "{2}" } else { "" }));
             self.gap(false);
             if array {
                 self.text.push('[');
@@ -213,7 +250,12 @@ impl Writer {
 
 fn program(seed: u64, language: Language) -> Writer {
     let rapid = language == Language::Rapid;
-    let mut writer = Writer { rng: ChaCha8Rng::seed_from_u64(seed), rapid, text: String::new(), wanted: Vec::new() };
+    let mut writer = Writer {
+        rng: ChaCha8Rng::seed_from_u64(seed),
+        rapid,
+        text: String::new(),
+        wanted: Vec::new(),
+    };
     if rapid {
         writer.rapid()
     } else {
@@ -223,16 +265,28 @@ fn program(seed: u64, language: Language) -> Writer {
 }
 
 fn read(language: Language, text: &[u8]) -> Option<Targets> {
-    if language == Language::Krl { reader::krl(text) } else { reader::rapid(text) }
+    if language == Language::Krl {
+        reader::krl(text)
+    } else {
+        reader::rapid(text)
+    }
 }
 
 fn found(program: &Program) -> Targets {
-    program.literals().iter().map(|literal| (literal.kind, literal.values.clone())).collect()
+    program
+        .literals()
+        .iter()
+        .map(|literal| (literal.kind, literal.values.clone()))
+        .collect()
 }
 
 /// The bytes outside of the numbers of targets, and of the blank between a name and a number.
 pub fn rest(text: &[u8], program: &Program) -> Vec<u8> {
-    let mut spans: Vec<_> = program.literals().iter().flat_map(|literal| literal.spans.clone()).collect();
+    let mut spans: Vec<_> = program
+        .literals()
+        .iter()
+        .flat_map(|literal| literal.spans.clone())
+        .collect();
     spans.sort_by_key(|span| span.start);
     let mut out = Vec::new();
     let mut from = 0;
@@ -248,7 +302,8 @@ pub fn rest(text: &[u8], program: &Program) -> Vec<u8> {
 /// Every number of what is written for an accepted program, against the second reader's of the program.
 fn check(language: Language, text: &[u8], program: &Program) {
     let shown = String::from_utf8_lossy(text);
-    let wanted = read(language, text).unwrap_or_else(|| panic!("accepted, and not to be read:\n{shown}"));
+    let wanted =
+        read(language, text).unwrap_or_else(|| panic!("accepted, and not to be read:\n{shown}"));
     assert_eq!(found(program), wanted, "{shown}");
     assert_eq!(moved(program, 0.0), text, "{shown}");
     // A quaternion is one no longer when every part of it is moved far.
@@ -264,7 +319,10 @@ fn check(language: Language, text: &[u8], program: &Program) {
                 _ => 5e-7,
             };
             let slack = half + 1e-15 * given.abs();
-            assert!((value - given - by).abs() <= slack * 1.000_001, "{value} of {given}:\n{shown}");
+            assert!(
+                (value - given - by).abs() <= slack * 1.000_001,
+                "{value} of {given}:\n{shown}"
+            );
         }
     }
     let again = Program::parse(&out, language, Partial::Refused).expect("what is written");
@@ -315,7 +373,10 @@ fn a_program_with_a_byte_changed_is_refused_or_read_as_it_stands() {
             }
         }
         let share = accepted as f64 / (PROGRAMS * CHANGES) as f64;
-        println!("{language:?}: {accepted} of {} changed programs accepted", PROGRAMS * CHANGES);
+        println!(
+            "{language:?}: {accepted} of {} changed programs accepted",
+            PROGRAMS * CHANGES
+        );
         assert!((0.1..0.9).contains(&share), "{share}");
     }
 }

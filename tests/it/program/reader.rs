@@ -95,8 +95,11 @@ pub fn krl(program: &[u8]) -> Option<Targets> {
         let settings = text.find("WITH").filter(|_| motion).unwrap_or(text.len());
         for group in text[..settings].split('{').skip(1) {
             let inner = group.split('}').next()?;
-            let (prefix, inner) =
-                inner.split_once(':').map_or((None, inner), |(prefix, rest)| (Some(prefix.trim_matches(blank)), rest));
+            let (prefix, inner) = inner
+                .split_once(':')
+                .map_or((None, inner), |(prefix, rest)| {
+                    (Some(prefix.trim_matches(blank)), rest)
+                });
             let wanted = match prefix {
                 Some(prefix) => TYPES.contains(&prefix),
                 None if first == "DECL" => all.get(1).is_some_and(|kind| TYPES.contains(kind)),
@@ -114,7 +117,10 @@ fn fields(inner: &str) -> Option<(TargetKind, Vec<f64>)> {
     let mut given: Vec<(String, &str)> = Vec::new();
     for field in inner.split(',') {
         let field = field.trim_matches(blank);
-        let name: String = field.chars().take_while(char::is_ascii_alphanumeric).collect();
+        let name: String = field
+            .chars()
+            .take_while(char::is_ascii_alphanumeric)
+            .collect();
         let rest = &field[name.len()..];
         if given.iter().any(|(known, _)| *known == name) {
             return None;
@@ -122,7 +128,10 @@ fn fields(inner: &str) -> Option<(TargetKind, Vec<f64>)> {
         given.push((name, rest));
     }
     let take = |names: [&str; 6]| -> Option<Vec<f64>> {
-        names.iter().map(|name| number(given.iter().find(|(known, _)| known == name)?.1, false)).collect()
+        names
+            .iter()
+            .map(|name| number(given.iter().find(|(known, _)| known == name)?.1, false))
+            .collect()
     };
     take(["A1", "A2", "A3", "A4", "A5", "A6"])
         .map(|values| (TargetKind::Joints, values))
@@ -163,7 +172,9 @@ fn piece(text: &mut std::iter::Peekable<std::str::Chars>) -> Option<Piece> {
 }
 
 fn collect(piece: &Piece, pose: bool, out: &mut Targets) -> Option<()> {
-    let Piece::List(items) = piece else { return None };
+    let Piece::List(items) = piece else {
+        return None;
+    };
     let deep = |piece: &Piece| matches!(piece, Piece::List(items) if items.iter().any(|item| matches!(item, Piece::List(_))));
     if items.iter().any(deep) {
         return items.iter().try_for_each(|item| collect(item, pose, out));
@@ -174,7 +185,9 @@ fn collect(piece: &Piece, pose: bool, out: &mut Targets) -> Option<()> {
         return None;
     }
     for (item, size) in items.iter().zip(sizes) {
-        let Piece::List(leaves) = item else { return None };
+        let Piece::List(leaves) = item else {
+            return None;
+        };
         if leaves.len() != *size {
             return None;
         }
@@ -184,27 +197,49 @@ fn collect(piece: &Piece, pose: bool, out: &mut Targets) -> Option<()> {
         }
     }
     values.truncate(if pose { 7 } else { 6 });
-    out.push((if pose { TargetKind::Quaternion } else { TargetKind::Joints }, values));
+    out.push((
+        if pose {
+            TargetKind::Quaternion
+        } else {
+            TargetKind::Joints
+        },
+        values,
+    ));
     Some(())
 }
 
 pub fn rapid(program: &[u8]) -> Option<Targets> {
-    let lines: Vec<String> = program.split(|byte| *byte == b'\n').map(|line| bare(line, b'!')).collect();
+    let lines: Vec<String> = program
+        .split(|byte| *byte == b'\n')
+        .map(|line| bare(line, b'!'))
+        .collect();
     let text = lines.join("\n");
     let mut out = Vec::new();
     for statement in text.split(';') {
-        let Some(open) = statement.find('[') else { continue };
+        let Some(open) = statement.find('[') else {
+            continue;
+        };
         let all = words(&statement[..open]);
-        let storage = all.iter().rposition(|word| ["CONST", "PERS", "VAR"].contains(word));
+        let storage = all
+            .iter()
+            .rposition(|word| ["CONST", "PERS", "VAR"].contains(word));
         let kind = storage.and_then(|k| all.get(k + 1)).copied();
-        let motion = all.iter().find(|word| word.starts_with("MOVE")).filter(|_| kind.is_none()).copied();
+        let motion = all
+            .iter()
+            .find(|word| word.starts_with("MOVE"))
+            .filter(|_| kind.is_none())
+            .copied();
         let pose = match (kind, motion) {
             (Some("ROBTARGET"), _) => true,
             (Some("JOINTTARGET"), _) => false,
             (None, Some(motion)) => !motion.contains("ABSJ"),
             _ => continue,
         };
-        let count = if motion.is_some_and(|motion| motion.starts_with("MOVEC")) { 2 } else { 1 };
+        let count = if motion.is_some_and(|motion| motion.starts_with("MOVEC")) {
+            2
+        } else {
+            1
+        };
         let mut rest = statement[open..].chars().peekable();
         for position in 0..count {
             // The second position of a circle may be a variable.

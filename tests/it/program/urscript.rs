@@ -39,9 +39,13 @@ fn poses_and_joints_of_motions_are_targets_where_they_are_written() {
     assert_eq!(found, expected);
     assert_eq!(
         warned,
-        ["3:3: payload 1.5 kg, as the program states", "15:9: left as it is: `get_actual_tcp_pose()` computes the target"]
+        [
+            "3:3: payload 1.5 kg, as the program states",
+            "15:9: left as it is: `get_actual_tcp_pose()` computes the target"
+        ]
     );
-    let program = Program::parse(SCRIPT.as_bytes(), Language::UrScript, Partial::Refused).expect("accepted");
+    let program =
+        Program::parse(SCRIPT.as_bytes(), Language::UrScript, Partial::Refused).expect("accepted");
     let near = [-1_600_000, -1_730_000, -2_200_000, -810_000, 1_600_000, 0];
     assert_eq!(program.literals()[0].posture, PostureStatement::Near(near));
     let list = joint_list(SCRIPT.as_bytes(), Language::UrScript).expect("a list");
@@ -57,24 +61,62 @@ fn what_may_or_may_not_be_a_target_is_refused_with_its_line() {
             "movel(pose_trans(p[1,0,0,0,0,0], wp1_p))",
             "16:9: `pose_trans(p[1,0,0,0,0,0], wp1_p)` computes a target from a literal",
         ),
-        ("go(p[0.1,0.2,0.3,0,0,0])", "16:6: a pose in a call of `go`: calib cannot say whether it is a target"),
-        ("go([0.1,0.2,0.3,0,0,0])", "16:6: a list of six numbers in a call of `go`"),
-        ("go(home)", "16:6: the target `home` is handed to `go`: calib cannot say what becomes of it there"),
-        ("home[2] = 1.2", "16:3: the target `home` is changed in one number"),
-        ("x = wp1_p + p[0,0,0.1,0,0,0]", "16:15: a pose in an expression"),
-        ("movel(p[0.1,0.2,0.3,0,0])", "16:9: `p[0.1,0.2,0.3,0,0]` is no list of six numbers"),
-        ("movel(p[0.1,0.2,0.3,0,0,d2r(90)]", "16:8: `(` is not closed on its line"),
+        (
+            "go(p[0.1,0.2,0.3,0,0,0])",
+            "16:6: a pose in a call of `go`: calib cannot say whether it is a target",
+        ),
+        (
+            "go([0.1,0.2,0.3,0,0,0])",
+            "16:6: a list of six numbers in a call of `go`",
+        ),
+        (
+            "go(home)",
+            "16:6: the target `home` is handed to `go`: calib cannot say what becomes of it there",
+        ),
+        (
+            "home[2] = 1.2",
+            "16:3: the target `home` is changed in one number",
+        ),
+        (
+            "x = wp1_p + p[0,0,0.1,0,0,0]",
+            "16:15: a pose in an expression",
+        ),
+        (
+            "movel(p[0.1,0.2,0.3,0,0])",
+            "16:9: `p[0.1,0.2,0.3,0,0]` is no list of six numbers",
+        ),
+        (
+            "movel(p[0.1,0.2,0.3,0,0,d2r(90)]",
+            "16:8: `(` is not closed on its line",
+        ),
         ("movej([0,0,0,0,0,0)]", "16:21: `)` without `(`"),
-        ("x = p[1,2,3]", "16:7: a pose that is not written in six numbers"),
+        (
+            "x = p[1,2,3]",
+            "16:7: a pose that is not written in six numbers",
+        ),
         ("movej([0,0,0,0,0,1e9])", "16:"),
-        ("movej([0,0,0,0,0,d2r(90)])", "16:9: `[0,0,0,0,0,d2r(90)]` is no list of six numbers"),
+        (
+            "movej([0,0,0,0,0,d2r(90)])",
+            "16:9: `[0,0,0,0,0,d2r(90)]` is no list of six numbers",
+        ),
     ] {
-        let text = SCRIPT.replace("end\n  movec", "end2").replacen("\nend\n", &format!("\n  {line}\nend\n"), 1);
+        let text = SCRIPT.replace("end\n  movec", "end2").replacen(
+            "\nend\n",
+            &format!("\n  {line}\nend\n"),
+            1,
+        );
         let text = text.replace("end2", "end\n  movec");
         let told = told(&text);
-        assert!(told.iter().any(|one| one.contains(wanted)), "{line}: {told:?}");
+        assert!(
+            told.iter().any(|one| one.contains(wanted)),
+            "{line}: {told:?}"
+        );
     }
-    let frames = SCRIPT.replace("  movej(home)\n", "  set_tcp(p[0, 0, 0.2, 0, 0, 0])\n  movej(home)\n");
-    let program = Program::parse(frames.as_bytes(), Language::UrScript, Partial::Refused).expect("accepted");
+    let frames = SCRIPT.replace(
+        "  movej(home)\n",
+        "  set_tcp(p[0, 0, 0.2, 0, 0, 0])\n  movej(home)\n",
+    );
+    let program =
+        Program::parse(frames.as_bytes(), Language::UrScript, Partial::Refused).expect("accepted");
     assert!(super::told(program.frames())[0].contains("set_tcp sets several tools"));
 }

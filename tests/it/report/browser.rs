@@ -9,7 +9,9 @@ use tempfile::TempDir;
 
 fn chromium() -> Option<PathBuf> {
     let path = std::env::var_os("PATH")?;
-    std::env::split_paths(&path).map(|folder| folder.join("chromium")).find(|file| file.is_file())
+    std::env::split_paths(&path)
+        .map(|folder| folder.join("chromium"))
+        .find(|file| file.is_file())
 }
 
 /// A browser that asks nobody: nothing listens at its proxy, so its own requests for updates end there too.
@@ -24,7 +26,10 @@ fn browser(chromium: &Path, folder: &Path, arguments: &[&str], page: &Path) -> O
             "--disable-background-networking",
         ])
         .args(["--proxy-server=127.0.0.1:9", "--enable-logging=stderr"])
-        .arg(format!("--user-data-dir={}", folder.join("profile").display()))
+        .arg(format!(
+            "--user-data-dir={}",
+            folder.join("profile").display()
+        ))
         .args(arguments)
         .arg(format!("file://{}", page.display()))
         .output()
@@ -42,10 +47,22 @@ fn folder(page: &str) -> TempDir {
 fn open(chromium: &Path, page: &str, milliseconds: u32) -> (String, Vec<String>) {
     let folder = folder(page);
     let time = format!("--virtual-time-budget={milliseconds}");
-    let output = browser(chromium, folder.path(), &[&time, "--dump-dom"], &folder.path().join("report.html"));
+    let output = browser(
+        chromium,
+        folder.path(),
+        &[&time, "--dump-dom"],
+        &folder.path().join("report.html"),
+    );
     let log = String::from_utf8_lossy(&output.stderr);
-    let console = log.lines().filter(|line| line.contains(":CONSOLE")).map(str::to_owned).collect();
-    (String::from_utf8_lossy(&output.stdout).into_owned(), console)
+    let console = log
+        .lines()
+        .filter(|line| line.contains(":CONSOLE"))
+        .map(str::to_owned)
+        .collect();
+    (
+        String::from_utf8_lossy(&output.stdout).into_owned(),
+        console,
+    )
 }
 
 #[test]
@@ -61,9 +78,16 @@ fn a_browser_shows_the_report_without_complaint_and_without_a_request() {
     // The page's own policy forbids every request, so that one would show on the console.
     let asking = page.replace("</main>", "<img src=\"http://127.0.0.1:9/a.png\"></main>");
     // On a busy machine the browser may be done before it has written that.
-    let refused =
-        |milliseconds| open(&chromium, &asking, milliseconds).1.iter().any(|line| line.contains("Content Security Policy"));
-    assert!([4_000, 16_000, 64_000].into_iter().any(refused), "a request is not refused");
+    let refused = |milliseconds| {
+        open(&chromium, &asking, milliseconds)
+            .1
+            .iter()
+            .any(|line| line.contains("Content Security Policy"))
+    };
+    assert!(
+        [4_000, 16_000, 64_000].into_iter().any(refused),
+        "a request is not refused"
+    );
 }
 
 /// What `frame.html` saw of the report at some widths. On a busy machine the browser may be done before its frames are: then it gets longer.
@@ -72,13 +96,32 @@ fn seen(chromium: &Path, folder: &Path, widths: &[u32], scheme: &[&str]) -> Vec<
     std::fs::write(folder.join("frame.html"), frames).expect("a page");
     let views = |budget: u32| -> Vec<serde_json::Value> {
         let budget = format!("--virtual-time-budget={budget}");
-        let arguments = [&["--allow-file-access-from-files", budget.as_str(), "--dump-dom"], scheme].concat();
+        let arguments = [
+            &[
+                "--allow-file-access-from-files",
+                budget.as_str(),
+                "--dump-dom",
+            ],
+            scheme,
+        ]
+        .concat();
         let output = browser(chromium, folder, &arguments, &folder.join("frame.html"));
         let dom = String::from_utf8_lossy(&output.stdout).into_owned();
-        let texts = dom.split("<pre class=\"seen\">").skip(1).filter_map(|rest| rest.split("</pre>").next());
-        texts.map(|text| serde_json::from_str(text).unwrap_or_else(|error| panic!("{error}: {text}"))).collect()
+        let texts = dom
+            .split("<pre class=\"seen\">")
+            .skip(1)
+            .filter_map(|rest| rest.split("</pre>").next());
+        texts
+            .map(|text| {
+                serde_json::from_str(text).unwrap_or_else(|error| panic!("{error}: {text}"))
+            })
+            .collect()
     };
-    [4_000, 16_000, 64_000, 256_000].into_iter().map(views).find(|views| views.len() == widths.len()).unwrap_or_default()
+    [4_000, 16_000, 64_000, 256_000]
+        .into_iter()
+        .map(views)
+        .find(|views| views.len() == widths.len())
+        .unwrap_or_default()
 }
 
 #[test]
@@ -86,18 +129,36 @@ fn the_report_fits_a_desk_and_a_telephone_and_is_legible_by_day_and_night() {
     let Some(chromium) = chromium() else {
         return skipped("no chromium on PATH");
     };
-    let page = html(Report::default(), tables("Heavy 6R, cell 4 with a name that is longer than a telephone is wide"));
+    let page = html(
+        Report::default(),
+        tables("Heavy 6R, cell 4 with a name that is longer than a telephone is wide"),
+    );
     let folder = folder(&page);
-    for (dark, scheme) in [(false, &[][..]), (true, &["--blink-settings=preferredColorScheme=0"][..])] {
+    for (dark, scheme) in [
+        (false, &[][..]),
+        (true, &["--blink-settings=preferredColorScheme=0"][..]),
+    ] {
         let seen = seen(&chromium, folder.path(), &[1280, 390], scheme);
         assert_eq!(seen.len(), 2, "{seen:?}");
         for view in seen {
             assert_eq!(view["dark"], dark, "{view}");
             assert_eq!(view["pictures"], page.matches("<svg ").count(), "{view}");
-            assert_eq!((&view["hidden"], &view["requests"]), (&0.into(), &0.into()), "{view}");
-            assert!(view["overflow"].as_i64().is_some_and(|beyond| beyond <= 0), "scrolls sideways: {view}");
+            assert_eq!(
+                (&view["hidden"], &view["requests"]),
+                (&0.into(), &0.into()),
+                "{view}"
+            );
+            assert!(
+                view["overflow"].as_i64().is_some_and(|beyond| beyond <= 0),
+                "scrolls sideways: {view}"
+            );
             // WCAG 2 AA.
-            assert!(view["contrast"].as_f64().is_some_and(|contrast| contrast >= 4.5), "too faint: {view}");
+            assert!(
+                view["contrast"]
+                    .as_f64()
+                    .is_some_and(|contrast| contrast >= 4.5),
+                "too faint: {view}"
+            );
         }
     }
 }
@@ -112,7 +173,13 @@ fn nothing_of_the_report_is_cut_off_on_paper() {
     // A4 without its margins of 14 mm, at 96 dots an inch.
     let seen = seen(&chromium, folder.path(), &[688], &[]);
     assert_eq!(seen.len(), 1, "{seen:?}");
-    assert!(seen[0]["overflow"].as_i64().is_some_and(|beyond| beyond <= 0), "wider than the paper: {}", seen[0]);
+    assert!(
+        seen[0]["overflow"]
+            .as_i64()
+            .is_some_and(|beyond| beyond <= 0),
+        "wider than the paper: {}",
+        seen[0]
+    );
 }
 
 #[test]
@@ -123,8 +190,19 @@ fn the_report_prints() {
     let folder = folder(&html(Report::default(), tables("Heavy 6R, cell 4")));
     let folder = folder.path();
     let file = folder.join("report.pdf");
-    browser(&chromium, folder, &[&format!("--print-to-pdf={}", file.display())], &folder.join("report.html"));
+    browser(
+        &chromium,
+        folder,
+        &[&format!("--print-to-pdf={}", file.display())],
+        &folder.join("report.html"),
+    );
     let printed = std::fs::read(&file).expect("a PDF");
-    let pages = printed.windows(12).filter(|bytes| bytes == b"/Type /Page\n").count();
-    assert!(printed.starts_with(b"%PDF") && (4..20).contains(&pages), "{pages} pages");
+    let pages = printed
+        .windows(12)
+        .filter(|bytes| bytes == b"/Type /Page\n")
+        .count();
+    assert!(
+        printed.starts_with(b"%PDF") && (4..20).contains(&pages),
+        "{pages} pages"
+    );
 }

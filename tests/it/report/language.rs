@@ -1,8 +1,7 @@
 //! The report in German: no sentence without its German, names as they are, decimal commas.
 
-use super::{html, tables::tables};
+use super::{html, literals::sentences, tables::tables};
 use crate::compensate::calib;
-use crate::strings::sentences;
 use calib::report::PageLanguage;
 use calib::stage::Report;
 
@@ -52,9 +51,18 @@ const WORDS: usize = 3;
 
 /// What is said in one piece between the holes of a literal.
 fn parts(literal: &str) -> Vec<String> {
-    let plain =
-        [("u{201c}", "\u{201c}"), ("u{201d}", "\u{201d}"), ("u{b1}", "\u{b1}"), ("u{d7}", "\u{d7}"), ("u{2192}", "\u{2192}")];
-    let text = plain.iter().fold(literal.to_string(), |text, (code, letter)| text.replace(code, letter));
+    let plain = [
+        ("u{201c}", "\u{201c}"),
+        ("u{201d}", "\u{201d}"),
+        ("u{b1}", "\u{b1}"),
+        ("u{d7}", "\u{d7}"),
+        ("u{2192}", "\u{2192}"),
+    ];
+    let text = plain
+        .iter()
+        .fold(literal.to_string(), |text, (code, letter)| {
+            text.replace(code, letter)
+        });
     let (mut parts, mut depth) = (vec![String::new()], 0);
     for letter in text.chars() {
         match letter {
@@ -67,21 +75,33 @@ fn parts(literal: &str) -> Vec<String> {
             parts.push(String::new());
         }
     }
-    let trimmed = parts.iter().map(|part| part.trim_matches([' ', ',', '.', ';', ':', '(', ')', '`']).to_string());
-    trimmed.filter(|part| part.split(' ').filter(|word| word.len() > 1).count() >= WORDS).collect()
+    let trimmed = parts.iter().map(|part| {
+        part.trim_matches([' ', ',', '.', ';', ':', '(', ')', '`'])
+            .to_string()
+    });
+    trimmed
+        .filter(|part| part.split(' ').filter(|word| word.len() > 1).count() >= WORDS)
+        .collect()
 }
 
 #[test]
 fn no_sentence_of_the_sources_lacks_its_german() {
     let known = PageLanguage::German.known().join("\n").to_lowercase();
-    let shown =
-        |file: &str| SOURCES.iter().any(|own| file.starts_with(own)) && !OTHERS.iter().any(|other| file.starts_with(other));
-    let all: Vec<(String, String)> = sentences().into_iter().filter(|(file, _)| shown(file)).collect();
+    let shown = |file: &str| {
+        SOURCES.iter().any(|own| file.starts_with(own))
+            && !OTHERS.iter().any(|other| file.starts_with(other))
+    };
+    let all: Vec<(String, String)> = sentences()
+        .into_iter()
+        .filter(|(file, _)| shown(file))
+        .collect();
     assert!(all.len() > 150, "only {}", all.len());
     let missing: Vec<String> = all
         .iter()
         .flat_map(|(file, literal)| {
-            parts(literal).into_iter().map(move |part| (file, part.trim_start_matches("in `ingest`: ").to_string()))
+            parts(literal)
+                .into_iter()
+                .map(move |part| (file, part.trim_start_matches("in `ingest`: ").to_string()))
         })
         // What is written into a pipeline or a robot file is YAML in every language.
         .filter(|(_, part)| part.matches('`').count().is_multiple_of(2))
@@ -93,7 +113,11 @@ fn no_sentence_of_the_sources_lacks_its_german() {
         .filter(|(_, part)| !known.contains(&part.to_lowercase()))
         .map(|(file, part)| format!("{file}: {part}"))
         .collect();
-    assert!(missing.is_empty(), "src/report/language/german.txt lacks\n{}", missing.join("\n"));
+    assert!(
+        missing.is_empty(),
+        "src/report/language/german.txt lacks\n{}",
+        missing.join("\n")
+    );
 }
 
 #[test]
@@ -102,10 +126,20 @@ fn every_finding_of_the_library_has_its_german() {
     let missing: Vec<String> = all
         .lines()
         .filter_map(|line| Some(line.split_once(": ")?.1.replace('#', "7")))
-        .map(|sentence| format!("{}{} (31 um rms at the tool).", sentence[..1].to_uppercase(), &sentence[1..]))
+        .map(|sentence| {
+            format!(
+                "{}{} (31 um rms at the tool).",
+                sentence[..1].to_uppercase(),
+                &sentence[1..]
+            )
+        })
         .filter(|sentence| PageLanguage::German.sentence(sentence).is_none())
         .collect();
-    assert!(missing.is_empty(), "src/report/language/german.txt lacks\n{}", missing.join("\n"));
+    assert!(
+        missing.is_empty(),
+        "src/report/language/german.txt lacks\n{}",
+        missing.join("\n")
+    );
 }
 
 /// Statements that are made of several sentences, as they were written on pages.
@@ -136,13 +170,23 @@ const STATEMENTS: [&str; 14] = [
 #[test]
 fn what_is_made_of_several_sentences_is_translated_as_a_whole() {
     for statement in STATEMENTS {
-        let german = PageLanguage::German.sentence(statement).unwrap_or_else(|| panic!("no German of: {statement}"));
-        assert!(!["error", " the ", " joint ", " rows", "mm from"].iter().any(|word| german.contains(word)), "{german}");
+        let german = PageLanguage::German
+            .sentence(statement)
+            .unwrap_or_else(|| panic!("no German of: {statement}"));
+        assert!(
+            !["error", " the ", " joint ", " rows", "mm from"]
+                .iter()
+                .any(|word| german.contains(word)),
+            "{german}"
+        );
     }
-    let said = PageLanguage::German.sentence("The zero of joint 2 steps by 15.5 arcsec from row 40 (31 um rms at the tool).");
+    let said = PageLanguage::German
+        .sentence("The zero of joint 2 steps by 15.5 arcsec from row 40 (31 um rms at the tool).");
     assert_eq!(
         said.as_deref(),
-        Some("Der Nullpunkt von Gelenk 2 springt um 15,5 \u{2033} ab Zeile 40 (RMS am Werkzeug: 31 \u{b5}m).")
+        Some(
+            "Der Nullpunkt von Gelenk 2 springt um 15,5 \u{2033} ab Zeile 40 (RMS am Werkzeug: 31 \u{b5}m)."
+        )
     );
 }
 
@@ -164,20 +208,44 @@ const MADE_UP: [&str; 11] = [
 #[test]
 fn the_page_is_german_throughout_but_for_names() {
     let english = html(Report::default(), tables("Joint & mean"));
-    let german = html(Report { language: PageLanguage::German, ..Report::default() }, tables("Joint & mean"));
+    let german = html(
+        Report {
+            language: PageLanguage::German,
+            ..Report::default()
+        },
+        tables("Joint & mean"),
+    );
     let translated = PageLanguage::German.page(english.replace('\u{b5}', "u"));
-    let missing: Vec<&String> = translated.missing.iter().filter(|text| !MADE_UP.contains(&text.as_str())).collect();
+    let missing: Vec<&String> = translated
+        .missing
+        .iter()
+        .filter(|text| !MADE_UP.contains(&text.as_str()))
+        .collect();
     assert_eq!(missing, Vec::<&String>::new());
     assert_eq!(translated.html, german);
-    assert!(german.contains("<html lang=\"de\">") && german.contains("<h2>Kalibrierschein</h2>"), "{german}");
+    assert!(
+        german.contains("<html lang=\"de\">") && german.contains("<h2>Kalibrierschein</h2>"),
+        "{german}"
+    );
     // Names of robot and steps, what is written to be copied, and pictures are as they were.
     assert!(german.contains("Joint &amp; mean"));
-    for kept in ["<span translate=\"no\">geometry</span>", "class=\"stored\"", "<svg ", "<code>"] {
-        assert_eq!(german.matches(kept).count(), english.matches(kept).count(), "{kept}");
+    for kept in [
+        "<span translate=\"no\">geometry</span>",
+        "class=\"stored\"",
+        "<svg ",
+        "<code>",
+    ] {
+        assert_eq!(
+            german.matches(kept).count(),
+            english.matches(kept).count(),
+            "{kept}"
+        );
     }
     let stored = |page: &str| {
         let cells = page.split("class=\"stored\"").skip(1);
-        cells.map(|rest| rest.split('<').next().map(str::to_owned)).collect::<Vec<_>>()
+        cells
+            .map(|rest| rest.split('<').next().map(str::to_owned))
+            .collect::<Vec<_>>()
     };
     assert_eq!(stored(&german), stored(&english));
 }
@@ -187,14 +255,32 @@ fn a_run_writes_its_report_in_the_language_that_is_asked_for() {
     let folder = tempfile::tempdir().expect("a folder");
     let pipeline = concat!(env!("CARGO_MANIFEST_DIR"), "/pipelines/case/pipeline.yaml");
     let run = |arguments: &[&str]| {
-        let output = calib(folder.path(), &[&["run", pipeline, "--quiet"], arguments].concat(), "");
-        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
-        std::fs::read_to_string(folder.path().join(".calib/documents/case/report.html")).expect("a report")
+        let output = calib(
+            folder.path(),
+            &[&["run", pipeline, "--quiet"], arguments].concat(),
+            "",
+        );
+        assert_eq!(
+            output.status.code(),
+            Some(0),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+        std::fs::read_to_string(folder.path().join(".calib/documents/case/report.html"))
+            .expect("a report")
     };
-    let [english, german, again] = [run(&[]), run(&["--language", "de"]), run(&["--set", "report.language=de"])];
+    let [english, german, again] = [
+        run(&[]),
+        run(&["--language", "de"]),
+        run(&["--set", "report.language=de"]),
+    ];
     let translated = PageLanguage::German.page(english.replace('\u{b5}', "u"));
     assert_eq!(translated.missing, Vec::<String>::new());
-    assert!(english.contains("<html lang=\"en\">") && german.contains("<html lang=\"de\">") && again == german);
+    assert!(
+        english.contains("<html lang=\"en\">")
+            && german.contains("<html lang=\"de\">")
+            && again == german
+    );
     let refused = calib(folder.path(), &["run", pipeline, "--language", "latin"], "");
     assert_eq!(refused.status.code(), Some(2));
 }
@@ -202,14 +288,27 @@ fn a_run_writes_its_report_in_the_language_that_is_asked_for() {
 #[test]
 fn the_table_is_whole_and_every_hole_is_filled() {
     let table = include_str!("../../../src/report/language/german.txt");
-    let lines: Vec<&str> = table.lines().filter(|line| !line.is_empty() && !line.starts_with('#')).collect();
+    let lines: Vec<&str> = table
+        .lines()
+        .filter(|line| !line.is_empty() && !line.starts_with('#'))
+        .collect();
     let mut seen = std::collections::BTreeSet::new();
     for pair in lines.chunks(2) {
-        let [english, german] = pair else { panic!("no German of {pair:?}") };
-        let german = german.strip_prefix("= ").unwrap_or_else(|| panic!("no German of `{english}`"));
+        let [english, german] = pair else {
+            panic!("no German of {pair:?}")
+        };
+        let german = german
+            .strip_prefix("= ")
+            .unwrap_or_else(|| panic!("no German of `{english}`"));
         assert!(seen.insert(*english), "`{english}` stands twice");
-        let holes = ["{}", "{#}", "{=}"].iter().map(|hole| english.matches(hole).count()).sum::<usize>();
-        let filled = (1..=9).map(|n| german.matches(&format!("{{{n}}}")).count()).sum::<usize>() + german.matches("{}").count();
+        let holes = ["{}", "{#}", "{=}"]
+            .iter()
+            .map(|hole| english.matches(hole).count())
+            .sum::<usize>();
+        let filled = (1..=9)
+            .map(|n| german.matches(&format!("{{{n}}}")).count())
+            .sum::<usize>()
+            + german.matches("{}").count();
         assert_eq!(holes, filled, "`{english}`");
     }
 }

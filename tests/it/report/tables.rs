@@ -5,7 +5,13 @@ use calib::stage::{Labelled, ReportReads};
 use calib::table::*;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
-pub fn point(sequence: i64, step: &str, set: &str, held_out: bool, residual: [f64; 3]) -> PredictionRow {
+pub fn point(
+    sequence: i64,
+    step: &str,
+    set: &str,
+    held_out: bool,
+    residual: [f64; 3],
+) -> PredictionRow {
     let [dx_mm, dy_mm, dz_mm] = residual;
     PredictionRow {
         sequence,
@@ -37,12 +43,35 @@ pub fn point(sequence: i64, step: &str, set: &str, held_out: bool, residual: [f6
 fn predictions() -> Vec<Prediction> {
     let mut random = ChaCha8Rng::seed_from_u64(20200116);
     let mut normal = move || (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0;
-    let steps = [("nominal", 2.0, 0.6), ("geometry", 0.55, 0.3), ("stiffness", 0.25, 0.16), ("network", 0.05, 0.1)];
-    let places: Vec<[f64; 3]> =
-        (0..500).map(|_| [1900.0 + 420.0 * normal(), 600.0 * normal(), 1100.0 + 330.0 * normal()]).collect();
+    let steps = [
+        ("nominal", 2.0, 0.6),
+        ("geometry", 0.55, 0.3),
+        ("stiffness", 0.25, 0.16),
+        ("network", 0.05, 0.1),
+    ];
+    let places: Vec<[f64; 3]> = (0..500)
+        .map(|_| {
+            [
+                1900.0 + 420.0 * normal(),
+                600.0 * normal(),
+                1100.0 + 330.0 * normal(),
+            ]
+        })
+        .collect();
     let step = |(name, smooth, rough): (&str, f64, f64), normal: &mut dyn FnMut() -> f64| {
         let rows = places.iter().zip(0..).map(|([x, y, z], k)| {
-            let set = ["unloaded_fit", "unloaded_check", "loaded", "learn", "learn", "check", "check", "check", "learn", "learn"];
+            let set = [
+                "unloaded_fit",
+                "unloaded_check",
+                "loaded",
+                "learn",
+                "learn",
+                "check",
+                "check",
+                "check",
+                "learn",
+                "learn",
+            ];
             let set = set[(k % 10) as usize];
             let fitted = match set {
                 "unloaded_fit" => name != "nominal",
@@ -55,7 +84,12 @@ fn predictions() -> Vec<Prediction> {
                 smooth * 0.7 * (x / 500.0).cos() + rough * 0.6 * normal(),
                 -smooth * (0.4 + (x - 1900.0) / 1200.0) + rough * 0.6 * normal(),
             ];
-            PredictionRow { x_mm: *x, y_mm: *y, z_mm: *z, ..point(k, name, set, !fitted, residual) }
+            PredictionRow {
+                x_mm: *x,
+                y_mm: *y,
+                z_mm: *z,
+                ..point(k, name, set, !fitted, residual)
+            }
         });
         Prediction(rows.collect())
     };
@@ -82,7 +116,12 @@ fn parameter(
         change: value - nominal,
         sigma: (sigma > 0.0).then_some(sigma),
         status: status.into(),
-        step: if effect == "joint_compliance" { "stiffness" } else { "geometry" }.into(),
+        step: if effect == "joint_compliance" {
+            "stiffness"
+        } else {
+            "geometry"
+        }
+        .into(),
         remark: remark.map(str::to_owned),
         form: None,
         corrects: None,
@@ -95,24 +134,61 @@ fn parameters() -> Parameters {
     let mut rows = Vec::new();
     for (axis, value) in ["x", "y", "z"].into_iter().zip([12.412, -3.207, 880.114]) {
         let name = format!("base_frame.{axis}");
-        rows.push(parameter(&name, "base_frame", "base", "mm", [0.0, value, 0.0113], "free", None));
+        rows.push(parameter(
+            &name,
+            "base_frame",
+            "base",
+            "mm",
+            [0.0, value, 0.0113],
+            "free",
+            None,
+        ));
     }
-    rows.push(parameter("base_frame.rz", "base_frame", "base", "rad", [0.0, 0.002_341_7, 8.1e-6], "free", None));
+    rows.push(parameter(
+        "base_frame.rz",
+        "base_frame",
+        "base",
+        "rad",
+        [0.0, 0.002_341_7, 8.1e-6],
+        "free",
+        None,
+    ));
     for j in 1..=6 {
         let value = [3.1e-4, -1.2e-3, 7.7e-4, -2.0e-4, 1.1e-3, 0.0][j - 1];
         let status = if j == 6 { "unseen" } else { "earlier" };
         let sigma = if j == 6 { 0.0 } else { 9e-6 * j as f64 };
         let remark = (j == 6).then_some("the measured point lies on the axis of joint 6");
         let name = format!("joint_offset.j{j}");
-        rows.push(parameter(&name, "joint_offset", &format!("joint {j}"), "rad", [0.0, value, sigma], status, remark));
+        rows.push(parameter(
+            &name,
+            "joint_offset",
+            &format!("joint {j}"),
+            "rad",
+            [0.0, value, sigma],
+            status,
+            remark,
+        ));
     }
     for (j, axis) in [(2, "x"), (2, "z"), (3, "x"), (3, "z"), (4, "y")] {
         let redundant = (j, axis) == (3, "z");
-        let numbers = if redundant { [0.0; 3] } else { [0.0, 0.31 * j as f64 - 0.9, 0.021] };
-        let remark = redundant.then_some("does the same as link_geometry.l2.z with joint_offset.j2");
+        let numbers = if redundant {
+            [0.0; 3]
+        } else {
+            [0.0, 0.31 * j as f64 - 0.9, 0.021]
+        };
+        let remark =
+            redundant.then_some("does the same as link_geometry.l2.z with joint_offset.j2");
         let status = if redundant { "redundant" } else { "free" };
         let name = format!("link_geometry.l{j}.{axis}");
-        rows.push(parameter(&name, "link_geometry", &format!("link {j}"), "mm", numbers, status, remark));
+        rows.push(parameter(
+            &name,
+            "link_geometry",
+            &format!("link {j}"),
+            "mm",
+            numbers,
+            status,
+            remark,
+        ));
     }
     for j in 1..=6 {
         let numbers = [1.0, 1.0 + 1.3e-4 * (j as f64 - 3.2), 6e-6];
@@ -129,13 +205,24 @@ fn parameters() -> Parameters {
     for j in 2..=3 {
         let numbers = [0.0, 4.1e-7 * j as f64, 1.2e-8];
         let name = format!("joint_compliance.j{j}");
-        rows.push(parameter(&name, "joint_compliance", &format!("joint {j}"), "rad/Nm", numbers, "free", None));
+        rows.push(parameter(
+            &name,
+            "joint_compliance",
+            &format!("joint {j}"),
+            "rad/Nm",
+            numbers,
+            "free",
+            None,
+        ));
     }
     Parameters(rows)
 }
 
 fn diagnosed<T>(table: T) -> Vec<Labelled<T>> {
-    vec![Labelled { stage: "diagnose".into(), table }]
+    vec![Labelled {
+        stage: "diagnose".into(),
+        table,
+    }]
 }
 
 fn verdict() -> Verdict {
@@ -169,7 +256,11 @@ fn verdict() -> Verdict {
 }
 
 fn sentences() -> VerdictSentences {
-    let unseen = ["temperature: none was recorded", "tracker_scale: <measure> a scale bar"].map(String::from);
+    let unseen = [
+        "temperature: none was recorded",
+        "tracker_scale: <measure> a scale bar",
+    ]
+    .map(String::from);
     VerdictSentences::of("diagnose", &[(VerdictTopic::NotObservable, &unseen)])
 }
 
@@ -219,8 +310,13 @@ pub fn findings() -> Findings {
 }
 
 fn numbers() -> FindingNumbers {
-    let number =
-        |name: &str, value| FindingNumberRow { rank: 1, name: name.into(), value, unit: "arcsec".into(), sigma: Some(0.4) };
+    let number = |name: &str, value| FindingNumberRow {
+        rank: 1,
+        name: name.into(),
+        value,
+        unit: "arcsec".into(),
+        sigma: Some(0.4),
+    };
     FindingNumbers(vec![number("amplitude", 25.1), number("phase", 3.2)])
 }
 
@@ -250,7 +346,11 @@ fn formulas() -> Forms {
         sigma: Some(0.02),
         declaration: "{}".into(),
     };
-    Forms(vec![number("c1", 53.2, "arcsec"), number("centre", -0.71, "rad"), number("width", 0.6, "rad")])
+    Forms(vec![
+        number("c1", 53.2, "arcsec"),
+        number("centre", -0.71, "rad"),
+        number("width", 0.6, "rad"),
+    ])
 }
 
 fn robot(name: &str) -> Robot {
@@ -291,10 +391,17 @@ fn robot(name: &str) -> Robot {
         tolerance_inertia: None,
         coulomb_nm: None,
     };
-    let axes =
-        [([0.0, 0.0, 1.0], [0.0, 0.0, 0.0]), ([0.0, -1.0, 0.0], [312.0, 0.0, 670.0]), ([0.0, -1.0, 0.0], [312.0, 0.0, 1745.0])];
+    let axes = [
+        ([0.0, 0.0, 1.0], [0.0, 0.0, 0.0]),
+        ([0.0, -1.0, 0.0], [312.0, 0.0, 670.0]),
+        ([0.0, -1.0, 0.0], [312.0, 0.0, 1745.0]),
+    ];
     let mut rows = vec![body(0, name, "base", [0.0, 0.0, -1.0], [0.0; 3])];
-    rows.extend(axes.iter().zip(1..).map(|((axis, at), j)| body(j, &format!("A{j}"), "revolute", *axis, *at)));
+    rows.extend(
+        axes.iter()
+            .zip(1..)
+            .map(|((axis, at), j)| body(j, &format!("A{j}"), "revolute", *axis, *at)),
+    );
     rows.push(body(4, "flange", "tool", [0.0; 3], [1954.0, 60.0, 1400.0]));
     Robot(rows)
 }
@@ -314,7 +421,10 @@ fn fits() -> Vec<Labelled<Fit>> {
                 stop: (k == 7).then(|| "converged: gradient".into()),
             }
         });
-        Labelled { stage: step.into(), table: Fit(rows.collect()) }
+        Labelled {
+            stage: step.into(),
+            table: Fit(rows.collect()),
+        }
     };
     vec![fit("geometry", 2.4, 0.31), fit("stiffness", 1.5, 0.22)]
 }
@@ -328,16 +438,44 @@ fn observability() -> Vec<Labelled<Observability>> {
         meaning: meaning.into(),
     };
     let mut rows = vec![
-        row("rank", 0, 27.0, "directions of the parameters that the data see"),
-        row("rank_expected", 0, 27.0, "directions that this kind of robot can show"),
-        row("condition", 0, 812.4, "largest over smallest seen singular value"),
-        row("O1", 0, 0.0183, "root of the product of the singular values over the root of the rows"),
+        row(
+            "rank",
+            0,
+            27.0,
+            "directions of the parameters that the data see",
+        ),
+        row(
+            "rank_expected",
+            0,
+            27.0,
+            "directions that this kind of robot can show",
+        ),
+        row(
+            "condition",
+            0,
+            812.4,
+            "largest over smallest seen singular value",
+        ),
+        row(
+            "O1",
+            0,
+            0.0183,
+            "root of the product of the singular values over the root of the rows",
+        ),
     ];
     rows.extend((1..=35).map(|k| {
         let value = 12_000.0 * 0.79f64.powi(k as i32);
-        row("singular_value", k, value, "of the whitened Jacobian, columns scaled to unit prior sigma")
+        row(
+            "singular_value",
+            k,
+            value,
+            "of the whitened Jacobian, columns scaled to unit prior sigma",
+        )
     }));
-    vec![Labelled { stage: "geometry".into(), table: Observability(rows) }]
+    vec![Labelled {
+        stage: "geometry".into(),
+        table: Observability(rows),
+    }]
 }
 
 fn training() -> Vec<Labelled<Training>> {
@@ -357,8 +495,13 @@ fn training() -> Vec<Labelled<Training>> {
             }
         })
     };
-    let rows = phase("swarm", 400, 0.62, 0.3).chain(phase("gradient", 120, 0.3, 0.17)).collect();
-    vec![Labelled { stage: "network".into(), table: Training(rows) }]
+    let rows = phase("swarm", 400, 0.62, 0.3)
+        .chain(phase("gradient", 120, 0.3, 0.17))
+        .collect();
+    vec![Labelled {
+        stage: "network".into(),
+        table: Training(rows),
+    }]
 }
 
 fn corrections() -> Vec<Labelled<Corrections>> {
@@ -381,10 +524,23 @@ fn corrections() -> Vec<Labelled<Corrections>> {
     let rows = vec![
         row("none", Some(0.81), false, "a correction gains 0.260 mm"),
         row("ridge", Some(0.62), false, "0.070 mm behind mlp_bso <b>"),
-        row("mlp_bso", Some(0.55), true, "smallest error of those that help: gains 0.260 +- 0.021 mm"),
-        row("curves", None, false, "it could not be fitted to these rows"),
+        row(
+            "mlp_bso",
+            Some(0.55),
+            true,
+            "smallest error of those that help: gains 0.260 +- 0.021 mm",
+        ),
+        row(
+            "curves",
+            None,
+            false,
+            "it could not be fitted to these rows",
+        ),
     ];
-    vec![Labelled { stage: "network".into(), table: Corrections(rows) }]
+    vec![Labelled {
+        stage: "network".into(),
+        table: Corrections(rows),
+    }]
 }
 
 fn rejected(rows: i64) -> Vec<Labelled<Rejected>> {
@@ -394,39 +550,71 @@ fn rejected(rows: i64) -> Vec<Labelled<Rejected>> {
         point_id: (k % 2 == 0).then(|| format!("P{k:04}")),
         reason: ["not_a_number", "lost_beam", "duplicate_id"][(k % 3) as usize].into(),
         detail: "column `x`: `--` is no number; a decimal number in mm is expected".into(),
-        text: format!("P{k:04};--;-512.003;1093.442;2026-11-02T09:14:{:02}.120", k % 60),
+        text: format!(
+            "P{k:04};--;-512.003;1093.442;2026-11-02T09:14:{:02}.120",
+            k % 60
+        ),
     };
-    vec![Labelled { stage: "ingest".into(), table: Rejected((0..rows).map(row).collect()) }]
+    vec![Labelled {
+        stage: "ingest".into(),
+        table: Rejected((0..rows).map(row).collect()),
+    }]
 }
 
 /// The tables of a whole pipeline of a robot with this name.
 pub fn tables(name: &str) -> ReportReads {
     let prediction = predictions();
     let last = &prediction[3].0;
-    let split =
-        last.iter().map(|r| SplitRow { sequence: r.sequence, point_id: r.point_id.clone(), set: r.set.clone() }).collect();
+    let split = last
+        .iter()
+        .map(|r| SplitRow {
+            sequence: r.sequence,
+            point_id: r.point_id.clone(),
+            set: r.set.clone(),
+        })
+        .collect();
     let recording = Recording {
         joints: 3,
         prismatic: vec![false; 3],
         sequence: last.iter().map(|r| r.sequence).collect(),
         point_id: last.iter().map(|r| r.point_id.clone()).collect(),
         usage: last.iter().map(|r| Some(r.set.clone())).collect(),
-        q: (0..3 * last.len()).map(|k| (0.37 * k as f64).sin()).collect(),
-        position: last.iter().map(|r| [r.x_mm, r.y_mm, r.z_mm].map(|mm| mm / 1e3)).collect(),
+        q: (0..3 * last.len())
+            .map(|k| (0.37 * k as f64).sin())
+            .collect(),
+        position: last
+            .iter()
+            .map(|r| [r.x_mm, r.y_mm, r.z_mm].map(|mm| mm / 1e3))
+            .collect(),
         payload: Some(vec![210.0; last.len()]),
         current: Some(vec![1.0; 3 * last.len()]),
         ..Recording::default()
     };
-    let intake = IntakeRow { file: "tracker.csv".into(), lines: 564, read: 561, accepted: 500, rejected: 61 };
+    let intake = IntakeRow {
+        file: "tracker.csv".into(),
+        lines: 564,
+        read: 561,
+        accepted: 500,
+        rejected: 61,
+    };
     ReportReads {
         statistics: validate(prediction.clone()),
-        prediction: prediction.into_iter().map(|table| Labelled { stage: "identify".into(), table }).collect(),
+        prediction: prediction
+            .into_iter()
+            .map(|table| Labelled {
+                stage: "identify".into(),
+                table,
+            })
+            .collect(),
         parameters: parameters(),
         robot: robot(name),
         recording,
         convention: vec![],
         split: Split(split),
-        intake: vec![Labelled { stage: "ingest".into(), table: Intake(vec![intake]) }],
+        intake: vec![Labelled {
+            stage: "ingest".into(),
+            table: Intake(vec![intake]),
+        }],
         rejected: rejected(61),
         fit: fits(),
         observability: observability(),

@@ -5,14 +5,28 @@ use super::{fixture, socket, touched, touched_with, truth};
 use crate::desk::{self, Desk};
 use calib::description::RobotDescription;
 use calib::stage::{Diagnose, DiagnoseReads};
-use calib::table::{Findings, Recording, Robot, Verdict, VerdictRow, VerdictSentences, VerdictTopic};
+use calib::table::{
+    Findings, Recording, Robot, Verdict, VerdictRow, VerdictSentences, VerdictTopic,
+};
 use calib::twin::touch::Fixture;
 use calib::twin::truth::TrueRobot;
 
 fn cell(points: usize) -> Vec<Fixture> {
-    let places = [("a/0", [480.0, 120.0, 300.0]), ("a/1", [480.0, 170.0, 300.0]), ("b/0", [-250.0, 450.0, 380.0])];
-    let more = [("b/1", [-250.0, 450.0, 430.0]), ("c/0", [100.0, -480.0, 320.0]), ("c/1", [100.0, -480.0, 370.0])];
-    places.into_iter().chain(more).map(|(name, place)| socket(name, place, points, 60.0)).collect()
+    let places = [
+        ("a/0", [480.0, 120.0, 300.0]),
+        ("a/1", [480.0, 170.0, 300.0]),
+        ("b/0", [-250.0, 450.0, 380.0]),
+    ];
+    let more = [
+        ("b/1", [-250.0, 450.0, 430.0]),
+        ("c/0", [100.0, -480.0, 320.0]),
+        ("c/1", [100.0, -480.0, 370.0]),
+    ];
+    places
+        .into_iter()
+        .chain(more)
+        .map(|(name, place)| socket(name, place, points, 60.0))
+        .collect()
 }
 
 /// Causes by place, the verdict, and all that was warned of.
@@ -22,39 +36,75 @@ fn diagnosed(robot: &RobotDescription, recording: Recording) -> (Vec<String>, Ve
 }
 
 /// The same, with what the data cannot show.
-fn diagnosed_with_sentences(robot: &RobotDescription, recording: Recording) -> (Vec<String>, VerdictRow, String, String) {
+fn diagnosed_with_sentences(
+    robot: &RobotDescription,
+    recording: Recording,
+) -> (Vec<String>, VerdictRow, String, String) {
     let split = all(&recording);
     let desk = Desk::default();
     let stage: Diagnose = serde_saphyr::from_str("{}").expect("every setting has a default");
-    let tables = desk.run(&stage, DiagnoseReads { robot: Robot::from_description(robot), recording, split }).expect("diagnosed");
+    let tables = desk
+        .run(
+            &stage,
+            DiagnoseReads {
+                robot: Robot::from_description(robot),
+                recording,
+                split,
+            },
+        )
+        .expect("diagnosed");
     let findings = desk::table::<Findings>(&tables).remove(0).0;
     let verdict = desk::table::<Verdict>(&tables).remove(0).0.remove(0);
-    let named = findings.iter().map(|finding| format!("{} at {}", finding.effect, finding.place)).collect();
+    let named = findings
+        .iter()
+        .map(|finding| format!("{} at {}", finding.effect, finding.place))
+        .collect();
     let warnings = desk.warnings.into_inner().unwrap().join("\n");
     let sentences = desk::table::<VerdictSentences>(&tables).remove(0);
-    let unseen = sentences.about(&verdict.step, VerdictTopic::NotObservable).join("\n");
+    let unseen = sentences
+        .about(&verdict.step, VerdictTopic::NotObservable)
+        .join("\n");
     (named, verdict, unseen, warnings)
 }
 
 #[test]
 fn nothing_is_found_in_a_clean_recording_and_what_cannot_be_known_is_said() {
     let robot = fixture::seven();
-    let (named, verdict, unseen, warnings) = diagnosed_with_sentences(&robot, touched(&robot, &truth(&robot, 31), &cell(30), 31));
+    let (named, verdict, unseen, warnings) =
+        diagnosed_with_sentences(&robot, touched(&robot, &truth(&robot, 31), &cell(30), 31));
     assert!(named.is_empty(), "{named:?}");
-    assert_eq!(verdict.verdict, "nothing_missing", "{:?}", verdict.statement);
-    for expected in ["anything below the repeatability of closing", "scale of the arm", "place of the base"] {
+    assert_eq!(
+        verdict.verdict, "nothing_missing",
+        "{:?}",
+        verdict.statement
+    );
+    for expected in [
+        "anything below the repeatability of closing",
+        "scale of the arm",
+        "place of the base",
+    ] {
         assert!(unseen.contains(expected), "{unseen}");
     }
-    assert!(!warnings.contains("do not close") && !warnings.contains("sits elsewhere"), "{warnings}");
+    assert!(
+        !warnings.contains("do not close") && !warnings.contains("sits elsewhere"),
+        "{warnings}"
+    );
 }
 
 #[test]
 fn wind_up_under_gravity_is_named_at_its_joint() {
     let robot = fixture::seven();
-    let truth = TrueRobot { compliance_rad_nm: vec![0.0, 3e-5, 0.0, 6e-5, 0.0, 0.0, 0.0], ..truth(&robot, 32) };
+    let truth = TrueRobot {
+        compliance_rad_nm: vec![0.0, 3e-5, 0.0, 6e-5, 0.0, 0.0, 0.0],
+        ..truth(&robot, 32)
+    };
     let (named, verdict, _) = diagnosed(&robot, touched(&robot, &truth, &cell(30), 32));
     for expected in ["joint_compliance at joint 2", "joint_compliance at joint 4"] {
-        assert!(named.iter().any(|name| name == expected), "{named:?}, {:?}", verdict.statement);
+        assert!(
+            named.iter().any(|name| name == expected),
+            "{named:?}, {:?}",
+            verdict.statement
+        );
     }
 }
 
@@ -62,16 +112,30 @@ fn wind_up_under_gravity_is_named_at_its_joint() {
 fn a_cyclic_error_of_a_gear_is_named_at_its_joint() {
     let robot = fixture::seven();
     let effects = "[{gear_cyclic: {joint: 2, order: 3, amplitude_arcsec: 150, phase_deg: 40}}]";
-    let (named, verdict, _) = diagnosed(&robot, touched_with(&robot, &truth(&robot, 33), effects, &cell(30), 33));
-    assert!(named.iter().any(|name| name == "gear_cyclic at joint 2"), "{named:?}, {:?}", verdict.statement);
+    let (named, verdict, _) = diagnosed(
+        &robot,
+        touched_with(&robot, &truth(&robot, 33), effects, &cell(30), 33),
+    );
+    assert!(
+        named.iter().any(|name| name == "gear_cyclic at joint 2"),
+        "{named:?}, {:?}",
+        verdict.statement
+    );
 }
 
 #[test]
 fn lost_motion_is_named_at_its_joint() {
     let robot = fixture::seven();
     let effects = "[{backlash: {joint: 2, gap_arcsec: 250}}]";
-    let (named, verdict, _) = diagnosed(&robot, touched_with(&robot, &truth(&robot, 36), effects, &cell(30), 36));
-    assert!(named.iter().any(|name| name == "backlash at joint 2"), "{named:?}, {:?}", verdict.statement);
+    let (named, verdict, _) = diagnosed(
+        &robot,
+        touched_with(&robot, &truth(&robot, 36), effects, &cell(30), 36),
+    );
+    assert!(
+        named.iter().any(|name| name == "backlash at joint 2"),
+        "{named:?}, {:?}",
+        verdict.statement
+    );
 }
 
 #[test]
@@ -80,11 +144,15 @@ fn a_ball_that_was_put_back_elsewhere_is_found() {
     let before = truth(&robot, 37);
     let mut after = before.clone();
     after.links.last_mut().expect("links").shift_mm[0] += 1.5;
-    let (mut recording, second) = (touched(&robot, &before, &cell(30), 37), touched(&robot, &after, &cell(30), 38));
+    let (mut recording, second) = (
+        touched(&robot, &before, &cell(30), 37),
+        touched(&robot, &after, &cell(30), 38),
+    );
     let half = 90 * recording.joints;
     recording.q[half..].copy_from_slice(&second.q[half..]);
     let (named, verdict, warnings) = diagnosed(&robot, recording);
-    let told = warnings.contains("sits elsewhere on the tool") || named.iter().any(|name| name.starts_with("tool_shift"));
+    let told = warnings.contains("sits elsewhere on the tool")
+        || named.iter().any(|name| name.starts_with("tool_shift"));
     assert!(told, "{named:?}, {:?}, {warnings}", verdict.statement);
 }
 
@@ -94,14 +162,27 @@ fn rows_of_a_plate_that_slipped_are_named_in_the_verdict() {
     let mut recording = touched(&robot, &truth(&robot, 34), &cell(30), 34);
     let moved: Vec<Fixture> = cell(30)
         .into_iter()
-        .map(|own| Fixture { centre_mm: [own.centre_mm[0] + 1.5, own.centre_mm[1], own.centre_mm[2] + 1.0], ..own })
+        .map(|own| Fixture {
+            centre_mm: [
+                own.centre_mm[0] + 1.5,
+                own.centre_mm[1],
+                own.centre_mm[2] + 1.0,
+            ],
+            ..own
+        })
         .collect();
     let slipped = touched(&robot, &truth(&robot, 34), &moved, 35);
     // Rows 20 to 25 of b/0, which is the third socket.
     let joints = recording.joints;
     recording.q[79 * joints..85 * joints].copy_from_slice(&slipped.q[79 * joints..85 * joints]);
     let (named, verdict, warnings) = diagnosed(&robot, recording);
-    let told = warnings.contains("6 rows do not close") && warnings.contains("b/0-0020 to b/0-0025 (6 rows)");
+    let told = warnings.contains("6 rows do not close")
+        && warnings.contains("b/0-0020 to b/0-0025 (6 rows)");
     assert!(told, "{named:?}, {warnings}");
-    assert!(verdict.statement.unwrap_or_default().contains("ball or fixture moved there"));
+    assert!(
+        verdict
+            .statement
+            .unwrap_or_default()
+            .contains("ball or fixture moved there")
+    );
 }

@@ -27,7 +27,14 @@ pub fn cell(points: usize) -> [calib::twin::touch::Fixture; 4] {
 /// Every row to fit.
 pub fn all(recording: &Recording) -> Split {
     let ids = recording.sequence.iter().zip(&recording.point_id);
-    Split(ids.map(|(sequence, id)| SplitRow { sequence: *sequence, point_id: id.clone(), set: "fit".into() }).collect())
+    Split(
+        ids.map(|(sequence, id)| SplitRow {
+            sequence: *sequence,
+            point_id: id.clone(),
+            set: "fit".into(),
+        })
+        .collect(),
+    )
 }
 
 /// All that an identification says, and its parameters.
@@ -35,10 +42,17 @@ fn said(robot: &RobotDescription, recording: Recording, settings: &str) -> (Stri
     let split = all(&recording);
     let desk = Desk::default();
     let stage: Identify = serde_saphyr::from_str(settings).expect("good settings");
-    let reads = IdentifyReads { robot: Robot::from_description(robot), recording, split };
+    let reads = IdentifyReads {
+        robot: Robot::from_description(robot),
+        recording,
+        split,
+    };
     let tables = desk.run(&stage, reads).expect("identified");
     let parameters = desk::table::<Parameters>(&tables).remove(0);
-    let (warnings, notes) = (desk.warnings.into_inner().unwrap(), desk.notes.into_inner().unwrap());
+    let (warnings, notes) = (
+        desk.warnings.into_inner().unwrap(),
+        desk.notes.into_inner().unwrap(),
+    );
     ([warnings, notes].concat().join("\n"), parameters)
 }
 
@@ -51,13 +65,29 @@ fn rows_of_another_hole_are_named_with_the_hole() {
         names[row] = Some("b/0".into());
     }
     let (text, parameters) = said(&robot, recording, SETTINGS);
-    assert!(text.contains("2 rows do not close within their noise") && text.contains("a/1-0006 to a/1-0007 (2 rows)"), "{text}");
+    assert!(
+        text.contains("2 rows do not close within their noise")
+            && text.contains("a/1-0006 to a/1-0007 (2 rows)"),
+        "{text}"
+    );
     assert!(text.contains("where `a/1` is"), "{text}");
-    assert!(text.contains("the scale of the arm is known to") && text.contains("by the lengths that were given"), "{text}");
-    let told = parameters.0.iter().filter(|row| row.name.starts_with("link_geometry") && row.status == "free");
-    let silent: Vec<&str> =
-        told.filter(|row| !row.remark.as_deref().unwrap_or("").contains("prior")).map(|row| row.name.as_str()).collect();
-    assert!(silent.is_empty(), "priors are visible in the table: {silent:?}");
+    assert!(
+        text.contains("the scale of the arm is known to")
+            && text.contains("by the lengths that were given"),
+        "{text}"
+    );
+    let told = parameters
+        .0
+        .iter()
+        .filter(|row| row.name.starts_with("link_geometry") && row.status == "free");
+    let silent: Vec<&str> = told
+        .filter(|row| !row.remark.as_deref().unwrap_or("").contains("prior"))
+        .map(|row| row.name.as_str())
+        .collect();
+    assert!(
+        silent.is_empty(),
+        "priors are visible in the table: {silent:?}"
+    );
 }
 
 #[test]
@@ -66,38 +96,73 @@ fn a_ball_that_was_put_back_elsewhere_is_said_with_the_row() {
     let before = truth(&robot, 4);
     let mut after = before.clone();
     after.links.last_mut().expect("links").shift_mm[0] += 1.5;
-    let (first, second) = (touched(&robot, &before, &cell(20), 4), touched(&robot, &after, &cell(20), 5));
+    let (first, second) = (
+        touched(&robot, &before, &cell(20), 4),
+        touched(&robot, &after, &cell(20), 5),
+    );
     let mut recording = first.clone();
     let half = 40 * first.joints;
     recording.q[half..].copy_from_slice(&second.q[half..]);
     let (text, _) = said(&robot, recording, SETTINGS);
-    assert!(text.contains("on the ball sits elsewhere on the tool") && text.contains("from b/0-000"), "{text}");
+    assert!(
+        text.contains("on the ball sits elsewhere on the tool") && text.contains("from b/0-000"),
+        "{text}"
+    );
     let (clean, _) = said(&robot, first, SETTINGS);
-    assert!(!clean.contains("sits elsewhere") && !clean.contains("do not close"), "{clean}");
+    assert!(
+        !clean.contains("sits elsewhere") && !clean.contains("do not close"),
+        "{clean}"
+    );
 }
 
 #[test]
 fn five_rows_and_no_length_are_said_to_be_too_little() {
     let robot = fixture::seven();
-    let recording = touched(&robot, &truth(&robot, 5), &[socket("a/0", [480.0, 120.0, 300.0], 5, 60.0)], 5);
+    let recording = touched(
+        &robot,
+        &truth(&robot, 5),
+        &[socket("a/0", [480.0, 120.0, 300.0], 5, 60.0)],
+        5,
+    );
     let bare = "{effects: [anchor, base_frame, tool_offset, joint_offset, link_geometry]}";
     let (text, _) = said(&robot, recording, bare);
     assert!(text.contains("only 5 points for"), "{text}");
-    assert!(text.contains("the scale of the arm is not observable: no length was given"), "{text}");
+    assert!(
+        text.contains("the scale of the arm is not observable: no length was given"),
+        "{text}"
+    );
 }
 
 #[test]
 fn names_that_the_recording_does_not_have_are_refused() {
     let robot = fixture::seven();
-    let recording = touched(&robot, &truth(&robot, 5), &[socket("a/0", [480.0, 120.0, 300.0], 9, 60.0)], 5);
+    let recording = touched(
+        &robot,
+        &truth(&robot, 5),
+        &[socket("a/0", [480.0, 120.0, 300.0], 9, 60.0)],
+        5,
+    );
     let split = all(&recording);
     for (more, expected) in [
-        ("distances: [{between: [a/0, a/7], mm: 50, sigma: 0.1}]", "no `a/0` and `a/7`; the recording has: a/0"),
-        ("spheres: {ball: {diameter: 30, sigma: 0.1}}", "no sphere `ball`; the recording has: a/0"),
+        (
+            "distances: [{between: [a/0, a/7], mm: 50, sigma: 0.1}]",
+            "no `a/0` and `a/7`; the recording has: a/0",
+        ),
+        (
+            "spheres: {ball: {diameter: 30, sigma: 0.1}}",
+            "no sphere `ball`; the recording has: a/0",
+        ),
     ] {
         let stage: Identify = serde_saphyr::from_str(more).expect("good settings");
-        let reads = IdentifyReads { robot: Robot::from_description(&robot), recording: recording.clone(), split: split.clone() };
-        let message = Desk::default().run(&stage, reads).expect_err("refused").to_string();
+        let reads = IdentifyReads {
+            robot: Robot::from_description(&robot),
+            recording: recording.clone(),
+            split: split.clone(),
+        };
+        let message = Desk::default()
+            .run(&stage, reads)
+            .expect_err("refused")
+            .to_string();
         assert!(message.contains(expected), "{message}");
     }
 }
@@ -116,25 +181,36 @@ fn derivatives_of_sockets_planes_and_spheres_are_central_differences() {
             *value += 2e-3 * (1.3 * k as f64).sin();
         }
         let mut checked = 0;
-        for (kind, row) in
-            KINDS.iter().filter(|kind| kind.is_brought()).flat_map(|kind| (0..data.rows()).map(move |row| (*kind, row)))
+        for (kind, row) in KINDS
+            .iter()
+            .filter(|kind| kind.is_brought())
+            .flat_map(|kind| (0..data.rows()).map(move |row| (*kind, row)))
         {
             let mut scratch = model.stack.scratch(&model.robot);
-            let mut placed = model.stack.place(&model.robot, &data, row, &model.x, &mut scratch);
+            let mut placed = model
+                .stack
+                .place(&model.robot, &data, row, &model.x, &mut scratch);
             if kind.residual(&data, row, &placed).is_none() {
                 continue;
             }
             checked += 1;
             let mut partials = vec![Vector3::zeros(); model.x.len()];
             let sensitivity = kind.sensitivity(&data, row, &placed, Weight::uniform(1.0));
-            sensitivity.derivatives(&mut placed, |k, own| partials[k] += Vector3::from_column_slice(own));
+            sensitivity.derivatives(&mut placed, |k, own| {
+                partials[k] += Vector3::from_column_slice(own)
+            });
             for (k, partial) in partials.iter().enumerate() {
                 let moved = |step: f64| {
                     let mut x = model.x.clone();
                     x[k] += step;
                     let mut scratch = model.stack.scratch(&model.robot);
-                    let placed = model.stack.place(&model.robot, &data, row, &x, &mut scratch);
-                    kind.residual(&data, row, &placed).expect("measured").0.first_three()
+                    let placed = model
+                        .stack
+                        .place(&model.robot, &data, row, &x, &mut scratch);
+                    kind.residual(&data, row, &placed)
+                        .expect("measured")
+                        .0
+                        .first_three()
                 };
                 let central = (moved(-1e-6) - moved(1e-6)) / 2e-6;
                 let (name, off) = (&model.stack.specs()[k].name, (central - partial).norm());

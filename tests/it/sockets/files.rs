@@ -23,9 +23,11 @@ fn folder(columns: &str, file: &str) -> tempfile::TempDir {
         std::fs::write(path, text).unwrap();
     };
     write("robot.yaml", ROBOT);
-    for (name, rows) in
-        [("front/hole_0.csv", "0.1,0.2\n0.3,0.4\n"), ("front/hole_1.csv", "0.5,0.6\n"), ("back/hole_0.csv", "0.7,0.8\n")]
-    {
+    for (name, rows) in [
+        ("front/hole_0.csv", "0.1,0.2\n0.3,0.4\n"),
+        ("front/hole_1.csv", "0.5,0.6\n"),
+        ("back/hole_0.csv", "0.7,0.8\n"),
+    ] {
         write(&format!("data/{name}"), rows);
     }
     write("data/front/hole_0_pose.csv", "1,2,3,4,5,6,7\n");
@@ -53,22 +55,54 @@ fn a_pattern_stands_for_its_files_and_paths_name_the_sockets() {
     let folder = folder(NAMED, "data/*/hole_?.csv");
     let plan = plan(folder.path()).expect("sound");
     let ingest = &plan.stages[1];
-    let named: Vec<String> = ingest.files.iter().map(|file| file.named.display().to_string()).collect();
-    assert_eq!(named, ["data/back/hole_0.csv", "data/front/hole_0.csv", "data/front/hole_1.csv"]);
+    let named: Vec<String> = ingest
+        .files
+        .iter()
+        .map(|file| file.named.display().to_string())
+        .collect();
+    assert_eq!(
+        named,
+        [
+            "data/back/hole_0.csv",
+            "data/front/hole_0.csv",
+            "data/front/hole_1.csv"
+        ]
+    );
     let settings = ingest.stage.settings();
-    let sockets: Vec<&str> = (0..3).map(|k| settings["files"][k]["columns"]["socket"]["value"].as_str().unwrap()).collect();
+    let sockets: Vec<&str> = (0..3)
+        .map(|k| {
+            settings["files"][k]["columns"]["socket"]["value"]
+                .as_str()
+                .unwrap()
+        })
+        .collect();
     assert_eq!(sockets, ["back/0", "front/0", "front/1"]);
 }
 
 #[test]
 fn what_does_not_fit_is_refused_with_its_place() {
     let none = refused(NAMED, "data/*/socket_?.csv");
-    assert!(none.contains("stages[1].with.files[0].file") && none.contains("no file matches"), "{none}");
-    let path = refused(&NAMED.replace("hole_{n}", "socket_{n}"), "data/*/hole_?.csv");
-    assert!(path.contains("files[0].columns.socket.path") && path.contains("does not end like"), "{path}");
+    assert!(
+        none.contains("stages[1].with.files[0].file") && none.contains("no file matches"),
+        "{none}"
+    );
+    let path = refused(
+        &NAMED.replace("hole_{n}", "socket_{n}"),
+        "data/*/hole_?.csv",
+    );
+    assert!(
+        path.contains("files[0].columns.socket.path") && path.contains("does not end like"),
+        "{path}"
+    );
     let alone = refused("            socket: {value: a}\n", "data/back/hole_0.csv");
-    assert!(alone.contains("map `socket` and `sigma_socket` together"), "{alone}");
+    assert!(
+        alone.contains("map `socket` and `sigma_socket` together"),
+        "{alone}"
+    );
     let distance = "            distance: {value: 0, unit: mm}\n            sigma_distance: {value: 0.1, unit: mm}\n";
     let nought = refused(distance, "data/back/hole_0.csv");
-    assert!(nought.contains("columns.distance") && nought.contains("`socket: {column: ...}`"), "{nought}");
+    assert!(
+        nought.contains("columns.distance") && nought.contains("`socket: {column: ...}`"),
+        "{nought}"
+    );
 }

@@ -21,11 +21,17 @@ fn planes_and_spheres_stand_where_they_were_identified() {
     let recording = touched(&robot, &truth(&robot, 12), &things, 12);
     let stage: Identify = serde_saphyr::from_str(dirty::SETTINGS).expect("good settings");
     let (data, split) = (recording.measurements(), dirty::all(&recording));
-    let reads = IdentifyReads { robot: Robot::from_description(&robot), recording, split };
+    let reads = IdentifyReads {
+        robot: Robot::from_description(&robot),
+        recording,
+        split,
+    };
     let tables = Desk::default().run(&stage, reads).expect("identified");
     let parameters = desk::table::<Parameters>(&tables).remove(0);
     let prediction = desk::table::<Prediction>(&tables).remove(0);
-    let model = parameters.model(RobotModel::new(robot.clone()), &[], Load::GravityTorque).expect("read again");
+    let model = parameters
+        .model(RobotModel::new(robot.clone()), &[], Load::GravityTorque)
+        .expect("read again");
     for (error, row) in model.row_errors(&data).iter().zip(&prediction.0) {
         assert!(
             (1e3 * error.length - row.error_mm).abs() < 1e-6,
@@ -35,16 +41,35 @@ fn planes_and_spheres_stand_where_they_were_identified() {
             row.error_mm
         );
     }
-    let value = |name: &str| parameters.0.iter().find(|row| row.name == name).expect("a row").value;
-    assert!((value("anchor.ball.radius") - 40.0).abs() < 0.3, "{}", value("anchor.ball.radius"));
+    let value = |name: &str| {
+        parameters
+            .0
+            .iter()
+            .find(|row| row.name == name)
+            .expect("a row")
+            .value
+    };
+    assert!(
+        (value("anchor.ball.radius") - 40.0).abs() < 0.3,
+        "{}",
+        value("anchor.ball.radius")
+    );
     // The base stands at nominal, up to what the tolerances of the first link leave.
     let normal = Anchor::normal([value("anchor.wall.rx"), value("anchor.wall.ry")]);
-    assert!((normal - Vector3::new(1.0, 0.1, 0.05).normalize()).norm() < 5e-3, "{normal}");
+    assert!(
+        (normal - Vector3::new(1.0, 0.1, 0.05).normalize()).norm() < 5e-3,
+        "{normal}"
+    );
 }
 
 #[test]
 fn tilts_are_a_normal_and_move_it_as_they_say() {
-    for normal in [[0.0, 0.0, 1.0], [1.0, 0.1, 0.05], [0.3, -0.8, 0.2], [1e-5, -2e-5, 1.0]] {
+    for normal in [
+        [0.0, 0.0, 1.0],
+        [1.0, 0.1, 0.05],
+        [0.3, -0.8, 0.2],
+        [1e-5, -2e-5, 1.0],
+    ] {
         let normal = Vector3::from(normal).normalize();
         let tilts = Anchor::tilts(&normal);
         assert!((Anchor::normal(tilts) - normal).norm() < 1e-14);
@@ -55,7 +80,10 @@ fn tilts_are_a_normal_and_move_it_as_they_say() {
                 Anchor::normal(tilts)
             };
             let central = (moved(1e-5) - moved(-1e-5)) / 2e-5;
-            assert!((central - rate).norm() < 1e-8, "{normal}, {k}: {central} by differences, {rate}");
+            assert!(
+                (central - rate).norm() < 1e-8,
+                "{normal}, {k}: {central} by differences, {rate}"
+            );
         }
     }
 }

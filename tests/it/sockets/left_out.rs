@@ -10,9 +10,16 @@ use calib::twin::touch::Fixture;
 
 fn split(yaml: &str, recording: &Recording) -> Result<Split, String> {
     let options = serde_saphyr::options! { strict_booleans: true };
-    let settings: SplitBy = serde_saphyr::from_str_with_options(yaml, options).expect("good settings");
-    let tables =
-        Desk::default().run(&settings, SplitReads { recording: recording.clone() }).map_err(|error| error.to_string())?;
+    let settings: SplitBy =
+        serde_saphyr::from_str_with_options(yaml, options).expect("good settings");
+    let tables = Desk::default()
+        .run(
+            &settings,
+            SplitReads {
+                recording: recording.clone(),
+            },
+        )
+        .map_err(|error| error.to_string())?;
     Ok(table::<Split>(&tables).remove(0))
 }
 
@@ -22,7 +29,11 @@ fn a_place_that_no_row_was_fitted_to_closes_as_well_as_the_others() {
     let recording = touched(&robot, &truth(&robot, 6), &cell(30), 6);
     let split = split("{by: named, column: socket, names: [b/*]}", &recording).expect("dealt");
     let stage: Identify = serde_saphyr::from_str(SETTINGS).expect("good settings");
-    let reads = IdentifyReads { robot: Robot::from_description(&robot), recording, split };
+    let reads = IdentifyReads {
+        robot: Robot::from_description(&robot),
+        recording,
+        split,
+    };
     let tables = Desk::default().run(&stage, reads).expect("identified");
     let rows = table::<Prediction>(&tables).remove(0).0;
     let mean = |rows: &[&PredictionRow], error: fn(&PredictionRow) -> Option<f64>| {
@@ -34,9 +45,15 @@ fn a_place_that_no_row_was_fitted_to_closes_as_well_as_the_others() {
     // The mean length of a normal error of 0.06 mm per axis.
     let noise = 0.06 * (8.0 / std::f64::consts::PI).sqrt();
     let out = mean(&held, |row| Some(row.error_mm));
-    assert!((0.9..1.35).contains(&(out / noise)), "{out:.4} mm held out, {noise:.4} mm of noise");
+    assert!(
+        (0.9..1.35).contains(&(out / noise)),
+        "{out:.4} mm held out, {noise:.4} mm of noise"
+    );
     let own = mean(&fitted, |row| Some(row.error_mm));
-    assert!((0.8..1.1).contains(&(own / noise)), "{own:.4} mm fitted, {noise:.4} mm of noise");
+    assert!(
+        (0.8..1.1).contains(&(own / noise)),
+        "{own:.4} mm fitted, {noise:.4} mm of noise"
+    );
 }
 
 #[test]
@@ -45,22 +62,52 @@ fn blocks_of_a_cross_validation_are_whole_places() {
     let recording = touched(&robot, &truth(&robot, 8), &cell(30), 8);
     let all = split("{by: order, sets: [{set: fit}]}", &recording).expect("dealt");
     let stage: Identify = serde_saphyr::from_str(SETTINGS).expect("good settings");
-    let reads = IdentifyReads { robot: Robot::from_description(&robot), recording, split: all };
-    let rows = table::<Prediction>(&Desk::default().run(&stage, reads).expect("identified")).remove(0).0;
-    let mean = |error: fn(&PredictionRow) -> Option<f64>| rows.iter().filter_map(error).sum::<f64>() / rows.len() as f64;
-    let (own, random, places) = (mean(|row| Some(row.error_mm)), mean(|row| row.fold_error_mm), mean(|row| row.block_error_mm));
+    let reads = IdentifyReads {
+        robot: Robot::from_description(&robot),
+        recording,
+        split: all,
+    };
+    let rows = table::<Prediction>(&Desk::default().run(&stage, reads).expect("identified"))
+        .remove(0)
+        .0;
+    let mean = |error: fn(&PredictionRow) -> Option<f64>| {
+        rows.iter().filter_map(error).sum::<f64>() / rows.len() as f64
+    };
+    let (own, random, places) = (
+        mean(|row| Some(row.error_mm)),
+        mean(|row| row.fold_error_mm),
+        mean(|row| row.block_error_mm),
+    );
     // Of two places, one alone tells the arm worse, but never millimetres off as where its sockets stood at nominal.
-    assert!(own < random && random < places && places < 3.0 * own, "{own:.4}, {random:.4}, {places:.4} mm");
+    assert!(
+        own < random && random < places && places < 3.0 * own,
+        "{own:.4}, {random:.4}, {places:.4} mm"
+    );
 }
 
 #[test]
 fn rows_are_counted_anew_in_every_socket() {
     let robot = fixture::seven();
-    let uneven: Vec<Fixture> = cell(6).into_iter().enumerate().map(|(k, socket)| Fixture { points: 5 + k, ..socket }).collect();
+    let uneven: Vec<Fixture> = cell(6)
+        .into_iter()
+        .enumerate()
+        .map(|(k, socket)| Fixture {
+            points: 5 + k,
+            ..socket
+        })
+        .collect();
     let recording = touched(&robot, &truth(&robot, 6), &uneven, 6);
     let dealt = split("{by: every, n: 4, within: socket}", &recording).expect("dealt");
-    let held: Vec<&str> = dealt.0.iter().filter(|row| row.set == "validate").map(|row| row.point_id.as_str()).collect();
-    assert_eq!(held, ["a/0-0004", "a/1-0004", "b/0-0004", "b/1-0004", "b/1-0008"]);
+    let held: Vec<&str> = dealt
+        .0
+        .iter()
+        .filter(|row| row.set == "validate")
+        .map(|row| row.point_id.as_str())
+        .collect();
+    assert_eq!(
+        held,
+        ["a/0-0004", "a/1-0004", "b/0-0004", "b/1-0004", "b/1-0008"]
+    );
 }
 
 #[test]
@@ -68,8 +115,14 @@ fn names_and_columns_that_are_not_there_are_refused() {
     let robot = fixture::seven();
     let recording = touched(&robot, &truth(&robot, 6), &cell(6), 6);
     for (yaml, expected) in [
-        ("{by: named, column: socket, names: [c/*]}", "with.names[0]: no row has such a name; there are: a/0, a/1, b/0, b/1"),
-        ("{by: every, n: 4, within: sphere}", "with.within: the recording has no names of `sphere`; it has: socket"),
+        (
+            "{by: named, column: socket, names: [c/*]}",
+            "with.names[0]: no row has such a name; there are: a/0, a/1, b/0, b/1",
+        ),
+        (
+            "{by: every, n: 4, within: sphere}",
+            "with.within: the recording has no names of `sphere`; it has: socket",
+        ),
     ] {
         assert_eq!(split(yaml, &recording).expect_err("refused"), expected);
     }

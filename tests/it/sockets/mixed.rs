@@ -16,11 +16,14 @@ const SIGMA: f64 = 2e-5;
 fn beside(points: Measurements, sockets: &Measurements) -> Measurements {
     let (rows, more) = (points.rows(), sockets.rows());
     let own = &sockets.readings[0];
-    let names: Vec<&str> =
-        std::iter::repeat_n("", rows).chain((0..more).map(|row| own.row(row).expect("a socket").anchor)).collect();
+    let names: Vec<&str> = std::iter::repeat_n("", rows)
+        .chain((0..more).map(|row| own.row(row).expect("a socket").anchor))
+        .collect();
     let readings = Readings {
         kind: own.kind,
-        sigma: std::iter::repeat_n(f64::NAN, rows).chain(own.sigma.iter().copied()).collect(),
+        sigma: std::iter::repeat_n(f64::NAN, rows)
+            .chain(own.sigma.iter().copied())
+            .collect(),
         anchor: Some(Named::of(names.iter().copied())),
         ..Readings::default()
     };
@@ -41,12 +44,24 @@ fn beside(points: Measurements, sockets: &Measurements) -> Measurements {
 fn points_of_a_tracker_tell_the_scale_of_sockets() {
     for robot in [fixture::offset_wrist(), fixture::seven()] {
         let truth = truth(&robot, 21);
-        let cell = [socket("a", [480.0, 120.0, 300.0], 40, 60.0), socket("b", [-250.0, 450.0, 380.0], 40, 60.0)];
-        let elsewhere = [socket("x", [350.0, -350.0, 450.0], 12, 0.0), socket("y", [-200.0, 450.0, 520.0], 12, 0.0)];
+        let cell = [
+            socket("a", [480.0, 120.0, 300.0], 40, 60.0),
+            socket("b", [-250.0, 450.0, 380.0], 40, 60.0),
+        ];
+        let elsewhere = [
+            socket("x", [350.0, -350.0, 450.0], 12, 0.0),
+            socket("y", [-200.0, 450.0, 520.0], 12, 0.0),
+        ];
         let mut points = touched(&robot, &truth, &elsewhere, 5).measurements();
         let arm = Arm::new(&robot, &truth);
         let there = |data: &Measurements, row: usize| {
-            Vector3::from(arm.posture(&truth.drive(&robot, data.q(row)), &Motion::none(robot.joints.len())).tool)
+            Vector3::from(
+                arm.posture(
+                    &truth.drive(&robot, data.q(row)),
+                    &Motion::none(robot.joints.len()),
+                )
+                .tool,
+            )
         };
         points.points.position = (0..points.rows())
             .map(|row| {
@@ -59,11 +74,25 @@ fn points_of_a_tracker_tell_the_scale_of_sockets() {
         let data = beside(points, &touched(&robot, &truth, &cell, 21).measurements());
         let rows: Vec<usize> = (0..data.rows()).collect();
         let (model, fitted) = calibrated(&robot, &data, &[], &[]);
-        assert_eq!(rank(&model.robot, &data, &rows, false, 0), Some(free(&fitted)), "{}", robot.name);
-        assert!(!only_brought(&data, &rows) && scale(&model, &data, &rows, fitted.covariance.as_ref()).is_none());
+        assert_eq!(
+            rank(&model.robot, &data, &rows, false, 0),
+            Some(free(&fitted)),
+            "{}",
+            robot.name
+        );
+        assert!(
+            !only_brought(&data, &rows)
+                && scale(&model, &data, &rows, fitted.covariance.as_ref()).is_none()
+        );
         let predicted = model.predict(&data);
         let (first, last) = (30, data.rows() - 1);
-        let apart = (predicted[first] - predicted[last]).norm() - (there(&data, first) - there(&data, last)).norm();
-        assert!(apart.abs() < 1.5e-4, "{}: distances of sockets are {:.3} mm off", robot.name, 1e3 * apart);
+        let apart = (predicted[first] - predicted[last]).norm()
+            - (there(&data, first) - there(&data, last)).norm();
+        assert!(
+            apart.abs() < 1.5e-4,
+            "{}: distances of sockets are {:.3} mm off",
+            robot.name,
+            1e3 * apart
+        );
     }
 }

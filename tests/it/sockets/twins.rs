@@ -1,6 +1,8 @@
 //! Many twins: what is stated of the arm's distances holds as often as it should. `CALIB_RECORDINGS=200` for the whole count.
 
-use super::{Length, calibrated, fitted_with, fixture, free, plane, priors, socket, sphere, touched, truth};
+use super::{
+    Length, calibrated, fitted_with, fixture, free, plane, priors, socket, sphere, touched, truth,
+};
 use crate::identify::normal;
 use calib::estimate::scale;
 use calib::observation::rank;
@@ -21,7 +23,13 @@ fn cell(kind: usize) -> Vec<Fixture> {
         socket("b/1", [-250.0, 450.0, 430.0], 30, SIGMA),
     ];
     if kind % 4 == 1 || kind % 4 == 3 {
-        all.push(plane("table", [100.0, -480.0, 320.0], [0.2, 0.1, 1.0], 40, SIGMA));
+        all.push(plane(
+            "table",
+            [100.0, -480.0, 320.0],
+            [0.2, 0.1, 1.0],
+            40,
+            SIGMA,
+        ));
     }
     if kind % 4 >= 2 {
         all.push(sphere("ball", [350.0, -350.0, 450.0], 40.0, 40, SIGMA));
@@ -31,75 +39,158 @@ fn cell(kind: usize) -> Vec<Fixture> {
 
 #[test]
 fn stated_sigmas_of_distances_hold_and_the_rank_is_that_of_theory() {
-    let count: usize = std::env::var("CALIB_RECORDINGS").ok().and_then(|text| text.parse().ok()).unwrap_or(12);
+    let count: usize = std::env::var("CALIB_RECORDINGS")
+        .ok()
+        .and_then(|text| text.parse().ok())
+        .unwrap_or(12);
     let (mut scores, mut wrong) = (Vec::new(), Vec::new());
     for seed in 0..count {
-        let robot = if seed % 2 == 0 { fixture::offset_wrist() } else { fixture::seven() };
+        let robot = if seed % 2 == 0 {
+            fixture::offset_wrist()
+        } else {
+            fixture::seven()
+        };
         let truth = truth(&robot, seed);
         let data = touched(&robot, &truth, &cell(seed / 2), seed).measurements();
-        let length = |from, to, k: usize| Length(from, to, 0.05 + 2e-5 * normal(77 * seed + k), 2e-5);
-        let (model, fitted) = calibrated(&robot, &data, &[length("a/0", "a/1", 1), length("b/0", "b/1", 2)], &[]);
+        let length =
+            |from, to, k: usize| Length(from, to, 0.05 + 2e-5 * normal(77 * seed + k), 2e-5);
+        let (model, fitted) = calibrated(
+            &robot,
+            &data,
+            &[length("a/0", "a/1", 1), length("b/0", "b/1", 2)],
+            &[],
+        );
         let rows: Vec<usize> = (0..data.rows()).collect();
         if rank(&model.robot, &data, &rows, true, 0) != Some(free(&fitted)) {
             wrong.push(format!("{} {seed}: {} free", robot.name, free(&fitted)));
         }
-        let Some(covariance) = &fitted.covariance else { panic!("{} {seed}: singular", robot.name) };
+        let Some(covariance) = &fitted.covariance else {
+            panic!("{} {seed}: singular", robot.name)
+        };
         let (arm, points) = (Arm::new(&robot, &truth), model.predict(&data));
-        let there =
-            |row: usize| Vector3::from(arm.posture(&truth.drive(&robot, data.q(row)), &Motion::none(robot.joints.len())).tool);
+        let there = |row: usize| {
+            Vector3::from(
+                arm.posture(
+                    &truth.drive(&robot, data.q(row)),
+                    &Motion::none(robot.joints.len()),
+                )
+                .tool,
+            )
+        };
         let mut scratch = model.stack.scratch(&model.robot);
-        for pair in [[3, 75], [40, 100], [10, data.rows() - 5], [70, data.rows() - 20]] {
+        for pair in [
+            [3, 75],
+            [40, 100],
+            [10, data.rows() - 5],
+            [70, data.rows() - 20],
+        ] {
             let [a, b] = pair;
             let along = (points[a] - points[b]).normalize();
             let mut rates = vec![0.0; model.x.len()];
             for (row, sign) in [(a, 1.0), (b, -1.0)] {
-                model
-                    .stack
-                    .derivatives(&model.robot, &data, row, &model.x, &mut scratch, |k, rate| rates[k] += sign * along.dot(&rate));
+                model.stack.derivatives(
+                    &model.robot,
+                    &data,
+                    row,
+                    &model.x,
+                    &mut scratch,
+                    |k, rate| rates[k] += sign * along.dot(&rate),
+                );
             }
             let parameters = covariance.parameters();
-            let weights = DVector::from_iterator(parameters.len(), parameters.iter().map(|k| rates[*k]));
-            let sigma = weights.dot(&(covariance.block(parameters).expect("estimated") * &weights)).sqrt();
+            let weights =
+                DVector::from_iterator(parameters.len(), parameters.iter().map(|k| rates[*k]));
+            let sigma = weights
+                .dot(&(covariance.block(parameters).expect("estimated") * &weights))
+                .sqrt();
             scores.push(((points[a] - points[b]).norm() - (there(a) - there(b)).norm()) / sigma);
         }
     }
-    let scatter = (scores.iter().map(|score| score * score).sum::<f64>() / scores.len() as f64).sqrt();
-    let covered = scores.iter().filter(|score| score.abs() < 1.96).count() as f64 / scores.len() as f64;
-    println!("{count} twins: scatter over sigma {scatter:.3}, coverage {:.1} %, rank wrong in {}", 100.0 * covered, wrong.len());
+    let scatter =
+        (scores.iter().map(|score| score * score).sum::<f64>() / scores.len() as f64).sqrt();
+    let covered =
+        scores.iter().filter(|score| score.abs() < 1.96).count() as f64 / scores.len() as f64;
+    println!(
+        "{count} twins: scatter over sigma {scatter:.3}, coverage {:.1} %, rank wrong in {}",
+        100.0 * covered,
+        wrong.len()
+    );
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
     // Twelve twins leave room for chance.
-    let (scatters, coverage) = if count >= 100 { (0.85..1.18, 0.92..0.98) } else { (0.7..1.35, 0.85..1.001) };
-    assert!(scatters.contains(&scatter) && coverage.contains(&covered), "scatter {scatter:.3}, coverage {covered:.3}");
+    let (scatters, coverage) = if count >= 100 {
+        (0.85..1.18, 0.92..0.98)
+    } else {
+        (0.7..1.35, 0.85..1.001)
+    };
+    assert!(
+        scatters.contains(&scatter) && coverage.contains(&covered),
+        "scatter {scatter:.3}, coverage {covered:.3}"
+    );
 }
 
 /// Links that err on their own, each within its prior: what is stated for just that holds as often as it should, and the statement for
 /// tolerances that lean together is wider.
 #[test]
 fn the_scale_that_priors_tell_scatters_as_stated_where_links_err_on_their_own() {
-    let count: usize = std::env::var("CALIB_RECORDINGS").ok().and_then(|text| text.parse().ok()).unwrap_or(12);
+    let count: usize = std::env::var("CALIB_RECORDINGS")
+        .ok()
+        .and_then(|text| text.parse().ok())
+        .unwrap_or(12);
     let mut scores = Vec::new();
     for seed in 0..count {
-        let robot = if seed % 2 == 0 { fixture::offset_wrist() } else { fixture::seven() };
+        let robot = if seed % 2 == 0 {
+            fixture::offset_wrist()
+        } else {
+            fixture::seven()
+        };
         let truth = truth(&robot, 500 + seed);
         let data = touched(&robot, &truth, &cell(0), 500 + seed).measurements();
         let rows: Vec<usize> = (0..data.rows()).collect();
-        let (model, fitted) = fitted_with(&robot, &data, &rows, &["joint_offset", "link_geometry"], &[], priors);
-        let stated = scale(&model, &data, &rows, fitted.covariance.as_ref()).expect("brought to sockets alone");
-        let (together, apart) = (stated.sigma.expect("two places"), stated.independent.expect("two places"));
-        assert!(!stated.by_length && stated.by_priors && apart <= together, "{stated:?}");
+        let (model, fitted) = fitted_with(
+            &robot,
+            &data,
+            &rows,
+            &["joint_offset", "link_geometry"],
+            &[],
+            priors,
+        );
+        let stated = scale(&model, &data, &rows, fitted.covariance.as_ref())
+            .expect("brought to sockets alone");
+        let (together, apart) = (
+            stated.sigma.expect("two places"),
+            stated.independent.expect("two places"),
+        );
+        assert!(
+            !stated.by_length && stated.by_priors && apart <= together,
+            "{stated:?}"
+        );
         let (arm, points) = (Arm::new(&robot, &truth), model.predict(&data));
-        let there =
-            |row: usize| Vector3::from(arm.posture(&truth.drive(&robot, data.q(row)), &Motion::none(robot.joints.len())).tool);
+        let there = |row: usize| {
+            Vector3::from(
+                arm.posture(
+                    &truth.drive(&robot, data.q(row)),
+                    &Motion::none(robot.joints.len()),
+                )
+                .tool,
+            )
+        };
         let [own, real] = [points, rows.iter().map(|row| there(*row)).collect()].map(|points| {
             let middle = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
-            points.iter().map(|point| (point - middle).norm_squared()).sum::<f64>().sqrt()
+            points
+                .iter()
+                .map(|point| (point - middle).norm_squared())
+                .sum::<f64>()
+                .sqrt()
         });
         // The factor by which links are off more than their priors say is by chance here.
         scores.push((own / real - 1.0) * stated.beyond / apart);
     }
-    let scatter = (scores.iter().map(|score| score * score).sum::<f64>() / scores.len() as f64).sqrt();
+    let scatter =
+        (scores.iter().map(|score| score * score).sum::<f64>() / scores.len() as f64).sqrt();
     let mean = scores.iter().sum::<f64>() / scores.len() as f64;
-    println!("{count} twins without a length: scale over its sigma, mean {mean:+.2}, scatter {scatter:.2}");
+    println!(
+        "{count} twins without a length: scale over its sigma, mean {mean:+.2}, scatter {scatter:.2}"
+    );
     let scatters = if count >= 100 { 0.85..1.18 } else { 0.6..1.5 };
     assert!(scatters.contains(&scatter), "{scatter:.3}");
 }

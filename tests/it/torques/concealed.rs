@@ -5,14 +5,24 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 fn simulate(verb: &str, out: &Path, more: &[&str]) -> Output {
-    let pipeline = concat!(env!("CARGO_MANIFEST_DIR"), "/pipelines/dynamics/pipeline.yaml");
+    let pipeline = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/pipelines/dynamics/pipeline.yaml"
+    );
     let mut command = Command::new(env!("CARGO_BIN_EXE_calib"));
-    command.args(["simulate", verb, "--dynamics", "--out"]).arg(out).args(more);
+    command
+        .args(["simulate", verb, "--dynamics", "--out"])
+        .arg(out)
+        .args(more);
     if verb == "prove" {
         command.args(["--pipeline", pipeline, "--quiet", "--json"]);
     }
     let done = command.output().expect("calib");
-    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    assert!(
+        done.status.success(),
+        "{}",
+        String::from_utf8_lossy(&done.stderr)
+    );
     done
 }
 
@@ -20,13 +30,27 @@ fn simulate(verb: &str, out: &Path, more: &[&str]) -> Output {
 #[test]
 fn concealed_torques_are_found_and_nulls_stay_empty() {
     let folder = tempfile::tempdir().expect("a folder");
-    let done = simulate("prove", &folder.path().join("set"), &["--seed", "11", "--cases", "4", "--nulls", "0.25"]);
+    let done = simulate(
+        "prove",
+        &folder.path().join("set"),
+        &["--seed", "11", "--cases", "4", "--nulls", "0.25"],
+    );
     let board: Value = serde_json::from_slice(&done.stdout).expect("JSON");
-    assert_eq!((&board["recordings"], &board["without_verdict"]), (&4.into(), &serde_json::json!([])));
+    assert_eq!(
+        (&board["recordings"], &board["without_verdict"]),
+        (&4.into(), &serde_json::json!([]))
+    );
     let alarms = &board["shares"][0]["share"];
-    assert_eq!((alarms["count"].as_u64(), alarms["of"].as_u64()), (Some(0), Some(1)), "false alarms: {board:#}");
+    assert_eq!(
+        (alarms["count"].as_u64(), alarms["of"].as_u64()),
+        (Some(0), Some(1)),
+        "false alarms: {board:#}"
+    );
     let place = &board["places"]["all"]["place"];
-    assert!(place["of"].as_u64() >= Some(2) && place["count"] == place["of"], "places: {board:#}");
+    assert!(
+        place["of"].as_u64() >= Some(2) && place["count"] == place["of"],
+        "places: {board:#}"
+    );
 }
 
 #[test]
@@ -34,7 +58,22 @@ fn a_seed_gives_the_same_recordings_of_torques_on_one_and_two_threads() {
     let folder = tempfile::tempdir().expect("a folder");
     let seals = ["1", "2"].map(|jobs| {
         let out = folder.path().join(jobs);
-        simulate("conceal", &out, &["--cases", "3", "--seconds", "16", "--rate", "20", "--open", "0.4", "--jobs", jobs]);
+        simulate(
+            "conceal",
+            &out,
+            &[
+                "--cases",
+                "3",
+                "--seconds",
+                "16",
+                "--rate",
+                "20",
+                "--open",
+                "0.4",
+                "--jobs",
+                jobs,
+            ],
+        );
         std::fs::read_to_string(out.join("seal.json")).expect("a seal")
     });
     // The hash of every file is in it.
@@ -45,9 +84,21 @@ fn a_seed_gives_the_same_recordings_of_torques_on_one_and_two_threads() {
 #[test]
 fn options_of_points_are_refused_of_torques() {
     let done = Command::new(env!("CARGO_BIN_EXE_calib"))
-        .args(["simulate", "conceal", "--dynamics", "--out", "never", "--layout", "path"])
+        .args([
+            "simulate",
+            "conceal",
+            "--dynamics",
+            "--out",
+            "never",
+            "--layout",
+            "path",
+        ])
         .output()
         .expect("calib");
     assert_eq!(done.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&done.stderr).contains("--layout"), "{}", String::from_utf8_lossy(&done.stderr));
+    assert!(
+        String::from_utf8_lossy(&done.stderr).contains("--layout"),
+        "{}",
+        String::from_utf8_lossy(&done.stderr)
+    );
 }

@@ -1,7 +1,9 @@
 //! A motion proposed for a recording of torques: it holds its limits, and tells more than a random one.
 
 use super::write;
-use calib::dynamics::{DynamicArm, InverseDynamics, MotionRow, TorqueModel, TorqueQuestion, TorqueRecording, diagnose};
+use calib::dynamics::{
+    DynamicArm, InverseDynamics, MotionRow, TorqueModel, TorqueQuestion, TorqueRecording, diagnose,
+};
 use calib::effect::Place;
 use calib::excitation::{MotionProposal, MotionRequest, exciting_motion};
 use calib::twin::torque::TorqueCase;
@@ -16,7 +18,14 @@ fn request(robot: PathBuf, generations: usize) -> MotionRequest {
         seconds: 20.0,
         rate: 100.0,
         harmonics: 5,
-        limits: Some(vec![[-120.0, 120.0], [-140.0, -30.0], [-100.0, 100.0], [-120.0, 120.0], [-120.0, 120.0], [-120.0, 120.0]]),
+        limits: Some(vec![
+            [-120.0, 120.0],
+            [-140.0, -30.0],
+            [-100.0, 100.0],
+            [-120.0, 120.0],
+            [-120.0, 120.0],
+            [-120.0, 120.0],
+        ]),
         margin: 2.0,
         speed: vec![80.0],
         acceleration: vec![240.0],
@@ -39,15 +48,28 @@ fn an_exciting_motion_holds_its_limits_and_tells_more_than_random_ones() {
     for row in 0..motion.time.len() {
         for joint in 0..n {
             let [least, most] = asked.limits.as_ref().expect("limits")[joint].map(f64::to_radians);
-            assert!((least..=most).contains(&motion.position[n * row + joint]), "joint {} leaves its range", joint + 1);
+            assert!(
+                (least..=most).contains(&motion.position[n * row + joint]),
+                "joint {} leaves its range",
+                joint + 1
+            );
             assert!(motion.velocity[n * row + joint].abs() <= 80f64.to_radians());
             assert!(motion.acceleration[n * row + joint].abs() <= 240f64.to_radians());
         }
     }
     println!("gain {:.3}, condition {:?}", motion.gain, motion.condition);
-    assert!(motion.gain > 1.5, "sigmas of random motions are {} times those of this one", motion.gain);
+    assert!(
+        motion.gain > 1.5,
+        "sigmas of random motions are {} times those of this one",
+        motion.gain
+    );
     assert!(motion.parameters.len() > 40, "{}", motion.parameters.len());
-    assert!(motion.unseen.iter().any(|line| line.contains("torque constants")));
+    assert!(
+        motion
+            .unseen
+            .iter()
+            .any(|line| line.contains("torque constants"))
+    );
     // The same seed on one thread gives the same motion.
     let again = exciting_motion(&MotionRequest { jobs: 1, ..asked }).expect("a motion");
     assert_eq!(motion.position, again.motion.position);
@@ -57,17 +79,30 @@ fn an_exciting_motion_holds_its_limits_and_tells_more_than_random_ones() {
 fn recorded(case: &TorqueCase, proposal: &MotionProposal) -> TorqueRecording {
     let (motion, n) = (&proposal.motion, case.robot.joints.len());
     let of = |list: &[f64], row: usize| list[n * row..n * (row + 1)].to_vec();
-    let state =
-        |row: usize| JointState { q: of(&motion.position, row), v: of(&motion.velocity, row), a: of(&motion.acceleration, row) };
-    let case = case.clone().on_motion(0.01, (0..motion.time.len()).map(state).collect());
+    let state = |row: usize| JointState {
+        q: of(&motion.position, row),
+        v: of(&motion.velocity, row),
+        a: of(&motion.acceleration, row),
+    };
+    let case = case
+        .clone()
+        .on_motion(0.01, (0..motion.time.len()).map(state).collect());
     let rows = case.true_rows();
     TorqueRecording {
         joints: n,
         torque: case.noisy(&rows),
-        position: rows.state.iter().flat_map(|state| state.q.clone()).collect(),
+        position: rows
+            .state
+            .iter()
+            .flat_map(|state| state.q.clone())
+            .collect(),
         velocity: None,
         temperature: None,
-        trajectory: rows.trajectory.iter().map(|number| *number as u32).collect(),
+        trajectory: rows
+            .trajectory
+            .iter()
+            .map(|number| *number as u32)
+            .collect(),
         held_out: rows.validate,
         time: rows.time,
         from_current: false,
@@ -77,15 +112,35 @@ fn recorded(case: &TorqueCase, proposal: &MotionProposal) -> TorqueRecording {
 /// Standard deviation of the torque that a model of base parameters, viscous and Coulomb friction gives, mean over joints in parts of
 /// their noise, over the rows of fresh motions.
 fn predicted_sigma(model: &TorqueModel, arm: &DynamicArm, case: &TorqueCase) -> f64 {
-    let (n, width) = (arm.joints(), (model.covariance.len() as f64).sqrt().round() as usize);
-    let numbers: Vec<usize> = (0..10 * n).filter(|number| model.identified[*number]).collect();
+    let (n, width) = (
+        arm.joints(),
+        (model.covariance.len() as f64).sqrt().round() as usize,
+    );
+    let numbers: Vec<usize> = (0..10 * n)
+        .filter(|number| model.identified[*number])
+        .collect();
     let mut dynamics = InverseDynamics::new(arm);
     let (mut sum, mut count) = (0.0, 0);
-    for state in case.clone().on_other_paths(404, 40.0).true_rows().state.iter().step_by(25) {
+    for state in case
+        .clone()
+        .on_other_paths(404, 40.0)
+        .true_rows()
+        .state
+        .iter()
+        .step_by(25)
+    {
         let mut by = vec![vec![0.0; width]; n];
-        let motion = MotionRow { position: &state.q, velocity: &state.v, acceleration: &state.a };
+        let motion = MotionRow {
+            position: &state.q,
+            velocity: &state.v,
+            acceleration: &state.a,
+        };
         dynamics.regressor(motion, &arm.gravity, |joint, link, ten| {
-            for (place, number) in numbers.iter().enumerate().filter(|(_, number)| **number / 10 == link) {
+            for (place, number) in numbers
+                .iter()
+                .enumerate()
+                .filter(|(_, number)| **number / 10 == link)
+            {
                 by[joint][place] = ten[number % 10];
             }
         });
@@ -101,7 +156,12 @@ fn predicted_sigma(model: &TorqueModel, arm: &DynamicArm, case: &TorqueCase) -> 
             place += term.coefficients.len();
         }
         for (joint, by) in by.iter().enumerate() {
-            let product = |row: usize| by.iter().zip(&model.covariance[width * row..]).map(|(a, b)| a * b).sum::<f64>();
+            let product = |row: usize| {
+                by.iter()
+                    .zip(&model.covariance[width * row..])
+                    .map(|(a, b)| a * b)
+                    .sum::<f64>()
+            };
             let variance: f64 = (0..width).map(|row| by[row] * product(row)).sum();
             sum += variance.max(0.0).sqrt() / case.white_noise()[joint];
             count += 1;
@@ -119,32 +179,75 @@ fn what_is_identified_from_an_exciting_motion_is_surer_than_from_random_ones() {
     arm.links = None;
     let sigma = |asked: &MotionRequest| {
         let proposal = exciting_motion(asked).expect("a motion");
-        let question = TorqueQuestion { free_inertials: true, ..TorqueQuestion::default() };
-        let found = diagnose(&arm, &recorded(&case, &proposal), &question, &mut |_| ()).expect("a diagnosis");
+        let question = TorqueQuestion {
+            free_inertials: true,
+            ..TorqueQuestion::default()
+        };
+        let found = diagnose(&arm, &recorded(&case, &proposal), &question, &mut |_| ())
+            .expect("a diagnosis");
         predicted_sigma(&found.model, &arm, &case)
     };
     let asked = request(folder.path().join("robot.json"), 60);
     let exciting = sigma(&asked);
     // Without a generation the best of the forty random motions that the search begins with.
-    let random: Vec<f64> = (11..13).map(|seed| sigma(&MotionRequest { seed, generations: 0, ..asked.clone() })).collect();
-    println!("sigma of fresh torques over noise {exciting:.4}, by the best of forty random motions {random:?}");
-    assert!(random.iter().all(|random| 1.15 * exciting < *random), "{exciting}, by random motions {random:?}");
+    let random: Vec<f64> = (11..13)
+        .map(|seed| {
+            sigma(&MotionRequest {
+                seed,
+                generations: 0,
+                ..asked.clone()
+            })
+        })
+        .collect();
+    println!(
+        "sigma of fresh torques over noise {exciting:.4}, by the best of forty random motions {random:?}"
+    );
+    assert!(
+        random.iter().all(|random| 1.15 * exciting < *random),
+        "{exciting}, by random motions {random:?}"
+    );
 }
 
 #[test]
 fn the_file_of_a_motion_is_one_that_compensate_takes() {
     let folder = tempfile::tempdir().expect("a folder");
     write(folder.path(), &super::results::arm().recording());
-    let (robot, file) = (folder.path().join("robot.json"), folder.path().join("motion.csv"));
+    let (robot, file) = (
+        folder.path().join("robot.json"),
+        folder.path().join("motion.csv"),
+    );
     let mut command = Command::new(env!("CARGO_BIN_EXE_calib"));
-    command.arg("excite").arg(&robot).args(["--seconds", "8", "--rate", "50", "--generations", "2", "--out"]).arg(&file);
-    let output = command.args(["--limits", "-90:90,-120:-40,-90:90,-90:90,-90:90,-90:90"]).output().expect("calib");
+    command
+        .arg("excite")
+        .arg(&robot)
+        .args([
+            "--seconds",
+            "8",
+            "--rate",
+            "50",
+            "--generations",
+            "2",
+            "--out",
+        ])
+        .arg(&file);
+    let output = command
+        .args(["--limits", "-90:90,-120:-40,-90:90,-90:90,-90:90,-90:90"])
+        .output()
+        .expect("calib");
     let told = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    assert!(told.contains("condition number") && told.contains("will not determine"), "{told}");
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    assert!(
+        told.contains("condition number") && told.contains("will not determine"),
+        "{told}"
+    );
     let text = std::fs::read_to_string(&file).expect("a file");
     let robot = calib::identified::robot_file(&robot, None).expect("a robot");
-    let trajectory = calib::targets::Trajectory::read("motion.csv", &text, &robot, false).expect("a motion");
+    let trajectory =
+        calib::targets::Trajectory::read("motion.csv", &text, &robot, false).expect("a motion");
     assert_eq!(trajectory.motion.time.len(), 401);
     assert!(trajectory.motion.acceleration.is_some());
 }

@@ -8,7 +8,10 @@ use std::process::Output;
 
 fn fed(solved: &Solved, file: &Path, more: &[&str]) -> Output {
     let file = file.display().to_string();
-    calib(&[&["compensate", "HEAD", &file, "--torque"], more].concat(), &solved.path("store"))
+    calib(
+        &[&["compensate", "HEAD", &file, "--torque"], more].concat(),
+        &solved.path("store"),
+    )
 }
 
 fn told(output: &Output) -> String {
@@ -31,8 +34,15 @@ fn fresh(name: &str) -> std::path::PathBuf {
 /// Cells of a column as text.
 fn cells<'t>(text: &'t str, name: &str) -> Vec<&'t str> {
     let mut lines = text.lines();
-    let place = lines.next().expect("a header").split(',').position(|column| column == name).expect("the column");
-    lines.map(|line| line.splitn(place + 2, ',').nth(place).expect("a cell")).collect()
+    let place = lines
+        .next()
+        .expect("a header")
+        .split(',')
+        .position(|column| column == name)
+        .expect("the column");
+    lines
+        .map(|line| line.splitn(place + 2, ',').nth(place).expect("a cell"))
+        .collect()
 }
 
 /// Share of rows of a fresh motion whose true torque lies within the uncertainty that is told, joint by joint.
@@ -44,11 +54,17 @@ fn covered(solved: &Solved, seed: u64) -> Vec<f64> {
         let file = solved.path(&format!("fresh_{seed}_{stretch}.csv"));
         std::fs::write(&file, motion(&rows, stretch, true)).expect("a file");
         let text = answer(&fed(solved, &file, &["--quiet", "--force"]));
-        let own: Vec<usize> = (0..rows.time.len()).filter(|row| rows.trajectory[*row] == stretch).collect();
+        let own: Vec<usize> = (0..rows.time.len())
+            .filter(|row| rows.trajectory[*row] == stretch)
+            .collect();
         for (joint, (inside, all)) in within.iter_mut().enumerate() {
             let found = column(&text, &format!("tau{}_nm", joint + 1));
             let u95 = column(&text, &format!("u95_{}_nm", joint + 1));
-            let off = super::results::rms(own.iter().zip(&found).map(|(row, found)| rows.torque[n * row + joint] - found));
+            let off = super::results::rms(
+                own.iter()
+                    .zip(&found)
+                    .map(|(row, found)| rows.torque[n * row + joint] - found),
+            );
             println!(
                 "stretch {stretch}, joint {}: rms error {off:.4} Nm, rms u95 {:.4} Nm",
                 joint + 1,
@@ -60,7 +76,10 @@ fn covered(solved: &Solved, seed: u64) -> Vec<f64> {
             }
         }
     }
-    within.into_iter().map(|(inside, all)| inside as f64 / all as f64).collect()
+    within
+        .into_iter()
+        .map(|(inside, all)| inside as f64 / all as f64)
+        .collect()
 }
 
 fn mean(values: &[f64]) -> f64 {
@@ -72,14 +91,21 @@ fn the_uncertainty_of_a_torque_covers_the_truth_of_fresh_motions() {
     let shares = covered(solved(), 977);
     println!("within u95, joint by joint: {shares:.2?}");
     // Joint 2 has Stribeck friction: the speed over which it falls has a variance, and still its torques are surer than they should be.
-    let others = shares.iter().enumerate().all(|(joint, share)| joint == 1 || *share > 0.7);
-    assert!(mean(&shares) > 0.9 && others && shares[1] > 0.55, "{shares:.2?}");
+    let others = shares
+        .iter()
+        .enumerate()
+        .all(|(joint, share)| joint == 1 || *share > 0.7);
+    assert!(
+        mean(&shares) > 0.9 && others && shares[1] > 0.55,
+        "{shares:.2?}"
+    );
 }
 
 /// `CALIB_RECORDINGS=12 cargo test --test it -- torques::feed_forward --nocapture` prints the figures of the README.
 #[test]
 fn the_uncertainty_of_torques_covers_the_truth_of_several_arms() {
-    let cases: Vec<TorqueCase> = super::results::cases(from_environment("CALIB_RECORDINGS", 2) as usize);
+    let cases: Vec<TorqueCase> =
+        super::results::cases(from_environment("CALIB_RECORDINGS", 2) as usize);
     let mut all = Vec::new();
     for case in cases {
         let name = format!("{} {}", case.name, case.robot.name);
@@ -95,21 +121,48 @@ fn the_uncertainty_of_torques_covers_the_truth_of_several_arms() {
 #[test]
 fn torques_less_certain_than_allowed_are_refused_and_written_only_with_force() {
     let file = fresh("doubtful.csv");
-    let rows = std::fs::read_to_string(&file).expect("text").lines().count() - 1;
+    let rows = std::fs::read_to_string(&file)
+        .expect("text")
+        .lines()
+        .count()
+        - 1;
     let refused = fed(solved(), &file, &["--max-uncertainty", "1e-6"]);
     assert_eq!(refused.status.code(), Some(10), "{}", told(&refused));
     let said = told(&refused);
-    assert!(said.contains("doubtful.csv:2: ") && said.contains("no torques are written"), "{said}");
-    assert!(said.contains(&format!("{rows} of {rows} rows are less certain than allowed")), "{said}");
+    assert!(
+        said.contains("doubtful.csv:2: ") && said.contains("no torques are written"),
+        "{said}"
+    );
+    assert!(
+        said.contains(&format!(
+            "{rows} of {rows} rows are less certain than allowed"
+        )),
+        "{said}"
+    );
     let text = String::from_utf8(refused.stdout).expect("UTF-8");
     assert!(
-        cells(&text, "tau2_nm").iter().all(|cell| cell.is_empty()) && cells(&text, "i2_a").iter().all(|cell| cell.is_empty())
+        cells(&text, "tau2_nm").iter().all(|cell| cell.is_empty())
+            && cells(&text, "i2_a").iter().all(|cell| cell.is_empty())
     );
     assert!(column(&text, "u95_2_nm").iter().all(|u95| *u95 > 0.0));
-    assert!(text.contains("refused: joint ") && text.contains("Nm allowed (--max-uncertainty)"), "{text}");
-    let text = answer(&fed(solved(), &file, &["--max-uncertainty", "1e-6", "--force"]));
-    assert!(column(&text, "tau2_nm").iter().all(|torque| torque.is_finite()));
-    assert_eq!(text.matches("written because of --force: joint ").count(), rows);
+    assert!(
+        text.contains("refused: joint ") && text.contains("Nm allowed (--max-uncertainty)"),
+        "{text}"
+    );
+    let text = answer(&fed(
+        solved(),
+        &file,
+        &["--max-uncertainty", "1e-6", "--force"],
+    ));
+    assert!(
+        column(&text, "tau2_nm")
+            .iter()
+            .all(|torque| torque.is_finite())
+    );
+    assert_eq!(
+        text.matches("written because of --force: joint ").count(),
+        rows
+    );
     // By default a motion like the recorded one is written whole.
     let usual = fed(solved(), &file, &[]);
     assert_eq!(usual.status.code(), Some(0), "{}", told(&usual));
@@ -125,7 +178,11 @@ fn torques_that_were_fed_forward_already_are_no_motion() {
     std::fs::write(&twice, &once).expect("a file");
     let refused = fed(solved(), &twice, &[]);
     assert_eq!(refused.status.code(), Some(10), "{}", told(&refused));
-    assert!(told(&refused).contains("carries the torques that calib wrote already"), "{}", told(&refused));
+    assert!(
+        told(&refused).contains("carries the torques that calib wrote already"),
+        "{}",
+        told(&refused)
+    );
     let again = answer(&fed(solved(), &twice, &["--quiet", "--force"]));
     assert_eq!(again, once);
 }
@@ -134,26 +191,49 @@ fn torques_that_were_fed_forward_already_are_no_motion() {
 fn a_motion_beyond_the_recording_is_remarked_row_by_row_with_what_it_exceeds() {
     let slow = std::fs::read_to_string(fresh("slow.csv")).expect("text");
     // The same path in a third of the time.
-    let path = |line: &str| line.split(',').skip(1).take(6).collect::<Vec<_>>().join(",");
+    let path = |line: &str| {
+        line.split(',')
+            .skip(1)
+            .take(6)
+            .collect::<Vec<_>>()
+            .join(",")
+    };
     let fast: String = slow
         .lines()
         .map(|line| match line.split_once(',') {
-            Some((time, _)) if time != "time_s" => format!("{:.5},{}\n", time.parse::<f64>().expect("s") / 3.0, path(line)),
+            Some((time, _)) if time != "time_s" => format!(
+                "{:.5},{}\n",
+                time.parse::<f64>().expect("s") / 3.0,
+                path(line)
+            ),
             _ => format!("time_s,{}\n", path(line)),
         })
         .collect();
     let file = solved().path("fast.csv");
     std::fs::write(&file, fast).expect("a file");
     let output = fed(solved(), &file, &["--force"]);
-    assert!(told(&output).contains("beyond the motion that the model was seen in"), "{}", told(&output));
+    assert!(
+        told(&output).contains("beyond the motion that the model was seen in"),
+        "{}",
+        told(&output)
+    );
     let fast = answer(&output);
-    for what in ["faster than recorded", "accelerates more than recorded", "under more load than recorded"] {
+    for what in [
+        "faster than recorded",
+        "accelerates more than recorded",
+        "under more load than recorded",
+    ] {
         assert!(fast.contains(what), "no `{what}`");
     }
     // Friction is less certain where nobody saw it.
     let slow = answer(&fed(solved(), &solved().path("slow.csv"), &["--quiet"]));
     let most = |text: &str| column(text, "u95_2_nm").into_iter().fold(0.0, f64::max);
-    assert!(most(&fast) > 2.0 * most(&slow), "{} {}", most(&fast), most(&slow));
+    assert!(
+        most(&fast) > 2.0 * most(&slow),
+        "{} {}",
+        most(&fast),
+        most(&slow)
+    );
 }
 
 #[test]
@@ -167,9 +247,17 @@ fn an_arm_whose_recording_says_its_temperature_is_remarked_where_it_is_colder() 
     let text: String = text.lines().enumerate().map(warmer).collect();
     let solved = super::results::solve_files(case.clone(), &[robot, (name, text)]);
     let file = solved.path("motion.csv");
-    std::fs::write(&file, motion(&case.on_other_paths(977, 40.0).true_rows(), 1, false)).expect("a file");
+    std::fs::write(
+        &file,
+        motion(&case.on_other_paths(977, 40.0).true_rows(), 1, false),
+    )
+    .expect("a file");
     let cold = answer(&fed(&solved, &file, &["--temperature", "5"]));
-    assert!(cold.contains("colder than recorded: 5.0 C, the recording begins at 25.0 C"), "{}", &cold[..2000]);
+    assert!(
+        cold.contains("colder than recorded: 5.0 C, the recording begins at 25.0 C"),
+        "{}",
+        &cold[..2000]
+    );
     let usual = answer(&fed(&solved, &file, &["--temperature", "26"]));
     assert!(!usual.contains("than recorded: "), "{}", &usual[..2000]);
 }

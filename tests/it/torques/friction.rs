@@ -57,22 +57,46 @@ fn gap(store: &Path, stage: &str) -> (String, [f64; 2]) {
     let FindingNumbers(numbers) = table(store, &format!("{stage}/finding_numbers"));
     let place = format!("joint {JOINT}");
     let named: Vec<String> = rows.iter().map(|row| row.statement.clone()).collect();
-    let found = rows.into_iter().find(|row| row.effect == "backlash" && row.place == place);
+    let found = rows
+        .into_iter()
+        .find(|row| row.effect == "backlash" && row.place == place);
     let found = found.unwrap_or_else(|| panic!("no gap but {named:?}"));
-    let half = numbers.into_iter().find(|number| number.rank == found.rank).expect("its size");
-    (found.statement, [half.value, half.sigma.expect("its sigma")])
+    let half = numbers
+        .into_iter()
+        .find(|number| number.rank == found.rank)
+        .expect("its size");
+    (
+        found.statement,
+        [half.value, half.sigma.expect("its sigma")],
+    )
 }
 
 /// The arm, and the pipeline that was run on it.
 fn solved() -> &'static Solved {
     static SOLVED: OnceLock<Solved> = OnceLock::new();
     SOLVED.get_or_init(|| {
-        let solved = Solved { folder: tempfile::tempdir().expect("a folder"), case: arm() };
+        let solved = Solved {
+            folder: tempfile::tempdir().expect("a folder"),
+            case: arm(),
+        };
         write(&solved.path("case"), &solved.case.recording());
-        let text = PIPELINE.replace("GAP", &GAP.to_string()).replace("FRICTION", &friction(&solved.case).to_string());
+        let text = PIPELINE
+            .replace("GAP", &GAP.to_string())
+            .replace("FRICTION", &friction(&solved.case).to_string());
         std::fs::write(solved.path("pipeline.yaml"), text).expect("a file");
-        let output = calib(&["run", "--quiet", &solved.path("pipeline.yaml").display().to_string()], &solved.path("store"));
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let output = calib(
+            &[
+                "run",
+                "--quiet",
+                &solved.path("pipeline.yaml").display().to_string(),
+            ],
+            &solved.path("store"),
+        );
+        assert!(
+            output.status.success(),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
         solved
     })
 }
@@ -83,15 +107,29 @@ fn friction(case: &TorqueCase) -> f64 {
 }
 
 #[test]
-fn a_gap_whose_side_the_loads_seem_to_decide_is_left_to_approach_below_the_friction_of_the_torques() {
+fn a_gap_whose_side_the_loads_seem_to_decide_is_left_to_approach_below_the_friction_of_the_torques()
+{
     let (store, friction) = (solved().path("store"), friction(&solved().case));
-    let [(alone, before), (together, after)] = ["alone", "together"].map(|stage| gap(&store, stage));
-    println!("friction {friction:.2} Nm; alone: {alone} {before:.2?}; together: {together} {after:.2?}");
+    let [(alone, before), (together, after)] =
+        ["alone", "together"].map(|stage| gap(&store, stage));
+    println!(
+        "friction {friction:.2} Nm; alone: {alone} {before:.2?}; together: {together} {after:.2?}"
+    );
     assert!(!alone.contains("approach"), "{alone}");
-    let said = together.split(" Nm").next().and_then(|text| text.rsplit(' ').next()).expect("Nm");
-    assert!((said.parse::<f64>().expect("a number") / friction - 1.0).abs() < 0.03, "{together}");
+    let said = together
+        .split(" Nm")
+        .next()
+        .and_then(|text| text.rsplit(' ').next())
+        .expect("Nm");
+    assert!(
+        (said.parse::<f64>().expect("a number") / friction - 1.0).abs() < 0.03,
+        "{together}"
+    );
     let [half, sigma] = after;
-    assert!((half - 0.5 * GAP).abs() < 3.0 * sigma && sigma <= before[1], "{after:?}, {before:?}");
+    assert!(
+        (half - 0.5 * GAP).abs() < 3.0 * sigma && sigma <= before[1],
+        "{after:?}, {before:?}"
+    );
 }
 
 #[test]
@@ -104,22 +142,42 @@ fn each_page_of_a_pipeline_says_what_its_own_diagnosis_says() {
     };
     let page = |stage: &str| -> String {
         let Document(rows) = table(&store, &format!("{stage}/document"));
-        let page = rows.into_iter().find(|row| row.name.ends_with(".html")).expect("a page");
-        [("&#x27;", "'"), ("&#x2f;", "/"), ("&lt;", "<"), ("&gt;", ">")]
-            .iter()
-            .fold(page.content, |text, (a, b)| text.replace(a, b))
+        let page = rows
+            .into_iter()
+            .find(|row| row.name.ends_with(".html"))
+            .expect("a page");
+        [
+            ("&#x27;", "'"),
+            ("&#x2f;", "/"),
+            ("&lt;", "<"),
+            ("&gt;", ">"),
+        ]
+        .iter()
+        .fold(page.content, |text, (a, b)| text.replace(a, b))
     };
     let (points, torques) = (said("together"), said("diagnose_torques"));
     println!("points: {points:#?}\ntorques: {torques:#?}");
     assert!(!points.is_empty() && !torques.is_empty());
     let (of_points, of_torques) = (page("report"), page("report_torques"));
     for sentence in &torques {
-        assert!(of_torques.contains(sentence), "{sentence} is not on its page");
-        assert!(points.contains(sentence) || !of_points.contains(sentence), "{sentence} is on the page of the points");
+        assert!(
+            of_torques.contains(sentence),
+            "{sentence} is not on its page"
+        );
+        assert!(
+            points.contains(sentence) || !of_points.contains(sentence),
+            "{sentence} is on the page of the points"
+        );
     }
     let shown = |sentence: &&String| of_points.contains(sentence.as_str());
-    assert!(points.iter().any(|sentence| shown(&sentence)), "nothing of {points:?} is on its page");
+    assert!(
+        points.iter().any(|sentence| shown(&sentence)),
+        "nothing of {points:?} is on its page"
+    );
     for sentence in points.iter().filter(|sentence| !torques.contains(sentence)) {
-        assert!(!of_torques.contains(sentence), "{sentence} is on the page of the torques");
+        assert!(
+            !of_torques.contains(sentence),
+            "{sentence} is on the page of the torques"
+        );
     }
 }

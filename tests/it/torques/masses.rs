@@ -67,8 +67,15 @@ fn ratios(inertials: &str, share: f64) -> ([f64; 2], [f64; 2]) {
     write(&at("believed"), &[(name, file.to_string()), recording]);
     let pipeline = at("pipeline.yaml");
     std::fs::write(&pipeline, PIPELINE.replace("INERTIALS", inertials)).expect("a file");
-    let output = calib(&["run", "--quiet", &pipeline.display().to_string()], &at("store"));
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let output = calib(
+        &["run", "--quiet", &pipeline.display().to_string()],
+        &at("store"),
+    );
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     let found = |stage: &str| compliances(&at("store"), stage);
     let of = |found: [f64; 2]| [found[0] / TRULY[0], found[1] / TRULY[1]];
     let masses: Robot = table(&at("store"), "masses/robot");
@@ -88,7 +95,10 @@ fn compliances(store: &Path, stage: &str) -> [f64; 2] {
     let Parameters(rows) = table(store, &format!("{stage}/parameters"));
     let value = |joint: usize| {
         let name = format!("joint_compliance.j{joint}");
-        rows.iter().find(|row| row.name.starts_with(&name)).unwrap_or_else(|| panic!("no {name}")).value
+        rows.iter()
+            .find(|row| row.name.starts_with(&name))
+            .unwrap_or_else(|| panic!("no {name}"))
+            .value
     };
     [value(2), value(3)]
 }
@@ -100,7 +110,10 @@ fn compliance_is_right_by_masses_from_torques_though_the_robot_files_masses_are_
         "found over true compliance of joints 2 and 3: {before:.3?} with the file's masses, {after:.3?} with those of the torques"
     );
     assert!(before.iter().all(|ratio| *ratio > 1.3), "{before:?}");
-    assert!(after.iter().all(|ratio| (ratio - 1.0).abs() < 0.05), "{after:?}");
+    assert!(
+        after.iter().all(|ratio| (ratio - 1.0).abs() < 0.05),
+        "{after:?}"
+    );
 }
 
 #[test]
@@ -109,5 +122,11 @@ fn masses_that_are_right_stay_right() {
     println!(
         "found over true compliance of joints 2 and 3: {before:.3?} with the file's masses, {after:.3?} with those of the torques"
     );
-    assert!(before.iter().chain(&after).all(|ratio| (ratio - 1.0).abs() < 0.05), "{before:?} {after:?}");
+    assert!(
+        before
+            .iter()
+            .chain(&after)
+            .all(|ratio| (ratio - 1.0).abs() < 0.05),
+        "{before:?} {after:?}"
+    );
 }

@@ -39,52 +39,106 @@ pub(super) fn solve(case: TorqueCase) -> Solved {
 pub(super) fn solve_files(case: TorqueCase, files: &[TorqueFile]) -> Solved {
     let folder = tempfile::tempdir().expect("a folder");
     write(&folder.path().join("case"), files);
-    let pipeline = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/dynamics/pipeline.yaml").display().to_string();
+    let pipeline = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("pipelines/dynamics/pipeline.yaml")
+        .display()
+        .to_string();
     let set = format!("case={}", folder.path().join("case").display());
-    let output = calib(&["run", "--quiet", "--set", &set, &pipeline], &folder.path().join("store"));
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let output = calib(
+        &["run", "--quiet", "--set", &set, &pipeline],
+        &folder.path().join("store"),
+    );
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     Solved { folder, case }
 }
 
 /// Friction and nothing else concealed.
 fn design() -> TorqueDesign {
-    TorqueDesign { seed: 21, cases: 60, nulls: 1.0, pairs: 0.0, open: 0.0, other_forms: 0.0, seconds: 48.0, rate: 100.0 }
+    TorqueDesign {
+        seed: 21,
+        cases: 60,
+        nulls: 1.0,
+        pairs: 0.0,
+        open: 0.0,
+        other_forms: 0.0,
+        seconds: 48.0,
+        rate: 100.0,
+    }
 }
 
 /// Friction at all joints and nothing else concealed, motor currents.
 pub(super) fn arm() -> TorqueCase {
-    let fits =
-        |case: &TorqueCase| case.robot.name == "compact6" && case.plain_friction().iter().all(|[v, c]| v.and(*c).is_some());
-    cases(60).into_iter().find(fits).expect("an arm with friction at all joints")
+    let fits = |case: &TorqueCase| {
+        case.robot.name == "compact6"
+            && case
+                .plain_friction()
+                .iter()
+                .all(|[v, c]| v.and(*c).is_some())
+    };
+    cases(60)
+        .into_iter()
+        .find(fits)
+        .expect("an arm with friction at all joints")
 }
 
 /// The first arm of six joints without any friction.
 fn frictionless() -> TorqueCase {
-    let bare = |case: &TorqueCase| case.robot.name == "compact6" && case.plain_friction().iter().all(|[v, c]| v.or(*c).is_none());
-    cases(60).into_iter().find(bare).expect("an arm without friction")
+    let bare = |case: &TorqueCase| {
+        case.robot.name == "compact6"
+            && case
+                .plain_friction()
+                .iter()
+                .all(|[v, c]| v.or(*c).is_none())
+    };
+    cases(60)
+        .into_iter()
+        .find(bare)
+        .expect("an arm without friction")
 }
 
 /// Arms of all kinds.
 pub(super) fn cases(count: usize) -> Vec<TorqueCase> {
-    (0..count).map(|number| TorqueCase::draw(&design(), number)).collect()
+    (0..count)
+        .map(|number| TorqueCase::draw(&design(), number))
+        .collect()
 }
 
 pub(super) fn calib(arguments: &[&str], store: &Path) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_calib"));
-    command.args(arguments).arg("--store").arg(store).output().expect("calib")
+    command
+        .args(arguments)
+        .arg("--store")
+        .arg(store)
+        .output()
+        .expect("calib")
 }
 
 fn text(output: Output) -> String {
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     String::from_utf8(output.stdout).expect("UTF-8")
 }
 
 fn exported(format: &str) -> String {
-    text(calib(&["export", "HEAD", "--quiet", "--format", format], &solved().path("store")))
+    text(calib(
+        &["export", "HEAD", "--quiet", "--format", format],
+        &solved().path("store"),
+    ))
 }
 
 fn number(element: &roxmltree::Node, name: &str) -> f64 {
-    element.attribute(name).unwrap_or_else(|| panic!("no {name}")).parse().expect("a number")
+    element
+        .attribute(name)
+        .unwrap_or_else(|| panic!("no {name}"))
+        .parse()
+        .expect("a number")
 }
 
 /// How near friction is asked for: at joint 2 Stribeck friction, which no attribute holds, shares it with viscous and Coulomb friction; that of
@@ -94,7 +148,10 @@ fn share(joint: usize) -> f64 {
 }
 
 fn near(found: f64, truth: f64, share: f64, what: &str) {
-    assert!((found - truth).abs() <= share * truth.abs(), "{what}: {found}, truly {truth}");
+    assert!(
+        (found - truth).abs() <= share * truth.abs(),
+        "{what}: {found}, truly {truth}"
+    );
 }
 
 /// Mass and its moment about the last joint's point of the last link and what it carries.
@@ -103,7 +160,12 @@ fn true_last(case: &TorqueCase) -> (f64, [f64; 3]) {
     let point = case.robot.joints[case.robot.joints.len() - 1].point;
     let bodies = std::iter::once(link).chain(payload);
     bodies.fold((0.0, [0.0; 3]), |(mass, moment), body| {
-        (mass + body.mass, std::array::from_fn(|axis| moment[axis] + body.mass * (body.centre[axis] - point[axis])))
+        (
+            mass + body.mass,
+            std::array::from_fn(|axis| {
+                moment[axis] + body.mass * (body.centre[axis] - point[axis])
+            }),
+        )
     })
 }
 
@@ -111,7 +173,10 @@ fn true_last(case: &TorqueCase) -> (f64, [f64; 3]) {
 fn a_urdf_of_torques_holds_the_friction_and_the_masses_of_the_twin() {
     let text = exported("urdf");
     let file = roxmltree::Document::parse(&text).expect("XML");
-    let all: Vec<_> = file.descendants().filter(|node| node.has_tag_name("dynamics")).collect();
+    let all: Vec<_> = file
+        .descendants()
+        .filter(|node| node.has_tag_name("dynamics"))
+        .collect();
     let truth = solved().case.plain_friction();
     assert_eq!(all.len(), truth.len());
     for (joint, (dynamics, [viscous, coulomb])) in all.iter().zip(truth).enumerate() {
@@ -128,10 +193,21 @@ fn a_urdf_of_torques_holds_the_friction_and_the_masses_of_the_twin() {
             &format!("Coulomb friction of joint {}", joint + 1),
         );
     }
-    let last = file.descendants().find(|node| node.attribute("name") == Some("link_6")).expect("the last link");
-    let mass = last.descendants().find(|node| node.has_tag_name("mass")).expect("its mass");
+    let last = file
+        .descendants()
+        .find(|node| node.attribute("name") == Some("link_6"))
+        .expect("the last link");
+    let mass = last
+        .descendants()
+        .find(|node| node.has_tag_name("mass"))
+        .expect("its mass");
     let (truth, _) = true_last(&solved().case);
-    near(number(&mass, "value"), truth, 0.03, "mass of the last link with its payload");
+    near(
+        number(&mass, "value"),
+        truth,
+        0.03,
+        "mass of the last link with its payload",
+    );
 }
 
 #[test]
@@ -139,7 +215,10 @@ fn an_mjcf_of_torques_holds_friction_and_drives() {
     let text = exported("mjcf");
     let file = roxmltree::Document::parse(&text).expect("XML");
     let truth = solved().case.plain_friction();
-    let joints: Vec<_> = file.descendants().filter(|node| node.has_tag_name("joint")).collect();
+    let joints: Vec<_> = file
+        .descendants()
+        .filter(|node| node.has_tag_name("joint"))
+        .collect();
     assert_eq!(joints.len(), truth.len());
     for (joint, (element, [viscous, coulomb])) in joints.iter().zip(truth).enumerate() {
         near(
@@ -155,10 +234,17 @@ fn an_mjcf_of_torques_holds_friction_and_drives() {
             &format!("Coulomb friction of joint {}", joint + 1),
         );
     }
-    let gears: Vec<f64> =
-        file.descendants().filter(|node| node.has_tag_name("motor")).map(|motor| number(&motor, "gear")).collect();
-    let declared =
-        solved().case.robot.joints.iter().map(|joint| joint.reduction_ratio.zip(joint.motor_constant).expect("a drive"));
+    let gears: Vec<f64> = file
+        .descendants()
+        .filter(|node| node.has_tag_name("motor"))
+        .map(|motor| number(&motor, "gear"))
+        .collect();
+    let declared = solved().case.robot.joints.iter().map(|joint| {
+        joint
+            .reduction_ratio
+            .zip(joint.motor_constant)
+            .expect("a drive")
+    });
     for (gear, (ratio, constant)) in gears.iter().zip(declared) {
         near(*gear, ratio * constant, 1e-12, "Nm per ampere");
     }
@@ -170,29 +256,66 @@ fn files_say_nothing_of_friction_that_was_not_found() {
     // Friction at two joints alone: none at the others is found, and 0 would be a statement that nobody made.
     let plain = arm().plain_friction();
     let [viscous, coulomb] = [1, 2].map(|joint| plain[joint].map(|size| size.expect("friction")));
-    let case = frictionless().with_drag(1, viscous[1]).with_drag(2, coulomb[1]);
+    let case = frictionless()
+        .with_drag(1, viscous[1])
+        .with_drag(2, coulomb[1]);
     let solved = solve(case);
-    let found: Value =
-        serde_json::from_str(&text(calib(&["export", "HEAD", "--quiet", "--format", "dynamics"], &solved.path("store"))))
-            .expect("JSON");
-    for (format, element, names) in
-        [("urdf", "dynamics", ["damping", "friction"]), ("mjcf", "joint", ["damping", "frictionloss"])]
-    {
-        let text = text(calib(&["export", "HEAD", "--quiet", "--format", format], &solved.path("store")));
+    let found: Value = serde_json::from_str(&text(calib(
+        &["export", "HEAD", "--quiet", "--format", "dynamics"],
+        &solved.path("store"),
+    )))
+    .expect("JSON");
+    for (format, element, names) in [
+        ("urdf", "dynamics", ["damping", "friction"]),
+        ("mjcf", "joint", ["damping", "frictionloss"]),
+    ] {
+        let text = text(calib(
+            &["export", "HEAD", "--quiet", "--format", format],
+            &solved.path("store"),
+        ));
         let file = roxmltree::Document::parse(&text).expect("XML");
-        for (index, joint) in found["joints"].as_array().expect("joints").iter().enumerate() {
+        for (index, joint) in found["joints"]
+            .as_array()
+            .expect("joints")
+            .iter()
+            .enumerate()
+        {
             let name = joint["name"].as_str().expect("a name");
-            let own = file.descendants().find(|node| node.has_tag_name("joint") && node.attribute("name") == Some(name));
+            let own = file
+                .descendants()
+                .find(|node| node.has_tag_name("joint") && node.attribute("name") == Some(name));
             let own = own.expect("the joint");
-            let own = if element == "joint" { Some(own) } else { own.children().find(|node| node.has_tag_name(element)) };
+            let own = if element == "joint" {
+                Some(own)
+            } else {
+                own.children().find(|node| node.has_tag_name(element))
+            };
             for (attribute, number) in names.iter().zip([&joint["viscous"], &joint["coulomb"]]) {
                 let written = own.and_then(|node| node.attribute(*attribute));
-                assert_eq!(written.is_some(), !number.is_null(), "{format}: {attribute} of joint {}", index + 1);
-                assert_ne!(written, Some("0"), "{format}: {attribute} of joint {}", index + 1);
+                assert_eq!(
+                    written.is_some(),
+                    !number.is_null(),
+                    "{format}: {attribute} of joint {}",
+                    index + 1
+                );
+                assert_ne!(
+                    written,
+                    Some("0"),
+                    "{format}: {attribute} of joint {}",
+                    index + 1
+                );
             }
         }
-        let sliding = found["joints"].as_array().expect("joints").iter().filter(|joint| !joint["coulomb"].is_null()).count();
-        assert!((2..6).contains(&sliding), "Coulomb friction at {sliding} joints");
+        let sliding = found["joints"]
+            .as_array()
+            .expect("joints")
+            .iter()
+            .filter(|joint| !joint["coulomb"].is_null())
+            .count();
+        assert!(
+            (2..6).contains(&sliding),
+            "Coulomb friction at {sliding} joints"
+        );
     }
 }
 
@@ -200,29 +323,60 @@ fn files_say_nothing_of_friction_that_was_not_found() {
 fn what_a_format_does_not_hold_of_torques_is_said_with_its_size() {
     let all: Value = serde_json::from_str(&exported("dynamics")).expect("JSON");
     let causes = all["causes"].as_array().expect("causes");
-    let stribeck = causes.iter().find(|cause| cause["effect"] == "stribeck_friction").expect("the hidden Stribeck friction");
+    let stribeck = causes
+        .iter()
+        .find(|cause| cause["effect"] == "stribeck_friction")
+        .expect("the hidden Stribeck friction");
     assert_eq!(stribeck["where"], "joint 2");
-    assert!(stribeck["numbers"]["stribeck"]["sigma"].as_f64().expect("a sigma") > 0.0);
+    assert!(
+        stribeck["numbers"]["stribeck"]["sigma"]
+            .as_f64()
+            .expect("a sigma")
+            > 0.0
+    );
     for format in ["urdf", "mjcf"] {
         let text = exported(format);
-        assert!(text.contains("not carried: stribeck_friction at joint 2, "), "{text}");
+        assert!(
+            text.contains("not carried: stribeck_friction at joint 2, "),
+            "{text}"
+        );
     }
-    let refused = calib(&["export", "HEAD", "--format", "dh"], &solved().path("store"));
+    let refused = calib(
+        &["export", "HEAD", "--format", "dh"],
+        &solved().path("store"),
+    );
     let told = String::from_utf8_lossy(&refused.stderr).into_owned();
     assert_eq!(refused.status.code(), Some(2), "{told}");
-    assert!(told.contains("allowed: urdf, json, mjcf, sdf, dynamics"), "{told}");
+    assert!(
+        told.contains("allowed: urdf, json, mjcf, sdf, dynamics"),
+        "{told}"
+    );
 }
 
 /// A motion as its user has it, of one stretch of rows.
 pub(super) fn motion(rows: &TorqueRows, stretch: usize, derivatives: bool) -> String {
     let n = rows.state[0].q.len();
-    let names = |name: &str| (1..=n).map(|joint| format!(",{}", name.replace("{j}", &joint.to_string()))).collect::<String>();
+    let names = |name: &str| {
+        (1..=n)
+            .map(|joint| format!(",{}", name.replace("{j}", &joint.to_string())))
+            .collect::<String>()
+    };
     let mut text = format!("time_s{}", names("q{j}_deg"));
     if derivatives {
         text += &(names("dq{j}_deg_s") + &names("ddq{j}_deg_s2"));
     }
-    for (row, state) in rows.state.iter().enumerate().filter(|(row, _)| rows.trajectory[*row] == stretch) {
-        let degrees = |values: &[f64]| values.iter().map(|value| format!(",{:.7}", value.to_degrees())).collect::<String>();
+    for (row, state) in rows
+        .state
+        .iter()
+        .enumerate()
+        .filter(|(row, _)| rows.trajectory[*row] == stretch)
+    {
+        let degrees = |values: &[f64]| {
+            values
+                .iter()
+                .map(|value| format!(",{:.7}", value.to_degrees()))
+                .collect::<String>()
+        };
         text += &format!("\n{:.4}{}", rows.time[row], degrees(&state.q));
         if derivatives {
             text += &(degrees(&state.v) + &degrees(&state.a));
@@ -234,9 +388,21 @@ pub(super) fn motion(rows: &TorqueRows, stretch: usize, derivatives: bool) -> St
 /// Columns of a file by name.
 pub(super) fn column(text: &str, name: &str) -> Vec<f64> {
     let mut lines = text.lines();
-    let place =
-        lines.next().expect("a header").split(',').position(|column| column == name).unwrap_or_else(|| panic!("no {name}"));
-    lines.map(|line| line.split(',').nth(place).expect("a cell").parse().expect("a number")).collect()
+    let place = lines
+        .next()
+        .expect("a header")
+        .split(',')
+        .position(|column| column == name)
+        .unwrap_or_else(|| panic!("no {name}"));
+    lines
+        .map(|line| {
+            line.split(',')
+                .nth(place)
+                .expect("a cell")
+                .parse()
+                .expect("a number")
+        })
+        .collect()
 }
 
 pub(super) fn rms(errors: impl Iterator<Item = f64>) -> f64 {
@@ -249,27 +415,67 @@ fn torques_fed_forward_are_those_of_the_twin_on_fresh_motions() {
     let solved = solved();
     let fresh = solved.case.clone().on_other_paths(977, 40.0);
     let rows = fresh.true_rows();
-    let rigid: Vec<Vec<f64>> = fresh.rigid().into_iter().map(|(_, torque)| torque).collect();
+    let rigid: Vec<Vec<f64>> = fresh
+        .rigid()
+        .into_iter()
+        .map(|(_, torque)| torque)
+        .collect();
     let n = fresh.robot.joints.len();
     for (stretch, derivatives) in [(1, false), (1, true), (2, true)] {
         let file = solved.path(&format!("motion_{stretch}_{derivatives}.csv"));
         std::fs::write(&file, motion(&rows, stretch, derivatives)).expect("a file");
-        let told =
-            text(calib(&["compensate", "HEAD", &file.display().to_string(), "--torque", "--quiet"], &solved.path("store")));
-        let own: Vec<usize> = (0..rows.time.len()).filter(|row| rows.trajectory[*row] == stretch).collect();
-        let drives = fresh.robot.joints.iter().map(|joint| joint.reduction_ratio.zip(joint.motor_constant).expect("a drive"));
+        let told = text(calib(
+            &[
+                "compensate",
+                "HEAD",
+                &file.display().to_string(),
+                "--torque",
+                "--quiet",
+            ],
+            &solved.path("store"),
+        ));
+        let own: Vec<usize> = (0..rows.time.len())
+            .filter(|row| rows.trajectory[*row] == stretch)
+            .collect();
+        let drives = fresh.robot.joints.iter().map(|joint| {
+            joint
+                .reduction_ratio
+                .zip(joint.motor_constant)
+                .expect("a drive")
+        });
         for (joint, (ratio, constant)) in drives.enumerate() {
             let found = column(&told, &format!("tau{}_nm", joint + 1));
             assert_eq!(found.len(), own.len());
-            let error = rms(own.iter().zip(&found).map(|(row, found)| rows.torque[n * row + joint] - found));
-            let nominal = rms(own.iter().map(|row| rows.torque[n * row + joint] - rigid[*row][joint]));
+            let error = rms(own
+                .iter()
+                .zip(&found)
+                .map(|(row, found)| rows.torque[n * row + joint] - found));
+            let nominal = rms(own
+                .iter()
+                .map(|row| rows.torque[n * row + joint] - rigid[*row][joint]));
             let noise = fresh.white_noise()[joint];
-            println!("stretch {stretch}, joint {}: {error:.4} Nm, rigid {nominal:.4} Nm, noise {noise:.4} Nm", joint + 1);
-            assert!(error < noise, "joint {}: {error} Nm, noise {noise} Nm", joint + 1);
-            assert!(nominal > 3.0 * error, "joint {}: {error} Nm, of the rigid arm {nominal} Nm", joint + 1);
+            println!(
+                "stretch {stretch}, joint {}: {error:.4} Nm, rigid {nominal:.4} Nm, noise {noise:.4} Nm",
+                joint + 1
+            );
+            assert!(
+                error < noise,
+                "joint {}: {error} Nm, noise {noise} Nm",
+                joint + 1
+            );
+            assert!(
+                nominal > 3.0 * error,
+                "joint {}: {error} Nm, of the rigid arm {nominal} Nm",
+                joint + 1
+            );
             let factor = ratio * constant;
             let currents = column(&told, &format!("i{}_a", joint + 1));
-            assert!(found.iter().zip(currents).all(|(torque, current)| (torque - factor * current).abs() < 1e-3 * factor));
+            assert!(
+                found
+                    .iter()
+                    .zip(currents)
+                    .all(|(torque, current)| (torque - factor * current).abs() < 1e-3 * factor)
+            );
         }
     }
 }
@@ -277,23 +483,58 @@ fn torques_fed_forward_are_those_of_the_twin_on_fresh_motions() {
 #[test]
 fn a_motion_that_cannot_be_fed_forward_is_refused_at_its_line() {
     let solved = solved();
-    let whole = motion(&solved.case.clone().on_other_paths(977, 40.0).true_rows(), 1, false);
+    let whole = motion(
+        &solved.case.clone().on_other_paths(977, 40.0).true_rows(),
+        1,
+        false,
+    );
     let file = solved.path("bad.csv");
     let changed = |change: &dyn Fn(&mut Vec<String>), words: &[&str]| {
         let mut lines: Vec<String> = whole.lines().map(String::from).collect();
         change(&mut lines);
         std::fs::write(&file, lines.join("\n")).expect("a file");
-        let output = calib(&["compensate", "HEAD", &file.display().to_string(), "--torque"], &solved.path("store"));
+        let output = calib(
+            &[
+                "compensate",
+                "HEAD",
+                &file.display().to_string(),
+                "--torque",
+            ],
+            &solved.path("store"),
+        );
         let told = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!([Some(2), Some(10)].contains(&output.status.code()), "{told}");
-        words.iter().for_each(|word| assert!(told.contains(word), "no `{word}` in: {told}"));
+        assert!(
+            [Some(2), Some(10)].contains(&output.status.code()),
+            "{told}"
+        );
+        words
+            .iter()
+            .for_each(|word| assert!(told.contains(word), "no `{word}` in: {told}"));
     };
-    changed(&|lines| lines[0] = lines[0].replace("q3_deg", "angle3"), &["unknown column `angle3`", "allowed: time_s"]);
-    changed(&|lines| lines.swap(40, 41), &["bad.csv:42", "the time does not increase"]);
-    changed(&|lines| _ = lines.remove(40), &["bad.csv:41", "the clock is uneven"]);
-    changed(&|lines| lines[7] = lines[7].replacen(',', ",x", 1), &["bad.csv:8", "is not a number"]);
+    changed(
+        &|lines| lines[0] = lines[0].replace("q3_deg", "angle3"),
+        &["unknown column `angle3`", "allowed: time_s"],
+    );
+    changed(
+        &|lines| lines.swap(40, 41),
+        &["bad.csv:42", "the time does not increase"],
+    );
+    changed(
+        &|lines| _ = lines.remove(40),
+        &["bad.csv:41", "the clock is uneven"],
+    );
+    changed(
+        &|lines| lines[7] = lines[7].replacen(',', ",x", 1),
+        &["bad.csv:8", "is not a number"],
+    );
     changed(&|lines| lines.truncate(5), &["at least 10"]);
     // Without --torque there is nothing to correct.
-    let output = calib(&["compensate", "HEAD", &file.display().to_string()], &solved.path("store"));
-    assert!(String::from_utf8_lossy(&output.stderr).contains("--torque"), "{output:?}");
+    let output = calib(
+        &["compensate", "HEAD", &file.display().to_string()],
+        &solved.path("store"),
+    );
+    assert!(
+        String::from_utf8_lossy(&output.stderr).contains("--torque"),
+        "{output:?}"
+    );
 }

@@ -1,6 +1,8 @@
 //! Torques of rigid arms by other engines: MuJoCo's and Pinocchio's inverse dynamics (tests/reference/mujoco_dynamics.py).
 
-use calib::dynamics::{DynamicArm, INERTIAL_NUMBERS, InertialTolerance, InverseDynamics, MotionRow};
+use calib::dynamics::{
+    DynamicArm, INERTIAL_NUMBERS, InertialTolerance, InverseDynamics, MotionRow,
+};
 use calib::twin::torque::rigid::{Body, JointState, Machine};
 use serde_json::Value;
 
@@ -9,7 +11,12 @@ fn numbers<const N: usize>(value: &Value) -> [f64; N] {
 }
 
 fn list(value: &Value) -> Vec<f64> {
-    value.as_array().expect("a list").iter().map(|x| x.as_f64().expect("a number")).collect()
+    value
+        .as_array()
+        .expect("a list")
+        .iter()
+        .map(|x| x.as_f64().expect("a number"))
+        .collect()
 }
 
 /// The ten numbers of a body about its joint's point, by the parallel-axis rule.
@@ -22,7 +29,8 @@ fn ten(body: &Body, point: [f64; 3]) -> [f64; INERTIAL_NUMBERS] {
         1..=3 => body.mass * r[k - 1],
         _ => {
             let (row, column) = entry[k - 4];
-            body.inertia[k - 4] + body.mass * (if row == column { square } else { 0.0 } - r[row] * r[column])
+            body.inertia[k - 4]
+                + body.mass * (if row == column { square } else { 0.0 } - r[row] * r[column])
         }
     })
 }
@@ -39,7 +47,11 @@ fn bare(axes: &[[f64; 3]], points: &[[f64; 3]], gravity: [f64; 3]) -> DynamicArm
         gravity: gravity.into(),
         ratio: vec![1.0; axes.len()],
         coupled: Vec::new(),
-        tolerance: InertialTolerance { mass_relative: 0.01, centre: 0.001, inertia_relative: 0.05 },
+        tolerance: InertialTolerance {
+            mass_relative: 0.01,
+            centre: 0.001,
+            inertia_relative: 0.05,
+        },
     }
 }
 
@@ -50,17 +62,33 @@ fn columns_of_the_regressor_are_those_of_mujoco_and_pinocchio() {
     let mut largest: [f64; 2] = [0.0; 2];
     for told in document["arms"].as_array().expect("arms") {
         let of = |name: &str| -> Vec<[f64; 3]> {
-            told["links"].as_array().expect("links").iter().map(|link| numbers(&link[name])).collect()
+            told["links"]
+                .as_array()
+                .expect("links")
+                .iter()
+                .map(|link| numbers(&link[name]))
+                .collect()
         };
         let arm = bare(&of("axis"), &of("point"), numbers(&told["gravity"]));
         let mut dynamics = InverseDynamics::new(&arm);
-        for (row, columns) in told["rows"].as_array().expect("rows").iter().zip(told["columns"].as_array().expect("columns")) {
+        for (row, columns) in told["rows"]
+            .as_array()
+            .expect("rows")
+            .iter()
+            .zip(told["columns"].as_array().expect("columns"))
+        {
             let [q, v, a] = ["q", "v", "a"].map(|name| list(&row[name]));
-            let motion = MotionRow { position: &q, velocity: &v, acceleration: &a };
+            let motion = MotionRow {
+                position: &q,
+                velocity: &v,
+                acceleration: &a,
+            };
             dynamics.regressor(motion, &arm.gravity, |joint, link, own| {
                 for (engine, off) in ["mujoco", "pinocchio"].into_iter().zip(&mut largest) {
                     for (number, value) in own.iter().enumerate() {
-                        let other = columns[engine][link][number][joint].as_f64().expect("a number");
+                        let other = columns[engine][link][number][joint]
+                            .as_f64()
+                            .expect("a number");
                         *off = off.max((value - other).abs());
                         compared += 1;
                     }
@@ -68,7 +96,10 @@ fn columns_of_the_regressor_are_those_of_mujoco_and_pinocchio() {
             });
         }
     }
-    println!("columns differ by {:.1e} Nm from MuJoCo's, by {:.1e} Nm from Pinocchio's", largest[0], largest[1]);
+    println!(
+        "columns differ by {:.1e} Nm from MuJoCo's, by {:.1e} Nm from Pinocchio's",
+        largest[0], largest[1]
+    );
     // Two motions of arms of 5, 6 and 7 joints: n (n + 1) / 2 pairs of joint and link, ten numbers, two engines.
     assert_eq!(compared, 2 * 2 * 10 * (15 + 21 + 28));
     assert!(largest.iter().all(|off| *off < 1e-9), "{largest:?}");
@@ -91,20 +122,47 @@ fn inverse_dynamics_of_estimator_and_twin_are_those_of_mujoco_and_pinocchio() {
             inertia: numbers(&link["inertia"]),
         };
         let bodies: Vec<Body> = links.iter().map(body).collect();
-        let theta: Vec<f64> = bodies.iter().zip(&points).flat_map(|(body, point)| ten(body, *point)).collect();
+        let theta: Vec<f64> = bodies
+            .iter()
+            .zip(&points)
+            .flat_map(|(body, point)| ten(body, *point))
+            .collect();
         let tool = points[points.len() - 1];
         let arm = bare(&axes, &points, gravity);
-        let machine = Machine { axes, points, tool, links: bodies, payload: None, gravity };
+        let machine = Machine {
+            axes,
+            points,
+            tool,
+            links: bodies,
+            payload: None,
+            gravity,
+        };
         let mut dynamics = InverseDynamics::new(&arm);
         for row in told["rows"].as_array().expect("rows") {
-            let [q, v, a, mujoco, pinocchio] = ["q", "v", "a", "mujoco", "pinocchio"].map(|name| list(&row[name]));
+            let [q, v, a, mujoco, pinocchio] =
+                ["q", "v", "a", "mujoco", "pinocchio"].map(|name| list(&row[name]));
             let mut estimator = vec![0.0; q.len()];
-            dynamics.torque(MotionRow { position: &q, velocity: &v, acceleration: &a }, &arm.gravity, &theta, &mut estimator);
+            dynamics.torque(
+                MotionRow {
+                    position: &q,
+                    velocity: &v,
+                    acceleration: &a,
+                },
+                &arm.gravity,
+                &theta,
+                &mut estimator,
+            );
             let twin = machine.torque(&JointState { q, v, a });
-            let largest = mujoco.iter().fold(1.0, |most: f64, torque| most.max(torque.abs()));
+            let largest = mujoco
+                .iter()
+                .fold(1.0, |most: f64, torque| most.max(torque.abs()));
             for own in [&estimator, &twin] {
                 for other in [&mujoco, &pinocchio] {
-                    let off = own.iter().zip(other).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                    let off = own
+                        .iter()
+                        .zip(other)
+                        .map(|(a, b)| (a - b).abs())
+                        .fold(0.0, f64::max);
                     assert!(off < 1e-9 * largest, "{off} Nm of {largest}");
                 }
             }

@@ -19,12 +19,26 @@ pub(super) struct NamedVariable {
 
 impl NamedVariable {
     /// The variable of a law at a joint; `None` if it has no name in formulas or never varies. `slides`: which joints do not turn.
-    pub fn of(variable: Variable, joint: usize, [low, high]: [f64; 2], slides: impl Fn(usize) -> bool) -> Option<Self> {
+    pub fn of(
+        variable: Variable,
+        joint: usize,
+        [low, high]: [f64; 2],
+        slides: impl Fn(usize) -> bool,
+    ) -> Option<Self> {
         let name = variable.in_formulas(joint)?;
         let is_prismatic = matches!(variable, Variable::Angle { joint } if slides(joint));
         let is_angle = matches!(variable, Variable::Angle { .. }) && !is_prismatic;
-        let range = if is_angle { [-TURN, TURN] } else { [rounded(low, f64::floor), rounded(high, f64::ceil)] };
-        (range[0] < range[1]).then_some(Self { name, is_angle, is_prismatic, range })
+        let range = if is_angle {
+            [-TURN, TURN]
+        } else {
+            [rounded(low, f64::floor), rounded(high, f64::ceil)]
+        };
+        (range[0] < range[1]).then_some(Self {
+            name,
+            is_angle,
+            is_prismatic,
+            range,
+        })
     }
 }
 
@@ -48,14 +62,24 @@ struct Sketch {
 }
 
 /// Declarations of all formulas at `place` of one variable, or of two; their coefficients are in `unit`.
-pub(super) fn declarations(place: &str, unit: &str, variables: &[NamedVariable]) -> Vec<EffectDeclaration> {
+pub(super) fn declarations(
+    place: &str,
+    unit: &str,
+    variables: &[NamedVariable],
+) -> Vec<EffectDeclaration> {
     let sketches = match variables {
         [one] => of_one(one),
         [first, second] => of_two(first, second),
         _ => Vec::new(),
     };
-    let of: Vec<String> = variables.iter().map(|variable| variable.name.replace(['(', ')', '.'], "_")).collect();
-    sketches.into_iter().map(|sketch| declaration((place, unit), &of.join("_and_"), sketch)).collect()
+    let of: Vec<String> = variables
+        .iter()
+        .map(|variable| variable.name.replace(['(', ')', '.'], "_"))
+        .collect();
+    sketches
+        .into_iter()
+        .map(|sketch| declaration((place, unit), &of.join("_and_"), sketch))
+        .collect()
 }
 
 fn declaration((place, unit): (&str, &str), of: &str, sketch: Sketch) -> EffectDeclaration {
@@ -63,9 +87,16 @@ fn declaration((place, unit): (&str, &str), of: &str, sketch: Sketch) -> EffectD
     EffectDeclaration {
         name: format!("{}_of_{of}", sketch.label),
         place: place.into(),
-        sentence: Some(format!("{{place}} errs by {{values}} times {formulas}{}", told(&sketch.shape))),
+        sentence: Some(format!(
+            "{{place}} errs by {{values}} times {formulas}{}",
+            told(&sketch.shape)
+        )),
         law: Laws(sketch.laws),
-        shape: sketch.shape.into_iter().map(|(name, range)| (name.to_string(), range)).collect::<BTreeMap<_, _>>(),
+        shape: sketch
+            .shape
+            .into_iter()
+            .map(|(name, range)| (name.to_string(), range))
+            .collect::<BTreeMap<_, _>>(),
         unit: Some(unit.into()),
         ..EffectDeclaration::default()
     }
@@ -73,8 +104,15 @@ fn declaration((place, unit): (&str, &str), of: &str, sketch: Sketch) -> EffectD
 
 /// The shape numbers, to be filled in.
 fn told(shape: &[(&str, ShapeRange)]) -> String {
-    let each: Vec<String> = shape.iter().map(|(name, _)| format!("{name} = {{{name}}}")).collect();
-    if each.is_empty() { String::new() } else { format!(", {}", each.join(", ")) }
+    let each: Vec<String> = shape
+        .iter()
+        .map(|(name, _)| format!("{name} = {{{name}}}"))
+        .collect();
+    if each.is_empty() {
+        String::new()
+    } else {
+        format!(", {}", each.join(", "))
+    }
 }
 
 fn span(variable: &NamedVariable) -> f64 {
@@ -84,29 +122,71 @@ fn span(variable: &NamedVariable) -> f64 {
 /// Where something happens.
 fn centre(variable: &NamedVariable) -> (&'static str, ShapeRange) {
     let [from, to] = variable.range;
-    let steps = if variable.is_angle { (span(variable) / *SPACING) as usize } else { 12 };
-    let start = (1..steps).map(|k| (1e3 * (from + span(variable) * k as f64 / steps as f64)).round() / 1e3).collect();
-    ("centre", ShapeRange { from, to, start: Starts(start) })
+    let steps = if variable.is_angle {
+        (span(variable) / *SPACING) as usize
+    } else {
+        12
+    };
+    let start = (1..steps)
+        .map(|k| (1e3 * (from + span(variable) * k as f64 / steps as f64)).round() / 1e3)
+        .collect();
+    (
+        "centre",
+        ShapeRange {
+            from,
+            to,
+            start: Starts(start),
+        },
+    )
 }
 
 /// Over how much.
 fn width(variable: &NamedVariable) -> (&'static str, ShapeRange) {
-    let shares: &[f64] = if variable.is_angle { &[0.02, 0.06] } else { &[0.05, 0.2] };
+    let shares: &[f64] = if variable.is_angle {
+        &[0.02, 0.06]
+    } else {
+        &[0.05, 0.2]
+    };
     let start = shares.iter().map(|share| share * span(variable)).collect();
-    ("width", ShapeRange { from: 0.004 * span(variable), to: span(variable), start: Starts(start) })
+    (
+        "width",
+        ShapeRange {
+            from: 0.004 * span(variable),
+            to: span(variable),
+            start: Starts(start),
+        },
+    )
 }
 
 /// How often.
 fn order(variable: &NamedVariable) -> (&'static str, ShapeRange) {
-    let unit = if variable.is_angle { 1.0 } else { std::f64::consts::TAU / span(variable) };
+    let unit = if variable.is_angle {
+        1.0
+    } else {
+        std::f64::consts::TAU / span(variable)
+    };
     let last = if variable.is_angle { *ORDER } else { *TURNS };
-    let start = (1..=4 * last as usize).map(|k| 0.25 * k as f64).filter(|k| *k >= 0.5 && *k < last).map(|k| k * unit);
-    ("order", ShapeRange { from: 0.4 * unit, to: last * unit, start: Starts(start.step_by(2).collect()) })
+    let start = (1..=4 * last as usize)
+        .map(|k| 0.25 * k as f64)
+        .filter(|k| *k >= 0.5 && *k < last)
+        .map(|k| k * unit);
+    (
+        "order",
+        ShapeRange {
+            from: 0.4 * unit,
+            to: last * unit,
+            start: Starts(start.step_by(2).collect()),
+        },
+    )
 }
 
 fn of_one(variable: &NamedVariable) -> Vec<Sketch> {
     let (v, [low, high]) = (&variable.name, variable.range);
-    let bare = |label, laws: &[String]| Sketch { label, laws: laws.to_vec(), shape: Vec::new() };
+    let bare = |label, laws: &[String]| Sketch {
+        label,
+        laws: laws.to_vec(),
+        shape: Vec::new(),
+    };
     let mut out = vec![
         bare("line", std::slice::from_ref(v)),
         bare("square", &[format!("{v}^2")]),
@@ -114,8 +194,16 @@ fn of_one(variable: &NamedVariable) -> Vec<Sketch> {
         bare("cubic", &[format!("{v}^2"), format!("{v}^3")]),
         bare("growing_square", &[format!("{v} * abs({v})")]),
         bare("root", &[format!("sqrt(abs({v}))")]),
-        Sketch { label: "kink", laws: vec![format!("abs({v} - centre)")], shape: vec![centre(variable)] },
-        Sketch { label: "step", laws: vec![format!("step({v} - centre)")], shape: vec![centre(variable)] },
+        Sketch {
+            label: "kink",
+            laws: vec![format!("abs({v} - centre)")],
+            shape: vec![centre(variable)],
+        },
+        Sketch {
+            label: "step",
+            laws: vec![format!("step({v} - centre)")],
+            shape: vec![centre(variable)],
+        },
         Sketch {
             label: "rise",
             laws: vec![format!("tanh(({v} - centre) / width)")],
@@ -136,8 +224,16 @@ fn of_one(variable: &NamedVariable) -> Vec<Sketch> {
         out.push(bare("side", &[format!("sign({v})")]));
     }
     if !variable.is_angle {
-        out.push(Sketch { label: "decay", laws: vec![format!("exp(-({v} - {low}) / width)")], shape: vec![width(variable)] });
-        out.push(Sketch { label: "rush", laws: vec![format!("exp(({v} - {high}) / width)")], shape: vec![width(variable)] });
+        out.push(Sketch {
+            label: "decay",
+            laws: vec![format!("exp(-({v} - {low}) / width)")],
+            shape: vec![width(variable)],
+        });
+        out.push(Sketch {
+            label: "rush",
+            laws: vec![format!("exp(({v} - {high}) / width)")],
+            shape: vec![width(variable)],
+        });
     }
     out
 }
@@ -145,7 +241,11 @@ fn of_one(variable: &NamedVariable) -> Vec<Sketch> {
 /// Functions of one factor: a label and their formulas.
 fn factors(variable: &NamedVariable) -> Vec<(&'static str, Vec<String>)> {
     let v = &variable.name;
-    let mut out = vec![("", vec![v.clone()]), ("square", vec![format!("{v}^2")]), ("size", vec![format!("abs({v})")])];
+    let mut out = vec![
+        ("", vec![v.clone()]),
+        ("square", vec![format!("{v}^2")]),
+        ("size", vec![format!("abs({v})")]),
+    ];
     if variable.range[0] < 0.0 && variable.range[1] > 0.0 {
         out.push(("side", vec![format!("sign({v})")]));
     }
@@ -157,7 +257,9 @@ fn factors(variable: &NamedVariable) -> Vec<(&'static str, Vec<String>)> {
 
 fn of_two(first: &NamedVariable, second: &NamedVariable) -> Vec<Sketch> {
     let products = |a: &[String], b: &[String]| -> Vec<String> {
-        a.iter().flat_map(|a| b.iter().map(move |b| format!("{a} * {b}"))).collect()
+        a.iter()
+            .flat_map(|a| b.iter().map(move |b| format!("{a} * {b}")))
+            .collect()
     };
     let mut out = Vec::new();
     for (label, a) in factors(first) {
@@ -173,17 +275,32 @@ fn of_two(first: &NamedVariable, second: &NamedVariable) -> Vec<Sketch> {
                 ("turn", "turn") => "product_of_turns",
                 _ => "mixed_product",
             };
-            out.push(Sketch { label, laws: products(&a, &b), shape: Vec::new() });
+            out.push(Sketch {
+                label,
+                laws: products(&a, &b),
+                shape: Vec::new(),
+            });
         }
     }
     for (one, other) in [(first, second), (second, first)] {
         let (v, w) = (&one.name, &other.name);
         if one.is_angle {
-            let laws = vec![format!("sin(order * {v}) * {w}"), format!("cos(order * {v}) * {w}")];
-            out.push(Sketch { label: "scaled_wave", laws, shape: vec![order(one)] });
+            let laws = vec![
+                format!("sin(order * {v}) * {w}"),
+                format!("cos(order * {v}) * {w}"),
+            ];
+            out.push(Sketch {
+                label: "scaled_wave",
+                laws,
+                shape: vec![order(one)],
+            });
         }
         let law = format!("exp(-(({v} - centre) / width)^2) * {w}");
-        out.push(Sketch { label: "scaled_bump", laws: vec![law], shape: vec![centre(one), width(one)] });
+        out.push(Sketch {
+            label: "scaled_bump",
+            laws: vec![law],
+            shape: vec![centre(one), width(one)],
+        });
     }
     out
 }
@@ -195,13 +312,20 @@ mod tests {
 
     #[test]
     fn every_formula_is_a_declaration_without_a_fault() {
-        let named = |variable, range| NamedVariable::of(variable, 2, range, |joint| joint == 0).expect("a name");
+        let named = |variable, range| {
+            NamedVariable::of(variable, 2, range, |joint| joint == 0).expect("a name")
+        };
         let angle = named(Variable::Angle { joint: 2 }, [-1.0, 1.0]);
         let load = named(Variable::Load { joint: 2 }, [-113.0, 87.0]);
         let other = named(Variable::Angle { joint: 4 }, [0.0, 1.0]);
         assert_eq!([&angle.name, &load.name, &other.name], ["q", "load", "q5"]);
         assert_eq!(load.range, [-200.0, 90.0]);
-        for variables in [vec![angle.clone()], vec![load.clone()], vec![angle.clone(), load], vec![angle, other]] {
+        for variables in [
+            vec![angle.clone()],
+            vec![load.clone()],
+            vec![angle.clone(), load],
+            vec![angle, other],
+        ] {
             let all = declarations("joint 3", "rad", &variables);
             assert!(all.len() > 10);
             for declaration in all {
@@ -214,14 +338,34 @@ mod tests {
 
     #[test]
     fn a_rail_errs_by_millimetres_over_its_own_travel() {
-        let rail = NamedVariable::of(Variable::Angle { joint: 0 }, 0, [0.012, 1.987], |joint| joint == 0).expect("a name");
-        assert_eq!((rail.name.as_str(), rail.is_angle, rail.is_prismatic, rail.range), ("q", false, true, [0.01, 2.0]));
+        let rail = NamedVariable::of(Variable::Angle { joint: 0 }, 0, [0.012, 1.987], |joint| {
+            joint == 0
+        })
+        .expect("a name");
+        assert_eq!(
+            (
+                rail.name.as_str(),
+                rail.is_angle,
+                rail.is_prismatic,
+                rail.range
+            ),
+            ("q", false, true, [0.01, 2.0])
+        );
         let all = declarations("joint 1", "mm", &[rail]);
-        assert!(all.iter().any(|declaration| declaration.name == "bump_of_q"));
+        assert!(
+            all.iter()
+                .any(|declaration| declaration.name == "bump_of_q")
+        );
         for declaration in all {
             assert_eq!(declaration.unit.as_deref(), Some("mm"));
-            let within = declaration.shape.get("centre").is_none_or(|centre| (centre.from, centre.to) == (0.01, 2.0));
-            assert!(within && DeclaredCause::of(&declaration).is_ok(), "{declaration:?}");
+            let within = declaration
+                .shape
+                .get("centre")
+                .is_none_or(|centre| (centre.from, centre.to) == (0.01, 2.0));
+            assert!(
+                within && DeclaredCause::of(&declaration).is_ok(),
+                "{declaration:?}"
+            );
         }
     }
 }

@@ -13,7 +13,10 @@ use super::regression::FormRegression;
 use super::round::{EstimatedCause, FitState, Fitter, RoundView};
 use super::types::{ClosedForm, Finding};
 use crate::criteria::closed_form::STARTS;
-use crate::effect::{DeclaredCause, DeclaredForm, Form, Motion, ParameterEstimate, Place, Survey, Variable, names, people};
+use crate::effect::{
+    DeclaredCause, DeclaredForm, Form, Motion, ParameterEstimate, Place, Survey, Variable, names,
+    people,
+};
 use front::{Priced, front};
 use grammar::{NamedVariable, declarations};
 use shape_sigma::shape_sigmas;
@@ -36,29 +39,65 @@ struct Candidate {
 impl FormulaSearch<'_, '_> {
     /// Formulas for findings, those of each cheapest first; none where it has a name, or is no function of one or two variables.
     pub fn of_all(&self, findings: &[Finding]) -> Vec<ClosedForm> {
-        findings.iter().enumerate().filter_map(|(at, finding)| self.forms(at, finding)).flatten().collect()
+        findings
+            .iter()
+            .enumerate()
+            .filter_map(|(at, finding)| self.forms(at, finding))
+            .flatten()
+            .collect()
     }
 
     fn forms(&self, at: usize, finding: &Finding) -> Option<Vec<ClosedForm>> {
         let nameless = |form: &Form| form.cause().is_nameless();
         // What it has elsewhere are details of the model.
-        let own: Vec<&Form> = finding.forms.iter().filter(|form| form.place() == finding.place).collect();
-        if finding.effect != names::UNKNOWN || own.is_empty() || !own.iter().all(|form| nameless(form)) {
+        let own: Vec<&Form> = finding
+            .forms
+            .iter()
+            .filter(|form| form.place() == finding.place)
+            .collect();
+        if finding.effect != names::UNKNOWN
+            || own.is_empty()
+            || !own.iter().all(|form| nameless(form))
+        {
             return None;
         }
         let causes = &self.state.causes;
-        let members: Vec<usize> = (0..causes.len()).filter(|i| own.contains(&&causes[*i].form)).collect();
+        let members: Vec<usize> = (0..causes.len())
+            .filter(|i| own.contains(&&causes[*i].form))
+            .collect();
         let (place, variables) = self.variables(&own)?;
-        let rest: Vec<&Form> = (0..causes.len()).filter(|i| !members.contains(i)).map(|i| &causes[i].form).collect();
-        let (problem, jacobian) = (&self.view.problem, self.view.problem.jacobian(self.fitter.free()));
-        let given = FormRegression::new(problem, &jacobian, &rest, &self.view.without_causes(self.state));
-        let Place::Joint(joint) = finding.place else { return None };
-        let unit = if self.survey.robot.is_revolute(joint) { "rad" } else { "mm" };
+        let rest: Vec<&Form> = (0..causes.len())
+            .filter(|i| !members.contains(i))
+            .map(|i| &causes[i].form)
+            .collect();
+        let (problem, jacobian) = (
+            &self.view.problem,
+            self.view.problem.jacobian(self.fitter.free()),
+        );
+        let given = FormRegression::new(
+            problem,
+            &jacobian,
+            &rest,
+            &self.view.without_causes(self.state),
+        );
+        let Place::Joint(joint) = finding.place else {
+            return None;
+        };
+        let unit = if self.survey.robot.is_revolute(joint) {
+            "rad"
+        } else {
+            "mm"
+        };
         let candidates: Vec<Candidate> = declarations(&place, unit, &variables)
             .iter()
-            .filter_map(|declaration| self.candidate(DeclaredCause::of(declaration).ok()?, finding.place, &given))
+            .filter_map(|declaration| {
+                self.candidate(DeclaredCause::of(declaration).ok()?, finding.place, &given)
+            })
             .collect();
-        let rivals: Vec<EstimatedCause> = candidates.iter().map(|candidate| self.at_zero(&candidate.form)).collect();
+        let rivals: Vec<EstimatedCause> = candidates
+            .iter()
+            .map(|candidate| self.at_zero(&candidate.form))
+            .collect();
         let alternatives = Alternatives::of(self.state, self.fitter, &rivals)?;
         let near = alternatives.near()?;
         // Where nothing near the model does without them, all that is known is that it is worse than any formula.
@@ -66,7 +105,9 @@ impl FormulaSearch<'_, '_> {
         let curve = FoldErrors::of(self.state, self.fitter)?.rms();
         let priced = |(k, candidate): (usize, &Candidate)| Priced {
             price: candidate.price,
-            error: near.errors(&members, Some(k)).map_or(f64::NAN, |errors| errors.rms()),
+            error: near
+                .errors(&members, Some(k))
+                .map_or(f64::NAN, |errors| errors.rms()),
         };
         let priced: Vec<Priced> = candidates.iter().enumerate().map(priced).collect();
         let (shown, chosen) = front(&priced, [without.unwrap_or(f64::INFINITY), curve])?;
@@ -78,7 +119,12 @@ impl FormulaSearch<'_, '_> {
             curve,
             without,
             chosen: Some(position) == chosen,
-            numbers: self.numbers(&candidates[*k], &variables, &given, near.coefficients(&members, *k)),
+            numbers: self.numbers(
+                &candidates[*k],
+                &variables,
+                &given,
+                near.coefficients(&members, *k),
+            ),
         };
         Some(shown.iter().enumerate().map(one).collect())
     }
@@ -89,7 +135,9 @@ impl FormulaSearch<'_, '_> {
         let mut variables: Vec<Variable> = Vec::new();
         for form in own {
             let term = form.term()?;
-            let Motion::Joint { joint: own } = term.motion() else { return None };
+            let Motion::Joint { joint: own } = term.motion() else {
+                return None;
+            };
             joint = Some(own);
             for variable in term.law().variables() {
                 if !variables.contains(&variable) {
@@ -101,8 +149,13 @@ impl FormulaSearch<'_, '_> {
         let slides = |joint: usize| !self.survey.robot.is_revolute(joint);
         let named = |of: &Variable| NamedVariable::of(*of, joint, self.range(*of)?, slides);
         let named: Vec<NamedVariable> = variables.iter().map(named).collect::<Option<_>>()?;
-        let anywhere = self.survey.robot.is_revolute(joint) && variables.iter().all(|of| of.is_of(joint));
-        let place = if anywhere { "joint".into() } else { Place::Joint(joint).to_string() };
+        let anywhere =
+            self.survey.robot.is_revolute(joint) && variables.iter().all(|of| of.is_of(joint));
+        let place = if anywhere {
+            "joint".into()
+        } else {
+            Place::Joint(joint).to_string()
+        };
         (1..=2).contains(&named.len()).then_some((place, named))
     }
 
@@ -123,28 +176,52 @@ impl FormulaSearch<'_, '_> {
             })
         };
         let values: Option<Vec<f64>> = survey.rows.iter().enumerate().map(value).collect();
-        values?.into_iter().fold(None, |range: Option<[f64; 2]>, value| {
-            Some(range.map_or([value; 2], |[low, high]| [low.min(value), high.max(value)]))
-        })
+        values?
+            .into_iter()
+            .fold(None, |range: Option<[f64; 2]>, value| {
+                Some(range.map_or([value; 2], |[low, high]| [low.min(value), high.max(value)]))
+            })
     }
 
     /// A declared law at the place of the finding, its shape numbers where they fit best.
-    fn candidate(&self, cause: &'static DeclaredCause, place: Place, given: &FormRegression) -> Option<Candidate> {
-        let forms = DeclaredForm::hypotheses(cause, self.survey).into_iter().map(|hypothesis| hypothesis.form);
+    fn candidate(
+        &self,
+        cause: &'static DeclaredCause,
+        place: Place,
+        given: &FormRegression,
+    ) -> Option<Candidate> {
+        let forms = DeclaredForm::hypotheses(cause, self.survey)
+            .into_iter()
+            .map(|hypothesis| hypothesis.form);
         let forms: Vec<Form> = forms.filter(|form| form.place() == place).collect();
         let gains = given.gains(&forms);
         let mut starts: Vec<(f64, Form)> = gains.into_iter().zip(forms).collect();
         starts.sort_by(|a, b| b.0.total_cmp(&a.0));
         // The best start need not lead to the best shape.
-        let ends: Vec<Form> = starts.into_iter().take(*STARTS).map(|(_, form)| given.refined(form, self.survey)).collect();
+        let ends: Vec<Form> = starts
+            .into_iter()
+            .take(*STARTS)
+            .map(|(_, form)| given.refined(form, self.survey))
+            .collect();
         let gains = given.gains(&ends);
-        let (_, form) = gains.into_iter().zip(ends).max_by(|a, b| a.0.total_cmp(&b.0))?;
-        Some(Candidate { cause, form, price: cause.price() })
+        let (_, form) = gains
+            .into_iter()
+            .zip(ends)
+            .max_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some(Candidate {
+            cause,
+            form,
+            price: cause.price(),
+        })
     }
 
     fn at_zero(&self, form: &Form) -> EstimatedCause {
         let count = form.parameters(&self.state.model.robot).len();
-        EstimatedCause { form: form.clone(), coefficients: vec![0.0; count], priors: Vec::new() }
+        EstimatedCause {
+            form: form.clone(),
+            coefficients: vec![0.0; count],
+            priors: Vec::new(),
+        }
     }
 
     /// Shape numbers, then coefficients (SI, with their standard deviations) as the whole model has them with the formula in place of the
@@ -162,14 +239,28 @@ impl FormulaSearch<'_, '_> {
         let mut out: Vec<ParameterEstimate> = shape
             .map(|((name, value), sigma)| {
                 let (unit, scale) = unit(&name, variables);
-                ParameterEstimate { unit, name, form: 0, value: scale * value, sigma: sigma.map(|sigma| scale * sigma) }
+                ParameterEstimate {
+                    unit,
+                    name,
+                    form: 0,
+                    value: scale * value,
+                    sigma: sigma.map(|sigma| scale * sigma),
+                }
             })
             .collect();
         let specs = form.parameters(&self.state.model.robot);
-        for ((spec, (value, sigma)), number) in specs.iter().zip(coefficients.unwrap_or_default()).zip(1..) {
+        for ((spec, (value, sigma)), number) in
+            specs.iter().zip(coefficients.unwrap_or_default()).zip(1..)
+        {
             let (unit, symbol) = people(spec.unit);
             let (value, sigma) = (unit.from_si(value), Some(unit.from_si(sigma)));
-            out.push(ParameterEstimate { name: format!("c{number}"), form: 0, value, unit: symbol, sigma });
+            out.push(ParameterEstimate {
+                name: format!("c{number}"),
+                form: 0,
+                value,
+                unit: symbol,
+                sigma,
+            });
         }
         out
     }

@@ -9,7 +9,9 @@ const STEP: f64 = 1e-3;
 
 /// One standard deviation of each shape number of a form that fits best; none where what is left has no minimum there.
 pub(super) fn shape_sigmas(form: &Form, given: &FormRegression) -> Vec<Option<f64>> {
-    let Some(declared) = form.declared() else { return Vec::new() };
+    let Some(declared) = form.declared() else {
+        return Vec::new();
+    };
     let steps = declared.shape_steps(STEP);
     let count = steps.len();
     let unknown = vec![None; count];
@@ -18,12 +20,19 @@ pub(super) fn shape_sigmas(form: &Form, given: &FormRegression) -> Vec<Option<f6
     }
     let at = |moves: &[(usize, f64)]| {
         let mut shift = vec![0.0; count];
-        moves.iter().for_each(|(k, times)| shift[*k] += times * steps[*k]);
+        moves
+            .iter()
+            .for_each(|(k, times)| shift[*k] += times * steps[*k]);
         declared.shifted(&shift)
     };
-    let pairs: Vec<(usize, usize)> = (0..count).flat_map(|a| (0..=a).map(move |b| (a, b))).collect();
+    let pairs: Vec<(usize, usize)> = (0..count)
+        .flat_map(|a| (0..=a).map(move |b| (a, b)))
+        .collect();
     let corners = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)];
-    let forms: Vec<Form> = pairs.iter().flat_map(|(a, b)| corners.map(|(i, j)| at(&[(*a, i), (*b, j)]))).collect();
+    let forms: Vec<Form> = pairs
+        .iter()
+        .flat_map(|(a, b)| corners.map(|(i, j)| at(&[(*a, i), (*b, j)])))
+        .collect();
     let gains = given.gains(&forms);
     // Squares of whitened residuals fall by the gain: half of their second derivatives is the information.
     let mut information = DMatrix::zeros(count, count);
@@ -32,6 +41,14 @@ pub(super) fn shape_sigmas(form: &Form, given: &FormRegression) -> Vec<Option<f6
         information[(a, b)] = 0.5 * second;
         information[(b, a)] = 0.5 * second;
     }
-    let Some(covariance) = information.try_inverse() else { return unknown };
-    (0..count).map(|k| Some(covariance[(k, k)]).filter(|variance| *variance > 0.0).map(f64::sqrt)).collect()
+    let Some(covariance) = information.try_inverse() else {
+        return unknown;
+    };
+    (0..count)
+        .map(|k| {
+            Some(covariance[(k, k)])
+                .filter(|variance| *variance > 0.0)
+                .map(f64::sqrt)
+        })
+        .collect()
 }

@@ -20,21 +20,48 @@ pub(crate) struct Alternatives<'a> {
 impl<'a> Alternatives<'a> {
     /// `None` where the poses are too few for folds.
     pub fn of(state: &'a FitState, fitter: &'a Fitter, rivals: &[EstimatedCause]) -> Option<Self> {
-        let at_zero =
-            |cause: &EstimatedCause| EstimatedCause { coefficients: vec![0.0; cause.coefficients.len()], ..cause.clone() };
-        let causes: Vec<EstimatedCause> = state.causes.iter().cloned().chain(rivals.iter().map(at_zero)).collect();
+        let at_zero = |cause: &EstimatedCause| EstimatedCause {
+            coefficients: vec![0.0; cause.coefficients.len()],
+            ..cause.clone()
+        };
+        let causes: Vec<EstimatedCause> = state
+            .causes
+            .iter()
+            .cloned()
+            .chain(rivals.iter().map(at_zero))
+            .collect();
         let (model, ranges) = with_causes(&state.model, &causes);
-        Some(Self { state, fitter, model, ranges, folds: folds(state, fitter)? })
+        Some(Self {
+            state,
+            fitter,
+            model,
+            ranges,
+            folds: folds(state, fitter)?,
+        })
     }
 
     /// The fits around the state; none where bounds are in the way.
     pub fn near(&self) -> Option<NearAlternatives<'_>> {
-        let Self { state, fitter, model, ranges, folds } = self;
-        let session = Session { model, ..state.session(fitter) };
+        let Self {
+            state,
+            fitter,
+            model,
+            ranges,
+            folds,
+        } = self;
+        let session = Session {
+            model,
+            ..state.session(fitter)
+        };
         let mut columns = state.fitted.free();
         columns.extend(ranges[state.causes.len()..].iter().cloned().flatten());
         let nearby = NearbyFits::of(&session, folds, &columns, fitter.scale)?;
-        Some(NearAlternatives { of: self, session, columns, nearby })
+        Some(NearAlternatives {
+            of: self,
+            session,
+            columns,
+            nearby,
+        })
     }
 }
 
@@ -49,18 +76,36 @@ pub(crate) struct NearAlternatives<'n> {
 impl NearAlternatives<'_> {
     /// Steps of what is left out: some causes (by their positions), and all rivals but one (by its own).
     fn steps(&self, out: &[usize], rival: Option<usize>) -> Vec<Option<f64>> {
-        let Alternatives { state, model, ranges, .. } = self.of;
+        let Alternatives {
+            state,
+            model,
+            ranges,
+            ..
+        } = self.of;
         let causes = state.causes.len();
         let left_out = |k: &usize| out.iter().any(|i| ranges[*i].contains(k));
-        let other = |k: &usize| (causes..ranges.len()).any(|i| ranges[i].contains(k) && rival != Some(i - causes));
-        self.columns.iter().map(|k| (left_out(k) || other(k)).then_some(-model.x[*k])).collect()
+        let other = |k: &usize| {
+            (causes..ranges.len()).any(|i| ranges[i].contains(k) && rival != Some(i - causes))
+        };
+        self.columns
+            .iter()
+            .map(|k| (left_out(k) || other(k)).then_some(-model.x[*k]))
+            .collect()
     }
 
     /// The errors of folds without some causes (by their positions), and with a rival (by its own) or none. Nothing where that is not near
     /// the state.
     pub fn errors(&self, out: &[usize], rival: Option<usize>) -> Option<FoldErrors> {
-        let errors: Option<Vec<Vec<f64>>> = self.nearby.with(&self.steps(out, rival))?.into_iter().collect();
-        Some(FoldErrors::gathered(&self.session, &self.of.folds, &errors?))
+        let errors: Option<Vec<Vec<f64>>> = self
+            .nearby
+            .with(&self.steps(out, rival))?
+            .into_iter()
+            .collect();
+        Some(FoldErrors::gathered(
+            &self.session,
+            &self.of.folds,
+            &errors?,
+        ))
     }
 
     /// The coefficients of a rival (by its position) in the place of some causes, with their standard deviations, SI.
@@ -69,6 +114,11 @@ impl NearAlternatives<'_> {
         let own: Vec<usize> = ranges[state.causes.len() + rival].clone().collect();
         let found = self.nearby.estimated(&self.steps(out, Some(rival)), &own)?;
         let scale = state.fitted.noise_scale;
-        Some(found.into_iter().map(|(value, sigma)| (value, sigma * scale)).collect())
+        Some(
+            found
+                .into_iter()
+                .map(|(value, sigma)| (value, sigma * scale))
+                .collect(),
+        )
     }
 }

@@ -12,7 +12,11 @@ pub(super) fn folds(now: &FitState, fitter: &Fitter) -> Option<Vec<Vec<usize>>> 
 
 /// Where noise is correlated, a row is known by its neighbours in time: whole stretches are left out.
 fn kind(fitter: &Fitter) -> FoldKind {
-    if fitter.correlated.is_some() { FoldKind::Blocks } else { FoldKind::Random(fitter.question.seed) }
+    if fitter.correlated.is_some() {
+        FoldKind::Blocks
+    } else {
+        FoldKind::Random(fitter.question.seed)
+    }
 }
 
 /// Errors of the rows that were fitted.
@@ -26,13 +30,22 @@ impl FoldErrors {
     pub fn of(now: &FitState, fitter: &Fitter) -> Option<Self> {
         let session = now.session(fitter);
         let folds = folds(now, fitter)?;
-        Some(Self::gathered(&session, &folds, &session.without_each(&folds, fitter.scale)))
+        Some(Self::gathered(
+            &session,
+            &folds,
+            &session.without_each(&folds, fitter.scale),
+        ))
     }
 
     /// From the errors of each fold's rows.
     pub fn gathered(session: &Session, folds: &[Vec<usize>], errors: &[Vec<f64>]) -> Self {
         let errors = gather(session.data, session.rows, folds, errors);
-        let squares = session.rows.iter().zip(errors).map(|(row, error)| (*row, error * error)).collect();
+        let squares = session
+            .rows
+            .iter()
+            .zip(errors)
+            .map(|(row, error)| (*row, error * error))
+            .collect();
         Self { squares }
     }
 

@@ -28,11 +28,26 @@ pub(crate) struct CorrelationChange {
 pub(super) fn follow_a_path(data: &Measurements, rows: &[usize]) -> bool {
     let mut measured: Vec<usize> = rows.to_vec();
     measured.sort_by_key(|row| data.rank_in_time(*row));
-    let apart = |a: usize, b: usize| data.q(a).iter().zip(data.q(b)).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
-    let mut steps: Vec<f64> = measured.windows(2).map(|pair| apart(pair[0], pair[1])).filter(|step| *step > 0.0).collect();
+    let apart = |a: usize, b: usize| {
+        data.q(a)
+            .iter()
+            .zip(data.q(b))
+            .map(|(a, b)| (a - b).powi(2))
+            .sum::<f64>()
+            .sqrt()
+    };
+    let mut steps: Vec<f64> = measured
+        .windows(2)
+        .map(|pair| apart(pair[0], pair[1]))
+        .filter(|step| *step > 0.0)
+        .collect();
     // Rows half of the recording apart stand for any two.
     let half = measured.len() / 2;
-    let mut any: Vec<f64> = measured.iter().zip(&measured[half..]).map(|(a, b)| apart(*a, *b)).collect();
+    let mut any: Vec<f64> = measured
+        .iter()
+        .zip(&measured[half..])
+        .map(|(a, b)| apart(*a, *b))
+        .collect();
     match (nearest(&mut steps, 0.5), nearest(&mut any, 0.5)) {
         (Some(step), Some(any)) => step < *NEAR * any,
         _ => false,

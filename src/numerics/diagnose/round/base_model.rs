@@ -15,13 +15,27 @@ pub const BASE: [&str; 6] = [
 ];
 
 /// The base model at its start, less the corrections that the user excludes.
-pub(super) fn base_model(robot: &RobotModel, data: &Measurements, rows: &[usize], without: &[String]) -> Model {
-    let setting = EffectContext { base: align(robot, data, rows), load: Load::GravityTorque };
+pub(super) fn base_model(
+    robot: &RobotModel,
+    data: &Measurements,
+    rows: &[usize],
+    without: &[String],
+) -> Model {
+    let setting = EffectContext {
+        base: align(robot, data, rows),
+        load: Load::GravityTorque,
+    };
     let effects: Vec<Box<dyn Effect>> = identified()
-        .filter(|cause| BASE.contains(&cause.name()) || (cause.name() == names::ANCHOR && !robot.setup().anchors.is_empty()))
+        .filter(|cause| {
+            BASE.contains(&cause.name())
+                || (cause.name() == names::ANCHOR && !robot.setup().anchors.is_empty())
+        })
         .filter(|cause| !without.iter().any(|name| name == cause.name()))
         .filter_map(|cause| cause.arm_effect(&setting))
         .filter(|effect| effect.missing(robot, data).is_none())
         .collect();
-    Model::nominal(robot.clone(), EffectStack::new(robot, setting.base, effects))
+    Model::nominal(
+        robot.clone(),
+        EffectStack::new(robot, setting.base, effects),
+    )
 }

@@ -37,19 +37,42 @@ fn held(state: &FitState) -> Option<Vec<EstimatedCause>> {
         }
         let own: Vec<usize> = family.iter().map(|k| range.start + k).collect();
         let specs = cause.form.parameters(&state.model.robot);
-        let free: Vec<usize> = own.iter().copied().filter(|k| covariance.parameters().contains(k)).collect();
-        let Some(size) = size(&state.model, covariance, &free, specs[family[0]].prior_sigma) else { continue };
+        let free: Vec<usize> = own
+            .iter()
+            .copied()
+            .filter(|k| covariance.parameters().contains(k))
+            .collect();
+        let Some(size) = size(
+            &state.model,
+            covariance,
+            &free,
+            specs[family[0]].prior_sigma,
+        ) else {
+            continue;
+        };
         // Bodies farther out are lighter and shorter: what rows hardly show of them is no larger than what they show of the arm's lines.
-        let others = range.clone().filter(|k| !own.contains(k) && is_shown(state, *k)).map(|k| state.model.x[k].abs());
+        let others = range
+            .clone()
+            .filter(|k| !own.contains(k) && is_shown(state, *k))
+            .map(|k| state.model.x[k].abs());
         let most = others.fold(0.0, f64::max);
-        let size = if most > 0.0 { size.clamp(*BESIDE * most, most) } else { size };
+        let size = if most > 0.0 {
+            size.clamp(*BESIDE * most, most)
+        } else {
+            size
+        };
         any = true;
         let sigma = |k: usize| match specs[k].prior_sigma {
             _ if family.contains(&k) => size,
             plausible if most > 0.0 && !is_shown(state, range.start + k) => plausible.min(most),
             plausible => plausible,
         };
-        cause.priors = (0..specs.len()).map(|k| Prior { mean: 0.0, sigma: sigma(k) }).collect();
+        cause.priors = (0..specs.len())
+            .map(|k| Prior {
+                mean: 0.0,
+                sigma: sigma(k),
+            })
+            .collect();
     }
     any.then_some(causes)
 }
@@ -67,23 +90,46 @@ fn is_shown(state: &FitState, k: usize) -> bool {
 fn size(model: &Model, covariance: &Covariance, own: &[usize], plausible: f64) -> Option<f64> {
     let block = covariance.block(own)?;
     let values = DVector::from_iterator(own.len(), own.iter().map(|k| model.x[*k]));
-    let prior = |k: usize| model.known(k).prior.map_or(0.0, |prior| prior.sigma.powi(-2));
+    let prior = |k: usize| {
+        model
+            .known(k)
+            .prior
+            .map_or(0.0, |prior| prior.sigma.powi(-2))
+    };
     let posterior = block.try_inverse()?;
     let about = &posterior * values;
-    let data = posterior - DMatrix::from_diagonal(&DVector::from_iterator(own.len(), own.iter().map(|k| prior(*k))));
-    let SymmetricEigen { eigenvectors, eigenvalues } = data.symmetric_eigen();
+    let data = posterior
+        - DMatrix::from_diagonal(&DVector::from_iterator(
+            own.len(),
+            own.iter().map(|k| prior(*k)),
+        ));
+    let SymmetricEigen {
+        eigenvectors,
+        eigenvalues,
+    } = data.symmetric_eigen();
     let along = eigenvectors.transpose() * about;
     let evidence = |size: f64| -> f64 {
         let each = eigenvalues.iter().zip(along.iter());
-        each.map(|(p, b)| (p.max(0.0), b)).map(|(p, b)| b * b / (p + size.powi(-2)) - (size * size * p).ln_1p()).sum()
+        each.map(|(p, b)| (p.max(0.0), b))
+            .map(|(p, b)| b * b / (p + size.powi(-2)) - (size * size * p).ln_1p())
+            .sum()
     };
     let sizes = (0..=STEPS).map(|step| plausible * (-FOLDS * step as f64 / STEPS as f64).exp());
     let all: Vec<(f64, f64)> = sizes.map(|size| (size, evidence(size))).collect();
-    let best = all.iter().map(|(_, evidence)| *evidence).fold(f64::NEG_INFINITY, f64::max);
+    let best = all
+        .iter()
+        .map(|(_, evidence)| *evidence)
+        .fold(f64::NEG_INFINITY, f64::max);
     // From the plausible size downwards: the loosest that rows do not speak against.
-    let loosest = all.into_iter().find(|(_, evidence)| *evidence >= best - *AGAINST).map(|(size, _)| size)?;
+    let loosest = all
+        .into_iter()
+        .find(|(_, evidence)| *evidence >= best - *AGAINST)
+        .map(|(size, _)| size)?;
     // What rows clearly show is as large as it is.
-    let shown =
-        eigenvalues.iter().zip(along.iter()).filter(|(p, b)| **p > 0.0 && **b * **b > *SHOWN * **p).map(|(p, b)| (b / p).abs());
+    let shown = eigenvalues
+        .iter()
+        .zip(along.iter())
+        .filter(|(p, b)| **p > 0.0 && **b * **b > *SHOWN * **p)
+        .map(|(p, b)| (b / p).abs());
     Some(shown.fold(loosest, f64::max).min(plausible))
 }

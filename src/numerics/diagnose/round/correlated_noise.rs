@@ -19,16 +19,30 @@ use faer::{Accum, Mat, MatRef, Par, Side};
 use rayon::prelude::*;
 
 /// What noise does from row to row, if the settled model shows it to be otherwise than believed.
-pub(crate) fn correlation_left_by(settled: &FitState, answer: &Answer, fitter: &Fitter) -> Option<CorrelationChange> {
-    let change = |noise| CorrelationChange { noise, keeps_causes: false };
+pub(crate) fn correlation_left_by(
+    settled: &FitState,
+    answer: &Answer,
+    fitter: &Fitter,
+) -> Option<CorrelationChange> {
+    let change = |noise| CorrelationChange {
+        noise,
+        keeps_causes: false,
+    };
     if !fitter.may_estimate_correlation(settled) {
         return None;
     }
-    let rows = thinned(&fitter.data, &first_of_pose(&fitter.data, &settled.screening.kept));
+    let rows = thinned(
+        &fitter.data,
+        &first_of_pose(&fitter.data, &settled.screening.kept),
+    );
     let problem = WhitenedProblem::new(&settled.model, &fitter.data, rows);
     // Rows that measured different numbers have no one correlation from each to the next.
     let width = problem.width()?;
-    let slow: Vec<bool> = settled.causes.iter().map(|cause| follows_time(&cause.form)).collect();
+    let slow: Vec<bool> = settled
+        .causes
+        .iter()
+        .map(|cause| follows_time(&cause.form))
+        .collect();
     let price = price_of(&answer.found, &|i| slow[i]);
     let with_all = Regression::of((&problem, width), settled, fitter, &vec![true; slow.len()]);
     let believed = with_all.cost(fitter.correlated) + price;
@@ -36,16 +50,25 @@ pub(crate) fn correlation_left_by(settled: &FitState, answer: &Answer, fitter: &
     if fitter.causes_of_the_arm_first() {
         // What noise alone explains as well has no other name.
         let price = price_of(&answer.found, &|_| true);
-        let (alone, of_noise) = Regression::of((&problem, width), settled, fitter, &vec![false; slow.len()]).likeliest();
+        let (alone, of_noise) =
+            Regression::of((&problem, width), settled, fitter, &vec![false; slow.len()])
+                .likeliest();
         let keeps_causes = best + price < alone - *PLAIN;
-        return Some(CorrelationChange { noise: if keeps_causes { noise } else { of_noise }, keeps_causes });
+        return Some(CorrelationChange {
+            noise: if keeps_causes { noise } else { of_noise },
+            keeps_causes,
+        });
     }
     let best = best + price;
     if slow.contains(&true) {
         let kept: Vec<bool> = slow.iter().map(|slow| !slow).collect();
         let (cost, other) = Regression::of((&problem, width), settled, fitter, &kept).likeliest();
         // Causes that were not found yet look like such noise, too.
-        let clearer = if answer.nothing_last > *SETTLED { *CLEARER } else { 10.0 * *CLEARER };
+        let clearer = if answer.nothing_last > *SETTLED {
+            *CLEARER
+        } else {
+            10.0 * *CLEARER
+        };
         if cost + clearer < best.min(believed) && other.is_some() {
             return (other != fitter.correlated).then(|| change(other));
         }
@@ -56,8 +79,12 @@ pub(crate) fn correlation_left_by(settled: &FitState, answer: &Answer, fitter: &
 /// Rows without those that measured a target again before the arm left the pose: what the model leaves there they share, whatever the noise does.
 fn first_of_pose(data: &Measurements, rows: &[usize]) -> Vec<usize> {
     let again = |row: usize| {
-        let before = (0..data.rank_in_time(row)).rev().map(|place| data.at_place(place));
-        before.take_while(|other| data.near_pose(*other, row)).any(|other| data.target(other) == data.target(row))
+        let before = (0..data.rank_in_time(row))
+            .rev()
+            .map(|place| data.at_place(place));
+        before
+            .take_while(|other| data.near_pose(*other, row))
+            .any(|other| data.target(other) == data.target(row))
     };
     rows.iter().copied().filter(|row| !again(*row)).collect()
 }
@@ -68,7 +95,9 @@ fn follows_time(form: &Form) -> bool {
 
 /// What the freedom of some findings costs them, -2 ln of evidence.
 fn price_of(found: &[FoundCell], of: &dyn Fn(usize) -> bool) -> f64 {
-    let of = found.iter().filter(|found| found.members.iter().any(|i| of(*i)));
+    let of = found
+        .iter()
+        .filter(|found| found.members.iter().any(|i| of(*i)));
     of.map(|found| found.price).sum()
 }
 
@@ -86,11 +115,18 @@ struct Regression<'a> {
 
 impl<'a> Regression<'a> {
     /// On the base model and the `kept` causes.
-    fn of((problem, width): (&'a WhitenedProblem, usize), settled: &FitState, fitter: &Fitter, kept: &[bool]) -> Self {
+    fn of(
+        (problem, width): (&'a WhitenedProblem, usize),
+        settled: &FitState,
+        fitter: &Fitter,
+        kept: &[bool],
+    ) -> Self {
         let rows = problem.residual_rows();
         let mut left = problem.of_readings().to_vec();
         let base = problem.jacobian(fitter.free());
-        let mut columns: Vec<f64> = (0..base.ncols()).flat_map(|j| base.col_as_slice(j).to_vec()).collect();
+        let mut columns: Vec<f64> = (0..base.ncols())
+            .flat_map(|j| base.col_as_slice(j).to_vec())
+            .collect();
         for (cause, kept) in settled.causes.iter().zip(kept) {
             let own = problem.columns(&cause.form);
             if *kept {
@@ -98,15 +134,26 @@ impl<'a> Regression<'a> {
                 continue;
             }
             for (column, coefficient) in own.chunks(rows).zip(&cause.coefficients) {
-                left.iter_mut().zip(column).for_each(|(value, c)| *value += c * coefficient);
+                left.iter_mut()
+                    .zip(column)
+                    .for_each(|(value, c)| *value += c * coefficient);
             }
         }
-        let design = orthonormal(&Mat::from_fn(rows, columns.len() / rows, |i, j| columns[j * rows + i]));
+        let design = orthonormal(&Mat::from_fn(rows, columns.len() / rows, |i, j| {
+            columns[j * rows + i]
+        }));
         project(design.as_ref(), &mut left);
         AutocorrelatedNoise::without_gross(&mut left);
-        let mut columns: Vec<f64> = (0..design.ncols()).flat_map(|j| design.col_as_slice(j).to_vec()).collect();
+        let mut columns: Vec<f64> = (0..design.ncols())
+            .flat_map(|j| design.col_as_slice(j).to_vec())
+            .collect();
         columns.extend(left);
-        Self { rows: &problem.rows, width, columns, count: design.ncols() }
+        Self {
+            rows: &problem.rows,
+            width,
+            columns,
+            count: design.ncols(),
+        }
     }
 
     /// -2 ln of the restricted likelihood, its scale estimated, up to a constant of the points; infinite where they leave nothing.
@@ -115,17 +162,35 @@ impl<'a> Regression<'a> {
         let rows = self.columns.len() / (self.count + 1);
         let innovations = believed.filter(self.rows, self.width);
         let mut columns = self.columns.clone();
-        columns.chunks_mut(rows).for_each(|column| innovations.apply(column));
+        columns
+            .chunks_mut(rows)
+            .for_each(|column| innovations.apply(column));
         let columns = MatRef::from_column_major_slice(&columns, rows, self.count + 1);
         let mut gram = Mat::zeros(self.count + 1, self.count + 1);
         let (lower, whole) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
-        matmul(gram.as_mut(), lower, Accum::Replace, columns.transpose(), whole, columns, whole, 1.0, Par::Seq);
-        let Ok(factor) = gram.llt(Side::Lower) else { return f64::INFINITY };
+        matmul(
+            gram.as_mut(),
+            lower,
+            Accum::Replace,
+            columns.transpose(),
+            whole,
+            columns,
+            whole,
+            1.0,
+            Par::Seq,
+        );
+        let Ok(factor) = gram.llt(Side::Lower) else {
+            return f64::INFINITY;
+        };
         let pivot = |k: usize| factor.L()[(k, k)];
         let freedom = (rows.saturating_sub(self.count)).max(1) as f64;
         // The last pivot is the length of what the design leaves of the points.
         let square = pivot(self.count).powi(2);
-        let shapes = if noise.is_some() { 2.0 * freedom.ln() } else { 0.0 };
+        let shapes = if noise.is_some() {
+            2.0 * freedom.ln()
+        } else {
+            0.0
+        };
         let design: f64 = (0..self.count).map(|k| pivot(k).ln()).sum();
         freedom * (square / freedom).ln() + innovations.determinant() + 2.0 * design + shapes
     }
@@ -135,8 +200,18 @@ impl<'a> Regression<'a> {
         let all: Vec<Option<AutocorrelatedNoise>> = AutocorrelatedNoise::all().collect();
         let costs: Vec<f64> = all.par_iter().map(|noise| self.cost(*noise)).collect();
         let best = costs.iter().copied().fold(f64::INFINITY, f64::min);
-        let as_good = all.into_iter().zip(costs).filter(|(_, cost)| *cost < best + *AS_GOOD).map(|(noise, _)| noise);
-        let length = |noise: &Option<AutocorrelatedNoise>| noise.map_or(0.0, AutocorrelatedNoise::length);
-        (best, as_good.max_by(|a, b| length(a).total_cmp(&length(b))).flatten())
+        let as_good = all
+            .into_iter()
+            .zip(costs)
+            .filter(|(_, cost)| *cost < best + *AS_GOOD)
+            .map(|(noise, _)| noise);
+        let length =
+            |noise: &Option<AutocorrelatedNoise>| noise.map_or(0.0, AutocorrelatedNoise::length);
+        (
+            best,
+            as_good
+                .max_by(|a, b| length(a).total_cmp(&length(b)))
+                .flatten(),
+        )
     }
 }

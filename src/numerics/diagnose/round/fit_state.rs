@@ -8,7 +8,8 @@ use crate::diagnose::types::{JointRepeatability, Question};
 use crate::diagnose::whitened::AutocorrelatedNoise;
 use crate::effect::{Effect, EffectContext, EffectStack, Form, Load, Variable, arm_effect, names};
 use crate::estimate::{
-    CLEARLY, ErrorScale, FitOptions, Fitted, Known, Model, ParameterStatus, Prior, Screening, Session, fit_screened, seen,
+    CLEARLY, ErrorScale, FitOptions, Fitted, Known, Model, ParameterStatus, Prior, Screening,
+    Session, fit_screened, seen,
 };
 use crate::robot::Measurements;
 use std::ops::Range;
@@ -26,19 +27,28 @@ pub(crate) struct FitState {
 impl FitState {
     /// The rows with the model fitted to them.
     pub fn session<'a>(&'a self, fitter: &'a Fitter) -> Session<'a> {
-        Session { data: &fitter.data, rows: &self.screening.kept, model: &self.model, fitted: &self.fitted }
+        Session {
+            data: &fitter.data,
+            rows: &self.screening.kept,
+            model: &self.model,
+            fitted: &self.fitted,
+        }
     }
 
     /// Whether any of its causes follows time.
     pub fn follows_time(&self) -> bool {
-        self.causes.iter().any(|cause| cause.form.variables().contains(&Variable::Time))
+        self.causes
+            .iter()
+            .any(|cause| cause.form.variables().contains(&Variable::Time))
     }
 
     /// The squared size of some causes together in their own uncertainty, a mean over their numbers; 0 where none of these is estimated,
     /// none where there is no covariance.
     pub fn square_size(&self, causes: &[usize]) -> Option<f64> {
         let own = causes.iter().flat_map(|i| self.ranges[*i].clone());
-        let free: Vec<usize> = own.filter(|k| matches!(self.fitted.statuses[*k], ParameterStatus::Free(_))).collect();
+        let free: Vec<usize> = own
+            .filter(|k| matches!(self.fitted.statuses[*k], ParameterStatus::Free(_)))
+            .collect();
         if free.is_empty() {
             return Some(0.0);
         }
@@ -93,7 +103,10 @@ impl<'a> Fitter<'a> {
             scale: ErrorScale::of(question.data, question.fit),
             free: Vec::new(),
             faint: Vec::new(),
-            repeatability: JointRepeatability { sigma: 0.0, repeats: 0 },
+            repeatability: JointRepeatability {
+                sigma: 0.0,
+                repeats: 0,
+            },
             spread: JointSpread::default(),
             repeated: 0.0,
             scaled: false,
@@ -107,18 +120,30 @@ impl<'a> Fitter<'a> {
         fitter.follow(&now);
         fitter.spread = JointSpread::of(&now.model, &fitter.data);
         let kept = &now.screening.kept;
-        let shown = RepeatPairs::of(&fitter.data, kept).noise(&now.model, &fitter.data, &fitter.spread);
+        let shown =
+            RepeatPairs::of(&fitter.data, kept).noise(&now.model, &fitter.data, &fitter.spread);
         fitter.repeatability = shown.joints;
         fitter.scaled = shown.scale != 1.0;
         if fitter.scaled {
-            fitter.data.points.sigma.iter_mut().for_each(|sigma| *sigma *= shown.scale);
+            fitter
+                .data
+                .points
+                .sigma
+                .iter_mut()
+                .for_each(|sigma| *sigma *= shown.scale);
             let returns = RepeatPairs::returns(&fitter.data, kept);
-            let by_returns = returns.map_or(0.0, |pairs| pairs.repeatability(&now.model, &fitter.data, &fitter.spread).sigma);
+            let by_returns = returns.map_or(0.0, |pairs| {
+                pairs
+                    .repeatability(&now.model, &fitter.data, &fitter.spread)
+                    .sigma
+            });
             fitter.repeatability.sigma = fitter.repeatability.sigma.max(by_returns);
         }
         fitter.repeated = fitter.repeatability.sigma;
         if fitter.repeatability.sigma > 0.0 || fitter.scaled {
-            fitter.spread.put(&mut fitter.data, fitter.repeatability.sigma);
+            fitter
+                .spread
+                .put(&mut fitter.data, fitter.repeatability.sigma);
             now = fitter.fit(&base, Vec::new());
         }
         (fitter, now)
@@ -128,7 +153,9 @@ impl<'a> Fitter<'a> {
     fn repeats(&self, rows: &[usize]) -> Option<RepeatPairs> {
         match self.scaled {
             true => RepeatPairs::returns(&self.data, rows),
-            false => (self.repeatability.repeats >= *REPEATS).then(|| RepeatPairs::of(&self.data, rows)),
+            false => {
+                (self.repeatability.repeats >= *REPEATS).then(|| RepeatPairs::of(&self.data, rows))
+            }
         }
     }
 
@@ -150,13 +177,23 @@ impl<'a> Fitter<'a> {
     /// Takes the base parameters that the rows show around a fitted model: a large effect that the model lacked had hidden them.
     /// Those that they hardly show are not estimated.
     pub fn follow(&mut self, state: &FitState) {
-        let first = state.ranges.first().map_or(state.model.x.len(), |range| range.start);
+        let first = state
+            .ranges
+            .first()
+            .map_or(state.model.x.len(), |range| range.start);
         if self.free.is_empty() {
             self.free = state.fitted.free();
         }
         let seen = |known: &[usize], times| {
             let others: Vec<usize> = (0..first).filter(|k| !known.contains(k)).collect();
-            seen(&state.model, &self.data, &state.fitted, &state.screening.kept, &others, times)
+            seen(
+                &state.model,
+                &self.data,
+                &state.fitted,
+                &state.screening.kept,
+                &others,
+                times,
+            )
         };
         let clearly = seen(&self.free, CLEARLY);
         self.free.extend(clearly);
@@ -166,7 +203,12 @@ impl<'a> Fitter<'a> {
     /// How well the joints repeat (rad) by what is left of a residual without structure, if that is news: it is asked once, and where
     /// repeats are too few to tell. Where the arm was elsewhere between repeats, by what the model leaves between those.
     pub fn noise_left_by(&self, settled: &FitState) -> Option<f64> {
-        let FitState { model, fitted, screening, .. } = settled;
+        let FitState {
+            model,
+            fitted,
+            screening,
+            ..
+        } = settled;
         let pairs = self.repeats(&screening.kept);
         if self.asked || pairs.as_ref().is_some_and(|pairs| !pairs.are_returns) {
             return None;
@@ -198,11 +240,23 @@ impl<'a> Fitter<'a> {
 
     /// Takes the autocorrelation that a residual showed, and returns the causes to go on with: none, but on a path those that do not follow
     /// time. On a path it is not believed before these have been searched by themselves.
-    pub fn take_correlation(&mut self, change: &CorrelationChange, settled: &FitState) -> Vec<EstimatedCause> {
-        let lasting =
-            || settled.causes.iter().filter(|cause| !cause.form.variables().contains(&Variable::Time)).cloned().collect();
+    pub fn take_correlation(
+        &mut self,
+        change: &CorrelationChange,
+        settled: &FitState,
+    ) -> Vec<EstimatedCause> {
+        let lasting = || {
+            settled
+                .causes
+                .iter()
+                .filter(|cause| !cause.form.variables().contains(&Variable::Time))
+                .cloned()
+                .collect()
+        };
         match self.on_path {
-            PathCorrelation::Unasked if change.noise.is_some() && follow_a_path(&self.data, &settled.screening.kept) => {
+            PathCorrelation::Unasked
+                if change.noise.is_some() && follow_a_path(&self.data, &settled.screening.kept) =>
+            {
                 self.on_path = PathCorrelation::CausesFirst;
                 return Vec::new();
             }
@@ -211,7 +265,11 @@ impl<'a> Fitter<'a> {
         }
         self.correlated = change.noise;
         self.estimated += 1;
-        if change.keeps_causes { lasting() } else { Vec::new() }
+        if change.keeps_causes {
+            lasting()
+        } else {
+            Vec::new()
+        }
     }
 
     /// The base effects of `from` with other causes, which start at their coefficients, fitted to the rows that belong.
@@ -219,40 +277,77 @@ impl<'a> Fitter<'a> {
         let (start, ranges) = with_causes(from, &causes);
         let first = ranges.first().map_or(start.x.len(), |range| range.start);
         let all: Vec<usize> = (0..first).collect();
-        let base = if self.free.is_empty() { &all } else { &self.free };
+        let base = if self.free.is_empty() {
+            &all
+        } else {
+            &self.free
+        };
         let candidates: Vec<usize> = base.iter().copied().chain(first..start.x.len()).collect();
-        let options = FitOptions { rows: self.question.fit, candidates: &candidates };
-        let (model, fitted, screening) = fit_screened(&start, &self.data, &options, self.question.set);
+        let options = FitOptions {
+            rows: self.question.fit,
+            candidates: &candidates,
+        };
+        let (model, fitted, screening) =
+            fit_screened(&start, &self.data, &options, self.question.set);
         let estimated = |(cause, range): (EstimatedCause, &Range<usize>)| EstimatedCause {
             coefficients: model.x[range.clone()].to_vec(),
             ..cause
         };
         let causes = causes.into_iter().zip(&ranges).map(estimated).collect();
-        FitState { model, fitted, screening, causes, ranges }
+        FitState {
+            model,
+            fitted,
+            screening,
+            causes,
+            ranges,
+        }
     }
 }
 
 /// The effects of the whole arm in `from` as they stand, then causes at their coefficients, and where the parameters of these are.
 pub(crate) fn with_causes(from: &Model, causes: &[EstimatedCause]) -> (Model, Vec<Range<usize>>) {
     // The base starts where it was found, so that its correction is too small to matter to what else moves it.
-    let setting = EffectContext { base: from.base(), load: Load::GravityTorque };
-    let base = || from.stack.effects().filter(|(effect, _)| effect.form().is_none());
+    let setting = EffectContext {
+        base: from.base(),
+        load: Load::GravityTorque,
+    };
+    let base = || {
+        from.stack
+            .effects()
+            .filter(|(effect, _)| effect.form().is_none())
+    };
     let again = base().filter_map(|(effect, _)| arm_effect(effect.name(), &setting));
-    let own = causes.iter().map(|cause| Box::new(cause.form.clone()) as Box<dyn Effect>);
+    let own = causes
+        .iter()
+        .map(|cause| Box::new(cause.form.clone()) as Box<dyn Effect>);
     let stack = EffectStack::new(&from.robot, setting.base, again.chain(own).collect());
     let mut model = Model::nominal(from.robot.clone(), stack);
     let stack = model.stack.clone();
-    for ((effect, range), (_, found)) in stack.effects().zip(base()).filter(|((effect, _), _)| effect.name() != names::BASE_FRAME)
+    for ((effect, range), (_, found)) in stack
+        .effects()
+        .zip(base())
+        .filter(|((effect, _), _)| effect.name() != names::BASE_FRAME)
     {
         debug_assert!(effect.form().is_none());
         model.x[range].copy_from_slice(&from.x[found]);
     }
-    let ranges: Vec<Range<usize>> =
-        stack.effects().filter(|(effect, _)| effect.form().is_some()).map(|(_, range)| range).collect();
+    let ranges: Vec<Range<usize>> = stack
+        .effects()
+        .filter(|(effect, _)| effect.form().is_some())
+        .map(|(_, range)| range)
+        .collect();
     for (cause, range) in causes.iter().zip(&ranges) {
         model.x[range.clone()].copy_from_slice(&cause.coefficients);
         let priors = range.clone().zip(&cause.priors);
-        model.known.extend(priors.map(|(k, prior)| (k, Known { prior: Some(*prior), bounds: None })));
+        model.known.extend(priors.map(|(k, prior)| {
+            (
+                k,
+                Known {
+                    prior: Some(*prior),
+                    bounds: None,
+                },
+            )
+        }));
     }
     (model, ranges)
 }

@@ -31,19 +31,31 @@ impl JointSpread {
     /// As a model moves; the joints' repeatability has no part in `data` yet.
     pub fn of(model: &Model, data: &Measurements) -> Self {
         let problem = WhitenedProblem::new(model, data, (0..data.rows()).collect());
-        let summed =
-            |motions: &[Vector3<f64>]| -> Matrix3<f64> { motions.iter().map(|motion| motion * motion.transpose()).sum() };
+        let summed = |motions: &[Vector3<f64>]| -> Matrix3<f64> {
+            motions
+                .iter()
+                .map(|motion| motion * motion.transpose())
+                .sum()
+        };
         let of_kind = |kind: &'static dyn MeasurementKind| {
             let name = kind.about().name;
             let by_row = |row: usize| {
-                let variance = kind.reading(data, row).map_or(0.0, |reading| reading.sigma * reading.sigma);
-                problem.reading_by_joint(row, name).map_or_else(Matrix3::zeros, |motions| summed(&motions) * variance)
+                let variance = kind
+                    .reading(data, row)
+                    .map_or(0.0, |reading| reading.sigma * reading.sigma);
+                problem
+                    .reading_by_joint(row, name)
+                    .map_or_else(Matrix3::zeros, |motions| summed(&motions) * variance)
             };
             (kind, (0..data.rows()).map(by_row).collect())
         };
-        let others = kinds(data).into_iter().filter(|kind| kind.about().name != PointKind.about().name);
+        let others = kinds(data)
+            .into_iter()
+            .filter(|kind| kind.about().name != PointKind.about().name);
         Self {
-            points: (0..data.rows()).map(|row| summed(problem.by_joint(row))).collect(),
+            points: (0..data.rows())
+                .map(|row| summed(problem.by_joint(row)))
+                .collect(),
             others: others.map(of_kind).collect(),
         }
     }
@@ -51,23 +63,39 @@ impl JointSpread {
     /// Gives every row what this deviation (rad) of every joint makes of its readings.
     pub fn put(&self, data: &mut Measurements, sigma: f64) {
         let square = sigma * sigma;
-        data.spread = (sigma > 0.0).then(|| self.points.iter().map(|matrix| matrix * square).collect());
+        data.spread =
+            (sigma > 0.0).then(|| self.points.iter().map(|matrix| matrix * square).collect());
         // What sees places has its part by the point's own.
-        let turns = self.others.iter().filter(|(kind, _)| sigma > 0.0 && kind.about().rank.rotations);
+        let turns = self
+            .others
+            .iter()
+            .filter(|(kind, _)| sigma > 0.0 && kind.about().rank.rotations);
         data.reading_spread = turns
             .map(|(kind, all)| {
                 let about = kind.about();
-                (about.name, all.iter().map(|matrix| matrix.trace() * square / about.axes as f64).collect())
+                (
+                    about.name,
+                    all.iter()
+                        .map(|matrix| matrix.trace() * square / about.axes as f64)
+                        .collect(),
+                )
             })
             .collect();
     }
 
     /// What is left of rows beside points, with the covariance of the instrument and that by the joints.
-    fn beside_points(&self, model: &Model, data: &Measurements, rows: &[usize]) -> Vec<LeftBySpread> {
+    fn beside_points(
+        &self,
+        model: &Model,
+        data: &Measurements,
+        rows: &[usize],
+    ) -> Vec<LeftBySpread> {
         let mut scratch = model.stack.scratch(&model.robot);
         let mut left = Vec::new();
         for row in rows {
-            let placed = model.stack.place(&model.robot, data, *row, &model.x, &mut scratch);
+            let placed = model
+                .stack
+                .place(&model.robot, data, *row, &model.x, &mut scratch);
             for (kind, spread) in &self.others {
                 let seen = Residual::of(*kind, data, *row, &placed).zip(kind.reading(data, *row));
                 left.extend(seen.map(|(residual, reading)| LeftBySpread {
@@ -125,12 +153,18 @@ impl RepeatPairs {
         let [mut pairs, mut returns] = Self::all(data, rows);
         if pairs.len() >= *REPEATS || returns.is_empty() {
             pairs.sort_unstable_by_key(|pair| pair[1]);
-            return Self { pairs, are_returns: false };
+            return Self {
+                pairs,
+                are_returns: false,
+            };
         }
         shortest(&mut returns);
         pairs.extend(returns);
         pairs.sort_unstable_by_key(|pair| pair[1]);
-        Self { pairs, are_returns: true }
+        Self {
+            pairs,
+            are_returns: true,
+        }
     }
 
     /// Returns alone; none where they are too few.
@@ -138,7 +172,10 @@ impl RepeatPairs {
         let [_, mut returns] = Self::all(data, rows);
         shortest(&mut returns);
         returns.sort_unstable_by_key(|pair| pair[1]);
-        (returns.len() >= *FEW).then_some(Self { pairs: returns, are_returns: true })
+        (returns.len() >= *FEW).then_some(Self {
+            pairs: returns,
+            are_returns: true,
+        })
     }
 
     /// Those right after each other, and those between which the arm was elsewhere.
@@ -166,32 +203,67 @@ impl RepeatPairs {
         let joints = self.repeatability(model, data, spread);
         let stated = RepeatedNoise { scale: 1.0, joints };
         let samples = self.of_points(model, data, spread);
-        let Some(shown) = scale_of(&samples).filter(|_| !self.are_returns && samples.len() >= *REPEATS) else { return stated };
+        let Some(shown) =
+            scale_of(&samples).filter(|_| !self.are_returns && samples.len() >= *REPEATS)
+        else {
+            return stated;
+        };
         // Mistakes speak for no noise.
-        let usual: Vec<Sample> = samples.into_iter().filter(|one| one.square() < *CAP * shown * shown).collect();
-        let deviance = |scale: f64, sigma: f64| usual.iter().map(|one| one.deviance(scale, sigma)).sum::<f64>();
+        let usual: Vec<Sample> = samples
+            .into_iter()
+            .filter(|one| one.square() < *CAP * shown * shown)
+            .collect();
+        let deviance = |scale: f64, sigma: f64| {
+            usual
+                .iter()
+                .map(|one| one.deviance(scale, sigma))
+                .sum::<f64>()
+        };
         let best_joints = |scale: f64| {
-            let all = std::iter::once(0.0).chain(deviations()).map(|sigma| (deviance(scale, sigma), sigma));
-            all.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::INFINITY, 0.0))
+            let all = std::iter::once(0.0)
+                .chain(deviations())
+                .map(|sigma| (deviance(scale, sigma), sigma));
+            all.min_by(|a, b| a.0.total_cmp(&b.0))
+                .unwrap_or((f64::INFINITY, 0.0))
         };
         let scales = grid(SMALLEST * shown, LARGEST * shown, STEPS / 3);
-        let best = scales.map(|scale| (best_joints(scale).0, scale)).min_by(|a, b| a.0.total_cmp(&b.0));
-        let Some((cost, scale)) = best else { return stated };
+        let best = scales
+            .map(|scale| (best_joints(scale).0, scale))
+            .min_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((cost, scale)) = best else {
+            return stated;
+        };
         let differs = (scale - 1.0).abs() > *SETTLED * scale.max(1.0);
         if !differs || cost > best_joints(1.0).0 - *CLEARER {
             return stated;
         }
-        let scaled: Vec<Sample> = usual.into_iter().map(|one| Sample { fixed: one.fixed * (scale * scale), ..one }).collect();
-        RepeatedNoise { scale, joints: JointRepeatability { sigma: likeliest(&scaled, 2.0), ..joints } }
+        let scaled: Vec<Sample> = usual
+            .into_iter()
+            .map(|one| Sample {
+                fixed: one.fixed * (scale * scale),
+                ..one
+            })
+            .collect();
+        RepeatedNoise {
+            scale,
+            joints: JointRepeatability {
+                sigma: likeliest(&scaled, 2.0),
+                ..joints
+            },
+        }
     }
 
     /// What points differ by beyond the motion that `model` knows between them.
     fn of_points(&self, model: &Model, data: &Measurements, spread: &JointSpread) -> Vec<Sample> {
         let predicted = model.predict(data);
         let one = |[a, b]: &[usize; 2]| {
-            let variance = |row: usize| Matrix3::from_diagonal(&data.points.sigma[row].map(|s| s * s));
-            let known =
-                if self.are_returns || !data.same_pose(*a, *b) { predicted[*b] - predicted[*a] } else { Vector3::zeros() };
+            let variance =
+                |row: usize| Matrix3::from_diagonal(&data.points.sigma[row].map(|s| s * s));
+            let known = if self.are_returns || !data.same_pose(*a, *b) {
+                predicted[*b] - predicted[*a]
+            } else {
+                Vector3::zeros()
+            };
             Some(Sample {
                 error: data.point(*b)? - data.point(*a)? - known,
                 fixed: variance(*a) + variance(*b),
@@ -202,15 +274,29 @@ impl RepeatPairs {
     }
 
     /// The joints' repeatability by what the pairs differ beyond the motion that `model` knows between them.
-    pub fn repeatability(&self, model: &Model, data: &Measurements, spread: &JointSpread) -> JointRepeatability {
+    pub fn repeatability(
+        &self,
+        model: &Model,
+        data: &Measurements,
+        spread: &JointSpread,
+    ) -> JointRepeatability {
         let repeats = self.pairs.len();
         if repeats < *FEW {
-            return JointRepeatability { sigma: 0.0, repeats };
+            return JointRepeatability {
+                sigma: 0.0,
+                repeats,
+            };
         }
         let mut samples = self.of_points(model, data, spread);
-        for [a, b] in self.pairs.iter().filter(|[a, b]| data.anchor(*a) == data.anchor(*b)) {
+        for [a, b] in self
+            .pairs
+            .iter()
+            .filter(|[a, b]| data.anchor(*a) == data.anchor(*b))
+        {
             let [from, to] = [a, b].map(|row| spread.beside_points(model, data, &[*row]));
-            let both = to.iter().filter_map(|to| Some((from.iter().find(|from| from.kind == to.kind)?, to)));
+            let both = to
+                .iter()
+                .filter_map(|to| Some((from.iter().find(|from| from.kind == to.kind)?, to)));
             // On lines that hold nothing the error is none and the variance a constant.
             samples.extend(both.map(|(from, to)| Sample {
                 error: to.error - from.error,
@@ -218,14 +304,19 @@ impl RepeatPairs {
                 varying: from.varying + to.varying,
             }));
         }
-        JointRepeatability { sigma: likeliest(&samples, 2.0), repeats }
+        JointRepeatability {
+            sigma: likeliest(&samples, 2.0),
+            repeats,
+        }
     }
 }
 
 /// The rows of a pose that measured other than whole points of one target, from one anchor, where there are several.
 fn without_points(data: &Measurements, poses: &Poses) -> Vec<Vec<usize>> {
-    let measured = |row: &usize| !data.has_point(*row) && values(data, *row) > data.points.axes(*row);
-    let same = |a: usize, b: usize| data.target(a) == data.target(b) && data.anchor(a) == data.anchor(b);
+    let measured =
+        |row: &usize| !data.has_point(*row) && values(data, *row) > data.points.axes(*row);
+    let same =
+        |a: usize, b: usize| data.target(a) == data.target(b) && data.anchor(a) == data.anchor(b);
     let mut out: Vec<Vec<usize>> = Vec::new();
     for pose in poses.all() {
         let first = out.len();
@@ -241,18 +332,33 @@ fn without_points(data: &Measurements, poses: &Poses) -> Vec<Vec<usize>> {
 }
 
 /// The joints' repeatability (rad) by what a fit leaves of `rows` that holds no structure any more.
-pub(super) fn by_residual(model: &Model, fitted: &Fitted, rows: &[usize], data: &Measurements, spread: &JointSpread) -> f64 {
+pub(super) fn by_residual(
+    model: &Model,
+    fitted: &Fitted,
+    rows: &[usize],
+    data: &Measurements,
+    spread: &JointSpread,
+) -> f64 {
     let predicted = model.predict(data);
     let numbers: usize = rows.iter().map(|row| values(data, *row)).sum();
-    let freedom = (numbers as f64 / numbers.saturating_sub(fitted.singular.len()).max(1) as f64).sqrt();
+    let freedom =
+        (numbers as f64 / numbers.saturating_sub(fitted.singular.len()).max(1) as f64).sqrt();
     let one = |row: &usize| {
         let residual = data.point(*row)? - predicted[*row];
         let fixed = Matrix3::from_diagonal(&data.points.sigma[*row].map(|s| s * s));
-        Some(Sample { error: residual * freedom, fixed, varying: spread.points[*row] })
+        Some(Sample {
+            error: residual * freedom,
+            fixed,
+            varying: spread.points[*row],
+        })
     };
     let mut samples: Vec<_> = rows.iter().filter_map(one).collect();
     let others = spread.beside_points(model, data, rows).into_iter();
-    samples.extend(others.map(|left| Sample { error: left.error * freedom, fixed: left.fixed, varying: left.varying }));
+    samples.extend(others.map(|left| Sample {
+        error: left.error * freedom,
+        fixed: left.fixed,
+        varying: left.varying,
+    }));
     likeliest(&samples, 6.0)
 }
 
@@ -265,7 +371,9 @@ fn shortest(returns: &mut Vec<[usize; 2]>) {
 /// By what stated standard deviations are multiplied for the usual sample to be as far off as it is; none without samples.
 fn scale_of(samples: &[Sample]) -> Option<f64> {
     let mut squares: Vec<f64> = samples.iter().map(Sample::square).collect();
-    nearest(&mut squares, 0.5).map(|median| (median / *MEDIAN).sqrt()).filter(|scale| *scale > 0.0)
+    nearest(&mut squares, 0.5)
+        .map(|median| (median / *MEDIAN).sqrt())
+        .filter(|scale| *scale > 0.0)
 }
 
 /// Standard deviations of the joints that are tried, rad.
@@ -281,13 +389,17 @@ fn grid(least: f64, greatest: f64, count: usize) -> impl Iterator<Item = f64> {
 impl Sample {
     /// Squared, in the instrument's stated standard deviations.
     fn square(&self) -> f64 {
-        self.fixed.try_inverse().map_or(*CAP, |inverse| self.error.dot(&(inverse * self.error)))
+        self.fixed
+            .try_inverse()
+            .map_or(*CAP, |inverse| self.error.dot(&(inverse * self.error)))
     }
 
     /// -2 ln of its likelihood, up to a constant.
     fn deviance(&self, scale: f64, sigma: f64) -> f64 {
         let covariance = self.fixed * (scale * scale) + self.varying * (sigma * sigma);
-        let square = covariance.try_inverse().map_or(*CAP, |inverse| self.error.dot(&(inverse * self.error)));
+        let square = covariance
+            .try_inverse()
+            .map_or(*CAP, |inverse| self.error.dot(&(inverse * self.error)));
         square + covariance.determinant().ln()
     }
 }
@@ -295,14 +407,23 @@ impl Sample {
 /// The likeliest deviation; none unless it is better than none by `evidence`.
 fn likeliest(samples: &[Sample], evidence: f64) -> f64 {
     let cost = |sigma: f64| -> f64 {
-        let one = |Sample { error, fixed, varying }: &Sample| {
+        let one = |Sample {
+                       error,
+                       fixed,
+                       varying,
+                   }: &Sample| {
             let covariance = fixed + varying * (sigma * sigma);
-            let square = covariance.try_inverse().map_or(*CAP, |inverse| error.dot(&(inverse * error)));
+            let square = covariance
+                .try_inverse()
+                .map_or(*CAP, |inverse| error.dot(&(inverse * error)));
             square.min(*CAP) + covariance.determinant().ln()
         };
         samples.iter().map(one).sum()
     };
     let none = cost(0.0);
-    let best = deviations().map(|sigma| (cost(sigma), sigma)).min_by(|a, b| a.0.total_cmp(&b.0));
-    best.filter(|(cost, _)| *cost < none - evidence).map_or(0.0, |(_, sigma)| sigma)
+    let best = deviations()
+        .map(|sigma| (cost(sigma), sigma))
+        .min_by(|a, b| a.0.total_cmp(&b.0));
+    best.filter(|(cost, _)| *cost < none - evidence)
+        .map_or(0.0, |(_, sigma)| sigma)
 }

@@ -8,7 +8,11 @@ use crate::robot::Measurements;
 /// Rows that the search looks at: all but those of the recording's first stop, to which nobody knows the way, or [`SEARCHED`] of them by a sequence
 /// that keeps no step with any design of the recording; the model is fitted to all.
 pub(super) fn thinned(data: &Measurements, rows: &[usize]) -> Vec<usize> {
-    let rows: Vec<usize> = rows.iter().copied().filter(|row| !data.at_first_stop(*row)).collect();
+    let rows: Vec<usize> = rows
+        .iter()
+        .copied()
+        .filter(|row| !data.at_first_stop(*row))
+        .collect();
     if rows.len() <= *SEARCHED {
         return rows;
     }
@@ -22,6 +26,12 @@ pub(super) fn thinned(data: &Measurements, rows: &[usize]) -> Vec<usize> {
 pub(super) fn bounded_autocorrelation_time(problem: &WhitenedProblem) -> f64 {
     let rows = &problem.rows;
     let moving = problem.width().filter(|_| problem.data.in_motion(rows));
-    let time = moving.map_or(1.0, |width| autocorrelation_time(problem.of_readings(), width));
-    if time < *ALONE { 1.0 } else { time.min(rows.len() as f64 / *STRETCHES as f64).max(1.0) }
+    let time = moving.map_or(1.0, |width| {
+        autocorrelation_time(problem.of_readings(), width)
+    });
+    if time < *ALONE {
+        1.0
+    } else {
+        time.min(rows.len() as f64 / *STRETCHES as f64).max(1.0)
+    }
 }

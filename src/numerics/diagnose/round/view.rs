@@ -19,7 +19,8 @@ impl<'a> RoundView<'a> {
     pub fn of(now: &'a FitState, fitter: &'a Fitter) -> Self {
         let data = &fitter.data;
         let compliance = compliance(&now.model);
-        let mut problem = WhitenedProblem::new(&now.model, data, thinned(data, &now.screening.kept));
+        let mut problem =
+            WhitenedProblem::new(&now.model, data, thinned(data, &now.screening.kept));
         if compliance.iter().any(|compliance| *compliance > 0.0) {
             problem = problem.with_currents();
         }
@@ -27,7 +28,12 @@ impl<'a> RoundView<'a> {
         if let Some(noise) = fitter.correlated {
             problem = problem.with_autocorrelation(noise);
         }
-        Self { autocorrelation_time, torque: problem.torques(), compliance, problem }
+        Self {
+            autocorrelation_time,
+            torque: problem.torques(),
+            compliance,
+            problem,
+        }
     }
 
     /// How many rows of what is left count as one.
@@ -36,7 +42,9 @@ impl<'a> RoundView<'a> {
     }
 
     pub fn survey(&self) -> Survey<'_> {
-        let WhitenedProblem { robot, data, rows, .. } = &self.problem;
+        let WhitenedProblem {
+            robot, data, rows, ..
+        } = &self.problem;
         Survey::new(robot, data, rows, &self.torque, &self.compliance)
     }
 
@@ -46,8 +54,14 @@ impl<'a> RoundView<'a> {
         let mut residual = problem.residual.clone();
         for cause in &now.causes {
             let columns = problem.columns(&cause.form);
-            for (column, coefficient) in columns.chunks(problem.residual_rows()).zip(&cause.coefficients) {
-                residual.iter_mut().zip(column).for_each(|(value, c)| *value += c * coefficient);
+            for (column, coefficient) in columns
+                .chunks(problem.residual_rows())
+                .zip(&cause.coefficients)
+            {
+                residual
+                    .iter_mut()
+                    .zip(column)
+                    .for_each(|(value, c)| *value += c * coefficient);
             }
         }
         residual
@@ -58,7 +72,10 @@ impl<'a> RoundView<'a> {
 pub(crate) fn compliance(model: &Model) -> Vec<f64> {
     let mut out = vec![0.0; model.robot.joints()];
     for (effect, range) in model.stack.effects() {
-        if let Some((joint, compliance)) = effect.form().and_then(|form| form.compliance(&model.x[range])) {
+        if let Some((joint, compliance)) = effect
+            .form()
+            .and_then(|form| form.compliance(&model.x[range]))
+        {
             out[joint] += compliance.max(0.0);
         }
     }

@@ -8,7 +8,9 @@ use super::order::RowOrder;
 use super::pairs::{PointPairs, sampled};
 use super::placement::{Placement, place};
 use super::wrong::{LENGTHS, WrongSetup};
-use crate::criteria::setup::{ALIKE, BETTER, CLOUD, GOOD, NOMINAL, OWN_NUMBERS, SAME, SECOND, TURNS};
+use crate::criteria::setup::{
+    ALIKE, BETTER, CLOUD, GOOD, NOMINAL, OWN_NUMBERS, SAME, SECOND, TURNS,
+};
 use crate::diagnose::types::Question;
 use crate::robot::RobotModel;
 use nalgebra::Vector3;
@@ -46,12 +48,30 @@ struct Try {
 impl<'a> AsStated<'a> {
     pub fn of(question: &'a Question<'a>) -> Self {
         let data = question.data;
-        let rows: Vec<usize> = (0..data.rows()).filter(|row| data.has_point(*row)).collect();
+        let rows: Vec<usize> = (0..data.rows())
+            .filter(|row| data.has_point(*row))
+            .collect();
         let sample = sampled(question.fit);
-        let judges = sample.iter().filter_map(|row| rows.binary_search(row).ok()).collect();
+        let judges = sample
+            .iter()
+            .filter_map(|row| rows.binary_search(row).ok())
+            .collect();
         let pairs = PointPairs::of(question.robot, data, sample.iter().map(|row| (*row, *row)));
-        let noise = (sample.iter().map(|row| data.noise(*row).powi(2)).sum::<f64>() / sample.len().max(1) as f64).sqrt();
-        Self { question, rows, judges, placed: place(&pairs, None), reach: pairs.reach(), cloud: pairs.cloud(), noise }
+        let noise = (sample
+            .iter()
+            .map(|row| data.noise(*row).powi(2))
+            .sum::<f64>()
+            / sample.len().max(1) as f64)
+            .sqrt();
+        Self {
+            question,
+            rows,
+            judges,
+            placed: place(&pairs, None),
+            reach: pairs.reach(),
+            cloud: pairs.cloud(),
+            noise,
+        }
     }
 
     /// What the nominal robot leaves, as a share of its reach.
@@ -81,9 +101,16 @@ impl<'a> AsStated<'a> {
     /// The rows that judge, with set-up errors mended.
     fn mended(&self, wrong: &[WrongSetup]) -> PointPairs<'a> {
         let (data, rows) = (self.question.data, &self.rows);
-        let order = wrong.iter().find_map(|one| one.order()).unwrap_or(RowOrder::Shifted(0));
+        let order = wrong
+            .iter()
+            .find_map(|one| one.order())
+            .unwrap_or(RowOrder::Shifted(0));
         let partners = order.partners(rows.len());
-        let pairs = PointPairs::of(self.question.robot, data, self.judges.iter().map(|k| (rows[*k], rows[partners[*k]])));
+        let pairs = PointPairs::of(
+            self.question.robot,
+            data,
+            self.judges.iter().map(|k| (rows[*k], rows[partners[*k]])),
+        );
         wrong.iter().fold(pairs, |pairs, one| one.mended(&pairs))
     }
 
@@ -92,27 +119,45 @@ impl<'a> AsStated<'a> {
         let number = wrong.iter().find_map(|one| one.number());
         let placed = place(&pairs, number);
         let share = placed.left / pairs.cloud().max(f64::MIN_POSITIVE);
-        let counts = number.is_none_or(|number| beyond_manufacture(number, &placed.values, self.question.robot, self.reach));
+        let counts = number.is_none_or(|number| {
+            beyond_manufacture(number, &placed.values, self.question.robot, self.reach)
+        });
         let own = if number.is_some() { *OWN_NUMBERS } else { 1.0 };
         // One error of the list is found by its kind; what has more freedom must leave what a robot that is set up rightly does.
-        let is_free = number.is_some() || wrong.len() > 1 || matches!(wrong[..], [WrongSetup::Counting(_)]);
+        let is_free =
+            number.is_some() || wrong.len() > 1 || matches!(wrong[..], [WrongSetup::Counting(_)]);
         let most = if is_free { *GOOD } else { *NOMINAL } * pairs.reach();
-        let explains = counts && *BETTER * own * share < self.share() && share < *CLOUD && placed.left < most;
-        Try { wrong, placed, share: own * share, explains }
+        let explains =
+            counts && *BETTER * own * share < self.share() && share < *CLOUD && placed.left < most;
+        Try {
+            wrong,
+            placed,
+            share: own * share,
+            explains,
+        }
     }
 
     /// Whether joints turn as far as joints do, and farther than an arm at rest, with a wrong unit of theirs mended.
     fn turns_as_joints_do(&self, unit: WrongSetup) -> bool {
         let (robot, mended) = (self.question.robot, self.mended(&[unit]));
-        let turning = (0..mended.rows()).flat_map(|row| (0..robot.joints()).map(move |joint| (row, joint)));
-        let largest = turning.filter(|(_, joint)| robot.is_revolute(*joint)).map(|(row, joint)| mended.q(row)[joint].abs());
+        let turning =
+            (0..mended.rows()).flat_map(|row| (0..robot.joints()).map(move |joint| (row, joint)));
+        let largest = turning
+            .filter(|(_, joint)| robot.is_revolute(*joint))
+            .map(|(row, joint)| mended.q(row)[joint].abs());
         let largest = largest.fold(0.0, f64::max);
         (TURNS[0]..=TURNS[1]).contains(&largest.to_degrees())
     }
 
     /// Two set-ups whose rows were read as one, where that explains it.
     pub fn two_setups(&self) -> Option<TwoSetups> {
-        let of = |rows: &[usize]| PointPairs::of(self.question.robot, self.question.data, rows.iter().map(|row| (*row, *row)));
+        let of = |rows: &[usize]| {
+            PointPairs::of(
+                self.question.robot,
+                self.question.data,
+                rows.iter().map(|row| (*row, *row)),
+            )
+        };
         let sample: Vec<usize> = self.judges.iter().map(|k| self.rows[*k]).collect();
         let found = TwoSetups::of(&of(&sample), &self.placed)?;
         let is_right = found.left < *CLOUD * self.cloud && found.left < *NOMINAL * self.reach;
@@ -123,37 +168,80 @@ impl<'a> AsStated<'a> {
     /// counting and a unit, else two.
     pub fn explained(&self) -> Option<ExplainedSetup> {
         let data = self.question.data;
-        let in_order = PointPairs::of(self.question.robot, data, self.rows.iter().map(|row| (*row, *row)));
+        let in_order = PointPairs::of(
+            self.question.robot,
+            data,
+            self.rows.iter().map(|row| (*row, *row)),
+        );
         let all = WrongSetup::all(&in_order);
-        let mut one: Vec<Try> = all.par_iter().map(|wrong| self.tried(vec![*wrong])).collect();
+        let mut one: Vec<Try> = all
+            .par_iter()
+            .map(|wrong| self.tried(vec![*wrong]))
+            .collect();
         let first = chosen(&one);
-        if let Some(found) = first.as_ref().filter(|found| found.placed.left < *GOOD * self.reach) {
+        if let Some(found) = first
+            .as_ref()
+            .filter(|found| found.placed.left < *GOOD * self.reach)
+        {
             return Some(found.clone());
         }
         let countings = |unit: &[WrongSetup]| -> Vec<Vec<WrongSetup>> {
             let found = Counting::likely(&self.mended(unit)).into_iter();
-            found.map(|counting| [unit, &[WrongSetup::Counting(counting)]].concat()).collect()
+            found
+                .map(|counting| [unit, &[WrongSetup::Counting(counting)]].concat())
+                .collect()
         };
-        let try_all = |all: Vec<Vec<WrongSetup>>| chosen(&all.into_par_iter().map(|wrong| self.tried(wrong)).collect::<Vec<_>>());
+        let try_all = |all: Vec<Vec<WrongSetup>>| {
+            chosen(
+                &all.into_par_iter()
+                    .map(|wrong| self.tried(wrong))
+                    .collect::<Vec<_>>(),
+            )
+        };
         let counted = countings(&[]);
         if let Some(found) = try_all(counted.clone()).or(first) {
             return Some(found);
         }
         // A unit of the points scales them and hides no counting; one of the joints is mended before theirs is looked for.
         let of_points = (0..LENGTHS.len()).map(|unit| vec![WrongSetup::PointUnit(unit)]);
-        let with_units = of_points.flat_map(|unit| counted.iter().map(move |one| [&unit[..], &one[..]].concat()));
-        let of_joints = [WrongSetup::InRadians, WrongSetup::InDegrees].into_iter().filter(|unit| self.turns_as_joints_do(*unit));
-        if let Some(found) = try_all(with_units.chain(of_joints.flat_map(|unit| countings(&[unit]))).collect()) {
+        let with_units = of_points.flat_map(|unit| {
+            counted
+                .iter()
+                .map(move |one| [&unit[..], &one[..]].concat())
+        });
+        let of_joints = [WrongSetup::InRadians, WrongSetup::InDegrees]
+            .into_iter()
+            .filter(|unit| self.turns_as_joints_do(*unit));
+        if let Some(found) = try_all(
+            with_units
+                .chain(of_joints.flat_map(|unit| countings(&[unit])))
+                .collect(),
+        ) {
             return Some(found);
         }
         one.sort_by(|a, b| a.share.total_cmp(&b.share));
-        let first = one.iter().map(|tried| tried.wrong[0]).filter(|wrong| wrong.number().is_none()).take(*SECOND);
+        let first = one
+            .iter()
+            .map(|tried| tried.wrong[0])
+            .filter(|wrong| wrong.number().is_none())
+            .take(*SECOND);
         let both = |a: WrongSetup| {
-            let others = all.iter().filter(move |b| a != **b && !(a.order().is_some() && b.order().is_some()));
-            others.map(move |b| if b.rank() < a.rank() { vec![*b, a] } else { vec![a, *b] })
+            let others = all
+                .iter()
+                .filter(move |b| a != **b && !(a.order().is_some() && b.order().is_some()));
+            others.map(move |b| {
+                if b.rank() < a.rank() {
+                    vec![*b, a]
+                } else {
+                    vec![a, *b]
+                }
+            })
         };
         let pairs: Vec<Vec<WrongSetup>> = first.flat_map(both).collect();
-        let two: Vec<Try> = pairs.into_par_iter().map(|wrong| self.tried(wrong)).collect();
+        let two: Vec<Try> = pairs
+            .into_par_iter()
+            .map(|wrong| self.tried(wrong))
+            .collect();
         chosen(&two)
     }
 }
@@ -161,14 +249,33 @@ impl<'a> AsStated<'a> {
 /// The best of tries in the order of the list, if one explains.
 fn chosen(tries: &[Try]) -> Option<ExplainedSetup> {
     let explaining: Vec<&Try> = tries.iter().filter(|tried| tried.explains).collect();
-    let least = explaining.iter().map(|tried| tried.share).fold(f64::INFINITY, f64::min);
-    let best = explaining.iter().find(|tried| tried.share <= *SAME * least)?;
+    let least = explaining
+        .iter()
+        .map(|tried| tried.share)
+        .fold(f64::INFINITY, f64::min);
+    let best = explaining
+        .iter()
+        .find(|tried| tried.share <= *SAME * least)?;
     // Countings that leave the same are the same by kinematics.
-    let is_same = |tried: &Try| matches!(tried.wrong[..], [WrongSetup::Counting(_)]) && tried.share <= *SAME * least;
-    let is_rival =
-        |tried: &&&Try| tried.wrong != best.wrong && tried.share < *ALIKE * least && tried.wrong.len() == 1 && !is_same(tried);
-    let alike = explaining.iter().filter(is_rival).map(|tried| tried.wrong[0]).collect();
-    Some(ExplainedSetup { wrong: best.wrong.clone(), alike, placed: best.placed.clone() })
+    let is_same = |tried: &Try| {
+        matches!(tried.wrong[..], [WrongSetup::Counting(_)]) && tried.share <= *SAME * least
+    };
+    let is_rival = |tried: &&&Try| {
+        tried.wrong != best.wrong
+            && tried.share < *ALIKE * least
+            && tried.wrong.len() == 1
+            && !is_same(tried)
+    };
+    let alike = explaining
+        .iter()
+        .filter(is_rival)
+        .map(|tried| tried.wrong[0])
+        .collect();
+    Some(ExplainedSetup {
+        wrong: best.wrong.clone(),
+        alike,
+        placed: best.placed.clone(),
+    })
 }
 
 /// Whether a number of the robot file is off by more than manufacture errs.

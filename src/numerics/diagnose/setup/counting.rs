@@ -46,10 +46,17 @@ impl Searched {
     /// The zero of the first joint is the base's, that of the last one the tool's.
     fn all(robot: &RobotModel) -> Vec<Self> {
         let n = robot.joints();
-        let zeros = (1..n.saturating_sub(1)).filter(|joint| robot.is_revolute(*joint)).map(Self::Zero);
-        let coupled =
-            |joint: &usize| robot.is_revolute(*joint) && robot.is_revolute(joint - 1) && robot.is_parallel(joint - 1, *joint);
-        zeros.chain((1..n).filter(coupled).map(Self::Coupling)).collect()
+        let zeros = (1..n.saturating_sub(1))
+            .filter(|joint| robot.is_revolute(*joint))
+            .map(Self::Zero);
+        let coupled = |joint: &usize| {
+            robot.is_revolute(*joint)
+                && robot.is_revolute(joint - 1)
+                && robot.is_parallel(joint - 1, *joint)
+        };
+        zeros
+            .chain((1..n).filter(coupled).map(Self::Coupling))
+            .collect()
     }
 
     fn values(self) -> &'static [i32] {
@@ -78,7 +85,11 @@ impl Counting {
     /// One joint alone, that shows so many quarter turns at the robot file's zero.
     pub fn of_a_zero(joint: usize, quarters: i32) -> Self {
         let mut out = Self::default();
-        out.0.iter_mut().skip(joint).take(1).for_each(|own| own.quarters = quarters);
+        out.0
+            .iter_mut()
+            .skip(joint)
+            .take(1)
+            .for_each(|own| own.quarters = quarters);
         out
     }
 
@@ -97,19 +108,27 @@ impl Counting {
 
     /// How much is otherwise: of two countings that are the same by kinematics the smaller one is meant.
     fn effort(&self) -> i32 {
-        let of = |joint: &CountedJoint| 2 * i32::from(joint.reversed) + 3 * joint.quarters.abs() + 5 * joint.coupled.abs();
+        let of = |joint: &CountedJoint| {
+            2 * i32::from(joint.reversed) + 3 * joint.quarters.abs() + 5 * joint.coupled.abs()
+        };
         self.0.iter().map(of).sum()
     }
 
     /// Those that leave least of these points, from the one that changes least on, each in its simplest form.
     pub fn likely(pairs: &PointPairs) -> Vec<Self> {
         let robot = pairs.robot;
-        let turning: Vec<usize> = (0..robot.joints()).filter(|joint| robot.is_revolute(*joint)).collect();
+        let turning: Vec<usize> = (0..robot.joints())
+            .filter(|joint| robot.is_revolute(*joint))
+            .collect();
         if robot.joints() > MOST {
             return Vec::new();
         }
-        let some: Vec<usize> = (0..pairs.rows()).step_by(pairs.rows().div_ceil(*SCREENED).max(1)).collect();
-        let affine = AffineImage { pairs: &pairs.only(&some) };
+        let some: Vec<usize> = (0..pairs.rows())
+            .step_by(pairs.rows().div_ceil(*SCREENED).max(1))
+            .collect();
+        let affine = AffineImage {
+            pairs: &pairs.only(&some),
+        };
         let searched = Searched::all(robot);
         let signs = |bits: usize| {
             let mut counting = Self::default();
@@ -119,23 +138,50 @@ impl Counting {
             counting
         };
         // The zeros with the longest levers are tried all: no descent leads from one of them to another.
-        let (levers, none) = (searched.iter().filter(|one| matches!(one, Searched::Zero(_))).take(2), [0]);
+        let (levers, none) = (
+            searched
+                .iter()
+                .filter(|one| matches!(one, Searched::Zero(_)))
+                .take(2),
+            [0],
+        );
         let levers: Vec<&Searched> = levers.collect();
         let values = |lever: usize| levers.get(lever).map_or(&none[..], |one| one.values());
         let turned = |start: Self| {
-            let set =
-                |counting: Self, lever: usize, value: i32| levers.get(lever).map_or(counting, |one| one.set(counting, value));
-            let both = values(0).iter().flat_map(|first| values(1).iter().map(move |second| (*first, *second)));
-            both.map(|(first, second)| set(set(start, 0, first), 1, second)).collect::<Vec<_>>()
+            let set = |counting: Self, lever: usize, value: i32| {
+                levers
+                    .get(lever)
+                    .map_or(counting, |one| one.set(counting, value))
+            };
+            let both = values(0)
+                .iter()
+                .flat_map(|first| values(1).iter().map(move |second| (*first, *second)));
+            both.map(|(first, second)| set(set(start, 0, first), 1, second))
+                .collect::<Vec<_>>()
         };
-        let starts: Vec<Self> = (0..1usize << turning.len()).map(signs).flat_map(turned).collect();
-        let alone = starts.into_par_iter().map(|start| affine.descended(start, &searched, 1));
+        let starts: Vec<Self> = (0..1usize << turning.len())
+            .map(signs)
+            .flat_map(turned)
+            .collect();
+        let alone = starts
+            .into_par_iter()
+            .map(|start| affine.descended(start, &searched, 1));
         let alone = best(alone.collect(), 2 * *COUNTINGS);
-        let together = alone.into_par_iter().map(|start| affine.descended(start, &searched, 2));
+        let together = alone
+            .into_par_iter()
+            .map(|start| affine.descended(start, &searched, 2));
         let found = best(together.collect(), *COUNTINGS);
-        let all: Vec<Searched> = turning.iter().map(|joint| Searched::Sign(*joint)).chain(searched).collect();
+        let all: Vec<Searched> = turning
+            .iter()
+            .map(|joint| Searched::Sign(*joint))
+            .chain(searched)
+            .collect();
         let mut simple: Vec<Self> = Vec::new();
-        for one in found.into_par_iter().map(|one| affine.simplest(one, &all)).collect::<Vec<_>>() {
+        for one in found
+            .into_par_iter()
+            .map(|one| affine.simplest(one, &all))
+            .collect::<Vec<_>>()
+        {
             if !simple.contains(&one) {
                 simple.push(one);
             }
@@ -168,15 +214,31 @@ impl AffineImage<'_, '_> {
         loop {
             let before = now.0;
             for (k, one) in searched.iter().enumerate() {
-                let others = if at_once > 1 { &searched[k + 1..] } else { &searched[k..=k] };
+                let others = if at_once > 1 {
+                    &searched[k + 1..]
+                } else {
+                    &searched[k..=k]
+                };
                 for other in others {
                     let base = now.1;
                     for value in one.values() {
                         let first = one.set(base, *value);
-                        let values = if at_once > 1 { other.values() } else { &[0][..] };
+                        let values = if at_once > 1 {
+                            other.values()
+                        } else {
+                            &[0][..]
+                        };
                         for second in values {
-                            let tried = if at_once > 1 { other.set(first, *second) } else { first };
-                            let left = if tried == now.1 { now.0 } else { self.left(tried) };
+                            let tried = if at_once > 1 {
+                                other.set(first, *second)
+                            } else {
+                                first
+                            };
+                            let left = if tried == now.1 {
+                                now.0
+                            } else {
+                                self.left(tried)
+                            };
                             if left < (1.0 - SETTLED) * now.0 {
                                 now = (left, tried);
                             }
@@ -195,14 +257,27 @@ impl AffineImage<'_, '_> {
         let most = *SAME * self.left(start);
         let mut now = start;
         loop {
-            let pairs = searched.iter().enumerate().flat_map(|(k, one)| searched[k..].iter().map(move |other| (one, other)));
+            let pairs = searched
+                .iter()
+                .enumerate()
+                .flat_map(|(k, one)| searched[k..].iter().map(move |other| (one, other)));
             let both = |(one, other): (&Searched, &Searched)| {
-                let values = one.values().iter().flat_map(|first| other.values().iter().map(move |second| (*first, *second)));
-                values.map(|(first, second)| other.set(one.set(now, first), second)).collect::<Vec<_>>()
+                let values = one
+                    .values()
+                    .iter()
+                    .flat_map(|first| other.values().iter().map(move |second| (*first, *second)));
+                values
+                    .map(|(first, second)| other.set(one.set(now, first), second))
+                    .collect::<Vec<_>>()
             };
-            let mut simpler: Vec<Counting> = pairs.flat_map(both).filter(|tried| tried.effort() < now.effort()).collect();
+            let mut simpler: Vec<Counting> = pairs
+                .flat_map(both)
+                .filter(|tried| tried.effort() < now.effort())
+                .collect();
             simpler.sort_by_key(Counting::effort);
-            let Some(next) = simpler.into_iter().find(|tried| self.left(*tried) <= most) else { return now };
+            let Some(next) = simpler.into_iter().find(|tried| self.left(*tried) <= most) else {
+                return now;
+            };
             now = next;
         }
     }
@@ -218,38 +293,56 @@ impl AffineImage<'_, '_> {
             })
             .collect();
         let all: Vec<usize> = (0..poses.len()).collect();
-        let Some((off, spread)) = self.off(&poses, &all) else { return f64::INFINITY };
+        let Some((off, spread)) = self.off(&poses, &all) else {
+            return f64::INFINITY;
+        };
         let middle = median(&off);
         // Where most points are far from each other's images none is an exception.
         if middle > *CLOUD * spread {
             return middle / spread;
         }
-        let near: Vec<usize> = all.iter().copied().filter(|row| off[*row] <= *TRIM * middle).collect();
+        let near: Vec<usize> = all
+            .iter()
+            .copied()
+            .filter(|row| off[*row] <= *TRIM * middle)
+            .collect();
         if near.len() == all.len() {
             return middle / spread;
         }
-        self.off(&poses, &near).map_or(f64::INFINITY, |(off, spread)| median(&off) / spread)
+        self.off(&poses, &near)
+            .map_or(f64::INFINITY, |(off, spread)| median(&off) / spread)
     }
 
     /// Distance of each of some rows from the best affine image of its point, and how far the images are apart, m.
     fn off(&self, poses: &[Pose], rows: &[usize]) -> Option<(Vec<f64>, f64)> {
         let pairs = self.pairs;
         let (count, width) = (rows.len(), 3 * pairs.targets);
-        let points = DMatrix::from_fn(count, 4, |row, k| if k < 3 { pairs.points[rows[row]][k] } else { 1.0 });
+        let points = DMatrix::from_fn(count, 4, |row, k| {
+            if k < 3 {
+                pairs.points[rows[row]][k]
+            } else {
+                1.0
+            }
+        });
         let basis = points.qr().q();
         // Columns of the seats, and that of the bodies' own places.
         let columns = |k: usize| {
             let mut out = DMatrix::zeros(count, width + 1);
             for (row, number) in rows.iter().enumerate() {
                 let pose = &poses[*number];
-                (0..3).for_each(|c| out[(row, 3 * pairs.target[*number] + c)] = pose.rotation[(k, c)]);
+                (0..3).for_each(|c| {
+                    out[(row, 3 * pairs.target[*number] + c)] = pose.rotation[(k, c)]
+                });
                 out[(row, width)] = pose.translation[k];
             }
             out
         };
         let own: [DMatrix<f64>; 3] = [0, 1, 2].map(columns);
         let rest = own.each_ref().map(|own| own - &basis * basis.tr_mul(own));
-        let normal = rest.iter().map(|rest| rest.tr_mul(rest)).fold(DMatrix::zeros(width + 1, width + 1), |sum, one| sum + one);
+        let normal = rest
+            .iter()
+            .map(|rest| rest.tr_mul(rest))
+            .fold(DMatrix::zeros(width + 1, width + 1), |sum, one| sum + one);
         let mut seats = normal.view((0, 0), (width, width)).into_owned();
         let ridge = RIDGE * seats.diagonal().max().max(f64::MIN_POSITIVE);
         (0..width).for_each(|k| seats[(k, k)] += ridge);
@@ -257,13 +350,18 @@ impl AffineImage<'_, '_> {
         let seat = seats.cholesky()?.solve(&right).push(1.0);
         let size = |all: &[DMatrix<f64>; 3]| -> Vec<f64> {
             let [x, y, z] = all.each_ref().map(|one| one * &seat);
-            (0..count).map(|row| (x[row] * x[row] + y[row] * y[row] + z[row] * z[row]).sqrt()).collect()
+            (0..count)
+                .map(|row| (x[row] * x[row] + y[row] * y[row] + z[row] * z[row]).sqrt())
+                .collect()
         };
         let centred = own.map(|own| {
             let mean = own.row_mean();
-            DMatrix::from_fn(count, width + 1, |row, column| own[(row, column)] - mean[column])
+            DMatrix::from_fn(count, width + 1, |row, column| {
+                own[(row, column)] - mean[column]
+            })
         });
-        let spread = (size(&centred).iter().map(|x| x * x).sum::<f64>() / count.max(1) as f64).sqrt();
+        let spread =
+            (size(&centred).iter().map(|x| x * x).sum::<f64>() / count.max(1) as f64).sqrt();
         Some((size(&rest), spread.max(f64::MIN_POSITIVE)))
     }
 }

@@ -23,17 +23,23 @@ pub(super) fn beyond(now: &FitState, robot: &RobotModel, reach: f64) -> Vec<Stri
     let specs = now.model.stack.specs();
     for (effect, range) in now.model.stack.effects() {
         for k in range {
-            let ParameterStatus::Free(sigma) = now.fitted.statuses[k] else { continue };
+            let ParameterStatus::Free(sigma) = now.fitted.statuses[k] else {
+                continue;
+            };
             let (spec, value) = (&specs[k], now.model.x[k]);
             let limit = match (effect.name(), spec.place, spec.unit) {
-                (names::LINK_GEOMETRY, Place::Links(link, _), Unit::Millimetre) => length_error(robot, link, reach),
+                (names::LINK_GEOMETRY, Place::Links(link, _), Unit::Millimetre) => {
+                    length_error(robot, link, reach)
+                }
                 (names::LINK_GEOMETRY | names::JOINT_OFFSET, _, Unit::Radian) => ANGLE,
                 (names::REDUCTION_RATIO, ..) => *RATIO,
                 _ => continue,
             };
             if value.abs() > limit + *CLEARLY * sigma {
                 out.push(match spec.unit {
-                    Unit::Radian => format!("{} by {} deg", spec.name, figure(value.to_degrees(), 1)),
+                    Unit::Radian => {
+                        format!("{} by {} deg", spec.name, figure(value.to_degrees(), 1))
+                    }
                     Unit::Millimetre => format!("{} by {} mm", spec.name, figure(value * 1e3, 1)),
                     _ => format!("{} by {} %", spec.name, figure(value * 100.0, 1)),
                 });

@@ -25,14 +25,17 @@ pub(super) struct TwoSetups {
 impl TwoSetups {
     /// The two set-ups of pairs, beside their one placement; none where two do not explain what it leaves.
     pub fn of(pairs: &PointPairs, one: &Placement) -> Option<Self> {
-        let found = starts(pairs, one).into_iter().filter_map(|start| dealt(pairs, start, most(&one.off)));
+        let found = starts(pairs, one)
+            .into_iter()
+            .filter_map(|start| dealt(pairs, start, most(&one.off)));
         let best = found.min_by(|a, b| a.left.total_cmp(&b.left))?;
         (*MIXED_BETTER * best.left < best.before).then_some(best)
     }
 
     /// All rows of a recording, of which `numbers` are those of the pairs, by the placement that has them nearest.
     pub fn of_all(self, all: &PointPairs, numbers: &[usize]) -> Self {
-        let rows = nearest(all, &self.placed).map(|own| own.into_iter().map(|k| numbers[k]).collect());
+        let rows =
+            nearest(all, &self.placed).map(|own| own.into_iter().map(|k| numbers[k]).collect());
         Self { rows, ..self }
     }
 
@@ -40,7 +43,10 @@ impl TwoSetups {
     pub fn words(&self) -> String {
         let [one, other] = &self.placed;
         let (base, tool) = (one.base_apart(other), one.tool_apart(other));
-        let lists = self.rows.each_ref().map(|rows| format!("{} ({})", listed(rows), counted(rows.len(), "row")));
+        let lists = self
+            .rows
+            .each_ref()
+            .map(|rows| format!("{} ({})", listed(rows), counted(rows.len(), "row")));
         format!(
             "two set-ups are in one recording: rows {} belong to one, rows {} to the other, whose base stands {} from that of the first and \
              whose tool point {}; placed as one the nominal robot has nine points in ten within {}, placed as two within {}. Remedy: read each as a \
@@ -72,10 +78,17 @@ fn most(lengths: &[f64]) -> f64 {
 /// Where rows might part: in stretches, in turn, or by where one placement misses them, in the tracker's frame and the tool's.
 fn starts(pairs: &PointPairs, one: &Placement) -> Vec<Vec<bool>> {
     let rows = pairs.rows();
-    let mut out: Vec<Vec<bool>> = (1..8).map(|part| (0..rows).map(|row| 8 * row < part * rows).collect()).collect();
+    let mut out: Vec<Vec<bool>> = (1..8)
+        .map(|part| (0..rows).map(|row| 8 * row < part * rows).collect())
+        .collect();
     out.push((0..rows).map(|row| row % 2 == 0).collect());
     // The rows that one placement has, and those that it leaves to another.
-    out.push(one.off.iter().map(|off| *off <= *MIXED_FAR * one.left).collect());
+    out.push(
+        one.off
+            .iter()
+            .map(|off| *off <= *MIXED_FAR * one.left)
+            .collect(),
+    );
     let [missed, turned] = one.missed(pairs);
     out.extend([missed, turned].iter().map(|all| along_most(all)));
     out
@@ -84,21 +97,37 @@ fn starts(pairs: &PointPairs, one: &Placement) -> Vec<Vec<bool>> {
 /// Whether vectors point along the direction in which they differ most.
 fn along_most(all: &[Vector3<f64>]) -> Vec<bool> {
     let mean = all.iter().sum::<Vector3<f64>>() / all.len().max(1) as f64;
-    let spread: Matrix3<f64> = all.iter().map(|one| (one - mean) * (one - mean).transpose()).sum();
+    let spread: Matrix3<f64> = all
+        .iter()
+        .map(|one| (one - mean) * (one - mean).transpose())
+        .sum();
     let axes = SymmetricEigen::new(spread);
-    let along = axes.eigenvectors.column(axes.eigenvalues.imax()).into_owned();
-    all.iter().map(|one| (one - mean).dot(&along) > 0.0).collect()
+    let along = axes
+        .eigenvectors
+        .column(axes.eigenvalues.imax())
+        .into_owned();
+    all.iter()
+        .map(|one| (one - mean).dot(&along) > 0.0)
+        .collect()
 }
 
 fn nearest(pairs: &PointPairs, placed: &[Placement; 2]) -> [Vec<usize>; 2] {
-    let [one, other] =
-        placed.each_ref().map(|placed| placed.missed(pairs)[0].iter().map(|missed| missed.norm()).collect::<Vec<f64>>());
-    (0..pairs.rows()).partition::<Vec<usize>, _>(|row| one[*row] <= other[*row]).into()
+    let [one, other] = placed.each_ref().map(|placed| {
+        placed.missed(pairs)[0]
+            .iter()
+            .map(|missed| missed.norm())
+            .collect::<Vec<f64>>()
+    });
+    (0..pairs.rows())
+        .partition::<Vec<usize>, _>(|row| one[*row] <= other[*row])
+        .into()
 }
 
 fn dealt(pairs: &PointPairs, first: Vec<bool>, before: f64) -> Option<TwoSetups> {
     let fewest = fewest(pairs.rows());
-    let mut rows: [Vec<usize>; 2] = (0..pairs.rows()).partition::<Vec<usize>, _>(|row| first[*row]).into();
+    let mut rows: [Vec<usize>; 2] = (0..pairs.rows())
+        .partition::<Vec<usize>, _>(|row| first[*row])
+        .into();
     for _ in 0..*MIXED_ROUNDS {
         if rows.iter().any(|own| own.len() < fewest) {
             return None;
@@ -106,8 +135,16 @@ fn dealt(pairs: &PointPairs, first: Vec<bool>, before: f64) -> Option<TwoSetups>
         let placed = rows.each_ref().map(|own| place(&pairs.only(own), None));
         let next = nearest(pairs, &placed);
         if next == rows {
-            let off: Vec<f64> = placed.iter().flat_map(|one| one.off.iter().copied()).collect();
-            return Some(TwoSetups { rows, before, left: most(&off), placed });
+            let off: Vec<f64> = placed
+                .iter()
+                .flat_map(|one| one.off.iter().copied())
+                .collect();
+            return Some(TwoSetups {
+                rows,
+                before,
+                left: most(&off),
+                placed,
+            });
         }
         rows = next;
     }
@@ -128,7 +165,15 @@ fn listed(rows: &[usize]) -> String {
         false => format!("{} to {}", from + 1, to + 1),
     };
     let more = if ranges.len() > LISTED { ", ..." } else { "" };
-    format!("{}{more}", ranges.iter().take(LISTED).map(words).collect::<Vec<_>>().join(", "))
+    format!(
+        "{}{more}",
+        ranges
+            .iter()
+            .take(LISTED)
+            .map(words)
+            .collect::<Vec<_>>()
+            .join(", ")
+    )
 }
 
 #[cfg(test)]

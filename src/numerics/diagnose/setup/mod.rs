@@ -30,14 +30,26 @@ struct WholePoints {
 
 impl WholePoints {
     fn of(question: &Question) -> Self {
-        let whole = |rows: &[usize]| rows.iter().copied().filter(|row| question.data.has_point(*row)).collect();
-        Self { fit: whole(question.fit), validate: whole(question.validate) }
+        let whole = |rows: &[usize]| {
+            rows.iter()
+                .copied()
+                .filter(|row| question.data.has_point(*row))
+                .collect()
+        };
+        Self {
+            fit: whole(question.fit),
+            validate: whole(question.validate),
+        }
     }
 
     /// The question of these rows; none where they are too few, or stand beside an outside simulation.
     fn question<'a>(&'a self, question: &Question<'a>) -> Option<Question<'a>> {
         let asked = self.fit.len() >= *FEWEST && !question.beside_simulation;
-        asked.then_some(Question { fit: &self.fit, validate: &self.validate, ..*question })
+        asked.then_some(Question {
+            fit: &self.fit,
+            validate: &self.validate,
+            ..*question
+        })
     }
 }
 
@@ -47,7 +59,11 @@ pub fn wrong_setup(question: &Question) -> Option<Diagnosis> {
     let question = &points.question(question)?;
     let stated = AsStated::of(question);
     if !stated.is_far_off() {
-        let parted = if stated.is_in_parts() { stated.two_setups() } else { None };
+        let parted = if stated.is_in_parts() {
+            stated.two_setups()
+        } else {
+            None
+        };
         return parted.map(|found| outcome::two_setups(question, &found));
     }
     if let Some(found) = stated.explained() {
@@ -55,7 +71,9 @@ pub fn wrong_setup(question: &Question) -> Option<Diagnosis> {
     }
     match stated.two_setups() {
         Some(found) => Some(outcome::two_setups(question, &found)),
-        None => stated.is_no_robot().then(|| outcome::unexplained(question, &stated)),
+        None => stated
+            .is_no_robot()
+            .then(|| outcome::unexplained(question, &stated)),
     }
 }
 

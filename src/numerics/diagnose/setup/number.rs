@@ -29,8 +29,14 @@ impl FreeNumber {
         let turning = (0..robot.joints()).filter(|joint| robot.is_revolute(*joint));
         let lengths = (0..robot.joints().saturating_sub(1)).map(Self::Length);
         // The first zero is the base's, the last one the tool's.
-        let zeros = turning.clone().filter(|joint| (1..robot.joints().saturating_sub(1)).contains(joint)).map(Self::Zero);
-        lengths.chain(turning.filter(|joint| *joint > 0).map(Self::Axis)).chain(zeros).collect()
+        let zeros = turning
+            .clone()
+            .filter(|joint| (1..robot.joints().saturating_sub(1)).contains(joint))
+            .map(Self::Zero);
+        lengths
+            .chain(turning.filter(|joint| *joint > 0).map(Self::Axis))
+            .chain(zeros)
+            .collect()
     }
 
     pub fn width(self) -> usize {
@@ -38,11 +44,25 @@ impl FreeNumber {
     }
 
     /// What a row sees of it at joint positions `q`; `seat` is where the point sits at the zero pose.
-    pub fn seen(self, robot: &RobotModel, q: &[f64], values: &[f64], seat: &Vector3<f64>) -> SeenNumber {
+    pub fn seen(
+        self,
+        robot: &RobotModel,
+        q: &[f64],
+        values: &[f64],
+        seat: &Vector3<f64>,
+    ) -> SeenNumber {
         let displaced = |body: Pose, by: Matrix3<f64>| {
             let columns: Vec<Vector3<f64>> = (0..3).map(|axis| by.column(axis).into()).collect();
-            let shift = columns.iter().zip(values).map(|(column, value)| column * *value).sum();
-            SeenNumber { body, shift, columns }
+            let shift = columns
+                .iter()
+                .zip(values)
+                .map(|(column, value)| column * *value)
+                .sum();
+            SeenNumber {
+                body,
+                shift,
+                columns,
+            }
         };
         match self {
             Self::Length(joint) => {
@@ -51,7 +71,10 @@ impl FreeNumber {
             }
             Self::Axis(joint) => {
                 let all = bodies(robot, q);
-                displaced(all[robot.joints()], all[joint].rotation - all[joint + 1].rotation)
+                displaced(
+                    all[robot.joints()],
+                    all[joint].rotation - all[joint + 1].rotation,
+                )
             }
             Self::Zero(joint) => {
                 let mut turned = q.to_vec();
@@ -60,7 +83,11 @@ impl FreeNumber {
                 let body = all[robot.joints()];
                 let arm = body.point(seat) - all[joint].point(robot.point(joint));
                 let column = (all[joint].rotation * robot.axis(joint)).cross(&arm);
-                SeenNumber { body, shift: Vector3::zeros(), columns: vec![column] }
+                SeenNumber {
+                    body,
+                    shift: Vector3::zeros(),
+                    columns: vec![column],
+                }
             }
         }
     }

@@ -26,7 +26,11 @@ impl RowOrder {
         let mut out = likely_shifts(pairs);
         out.push(Self::Reversed);
         if pairs.rows() >= *SORTED {
-            out.extend([1, 0].into_iter().flat_map(|first| [Self::PointsByText { first }, Self::JointsByText { first }]));
+            out.extend(
+                [1, 0]
+                    .into_iter()
+                    .flat_map(|first| [Self::PointsByText { first }, Self::JointsByText { first }]),
+            );
         }
         out
     }
@@ -36,15 +40,23 @@ impl RowOrder {
         let by_text = |first: usize| {
             let mut names: Vec<usize> = (first..first + count).collect();
             names.sort_by_key(usize::to_string);
-            names.into_iter().map(move |name| name - first).collect::<Vec<usize>>()
+            names
+                .into_iter()
+                .map(move |name| name - first)
+                .collect::<Vec<usize>>()
         };
         match self {
-            Self::Shifted(by) => (0..count).map(|row| (row as i64 + by).rem_euclid(count.max(1) as i64) as usize).collect(),
+            Self::Shifted(by) => (0..count)
+                .map(|row| (row as i64 + by).rem_euclid(count.max(1) as i64) as usize)
+                .collect(),
             Self::Reversed => (0..count).rev().collect(),
             Self::JointsByText { first } => by_text(first),
             Self::PointsByText { first } => {
                 let mut out = vec![0; count];
-                by_text(first).into_iter().enumerate().for_each(|(row, name)| out[name] = row);
+                by_text(first)
+                    .into_iter()
+                    .enumerate()
+                    .for_each(|(row, name)| out[name] = row);
                 out
             }
         }
@@ -54,22 +66,44 @@ impl RowOrder {
 /// The shifts by which the steps from point to point are most like those of the nominal arm: a rigid motion does not change them.
 fn likely_shifts(pairs: &PointPairs) -> Vec<RowOrder> {
     let (robot, count) = (pairs.robot, pairs.rows());
-    let model: Vec<Vector3<f64>> = (0..count).map(|row| robot.forward(pairs.q(row)).translation).collect();
+    let model: Vec<Vector3<f64>> = (0..count)
+        .map(|row| robot.forward(pairs.q(row)).translation)
+        .collect();
     let (model, measured) = (steps(&model), steps(&pairs.points));
-    let likeness = |shift: usize| (0..count).map(|row| model[row] * measured[(row + shift) % count]).sum::<f64>();
+    let likeness = |shift: usize| {
+        (0..count)
+            .map(|row| model[row] * measured[(row + shift) % count])
+            .sum::<f64>()
+    };
     let tried = (1..count).filter(|shift| *shift.min(&(count - shift)) <= *FARTHEST);
     let mut all: Vec<(f64, usize)> = tried.map(|shift| (likeness(shift), shift)).collect();
     all.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let signed = |shift: usize| if 2 * shift > count { shift as i64 - count as i64 } else { shift as i64 };
-    all.into_iter().take(*SHIFTS).map(|(_, shift)| RowOrder::Shifted(signed(shift))).collect()
+    let signed = |shift: usize| {
+        if 2 * shift > count {
+            shift as i64 - count as i64
+        } else {
+            shift as i64
+        }
+    };
+    all.into_iter()
+        .take(*SHIFTS)
+        .map(|(_, shift)| RowOrder::Shifted(signed(shift)))
+        .collect()
 }
 
 /// Distances from each point to the next, the first being next to the last, less their mean.
 fn steps(points: &[Vector3<f64>]) -> Vec<f64> {
     let next = points.iter().cycle().skip(1);
-    let lengths: Vec<f64> = points.iter().zip(next).map(|(a, b)| (b - a).norm()).collect();
+    let lengths: Vec<f64> = points
+        .iter()
+        .zip(next)
+        .map(|(a, b)| (b - a).norm())
+        .collect();
     let limit = *LONG * median(&lengths);
-    let lengths: Vec<f64> = lengths.into_iter().map(|length| length.min(limit)).collect();
+    let lengths: Vec<f64> = lengths
+        .into_iter()
+        .map(|length| length.min(limit))
+        .collect();
     let mean = lengths.iter().sum::<f64>() / lengths.len().max(1) as f64;
     lengths.into_iter().map(|length| length - mean).collect()
 }

@@ -5,14 +5,20 @@ use super::mixture::TwoSetups;
 use super::pairs::median;
 use super::words::{SetupWords, mm, together, words};
 use crate::criteria::setup::{FAR, NAMED};
-use crate::diagnose::types::{Diagnosis, ErrorLengths, Finding, Probabilities, Question, SETUP, VerdictKind};
+use crate::diagnose::types::{
+    Diagnosis, ErrorLengths, Finding, Probabilities, Question, SETUP, VerdictKind,
+};
 use crate::diagnose::unasked::{on_its_base, unasked};
 use crate::effect::{ParameterEstimate, Place};
 use crate::estimate::{FitOptions, Screening, fit};
 use crate::observation::Dimension;
 
 /// A set-up error that explains what the nominal robot leaves.
-pub(super) fn explained(question: &Question, stated: &AsStated, found: &ExplainedSetup) -> Diagnosis {
+pub(super) fn explained(
+    question: &Question,
+    stated: &AsStated,
+    found: &ExplainedSetup,
+) -> Diagnosis {
     let own = |wrong| words(wrong, question.robot, &found.placed.values, stated.reach);
     let all = together(&found.wrong, question.robot, own);
     let what: Vec<&str> = all.iter().map(|words| words.what.as_str()).collect();
@@ -26,28 +32,68 @@ pub(super) fn explained(question: &Question, stated: &AsStated, found: &Explaine
         mm(after),
         mend.join("; ")
     );
-    let mut alike: Vec<SetupWords> =
-        found.alike.iter().filter(|wrong| wrong.number().is_none()).map(|wrong| own(*wrong)).collect();
+    let mut alike: Vec<SetupWords> = found
+        .alike
+        .iter()
+        .filter(|wrong| wrong.number().is_none())
+        .map(|wrong| own(*wrong))
+        .collect();
     alike.dedup_by(|a, b| a.what == b.what);
     alike.retain(|other| !what.contains(&other.what.as_str()));
     if !alike.is_empty() {
-        let each: Vec<String> = alike.iter().map(|words| format!("{}; remedy then: {}", words.what, words.mend)).collect();
-        text.push_str(&format!(". These data are explained equally well if {}", each.join(", or if ")));
+        let each: Vec<String> = alike
+            .iter()
+            .map(|words| format!("{}; remedy then: {}", words.what, words.mend))
+            .collect();
+        text.push_str(&format!(
+            ". These data are explained equally well if {}",
+            each.join(", or if ")
+        ));
     }
-    let number = |name: &str, value: f64| ParameterEstimate { name: name.into(), form: 0, value, unit: "mm", sigma: None };
-    let kept: Vec<bool> = found.placed.off.iter().map(|off| *off <= *FAR * median(&found.placed.off)).collect();
+    let number = |name: &str, value: f64| ParameterEstimate {
+        name: name.into(),
+        form: 0,
+        value,
+        unit: "mm",
+        sigma: None,
+    };
+    let kept: Vec<bool> = found
+        .placed
+        .off
+        .iter()
+        .map(|off| *off <= *FAR * median(&found.placed.off))
+        .collect();
     let lengths = |off: &[f64], scale: f64| {
-        let kept: Vec<f64> = off.iter().zip(&kept).filter(|(_, kept)| **kept).map(|(off, _)| scale * off).collect();
+        let kept: Vec<f64> = off
+            .iter()
+            .zip(&kept)
+            .filter(|(_, kept)| **kept)
+            .map(|(off, _)| scale * off)
+            .collect();
         ErrorLengths::of_lengths(&kept)
     };
     let name = *NAMED / (1.0 + found.alike.len() as f64);
     let finding = Finding {
-        parameters: vec![number("median_before", before * 1e3), number("median_after", after * 1e3)],
-        probabilities: Probabilities { name, place: *NAMED, none: 1.0 - *NAMED },
+        parameters: vec![
+            number("median_before", before * 1e3),
+            number("median_after", after * 1e3),
+        ],
+        probabilities: Probabilities {
+            name,
+            place: *NAMED,
+            none: 1.0 - *NAMED,
+        },
         ..finding(format!("{text}."))
     };
-    let errors = (lengths(&stated.placed.off, 1.0), lengths(&found.placed.off, scale));
-    Diagnosis { before: errors.0, after: errors.1, ..wrong(question, vec![finding]) }
+    let errors = (
+        lengths(&stated.placed.off, 1.0),
+        lengths(&found.placed.off, scale),
+    );
+    Diagnosis {
+        before: errors.0,
+        after: errors.1,
+        ..wrong(question, vec![finding])
+    }
 }
 
 /// Rows of two set-ups.
@@ -75,7 +121,10 @@ pub(super) fn unexplained(question: &Question, stated: &AsStated) -> Diagnosis {
         mm(stated.placed.left),
         100.0 * stated.share_of_reach()
     );
-    Diagnosis { statement, ..wrong(question, Vec::new()) }
+    Diagnosis {
+        statement,
+        ..wrong(question, Vec::new())
+    }
 }
 
 fn finding(statement: String) -> Finding {
@@ -86,7 +135,11 @@ fn finding(statement: String) -> Finding {
         parameters: Vec::new(),
         evidence: None,
         rivals: Vec::new(),
-        probabilities: Probabilities { name: *NAMED, place: *NAMED, none: 1.0 - *NAMED },
+        probabilities: Probabilities {
+            name: *NAMED,
+            place: *NAMED,
+            none: 1.0 - *NAMED,
+        },
         valid: None,
         forms: Vec::new(),
     }
@@ -94,12 +147,35 @@ fn finding(statement: String) -> Finding {
 
 /// The nominal robot with its base where the rows to fit have it.
 fn wrong(question: &Question, findings: Vec<Finding>) -> Diagnosis {
-    let Question { data, fit: rows, .. } = *question;
+    let Question {
+        data, fit: rows, ..
+    } = *question;
     let (start, candidates) = on_its_base(question);
-    let (model, fitted) = fit(&start, data, &FitOptions { rows, candidates: &candidates });
+    let (model, fitted) = fit(
+        &start,
+        data,
+        &FitOptions {
+            rows,
+            candidates: &candidates,
+        },
+    );
     let before = ErrorLengths::of(&model.error_sizes(data, Dimension::Length), rows);
-    let screening = Screening { kept: rows.to_vec(), ..Screening::default() };
-    let not_observable = vec!["what the simulation lacks: it is tested once the set-up is right".into()];
-    let diagnosis = unasked(question, VerdictKind::WrongSetup, (model, fitted, screening));
-    Diagnosis { before, held_out: false, findings, not_observable, ..diagnosis }
+    let screening = Screening {
+        kept: rows.to_vec(),
+        ..Screening::default()
+    };
+    let not_observable =
+        vec!["what the simulation lacks: it is tested once the set-up is right".into()];
+    let diagnosis = unasked(
+        question,
+        VerdictKind::WrongSetup,
+        (model, fitted, screening),
+    );
+    Diagnosis {
+        before,
+        held_out: false,
+        findings,
+        not_observable,
+        ..diagnosis
+    }
 }

@@ -21,20 +21,35 @@ pub(super) struct PointPairs<'a> {
 
 /// Some of the rows, evenly over all of them.
 pub(super) fn sampled(rows: &[usize]) -> Vec<usize> {
-    rows.iter().copied().step_by(rows.len().div_ceil(*MOST).max(1)).collect()
+    rows.iter()
+        .copied()
+        .step_by(rows.len().div_ceil(*MOST).max(1))
+        .collect()
 }
 
 impl<'a> PointPairs<'a> {
     /// Joints of rows, each beside the point of a row that has a whole one.
-    pub fn of(robot: &'a RobotModel, data: &Measurements, rows: impl Iterator<Item = (usize, usize)>) -> Self {
+    pub fn of(
+        robot: &'a RobotModel,
+        data: &Measurements,
+        rows: impl Iterator<Item = (usize, usize)>,
+    ) -> Self {
         let (mut q, mut points, mut target) = (Vec::new(), Vec::new(), Vec::new());
         for (joints, point) in rows {
-            let Some(place) = data.point(point) else { continue };
+            let Some(place) = data.point(point) else {
+                continue;
+            };
             q.extend_from_slice(data.q(joints));
             points.push(place);
             target.push(robot.setup().target(data.target(point)).unwrap_or(0));
         }
-        Self { robot, q, points, target, targets: robot.setup().targets.len().max(1) }
+        Self {
+            robot,
+            q,
+            points,
+            target,
+            targets: robot.setup().targets.len().max(1),
+        }
     }
 
     pub fn joints(&self) -> usize {
@@ -67,25 +82,37 @@ impl<'a> PointPairs<'a> {
     }
 
     pub fn with_points(&self, change: impl Fn(&Vector3<f64>) -> Vector3<f64>) -> Self {
-        Self { points: self.points.iter().map(change).collect(), ..self.clone() }
+        Self {
+            points: self.points.iter().map(change).collect(),
+            ..self.clone()
+        }
     }
 
     /// Root mean square distance of the points from their centre, m.
     pub fn cloud(&self) -> f64 {
         let count = self.rows().max(1) as f64;
         let centre = self.points.iter().sum::<Vector3<f64>>() / count;
-        (self.points.iter().map(|point| (point - centre).norm_squared()).sum::<f64>() / count).sqrt()
+        (self
+            .points
+            .iter()
+            .map(|point| (point - centre).norm_squared())
+            .sum::<f64>()
+            / count)
+            .sqrt()
     }
 
     /// How far the tool point of the robot file gets in these rows from the first axis that turns, or from its middle, m.
     pub fn reach(&self) -> f64 {
         let robot = self.robot;
         let first = (0..robot.joints()).find(|joint| robot.is_revolute(*joint));
-        let all: Vec<Vec<Pose>> = (0..self.rows()).map(|row| bodies(robot, self.q(row))).collect();
+        let all: Vec<Vec<Pose>> = (0..self.rows())
+            .map(|row| bodies(robot, self.q(row)))
+            .collect();
         let tool = |bodies: &Vec<Pose>| bodies[robot.joints()].point(&robot.home().translation);
         let middle = all.iter().map(tool).sum::<Vector3<f64>>() / all.len().max(1) as f64;
         let distance = |bodies: &Vec<Pose>| {
-            let of_axis = first.map(|joint| (tool(bodies) - bodies[joint].point(robot.point(joint))).norm());
+            let of_axis =
+                first.map(|joint| (tool(bodies) - bodies[joint].point(robot.point(joint))).norm());
             of_axis.unwrap_or(0.0).max((tool(bodies) - middle).norm())
         };
         all.iter().map(distance).fold(0.0, f64::max)

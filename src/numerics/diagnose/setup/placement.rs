@@ -36,8 +36,12 @@ impl Placement {
         let robot = pairs.robot;
         let missed = |row: usize| {
             let body = bodies(robot, pairs.q(row))[robot.joints()];
-            let missed = pairs.points[row] - self.base.point(&body.point(&self.seats[pairs.target[row]]));
-            (missed, (self.base.rotation * body.rotation).transpose() * missed)
+            let missed =
+                pairs.points[row] - self.base.point(&body.point(&self.seats[pairs.target[row]]));
+            (
+                missed,
+                (self.base.rotation * body.rotation).transpose() * missed,
+            )
         };
         let (there, turned) = (0..pairs.rows()).map(missed).unzip();
         [there, turned]
@@ -50,23 +54,45 @@ impl Placement {
 
     /// How far another one's targets sit from its own at most, m.
     pub fn tool_apart(&self, other: &Self) -> f64 {
-        self.seats.iter().zip(&other.seats).map(|(own, other)| (own - other).norm()).fold(0.0, f64::max)
+        self.seats
+            .iter()
+            .zip(&other.seats)
+            .map(|(own, other)| (own - other).norm())
+            .fold(0.0, f64::max)
     }
 }
 
 /// The best placement.
 pub(super) fn place(pairs: &PointPairs, number: Option<FreeNumber>) -> Placement {
     let robot = pairs.robot;
-    let bodies: Vec<Pose> = (0..pairs.rows()).map(|row| bodies(robot, pairs.q(row))[robot.joints()]).collect();
+    let bodies: Vec<Pose> = (0..pairs.rows())
+        .map(|row| bodies(robot, pairs.q(row))[robot.joints()])
+        .collect();
     let seats = vec![robot.home().translation; pairs.targets];
-    let model: Vec<Vector3<f64>> = bodies.iter().zip(&pairs.target).map(|(body, target)| body.point(&seats[*target])).collect();
+    let model: Vec<Vector3<f64>> = bodies
+        .iter()
+        .zip(&pairs.target)
+        .map(|(body, target)| body.point(&seats[*target]))
+        .collect();
     let base = align_points(&model, &pairs.points);
     let values = vec![0.0; number.map_or(0, FreeNumber::width)];
-    let problem = PlacementProblem { pairs, bodies, number };
-    let mut now = problem.judged(Placement { base, seats, values, off: Vec::new(), left: 0.0 });
+    let problem = PlacementProblem {
+        pairs,
+        bodies,
+        number,
+    };
+    let mut now = problem.judged(Placement {
+        base,
+        seats,
+        values,
+        off: Vec::new(),
+        left: 0.0,
+    });
     let mut best = now.clone();
     for _ in 0..STEPS {
-        let Some(next) = problem.step(&now).map(|next| problem.judged(next)) else { break };
+        let Some(next) = problem.step(&now).map(|next| problem.judged(next)) else {
+            break;
+        };
         let settled = (now.left - next.left).abs() <= SETTLED * now.left;
         now = next;
         if now.left < best.left {
@@ -88,8 +114,17 @@ struct PlacementProblem<'a, 'b> {
 impl PlacementProblem<'_, '_> {
     fn seen(&self, now: &Placement, row: usize) -> SeenNumber {
         match self.number {
-            Some(number) => number.seen(self.pairs.robot, self.pairs.q(row), &now.values, &now.seats[self.pairs.target[row]]),
-            None => SeenNumber { body: self.bodies[row], shift: Vector3::zeros(), columns: Vec::new() },
+            Some(number) => number.seen(
+                self.pairs.robot,
+                self.pairs.q(row),
+                &now.values,
+                &now.seats[self.pairs.target[row]],
+            ),
+            None => SeenNumber {
+                body: self.bodies[row],
+                shift: Vector3::zeros(),
+                columns: Vec::new(),
+            },
         }
     }
 
@@ -115,21 +150,36 @@ impl PlacementProblem<'_, '_> {
         let width = 6 + targets + now.values.len();
         let mut normal = DMatrix::<f64>::zeros(width, width);
         let mut right = DVector::<f64>::zeros(width);
-        let kept: Vec<usize> = (0..now.off.len()).filter(|row| now.off[*row] <= *TRIM * now.left).collect();
-        let centre = kept.iter().map(|row| self.pairs.points[*row]).sum::<Vector3<f64>>() / kept.len().max(1) as f64;
+        let kept: Vec<usize> = (0..now.off.len())
+            .filter(|row| now.off[*row] <= *TRIM * now.left)
+            .collect();
+        let centre = kept
+            .iter()
+            .map(|row| self.pairs.points[*row])
+            .sum::<Vector3<f64>>()
+            / kept.len().max(1) as f64;
         for row in kept {
             let seen = self.seen(now, row);
             let at = now.base.point(&self.point(now, row, &seen));
             let residual = self.pairs.points[row] - at;
             let turned = now.base.rotation * seen.body.rotation;
-            let block = |first: usize, matrix: Matrix3<f64>| (0..3).map(move |k| (first + k, matrix.column(k).into_owned()));
+            let block = |first: usize, matrix: Matrix3<f64>| {
+                (0..3).map(move |k| (first + k, matrix.column(k).into_owned()))
+            };
             let mut columns: Vec<(usize, Vector3<f64>)> = block(0, -hat(&(at - centre))).collect();
             columns.extend(block(3, Matrix3::identity()));
             columns.extend(block(6 + 3 * self.pairs.target[row], turned));
-            columns.extend(seen.columns.iter().enumerate().map(|(k, c)| (6 + targets + k, now.base.rotation * c)));
+            columns.extend(
+                seen.columns
+                    .iter()
+                    .enumerate()
+                    .map(|(k, c)| (6 + targets + k, now.base.rotation * c)),
+            );
             for (i, a) in &columns {
                 right[*i] += a.dot(&residual);
-                columns.iter().for_each(|(j, b)| normal[(*i, *j)] += a.dot(b));
+                columns
+                    .iter()
+                    .for_each(|(j, b)| normal[(*i, *j)] += a.dot(b));
             }
         }
         let ridge = RIDGE * normal.diagonal().max();
@@ -137,9 +187,28 @@ impl PlacementProblem<'_, '_> {
         let by = normal.cholesky()?.solve(&right);
         let three = |first: usize| Vector3::new(by[first], by[first + 1], by[first + 2]);
         let turn = Rotation3::new(three(0)).into_inner();
-        let base = Pose::new(turn * now.base.rotation, centre + turn * (now.base.translation - centre) + three(3));
-        let seats = now.seats.iter().enumerate().map(|(k, seat)| seat + three(6 + 3 * k)).collect();
-        let values = now.values.iter().enumerate().map(|(k, value)| value + by[6 + targets + k]).collect();
-        Some(Placement { base, seats, values, off: Vec::new(), left: 0.0 })
+        let base = Pose::new(
+            turn * now.base.rotation,
+            centre + turn * (now.base.translation - centre) + three(3),
+        );
+        let seats = now
+            .seats
+            .iter()
+            .enumerate()
+            .map(|(k, seat)| seat + three(6 + 3 * k))
+            .collect();
+        let values = now
+            .values
+            .iter()
+            .enumerate()
+            .map(|(k, value)| value + by[6 + targets + k])
+            .collect();
+        Some(Placement {
+            base,
+            seats,
+            values,
+            off: Vec::new(),
+            left: 0.0,
+        })
     }
 }

@@ -12,18 +12,37 @@ pub(super) struct SignGroup(u64);
 impl SignGroup {
     /// The groups of two joints or more that a robot may have: swivel and roll, pitch, the pitch of the main axes, all, and every two.
     pub fn all(robot: &RobotModel) -> Vec<Self> {
-        let turning: Vec<usize> = (0..robot.joints().min(64)).filter(|joint| robot.is_revolute(*joint)).collect();
-        let pitch = turning.windows(2).find(|pair| robot.is_parallel(pair[0], pair[1])).map(|pair| pair[0]);
-        let of = |choose: &dyn Fn(usize) -> bool| Self::of(turning.iter().copied().filter(|joint| choose(*joint)));
-        let mut out = vec![of(&|joint| robot.joints() == 6 && [0, 3, 5].contains(&joint))];
+        let turning: Vec<usize> = (0..robot.joints().min(64))
+            .filter(|joint| robot.is_revolute(*joint))
+            .collect();
+        let pitch = turning
+            .windows(2)
+            .find(|pair| robot.is_parallel(pair[0], pair[1]))
+            .map(|pair| pair[0]);
+        let of = |choose: &dyn Fn(usize) -> bool| {
+            Self::of(turning.iter().copied().filter(|joint| choose(*joint)))
+        };
+        let mut out = vec![of(&|joint| {
+            robot.joints() == 6 && [0, 3, 5].contains(&joint)
+        })];
         if let Some(pitch) = pitch {
             let is_pitch = |joint: usize| robot.is_parallel(pitch, joint);
-            let wrist = (pitch..robot.joints()).find(|joint| !is_pitch(*joint)).unwrap_or(robot.joints());
-            out.extend([of(&|joint| !is_pitch(joint)), of(&is_pitch), of(&|joint| is_pitch(joint) && joint < wrist)]);
+            let wrist = (pitch..robot.joints())
+                .find(|joint| !is_pitch(*joint))
+                .unwrap_or(robot.joints());
+            out.extend([
+                of(&|joint| !is_pitch(joint)),
+                of(&is_pitch),
+                of(&|joint| is_pitch(joint) && joint < wrist),
+            ]);
         }
         out.push(of(&|_| true));
         let two = |k: usize| turning[k + 1..].iter().map(move |b| (k, *b));
-        out.extend((0..turning.len()).flat_map(two).map(|(k, b)| Self::of([turning[k], b].into_iter())));
+        out.extend(
+            (0..turning.len())
+                .flat_map(two)
+                .map(|(k, b)| Self::of([turning[k], b].into_iter())),
+        );
         let mut all: Vec<Self> = Vec::new();
         for group in out.into_iter().filter(|group| group.0.count_ones() > 1) {
             if !all.contains(&group) {

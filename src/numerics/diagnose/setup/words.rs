@@ -19,12 +19,21 @@ pub(super) struct SetupWords {
 
 impl SetupWords {
     fn of(what: String, mend: String) -> Self {
-        Self { what, mend, scale: 1.0 }
+        Self {
+            what,
+            mend,
+            scale: 1.0,
+        }
     }
 }
 
 /// The words of a set-up error; `values` are those of its own number, `reach` is that of the robot file's arm, m.
-pub(super) fn words(wrong: WrongSetup, robot: &RobotModel, values: &[f64], reach: f64) -> SetupWords {
+pub(super) fn words(
+    wrong: WrongSetup,
+    robot: &RobotModel,
+    values: &[f64],
+    reach: f64,
+) -> SetupWords {
     let joints = robot.joints();
     let list = |of: &dyn Fn(usize) -> String| (0..joints).map(of).collect::<Vec<_>>().join(", ");
     let (what, mend) = match wrong {
@@ -101,7 +110,11 @@ pub(super) fn words(wrong: WrongSetup, robot: &RobotModel, values: &[f64], reach
 }
 
 /// The words of several set-up errors at once; joints that turn the other way have one list of signs.
-pub(super) fn together(wrong: &[WrongSetup], robot: &RobotModel, words: impl Fn(WrongSetup) -> SetupWords) -> Vec<SetupWords> {
+pub(super) fn together(
+    wrong: &[WrongSetup],
+    robot: &RobotModel,
+    words: impl Fn(WrongSetup) -> SetupWords,
+) -> Vec<SetupWords> {
     let signs = |wrong: &WrongSetup| match wrong {
         WrongSetup::Sign(joint) => vec![*joint],
         WrongSetup::Signs(group) => group.joints().collect(),
@@ -109,16 +122,29 @@ pub(super) fn together(wrong: &[WrongSetup], robot: &RobotModel, words: impl Fn(
     };
     let turned: Vec<usize> = wrong.iter().flat_map(signs).collect();
     let twice = |joint: &usize| turned.iter().filter(|other| *other == joint).count() > 1;
-    let reversed: Vec<usize> = (0..robot.joints()).filter(|joint| turned.contains(joint) && !twice(joint)).collect();
-    let others = wrong.iter().filter(|wrong| signs(wrong).is_empty()).map(|wrong| words(*wrong));
+    let reversed: Vec<usize> = (0..robot.joints())
+        .filter(|joint| turned.contains(joint) && !twice(joint))
+        .collect();
+    let others = wrong
+        .iter()
+        .filter(|wrong| signs(wrong).is_empty())
+        .map(|wrong| words(*wrong));
     let (what, mend) = of_signs(&reversed, robot.joints());
-    others.chain((!reversed.is_empty()).then(|| SetupWords::of(what, mend))).collect()
+    others
+        .chain((!reversed.is_empty()).then(|| SetupWords::of(what, mend)))
+        .collect()
 }
 
 /// Joints, from 0, that turn the other way.
 fn of_signs(reversed: &[usize], joints: usize) -> (String, String) {
-    let signs: Vec<&str> = (0..joints).map(|joint| if reversed.contains(&joint) { "-1" } else { "1" }).collect();
-    let (verb, axes) = if reversed.len() == 1 { ("turns", "axis") } else { ("turn", "axes") };
+    let signs: Vec<&str> = (0..joints)
+        .map(|joint| if reversed.contains(&joint) { "-1" } else { "1" })
+        .collect();
+    let (verb, axes) = if reversed.len() == 1 {
+        ("turns", "axis")
+    } else {
+        ("turn", "axes")
+    };
     (
         format!(
             "joint{} {} {verb} the other way than the robot file says",
@@ -134,36 +160,70 @@ fn of_signs(reversed: &[usize], joints: usize) -> (String, String) {
 
 /// Signs, zeros and couplings of all joints.
 fn of_counting(counting: Counting, joints: usize) -> SetupWords {
-    let all: Vec<(usize, CountedJoint)> = counting.joints().iter().copied().enumerate().take(joints).collect();
-    let reversed: Vec<usize> = all.iter().filter(|(_, own)| own.reversed).map(|(joint, _)| *joint).collect();
-    let list = |of: &dyn Fn(&CountedJoint) -> i32| all.iter().map(|(_, own)| of(own).to_string()).collect::<Vec<_>>().join(", ");
+    let all: Vec<(usize, CountedJoint)> = counting
+        .joints()
+        .iter()
+        .copied()
+        .enumerate()
+        .take(joints)
+        .collect();
+    let reversed: Vec<usize> = all
+        .iter()
+        .filter(|(_, own)| own.reversed)
+        .map(|(joint, _)| *joint)
+        .collect();
+    let list = |of: &dyn Fn(&CountedJoint) -> i32| {
+        all.iter()
+            .map(|(_, own)| of(own).to_string())
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
     let (mut what, mut mend) = (Vec::new(), Vec::new());
     if !reversed.is_empty() {
         what.push(of_signs(&reversed, joints).0);
-        mend.push(format!("sign: [{}]", list(&|own| if own.reversed { -1 } else { 1 })));
+        mend.push(format!(
+            "sign: [{}]",
+            list(&|own| if own.reversed { -1 } else { 1 })
+        ));
     }
     let turned = all.iter().filter(|(_, own)| own.quarters != 0);
-    let zeros =
-        turned.map(|(joint, own)| format!("the recording reads {} deg at the zero of joint {}", 90 * own.quarters, joint + 1));
+    let zeros = turned.map(|(joint, own)| {
+        format!(
+            "the recording reads {} deg at the zero of joint {}",
+            90 * own.quarters,
+            joint + 1
+        )
+    });
     what.extend(zeros);
     let in_degrees = what.len() > usize::from(!reversed.is_empty());
     if in_degrees {
         mend.push(format!("zero: [{}]", list(&|own| 90 * own.quarters)));
     }
-    let coupled: Vec<(usize, i32)> =
-        all.iter().filter(|(_, own)| own.coupled != 0).map(|(joint, own)| (joint + 1, own.coupled)).collect();
+    let coupled: Vec<(usize, i32)> = all
+        .iter()
+        .filter(|(_, own)| own.coupled != 0)
+        .map(|(joint, own)| (joint + 1, own.coupled))
+        .collect();
     if !coupled.is_empty() {
         let how = |ratio: i32| if ratio < 0 { "minus" } else { "plus" };
         what.extend(coupled.iter().map(|(joint, ratio)| {
             let (how, by) = (how(*ratio), joint - 1);
             format!("joint {joint} is reported {how} the angle of joint {by}, relative to the horizontal and not to the link before it")
         }));
-        let each: Vec<String> =
-            coupled.iter().map(|(joint, ratio)| format!("{{joint: {joint}, by: {}, ratio: {ratio}}}", joint - 1)).collect();
+        let each: Vec<String> = coupled
+            .iter()
+            .map(|(joint, ratio)| format!("{{joint: {joint}, by: {}, ratio: {ratio}}}", joint - 1))
+            .collect();
         mend.push(format!("coupled: [{}]", each.join(", ")));
     }
     let degrees = if in_degrees { ", in deg" } else { "" };
-    SetupWords::of(what.join(", and "), format!("in `ingest`: `columns: {{q: {{.., {}}}}}`{degrees}", mend.join(", ")))
+    SetupWords::of(
+        what.join(", and "),
+        format!(
+            "in `ingest`: `columns: {{q: {{.., {}}}}}`{degrees}",
+            mend.join(", ")
+        ),
+    )
 }
 
 fn unit_name(unit: &str) -> &'static str {
@@ -179,19 +239,31 @@ fn unit_name(unit: &str) -> &'static str {
 fn of_lengths(unit: usize, reach: f64) -> SetupWords {
     let (factor, read, is) = LENGTHS[unit];
     if (ARMS[0]..=ARMS[1]).contains(&reach) {
-        let what = format!("the points are in {} and were read in {}", unit_name(is), unit_name(read));
+        let what = format!(
+            "the points are in {} and were read in {}",
+            unit_name(is),
+            unit_name(read)
+        );
         let mend = if is == "cm" {
             "export the points in mm; cm cannot be read".into()
         } else {
-            format!("in `ingest`: `columns: {{x: {{.., unit: {is}}}, y: {{.., unit: {is}}}, z: {{.., unit: {is}}}}}`")
+            format!(
+                "in `ingest`: `columns: {{x: {{.., unit: {is}}}, y: {{.., unit: {is}}}, z: {{.., unit: {is}}}}}`"
+            )
         };
         return SetupWords::of(what, mend);
     }
     // As much too small as the points seem too large.
-    let own = LENGTHS.iter().find(|other| (other.0 * factor - 1.0).abs() < 1e-9 && other.2 != "cm");
+    let own = LENGTHS
+        .iter()
+        .find(|other| (other.0 * factor - 1.0).abs() < 1e-9 && other.2 != "cm");
     let (read, is) = own.map_or(("mm", "m"), |own| (own.1, own.2));
     SetupWords {
-        what: format!("the lengths of the robot file are in {} and were read in {}", unit_name(is), unit_name(read)),
+        what: format!(
+            "the lengths of the robot file are in {} and were read in {}",
+            unit_name(is),
+            unit_name(read)
+        ),
         mend: format!("in the robot file: `units: {{length: {is}, ..}}`"),
         scale: 1.0 / factor,
     }
@@ -202,7 +274,10 @@ fn of_order(order: RowOrder) -> SetupWords {
         RowOrder::Shifted(by) => {
             let how = if by < 0 { "ahead of" } else { "behind" };
             (
-                format!("the points are {} {how} their joints", counted(by.unsigned_abs(), "row")),
+                format!(
+                    "the points are {} {how} their joints",
+                    counted(by.unsigned_abs(), "row")
+                ),
                 "in `ingest`: `join: {by: id}` or `join: {by: time}`, or remove the rows that only one file has",
             )
         }
@@ -231,7 +306,11 @@ fn of_number(number: FreeNumber, values: &[f64], joints: usize) -> SetupWords {
                 joint + 2,
                 displacement(values)
             ),
-            format!("in the robot file: look for a typing error between joints {} and {}", joint + 1, joint + 2),
+            format!(
+                "in the robot file: look for a typing error between joints {} and {}",
+                joint + 1,
+                joint + 2
+            ),
         ),
         FreeNumber::Axis(joint) => (
             format!(
@@ -239,20 +318,31 @@ fn of_number(number: FreeNumber, values: &[f64], joints: usize) -> SetupWords {
                 joint + 1,
                 displacement(values)
             ),
-            format!("in the robot file: look for a typing error in the point of joint {}'s axis", joint + 1),
+            format!(
+                "in the robot file: look for a typing error in the point of joint {}'s axis",
+                joint + 1
+            ),
         ),
         FreeNumber::Zero(joint) => {
             let degrees = values.first().copied().unwrap_or_default().to_degrees();
             let quarters = (-degrees / 90.0).round() as i32;
             let rest = -degrees - 90.0 * f64::from(quarters);
             if quarters != 0 && rest.abs() < *QUARTERLY && joints <= MOST {
-                let SetupWords { what, mend, .. } = of_counting(Counting::of_a_zero(joint, quarters), joints);
+                let SetupWords { what, mend, .. } =
+                    of_counting(Counting::of_a_zero(joint, quarters), joints);
                 let what = format!("{what}, and is {} deg off besides", figure(rest, 2));
                 return SetupWords::of(what, mend);
             }
             (
-                format!("the zero of joint {} is off by {} deg, more than manufacture allows", joint + 1, figure(degrees, 2)),
-                format!("master joint {} again, or correct its zero in the robot file", joint + 1),
+                format!(
+                    "the zero of joint {} is off by {} deg, more than manufacture allows",
+                    joint + 1,
+                    figure(degrees, 2)
+                ),
+                format!(
+                    "master joint {} again, or correct its zero in the robot file",
+                    joint + 1
+                ),
             )
         }
     };
@@ -262,13 +352,22 @@ fn of_number(number: FreeNumber, values: &[f64], joints: usize) -> SetupWords {
 /// Base axes that matter, mm.
 fn displacement(values: &[f64]) -> String {
     let largest = values.iter().map(|value| value.abs()).fold(0.0, f64::max);
-    let axes = values.iter().zip(["x", "y", "z"]).filter(|(value, _)| value.abs() > *SMALL * largest);
-    let axes: Vec<String> = axes.map(|(value, axis)| format!("{axis} {:+.1} mm", value * 1e3)).collect();
+    let axes = values
+        .iter()
+        .zip(["x", "y", "z"])
+        .filter(|(value, _)| value.abs() > *SMALL * largest);
+    let axes: Vec<String> = axes
+        .map(|(value, axis)| format!("{axis} {:+.1} mm", value * 1e3))
+        .collect();
     format!("{} (zero pose, base axes)", axes.join(", "))
 }
 
 /// A length in mm.
 pub(super) fn mm(metres: f64) -> String {
     let mm = metres * 1e3;
-    if mm < 99.5 { format!("{} mm", figure(mm, 1)) } else { format!("{mm:.0} mm") }
+    if mm < 99.5 {
+        format!("{} mm", figure(mm, 1))
+    } else {
+        format!("{mm:.0} mm")
+    }
 }

@@ -58,7 +58,9 @@ impl WrongSetup {
     /// All that this robot and these rows, in their order, may have.
     pub fn all(pairs: &PointPairs) -> Vec<Self> {
         let robot = pairs.robot;
-        let turning: Vec<usize> = (0..robot.joints()).filter(|joint| robot.is_revolute(*joint)).collect();
+        let turning: Vec<usize> = (0..robot.joints())
+            .filter(|joint| robot.is_revolute(*joint))
+            .collect();
         let mut out: Vec<Self> = (0..LENGTHS.len()).map(Self::PointUnit).collect();
         out.extend([Self::InRadians, Self::InDegrees]);
         out.extend(turning.iter().map(|joint| Self::Sign(*joint)));
@@ -66,14 +68,38 @@ impl WrongSetup {
         out.extend(SignGroup::all(robot).into_iter().map(Self::Signs));
         out.push(Self::Mirrored);
         let pairs_from = |k: usize| turning[k + 1..].iter().map(move |b| (k, b));
-        out.extend((0..turning.len()).flat_map(pairs_from).map(|(k, b)| Self::Exchanged(turning[k], *b)));
-        out.extend(turning.iter().flat_map(|joint| [1, -1, 2].map(|quarters| Self::Zero(*joint, quarters))));
-        let parallel = turning.windows(2).filter(|pair| pair[1] == pair[0] + 1 && robot.is_parallel(pair[0], pair[1]));
+        out.extend(
+            (0..turning.len())
+                .flat_map(pairs_from)
+                .map(|(k, b)| Self::Exchanged(turning[k], *b)),
+        );
+        out.extend(
+            turning
+                .iter()
+                .flat_map(|joint| [1, -1, 2].map(|quarters| Self::Zero(*joint, quarters))),
+        );
+        let parallel = turning
+            .windows(2)
+            .filter(|pair| pair[1] == pair[0] + 1 && robot.is_parallel(pair[0], pair[1]));
         out.extend(parallel.clone().flat_map(|pair| {
-            let against = if robot.axis(pair[0]).dot(robot.axis(pair[1])) > 0.0 { -1 } else { 1 };
-            [1, -1].map(|quarters| Self::Zeros { joint: pair[0], quarters, next: against * quarters })
+            let against = if robot.axis(pair[0]).dot(robot.axis(pair[1])) > 0.0 {
+                -1
+            } else {
+                1
+            };
+            [1, -1].map(|quarters| Self::Zeros {
+                joint: pair[0],
+                quarters,
+                next: against * quarters,
+            })
         }));
-        out.extend(parallel.flat_map(|pair| [1.0, -1.0].map(|sign| Self::Coupled { moved: pair[1], by: pair[0], sign })));
+        out.extend(parallel.flat_map(|pair| {
+            [1.0, -1.0].map(|sign| Self::Coupled {
+                moved: pair[1],
+                by: pair[0],
+                sign,
+            })
+        }));
         out.extend(RowOrder::all(pairs).into_iter().map(Self::Order));
         out.extend(FreeNumber::all(robot).into_iter().map(Self::Number));
         out
@@ -93,28 +119,48 @@ impl WrongSetup {
 
     /// The number of the robot file that is to be found.
     pub fn number(self) -> Option<FreeNumber> {
-        if let Self::Number(number) = self { Some(number) } else { None }
+        if let Self::Number(number) = self {
+            Some(number)
+        } else {
+            None
+        }
     }
 
     pub fn order(self) -> Option<RowOrder> {
-        if let Self::Order(order) = self { Some(order) } else { None }
+        if let Self::Order(order) = self {
+            Some(order)
+        } else {
+            None
+        }
     }
 
     /// The recording without it; the order of rows and numbers of the robot file are mended elsewhere.
     pub fn mended<'a>(self, pairs: &PointPairs<'a>) -> PointPairs<'a> {
         let robot = pairs.robot;
         let scaled = |factor: f64| {
-            pairs.with_joints(|q| (0..q.len()).filter(|joint| robot.is_revolute(*joint)).for_each(|joint| q[joint] *= factor))
+            pairs.with_joints(|q| {
+                (0..q.len())
+                    .filter(|joint| robot.is_revolute(*joint))
+                    .for_each(|joint| q[joint] *= factor)
+            })
         };
         match self {
             Self::PointUnit(unit) => pairs.with_points(|point| point * LENGTHS[unit].0),
             Self::InRadians => scaled(180.0 / PI),
             Self::InDegrees => scaled(PI / 180.0),
             Self::Sign(joint) => pairs.with_joints(|q| q[joint] = -q[joint]),
-            Self::Signs(group) => pairs.with_joints(|q| group.joints().for_each(|joint| q[joint] = -q[joint])),
+            Self::Signs(group) => {
+                pairs.with_joints(|q| group.joints().for_each(|joint| q[joint] = -q[joint]))
+            }
             Self::Exchanged(a, b) => pairs.with_joints(|q| q.swap(a, b)),
-            Self::Zero(joint, quarters) => pairs.with_joints(|q| q[joint] -= f64::from(quarters) * FRAC_PI_2),
-            Self::Zeros { joint, quarters, next } => pairs.with_joints(|q| {
+            Self::Zero(joint, quarters) => {
+                pairs.with_joints(|q| q[joint] -= f64::from(quarters) * FRAC_PI_2)
+            }
+            Self::Zeros {
+                joint,
+                quarters,
+                next,
+            } => pairs.with_joints(|q| {
                 q[joint] -= f64::from(quarters) * FRAC_PI_2;
                 q[joint + 1] -= f64::from(next) * FRAC_PI_2;
             }),

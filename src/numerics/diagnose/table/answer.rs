@@ -8,7 +8,9 @@ use super::scan::{CauseTable, CellScan};
 use super::search::without;
 use super::state::{CellColumns, Component, KnownState};
 use crate::criteria::cells::{BENDS, MISLED, NU, RIVAL};
-use crate::diagnose::types::{ExplainedCell, ExplainedShare, Located, Probabilities, RivalCause, SpectrumLine};
+use crate::diagnose::types::{
+    ExplainedCell, ExplainedShare, Located, Probabilities, RivalCause, SpectrumLine,
+};
 use crate::effect::{Basis, Clock, Form, Place, Variable, names};
 use std::collections::BTreeMap;
 
@@ -49,7 +51,11 @@ pub(crate) struct Answer {
 /// The name of a component.
 fn told(own: &Component, cell: &CauseCell) -> &'static str {
     let bends = cell.name == names::JOINT_COMPLIANCE && own.shape.is_bent;
-    if bends { names::JOINT_HARDENING } else { cell.name }
+    if bends {
+        names::JOINT_HARDENING
+    } else {
+        cell.name
+    }
 }
 
 impl CauseTable<'_, '_> {
@@ -68,7 +74,10 @@ impl CauseTable<'_, '_> {
         let mut groups: BTreeMap<(&'static str, Place), Vec<usize>> = BTreeMap::new();
         for (i, own) in components.iter().enumerate() {
             let cell = &self.cells[own.cell];
-            groups.entry((cell_of(cell.name), cell.place)).or_default().push(i);
+            groups
+                .entry((cell_of(cell.name), cell.place))
+                .or_default()
+                .push(i);
         }
         let found = groups.into_values().map(|members| {
             let mut found = self.found(components, &members, state.kappa);
@@ -76,10 +85,13 @@ impl CauseTable<'_, '_> {
             found
         });
         let found = found.collect();
-        let next = scan.best().filter(|best| scan.log_odds[*best] > 0.0).map(|best| {
-            let cell = &self.cells[best];
-            format!("most like {} at {}", cell.name, cell.place)
-        });
+        let next = scan
+            .best()
+            .filter(|best| scan.log_odds[*best] > 0.0)
+            .map(|best| {
+                let cell = &self.cells[best];
+                format!("most like {} at {}", cell.name, cell.place)
+            });
         let hidden = self.hidden(&state, &all);
         Answer {
             found,
@@ -99,8 +111,13 @@ impl CauseTable<'_, '_> {
         let state = self.state(&rest, Some(kappa));
         let with = self.state(&components.iter().collect::<Vec<_>>(), Some(kappa));
         // The strongest of several stands for its finding; further ones of its cell add to it.
-        let log_of = |i: usize, state: &KnownState, rest: &[&Component]| self.log_evidence(&components[i], state, rest);
-        let strongest = members.iter().copied().max_by(|a, b| log_of(*a, &state, &rest).total_cmp(&log_of(*b, &state, &rest)));
+        let log_of = |i: usize, state: &KnownState, rest: &[&Component]| {
+            self.log_evidence(&components[i], state, rest)
+        };
+        let strongest = members
+            .iter()
+            .copied()
+            .max_by(|a, b| log_of(*a, &state, &rest).total_cmp(&log_of(*b, &state, &rest)));
         let main = strongest.unwrap_or(members[0]);
         let cell = components[main].cell;
         let own = log_of(main, &state, &rest);
@@ -115,11 +132,19 @@ impl CauseTable<'_, '_> {
         let mut scan = self.scan_alike(&components[main], &state, &rest, 8, &[cell]);
         // Others are asked what the strongest does: further ones of its cell add to any of them.
         scan.log_odds[cell] = self.cells[cell].log_prior + own;
-        let (effect, place) = (told(&components[main], &self.cells[cell]), self.cells[cell].place);
+        let (effect, place) = (
+            told(&components[main], &self.cells[cell]),
+            self.cells[cell].place,
+        );
         let (probabilities, rivals) = self.weigh((effect, place), cell, &components[main], &scan);
         let mut bounds = Vec::new();
         for i in members {
-            bounds.extend(components[*i].forms.iter().map(|_| (components[*i].group.positive, components[*i].group.largest)));
+            bounds.extend(
+                components[*i]
+                    .forms
+                    .iter()
+                    .map(|_| (components[*i].group.positive, components[*i].group.largest)),
+            );
         }
         let gain = (state.rows.square - with.rows.square).max(0.0);
         let whole = *NU + state.rows.square;
@@ -146,7 +171,14 @@ impl CauseTable<'_, '_> {
         component: &Component,
         scan: &CellScan,
     ) -> (Probabilities, Vec<RivalCause>) {
-        let whole = log_sum(&scan.log_odds.iter().copied().chain([0.0]).collect::<Vec<_>>());
+        let whole = log_sum(
+            &scan
+                .log_odds
+                .iter()
+                .copied()
+                .chain([0.0])
+                .collect::<Vec<_>>(),
+        );
         let mut shares: BTreeMap<(&'static str, Place), f64> = BTreeMap::new();
         for (k, cell) in self.cells.iter().enumerate() {
             let probability = (scan.log_odds[k] - whole).exp();
@@ -161,9 +193,15 @@ impl CauseTable<'_, '_> {
             };
             let bent = scan.closely.get(&k).map_or(0.0, bends);
             // What was refined stands for its cell.
-            let bent = if k == own && component.shape.is_bent { bent.max(0.9) } else { bent };
+            let bent = if k == own && component.shape.is_bent {
+                bent.max(0.9)
+            } else {
+                bent
+            };
             if cell.name == names::JOINT_COMPLIANCE {
-                *shares.entry((names::JOINT_HARDENING, cell.place)).or_default() += bent * probability;
+                *shares
+                    .entry((names::JOINT_HARDENING, cell.place))
+                    .or_default() += bent * probability;
                 *shares.entry((cell.name, cell.place)).or_default() += (1.0 - bent) * probability;
             } else {
                 *shares.entry((cell.name, cell.place)).or_default() += probability;
@@ -171,8 +209,15 @@ impl CauseTable<'_, '_> {
         }
         let sound = 1.0 - *MISLED;
         let name = sound * shares.get(&(effect, place)).copied().unwrap_or(0.0);
-        let at_place = sound * shares.iter().filter(|(key, _)| key.1 == place).map(|(_, share)| share).sum::<f64>();
-        let rivals = shares.iter().filter(|(key, share)| **key != (effect, place) && **share > *RIVAL);
+        let at_place = sound
+            * shares
+                .iter()
+                .filter(|(key, _)| key.1 == place)
+                .map(|(_, share)| share)
+                .sum::<f64>();
+        let rivals = shares
+            .iter()
+            .filter(|(key, share)| **key != (effect, place) && **share > *RIVAL);
         let rival = |((other, at), share): (&(&'static str, Place), &f64)| RivalCause {
             effect: other,
             place: *at,
@@ -182,7 +227,14 @@ impl CauseTable<'_, '_> {
         let mut rivals: Vec<RivalCause> = rivals.map(rival).collect();
         rivals.sort_by(|a, b| b.probability.total_cmp(&a.probability));
         let of_rivals: f64 = rivals.iter().map(|rival| rival.probability).sum();
-        (Probabilities { name, place: at_place, none: (1.0 - name - of_rivals).max(0.0) }, rivals)
+        (
+            Probabilities {
+                name,
+                place: at_place,
+                none: (1.0 - name - of_rivals).max(0.0),
+            },
+            rivals,
+        )
     }
 
     /// What each place, variable and order could explain of what a state leaves.
@@ -197,20 +249,47 @@ impl CauseTable<'_, '_> {
             state.shapes(block, &across, self.first[k], |group, shape, found| {
                 let seen = &block.groups[group];
                 let share = found.fit / state.rows.square.max(f64::MIN_POSITIVE);
-                let parameters = seen.group.shapes[shape].shares.iter().filter(|share| **share > 0.0).count();
+                let parameters = seen.group.shapes[shape]
+                    .shares
+                    .iter()
+                    .filter(|share| **share > 0.0)
+                    .count();
                 let delta_bic = 2.0 * (found.log + cell.log_prior);
-                let entry = |by, name: String| ExplainedShare { by, name, share, parameters, delta_bic, effect: cell.name };
+                let entry = |by, name: String| ExplainedShare {
+                    by,
+                    name,
+                    share,
+                    parameters,
+                    delta_bic,
+                    effect: cell.name,
+                };
                 let form = &seen.group.forms[0];
                 let follows = form.follows(cell.place);
                 let explains = self.frame.size(found.fit) * state.kappa;
-                let new = ExplainedCell { place: cell.place, follows, explains, delta_bic, effect: cell.name };
-                let at = cells.entry((cell.place, follows)).or_insert_with(|| new.clone());
+                let new = ExplainedCell {
+                    place: cell.place,
+                    follows,
+                    explains,
+                    delta_bic,
+                    effect: cell.name,
+                };
+                let at = cells
+                    .entry((cell.place, follows))
+                    .or_insert_with(|| new.clone());
                 if new.delta_bic > at.delta_bic {
                     *at = new;
                 }
-                let variables: Vec<String> = form.variables().into_iter().map(|of| clock.named(of)).collect();
-                let variable = (!variables.is_empty()).then(|| ("variable", variables.join(" and ")));
-                for (by, name) in [("place", cell.place.to_string())].into_iter().chain(variable) {
+                let variables: Vec<String> = form
+                    .variables()
+                    .into_iter()
+                    .map(|of| clock.named(of))
+                    .collect();
+                let variable =
+                    (!variables.is_empty()).then(|| ("variable", variables.join(" and ")));
+                for (by, name) in [("place", cell.place.to_string())]
+                    .into_iter()
+                    .chain(variable)
+                {
                     let new = entry(by, name.clone());
                     let at = best.entry((by, name)).or_insert_with(|| new.clone());
                     if new.delta_bic > at.delta_bic {
@@ -224,25 +303,48 @@ impl CauseTable<'_, '_> {
             });
         }
         let mut shares: Vec<ExplainedShare> = best.into_values().collect();
-        shares.sort_by(|a, b| a.by.cmp(b.by).then(b.share.total_cmp(&a.share)).then(a.name.cmp(&b.name)));
-        let spectrum = lines.into_iter().map(|((joint, motor, order), share)| SpectrumLine { joint, motor, order, share });
-        Located { shares, cells: cells.into_values().collect(), spectrum: spectrum.collect() }
+        shares.sort_by(|a, b| {
+            a.by.cmp(b.by)
+                .then(b.share.total_cmp(&a.share))
+                .then(a.name.cmp(&b.name))
+        });
+        let spectrum = lines
+            .into_iter()
+            .map(|((joint, motor, order), share)| SpectrumLine {
+                joint,
+                motor,
+                order,
+                share,
+            });
+        Located {
+            shares,
+            cells: cells.into_values().collect(),
+            spectrum: spectrum.collect(),
+        }
     }
 
     /// Standard errors of forms that geometry may hide.
     fn hidden(&self, state: &KnownState, components: &[&Component]) -> Vec<(Form, f64)> {
         let mut out = Vec::new();
         for cell in self.cells.iter().filter(|cell| cell.is_named()) {
-            let super::cell::Shapes::Listed(groups) = &cell.shapes else { continue };
+            let super::cell::Shapes::Listed(groups) = &cell.shapes else {
+                continue;
+            };
             for group in groups {
                 let [form] = &group.forms[..] else { continue };
-                if form.cause().hidden(form, self.survey.robot).is_none() || components.iter().any(|own| own.forms.contains(form))
+                if form.cause().hidden(form, self.survey.robot).is_none()
+                    || components.iter().any(|own| own.forms.contains(form))
                 {
                     continue;
                 }
                 let block = CellColumns::of(vec![group.clone()], self.frame);
                 let across = self.across_block(&block, state, components);
-                out.extend(state.errors(&block, &across).first().map(|error| (form.clone(), *error)));
+                out.extend(
+                    state
+                        .errors(&block, &across)
+                        .first()
+                        .map(|error| (form.clone(), *error)),
+                );
             }
         }
         out
@@ -251,14 +353,28 @@ impl CauseTable<'_, '_> {
 
 /// Probability that nothing more is there.
 pub(super) fn nothing(scan: &CellScan) -> f64 {
-    (-log_sum(&scan.log_odds.iter().copied().chain([0.0]).collect::<Vec<_>>())).exp()
+    (-log_sum(
+        &scan
+            .log_odds
+            .iter()
+            .copied()
+            .chain([0.0])
+            .collect::<Vec<_>>(),
+    ))
+    .exp()
 }
 
 /// The joint, side of the gear and order of a pure sine and cosine of a joint's or its motor's angle at that joint.
 fn wave(form: &Form) -> Option<(usize, bool, u32)> {
     let term = form.term()?;
     let (joint, of) = term.of_one()?;
-    let Basis::Wave { order, overtone: false } = term.basis() else { return None };
+    let Basis::Wave {
+        order,
+        overtone: false,
+    } = term.basis()
+    else {
+        return None;
+    };
     let motor = of == Variable::Motor { joint };
     (motor || of == Variable::Angle { joint }).then_some((joint, motor, order))
 }

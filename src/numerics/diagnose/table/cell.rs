@@ -59,7 +59,11 @@ pub(super) struct FreeShape {
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Over {
     /// A line or a curve of so many cosines, fewer at first; down to this many of the correlation lengths.
-    Curve { count: usize, first: usize, lengths: usize },
+    Curve {
+        count: usize,
+        first: usize,
+        lengths: usize,
+    },
     /// A line alone.
     Line,
     /// A step at any time between rows.
@@ -70,7 +74,12 @@ pub(super) enum Over {
 
 impl CauseCell {
     /// Its groups of shapes; all of them if `closely`.
-    pub fn groups(&self, survey: &Survey, values: &dyn Fn(Variable) -> Option<Vec<f64>>, closely: bool) -> Vec<ShapeGroup> {
+    pub fn groups(
+        &self,
+        survey: &Survey,
+        values: &dyn Fn(Variable) -> Option<Vec<f64>>,
+        closely: bool,
+    ) -> Vec<ShapeGroup> {
         match &self.shapes {
             Shapes::Listed(groups) if closely => with_all_steps(groups, survey),
             Shapes::Listed(groups) => groups.clone(),
@@ -94,8 +103,17 @@ impl CauseCell {
 impl ShapeGroup {
     /// A single form, all of its columns alike.
     pub fn of(form: Form, log_weight: f64) -> Self {
-        let shape = CellShape { shares: Vec::new(), log_weight, is_bent: false };
-        Self { forms: vec![form], shapes: vec![shape], positive: false, largest: f64::INFINITY }
+        let shape = CellShape {
+            shares: Vec::new(),
+            log_weight,
+            is_bent: false,
+        };
+        Self {
+            forms: vec![form],
+            shapes: vec![shape],
+            positive: false,
+            largest: f64::INFINITY,
+        }
     }
 }
 
@@ -106,40 +124,81 @@ impl FreeShape {
 
     /// The same with other numbers in its variables (a time, a limit, a direction); steps halve with the level. Empty where they have none.
     pub fn near(&self, level: i32) -> Vec<Self> {
-        let first = near(self.of, level).into_iter().map(|of| Self { of, ..*self });
-        let Over::Product(other) = self.over else { return first.collect() };
-        first.chain(near(other, level).into_iter().map(|other| Self { over: Over::Product(other), ..*self })).collect()
+        let first = near(self.of, level)
+            .into_iter()
+            .map(|of| Self { of, ..*self });
+        let Over::Product(other) = self.over else {
+            return first.collect();
+        };
+        first
+            .chain(near(other, level).into_iter().map(|other| Self {
+                over: Over::Product(other),
+                ..*self
+            }))
+            .collect()
     }
 
     /// Its curves at all correlation lengths.
     pub fn curves(&self, values: &dyn Fn(Variable) -> Option<Vec<f64>>) -> Vec<ShapeGroup> {
-        let (Over::Curve { count, lengths, .. }, Some(values)) = (self.over, values(self.of)) else { return Vec::new() };
+        let (Over::Curve { count, lengths, .. }, Some(values)) = (self.over, values(self.of))
+        else {
+            return Vec::new();
+        };
         let [low, high] = support(&values);
-        let shape = |shares| CellShape { shares, log_weight: 0.0, is_bent: false };
+        let shape = |shares| CellShape {
+            shares,
+            log_weight: 0.0,
+            is_bent: false,
+        };
         vec![ShapeGroup {
             forms: vec![self.term(Law::new(self.of, Basis::Cosines { low, high, count }))],
-            shapes: matern(count, lengths, self.motion).into_iter().map(shape).collect(),
+            shapes: matern(count, lengths, self.motion)
+                .into_iter()
+                .map(shape)
+                .collect(),
             positive: false,
             largest: f64::INFINITY,
         }]
     }
 
-    pub fn groups(&self, survey: &Survey, values: &dyn Fn(Variable) -> Option<Vec<f64>>, closely: bool) -> Vec<ShapeGroup> {
+    pub fn groups(
+        &self,
+        survey: &Survey,
+        values: &dyn Fn(Variable) -> Option<Vec<f64>>,
+        closely: bool,
+    ) -> Vec<ShapeGroup> {
         let fields = fields(self.motion);
         match self.over {
             Over::Step => {
-                let times: Vec<f64> = if closely { survey.boundaries.clone() } else { survey.changes(*STEPS).collect() };
+                let times: Vec<f64> = if closely {
+                    survey.boundaries.clone()
+                } else {
+                    survey.changes(*STEPS).collect()
+                };
                 let log_weight = -(times.len().max(1) as f64).ln();
                 let form = |at| self.term(Law::new(self.of, Basis::After { at }));
-                times.into_iter().map(|at| ShapeGroup::of(form(at), log_weight)).collect()
+                times
+                    .into_iter()
+                    .map(|at| ShapeGroup::of(form(at), log_weight))
+                    .collect()
             }
             Over::Line => {
-                let Some(line) = values(self.of).and_then(|values| line(&values)) else { return Vec::new() };
+                let Some(line) = values(self.of).and_then(|values| line(&values)) else {
+                    return Vec::new();
+                };
                 vec![ShapeGroup::of(self.term(Law::new(self.of, line)), 0.0)]
             }
-            Over::Curve { count, first, lengths } => {
-                let Some(values) = values(self.of) else { return Vec::new() };
-                let Some(line) = line(&values) else { return Vec::new() };
+            Over::Curve {
+                count,
+                first,
+                lengths,
+            } => {
+                let Some(values) = values(self.of) else {
+                    return Vec::new();
+                };
+                let Some(line) = line(&values) else {
+                    return Vec::new();
+                };
                 let line = self.term(Law::new(self.of, line));
                 if has_few(&values) {
                     return vec![ShapeGroup::of(line, 0.0)];
@@ -150,30 +209,51 @@ impl FreeShape {
                 let lengths = if closely { lengths } else { lengths.min(2) };
                 vec![ShapeGroup {
                     forms: vec![line, curve],
-                    shapes: line_and_curve(fields, self.motion, &matern(count, lengths, self.motion), closely && lengths > 3),
+                    shapes: line_and_curve(
+                        fields,
+                        self.motion,
+                        &matern(count, lengths, self.motion),
+                        closely && lengths > 3,
+                    ),
                     positive: false,
                     largest: f64::INFINITY,
                 }]
             }
             Over::Product(other) => {
                 let factors = [self.of, other].map(|of| {
-                    values(of).and_then(|values| factor(&values, if closely { EACH[fields.clamp(1, 3) - 1] } else { *ROUGHLY }))
+                    values(of).and_then(|values| {
+                        factor(
+                            &values,
+                            if closely {
+                                EACH[fields.clamp(1, 3) - 1]
+                            } else {
+                                *ROUGHLY
+                            },
+                        )
+                    })
                 });
-                let [Some(a), Some(b)] = factors else { return Vec::new() };
+                let [Some(a), Some(b)] = factors else {
+                    return Vec::new();
+                };
                 let form = self.term(Law::new(self.of, a).times(other, b));
                 let spectrum = |basis: Basis, length: f64| -> Vec<f64> {
                     match basis {
                         Basis::Straight { .. } => vec![0.5, 0.5],
                         basis => {
                             let curve = density(basis.count() - 1, length);
-                            std::iter::once(0.5).chain(curve.into_iter().map(|share| 0.5 * share)).collect()
+                            std::iter::once(0.5)
+                                .chain(curve.into_iter().map(|share| 0.5 * share))
+                                .collect()
                         }
                     }
                 };
                 let lengths = &LENGTHS[..2];
                 let shape = |length: f64| {
                     let [first, second] = [a, b].map(|basis| spectrum(basis, length));
-                    let mut shares: Vec<f64> = first.iter().flat_map(|x| second.iter().map(move |y| x * y)).collect();
+                    let mut shares: Vec<f64> = first
+                        .iter()
+                        .flat_map(|x| second.iter().map(move |y| x * y))
+                        .collect();
                     // The constant is geometry.
                     shares[0] = 0.0;
                     let sum: f64 = shares.iter().sum();
@@ -185,7 +265,12 @@ impl FreeShape {
                     }
                 };
                 let shapes = lengths.iter().copied().map(shape).collect();
-                vec![ShapeGroup { forms: vec![form], shapes, positive: false, largest: f64::INFINITY }]
+                vec![ShapeGroup {
+                    forms: vec![form],
+                    shapes,
+                    positive: false,
+                    largest: f64::INFINITY,
+                }]
             }
         }
     }
@@ -199,22 +284,43 @@ fn near(of: Variable, level: i32) -> Vec<Variable> {
         let along = Vector3::from(along);
         let across = along.cross(&Vector3::ith(along.iamin(), 1.0)).normalize();
         let angle = 0.4 * step;
-        [across, along.cross(&across)].into_iter().flat_map(move |across| {
-            [angle, -angle].map(|angle| (along * libm::cos(angle) + across * libm::sin(angle)).normalize().into())
-        })
+        [across, along.cross(&across)]
+            .into_iter()
+            .flat_map(move |across| {
+                [angle, -angle].map(|angle| {
+                    (along * libm::cos(angle) + across * libm::sin(angle))
+                        .normalize()
+                        .into()
+                })
+            })
     };
     match of {
-        Variable::Recent { joint, time } => scales.map(|scale| Variable::Recent { joint, time: time * scale }).to_vec(),
-        Variable::Stretch { joint, limit } => scales.map(|scale| Variable::Stretch { joint, limit: limit * scale }).to_vec(),
-        Variable::Position { along } => turned(along).map(|along| Variable::Position { along }).collect(),
-        Variable::Sighted { along } => turned(along).map(|along| Variable::Sighted { along }).collect(),
+        Variable::Recent { joint, time } => scales
+            .map(|scale| Variable::Recent {
+                joint,
+                time: time * scale,
+            })
+            .to_vec(),
+        Variable::Stretch { joint, limit } => scales
+            .map(|scale| Variable::Stretch {
+                joint,
+                limit: limit * scale,
+            })
+            .to_vec(),
+        Variable::Position { along } => turned(along)
+            .map(|along| Variable::Position { along })
+            .collect(),
+        Variable::Sighted { along } => turned(along)
+            .map(|along| Variable::Sighted { along })
+            .collect(),
         _ => Vec::new(),
     }
 }
 
 /// Whether a form steps at a time.
 fn steps(form: &Form) -> bool {
-    matches!(form.term().map(Term::basis), Some(Basis::After { .. })) && form.variables() == [Variable::Time]
+    matches!(form.term().map(Term::basis), Some(Basis::After { .. }))
+        && form.variables() == [Variable::Time]
 }
 
 /// Groups with their steps at every time between rows.
@@ -223,15 +329,28 @@ fn with_all_steps(groups: &[ShapeGroup], survey: &Survey) -> Vec<ShapeGroup> {
         return groups.to_vec();
     }
     let mut out: Vec<ShapeGroup> = groups.to_vec();
-    let mut known: Vec<Form> = groups.iter().flat_map(|group| group.forms.iter().cloned()).collect();
+    let mut known: Vec<Form> = groups
+        .iter()
+        .flat_map(|group| group.forms.iter().cloned())
+        .collect();
     for group in groups {
-        for near in group.forms[0].near(survey, 0).into_iter().filter(|near| !known.contains(near)).collect::<Vec<_>>() {
-            out.push(ShapeGroup { forms: vec![near.clone()], ..group.clone() });
+        for near in group.forms[0]
+            .near(survey, 0)
+            .into_iter()
+            .filter(|near| !known.contains(near))
+            .collect::<Vec<_>>()
+        {
+            out.push(ShapeGroup {
+                forms: vec![near.clone()],
+                ..group.clone()
+            });
             known.push(near);
         }
     }
     let more = (groups.len() as f64 / out.len() as f64).ln();
-    out.iter_mut().flat_map(|group| &mut group.shapes).for_each(|shape| shape.log_weight += more);
+    out.iter_mut()
+        .flat_map(|group| &mut group.shapes)
+        .for_each(|shape| shape.log_weight += more);
     out
 }
 
@@ -247,35 +366,80 @@ pub(super) fn not_quite_straight(
         return None;
     }
     let [low, high] = support(values);
-    let curve = Term::new(&Unknown, motion, Law::new(of, Basis::Cosines { low, high, count: *BENDING }));
+    let curve = Term::new(
+        &Unknown,
+        motion,
+        Law::new(
+            of,
+            Basis::Cosines {
+                low,
+                high,
+                count: *BENDING,
+            },
+        ),
+    );
     let fields = fields(motion);
     let mut shapes = Vec::new();
     for curve in matern(*BENDING, 3, motion) {
         for share in *BENT {
             let all = 1.0 + share * share;
             let line = std::iter::repeat_n(1.0 / (fields as f64 * all), fields);
-            let shares = line.chain(curve.iter().map(|own| own * share * share / all)).collect();
-            shapes.push(CellShape { shares, log_weight: log_weight - 6.0_f64.ln(), is_bent: true });
+            let shares = line
+                .chain(curve.iter().map(|own| own * share * share / all))
+                .collect();
+            shapes.push(CellShape {
+                shares,
+                log_weight: log_weight - 6.0_f64.ln(),
+                is_bent: true,
+            });
         }
     }
-    Some(ShapeGroup { forms: vec![line, curve.into()], shapes, positive: false, largest: f64::INFINITY })
+    Some(ShapeGroup {
+        forms: vec![line, curve.into()],
+        shapes,
+        positive: false,
+        largest: f64::INFINITY,
+    })
 }
 
 /// A line, curves of some correlation lengths, and lines that are not quite straight.
-fn line_and_curve(line: usize, motion: Motion, lengths: &[Vec<f64>], rough: bool) -> Vec<CellShape> {
+fn line_and_curve(
+    line: usize,
+    motion: Motion,
+    lengths: &[Vec<f64>],
+    rough: bool,
+) -> Vec<CellShape> {
     let curve = lengths[0].len();
     let half = 0.5_f64.ln();
-    let straight = std::iter::repeat_n(1.0 / line as f64, line).chain(std::iter::repeat_n(0.0, curve)).collect();
-    let mut out = vec![CellShape { shares: straight, log_weight: half, is_bent: false }];
+    let straight = std::iter::repeat_n(1.0 / line as f64, line)
+        .chain(std::iter::repeat_n(0.0, curve))
+        .collect();
+    let mut out = vec![CellShape {
+        shares: straight,
+        log_weight: half,
+        is_bent: false,
+    }];
     let count = (lengths.len() as f64).ln();
     for own in lengths {
-        let alone = std::iter::repeat_n(0.0, line).chain(own.iter().copied()).collect();
-        out.push(CellShape { shares: alone, log_weight: half - count, is_bent: false });
+        let alone = std::iter::repeat_n(0.0, line)
+            .chain(own.iter().copied())
+            .collect();
+        out.push(CellShape {
+            shares: alone,
+            log_weight: half - count,
+            is_bent: false,
+        });
         for share in *BENT {
             let all = 1.0 + share * share;
             let line = std::iter::repeat_n(1.0 / (line as f64 * all), line);
-            let shares = line.chain(own.iter().map(|own| own * share * share / all)).collect();
-            out.push(CellShape { shares, log_weight: half - count - 2.0_f64.ln(), is_bent: true });
+            let shares = line
+                .chain(own.iter().map(|own| own * share * share / all))
+                .collect();
+            out.push(CellShape {
+                shares,
+                log_weight: half - count - 2.0_f64.ln(),
+                is_bent: true,
+            });
         }
     }
     if rough {
@@ -283,9 +447,17 @@ fn line_and_curve(line: usize, motion: Motion, lengths: &[Vec<f64>], rough: bool
         let density = |k: usize| 1.0 / (1.0 + (PI * k as f64 * 0.3).powi(2));
         let all: Vec<f64> = (1..=curve / line).map(density).collect();
         let sum: f64 = all.iter().sum();
-        let all = over_fields(all.into_iter().map(|share| share / sum).collect(), motion, line);
+        let all = over_fields(
+            all.into_iter().map(|share| share / sum).collect(),
+            motion,
+            line,
+        );
         let shares = std::iter::repeat_n(0.0, line).chain(all).collect();
-        out.push(CellShape { shares, log_weight: half - count, is_bent: false });
+        out.push(CellShape {
+            shares,
+            log_weight: half - count,
+            is_bent: false,
+        });
     }
     out
 }
@@ -293,7 +465,9 @@ fn line_and_curve(line: usize, motion: Motion, lengths: &[Vec<f64>], rough: bool
 /// The directions of a motion.
 pub(super) fn fields(motion: Motion) -> usize {
     match motion {
-        Motion::Axis { about: None, .. } | Motion::Slide { along: false, .. } | Motion::Bend { .. } => 2,
+        Motion::Axis { about: None, .. }
+        | Motion::Slide { along: false, .. }
+        | Motion::Bend { .. } => 2,
         Motion::Base { axes } | Motion::Tool { axes } | Motion::Tracker { axes } => axes.count(),
         _ => 1,
     }
@@ -302,17 +476,28 @@ pub(super) fn fields(motion: Motion) -> usize {
 /// Shares of functions, for every direction of a motion alike, in the order of its coefficients.
 fn over_fields(shares: Vec<f64>, motion: Motion, fields: usize) -> Vec<f64> {
     let scaled = |share: &f64| share / fields as f64;
-    if matches!(motion, Motion::Base { .. } | Motion::Tool { .. } | Motion::Tracker { .. }) {
-        shares.iter().flat_map(|share| std::iter::repeat_n(scaled(share), fields)).collect()
+    if matches!(
+        motion,
+        Motion::Base { .. } | Motion::Tool { .. } | Motion::Tracker { .. }
+    ) {
+        shares
+            .iter()
+            .flat_map(|share| std::iter::repeat_n(scaled(share), fields))
+            .collect()
     } else {
-        (0..fields).flat_map(|_| shares.iter().map(scaled)).collect()
+        (0..fields)
+            .flat_map(|_| shares.iter().map(scaled))
+            .collect()
     }
 }
 
 /// Shares of cosines of a smooth curve, one list a correlation length, for every direction of a motion alike.
 fn matern(count: usize, lengths: usize, motion: Motion) -> Vec<Vec<f64>> {
     let of = |length: &f64| over_fields(density(count, *length), motion, fields(motion));
-    LENGTHS[..lengths.min(LENGTHS.len())].iter().map(of).collect()
+    LENGTHS[..lengths.min(LENGTHS.len())]
+        .iter()
+        .map(of)
+        .collect()
 }
 
 /// Shares of cosines: the spectral density of a Matern kernel with smoothness 3/2 (Rasmussen and Williams, 2006, ch. 4).
@@ -328,7 +513,11 @@ fn density(count: usize, length: f64) -> Vec<f64> {
 
 /// The lowest and highest of some values.
 fn range(values: &[f64]) -> [f64; 2] {
-    values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], u| [low.min(*u), high.max(*u)])
+    values
+        .iter()
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], u| {
+            [low.min(*u), high.max(*u)]
+        })
 }
 
 /// The support of cosines over some values.
@@ -342,12 +531,17 @@ pub(super) fn line(values: &[f64]) -> Option<Basis> {
     let [low, high] = range(values);
     let span = high - low;
     let varies = span > 1e-9 * high.abs().max(low.abs()) && span > 1e-12;
-    varies.then_some(Basis::Linear { zero: 0.5 * (low + high), per: 0.5 * span })
+    varies.then_some(Basis::Linear {
+        zero: 0.5 * (low + high),
+        per: 0.5 * span,
+    })
 }
 
 /// Functions of one of two variables, a constant among them.
 fn factor(values: &[f64], count: usize) -> Option<Basis> {
-    let Basis::Linear { zero, per } = line(values)? else { return None };
+    let Basis::Linear { zero, per } = line(values)? else {
+        return None;
+    };
     if has_few(values) {
         return Some(Basis::Straight { zero, per });
     }
@@ -360,7 +554,10 @@ pub(super) fn has_few(values: &[f64]) -> bool {
     let [low, high] = range(values);
     let mut distinct: Vec<f64> = Vec::new();
     for value in values {
-        if !distinct.iter().any(|other| (other - value).abs() < 1e-9 * (high - low)) {
+        if !distinct
+            .iter()
+            .any(|other| (other - value).abs() < 1e-9 * (high - low))
+        {
             distinct.push(*value);
         }
         if distinct.len() > *FEW {

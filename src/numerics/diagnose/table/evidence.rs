@@ -32,21 +32,40 @@ pub(crate) struct GroupEvidence {
 
 impl GroupEvidence {
     /// Of a group that the rows do not see.
-    pub const NONE: Self = Self { log: 0.0, amplitude: 0.0, fit: 0.0 };
+    pub const NONE: Self = Self {
+        log: 0.0,
+        amplitude: 0.0,
+        fit: 0.0,
+    };
 }
 
 /// The evidence of columns by their Gram matrix, their products with the residual (both in standard deviations of the noise), and the
 /// shares of the prior variance.
-pub(crate) fn evidence(gram: &DMatrix<f64>, gradient: &DVector<f64>, shares: &[f64], rows: EvidenceRows) -> GroupEvidence {
+pub(crate) fn evidence(
+    gram: &DMatrix<f64>,
+    gradient: &DVector<f64>,
+    shares: &[f64],
+    rows: EvidenceRows,
+) -> GroupEvidence {
     let kept: Vec<usize> = (0..shares.len()).filter(|k| shares[*k] > 0.0).collect();
     let scaled;
     let (diagonal, off_diagonal, along) = if let [k] = kept[..] {
-        scaled = (vec![shares[k] * gram[(k, k)]], Vec::new(), vec![shares[k].sqrt() * gradient[k]]);
+        scaled = (
+            vec![shares[k] * gram[(k, k)]],
+            Vec::new(),
+            vec![shares[k].sqrt() * gradient[k]],
+        );
         (&scaled.0, &scaled.1, &scaled.2)
     } else {
         let roots: Vec<f64> = kept.iter().map(|k| shares[*k].sqrt()).collect();
-        let matrix = DMatrix::from_fn(kept.len(), kept.len(), |i, j| roots[i] * gram[(kept[i], kept[j])] * roots[j]);
-        let mut along: Vec<f64> = kept.iter().zip(&roots).map(|(k, root)| root * gradient[*k]).collect();
+        let matrix = DMatrix::from_fn(kept.len(), kept.len(), |i, j| {
+            roots[i] * gram[(kept[i], kept[j])] * roots[j]
+        });
+        let mut along: Vec<f64> = kept
+            .iter()
+            .zip(&roots)
+            .map(|(k, root)| root * gradient[*k])
+            .collect();
         let (diagonal, off_diagonal) = tridiagonal(matrix, &mut along);
         scaled = (diagonal, off_diagonal, along);
         (&scaled.0, &scaled.1, &scaled.2)
@@ -64,13 +83,23 @@ pub(crate) fn evidence(gram: &DMatrix<f64>, gradient: &DVector<f64>, shares: &[f
         // Noise is always left: what leaves none is rounding.
         let left = 1.0 - fit / whole;
         let sound = left > 1e-9 && square * trace < *EXACT;
-        *log = if sound { -0.5 * determinant - half * left.ln() } else { f64::NEG_INFINITY };
+        *log = if sound {
+            -0.5 * determinant - half * left.ln()
+        } else {
+            f64::NEG_INFINITY
+        };
     }
     if logs.iter().all(|log| *log == f64::NEG_INFINITY) {
         return GroupEvidence::NONE;
     }
-    let best = (0..AMPLITUDES).max_by(|a, b| logs[*a].total_cmp(&logs[*b])).unwrap_or(0);
-    GroupEvidence { log: log_mean(&logs), amplitude: amplitudes().nth(best).unwrap_or(*SMALLEST), fit: fits[best] }
+    let best = (0..AMPLITUDES)
+        .max_by(|a, b| logs[*a].total_cmp(&logs[*b]))
+        .unwrap_or(0);
+    GroupEvidence {
+        log: log_mean(&logs),
+        amplitude: amplitudes().nth(best).unwrap_or(*SMALLEST),
+        fit: fits[best],
+    }
 }
 
 /// The diagonal and the entries next to it of a symmetric matrix brought to tridiagonal form by reflections (Householder, 1958), which turn
@@ -83,7 +112,9 @@ fn tridiagonal(mut matrix: DMatrix<f64>, along: &mut [f64]) -> (Vec<f64>, Vec<f6
         diagonal.push(matrix[(k, k)]);
         let (done, rest) = matrix.as_mut_slice().split_at_mut((k + 1) * count);
         let (mirror, image) = (&mut done[k * (count + 1) + 1..], &mut image[k + 1..]);
-        let Some(first) = mirror.first().copied() else { break };
+        let Some(first) = mirror.first().copied() else {
+            break;
+        };
         let length = dot(mirror, mirror).sqrt();
         off.push(-length.copysign(first));
         if length == 0.0 {
@@ -95,13 +126,22 @@ fn tridiagonal(mut matrix: DMatrix<f64>, along: &mut [f64]) -> (Vec<f64>, Vec<f6
             *value = share * dot(&column[k + 1..], mirror);
         }
         let along_mirror = 0.5 * share * dot(image, mirror);
-        image.iter_mut().zip(&*mirror).for_each(|(value, by)| *value -= along_mirror * by);
+        image
+            .iter_mut()
+            .zip(&*mirror)
+            .for_each(|(value, by)| *value -= along_mirror * by);
         for ((column, by), value) in rest.chunks_mut(count).zip(&*mirror).zip(&*image) {
             let both = mirror.iter().zip(&*image);
-            column[k + 1..].iter_mut().zip(both).for_each(|(entry, (a, b))| *entry -= a * value + b * by);
+            column[k + 1..]
+                .iter_mut()
+                .zip(both)
+                .for_each(|(entry, (a, b))| *entry -= a * value + b * by);
         }
         let turn = share * dot(mirror, &along[k + 1..]);
-        along[k + 1..].iter_mut().zip(&*mirror).for_each(|(value, by)| *value -= turn * by);
+        along[k + 1..]
+            .iter_mut()
+            .zip(&*mirror)
+            .for_each(|(value, by)| *value -= turn * by);
     }
     (diagonal, off)
 }
@@ -133,7 +173,11 @@ fn amplitudes() -> impl Iterator<Item = f64> {
 /// ln of a sum of exponentials; minus infinity of none.
 pub(crate) fn log_sum(logs: &[f64]) -> f64 {
     let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    if most == f64::NEG_INFINITY { most } else { most + logs.iter().map(|log| (log - most).exp()).sum::<f64>().ln() }
+    if most == f64::NEG_INFINITY {
+        most
+    } else {
+        most + logs.iter().map(|log| (log - most).exp()).sum::<f64>().ln()
+    }
 }
 
 /// ln of a mean of exponentials: equal prior odds.
@@ -145,12 +189,18 @@ fn log_mean(logs: &[f64]) -> f64 {
 mod tests {
     use super::*;
 
-    const ROWS: EvidenceRows = EvidenceRows { freedom: 300.0, square: 320.0 };
+    const ROWS: EvidenceRows = EvidenceRows {
+        freedom: 300.0,
+        square: 320.0,
+    };
 
     #[test]
     fn one_column_has_the_evidence_of_its_integral() {
         // One column of squared length 4e6 and a residual 1e-5 along it: by hand over the grid.
-        let (gram, gradient) = (DMatrix::from_element(1, 1, 4e6), DVector::from_element(1, 40.0));
+        let (gram, gradient) = (
+            DMatrix::from_element(1, 1, 4e6),
+            DVector::from_element(1, 40.0),
+        );
         let found = evidence(&gram, &gradient, &[1.0], ROWS);
         let one = |a: f64| {
             let s = a * a * 4e6;
@@ -158,35 +208,65 @@ mod tests {
             -0.5 * (1.0 + s).ln() - 0.5 * (300.0 + *NU) * (1.0 - fit / (*NU + 320.0)).ln()
         };
         let logs: Vec<f64> = amplitudes().map(one).collect();
-        assert!((found.log - log_mean(&logs)).abs() < 1e-12, "{} {}", found.log, log_mean(&logs));
+        assert!(
+            (found.log - log_mean(&logs)).abs() < 1e-12,
+            "{} {}",
+            found.log,
+            log_mean(&logs)
+        );
     }
 
     #[test]
     fn the_evidence_of_columns_that_are_not_orthogonal_is_that_of_their_covariance() {
         // Columns and a residual of 9 rows; the covariance of the rows as a whole instead of the columns' products.
-        let entry = |i: usize, j: usize| (((5 * i + 3 * j * j + 2 * i * j) % 11) as f64 - 5.0) * 300.0;
+        let entry =
+            |i: usize, j: usize| (((5 * i + 3 * j * j + 2 * i * j) % 11) as f64 - 5.0) * 300.0;
         let columns = DMatrix::from_fn(9, 5, entry);
         let residual = DVector::from_fn(9, |i, _| ((7 * i) % 5) as f64 - 1.5);
         let shares = [0.1, 0.2, 0.05, 0.4, 0.25];
-        let rows = EvidenceRows { freedom: 9.0, square: residual.norm_squared() };
-        let found = evidence(&columns.tr_mul(&columns), &columns.tr_mul(&residual), &shares, rows);
+        let rows = EvidenceRows {
+            freedom: 9.0,
+            square: residual.norm_squared(),
+        };
+        let found = evidence(
+            &columns.tr_mul(&columns),
+            &columns.tr_mul(&residual),
+            &shares,
+            rows,
+        );
         let at = |amplitude: f64| {
-            let prior = DMatrix::from_diagonal(&DVector::from_row_slice(&shares)) * (amplitude * amplitude);
+            let prior =
+                DMatrix::from_diagonal(&DVector::from_row_slice(&shares)) * (amplitude * amplitude);
             let covariance = DMatrix::identity(9, 9) + &columns * prior * columns.transpose();
-            let solved = covariance.clone().lu().solve(&residual).expect("a covariance");
-            let [with, without] =
-                [residual.dot(&solved), residual.norm_squared()].map(|square| 0.5 * (9.0 + *NU) * (*NU + square).ln());
+            let solved = covariance
+                .clone()
+                .lu()
+                .solve(&residual)
+                .expect("a covariance");
+            let [with, without] = [residual.dot(&solved), residual.norm_squared()]
+                .map(|square| 0.5 * (9.0 + *NU) * (*NU + square).ln());
             without - with - 0.5 * covariance.determinant().ln()
         };
         let logs: Vec<f64> = amplitudes().map(at).collect();
-        assert!((found.log - log_mean(&logs)).abs() < 1e-6, "{} {}", found.log, log_mean(&logs));
+        assert!(
+            (found.log - log_mean(&logs)).abs() < 1e-6,
+            "{} {}",
+            found.log,
+            log_mean(&logs)
+        );
     }
 
     #[test]
     fn columns_without_a_signal_cost_evidence_and_more_of_them_cost_more() {
         let none = |count: usize| {
             let gram = DMatrix::identity(count, count).scale(1e12);
-            evidence(&gram, &DVector::zeros(count), &vec![1.0 / count as f64; count], ROWS).log
+            evidence(
+                &gram,
+                &DVector::zeros(count),
+                &vec![1.0 / count as f64; count],
+                ROWS,
+            )
+            .log
         };
         assert!(none(1) < 0.0 && none(8) < none(2) && none(2) < none(1));
     }

@@ -16,30 +16,61 @@ pub(crate) fn forms_of(
 ) -> Result<Vec<Form>, BTreeSet<Place>> {
     let values = |of| problem.values(of);
     let (cells, places): (Vec<CauseCell>, BTreeSet<Place>) = if name == names::UNKNOWN {
-        (unnamed(place, survey), generated::places(survey).into_iter().collect())
+        (
+            unnamed(place, survey),
+            generated::places(survey).into_iter().collect(),
+        )
     } else {
-        let own = if name == names::JOINT_HARDENING { names::JOINT_COMPLIANCE } else { name };
+        let own = if name == names::JOINT_HARDENING {
+            names::JOINT_COMPLIANCE
+        } else {
+            name
+        };
         let mut cells = listed::cells(survey, &values, question);
         cells.retain(|cell| cell.name == own);
         let places = cells.iter().map(|cell| cell.place).collect();
         (cells, places)
     };
-    let groups = cells.iter().filter(|cell| cell.place == place).flat_map(|cell| cell.groups(survey, &values, false));
-    let one_by_one = groups.filter(|group| name == names::UNKNOWN || group.forms.len() == 1).flat_map(|group| group.forms);
+    let groups = cells
+        .iter()
+        .filter(|cell| cell.place == place)
+        .flat_map(|cell| cell.groups(survey, &values, false));
+    let one_by_one = groups
+        .filter(|group| name == names::UNKNOWN || group.forms.len() == 1)
+        .flat_map(|group| group.forms);
     // A joint yields to its load in one way: in proportion, or not.
     let bends = [names::JOINT_COMPLIANCE, names::JOINT_HARDENING].contains(&name);
-    let forms: Vec<Form> = one_by_one.filter(|form| !bends || form.name() == name).collect();
-    if forms.is_empty() { Err(places) } else { Ok(forms) }
+    let forms: Vec<Form> = one_by_one
+        .filter(|form| !bends || form.name() == name)
+        .collect();
+    if forms.is_empty() {
+        Err(places)
+    } else {
+        Ok(forms)
+    }
 }
 
 /// The cells without a name at a place.
 fn unnamed(place: Place, survey: &Survey) -> Vec<CauseCell> {
     let mut out = Vec::new();
-    for motion in generated::families(place, survey).into_iter().flatten().filter(|motion| motion.place() == place) {
-        for (of, over) in generated::kinds(place, motion, survey).into_iter().flatten() {
+    for motion in generated::families(place, survey)
+        .into_iter()
+        .flatten()
+        .filter(|motion| motion.place() == place)
+    {
+        for (of, over) in generated::kinds(place, motion, survey)
+            .into_iter()
+            .flatten()
+        {
             if generated::listed_as(motion, of, over, survey).is_none() {
                 let shapes = Shapes::Free(FreeShape { motion, of, over });
-                out.push(CauseCell { name: names::UNKNOWN, place, key: String::new(), log_prior: 0.0, shapes });
+                out.push(CauseCell {
+                    name: names::UNKNOWN,
+                    place,
+                    key: String::new(),
+                    log_prior: 0.0,
+                    shapes,
+                });
             }
         }
     }

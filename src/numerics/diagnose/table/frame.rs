@@ -64,18 +64,29 @@ impl<'a> SearchRows<'a> {
     pub fn of(view: &'a RoundView<'a>, now: &FitState, fitter: &Fitter, noise: NoiseShape) -> Self {
         let problem = &view.problem;
         let variance = |(i, row): (usize, &usize)| {
-            fitter.scale.noise(problem.data, *row).powi(2) / problem.readings_of(i).len().max(1) as f64
+            fitter.scale.noise(problem.data, *row).powi(2)
+                / problem.readings_of(i).len().max(1) as f64
         };
         let variance = problem.rows.iter().enumerate().map(variance).collect();
         let mut residual = problem.residual.clone();
         for (cause, range) in now.causes.iter().zip(&now.ranges) {
             let columns = problem.columns(&cause.form);
             for (column, k) in columns.chunks(problem.residual_rows()).zip(range.clone()) {
-                residual.iter_mut().zip(column).for_each(|(value, c)| *value += c * now.model.x[k]);
+                residual
+                    .iter_mut()
+                    .zip(column)
+                    .for_each(|(value, c)| *value += c * now.model.x[k]);
             }
         }
-        let mut out =
-            Self { view, base: Mat::new(), residual: Vec::new(), variance, noise, directions: Vec::new(), values: Vec::new() };
+        let mut out = Self {
+            view,
+            base: Mat::new(),
+            residual: Vec::new(),
+            variance,
+            noise,
+            directions: Vec::new(),
+            values: Vec::new(),
+        };
         let mut jacobian = problem.jacobian(&fitter.seen());
         (0..jacobian.ncols()).for_each(|j| out.weigh(jacobian.col_as_slice_mut(j)));
         out.weigh(&mut residual);
@@ -89,12 +100,19 @@ impl<'a> SearchRows<'a> {
     pub fn rows(&self) -> EvidenceRows {
         let square = self.residual.iter().map(|value| value * value).sum();
         let counted = self.residual.len() as f64 / self.view.autocorrelation_time();
-        EvidenceRows { freedom: (counted - self.base.ncols() as f64).max(1.0), square }
+        EvidenceRows {
+            freedom: (counted - self.base.ncols() as f64).max(1.0),
+            square,
+        }
     }
 
     /// The least variance of the noise over what is stated: what motor currents leave says nothing of the points'.
     pub fn least_noise(&self) -> f64 {
-        if self.view.problem.of_readings().len() < self.residual.len() { 1.0 } else { 0.09 }
+        if self.view.problem.of_readings().len() < self.residual.len() {
+            1.0
+        } else {
+            0.09
+        }
     }
 
     pub fn residual(&self) -> &[f64] {
@@ -118,23 +136,46 @@ impl<'a> SearchRows<'a> {
     /// Computes once what the columns of many forms are made of.
     pub fn prepare(&mut self, motions: &[Motion], variables: &[Variable]) {
         let problem = &self.view.problem;
-        let fresh: Vec<Motion> =
-            motions.iter().filter(|motion| !self.directions.iter().any(|(other, _)| other == *motion)).copied().collect();
-        let directions = |motion| problem.directions(motion).into_iter().map(|raw| self.direction(raw)).collect();
-        let fresh: Vec<(Motion, Vec<WeighedDirection>)> =
-            fresh.into_par_iter().map(|motion| (motion, directions(motion))).collect();
+        let fresh: Vec<Motion> = motions
+            .iter()
+            .filter(|motion| !self.directions.iter().any(|(other, _)| other == *motion))
+            .copied()
+            .collect();
+        let directions = |motion| {
+            problem
+                .directions(motion)
+                .into_iter()
+                .map(|raw| self.direction(raw))
+                .collect()
+        };
+        let fresh: Vec<(Motion, Vec<WeighedDirection>)> = fresh
+            .into_par_iter()
+            .map(|motion| (motion, directions(motion)))
+            .collect();
         self.directions.extend(fresh);
-        let fresh: Vec<Variable> =
-            variables.iter().filter(|of| !self.values.iter().any(|(other, _)| other == *of)).copied().collect();
-        self.values.par_extend(fresh.into_par_iter().map(|of| (of, problem.values(of))));
+        let fresh: Vec<Variable> = variables
+            .iter()
+            .filter(|of| !self.values.iter().any(|(other, _)| other == *of))
+            .copied()
+            .collect();
+        self.values
+            .par_extend(fresh.into_par_iter().map(|of| (of, problem.values(of))));
     }
 
     /// Columns of some forms, one form after another, and how many each has. They end before the rows of motor currents where no form says
     /// anything of these.
     pub fn columns(&self, forms: &[Form]) -> (UnitColumns, Vec<usize>) {
-        let each: Vec<Weighed> = forms.iter().map(|form| self.of_term(form).unwrap_or_else(|| self.of_form(form))).collect();
-        let rows = each.iter().map(|own| own.rows).max().unwrap_or(self.residual.len());
-        let mut values = Vec::with_capacity(rows * each.iter().map(|own| own.square.len()).sum::<usize>());
+        let each: Vec<Weighed> = forms
+            .iter()
+            .map(|form| self.of_term(form).unwrap_or_else(|| self.of_form(form)))
+            .collect();
+        let rows = each
+            .iter()
+            .map(|own| own.rows)
+            .max()
+            .unwrap_or(self.residual.len());
+        let mut values =
+            Vec::with_capacity(rows * each.iter().map(|own| own.square.len()).sum::<usize>());
         for own in &each {
             for column in own.columns.chunks(own.rows.max(1)) {
                 values.extend_from_slice(column);
@@ -144,44 +185,74 @@ impl<'a> SearchRows<'a> {
         project(self.base.as_ref().subrows(0, rows), &mut values);
         let counts = each.iter().map(|own| own.square.len()).collect();
         let square: Vec<f64> = each.into_iter().flat_map(|own| own.square).collect();
-        (UnitColumns { values: Arc::new(DMatrix::from_vec(rows, square.len(), values)), square }, counts)
+        (
+            UnitColumns {
+                values: Arc::new(DMatrix::from_vec(rows, square.len(), values)),
+                square,
+            },
+            counts,
+        )
     }
 
     /// The columns of any form; without the rows of currents where it says nothing of these.
     fn of_form(&self, form: &Form) -> Weighed {
-        let (all, points, problem) = (self.residual.len(), self.view.problem.of_readings().len(), &self.view.problem);
+        let (all, points, problem) = (
+            self.residual.len(),
+            self.view.problem.of_readings().len(),
+            &self.view.problem,
+        );
         let mut columns = problem.motions_by(form);
-        let silent = columns.chunks(all.max(1)).all(|column| column[points..].iter().all(|value| *value == 0.0));
+        let silent = columns
+            .chunks(all.max(1))
+            .all(|column| column[points..].iter().all(|value| *value == 0.0));
         let rows = if silent { points } else { all };
         if silent && points < all {
-            columns = columns.chunks(all).flat_map(|column| column[..points].iter().copied()).collect();
+            columns = columns
+                .chunks(all)
+                .flat_map(|column| column[..points].iter().copied())
+                .collect();
         }
-        let square: Vec<f64> = columns.chunks(rows.max(1)).map(|column| self.mean_square(column)).collect();
+        let square: Vec<f64> = columns
+            .chunks(rows.max(1))
+            .map(|column| self.mean_square(column))
+            .collect();
         for (column, square) in columns.chunks_mut(rows.max(1)).zip(&square) {
             problem.innovate(column);
             self.weigh(column);
             let scale = unit(*square);
             column.iter_mut().for_each(|value| *value *= scale);
         }
-        Weighed { columns, rows, square }
+        Weighed {
+            columns,
+            rows,
+            square,
+        }
     }
 
     /// How much of the squared length of `left` the columns of a law at a place explain if they are orthogonal; nothing of what needs more.
     pub fn roughly(&self, form: &Form, left: &[f64]) -> Option<f64> {
         let term = form.term().filter(|_| !self.view.problem.is_correlated())?;
-        let (_, directions) = self.directions.iter().find(|(motion, _)| *motion == term.motion())?;
+        let (_, directions) = self
+            .directions
+            .iter()
+            .find(|(motion, _)| *motion == term.motion())?;
         let functions = self.functions(term.law())?;
         let mut fit = 0.0;
         for WeighedDirection { weighed, .. } in directions {
             let of_row = |i: usize| {
                 let lines = self.view.problem.readings_of(i);
-                let sums = lines.map(|line| [weighed[line] * left[line], weighed[line] * weighed[line]]);
+                let sums =
+                    lines.map(|line| [weighed[line] * left[line], weighed[line] * weighed[line]]);
                 sums.fold([0.0, 0.0], |sum, own| [sum[0] + own[0], sum[1] + own[1]])
             };
             let rows: Vec<[f64; 2]> = (0..self.variance.len()).map(of_row).collect();
             for function in &functions {
-                let sums = function.iter().zip(&rows).map(|(value, [along, square])| [value * along, value * value * square]);
-                let [along, square] = sums.fold([0.0, 0.0], |sum, own| [sum[0] + own[0], sum[1] + own[1]]);
+                let sums = function
+                    .iter()
+                    .zip(&rows)
+                    .map(|(value, [along, square])| [value * along, value * value * square]);
+                let [along, square] =
+                    sums.fold([0.0, 0.0], |sum, own| [sum[0] + own[0], sum[1] + own[1]]);
                 fit += along * along / square.max(f64::MIN_POSITIVE);
             }
         }
@@ -193,28 +264,48 @@ impl<'a> SearchRows<'a> {
         raw.truncate(self.view.problem.of_readings().len());
         let count = self.variance.len().max(1) as f64;
         let of_row = |(i, variance): (usize, &f64)| {
-            raw[self.view.problem.readings_of(i)].iter().map(|value| value * value).sum::<f64>() * variance / count
+            raw[self.view.problem.readings_of(i)]
+                .iter()
+                .map(|value| value * value)
+                .sum::<f64>()
+                * variance
+                / count
         };
         let square = self.variance.iter().enumerate().map(of_row).collect();
         if !self.view.problem.is_correlated() {
             self.weigh(&mut raw);
         }
-        WeighedDirection { weighed: raw, square }
+        WeighedDirection {
+            weighed: raw,
+            square,
+        }
     }
 
     /// The columns of a law at a place from the motion's directions and the law's functions.
     fn of_term(&self, form: &Form) -> Option<Weighed> {
         let term = form.term()?;
-        let (_, directions) = self.directions.iter().find(|(motion, _)| *motion == term.motion())?;
+        let (_, directions) = self
+            .directions
+            .iter()
+            .find(|(motion, _)| *motion == term.motion())?;
         let functions = self.functions(term.law())?;
         let (problem, rows) = (&self.view.problem, self.view.problem.of_readings().len());
-        let squared: Vec<Vec<f64>> =
-            functions.iter().map(|function| function.iter().map(|value| value * value).collect()).collect();
+        let squared: Vec<Vec<f64>> = functions
+            .iter()
+            .map(|function| function.iter().map(|value| value * value).collect())
+            .collect();
         let count = directions.len() * functions.len();
         // In the order of the term's coefficients: a frame's axes alternate.
-        let alternate = matches!(term.motion(), Motion::Base { .. } | Motion::Tool { .. } | Motion::Tracker { .. });
+        let alternate = matches!(
+            term.motion(),
+            Motion::Base { .. } | Motion::Tool { .. } | Motion::Tracker { .. }
+        );
         let pair = |k: usize| {
-            if alternate { (k % directions.len(), k / directions.len()) } else { (k / functions.len(), k % functions.len()) }
+            if alternate {
+                (k % directions.len(), k / directions.len())
+            } else {
+                (k / functions.len(), k % functions.len())
+            }
         };
         let (mut columns, mut square) = (vec![0.0; rows * count], Vec::with_capacity(count));
         for (k, column) in columns.chunks_mut(rows.max(1)).enumerate().take(count) {
@@ -233,7 +324,11 @@ impl<'a> SearchRows<'a> {
                 self.weigh(column);
             }
         }
-        Some(Weighed { columns, rows, square })
+        Some(Weighed {
+            columns,
+            rows,
+            square,
+        })
     }
 
     /// The functions of a law at every row; none of a variable of several numbers, or that some row does not tell.
@@ -249,10 +344,15 @@ impl<'a> SearchRows<'a> {
             };
             let mut functions = vec![vec![0.0; values.len()]; factor.basis.count()];
             for (row, u) in values.iter().enumerate() {
-                factor.basis.at(*u, &mut |k, value| functions[k][row] = value);
+                factor
+                    .basis
+                    .at(*u, &mut |k, value| functions[k][row] = value);
             }
             let times = |a: &Vec<f64>, b: &Vec<f64>| a.iter().zip(b).map(|(x, y)| x * y).collect();
-            out = out.iter().flat_map(|a| functions.iter().map(move |b| times(a, b))).collect();
+            out = out
+                .iter()
+                .flat_map(|a| functions.iter().map(move |b| times(a, b)))
+                .collect();
         }
         Some(out)
     }
@@ -268,7 +368,8 @@ impl<'a> SearchRows<'a> {
             let lines = self.view.problem.readings_of(i);
             column[lines].iter().map(|value| value * value).sum::<f64>() * variance
         };
-        self.variance.iter().enumerate().map(of_row).sum::<f64>() / self.variance.len().max(1) as f64
+        self.variance.iter().enumerate().map(of_row).sum::<f64>()
+            / self.variance.len().max(1) as f64
     }
 
     fn weigh(&self, column: &mut [f64]) {
@@ -285,7 +386,9 @@ impl<'a> SearchRows<'a> {
         }
         if let Some(factor) = self.noise.currents {
             let points = problem.of_readings().len();
-            column[points..].iter_mut().for_each(|value| *value *= factor);
+            column[points..]
+                .iter_mut()
+                .for_each(|value| *value *= factor);
         }
     }
 }
@@ -295,7 +398,10 @@ impl NoiseShape {
     pub fn at_first(view: &RoundView, rows: usize) -> Self {
         let mut weights = vec![1.0; rows];
         share_among_repeats(view, &mut weights);
-        Self { weights, ..Self::default() }
+        Self {
+            weights,
+            ..Self::default()
+        }
     }
 
     /// By what a fitted model leaves of the rows: those that are far off count less, and a noise that is stronger in some direction is made
@@ -305,9 +411,15 @@ impl NoiseShape {
         let residual = problem.of_readings();
         let square = |lines: std::ops::Range<usize>| {
             let count = lines.len().max(1) as f64;
-            residual[lines].iter().map(|value| value * value).sum::<f64>() / count
+            residual[lines]
+                .iter()
+                .map(|value| value * value)
+                .sum::<f64>()
+                / count
         };
-        let mut sizes: Vec<f64> = (0..problem.rows.len()).map(|i| square(problem.readings_of(i)).sqrt()).collect();
+        let mut sizes: Vec<f64> = (0..problem.rows.len())
+            .map(|i| square(problem.readings_of(i)).sqrt())
+            .collect();
         let by_row = sizes.clone();
         if sizes.is_empty() {
             return Self::default();
@@ -319,7 +431,8 @@ impl NoiseShape {
         for (size, row) in by_row.iter().zip(&problem.rows) {
             weights[*row] = (*FAR * scale / size.max(f64::MIN_POSITIVE)).min(1.0);
         }
-        let points = (0..problem.rows.len()).filter(|i| weights[problem.rows[*i]] == 1.0 && problem.readings_of(*i).len() == 3);
+        let points = (0..problem.rows.len())
+            .filter(|i| weights[problem.rows[*i]] == 1.0 && problem.readings_of(*i).len() == 3);
         let (mut sum, mut count) = (Matrix3::zeros(), 0.0);
         for i in points {
             let left = Vector3::from_column_slice(&residual[problem.readings_of(i)]);
@@ -327,10 +440,20 @@ impl NoiseShape {
             count += 1.0;
         }
         share_among_repeats(view, &mut weights);
-        let mean = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64;
+        let mean = |values: &[f64]| {
+            values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64
+        };
         let currents = &problem.residual[residual.len()..];
-        let currents = (!currents.is_empty()).then(|| (mean(residual) / mean(currents).max(1e-12)).sqrt().clamp(0.2, 5.0));
-        Self { weights, whitening: evened(sum, count), currents }
+        let currents = (!currents.is_empty()).then(|| {
+            (mean(residual) / mean(currents).max(1e-12))
+                .sqrt()
+                .clamp(0.2, 5.0)
+        });
+        Self {
+            weights,
+            whitening: evened(sum, count),
+            currents,
+        }
     }
 }
 
@@ -341,7 +464,10 @@ fn share_among_repeats(view: &RoundView, weights: &mut [f64]) {
     let width = problem.width().unwrap_or(0);
     let mut poses: Vec<Vec<usize>> = Vec::new();
     for (i, row) in problem.rows.iter().enumerate() {
-        match poses.last_mut().filter(|pose| problem.data.same_pose(problem.rows[pose[0]], *row)) {
+        match poses
+            .last_mut()
+            .filter(|pose| problem.data.same_pose(problem.rows[pose[0]], *row))
+        {
             Some(pose) => pose.push(i),
             None => poses.push(vec![i]),
         }
@@ -349,9 +475,15 @@ fn share_among_repeats(view: &RoundView, weights: &mut [f64]) {
     let (mut within, mut freedom) = (0.0, 0.0);
     for pose in poses.iter().filter(|pose| pose.len() > 1) {
         for k in 0..width {
-            let values: Vec<f64> = pose.iter().map(|i| residual[problem.readings_of(*i).start + k]).collect();
+            let values: Vec<f64> = pose
+                .iter()
+                .map(|i| residual[problem.readings_of(*i).start + k])
+                .collect();
             let mean = values.iter().sum::<f64>() / values.len() as f64;
-            within += values.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
+            within += values
+                .iter()
+                .map(|value| (value - mean).powi(2))
+                .sum::<f64>();
             freedom += values.len() as f64 - 1.0;
         }
     }
@@ -359,11 +491,14 @@ fn share_among_repeats(view: &RoundView, weights: &mut [f64]) {
         return;
     }
     let within = within / freedom;
-    let whole = residual.iter().map(|value| value * value).sum::<f64>() / residual.len().max(1) as f64;
+    let whole =
+        residual.iter().map(|value| value * value).sum::<f64>() / residual.len().max(1) as f64;
     let between = (whole - within).max(0.0);
     for pose in poses.iter().filter(|pose| pose.len() > 1) {
         let count = pose.len() as f64;
-        let share = ((between + within) / (count * between + within).max(f64::MIN_POSITIVE)).sqrt().min(1.0);
+        let share = ((between + within) / (count * between + within).max(f64::MIN_POSITIVE))
+            .sqrt()
+            .min(1.0);
         pose.iter().for_each(|i| weights[problem.rows[*i]] *= share);
     }
 }
@@ -386,7 +521,11 @@ fn evened(sum: Matrix3<f64>, count: f64) -> Option<Matrix3<f64>> {
 
 /// What makes a motion of this mean square one of unit size; 0 of none.
 fn unit(square: f64) -> f64 {
-    if square > 0.0 { square.sqrt().recip() } else { 0.0 }
+    if square > 0.0 {
+        square.sqrt().recip()
+    } else {
+        0.0
+    }
 }
 
 /// Transpose of `a` times `b`; where one has fewer rows the others count as zero.

@@ -28,20 +28,41 @@ const ARROWS: [[i8; 3]; 13] = [
 /// Shorter links (m) are no place of their own.
 const SHORT: f64 = 1e-3;
 
-const FINE: Over = Over::Curve { count: 40, first: 8, lengths: 5 };
-const CURVE: Over = Over::Curve { count: 20, first: 5, lengths: 3 };
-const SLOW: Over = Over::Curve { count: 8, first: 4, lengths: 2 };
+const FINE: Over = Over::Curve {
+    count: 40,
+    first: 8,
+    lengths: 5,
+};
+const CURVE: Over = Over::Curve {
+    count: 20,
+    first: 5,
+    lengths: 3,
+};
+const SLOW: Over = Over::Curve {
+    count: 8,
+    first: 4,
+    lengths: 2,
+};
 
 /// Variables of one kind, which share its prior odds.
 type Kind = Vec<(Variable, Over)>;
 
 /// All cells of one variable.
-pub(super) fn cells(survey: &Survey, frame: &mut SearchRows, question: &Question, is_open: bool) -> Vec<CauseCell> {
+pub(super) fn cells(
+    survey: &Survey,
+    frame: &mut SearchRows,
+    question: &Question,
+    is_open: bool,
+) -> Vec<CauseCell> {
     let odds = |probability: f64| probability / (1.0 - probability);
     let unnamed = *UNNAMED * odds(question.open_world) / odds(*USUAL);
     let left_out = |name: &str| question.without.iter().any(|out| out == name);
     let mut out = Vec::new();
-    let varies = |frame: &SearchRows, of: Variable| frame.values(of).is_some_and(|values| super::cell::line(&values).is_some());
+    let varies = |frame: &SearchRows, of: Variable| {
+        frame
+            .values(of)
+            .is_some_and(|values| super::cell::line(&values).is_some())
+    };
     // Where nothing but joints was recorded, an arm that is smaller closes as well, and whatever follows the place of the tool looks so.
     let closed = only_brought(survey.data, survey.rows) || !is_open;
     let places = if closed { Vec::new() } else { places(survey) };
@@ -56,7 +77,9 @@ pub(super) fn cells(survey: &Survey, frame: &mut SearchRows, question: &Question
                 let kind = kind.into_iter().filter(|(of, _)| varies(frame, *of));
                 let all: Vec<_> = kind
                     .flat_map(|(of, over)| motions.iter().map(move |motion| (*motion, of, over)))
-                    .filter(|(motion, of, over)| listed_as(*motion, *of, *over, survey).is_none_or(left_out))
+                    .filter(|(motion, of, over)| {
+                        listed_as(*motion, *of, *over, survey).is_none_or(left_out)
+                    })
                     .collect();
                 if !all.is_empty() {
                     groups.push(all);
@@ -66,18 +89,31 @@ pub(super) fn cells(survey: &Survey, frame: &mut SearchRows, question: &Question
         let count = groups.len() as f64;
         for group in groups {
             let log_prior = (unnamed / count / group.len() as f64).ln();
-            out.extend(group.into_iter().map(|(motion, of, over)| cell(FreeShape { motion, of, over }, log_prior)));
+            out.extend(
+                group
+                    .into_iter()
+                    .map(|(motion, of, over)| cell(FreeShape { motion, of, over }, log_prior)),
+            );
         }
     }
     out
 }
 
 /// Products of a motion's variable that shows with every other one that it may follow.
-pub(super) fn products(shown: &[FreeShape], survey: &Survey, frame: &mut SearchRows) -> Vec<CauseCell> {
+pub(super) fn products(
+    shown: &[FreeShape],
+    survey: &Survey,
+    frame: &mut SearchRows,
+) -> Vec<CauseCell> {
     let mut out: Vec<CauseCell> = Vec::new();
     for FreeShape { motion, of, .. } in shown {
         let kinds = kinds(motion.place(), *motion, survey);
-        let others: Vec<Variable> = kinds.into_iter().flatten().map(|(other, _)| other).filter(|other| other != of).collect();
+        let others: Vec<Variable> = kinds
+            .into_iter()
+            .flatten()
+            .map(|(other, _)| other)
+            .filter(|other| other != of)
+            .collect();
         frame.prepare(&[*motion], &others);
         let mut seen: Vec<Variable> = Vec::new();
         for other in others {
@@ -85,7 +121,11 @@ pub(super) fn products(shown: &[FreeShape], survey: &Survey, frame: &mut SearchR
                 continue;
             }
             seen.push(other);
-            let free = FreeShape { motion: *motion, of: *of, over: Over::Product(other) };
+            let free = FreeShape {
+                motion: *motion,
+                of: *of,
+                over: Over::Product(other),
+            };
             let cell = cell(free, PRODUCT.ln());
             if !out.iter().any(|known| known.key == cell.key) {
                 out.push(cell);
@@ -103,8 +143,15 @@ pub(super) fn pairs(survey: &Survey, frame: &mut SearchRows) -> Vec<FreeShape> {
         for motion in families(place, survey).into_iter().flatten() {
             let kinds = kinds(place, motion, survey);
             let mut variables: Vec<Variable> = Vec::new();
-            for of in kinds.into_iter().filter(|kind| kind.len() <= survey.joints()).flatten().map(|(of, _)| of) {
-                if frame.values(of).is_some_and(|values| super::cell::line(&values).is_some())
+            for of in kinds
+                .into_iter()
+                .filter(|kind| kind.len() <= survey.joints())
+                .flatten()
+                .map(|(of, _)| of)
+            {
+                if frame
+                    .values(of)
+                    .is_some_and(|values| super::cell::line(&values).is_some())
                     && !variables.iter().any(|known| is_alike(*known, of))
                 {
                     variables.push(of);
@@ -116,8 +163,15 @@ pub(super) fn pairs(survey: &Survey, frame: &mut SearchRows) -> Vec<FreeShape> {
                 _ => true,
             };
             for (i, of) in variables.iter().enumerate().filter(|(_, of)| own(of)) {
-                let others = variables.iter().enumerate().filter(|(k, other)| *k != i && (*k > i || !own(other)));
-                out.extend(others.map(|(_, other)| FreeShape { motion, of: *of, over: Over::Product(*other) }));
+                let others = variables
+                    .iter()
+                    .enumerate()
+                    .filter(|(k, other)| *k != i && (*k > i || !own(other)));
+                out.extend(others.map(|(_, other)| FreeShape {
+                    motion,
+                    of: *of,
+                    over: Over::Product(*other),
+                }));
             }
         }
     }
@@ -148,7 +202,11 @@ fn is_alike(a: Variable, b: Variable) -> bool {
 }
 
 fn cell(free: FreeShape, log_prior: f64) -> CauseCell {
-    let times = if let Over::Product(other) = free.over { format!(" times {other:?}") } else { String::new() };
+    let times = if let Over::Product(other) = free.over {
+        format!(" times {other:?}")
+    } else {
+        String::new()
+    };
     let step = if free.over == Over::Step { " step" } else { "" };
     CauseCell {
         name: names::UNKNOWN,
@@ -163,10 +221,16 @@ fn cell(free: FreeShape, log_prior: f64) -> CauseCell {
 pub(super) fn places(survey: &Survey) -> Vec<Place> {
     let joints = 0..survey.joints();
     let length = |link: usize| (survey.robot.point(link + 1) - survey.robot.point(link)).norm();
-    let links = joints.clone().filter(|link| link + 1 < survey.joints() && length(*link) > SHORT);
-    let all = joints.map(Place::Joint).chain(links.map(|link| Place::Links(link, link)));
+    let links = joints
+        .clone()
+        .filter(|link| link + 1 < survey.joints() && length(*link) > SHORT);
+    let all = joints
+        .map(Place::Joint)
+        .chain(links.map(|link| Place::Links(link, link)));
     let instrument = survey.seen_from_outside().then_some(Place::Tracker);
-    all.chain([Place::Base, Place::Tool]).chain(instrument).collect()
+    all.chain([Place::Base, Place::Tool])
+        .chain(instrument)
+        .collect()
 }
 
 /// The motions of a place, by family.
@@ -177,16 +241,34 @@ pub(super) fn families(place: Place, survey: &Survey) -> Vec<Vec<Motion>> {
             vec![Motion::Joint { joint }],
             vec![false, true]
                 .into_iter()
-                .map(|turning| Motion::Axis { joint, about: None, turning, at: AxisPoint::Own })
+                .map(|turning| Motion::Axis {
+                    joint,
+                    about: None,
+                    turning,
+                    at: AxisPoint::Own,
+                })
                 .collect(),
             vec![Motion::Slide { joint, along: true }],
-            vec![Motion::Slide { joint, along: false }],
+            vec![Motion::Slide {
+                joint,
+                along: false,
+            }],
         ],
         Place::Joint(joint) => vec![vec![Motion::Joint { joint }]],
-        Place::Links(link, _) => vec![vec![Motion::Links { first: link, last: link }], vec![Motion::Bend { link }]],
-        Place::Tracker => [Polar::Range, Polar::Azimuth, Polar::Elevation].map(|of| vec![Motion::Instrument { of }]).to_vec(),
+        Place::Links(link, _) => vec![
+            vec![Motion::Links {
+                first: link,
+                last: link,
+            }],
+            vec![Motion::Bend { link }],
+        ],
+        Place::Tracker => [Polar::Range, Polar::Azimuth, Polar::Elevation]
+            .map(|of| vec![Motion::Instrument { of }])
+            .to_vec(),
         Place::Tool => vec![vec![Motion::Tool { axes: Axes::Place }]],
-        _ => [Axes::Place, Axes::Rotation].map(|axes| vec![Motion::Base { axes }]).to_vec(),
+        _ => [Axes::Place, Axes::Rotation]
+            .map(|axes| vec![Motion::Base { axes }])
+            .to_vec(),
     }
 }
 
@@ -203,33 +285,107 @@ pub(super) fn kinds(place: Place, motion: Motion, survey: &Survey) -> Vec<Kind> 
     let arrows = ARROWS.map(|arrow| Vector3::from(arrow).map(f64::from).normalize().into());
     let mut out: Vec<Kind> = Vec::new();
     if let Motion::Instrument { .. } = motion {
-        out.extend([Variable::Azimuth, Variable::Elevation, Variable::Range].map(|of| vec![(of, CURVE)]));
-        out.push((0..joints).map(|joint| (Variable::Angle { joint }, CURVE)).collect());
-        out.push((0..joints).map(|joint| (Variable::Approach { joint }, Over::Line)).collect());
-        out.push((0..joints).map(|joint| (Variable::Move { joint }, SLOW)).collect());
-        out.push(arrows.map(|along| (Variable::Sighted { along }, SLOW)).to_vec());
+        out.extend(
+            [Variable::Azimuth, Variable::Elevation, Variable::Range].map(|of| vec![(of, CURVE)]),
+        );
+        out.push(
+            (0..joints)
+                .map(|joint| (Variable::Angle { joint }, CURVE))
+                .collect(),
+        );
+        out.push(
+            (0..joints)
+                .map(|joint| (Variable::Approach { joint }, Over::Line))
+                .collect(),
+        );
+        out.push(
+            (0..joints)
+                .map(|joint| (Variable::Move { joint }, SLOW))
+                .collect(),
+        );
+        out.push(
+            arrows
+                .map(|along| (Variable::Sighted { along }, SLOW))
+                .to_vec(),
+        );
     } else {
-        out.push(vec![(Variable::Angle { joint: own }, if turns { FINE } else { CURVE })]);
-        out.push(others().map(|joint| (Variable::Angle { joint }, CURVE)).collect());
+        out.push(vec![(
+            Variable::Angle { joint: own },
+            if turns { FINE } else { CURVE },
+        )]);
+        out.push(
+            others()
+                .map(|joint| (Variable::Angle { joint }, CURVE))
+                .collect(),
+        );
         out.push(vec![(Variable::Approach { joint: own }, Over::Line)]);
-        out.push(others().map(|joint| (Variable::Approach { joint }, Over::Line)).collect());
+        out.push(
+            others()
+                .map(|joint| (Variable::Approach { joint }, Over::Line))
+                .collect(),
+        );
         out.push(vec![(Variable::Move { joint: own }, CURVE)]);
-        out.push(others().map(|joint| (Variable::Move { joint }, SLOW)).collect());
+        out.push(
+            others()
+                .map(|joint| (Variable::Move { joint }, SLOW))
+                .collect(),
+        );
         let loaded = |joint: &usize| survey.is_loaded(*joint);
-        out.push([own].into_iter().filter(loaded).map(|joint| (Variable::Load { joint }, CURVE)).collect());
-        out.push(others().filter(loaded).map(|joint| (Variable::Load { joint }, SLOW)).collect());
-        out.push(arrows.map(|along| (Variable::Position { along }, SLOW)).to_vec());
-        let limits = LIMITS.map(|share| Variable::Stretch { joint: own, limit: share * survey.travel(own) });
+        out.push(
+            [own]
+                .into_iter()
+                .filter(loaded)
+                .map(|joint| (Variable::Load { joint }, CURVE))
+                .collect(),
+        );
+        out.push(
+            others()
+                .filter(loaded)
+                .map(|joint| (Variable::Load { joint }, SLOW))
+                .collect(),
+        );
+        out.push(
+            arrows
+                .map(|along| (Variable::Position { along }, SLOW))
+                .to_vec(),
+        );
+        let limits = LIMITS.map(|share| Variable::Stretch {
+            joint: own,
+            limit: share * survey.travel(own),
+        });
         out.push(limits.map(|of| (of, SLOW)).to_vec());
-        let other = |joint: usize| Variable::Stretch { joint, limit: LIMITS[1] * survey.travel(joint) };
+        let other = |joint: usize| Variable::Stretch {
+            joint,
+            limit: LIMITS[1] * survey.travel(joint),
+        };
         out.push(others().map(|joint| (other(joint), SLOW)).collect());
         if survey.data.has_clock() {
-            out.push(FADING.map(|time| (Variable::Recent { joint: own, time }, SLOW)).to_vec());
-            out.push(others().map(|joint| (Variable::Recent { joint, time: FADING[1] }, SLOW)).collect());
+            out.push(
+                FADING
+                    .map(|time| (Variable::Recent { joint: own, time }, SLOW))
+                    .to_vec(),
+            );
+            out.push(
+                others()
+                    .map(|joint| {
+                        (
+                            Variable::Recent {
+                                joint,
+                                time: FADING[1],
+                            },
+                            SLOW,
+                        )
+                    })
+                    .collect(),
+            );
         }
     }
     if place == Place::Tool {
-        out.push((0..3).map(|axis| (Variable::Gravity { axis: Some(axis) }, SLOW)).collect());
+        out.push(
+            (0..3)
+                .map(|axis| (Variable::Gravity { axis: Some(axis) }, SLOW))
+                .collect(),
+        );
     }
     out.push(vec![(Variable::Time, CURVE)]);
     out.push(vec![(Variable::Time, Over::Step)]);
@@ -240,13 +396,24 @@ pub(super) fn kinds(place: Place, motion: Motion, survey: &Survey) -> Vec<Kind> 
 }
 
 /// The cause whose cell is this motion over this variable in all shapes, if there is one.
-pub(super) fn listed_as(motion: Motion, of: Variable, over: Over, survey: &Survey) -> Option<&'static str> {
+pub(super) fn listed_as(
+    motion: Motion,
+    of: Variable,
+    over: Over,
+    survey: &Survey,
+) -> Option<&'static str> {
     let last = survey.joints().saturating_sub(1);
     match (motion, of, over) {
         // What the last joint carries is the tool.
-        (Motion::Slide { joint, .. }, Variable::Time, Over::Step) if joint == last => Some(names::TOOL_SHIFT),
-        (Motion::Joint { joint }, Variable::Approach { joint: by }, _) if joint == by => Some(names::BACKLASH),
-        (Motion::Joint { joint }, Variable::Load { joint: by }, _) if joint == by => Some(names::JOINT_COMPLIANCE),
+        (Motion::Slide { joint, .. }, Variable::Time, Over::Step) if joint == last => {
+            Some(names::TOOL_SHIFT)
+        }
+        (Motion::Joint { joint }, Variable::Approach { joint: by }, _) if joint == by => {
+            Some(names::BACKLASH)
+        }
+        (Motion::Joint { joint }, Variable::Load { joint: by }, _) if joint == by => {
+            Some(names::JOINT_COMPLIANCE)
+        }
         (Motion::Joint { .. }, Variable::Time, Over::Step) => Some(names::ZERO_SHIFT),
         (Motion::Base { .. }, Variable::Time, Over::Step) => Some(names::BASE_SHIFT),
         (Motion::Tool { .. }, Variable::Time, Over::Step) => Some(names::TOOL_SHIFT),

@@ -6,7 +6,8 @@ use crate::criteria::cells::{BENT, COMMON, RARE, RARER};
 use crate::criteria::effect;
 use crate::diagnose::types::Question;
 use crate::effect::{
-    AxisPoint, Basis, CAUSES, DeclaredForm, Hypothesis, Law, Motion, Place, Survey, Term, Unknown, Variable, cause, names,
+    AxisPoint, Basis, CAUSES, DeclaredForm, Hypothesis, Law, Motion, Place, Survey, Term, Unknown,
+    Variable, cause, names,
 };
 use crate::robot::RobotModel;
 use std::collections::BTreeMap;
@@ -40,18 +41,40 @@ fn log_prior(name: &str, place: Place, weight: f64) -> f64 {
 
 /// The cause under whose name a form is a cell: a joint yields to its load in one way, in proportion or not.
 pub(super) fn cell_of(cause: &'static str) -> &'static str {
-    if cause == names::JOINT_HARDENING { names::JOINT_COMPLIANCE } else { cause }
+    if cause == names::JOINT_HARDENING {
+        names::JOINT_COMPLIANCE
+    } else {
+        cause
+    }
 }
 
 /// All cells with a name, but of those that are to be left out: cells without a name take their place.
-pub(super) fn cells(survey: &Survey, values: &dyn Fn(Variable) -> Option<Vec<f64>>, question: &Question) -> Vec<CauseCell> {
-    let Question { without, own: declared, prior_weight, .. } = *question;
+pub(super) fn cells(
+    survey: &Survey,
+    values: &dyn Fn(Variable) -> Option<Vec<f64>>,
+    question: &Question,
+) -> Vec<CauseCell> {
+    let Question {
+        without,
+        own: declared,
+        prior_weight,
+        ..
+    } = *question;
     let mut all: BTreeMap<(&'static str, Place), Vec<Hypothesis>> = BTreeMap::new();
     // What is a cell of its own without a name, or no cell at all.
-    let other = [names::UNKNOWN, names::JOINT_TABLE, names::OUTLIER, names::MISLABELLED_POINT];
+    let other = [
+        names::UNKNOWN,
+        names::JOINT_TABLE,
+        names::OUTLIER,
+        names::MISLABELLED_POINT,
+    ];
     let causes = CAUSES.iter().filter(|cause| !other.contains(&cause.name()));
     let proposed = causes.flat_map(|cause| cause.propose(survey));
-    let proposed = proposed.chain(declared.iter().flat_map(|cause| DeclaredForm::hypotheses(cause, survey)));
+    let proposed = proposed.chain(
+        declared
+            .iter()
+            .flat_map(|cause| DeclaredForm::hypotheses(cause, survey)),
+    );
     let left_out = |name: &str| without.iter().any(|out| out == name);
     for hypothesis in proposed.filter(|hypothesis| !left_out(hypothesis.form.name())) {
         let key = (cell_of(hypothesis.form.name()), hypothesis.form.place());
@@ -60,7 +83,9 @@ pub(super) fn cells(survey: &Survey, values: &dyn Fn(Variable) -> Option<Vec<f64
     for joint in survey.revolute().filter(|_| !left_out(names::CABLE_DRAG)) {
         let pulled = hoses(survey, joint);
         if !pulled.is_empty() {
-            all.entry((names::CABLE_DRAG, Place::Joint(joint))).or_default().extend(pulled);
+            all.entry((names::CABLE_DRAG, Place::Joint(joint)))
+                .or_default()
+                .extend(pulled);
         }
     }
     let cell = |((name, place), hypotheses): ((&'static str, Place), Vec<Hypothesis>)| {
@@ -83,26 +108,42 @@ pub(super) fn cells(survey: &Survey, values: &dyn Fn(Variable) -> Option<Vec<f64
 
 /// By how much, in ln of odds, the commonest form of a cell is rarer than what is rare.
 fn unusual(hypotheses: &[Hypothesis]) -> f64 {
-    let least = hypotheses.iter().map(|hypothesis| hypothesis.prior_penalty).fold(f64::INFINITY, f64::min);
+    let least = hypotheses
+        .iter()
+        .map(|hypothesis| hypothesis.prior_penalty)
+        .fold(f64::INFINITY, f64::min);
     0.5 * (least - *effect::RARE).max(0.0)
 }
 
 /// The forms of a cell, weighed by how many like them are tried and how rare they are among each other.
 fn weighed(hypotheses: Vec<Hypothesis>, robot: &RobotModel) -> Vec<ShapeGroup> {
-    let weight = |hypothesis: &Hypothesis| (-0.5 * hypothesis.prior_penalty).exp() / hypothesis.tried;
+    let weight =
+        |hypothesis: &Hypothesis| (-0.5 * hypothesis.prior_penalty).exp() / hypothesis.tried;
     let sum: f64 = hypotheses.iter().map(weight).sum();
     let plain = hypotheses.iter().map(weight).fold(0.0, f64::max);
     let one = |hypothesis: Hypothesis| {
         let weight = weight(&hypothesis);
         let is_hardening = hypothesis.form.name() == names::JOINT_HARDENING;
         let is_bent = is_hardening || weight < 0.5 * plain && hypothesis.tried > 1.0;
-        let shape = |shares, part: f64| CellShape { shares, log_weight: (part * weight / sum).ln(), is_bent };
+        let shape = |shares, part: f64| CellShape {
+            shares,
+            log_weight: (part * weight / sum).ln(),
+            is_bent,
+        };
         let shapes = if is_hardening {
-            vec![shape(bent_shares(hypothesis.form.numbers(robot).len()), 0.5), shape(Vec::new(), 0.5)]
+            vec![
+                shape(bent_shares(hypothesis.form.numbers(robot).len()), 0.5),
+                shape(Vec::new(), 0.5),
+            ]
         } else {
             vec![shape(Vec::new(), 1.0)]
         };
-        ShapeGroup { forms: vec![hypothesis.form], shapes, positive: hypothesis.positive, largest: hypothesis.largest }
+        ShapeGroup {
+            forms: vec![hypothesis.form],
+            shapes,
+            positive: hypothesis.positive,
+            largest: hypothesis.largest,
+        }
     };
     hypotheses.into_iter().map(one).collect()
 }
@@ -111,7 +152,9 @@ fn weighed(hypotheses: Vec<Hypothesis>, robot: &RobotModel) -> Vec<ShapeGroup> {
 fn bent_shares(count: usize) -> Vec<f64> {
     let bend = BENT[1] * BENT[1];
     let each = bend / (1.0 + bend) / (count.max(2) - 1) as f64;
-    std::iter::once(1.0 / (1.0 + bend)).chain(std::iter::repeat_n(each, count.max(2) - 1)).collect()
+    std::iter::once(1.0 / (1.0 + bend))
+        .chain(std::iter::repeat_n(each, count.max(2) - 1))
+        .collect()
 }
 
 /// Curves that are the same physics as a cause's own laws.
@@ -122,43 +165,108 @@ fn curves(
     values: &dyn Fn(Variable) -> Option<Vec<f64>>,
     joints: usize,
 ) -> Vec<ShapeGroup> {
-    let Place::Joint(joint) = place else { return Vec::new() };
+    let Place::Joint(joint) = place else {
+        return Vec::new();
+    };
     let (motion, load) = (Motion::Joint { joint }, Variable::Load { joint });
     match name {
         names::JOINT_COMPLIANCE => {
-            let line = groups.iter().flat_map(|group| &group.forms).find(|form| form.name() == name);
-            let line = line.filter(|form| form.variables() == [load] && form.compliance(&[1.0]).is_some());
+            let line = groups
+                .iter()
+                .flat_map(|group| &group.forms)
+                .find(|form| form.name() == name);
+            let line =
+                line.filter(|form| form.variables() == [load] && form.compliance(&[1.0]).is_some());
             let curve = line.cloned().zip(values(load));
-            curve.and_then(|(line, values)| not_quite_straight(line, motion, load, &values, 0.0)).into_iter().collect()
+            curve
+                .and_then(|(line, values)| not_quite_straight(line, motion, load, &values, 0.0))
+                .into_iter()
+                .collect()
         }
         names::BACKLASH => {
-            let gap = groups.iter().flat_map(|group| &group.forms).any(|form| form.variables() == [Variable::Approach { joint }]);
-            let Some(values) = values(load).filter(|_| gap) else { return Vec::new() };
-            let Some(Basis::Linear { .. }) = super::cell::line(&values) else { return Vec::new() };
+            let gap = groups
+                .iter()
+                .flat_map(|group| &group.forms)
+                .any(|form| form.variables() == [Variable::Approach { joint }]);
+            let Some(values) = values(load).filter(|_| gap) else {
+                return Vec::new();
+            };
+            let Some(Basis::Linear { .. }) = super::cell::line(&values) else {
+                return Vec::new();
+            };
             let [low, high] = super::cell::support(&values);
-            let law = Law::of(Variable::Approach { joint }).times(load, Basis::Series { low, high, count: 8 });
-            let shares = std::iter::once(0.5).chain([0.3, 0.12, 0.04, 0.02, 0.01, 0.006, 0.004]).collect();
-            let shape = CellShape { shares, log_weight: 0.3_f64.ln(), is_bent: true };
+            let law = Law::of(Variable::Approach { joint }).times(
+                load,
+                Basis::Series {
+                    low,
+                    high,
+                    count: 8,
+                },
+            );
+            let shares = std::iter::once(0.5)
+                .chain([0.3, 0.12, 0.04, 0.02, 0.01, 0.006, 0.004])
+                .collect();
+            let shape = CellShape {
+                shares,
+                log_weight: 0.3_f64.ln(),
+                is_bent: true,
+            };
             let form = Term::new(&Unknown, motion, law).into();
-            vec![ShapeGroup { forms: vec![form], shapes: vec![shape], positive: false, largest: f64::INFINITY }]
+            vec![ShapeGroup {
+                forms: vec![form],
+                shapes: vec![shape],
+                positive: false,
+                largest: f64::INFINITY,
+            }]
         }
         names::AXIS_WOBBLE => {
             let of = Variable::Angle { joint };
-            let Some(values) = values(of).filter(|values| !super::cell::has_few(values)) else { return Vec::new() };
+            let Some(values) = values(of).filter(|values| !super::cell::has_few(values)) else {
+                return Vec::new();
+            };
             let free = |turning| FreeShape {
-                motion: Motion::Axis { joint, about: None, turning, at: AxisPoint::Own },
+                motion: Motion::Axis {
+                    joint,
+                    about: None,
+                    turning,
+                    at: AxisPoint::Own,
+                },
                 of,
-                over: Over::Curve { count: 12, first: 12, lengths: 3 },
+                over: Over::Curve {
+                    count: 12,
+                    first: 12,
+                    lengths: 3,
+                },
             };
             let known = |_: Variable| Some(values.clone());
-            let mut out: Vec<ShapeGroup> = [true, false].into_iter().flat_map(|turning| free(turning).curves(&known)).collect();
-            let count = out.iter().map(|group| group.shapes.len()).sum::<usize>().max(1) as f64;
+            let mut out: Vec<ShapeGroup> = [true, false]
+                .into_iter()
+                .flat_map(|turning| free(turning).curves(&known))
+                .collect();
+            let count = out
+                .iter()
+                .map(|group| group.shapes.len())
+                .sum::<usize>()
+                .max(1) as f64;
             let shapes = out.iter_mut().flat_map(|group| &mut group.shapes);
             shapes.for_each(|shape| shape.log_weight = 0.3_f64.ln() - count.ln());
             // About the middle of the link that the joint moves.
-            let bent = |order| Law::new(of, Basis::Wave { order, overtone: false });
-            let bent = [1, 2].map(|order| Term::new(&Unknown, Motion::Bend { link: joint }, bent(order)).into());
-            out.extend(bent.into_iter().filter(|_| joint + 1 < joints).map(|form| ShapeGroup::of(form, 0.05_f64.ln())));
+            let bent = |order| {
+                Law::new(
+                    of,
+                    Basis::Wave {
+                        order,
+                        overtone: false,
+                    },
+                )
+            };
+            let bent = [1, 2]
+                .map(|order| Term::new(&Unknown, Motion::Bend { link: joint }, bent(order)).into());
+            out.extend(
+                bent.into_iter()
+                    .filter(|_| joint + 1 < joints)
+                    .map(|form| ShapeGroup::of(form, 0.05_f64.ln())),
+            );
             out
         }
         _ => Vec::new(),
@@ -167,17 +275,38 @@ fn curves(
 
 /// Pulls on a joint by its own angle and a neighbour's.
 fn hoses(survey: &Survey, joint: usize) -> Vec<Hypothesis> {
-    let turns = |other: &usize| *other < survey.joints() && survey.robot.is_revolute(*other) && survey.travel(*other) > 0.0;
-    let neighbours: Vec<usize> = [joint.wrapping_sub(1), joint + 1].into_iter().filter(turns).collect();
-    let wave = Basis::Wave { order: 1, overtone: false };
+    let turns = |other: &usize| {
+        *other < survey.joints() && survey.robot.is_revolute(*other) && survey.travel(*other) > 0.0
+    };
+    let neighbours: Vec<usize> = [joint.wrapping_sub(1), joint + 1]
+        .into_iter()
+        .filter(turns)
+        .collect();
+    let wave = Basis::Wave {
+        order: 1,
+        overtone: false,
+    };
     let law = |other: &usize| {
         let cosines = |joint: usize| {
             let [low, high] = survey.range[joint];
-            Basis::Series { low, high, count: 3 }
+            Basis::Series {
+                low,
+                high,
+                count: 3,
+            }
         };
         let [own, other] = [joint, *other].map(|joint| (Variable::Angle { joint }, cosines(joint)));
-        [Law::new(own.0, wave).times(other.0, wave), Law::new(own.0, own.1).times(other.0, other.1)]
+        [
+            Law::new(own.0, wave).times(other.0, wave),
+            Law::new(own.0, own.1).times(other.0, other.1),
+        ]
     };
     let laws = neighbours.iter().flat_map(law);
-    laws.map(|law| Hypothesis::new(Term::new(&Unknown, Motion::Joint { joint }, law), 2 * neighbours.len())).collect()
+    laws.map(|law| {
+        Hypothesis::new(
+            Term::new(&Unknown, Motion::Joint { joint }, law),
+            2 * neighbours.len(),
+        )
+    })
+    .collect()
 }

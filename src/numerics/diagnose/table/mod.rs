@@ -64,7 +64,10 @@ impl Rounds {
 
     /// From the beginning, where the noise is believed to be another one; where the residual sat at first stays.
     pub fn again(&mut self) {
-        *self = Self { first: self.first.take(), ..Self::default() };
+        *self = Self {
+            first: self.first.take(),
+            ..Self::default()
+        };
     }
 
     /// Searches around a fitted model.
@@ -82,13 +85,22 @@ impl Rounds {
         let brought = only_brought(&fitter.data, question.fit);
         let keeps = |cell: &cell::CauseCell| {
             // Where nothing but joints was recorded, base and first joint move with all places that the target was laid into.
-            let unseen =
-                brought && (cell.place == Place::Base || cell.place == Place::Joint(0) && cell.name == names::ZERO_SHIFT);
+            let unseen = brought
+                && (cell.place == Place::Base
+                    || cell.place == Place::Joint(0) && cell.name == names::ZERO_SHIFT);
             let values = |of| view.problem.values(of);
-            let is_slow = || cell.groups(&survey, &values, false).iter().any(|group| group.forms.iter().any(slow));
+            let is_slow = || {
+                cell.groups(&survey, &values, false)
+                    .iter()
+                    .any(|group| group.forms.iter().any(slow))
+            };
             !(unseen || fitter.causes_of_the_arm_first() && is_slow())
         };
-        let all_pairs = if self.pairs.is_none() { generated::pairs(&survey, &mut frame) } else { Vec::new() };
+        let all_pairs = if self.pairs.is_none() {
+            generated::pairs(&survey, &mut frame)
+        } else {
+            Vec::new()
+        };
         let products = (&self.shown[..], self.pairs.as_deref().unwrap_or_default());
         let is_open = self.is_open || survey.rows.len() >= *OPEN;
         let mut table = CauseTable::new(&mut frame, &survey, question, products, is_open, keeps);
@@ -106,7 +118,11 @@ impl Rounds {
             self.first = Some((table.locate(&state), answer::nothing(&scan)));
         }
         let has_begun = !components.is_empty();
-        components = if has_begun { table.backfit(components, 1) } else { table.start() };
+        components = if has_begun {
+            table.backfit(components, 1)
+        } else {
+            table.start()
+        };
         // Joints that yield come first: masses and currents speak of what yields in the model, and large motions are not linear.
         let waits = !has_begun && !components.is_empty() && self.round < *ROUNDS;
         if !waits {
@@ -118,7 +134,10 @@ impl Rounds {
             components = table.grow(components);
             components = table.by_several(components);
         }
-        let keys: Vec<String> = components.iter().map(|own| table.cells[own.cell].key.clone()).collect();
+        let keys: Vec<String> = components
+            .iter()
+            .map(|own| table.cells[own.cell].key.clone())
+            .collect();
         let sorted = |keys: &[String]| {
             let mut keys = keys.to_vec();
             keys.sort();
@@ -126,7 +145,8 @@ impl Rounds {
         };
         let shown = table.shown(&components);
         let is_settled = sorted(&keys) == sorted(&before) && shown.len() <= self.shown.len();
-        let mut is_last = components.is_empty() || is_settled && self.round > 1 || self.round >= *ROUNDS;
+        let mut is_last =
+            components.is_empty() || is_settled && self.round > 1 || self.round >= *ROUNDS;
         if is_last && !(is_open && self.pairs.is_some()) {
             let all: Vec<&Component> = components.iter().collect();
             let state = table.state(&all, None);
@@ -135,18 +155,27 @@ impl Rounds {
                 self.is_open = unexplained;
                 is_last = !unexplained;
             } else if self.pairs.is_none() {
-                let seen = if unexplained { table.seen_pairs(&all_pairs, &state, &all) } else { Vec::new() };
+                let seen = if unexplained {
+                    table.seen_pairs(&all_pairs, &state, &all)
+                } else {
+                    Vec::new()
+                };
                 is_last = seen.is_empty();
                 self.pairs = Some(seen);
             }
         }
-        let answer = is_last.then(|| table.answer(&components, self.first.clone().unwrap_or_default()));
+        let answer =
+            is_last.then(|| table.answer(&components, self.first.clone().unwrap_or_default()));
         let mut causes = estimated(&table, &components);
         by_currents(&mut causes, view);
         let cells = table.cells.len();
         self.components = keys.into_iter().zip(components).collect();
         self.shown = shown;
-        Round { causes, answer, cells }
+        Round {
+            causes,
+            answer,
+            cells,
+        }
     }
 }
 
@@ -172,7 +201,10 @@ fn estimated(table: &CauseTable, components: &[Component]) -> Vec<EstimatedCause
                 coefficients: kept.iter().map(|k| coefficients[range.start + k]).collect(),
                 priors: kept
                     .iter()
-                    .map(|k| Prior { mean: 0.0, sigma: sigmas[range.start + k].max(f64::MIN_POSITIVE.sqrt()) })
+                    .map(|k| Prior {
+                        mean: 0.0,
+                        sigma: sigmas[range.start + k].max(f64::MIN_POSITIVE.sqrt()),
+                    })
                     .collect(),
             });
         }
@@ -182,10 +214,19 @@ fn estimated(table: &CauseTable, components: &[Component]) -> Vec<EstimatedCause
 
 /// What the motor currents say of the numbers of the torque model, as their priors.
 fn by_currents(causes: &mut [EstimatedCause], view: &RoundView) {
-    let of_torque_model: Vec<Form> =
-        causes.iter().map(|cause| cause.form.clone()).filter(|form| form.is_of_torque_model()).collect();
-    let mut priors = view.problem.priors_by_currents(&of_torque_model.iter().collect::<Vec<_>>()).into_iter();
-    for cause in causes.iter_mut().filter(|cause| cause.form.is_of_torque_model()) {
+    let of_torque_model: Vec<Form> = causes
+        .iter()
+        .map(|cause| cause.form.clone())
+        .filter(|form| form.is_of_torque_model())
+        .collect();
+    let mut priors = view
+        .problem
+        .priors_by_currents(&of_torque_model.iter().collect::<Vec<_>>())
+        .into_iter();
+    for cause in causes
+        .iter_mut()
+        .filter(|cause| cause.form.is_of_torque_model())
+    {
         let own: Vec<Prior> = priors.by_ref().take(cause.coefficients.len()).collect();
         if own.len() == cause.coefficients.len() {
             cause.priors = own;
@@ -194,19 +235,56 @@ fn by_currents(causes: &mut [EstimatedCause], view: &RoundView) {
 }
 
 /// A form with a curve of no more waves than are `seen`, and which of its columns stay.
-fn without_idle_waves(form: &Form, count: usize, seen: &dyn Fn(usize) -> bool) -> (Form, Vec<usize>) {
+fn without_idle_waves(
+    form: &Form,
+    count: usize,
+    seen: &dyn Fn(usize) -> bool,
+) -> (Form, Vec<usize>) {
     let all: Vec<usize> = (0..count).collect();
-    let Some(term) = form.term() else { return (form.clone(), all) };
-    let (Basis::Cosines { low, high, count: waves }, None) = (term.basis(), term.law().times) else { return (form.clone(), all) };
+    let Some(term) = form.term() else {
+        return (form.clone(), all);
+    };
+    let (
+        Basis::Cosines {
+            low,
+            high,
+            count: waves,
+        },
+        None,
+    ) = (term.basis(), term.law().times)
+    else {
+        return (form.clone(), all);
+    };
     let fields = count / waves.max(1);
-    let alternates = matches!(term.motion(), Motion::Base { .. } | Motion::Tool { .. } | Motion::Tracker { .. });
-    let column = |wave: usize, field: usize| if alternates { wave * fields + field } else { field * waves + wave };
-    let last = (0..waves).rev().find(|wave| (0..fields).any(|field| seen(column(*wave, field)))).map_or(1, |last| last + 1);
-    let law = Law::new(term.law().first.of, Basis::Cosines { low, high, count: last });
+    let alternates = matches!(
+        term.motion(),
+        Motion::Base { .. } | Motion::Tool { .. } | Motion::Tracker { .. }
+    );
+    let column = |wave: usize, field: usize| {
+        if alternates {
+            wave * fields + field
+        } else {
+            field * waves + wave
+        }
+    };
+    let last = (0..waves)
+        .rev()
+        .find(|wave| (0..fields).any(|field| seen(column(*wave, field))))
+        .map_or(1, |last| last + 1);
+    let law = Law::new(
+        term.law().first.of,
+        Basis::Cosines {
+            low,
+            high,
+            count: last,
+        },
+    );
     let kept = if alternates {
         (0..last * fields).collect()
     } else {
-        (0..fields).flat_map(|field| (0..last).map(move |wave| field * waves + wave)).collect()
+        (0..fields)
+            .flat_map(|field| (0..last).map(move |wave| field * waves + wave))
+            .collect()
     };
     (Form::from(term.with(law)), kept)
 }

@@ -26,16 +26,29 @@ impl CauseTable<'_, '_> {
         let most = scan.best().map_or(0.0, |best| scan.log_odds[best]);
         let best = scan.best();
         let open = best.is_some_and(|best| !self.cells[best].is_named());
-        let near = |cell: &usize| open && scan.log_odds[*cell] > most - (0.2 * most).max(10.0) && scan.log_odds[*cell] > -5.0;
-        let named =
-            |cell: &usize| Some(*cell) == best || self.declared.contains(cell) || self.cells[*cell].is_named() && near(cell);
+        let near = |cell: &usize| {
+            open && scan.log_odds[*cell] > most - (0.2 * most).max(10.0)
+                && scan.log_odds[*cell] > -5.0
+        };
+        let named = |cell: &usize| {
+            Some(*cell) == best
+                || self.declared.contains(cell)
+                || self.cells[*cell].is_named() && near(cell)
+        };
         let listed: Vec<usize> = scan.closely.keys().copied().filter(named).collect();
         let refined: Vec<(usize, Refined)> = listed
             .into_par_iter()
-            .filter_map(|cell| Some((cell, self.refined(cell, &scan.closely[&cell], state, components)?)))
+            .filter_map(|cell| {
+                Some((
+                    cell,
+                    self.refined(cell, &scan.closely[&cell], state, components)?,
+                ))
+            })
             .collect();
         for (cell, own) in refined {
-            let Some(found) = scan.closely.get_mut(&cell) else { continue };
+            let Some(found) = scan.closely.get_mut(&cell) else {
+                continue;
+            };
             if own.1 > found.log {
                 found.log = own.1;
                 scan.log_odds[cell] = prior(cell) + own.1;
@@ -45,14 +58,26 @@ impl CauseTable<'_, '_> {
     }
 
     /// The shape of a cell with its numbers where the evidence is largest, with ln of that and its amplitude; none where it has no numbers.
-    pub fn refined(&self, cell: usize, found: &CellEvidence, state: &KnownState, others: &[&Component]) -> Option<Refined> {
+    pub fn refined(
+        &self,
+        cell: usize,
+        found: &CellEvidence,
+        state: &KnownState,
+        others: &[&Component],
+    ) -> Option<Refined> {
         let best = self.as_found(cell, found);
-        let keys: BTreeSet<String> = others.iter().flat_map(|own| &own.forms).map(Form::key).collect();
+        let keys: BTreeSet<String> = others
+            .iter()
+            .flat_map(|own| &own.forms)
+            .map(Form::key)
+            .collect();
         let value = |forms: &[Form]| {
             let other = self.with_forms(&best, forms.to_vec());
             // With other numbers a variable may have so few values that its curve has fewer columns.
             let is_alike = other.values.ncols() == best.shape.shares.len();
-            is_alike.then(|| self.of_component(&other, state, others)).flatten()
+            is_alike
+                .then(|| self.of_component(&other, state, others))
+                .flatten()
         };
         let is_there = |forms: &[Form]| forms.iter().any(|form| keys.contains(&form.key()));
         let start = self.of_component(&best, state, others)?;
@@ -65,18 +90,38 @@ impl CauseTable<'_, '_> {
                         let group = groups.get(found.shape.0)?;
                         Some((free, self.forms_of(group, found.shape.1)?))
                     };
-                    free.near(level).into_iter().filter_map(forms).filter(|(_, forms)| !is_there(forms)).collect::<Vec<_>>()
+                    free.near(level)
+                        .into_iter()
+                        .filter_map(forms)
+                        .filter(|(_, forms)| !is_there(forms))
+                        .collect::<Vec<_>>()
                 };
                 let refined = climb(*free, start, &near, &value, &|_, _| 0.0)?;
-                let forms = self.forms_of(refined.0.groups(self.survey, &values, true).get(found.shape.0)?, found.shape.1)?;
+                let forms = self.forms_of(
+                    refined
+                        .0
+                        .groups(self.survey, &values, true)
+                        .get(found.shape.0)?,
+                    found.shape.1,
+                )?;
                 Some((forms, refined.1, refined.2))
             }
             (Shapes::Listed(_), [form]) if !form.cause().is_nameless() => {
                 let near = |form: &Form, level| {
-                    let near = form.near(self.survey, level).into_iter().map(|near| (near.clone(), vec![near]));
-                    near.filter(|(_, forms)| !is_there(forms)).collect::<Vec<_>>()
+                    let near = form
+                        .near(self.survey, level)
+                        .into_iter()
+                        .map(|near| (near.clone(), vec![near]));
+                    near.filter(|(_, forms)| !is_there(forms))
+                        .collect::<Vec<_>>()
                 };
-                let price = |form: &Form, near: &Form| if is_whole_order(form) && !is_whole_order(near) { *BENDS } else { 0.0 };
+                let price = |form: &Form, near: &Form| {
+                    if is_whole_order(form) && !is_whole_order(near) {
+                        *BENDS
+                    } else {
+                        0.0
+                    }
+                };
                 let (form, log, amplitude) = climb(form.clone(), start, &near, &value, &price)?;
                 Some((vec![form], log, amplitude))
             }
@@ -90,7 +135,9 @@ impl CauseTable<'_, '_> {
         let shares = &group.shapes.get(shape)?.shares;
         let mut out = Vec::new();
         for form in &group.forms {
-            let count = form.term().map_or(0, |term| fields(term.motion()) * term.law().count());
+            let count = form
+                .term()
+                .map_or(0, |term| fields(term.motion()) * term.law().count());
             let own = shares.get(at..at + count).unwrap_or_default();
             at += count;
             if own.is_empty() || own.iter().any(|share| *share > 0.0) {
@@ -113,11 +160,13 @@ fn climb<T: Clone>(
     let (mut now, (mut log, mut amplitude), mut moved) = (first, start, false);
     for level in 0..*LEVELS {
         loop {
-            let tried = near(&now, level)
-                .into_iter()
-                .filter_map(|other| value(&other.1).map(|(log, amplitude)| (log, amplitude, other.0)));
+            let tried = near(&now, level).into_iter().filter_map(|other| {
+                value(&other.1).map(|(log, amplitude)| (log, amplitude, other.0))
+            });
             let paid = |(log, _, other): &(f64, f64, T)| log - price(&now, other);
-            let Some(next) = tried.max_by(|a, b| paid(a).total_cmp(&paid(b))) else { break };
+            let Some(next) = tried.max_by(|a, b| paid(a).total_cmp(&paid(b))) else {
+                break;
+            };
             if paid(&next) <= log + 1e-6 {
                 break;
             }
@@ -133,5 +182,8 @@ fn climb<T: Clone>(
 
 /// Whether a form is a wave of whole periods a turn.
 fn is_whole_order(form: &Form) -> bool {
-    matches!(form.term().map(|term| term.basis()), Some(Basis::Wave { .. }))
+    matches!(
+        form.term().map(|term| term.basis()),
+        Some(Basis::Wave { .. })
+    )
 }

@@ -68,7 +68,10 @@ pub(super) struct CellScan {
 impl CellScan {
     /// The cell of the largest odds among those asked closely.
     pub fn best(&self) -> Option<usize> {
-        self.closely.keys().copied().max_by(|a, b| self.log_odds[*a].total_cmp(&self.log_odds[*b]))
+        self.closely
+            .keys()
+            .copied()
+            .max_by(|a, b| self.log_odds[*a].total_cmp(&self.log_odds[*b]))
     }
 }
 
@@ -85,27 +88,41 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         let mut cells = generated::cells(survey, frame, question, is_open);
         cells.extend(generated::products(shown, survey, frame));
         let mut known: BTreeSet<String> = cells.iter().map(|cell| cell.key.clone()).collect();
-        cells.extend(generated::pair_cells(pairs).into_iter().filter(|cell| known.insert(cell.key.clone())));
+        cells.extend(
+            generated::pair_cells(pairs)
+                .into_iter()
+                .filter(|cell| known.insert(cell.key.clone())),
+        );
         let values = |of: Variable| frame.values(of);
         let mut named = listed::cells(survey, &values, question);
         named.append(&mut cells);
         named.retain(keeps);
         let mut motions = Vec::new();
         let mut variables = Vec::new();
-        for form in named.iter().flat_map(|cell| cell.groups(survey, &values, false)).flat_map(|group| group.forms) {
+        for form in named
+            .iter()
+            .flat_map(|cell| cell.groups(survey, &values, false))
+            .flat_map(|group| group.forms)
+        {
             let Some(term) = form.term() else { continue };
             if !motions.contains(&term.motion()) {
                 motions.push(term.motion());
             }
             variables.extend(
-                term.law().variables().into_iter().filter(|of| of.is_single() && !variables.contains(of)).collect::<Vec<_>>(),
+                term.law()
+                    .variables()
+                    .into_iter()
+                    .filter(|of| of.is_single() && !variables.contains(of))
+                    .collect::<Vec<_>>(),
             );
         }
         frame.prepare(&motions, &variables);
         let frame = &*frame;
         let values = |of: Variable| frame.values(of);
-        let coarse: Vec<CellColumns> =
-            named.par_iter().map(|cell| CellColumns::of(cell.groups(survey, &values, false), frame)).collect();
+        let coarse: Vec<CellColumns> = named
+            .par_iter()
+            .map(|cell| CellColumns::of(cell.groups(survey, &values, false), frame))
+            .collect();
         let fine = named.iter().map(|_| OnceLock::new()).collect();
         let mut columns = 0;
         let mut first = Vec::with_capacity(coarse.len());
@@ -115,7 +132,9 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         }
         let products = BTreeMap::new();
         let is_declared = |cell: &CauseCell| cell.is_named() && cause(cell.name).is_none();
-        let declared = (0..named.len()).filter(|cell| is_declared(&named[*cell])).collect();
+        let declared = (0..named.len())
+            .filter(|cell| is_declared(&named[*cell]))
+            .collect();
         Self {
             frame,
             survey,
@@ -146,7 +165,10 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         }
         self.fine[cell].get_or_init(|| {
             let values = |of: Variable| self.frame.values(of);
-            CellColumns::of(self.cells[cell].groups(self.survey, &values, true), self.frame)
+            CellColumns::of(
+                self.cells[cell].groups(self.survey, &values, true),
+                self.frame,
+            )
         })
     }
 
@@ -154,10 +176,18 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     pub fn know(&mut self, components: &[Component]) {
         for own in components {
             if !self.products.contains_key(&own.id) {
-                let with = |block: &CellColumns| own.by_part(&self.known.of(&own.values, &block.columns.values));
+                let with = |block: &CellColumns| {
+                    own.by_part(&self.known.of(&own.values, &block.columns.values))
+                };
                 let all: Vec<DMatrix<f64>> = self.coarse.par_iter().map(with).collect();
-                let values: Vec<f64> = all.iter().flat_map(|products| products.iter().copied()).collect();
-                self.products.insert(own.id, DMatrix::from_vec(own.part.ncols(), self.columns, values));
+                let values: Vec<f64> = all
+                    .iter()
+                    .flat_map(|products| products.iter().copied())
+                    .collect();
+                self.products.insert(
+                    own.id,
+                    DMatrix::from_vec(own.part.ncols(), self.columns, values),
+                );
             }
         }
         let known: BTreeSet<u64> = components.iter().map(|own| own.id).collect();
@@ -174,7 +204,11 @@ impl<'f, 'a> CauseTable<'f, 'a> {
 
     /// The same of some cells, with the first column of each.
     pub fn across_cells(&self, cells: &[usize], state: &KnownState) -> (DMatrix<f64>, Vec<usize>) {
-        let parts: Vec<&DMatrix<f64>> = state.components.iter().map(|id| &self.products[id]).collect();
+        let parts: Vec<&DMatrix<f64>> = state
+            .components
+            .iter()
+            .map(|id| &self.products[id])
+            .collect();
         let rows: usize = parts.iter().map(|part| part.nrows()).sum();
         let mut first = Vec::with_capacity(cells.len());
         let mut columns = Vec::new();
@@ -190,13 +224,18 @@ impl<'f, 'a> CauseTable<'f, 'a> {
                 for column in some {
                     for part in &parts {
                         let count = part.nrows();
-                        values.extend_from_slice(&part.as_slice()[column * count..(column + 1) * count]);
+                        values.extend_from_slice(
+                            &part.as_slice()[column * count..(column + 1) * count],
+                        );
                     }
                 }
                 state.solved(DMatrix::from_vec(rows, some.len(), values))
             })
             .collect();
-        let values = solved.iter().flat_map(|part| part.iter().copied()).collect();
+        let values = solved
+            .iter()
+            .flat_map(|part| part.iter().copied())
+            .collect();
         (DMatrix::from_vec(rows, columns.len(), values), first)
     }
 
@@ -205,17 +244,29 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         // Its likeliest motion, of unit length, in the directions of its part.
         self.parts.know(&[own], self.frame);
         let state = KnownState::of(&[own], &self.parts, self.frame, None);
-        let Some(weights) = state.weights() else { return Vec::new() };
+        let Some(weights) = state.weights() else {
+            return Vec::new();
+        };
         let motion = &*own.part * &weights;
         let length = motion.norm().max(f64::MIN_POSITIVE);
-        let Some(products) = self.products.get(&own.id) else { return Vec::new() };
-        let along: Vec<f64> = products.tr_mul(&weights).iter().map(|value| value / length).collect();
+        let Some(products) = self.products.get(&own.id) else {
+            return Vec::new();
+        };
+        let along: Vec<f64> = products
+            .tr_mul(&weights)
+            .iter()
+            .map(|value| value / length)
+            .collect();
         let overlap = |cell: usize| {
-            let range = self.first[cell]..self.first[cell] + self.coarse[cell].columns.values.ncols();
+            let range =
+                self.first[cell]..self.first[cell] + self.coarse[cell].columns.values.ncols();
             (self.coarse[cell].overlap(&along[range]), cell)
         };
-        let mut all: Vec<(f64, usize)> =
-            (0..self.cells.len()).into_par_iter().map(overlap).filter(|(share, _)| *share > *ALIKE).collect();
+        let mut all: Vec<(f64, usize)> = (0..self.cells.len())
+            .into_par_iter()
+            .map(overlap)
+            .filter(|(share, _)| *share > *ALIKE)
+            .collect();
         all.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         all.into_iter().take(most).map(|(_, cell)| cell).collect()
     }
@@ -224,11 +275,17 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     /// coarsely do not show how alike fine curves are.
     pub fn near(&self, own: &Component) -> Vec<usize> {
         let of = |cell: &CauseCell| match &cell.shapes {
-            Shapes::Free(FreeShape { of, over: Over::Curve { .. }, .. }) => Some(*of),
+            Shapes::Free(FreeShape {
+                of,
+                over: Over::Curve { .. },
+                ..
+            }) => Some(*of),
             Shapes::Free(_) => None,
             Shapes::Listed(groups) => {
                 let form = groups.first().and_then(|group| group.forms.first());
-                form.and_then(|form| form.term()).filter(|term| term.law().times.is_none()).map(|term| term.law().first.of)
+                form.and_then(|form| form.term())
+                    .filter(|term| term.law().times.is_none())
+                    .map(|term| term.law().first.of)
             }
         };
         let joints = self.survey.joints();
@@ -243,17 +300,28 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         let free = matches!(cell.shapes, Shapes::Free(_));
         let variable = of(cell).filter(|_| free);
         let near = |other: &CauseCell| match (along(cell.place), along(other.place)) {
-            (Some(place), Some(at)) => variable.is_some() && of(other) == variable && place.abs_diff(at) <= 2,
+            (Some(place), Some(at)) => {
+                variable.is_some() && of(other) == variable && place.abs_diff(at) <= 2
+            }
             _ => false,
         };
         let named_here = |other: &CauseCell| other.is_named() && other.place == cell.place;
-        (0..self.cells.len()).filter(|k| near(&self.cells[*k]) || named_here(&self.cells[*k])).collect()
+        (0..self.cells.len())
+            .filter(|k| near(&self.cells[*k]) || named_here(&self.cells[*k]))
+            .collect()
     }
 
     /// The same of a block's columns, from the components that the state has.
-    pub fn across_block(&self, block: &CellColumns, state: &KnownState, components: &[&Component]) -> DMatrix<f64> {
-        let parts: Vec<DMatrix<f64>> =
-            components.iter().map(|own| own.by_part(&self.known.of(&own.values, &block.columns.values))).collect();
+    pub fn across_block(
+        &self,
+        block: &CellColumns,
+        state: &KnownState,
+        components: &[&Component],
+    ) -> DMatrix<f64> {
+        let parts: Vec<DMatrix<f64>> = components
+            .iter()
+            .map(|own| own.by_part(&self.known.of(&own.values, &block.columns.values)))
+            .collect();
         let rows = parts.iter().map(DMatrix::nrows).sum();
         let columns = block.columns.values.ncols();
         let mut values = Vec::with_capacity(rows * columns);
@@ -271,31 +339,71 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     }
 
     /// The evidence of a cell in all of its shapes given a state of some components.
-    pub fn closely(&self, cell: usize, state: &KnownState, components: &[&Component]) -> Option<CellEvidence> {
+    pub fn closely(
+        &self,
+        cell: usize,
+        state: &KnownState,
+        components: &[&Component],
+    ) -> Option<CellEvidence> {
         let block = self.fine(cell);
         let across = self.across_block(block, state, components);
         let mut all: Vec<(f64, usize, usize, f64)> = Vec::new();
         // A model holds every number once, by its name.
-        let keys: BTreeSet<String> = components.iter().flat_map(|own| &own.forms).map(Form::key).collect();
-        let is_there = |group: usize| block.groups[group].group.forms.iter().any(|form| keys.contains(&form.key()));
-        let there: Vec<bool> = (0..block.groups.len()).map(|group| !keys.is_empty() && is_there(group)).collect();
+        let keys: BTreeSet<String> = components
+            .iter()
+            .flat_map(|own| &own.forms)
+            .map(Form::key)
+            .collect();
+        let is_there = |group: usize| {
+            block.groups[group]
+                .group
+                .forms
+                .iter()
+                .any(|form| keys.contains(&form.key()))
+        };
+        let there: Vec<bool> = (0..block.groups.len())
+            .map(|group| !keys.is_empty() && is_there(group))
+            .collect();
         state.shapes(block, &across, 0, |group, shape, found| {
             if !there[group] {
                 all.push((found.log, group, shape, found.amplitude));
             }
         });
         // A shape of further numbers only where it is clearly better.
-        let price = |group: usize, shape: usize| if block.groups[group].group.shapes[shape].is_bent { *BENDS } else { 0.0 };
+        let price = |group: usize, shape: usize| {
+            if block.groups[group].group.shapes[shape].is_bent {
+                *BENDS
+            } else {
+                0.0
+            }
+        };
         let paid = |one: &&(f64, usize, usize, f64)| one.0 - price(one.1, one.2);
         let best = all.iter().max_by(|a, b| paid(a).total_cmp(&paid(b)))?;
         let log = log_sum(&all.iter().map(|one| one.0).collect::<Vec<_>>());
-        let bent = log_sum(&all.iter().filter(|one| price(one.1, one.2) > 0.0).map(|one| one.0).collect::<Vec<_>>());
-        Some(CellEvidence { log, bent, shape: (best.1, best.2), amplitude: best.3, refined: None })
+        let bent = log_sum(
+            &all.iter()
+                .filter(|one| price(one.1, one.2) > 0.0)
+                .map(|one| one.0)
+                .collect::<Vec<_>>(),
+        );
+        Some(CellEvidence {
+            log,
+            bent,
+            shape: (best.1, best.2),
+            amplitude: best.3,
+            refined: None,
+        })
     }
 
     /// The odds of every cell given a state, closely those of the best and of some more. A cell that has a component already has no price for
     /// another one.
-    pub fn scan(&self, state: &KnownState, components: &[&Component], most: usize, also: &[usize]) -> CellScan {
+    pub fn scan(
+        &self,
+        state: &KnownState,
+        components: &[&Component],
+        most: usize,
+        also: &[usize],
+    ) -> CellScan {
         let all: Vec<usize> = (0..self.cells.len()).collect();
         self.scan_some(&all, state, components, most, also)
     }
@@ -322,14 +430,21 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         also: &[usize],
     ) -> CellScan {
         let prior = |cell: usize| {
-            if components.iter().any(|own| own.cell == cell) { 0.0 } else { self.cells[cell].log_prior }
+            if components.iter().any(|own| own.cell == cell) {
+                0.0
+            } else {
+                self.cells[cell].log_prior
+            }
         };
         let (across, first) = self.across_cells(cells, state);
-        let bound = |k: usize| prior(cells[k]) + state.bound(&self.coarse[cells[k]], &across, first[k]);
+        let bound =
+            |k: usize| prior(cells[k]) + state.bound(&self.coarse[cells[k]], &across, first[k]);
         let bounds: Vec<f64> = (0..cells.len()).into_par_iter().map(bound).collect();
         let coarse = |k: usize| {
             let mut logs = Vec::new();
-            state.shapes(&self.coarse[cells[k]], &across, first[k], |_, _, found| logs.push(found.log));
+            state.shapes(&self.coarse[cells[k]], &across, first[k], |_, _, found| {
+                logs.push(found.log)
+            });
             prior(cells[k]) + log_sum(&logs)
         };
         let mut promising: Vec<usize> = (0..cells.len()).collect();
@@ -341,27 +456,47 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             if bounds[some[0]] < (best - *FAR_BELOW).max(*UNLIKELY) {
                 break;
             }
-            let found: Vec<(usize, f64)> = some.par_iter().map(|k| (cells[*k], coarse(*k))).collect();
-            found.into_iter().for_each(|(cell, log)| log_odds[cell] = log);
+            let found: Vec<(usize, f64)> =
+                some.par_iter().map(|k| (cells[*k], coarse(*k))).collect();
+            found
+                .into_iter()
+                .for_each(|(cell, log)| log_odds[cell] = log);
         }
-        let mut order: Vec<usize> = (0..self.cells.len()).filter(|cell| log_odds[*cell].is_finite()).collect();
+        let mut order: Vec<usize> = (0..self.cells.len())
+            .filter(|cell| log_odds[*cell].is_finite())
+            .collect();
         order.sort_by(|a, b| log_odds[*b].total_cmp(&log_odds[*a]).then(a.cmp(b)));
         order.truncate(most);
-        let also = also.iter().chain(&self.declared).copied().filter(|cell| !order.contains(cell));
+        let also = also
+            .iter()
+            .chain(&self.declared)
+            .copied()
+            .filter(|cell| !order.contains(cell));
         order.extend(also.collect::<Vec<_>>());
-        let closely: BTreeMap<usize, CellEvidence> =
-            order.into_par_iter().filter_map(|cell| Some((cell, self.closely(cell, state, components)?))).collect();
+        let closely: BTreeMap<usize, CellEvidence> = order
+            .into_par_iter()
+            .filter_map(|cell| Some((cell, self.closely(cell, state, components)?)))
+            .collect();
         for (cell, found) in &closely {
             log_odds[*cell] = prior(*cell) + found.log;
         }
         let order = promising.into_iter().map(|k| cells[k]).collect();
-        let mut scan = CellScan { log_odds, closely, order };
+        let mut scan = CellScan {
+            log_odds,
+            closely,
+            order,
+        };
         self.refine(&mut scan, state, components, &prior);
         scan
     }
 
     /// Those of some products that a state shows, the most probable first.
-    pub fn seen_pairs(&self, pairs: &[FreeShape], state: &KnownState, components: &[&Component]) -> Vec<FreeShape> {
+    pub fn seen_pairs(
+        &self,
+        pairs: &[FreeShape],
+        state: &KnownState,
+        components: &[&Component],
+    ) -> Vec<FreeShape> {
         let values = |of: Variable| self.frame.values(of);
         let log = |free: &FreeShape| {
             let block = CellColumns::of(free.groups(self.survey, &values, false), self.frame);
@@ -373,15 +508,24 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         let left = state.left(components, self.frame);
         let rough = |free: &FreeShape| {
             let groups = free.groups(self.survey, &values, false);
-            Some((self.frame.roughly(groups.first()?.forms.first()?, &left)?, *free))
+            Some((
+                self.frame.roughly(groups.first()?.forms.first()?, &left)?,
+                *free,
+            ))
         };
         let mut promising: Vec<(f64, FreeShape)> = pairs.par_iter().filter_map(rough).collect();
         promising.sort_by(|a, b| b.0.total_cmp(&a.0));
         promising.truncate(6 * *PAIRS);
-        let seen = promising.par_iter().map(|(_, free)| (log(free), *free)).filter(|(log, _)| log + PAIR.ln() > *JOINS);
+        let seen = promising
+            .par_iter()
+            .map(|(_, free)| (log(free), *free))
+            .filter(|(log, _)| log + PAIR.ln() > *JOINS);
         let mut seen: Vec<(f64, FreeShape)> = seen.collect();
         seen.sort_by(|a, b| b.0.total_cmp(&a.0));
-        seen.into_iter().take(*PAIRS).map(|(_, free)| free).collect()
+        seen.into_iter()
+            .take(*PAIRS)
+            .map(|(_, free)| free)
+            .collect()
     }
 
     /// The component that a cell is in a scan.
@@ -391,7 +535,11 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             self.next += 1;
             return own.with_part(self.next);
         };
-        let own = Component { forms, amplitude, ..own };
+        let own = Component {
+            forms,
+            amplitude,
+            ..own
+        };
         self.component_of(&own, cell)
     }
 
@@ -406,38 +554,80 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         for (form, count) in seen.group.forms.iter().zip(&seen.counts) {
             let columns = at..at + count;
             at += count;
-            if shape.shares[columns.clone()].iter().any(|share| *share > 0.0) {
+            if shape.shares[columns.clone()]
+                .iter()
+                .any(|share| *share > 0.0)
+            {
                 forms.push(form.clone());
                 counts.push(*count);
                 kept.extend(columns);
             }
         }
-        let values = block.columns.values.select_columns(kept.iter().map(|k| seen.range.start + k).collect::<Vec<_>>().iter());
-        let square = kept.iter().map(|k| block.columns.square[seen.range.start + k]).collect();
+        let values = block.columns.values.select_columns(
+            kept.iter()
+                .map(|k| seen.range.start + k)
+                .collect::<Vec<_>>()
+                .iter(),
+        );
+        let square = kept
+            .iter()
+            .map(|k| block.columns.square[seen.range.start + k])
+            .collect();
         let shares = kept.iter().map(|k| shape.shares[*k]).collect();
         let shape = super::cell::CellShape { shares, ..shape };
-        let group = super::cell::ShapeGroup { forms: forms.clone(), shapes: vec![shape], ..seen.group.clone() };
-        Component::apart(cell, forms, counts, group, UnitColumns { values: Arc::new(values), square }, found.amplitude)
+        let group = super::cell::ShapeGroup {
+            forms: forms.clone(),
+            shapes: vec![shape],
+            ..seen.group.clone()
+        };
+        Component::apart(
+            cell,
+            forms,
+            counts,
+            group,
+            UnitColumns {
+                values: Arc::new(values),
+                square,
+            },
+            found.amplitude,
+        )
     }
 
     /// A component with other forms, before it has a part in the covariance.
     pub fn with_forms(&self, before: &Component, forms: Vec<Form>) -> Component {
         let (columns, counts) = self.frame.columns(&forms);
-        Component { forms, counts, values: columns.values, square: Arc::new(columns.square), ..before.clone() }
+        Component {
+            forms,
+            counts,
+            values: columns.values,
+            square: Arc::new(columns.square),
+            ..before.clone()
+        }
     }
 
     /// A component of given forms, e.g. of the model before.
     pub fn component_of(&mut self, before: &Component, cell: usize) -> Component {
         self.next += 1;
-        Component { cell, ..self.with_forms(before, before.forms.clone()) }.with_part(self.next)
+        Component {
+            cell,
+            ..self.with_forms(before, before.forms.clone())
+        }
+        .with_part(self.next)
     }
 
     /// ln of the evidence of one shape with its weight given a state, and its amplitude.
-    pub fn of_component(&self, own: &Component, state: &KnownState, others: &[&Component]) -> Option<(f64, f64)> {
+    pub fn of_component(
+        &self,
+        own: &Component,
+        state: &KnownState,
+        others: &[&Component],
+    ) -> Option<(f64, f64)> {
         let block = CellColumns::of_component(own, self.frame);
         let across = self.across_block(&block, state, others);
         let mut found = None;
-        state.shapes(&block, &across, 0, |_, _, own| found = Some((own.log, own.amplitude)));
+        state.shapes(&block, &across, 0, |_, _, own| {
+            found = Some((own.log, own.amplitude))
+        });
         found
     }
 }

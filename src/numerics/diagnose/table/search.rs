@@ -5,7 +5,8 @@ use super::evidence::AMPLITUDES;
 use super::scan::CauseTable;
 use super::state::{Component, KnownState};
 use crate::criteria::cells::{
-    BENDS, CLOSELY, COMPONENTS, COUPLED, EXCHANGES, JOINS, LEAVES, LIKELY, NU, SECOND_ORDER, SWAPS, TRACE, WAVES,
+    BENDS, CLOSELY, COMPONENTS, COUPLED, EXCHANGES, JOINS, LEAVES, LIKELY, NU, SECOND_ORDER, SWAPS,
+    TRACE, WAVES,
 };
 use crate::effect::{Form, Variable, names};
 use std::collections::BTreeSet;
@@ -41,7 +42,8 @@ pub(crate) trait ComponentSearch {
     fn prune(&mut self, mut components: Vec<Self::Component>) -> Vec<Self::Component> {
         while !components.is_empty() {
             let noise = self.noise(&components);
-            let odds = (0..components.len()).filter_map(|place| Some((place, self.odds(&components, place, noise)?)));
+            let odds = (0..components.len())
+                .filter_map(|place| Some((place, self.odds(&components, place, noise)?)));
             match odds.min_by(|a, b| a.1.total_cmp(&b.1)) {
                 Some((place, odds)) if odds <= self.least() => _ = components.remove(place),
                 _ => break,
@@ -60,7 +62,8 @@ impl ComponentSearch for CauseTable<'_, '_> {
     }
 
     fn noise(&self, components: &[Component]) -> f64 {
-        self.state(&components.iter().collect::<Vec<_>>(), None).kappa
+        self.state(&components.iter().collect::<Vec<_>>(), None)
+            .kappa
     }
 
     fn odds(&self, components: &[Component], i: usize, kappa: f64) -> Option<f64> {
@@ -69,7 +72,11 @@ impl ComponentSearch for CauseTable<'_, '_> {
         let state = self.state(&others, Some(kappa));
         let cell = components[i].cell;
         let again = others.iter().any(|other| other.cell == cell);
-        let prior = if again { 0.0 } else { self.cells[cell].log_prior };
+        let prior = if again {
+            0.0
+        } else {
+            self.cells[cell].log_prior
+        };
         Some(prior + self.log_evidence(&components[i], &state, &others))
     }
 
@@ -86,22 +93,29 @@ impl ComponentSearch for CauseTable<'_, '_> {
         let mut scan = self.scan_some(&self.likely, &state, &now, *CLOSELY, &[]);
         // A misjudged noise makes everything seem likely.
         let price = *JOINS * (1.0 + 2.0 * state.kappa.clamp(1.0, 4.0).ln());
-        if self.likely.len() < self.cells.len() && scan.best().is_none_or(|best| scan.log_odds[best] < price) {
+        if self.likely.len() < self.cells.len()
+            && scan.best().is_none_or(|best| scan.log_odds[best] < price)
+        {
             scan = self.scan(&state, &now, *CLOSELY, &[]);
         }
         // What was unlikely before is asked again when the likely ones are used up.
         self.likely = scan.order.iter().copied().take(*LIKELY).collect();
         let best = scan.best().filter(|best| scan.log_odds[*best] >= price)?;
         let found = &scan.closely[&best];
-        let new = components.iter().filter(|own| !self.from_before.contains(&self.cells[own.cell].key));
+        let new = components
+            .iter()
+            .filter(|own| !self.from_before.contains(&self.cells[own.cell].key));
         let moved: f64 = new.map(|own| own.amplitude.powi(2)).sum();
         (found.amplitude >= *SECOND_ORDER * moved).then(|| self.component(best, found))
     }
 
     /// The newest component and those that do in part what it does.
     fn with_newest(&mut self, components: Vec<Component>) -> Vec<Component> {
-        let Some(newest) = components.last() else { return components };
-        self.parts.know(&components.iter().collect::<Vec<_>>(), self.frame);
+        let Some(newest) = components.last() else {
+            return components;
+        };
+        self.parts
+            .know(&components.iter().collect::<Vec<_>>(), self.frame);
         let coupled = |i: &usize| self.parts.overlap(&components[*i], newest) > *COUPLED;
         let some: Vec<usize> = (0..components.len()).filter(coupled).collect();
         self.backfit_some(components, &some, 1)
@@ -119,9 +133,16 @@ impl CauseTable<'_, '_> {
         self.backfit_some(components, &all, rounds)
     }
 
-    fn backfit_some(&mut self, mut components: Vec<Component>, some: &[usize], rounds: usize) -> Vec<Component> {
+    fn backfit_some(
+        &mut self,
+        mut components: Vec<Component>,
+        some: &[usize],
+        rounds: usize,
+    ) -> Vec<Component> {
         for _ in 0..rounds {
-            let kappa = self.state(&components.iter().collect::<Vec<_>>(), None).kappa;
+            let kappa = self
+                .state(&components.iter().collect::<Vec<_>>(), None)
+                .kappa;
             let mut changed = false;
             for i in some.iter().copied() {
                 let others: Vec<Component> = without(&components, &[i]);
@@ -131,12 +152,25 @@ impl CauseTable<'_, '_> {
                 let Some(own) = own else { continue };
                 let before = (components[i].amplitude, components[i].shape.shares.clone());
                 components[i].amplitude = own.1;
-                let Some(mut grid) = self.closely(components[i].cell, &state, &others) else { continue };
+                let Some(mut grid) = self.closely(components[i].cell, &state, &others) else {
+                    continue;
+                };
                 let found = self.as_found(components[i].cell, &grid);
-                let same = found.forms == components[i].forms && found.shape.shares.len() == components[i].shape.shares.len();
+                let same = found.forms == components[i].forms
+                    && found.shape.shares.len() == components[i].shape.shares.len();
                 if same {
-                    let Component { shape, group, amplitude, .. } = found.clone();
-                    components[i] = Component { shape, group, amplitude, ..components[i].clone() };
+                    let Component {
+                        shape,
+                        group,
+                        amplitude,
+                        ..
+                    } = found.clone();
+                    components[i] = Component {
+                        shape,
+                        group,
+                        amplitude,
+                        ..components[i].clone()
+                    };
                 }
                 if before != (components[i].amplitude, components[i].shape.shares.clone()) {
                     self.next += 1;
@@ -146,9 +180,13 @@ impl CauseTable<'_, '_> {
                 if same {
                     continue;
                 }
-                let Some(other) = self.of_component(&found, &state, &others) else { continue };
+                let Some(other) = self.of_component(&found, &state, &others) else {
+                    continue;
+                };
                 // A shape of further numbers stays on the terms on which it came.
-                let paid = |(log, _): (f64, f64), own: &Component| log - if own.shape.is_bent { *BENDS } else { 0.0 };
+                let paid = |(log, _): (f64, f64), own: &Component| {
+                    log - if own.shape.is_bent { *BENDS } else { 0.0 }
+                };
                 if paid(other, &found) > paid(own, &components[i]) + *SWAPS {
                     grid.refined = self.refined(components[i].cell, &grid, &state, &others);
                     components[i] = self.component(components[i].cell, &grid);
@@ -168,7 +206,11 @@ impl CauseTable<'_, '_> {
     pub fn start(&mut self) -> Vec<Component> {
         let state = self.state(&[], None);
         let scan = self.scan(&state, &[], *CLOSELY, &[]);
-        let loads = |form: &Form| form.variables().iter().any(|of| matches!(of, Variable::Load { .. } | Variable::ArmLoad));
+        let loads = |form: &Form| {
+            form.variables()
+                .iter()
+                .any(|of| matches!(of, Variable::Load { .. } | Variable::ArmLoad))
+        };
         let by_load = |best: usize| {
             let found = self.as_found(best, &scan.closely[&best]);
             scan.log_odds[best] > *JOINS && found.forms.iter().any(loads)
@@ -176,7 +218,9 @@ impl CauseTable<'_, '_> {
         if !scan.best().is_some_and(by_load) {
             return Vec::new();
         }
-        let yields: Vec<usize> = (0..self.cells.len()).filter(|cell| self.cells[*cell].name == names::JOINT_COMPLIANCE).collect();
+        let yields: Vec<usize> = (0..self.cells.len())
+            .filter(|cell| self.cells[*cell].name == names::JOINT_COMPLIANCE)
+            .collect();
         let mut components = Vec::new();
         for cell in yields {
             if let Some(mut found) = self.closely(cell, &state, &[]) {
@@ -202,8 +246,11 @@ impl CauseTable<'_, '_> {
 
     /// ln of the evidence of a component's cell, its refined shape among the others.
     pub fn log_evidence(&self, own: &Component, state: &KnownState, others: &[&Component]) -> f64 {
-        let grid = self.closely(own.cell, state, others).map_or(f64::NEG_INFINITY, |found| found.log);
-        self.of_component(own, state, others).map_or(grid, |(log, _)| grid.max(log))
+        let grid = self
+            .closely(own.cell, state, others)
+            .map_or(f64::NEG_INFINITY, |found| found.log);
+        self.of_component(own, state, others)
+            .map_or(grid, |(log, _)| grid.max(log))
     }
 
     /// Exchanges components for cells that say more in their place.
@@ -216,20 +263,32 @@ impl CauseTable<'_, '_> {
         let mut seen = BTreeSet::from([key(&components)]);
         'rounds: for _ in 0..*EXCHANGES {
             self.know(&components);
-            let kappa = self.state(&components.iter().collect::<Vec<_>>(), None).kappa;
+            let kappa = self
+                .state(&components.iter().collect::<Vec<_>>(), None)
+                .kappa;
             let mut order: Vec<usize> = (0..components.len()).collect();
-            order.sort_by(|a, b| components[*a].amplitude.total_cmp(&components[*b].amplitude));
+            order.sort_by(|a, b| {
+                components[*a]
+                    .amplitude
+                    .total_cmp(&components[*b].amplitude)
+            });
             for i in order {
                 let own = components[i].cell;
                 let others = without(&components, &[i]);
                 let rest: Vec<&Component> = others.iter().collect();
                 let state = self.state(&rest, Some(kappa));
                 let alike = self.alike(&components[i], 24);
-                let near: Vec<usize> = std::iter::once(own).chain(self.near(&components[i])).collect();
+                let near: Vec<usize> = std::iter::once(own)
+                    .chain(self.near(&components[i]))
+                    .collect();
                 let scan = self.scan_some(&alike, &state, &rest, 5, &near);
                 let Some(best) = scan.best() else { continue };
                 let again = rest.iter().any(|other| other.cell == own);
-                let prior = if again { 0.0 } else { self.cells[own].log_prior };
+                let prior = if again {
+                    0.0
+                } else {
+                    self.cells[own].log_prior
+                };
                 let stays = prior + self.log_evidence(&components[i], &state, &rest);
                 if best == own || scan.log_odds[best] <= stays + *SWAPS {
                     continue;
@@ -255,7 +314,11 @@ impl CauseTable<'_, '_> {
         let mut prior = 0.0;
         for (i, own) in components.iter().enumerate() {
             let first = !components[..i].iter().any(|other| other.cell == own.cell);
-            prior += if first { self.cells[own.cell].log_prior } else { 0.0 };
+            prior += if first {
+                self.cells[own.cell].log_prior
+            } else {
+                0.0
+            };
             prior += own.shape.log_weight - (AMPLITUDES as f64).ln();
         }
         let half = 0.5 * (state.rows.freedom + *NU);
@@ -264,14 +327,27 @@ impl CauseTable<'_, '_> {
 
     /// A component without a name that a few causes of the list replace is those: two waves of a gear look like one curve.
     pub fn by_several(&mut self, mut components: Vec<Component>) -> Vec<Component> {
-        let unnamed: Vec<u64> = components.iter().filter(|own| !self.cells[own.cell].is_named()).map(|own| own.id).collect();
+        let unnamed: Vec<u64> = components
+            .iter()
+            .filter(|own| !self.cells[own.cell].is_named())
+            .map(|own| own.id)
+            .collect();
         for id in unnamed {
-            let Some(at) = components.iter().position(|own| own.id == id) else { continue };
+            let Some(at) = components.iter().position(|own| own.id == id) else {
+                continue;
+            };
             self.know(&components);
             let mut named = self.alike(&components[at], 40);
-            named.extend(self.near(&components[at]).into_iter().filter(|cell| !named.contains(cell)).collect::<Vec<_>>());
+            named.extend(
+                self.near(&components[at])
+                    .into_iter()
+                    .filter(|cell| !named.contains(cell))
+                    .collect::<Vec<_>>(),
+            );
             named.retain(|cell| self.cells[*cell].is_named());
-            let kappa = self.state(&components.iter().collect::<Vec<_>>(), None).kappa;
+            let kappa = self
+                .state(&components.iter().collect::<Vec<_>>(), None)
+                .kappa;
             let before = self.total(&components, kappa);
             let mut next = without(&components, &[at]);
             for _ in 0..*WAVES {
@@ -279,7 +355,9 @@ impl CauseTable<'_, '_> {
                 let rest: Vec<&Component> = next.iter().collect();
                 let state = self.state(&rest, Some(kappa));
                 let scan = self.scan_some(&named, &state, &rest, 4, &[]);
-                let Some(best) = scan.best().filter(|best| scan.log_odds[*best] > 0.0) else { break };
+                let Some(best) = scan.best().filter(|best| scan.log_odds[*best] > 0.0) else {
+                    break;
+                };
                 let found = scan.closely[&best].clone();
                 next.push(self.component(best, &found));
                 next = self.backfit(next, 1);
@@ -296,29 +374,56 @@ impl CauseTable<'_, '_> {
     /// Motions over a variable that show, whose products are not cells yet.
     pub fn shown(&self, components: &[Component]) -> Vec<FreeShape> {
         // What has become a product still shows by its first variable.
-        let products = components.iter().filter_map(|own| match &self.cells[own.cell].shapes {
-            Shapes::Free(free) if matches!(free.over, Over::Product(_)) => Some((free.motion, free.of)),
-            _ => None,
-        });
+        let products = components
+            .iter()
+            .filter_map(|own| match &self.cells[own.cell].shapes {
+                Shapes::Free(free) if matches!(free.over, Over::Product(_)) => {
+                    Some((free.motion, free.of))
+                }
+                _ => None,
+            });
         let products: Vec<_> = products.collect();
-        let stays = |shown: &&FreeShape| products.iter().any(|(motion, of)| *motion == shown.motion && *of == shown.of);
+        let stays = |shown: &&FreeShape| {
+            products
+                .iter()
+                .any(|(motion, of)| *motion == shown.motion && *of == shown.of)
+        };
         let mut out: Vec<FreeShape> = self.multiplied.iter().filter(stays).copied().collect();
-        let most = components.iter().map(|own| own.amplitude).fold(0.0, f64::max);
-        for own in components.iter().filter(|own| own.amplitude > 2.0 * *TRACE * most) {
+        let most = components
+            .iter()
+            .map(|own| own.amplitude)
+            .fold(0.0, f64::max);
+        for own in components
+            .iter()
+            .filter(|own| own.amplitude > 2.0 * *TRACE * most)
+        {
             let free = match &self.cells[own.cell].shapes {
                 Shapes::Free(free) if !matches!(free.over, Over::Product(_)) => {
-                    let refined = own.forms.first().and_then(|form| Some(form.term()?.law().first.of));
-                    Some(FreeShape { of: refined.unwrap_or(free.of), ..*free })
+                    let refined = own
+                        .forms
+                        .first()
+                        .and_then(|form| Some(form.term()?.law().first.of));
+                    Some(FreeShape {
+                        of: refined.unwrap_or(free.of),
+                        ..*free
+                    })
                 }
                 Shapes::Free(_) => None,
                 Shapes::Listed(_) => own.forms.first().and_then(|form| {
                     let term = form.term().filter(|term| term.law().times.is_none())?;
                     let of = term.law().first.of;
-                    Some(FreeShape { motion: term.motion(), of, over: Over::Line }).filter(|_| of.is_single())
+                    Some(FreeShape {
+                        motion: term.motion(),
+                        of,
+                        over: Over::Line,
+                    })
+                    .filter(|_| of.is_single())
                 }),
             };
             if let Some(free) = free
-                && !out.iter().any(|other| other.motion == free.motion && other.of == free.of)
+                && !out
+                    .iter()
+                    .any(|other| other.motion == free.motion && other.of == free.of)
             {
                 out.push(free);
             }
@@ -329,5 +434,8 @@ impl CauseTable<'_, '_> {
 
 /// Components without some of them.
 pub(super) fn without(components: &[Component], out: &[usize]) -> Vec<Component> {
-    (0..components.len()).filter(|i| !out.contains(i)).map(|i| components[i].clone()).collect()
+    (0..components.len())
+        .filter(|i| !out.contains(i))
+        .map(|i| components[i].clone())
+        .collect()
 }

@@ -10,7 +10,9 @@ use crate::criteria::cells::NU;
 use crate::diagnose::linear::dot;
 use crate::effect::Form;
 use faer::linalg::matmul::matmul;
-use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
+use faer::linalg::triangular_solve::{
+    solve_lower_triangular_in_place, solve_upper_triangular_in_place,
+};
 use faer::{Accum, Mat, MatMut, Par, Side};
 use nalgebra::{Cholesky, DMatrix, DVector};
 use std::collections::BTreeMap;
@@ -36,7 +38,10 @@ pub(super) struct CellColumns {
 
 impl CellColumns {
     pub fn of(groups: Vec<ShapeGroup>, frame: &SearchRows) -> Self {
-        let forms: Vec<Form> = groups.iter().flat_map(|group| group.forms.iter().cloned()).collect();
+        let forms: Vec<Form> = groups
+            .iter()
+            .flat_map(|group| group.forms.iter().cloned())
+            .collect();
         let (columns, counts) = frame.columns(&forms);
         let (mut first, mut counts) = (0, counts.into_iter());
         let seen = |mut group: ShapeGroup| {
@@ -44,14 +49,27 @@ impl CellColumns {
             let count: usize = counts.iter().sum();
             let range = first..first + count;
             first += count;
-            for shape in group.shapes.iter_mut().filter(|shape| shape.shares.is_empty()) {
+            for shape in group
+                .shapes
+                .iter_mut()
+                .filter(|shape| shape.shares.is_empty())
+            {
                 shape.shares = vec![1.0 / count.max(1) as f64; count];
             }
             let own = columns.values.columns(range.start, count).into_owned();
             let (gram, gradient) = (product(view(&own), view(&own)), frame.along(&own));
-            SeenGroup { group, range, counts, gram, gradient }
+            SeenGroup {
+                group,
+                range,
+                counts,
+                gram,
+                gradient,
+            }
         };
-        Self { groups: groups.into_iter().map(seen).collect(), columns }
+        Self {
+            groups: groups.into_iter().map(seen).collect(),
+            columns,
+        }
     }
 }
 
@@ -61,8 +79,20 @@ impl CellColumns {
         let values = own.values.clone();
         let (gram, gradient) = (product(view(&values), view(&values)), frame.along(&values));
         let range = 0..values.ncols();
-        let group = SeenGroup { group: (*own.group).clone(), range, counts: own.counts.clone(), gram, gradient };
-        Self { groups: vec![group], columns: UnitColumns { values, square: (*own.square).clone() } }
+        let group = SeenGroup {
+            group: (*own.group).clone(),
+            range,
+            counts: own.counts.clone(),
+            gram,
+            gradient,
+        };
+        Self {
+            groups: vec![group],
+            columns: UnitColumns {
+                values,
+                square: (*own.square).clone(),
+            },
+        }
     }
 
     /// The largest share of a motion that the columns of a group can make, by their products with it; of unit length.
@@ -74,7 +104,8 @@ impl CellColumns {
                 1 => along[0] * along[0] / group.gram[(0, 0)].max(f64::MIN_POSITIVE),
                 count => {
                     let least = 1e-6 * group.gram.trace().max(f64::MIN_POSITIVE);
-                    let factor = Cholesky::new(&group.gram + DMatrix::identity(count, count) * least);
+                    let factor =
+                        Cholesky::new(&group.gram + DMatrix::identity(count, count) * least);
                     factor.map_or(0.0, |factor| along.dot(&factor.solve(&along)))
                 }
             };
@@ -111,13 +142,25 @@ const UNSEEN: f64 = 0.01;
 impl Component {
     /// Roots of the prior variances of its columns.
     fn roots(&self) -> impl Iterator<Item = f64> + '_ {
-        self.shape.shares.iter().map(|share| self.amplitude * share.sqrt())
+        self.shape
+            .shares
+            .iter()
+            .map(|share| self.amplitude * share.sqrt())
     }
 
     /// Prior standard deviations of its coefficients, SI.
     pub fn sigmas(&self) -> Vec<f64> {
-        let scale = |square: &f64| if *square > 0.0 { square.sqrt().recip() } else { 0.0 };
-        self.roots().zip(self.square.iter()).map(|(root, square)| root * scale(square)).collect()
+        let scale = |square: &f64| {
+            if *square > 0.0 {
+                square.sqrt().recip()
+            } else {
+                0.0
+            }
+        };
+        self.roots()
+            .zip(self.square.iter())
+            .map(|(root, square)| root * scale(square))
+            .collect()
     }
 
     /// With its part in the covariance.
@@ -127,17 +170,42 @@ impl Component {
         if roots.len() > 2 {
             let mut gram = product(view(&self.values), view(&self.values));
             for (j, mut column) in gram.column_iter_mut().enumerate() {
-                column.iter_mut().zip(&roots).for_each(|(entry, root)| *entry *= root * roots[j]);
+                column
+                    .iter_mut()
+                    .zip(&roots)
+                    .for_each(|(entry, root)| *entry *= root * roots[j]);
             }
             let own = gram.symmetric_eigen();
-            let seen: Vec<usize> = (0..own.eigenvalues.len()).filter(|k| own.eigenvalues[*k] > UNSEEN).collect();
-            let kept = if seen.is_empty() { vec![own.eigenvalues.imax()] } else { seen };
+            let seen: Vec<usize> = (0..own.eigenvalues.len())
+                .filter(|k| own.eigenvalues[*k] > UNSEEN)
+                .collect();
+            let kept = if seen.is_empty() {
+                vec![own.eigenvalues.imax()]
+            } else {
+                seen
+            };
             mix *= own.eigenvectors.select_columns(kept.iter());
         }
         let mut part = DMatrix::zeros(self.values.nrows(), mix.ncols());
-        let out = MatMut::from_column_major_slice_mut(part.as_mut_slice(), self.values.nrows(), mix.ncols());
-        matmul(out, Accum::Replace, view(&self.values), view(&mix), 1.0, Par::Seq);
-        Self { id, part: Arc::new(part), mix: Arc::new(mix), ..self }
+        let out = MatMut::from_column_major_slice_mut(
+            part.as_mut_slice(),
+            self.values.nrows(),
+            mix.ncols(),
+        );
+        matmul(
+            out,
+            Accum::Replace,
+            view(&self.values),
+            view(&mix),
+            1.0,
+            Par::Seq,
+        );
+        Self {
+            id,
+            part: Arc::new(part),
+            mix: Arc::new(mix),
+            ..self
+        }
     }
 
     /// One that has no part in the covariance yet.
@@ -205,7 +273,13 @@ impl ColumnProducts {
                 *cache = ProductCache::default();
             }
             cache.size += product.len();
-            cache.known.insert(key, KnownProduct { _of: [Arc::downgrade(a), Arc::downgrade(b)], product: product.clone() });
+            cache.known.insert(
+                key,
+                KnownProduct {
+                    _of: [Arc::downgrade(a), Arc::downgrade(b)],
+                    product: product.clone(),
+                },
+            );
         }
         product
     }
@@ -224,16 +298,28 @@ struct PartCache {
 impl PartProducts {
     /// Computes what is missing for some components, and forgets what is too much.
     pub fn know(&self, components: &[&Component], frame: &SearchRows) {
-        let Ok(mut cache) = self.0.write() else { return };
+        let Ok(mut cache) = self.0.write() else {
+            return;
+        };
         if cache.pairs.len() > 20_000 {
             *cache = PartCache::default();
         }
         for (i, own) in components.iter().enumerate() {
-            cache.along.entry(own.id).or_insert_with(|| Arc::new(frame.along(&own.part)));
+            cache
+                .along
+                .entry(own.id)
+                .or_insert_with(|| Arc::new(frame.along(&own.part)));
             for other in &components[..=i] {
                 let key = (own.id.max(other.id), own.id.min(other.id));
-                let [later, earlier] = if own.id >= other.id { [own, other] } else { [other, own] };
-                cache.pairs.entry(key).or_insert_with(|| Arc::new(product(view(&later.part), view(&earlier.part))));
+                let [later, earlier] = if own.id >= other.id {
+                    [own, other]
+                } else {
+                    [other, own]
+                };
+                cache
+                    .pairs
+                    .entry(key)
+                    .or_insert_with(|| Arc::new(product(view(&later.part), view(&earlier.part))));
             }
         }
     }
@@ -242,7 +328,9 @@ impl PartProducts {
     fn of(&self, components: &[&Component]) -> (DMatrix<f64>, DVector<f64>) {
         let count: usize = components.iter().map(|own| own.part.ncols()).sum();
         let (mut gram, mut along) = (DMatrix::zeros(count, count), DVector::zeros(count));
-        let Ok(cache) = self.0.read() else { return (gram, along) };
+        let Ok(cache) = self.0.read() else {
+            return (gram, along);
+        };
         let mut down = 0;
         for (i, own) in components.iter().enumerate() {
             let rows = own.part.ncols();
@@ -254,9 +342,15 @@ impl PartProducts {
                 let columns = other.part.ncols();
                 let key = (own.id.max(other.id), own.id.min(other.id));
                 if let Some(known) = cache.pairs.get(&key) {
-                    let block = if own.id >= other.id { (**known).clone() } else { known.transpose() };
-                    gram.view_mut((across, down), (columns, rows)).copy_from(&block.transpose());
-                    gram.view_mut((down, across), (rows, columns)).copy_from(&block);
+                    let block = if own.id >= other.id {
+                        (**known).clone()
+                    } else {
+                        known.transpose()
+                    };
+                    gram.view_mut((across, down), (columns, rows))
+                        .copy_from(&block.transpose());
+                    gram.view_mut((down, across), (rows, columns))
+                        .copy_from(&block);
                 }
                 across += columns;
             }
@@ -268,9 +362,16 @@ impl PartProducts {
     /// How much two components do the same, 0 to 1.
     pub fn overlap(&self, a: &Component, b: &Component) -> f64 {
         let Ok(cache) = self.0.read() else { return 1.0 };
-        let square = |a: u64, b: u64| cache.pairs.get(&(a.max(b), a.min(b))).map(|known| known.norm_squared());
+        let square = |a: u64, b: u64| {
+            cache
+                .pairs
+                .get(&(a.max(b), a.min(b)))
+                .map(|known| known.norm_squared())
+        };
         match (square(a.id, b.id), square(a.id, a.id), square(b.id, b.id)) {
-            (Some(both), Some(own), Some(other)) => both / (own * other).sqrt().max(f64::MIN_POSITIVE),
+            (Some(both), Some(own), Some(other)) => {
+                both / (own * other).sqrt().max(f64::MIN_POSITIVE)
+            }
             _ => 1.0,
         }
     }
@@ -292,18 +393,37 @@ pub(crate) struct KnownState {
 
 impl KnownState {
     /// Components with the noise that fits them, or with a stated one.
-    pub(super) fn of(components: &[&Component], products: &PartProducts, frame: &SearchRows, kappa: Option<f64>) -> Self {
+    pub(super) fn of(
+        components: &[&Component],
+        products: &PartProducts,
+        frame: &SearchRows,
+        kappa: Option<f64>,
+    ) -> Self {
         let (gram, along) = products.of(components);
         let known = Self::new(&gram, along, frame.rows(), frame.least_noise(), kappa);
-        Self { components: components.iter().map(|own| own.id).collect(), ..known }
+        Self {
+            components: components.iter().map(|own| own.id).collect(),
+            ..known
+        }
     }
 
     /// Columns of unit prior variance in the covariance, by their Gram matrix and their products with the residual of rows.
-    pub fn new(gram: &DMatrix<f64>, along: DVector<f64>, rows: EvidenceRows, least_noise: f64, kappa: Option<f64>) -> Self {
+    pub fn new(
+        gram: &DMatrix<f64>,
+        along: DVector<f64>,
+        rows: EvidenceRows,
+        least_noise: f64,
+        kappa: Option<f64>,
+    ) -> Self {
         let count = along.len();
         let solved = |square: f64| {
-            let matrix = Mat::from_fn(count, count, |i, j| gram[(i, j)] + if i == j { square } else { 0.0 });
-            let lower = matrix.llt(Side::Lower).map_or_else(|_| Mat::identity(count, count), |factor| factor.L().to_owned());
+            let matrix = Mat::from_fn(count, count, |i, j| {
+                gram[(i, j)] + if i == j { square } else { 0.0 }
+            });
+            let lower = matrix.llt(Side::Lower).map_or_else(
+                |_| Mat::identity(count, count),
+                |factor| factor.L().to_owned(),
+            );
             let mut solved = along.clone();
             solve(&lower, solved.as_mut_slice());
             (lower, solved)
@@ -326,7 +446,10 @@ impl KnownState {
         Self {
             kappa: square.sqrt(),
             // Rows that leave less than the least noise do not make it smaller.
-            rows: EvidenceRows { square: left, freedom: rows.freedom.min(left) },
+            rows: EvidenceRows {
+                square: left,
+                freedom: rows.freedom.min(left),
+            },
             components: Vec::new(),
             lower,
             along: solved_along,
@@ -334,12 +457,19 @@ impl KnownState {
     }
 
     /// The likeliest coefficients (SI) of its components, one component after another.
-    pub(super) fn coefficients(&self, components: &[&Component], frame: &SearchRows) -> Vec<Vec<f64>> {
+    pub(super) fn coefficients(
+        &self,
+        components: &[&Component],
+        frame: &SearchRows,
+    ) -> Vec<Vec<f64>> {
         let left = DVector::from_vec(self.left(components, frame));
         let of = |own: &&Component| {
-            let along = own.values.tr_mul(&left.rows(0, own.values.nrows())) / (self.kappa * self.kappa);
+            let along =
+                own.values.tr_mul(&left.rows(0, own.values.nrows())) / (self.kappa * self.kappa);
             let scaled = own.roots().zip(own.sigmas()).zip(along.iter());
-            scaled.map(|((root, sigma), along)| sigma * root * along).collect()
+            scaled
+                .map(|((root, sigma), along)| sigma * root * along)
+                .collect()
         };
         components.iter().map(of).collect()
     }
@@ -347,9 +477,10 @@ impl KnownState {
     /// What its components leave of the residual at their likeliest.
     pub(super) fn left(&self, components: &[&Component], frame: &SearchRows) -> Vec<f64> {
         let residual = DVector::from_column_slice(frame.residual());
-        let left = self
-            .weights()
-            .map_or_else(|| residual.clone(), |weights| &residual - side_by_side(components, residual.len()) * weights);
+        let left = self.weights().map_or_else(
+            || residual.clone(),
+            |weights| &residual - side_by_side(components, residual.len()) * weights,
+        );
         left.data.into()
     }
 
@@ -368,7 +499,10 @@ impl KnownState {
     /// Half of ln of the determinant of the covariance over that of the noise.
     pub fn log_determinant(&self) -> f64 {
         let count = self.along.len() as f64;
-        (0..self.along.len()).map(|k| self.lower[(k, k)].ln()).sum::<f64>() - count * self.kappa.ln()
+        (0..self.along.len())
+            .map(|k| self.lower[(k, k)].ln())
+            .sum::<f64>()
+            - count * self.kappa.ln()
     }
 
     /// L^-1 Z'X by the products Z'X (components' columns down) of columns X.
@@ -378,8 +512,17 @@ impl KnownState {
     }
 
     /// Gram matrix and gradient of a group seen through the covariance; `across` is L^-1 Z'X of its block from column `first` on.
-    fn seen(&self, group: &SeenGroup, across: &DMatrix<f64>, first: usize) -> (DMatrix<f64>, DVector<f64>) {
-        self.see((&group.gram, &group.gradient), across, first + group.range.start)
+    fn seen(
+        &self,
+        group: &SeenGroup,
+        across: &DMatrix<f64>,
+        first: usize,
+    ) -> (DMatrix<f64>, DVector<f64>) {
+        self.see(
+            (&group.gram, &group.gradient),
+            across,
+            first + group.range.start,
+        )
     }
 
     /// The same of columns by their Gram matrix and gradient.
@@ -408,13 +551,21 @@ impl KnownState {
 
     /// Standard error of each coefficient (SI) of a block of one group given the components.
     pub(super) fn errors(&self, block: &CellColumns, across: &DMatrix<f64>) -> Vec<f64> {
-        let [group] = &block.groups[..] else { return Vec::new() };
+        let [group] = &block.groups[..] else {
+            return Vec::new();
+        };
         let (gram, _) = self.seen(group, across, 0);
         let inverse = gram.try_inverse();
         let of = |k: usize| {
-            let variance = inverse.as_ref().map_or(f64::INFINITY, |inverse| inverse[(k, k)]);
+            let variance = inverse
+                .as_ref()
+                .map_or(f64::INFINITY, |inverse| inverse[(k, k)]);
             let square = block.columns.square[group.range.start + k];
-            if variance > 0.0 && square > 0.0 { (variance / square).sqrt() } else { f64::INFINITY }
+            if variance > 0.0 && square > 0.0 {
+                (variance / square).sqrt()
+            } else {
+                f64::INFINITY
+            }
         };
         (0..group.range.len()).map(of).collect()
     }
@@ -432,11 +583,18 @@ impl KnownState {
                     // What is all but unseen cannot be told from rounding.
                     let least = 1e-9 * gram.trace().max(f64::MIN_POSITIVE);
                     let factor = Cholesky::new(gram + DMatrix::identity(count, count) * least);
-                    factor.map_or(self.rows.square, |factor| gradient.dot(&factor.solve(&gradient)))
+                    factor.map_or(self.rows.square, |factor| {
+                        gradient.dot(&factor.solve(&gradient))
+                    })
                 }
             };
             let log = -half * (1.0 - (fit / whole).min(1.0 - 1e-9)).ln();
-            let weight = group.group.shapes.iter().map(|shape| shape.log_weight).fold(f64::NEG_INFINITY, f64::max);
+            let weight = group
+                .group
+                .shapes
+                .iter()
+                .map(|shape| shape.log_weight)
+                .fold(f64::NEG_INFINITY, f64::max);
             most = most.max(log + weight.max(-3.0));
         }
         most
@@ -455,8 +613,9 @@ impl KnownState {
             let (gram, gradient) = self.seen(group, across, first);
             let single = gradient.len() == 1;
             if single {
-                let coefficient =
-                    gradient[0] / gram[(0, 0)].max(f64::MIN_POSITIVE) / block.columns.square[group.range.start].sqrt();
+                let coefficient = gradient[0]
+                    / gram[(0, 0)].max(f64::MIN_POSITIVE)
+                    / block.columns.square[group.range.start].sqrt();
                 let wrong = group.group.positive && coefficient < 0.0;
                 if wrong || coefficient.abs() > 1.5 * group.group.largest {
                     continue;
@@ -464,7 +623,14 @@ impl KnownState {
             }
             for (s, shape) in group.group.shapes.iter().enumerate() {
                 let found = evidence(&gram, &gradient, &shape.shares, self.rows);
-                each(g, s, GroupEvidence { log: found.log + shape.log_weight, ..found });
+                each(
+                    g,
+                    s,
+                    GroupEvidence {
+                        log: found.log + shape.log_weight,
+                        ..found
+                    },
+                );
             }
         }
     }
@@ -484,7 +650,8 @@ fn side_by_side(components: &[&Component], rows: usize) -> DMatrix<f64> {
     let mut out = DMatrix::zeros(rows, components.iter().map(|own| own.part.ncols()).sum());
     let mut first = 0;
     for own in components {
-        out.view_mut((0, first), own.part.shape()).copy_from(&*own.part);
+        out.view_mut((0, first), own.part.shape())
+            .copy_from(&*own.part);
         first += own.part.ncols();
     }
     out

@@ -24,24 +24,40 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Option<f64>])
     let (data, state) = (&fitter.data, &last.state);
     // What is predicted outside of the fitted rows is what everyone is told, and what programs are corrected with.
     let model = state.model.held_within(data, &state.screening.kept);
-    let misfit = Misfit::of(fitter.question, data, &state.screening, &model, state.fitted.singular.len());
+    let misfit = Misfit::of(
+        fitter.question,
+        data,
+        &state.screening,
+        &model,
+        state.fitted.singular.len(),
+    );
     let basis = basis(fitter, &state.screening.kept);
     // Repeats know the noise: what poses leave beyond it is no noise, even without structure.
-    let lack_of_fit = state.fitted.repeated.as_ref().and_then(|repeated| repeated.lack_of_fit);
-    let lacking = basis == NoiseBasis::Repeats && lack_of_fit.is_some_and(|(_, chance)| chance <= *SIGNIFICANT);
+    let lack_of_fit = state
+        .fitted
+        .repeated
+        .as_ref()
+        .and_then(|repeated| repeated.lack_of_fit);
+    let lacking = basis == NoiseBasis::Repeats
+        && lack_of_fit.is_some_and(|(_, chance)| chance <= *SIGNIFICANT);
     let structured = last.answer.nothing_last <= *SIGNIFICANT || lacking;
     let many_aside = stand_out_in_number(&state.screening, data.rows());
-    let left_at_fitted_rows =
-        structured && misfit.chi_square > *MAX_CHI_SQUARE_OF_STRUCTURE || misfit.chi_square > *MAX_CHI_SQUARE || many_aside;
+    let left_at_fitted_rows = structured && misfit.chi_square > *MAX_CHI_SQUARE_OF_STRUCTURE
+        || misfit.chi_square > *MAX_CHI_SQUARE
+        || many_aside;
     let something_left = left_at_fitted_rows || misfit.not_carried.is_some();
     let findings = findings(&last, left_at_fitted_rows, something_left);
     let is_stated = data.noise_basis != NoiseBasis::Inferred && basis != NoiseBasis::Repeats;
     let above_stated = is_stated && misfit.beyond_stated > *MAX_CHI_SQUARE_OF_STRUCTURE;
     let verdict = match verdict(&findings, &misfit, something_left, fitter.repeatability) {
         // What lasts from point to point may be the air, and may be a cause that follows time.
-        VerdictKind::NothingMissing if above_stated || fitter.correlated.is_some() => VerdictKind::Unexplained,
+        VerdictKind::NothingMissing if above_stated || fitter.correlated.is_some() => {
+            VerdictKind::Unexplained
+        }
         // A noise that is taken from what is left cannot explain what is left.
-        VerdictKind::Explained if above_stated && basis == NoiseBasis::Inferred => VerdictKind::Unexplained,
+        VerdictKind::Explained if above_stated && basis == NoiseBasis::Inferred => {
+            VerdictKind::Unexplained
+        }
         other => other,
     };
     let nameless = !something_left && only_unknown(&findings);
@@ -61,12 +77,25 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Option<f64>])
     not_observable.extend(not_tried(last.survey, fitter.question.own));
     not_observable.extend(unseen(&last));
     not_observable.extend(fitter.correlated.map(slower_than_noise));
-    let formulas = FormulaSearch { state: &last.state, view: last.view, survey: last.survey, fitter }.of_all(&findings);
+    let formulas = FormulaSearch {
+        state: &last.state,
+        view: last.view,
+        survey: last.survey,
+        fitter,
+    }
+    .of_all(&findings);
     let LastRound { state, answer, .. } = last;
     // The folds' errors are told as lengths.
     let lengths = misfit.dimension == Dimension::Length;
-    let folds = if lengths { cross_validate(&state.session(fitter), *FOLDS, fitter.question.seed) } else { None };
-    let ground = Ground { partly_nameless, ..misfit.ground(data, basis, fitter.repeatability.repeats, nameless) };
+    let folds = if lengths {
+        cross_validate(&state.session(fitter), *FOLDS, fitter.question.seed)
+    } else {
+        None
+    };
+    let ground = Ground {
+        partly_nameless,
+        ..misfit.ground(data, basis, fitter.repeatability.repeats, nameless)
+    };
     Diagnosis {
         dimension: misfit.dimension,
         statement: statement(verdict, &ground),
@@ -98,14 +127,26 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Option<f64>])
 }
 
 /// What the base model leaves of every row: of a model without a cause the same as what it leaves, by the noise that is known now.
-fn sizes_before<'s>(state: &FitState, before: &'s [Option<f64>], misfit: &'s Misfit) -> &'s [Option<f64>] {
-    if state.causes.is_empty() { &misfit.sizes } else { before }
+fn sizes_before<'s>(
+    state: &FitState,
+    before: &'s [Option<f64>],
+    misfit: &'s Misfit,
+) -> &'s [Option<f64>] {
+    if state.causes.is_empty() {
+        &misfit.sizes
+    } else {
+        before
+    }
 }
 
 /// The findings with their forms as the model has them.
 fn within(mut findings: Vec<Finding>, model: &Model) -> Vec<Finding> {
     for form in findings.iter_mut().flat_map(|finding| &mut finding.forms) {
-        let own = model.stack.effects().filter_map(|(effect, _)| effect.form()).find(|own| *own == form);
+        let own = model
+            .stack
+            .effects()
+            .filter_map(|(effect, _)| effect.form())
+            .find(|own| *own == form);
         if let Some(own) = own {
             *form = own.clone();
         }
@@ -133,18 +174,28 @@ fn nameless_share(findings: &[Finding]) -> f64 {
             .map(|e| e.gain)
             .sum()
     };
-    let unnamed = |finding: &Finding| finding.effect == names::UNKNOWN || finding.probabilities.none > 0.5;
+    let unnamed =
+        |finding: &Finding| finding.effect == names::UNKNOWN || finding.probabilities.none > 0.5;
     gains(&unnamed) / gains(&|_| true).max(f64::MIN_POSITIVE)
 }
 
 /// Whether something was found, and none of it has a name.
 fn only_unknown(findings: &[Finding]) -> bool {
-    let mut physics = findings.iter().filter(|finding| finding.is_physics()).peekable();
+    let mut physics = findings
+        .iter()
+        .filter(|finding| finding.is_physics())
+        .peekable();
     physics.peek().is_some() && physics.all(|finding| finding.effect == names::UNKNOWN)
 }
 
-fn verdict(findings: &[Finding], misfit: &Misfit, something_left: bool, repeatability: JointRepeatability) -> VerdictKind {
-    let blind = repeatability.repeats < *REPEATS && misfit.noise_floor > *NOT_NOISE * misfit.instrument;
+fn verdict(
+    findings: &[Finding],
+    misfit: &Misfit,
+    something_left: bool,
+    repeatability: JointRepeatability,
+) -> VerdictKind {
+    let blind =
+        repeatability.repeats < *REPEATS && misfit.noise_floor > *NOT_NOISE * misfit.instrument;
     if blind || something_left || nameless_share(findings) > *NAMELESS {
         VerdictKind::Unexplained
     } else if findings.is_empty() {
@@ -156,7 +207,15 @@ fn verdict(findings: &[Finding], misfit: &Misfit, something_left: bool, repeatab
 
 /// What is left looks like, where it is not noise, and what else speaks for it.
 fn signature(last: &LastRound, something_left: bool, remarks: [Option<&str>; 2]) -> Option<String> {
-    let signature = if something_left { last.answer.next.clone() } else { None };
-    let parts: Vec<&str> = signature.as_deref().into_iter().chain(remarks.into_iter().flatten()).collect();
+    let signature = if something_left {
+        last.answer.next.clone()
+    } else {
+        None
+    };
+    let parts: Vec<&str> = signature
+        .as_deref()
+        .into_iter()
+        .chain(remarks.into_iter().flatten())
+        .collect();
     (!parts.is_empty()).then(|| parts.join("; "))
 }

@@ -10,19 +10,26 @@ use crate::diagnose::table::FoundCell;
 use crate::diagnose::types::{Evidence, Finding, RivalCause};
 use crate::diagnose::words::{left_out, not_so, sentence, small, told};
 use crate::effect::{
-    Clock, FittedForms, Form, ModelledFinding, ParameterEstimate, Place, Summary, Variable, names, people, turned_holder,
+    Clock, FittedForms, Form, ModelledFinding, ParameterEstimate, Place, Summary, Variable, names,
+    people, turned_holder,
 };
 use crate::estimate::{Model, ParameterStatus, tail};
 use crate::observation::Dimension;
 
 /// The causes of the last round as findings, strongest first; whether they leave more than noise `at_fitted_rows` or anywhere.
-pub(super) fn findings(last: &LastRound, at_fitted_rows: bool, something_left: bool) -> Vec<Finding> {
+pub(super) fn findings(
+    last: &LastRound,
+    at_fitted_rows: bool,
+    something_left: bool,
+) -> Vec<Finding> {
     let state = &last.state;
     if let Some(offset) = state.screening.apart {
         return vec![rows_apart(offset, last)];
     }
-    let mut out: Vec<Finding> =
-        without_details(last, something_left).iter().map(|(found, details)| finding(last, found, details)).collect();
+    let mut out: Vec<Finding> = without_details(last, something_left)
+        .iter()
+        .map(|(found, details)| finding(last, found, details))
+        .collect();
     let data = last.survey.data;
     let by_the_way_there = |form: &Form| match form.variables().first() {
         Some(Variable::LastMove) => true,
@@ -30,7 +37,11 @@ pub(super) fn findings(last: &LastRound, at_fitted_rows: bool, something_left: b
         None => false,
     };
     // Nobody knows from where the arm came to the first row.
-    let unknown = state.causes.iter().any(|cause| by_the_way_there(&cause.form)).then_some(0);
+    let unknown = state
+        .causes
+        .iter()
+        .any(|cause| by_the_way_there(&cause.form))
+        .then_some(0);
     out.extend(faults(last, unknown, at_fitted_rows));
     let strength = |finding: &Finding| finding.evidence.map_or(0.0, |evidence| evidence.gain);
     out.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
@@ -43,7 +54,10 @@ pub(super) fn findings(last: &LastRound, at_fitted_rows: bool, something_left: b
 fn without_details(last: &LastRound, something_left: bool) -> Vec<(FoundCell, Vec<usize>)> {
     let sized = |found: &FoundCell| (size(last, &found.members), found.clone(), Vec::new());
     let mut all: Vec<(f64, FoundCell, Vec<usize>)> = last.answer.found.iter().map(sized).collect();
-    let strongest = all.iter().map(|(_, found, _)| found.log).fold(0.0, f64::max);
+    let strongest = all
+        .iter()
+        .map(|(_, found, _)| found.log)
+        .fold(0.0, f64::max);
     all.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut out: Vec<(f64, FoundCell, Vec<usize>)> = Vec::new();
     for (rms, found, details) in all {
@@ -52,11 +66,19 @@ fn without_details(last: &LastRound, something_left: bool) -> Vec<(FoundCell, Ve
             out[0].2.extend(&found.members);
             continue;
         }
-        let unclear = |main: &FoundCell| something_left && main.effect == names::UNKNOWN && found.log < main.log;
-        let of_unclear = out.iter().position(|(_, main, _)| main.place == found.place && unclear(main));
+        let unclear = |main: &FoundCell| {
+            something_left && main.effect == names::UNKNOWN && found.log < main.log
+        };
+        let of_unclear = out
+            .iter()
+            .position(|(_, main, _)| main.place == found.place && unclear(main));
         let first = (found.effect == names::UNKNOWN).then(|| {
-            let here = out.iter().position(|(most, main, _)| main.place == found.place && rms < *DETAIL * most);
-            let trace = |(most, ..): &&(f64, FoundCell, Vec<usize>)| rms < *TRACE * most || found.log < *FAINT * strongest;
+            let here = out
+                .iter()
+                .position(|(most, main, _)| main.place == found.place && rms < *DETAIL * most);
+            let trace = |(most, ..): &&(f64, FoundCell, Vec<usize>)| {
+                rms < *TRACE * most || found.log < *FAINT * strongest
+            };
             here.or_else(|| out.first().filter(trace).map(|_| 0))
         });
         match of_unclear.or(first.flatten()) {
@@ -64,27 +86,43 @@ fn without_details(last: &LastRound, something_left: bool) -> Vec<(FoundCell, Ve
             None => out.push((rms, found, details)),
         }
     }
-    out.into_iter().map(|(_, found, details)| (found, details)).collect()
+    out.into_iter()
+        .map(|(_, found, details)| (found, details))
+        .collect()
 }
 
 /// A finding with its numbers in the whole model.
 fn finding(last: &LastRound, found: &FoundCell, details: &[usize]) -> Finding {
     let state = &last.state;
-    let FoundCell { effect, place, ref members, .. } = *found;
+    let FoundCell {
+        effect,
+        place,
+        ref members,
+        ..
+    } = *found;
     let form = |i: &usize| state.causes[*i].form.clone();
     let mut forms: Vec<Form> = members.iter().map(form).collect();
     let mut rivals = found.rivals.clone();
     let mut probabilities = found.probabilities;
-    probabilities.name = share_with_identities(effect, &forms, last.survey, probabilities.name, &mut rivals);
+    probabilities.name =
+        share_with_identities(effect, &forms, last.survey, probabilities.name, &mut rivals);
     let modelled = modelled(last, effect, &forms);
     if let Some((effect, place)) = modelled.as_ref().map(|modelled| modelled.same)
-        && !rivals.iter().any(|rival| (rival.effect, rival.place) == (effect, place))
+        && !rivals
+            .iter()
+            .any(|rival| (rival.effect, rival.place) == (effect, place))
     {
         probabilities.name /= 2.0;
-        rivals.push(RivalCause { effect, place, delta_bic: 0.0, probability: probabilities.name });
+        rivals.push(RivalCause {
+            effect,
+            place,
+            delta_bic: 0.0,
+            probability: probabilities.name,
+        });
     }
     let effect_rms = size(last, members);
-    let freedom = (last.view.problem.residual_rows() as f64 - state.fitted.singular.len() as f64).max(1.0);
+    let freedom =
+        (last.view.problem.residual_rows() as f64 - state.fitted.singular.len() as f64).max(1.0);
     let rank = found.numbers.max(1) as f64;
     let f_statistic = found.gain / rank;
     let evidence = Evidence {
@@ -97,28 +135,57 @@ fn finding(last: &LastRound, found: &FoundCell, details: &[usize]) -> Finding {
     };
     let parameters = parameters(state, effect, members);
     let clock = Clock::of(last.survey.data);
-    let summary = Summary { place, forms: &forms, parameters: &parameters, clock };
+    let summary = Summary {
+        place,
+        forms: &forms,
+        parameters: &parameters,
+        clock,
+    };
     let impossible = impossible(last, found);
     let rms = small(effect_rms, last.scale.dimension());
     let named = effect != names::UNKNOWN;
-    let excluded = forms.iter().any(|form| !form.cause().is_nameless() && last.excludes(form.name()));
+    let excluded = forms
+        .iter()
+        .any(|form| !form.cause().is_nameless() && last.excludes(form.name()));
     let (effect, statement) = match (impossible, modelled) {
         _ if !named && excluded => (names::UNKNOWN, left_out(&summary, &rms)),
         (Some(why), _) if named => (names::UNKNOWN, not_so(effect, &summary, &why, &rms)),
         (_, Some(modelled)) => (effect, told(&modelled.sentence, &rms)),
         _ => (effect, sentence(effect, &summary, &rms)),
     };
-    rivals.retain(|rival| !last.excludes(rival.effect) && (rival.effect, rival.place) != (effect, place));
+    rivals.retain(|rival| {
+        !last.excludes(rival.effect) && (rival.effect, rival.place) != (effect, place)
+    });
     let valid = valid(&forms, last);
     forms.extend(details.iter().map(form));
-    Finding { effect, place, statement, parameters, evidence: Some(evidence), rivals, probabilities, valid, forms }
+    Finding {
+        effect,
+        place,
+        statement,
+        parameters,
+        evidence: Some(evidence),
+        rivals,
+        probabilities,
+        valid,
+        forms,
+    }
 }
 
 /// What a finding is in the fitted model as a whole, unless the user excludes what would do the same.
 fn modelled(last: &LastRound, called: &'static str, forms: &[Form]) -> Option<ModelledFinding> {
     let state = &last.state;
-    let Model { robot, stack, x, .. } = &state.model;
-    let fitted = FittedForms { robot, stack, x, data: last.survey.data, rows: &state.screening.kept, called, forms };
+    let Model {
+        robot, stack, x, ..
+    } = &state.model;
+    let fitted = FittedForms {
+        robot,
+        stack,
+        x,
+        data: last.survey.data,
+        rows: &state.screening.kept,
+        called,
+        forms,
+    };
     let modelled = turned_holder(&fitted)?;
     (!last.excludes(modelled.same.0)).then_some(modelled)
 }
@@ -127,35 +194,42 @@ fn modelled(last: &LastRound, called: &'static str, forms: &[Form]) -> Option<Mo
 /// recording holds.
 fn impossible(last: &LastRound, found: &FoundCell) -> Option<String> {
     let state = &last.state;
-    found.members.iter().zip(&found.bounds).find_map(|(i, (positive, largest))| {
-        let form = &state.causes[*i].form;
-        let range = state.ranges[*i].clone();
-        let error = |column: usize| match state.fitted.statuses[range.start + column] {
-            ParameterStatus::Free(sigma) => *FIRM * sigma,
-            _ => 0.0,
-        };
-        let values = &state.model.x[range.clone()];
-        // The finer shape of a finding is not what it is called by.
-        if form.cause().is_nameless() {
-            return None;
-        }
-        let beyond = form.impossible(values, &error, last.survey);
-        if beyond.is_some() {
-            return beyond;
-        }
-        if form.is_against_load(values, &error) {
-            return Some("has the wrong sign".into());
-        }
-        range.clone().find_map(|k| {
-            let ParameterStatus::Free(sigma) = state.fitted.statuses[k] else { return None };
-            let value = state.model.x[k];
-            if *positive && value < -*FIRM * sigma {
-                Some("has the wrong sign".into())
-            } else {
-                (value.abs() - *FIRM * sigma > *largest).then(|| "is more than is possible".into())
+    found
+        .members
+        .iter()
+        .zip(&found.bounds)
+        .find_map(|(i, (positive, largest))| {
+            let form = &state.causes[*i].form;
+            let range = state.ranges[*i].clone();
+            let error = |column: usize| match state.fitted.statuses[range.start + column] {
+                ParameterStatus::Free(sigma) => *FIRM * sigma,
+                _ => 0.0,
+            };
+            let values = &state.model.x[range.clone()];
+            // The finer shape of a finding is not what it is called by.
+            if form.cause().is_nameless() {
+                return None;
             }
+            let beyond = form.impossible(values, &error, last.survey);
+            if beyond.is_some() {
+                return beyond;
+            }
+            if form.is_against_load(values, &error) {
+                return Some("has the wrong sign".into());
+            }
+            range.clone().find_map(|k| {
+                let ParameterStatus::Free(sigma) = state.fitted.statuses[k] else {
+                    return None;
+                };
+                let value = state.model.x[k];
+                if *positive && value < -*FIRM * sigma {
+                    Some("has the wrong sign".into())
+                } else {
+                    (value.abs() - *FIRM * sigma > *largest)
+                        .then(|| "is more than is possible".into())
+                }
+            })
         })
-    })
 }
 
 /// The fitted parameters of some causes, as people read them.
@@ -167,7 +241,11 @@ fn parameters(state: &FitState, effect: &str, members: &[usize]) -> Vec<Paramete
             _ => None,
         };
         let (unit, symbol) = people(spec.unit);
-        let name = spec.name.strip_prefix(effect).unwrap_or(&spec.name).trim_start_matches('.');
+        let name = spec
+            .name
+            .strip_prefix(effect)
+            .unwrap_or(&spec.name)
+            .trim_start_matches('.');
         ParameterEstimate {
             name: name.to_string(),
             form,
@@ -176,12 +254,19 @@ fn parameters(state: &FitState, effect: &str, members: &[usize]) -> Vec<Paramete
             sigma: sigma.map(|sigma| unit.from_si(sigma)),
         }
     };
-    members.iter().enumerate().flat_map(|(form, i)| state.ranges[*i].clone().map(move |k| (form, k))).map(one).collect()
+    members
+        .iter()
+        .enumerate()
+        .flat_map(|(form, i)| state.ranges[*i].clone().map(move |k| (form, k)))
+        .map(one)
+        .collect()
 }
 
 /// Joint and range over which the errors of a joint hold.
 fn valid(forms: &[Form], last: &LastRound) -> Option<(usize, [f64; 2])> {
-    let Place::Joint(joint) = forms[0].place() else { return None };
+    let Place::Joint(joint) = forms[0].place() else {
+        return None;
+    };
     Some((joint, last.survey.range[joint]))
 }
 
@@ -192,13 +277,21 @@ fn size(last: &LastRound, members: &[usize]) -> f64 {
     let mut sum = vec![0.0; problem.residual_rows()];
     for i in members {
         let columns = problem.motions_by(&state.causes[*i].form);
-        for (column, coefficient) in columns.chunks(problem.residual_rows()).zip(&state.model.x[state.ranges[*i].clone()]) {
-            sum.iter_mut().zip(column).for_each(|(value, c)| *value += c * coefficient);
+        for (column, coefficient) in columns
+            .chunks(problem.residual_rows())
+            .zip(&state.model.x[state.ranges[*i].clone()])
+        {
+            sum.iter_mut()
+                .zip(column)
+                .for_each(|(value, c)| *value += c * coefficient);
         }
     }
     let squares = problem.rows.iter().enumerate().map(|(i, row)| {
         let lines = problem.readings_of(i);
-        let (values, whitened) = (lines.len().max(1) as f64, lines.map(|line| sum[line].powi(2)).sum::<f64>());
+        let (values, whitened) = (
+            lines.len().max(1) as f64,
+            lines.map(|line| sum[line].powi(2)).sum::<f64>(),
+        );
         whitened * last.scale.noise(problem.data, *row).powi(2) / values
     });
     (squares.sum::<f64>() / problem.rows.len().max(1) as f64).sqrt()

@@ -15,7 +15,9 @@ pub(super) fn not_observable(survey: &Survey, reach: &[f64]) -> Vec<String> {
         if *reach < *STILL {
             out.push(format!("joint {name}: the measured point lies on its axis; put a second target off the axis"));
         } else if survey.travel(joint) < 0.02 {
-            out.push(format!("joint {name}: it hardly moves; vary it over its range"));
+            out.push(format!(
+                "joint {name}: it hardly moves; vary it over its range"
+            ));
         } else if !survey.both_directions(joint) {
             out.push(format!(
                 "joint {name}, backlash: it was approached from one side only; approach half of the poses from the other"
@@ -23,9 +25,14 @@ pub(super) fn not_observable(survey: &Survey, reach: &[f64]) -> Vec<String> {
         }
     }
     if !survey.payload_changes() {
-        let payload =
-            if survey.heavy_payload() > 0.0 { "every row carries the same payload" } else { "no row carries a payload" };
-        out.push(format!("payload_error: {payload}; measure with two payloads in alternating blocks"));
+        let payload = if survey.heavy_payload() > 0.0 {
+            "every row carries the same payload"
+        } else {
+            "no row carries a payload"
+        };
+        out.push(format!(
+            "payload_error: {payload}; measure with two payloads in alternating blocks"
+        ));
     }
     out.extend(masses(survey));
     let clock = Clock::of(survey.data);
@@ -33,15 +40,27 @@ pub(super) fn not_observable(survey: &Survey, reach: &[f64]) -> Vec<String> {
         out.push("time: none was recorded; the order of the rows is used instead".into());
     }
     if survey.data.temperature.is_none() {
-        let by = if clock == Clock::Rows { "the order of the rows" } else { "time" };
-        out.push(format!("temperature: none was recorded; growth and drift are separated by {by} alone"));
+        let by = if clock == Clock::Rows {
+            "the order of the rows"
+        } else {
+            "time"
+        };
+        out.push(format!(
+            "temperature: none was recorded; growth and drift are separated by {by} alone"
+        ));
     }
     if survey.data.current.is_none() {
-        out.push("counterbalance: without motor currents it is confounded with gear_cyclic of order 1".into());
+        out.push(
+            "counterbalance: without motor currents it is confounded with gear_cyclic of order 1"
+                .into(),
+        );
     }
     if survey.data.direction.is_none() {
-        let order =
-            if survey.data.sequence.is_some() { "times, since the rows stand in another order" } else { "order of the rows" };
+        let order = if survey.data.sequence.is_some() {
+            "times, since the rows stand in another order"
+        } else {
+            "order of the rows"
+        };
         out.push(format!("direction of approach: taken from the {order}"));
     }
     let rows: Vec<usize> = (0..survey.data.rows()).collect();
@@ -68,7 +87,10 @@ fn closing(data: &Measurements, rows: &[usize]) -> f64 {
 pub(super) fn not_tried(survey: &Survey, own: &[&'static DeclaredCause]) -> Vec<String> {
     let one = |declared: &&'static DeclaredCause| {
         let lacking = DeclaredForm::lacking(declared, survey)?;
-        Some(format!("{}: the recording has no {lacking}", declared.name()))
+        Some(format!(
+            "{}: the recording has no {lacking}",
+            declared.name()
+        ))
     };
     own.iter().filter_map(one).collect()
 }
@@ -76,8 +98,12 @@ pub(super) fn not_tried(survey: &Survey, own: &[&'static DeclaredCause]) -> Vec<
 /// Links whose weight the robot file does not give.
 fn masses(survey: &Survey) -> Option<String> {
     let all = &survey.robot.description().joints;
-    let bare = (1..).zip(all).filter(|(_, joint)| joint.mass.is_none() || joint.centre.is_none());
-    let bare: Vec<String> = bare.map(|(number, _): (usize, _)| number.to_string()).collect();
+    let bare = (1..)
+        .zip(all)
+        .filter(|(_, joint)| joint.mass.is_none() || joint.centre.is_none());
+    let bare: Vec<String> = bare
+        .map(|(number, _): (usize, _)| number.to_string())
+        .collect();
     match bare.len() {
         0 => None,
         none if none == all.len() => {
@@ -101,12 +127,22 @@ pub(super) fn next(findings: &[Finding], own: &[&'static DeclaredCause]) -> Vec<
     let mut out = Vec::new();
     for finding in findings {
         for rival in finding.rivals.iter().take(2) {
-            let how = least([finding.effect, rival.effect].into_iter().filter_map(|name| {
-                let declared = own.iter().find(|declared| declared.name() == name);
-                declared.map_or_else(|| cause(name)?.measure, |declared| declared.about().measure)
-            }));
+            let how = least(
+                [finding.effect, rival.effect]
+                    .into_iter()
+                    .filter_map(|name| {
+                        let declared = own.iter().find(|declared| declared.name() == name);
+                        declared.map_or_else(
+                            || cause(name)?.measure,
+                            |declared| declared.about().measure,
+                        )
+                    }),
+            );
             let how = how.unwrap_or(POSES);
-            out.push(format!("{} at {} or {} at {}: {how}", finding.effect, finding.place, rival.effect, rival.place));
+            out.push(format!(
+                "{} at {} or {} at {}: {how}",
+                finding.effect, finding.place, rival.effect, rival.place
+            ));
         }
     }
     out
@@ -118,5 +154,7 @@ pub fn other_means(a: &str, b: &str) -> Option<&'static str> {
 }
 
 fn least(measures: impl Iterator<Item = Measure>) -> Option<&'static str> {
-    measures.min_by_key(|measure| measure.rank).map(|measure| measure.advice)
+    measures
+        .min_by_key(|measure| measure.rank)
+        .map(|measure| measure.advice)
 }

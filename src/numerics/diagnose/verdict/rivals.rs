@@ -14,11 +14,25 @@ pub(super) fn share_with_identities(
     rivals: &mut Vec<RivalCause>,
 ) -> f64 {
     let mut left = name;
-    let moved = forms.iter().filter_map(|form| moved_with_the_payload(form, survey)).map(|same| (same, 0.5));
-    let same = forms.iter().flat_map(|form| form.identities(called)).map(|same| (same, *IDENTITY));
+    let moved = forms
+        .iter()
+        .filter_map(|form| moved_with_the_payload(form, survey))
+        .map(|same| (same, 0.5));
+    let same = forms
+        .iter()
+        .flat_map(|form| form.identities(called))
+        .map(|same| (same, *IDENTITY));
     for ((effect, place), share) in moved.chain(same) {
-        if !rivals.iter().any(|rival| (rival.effect, rival.place) == (effect, place)) {
-            rivals.push(RivalCause { effect, place, delta_bic: 0.0, probability: share * left });
+        if !rivals
+            .iter()
+            .any(|rival| (rival.effect, rival.place) == (effect, place))
+        {
+            rivals.push(RivalCause {
+                effect,
+                place,
+                delta_bic: 0.0,
+                probability: share * left,
+            });
             left *= 1.0 - share;
         }
     }

@@ -10,14 +10,26 @@ use std::collections::BTreeMap;
 pub(super) fn unseen(last: &LastRound) -> Vec<String> {
     let mut causes: BTreeMap<&str, (HiddenSize, Vec<String>, f64)> = BTreeMap::new();
     for (form, error) in &last.answer.hidden {
-        let Some(hidden) = form.cause().hidden(form, last.survey.robot) else { continue };
+        let Some(hidden) = form.cause().hidden(form, last.survey.robot) else {
+            continue;
+        };
         // What cannot be seen at all has no standard error.
         let limit = *FOUND * error;
         if limit > hidden.least {
-            let (_, subjects, largest) = causes.entry(form.name()).or_insert((hidden, Vec::new(), 0.0));
-            subjects.push(hidden.subject.map_or_else(|| form.place().to_string(), String::from));
+            let (_, subjects, largest) =
+                causes
+                    .entry(form.name())
+                    .or_insert((hidden, Vec::new(), 0.0));
+            subjects.push(
+                hidden
+                    .subject
+                    .map_or_else(|| form.place().to_string(), String::from),
+            );
             *largest = largest.max(limit);
         }
     }
-    causes.into_iter().map(|(name, (of, subjects, largest))| hidden(name, &subjects.join(", "), &of, largest)).collect()
+    causes
+        .into_iter()
+        .map(|(name, (of, subjects, largest))| hidden(name, &subjects.join(", "), &of, largest))
+        .collect()
 }

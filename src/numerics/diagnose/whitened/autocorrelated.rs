@@ -17,19 +17,29 @@ const SHARES: [f64; 10] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0];
 
 impl AutocorrelatedNoise {
     /// White noise.
-    pub const NONE: Self = Self { correlation: 0.0, share: 0.0 };
+    pub const NONE: Self = Self {
+        correlation: 0.0,
+        share: 0.0,
+    };
 
     /// All that are tried, white noise (`None`) first.
     pub fn all() -> impl Iterator<Item = Option<Self>> {
-        let some =
-            AR1_COEFFICIENTS.into_iter().flat_map(|correlation| SHARES.into_iter().map(move |share| Self { correlation, share }));
+        let some = AR1_COEFFICIENTS.into_iter().flat_map(|correlation| {
+            SHARES
+                .into_iter()
+                .map(move |share| Self { correlation, share })
+        });
         std::iter::once(None).chain(some.map(Some))
     }
 
     /// Brings gross residuals back to where they no longer hide what the others share.
     pub fn without_gross(residual: &mut [f64]) {
-        let scale = (residual.iter().map(|value| value * value).sum::<f64>() / residual.len().max(1) as f64).sqrt();
-        residual.iter_mut().for_each(|value| *value = value.clamp(-*GROSS * scale, *GROSS * scale));
+        let scale = (residual.iter().map(|value| value * value).sum::<f64>()
+            / residual.len().max(1) as f64)
+            .sqrt();
+        residual
+            .iter_mut()
+            .for_each(|value| *value = value.clamp(-*GROSS * scale, *GROSS * scale));
     }
 
     /// The share times the autocorrelation time.
@@ -42,7 +52,12 @@ impl AutocorrelatedNoise {
         let mut variance = self.share;
         let mut steps = Vec::with_capacity(rows.len());
         for (i, row) in rows.iter().enumerate() {
-            let decay = if i == 0 { 0.0 } else { self.correlation.powi((row - rows[i - 1]).min(i32::MAX as usize) as i32) };
+            let decay = if i == 0 {
+                0.0
+            } else {
+                self.correlation
+                    .powi((row - rows[i - 1]).min(i32::MAX as usize) as i32)
+            };
             // The correlated part before the row was seen, then after.
             variance = self.share + decay * decay * (variance - self.share);
             let whole = variance + 1.0 - self.share;
@@ -101,7 +116,9 @@ mod tests {
         let mut even = move || (12.0f64).sqrt() * (rng.random::<f64>() - 0.5);
         let mut now = [0.0; 3].map(|_: f64| even());
         let mut row = |_| {
-            now = now.map(|value| correlation * value + (1.0 - correlation * correlation).sqrt() * even());
+            now = now.map(|value| {
+                correlation * value + (1.0 - correlation * correlation).sqrt() * even()
+            });
             now.map(|value| share.sqrt() * value + (1.0 - share).sqrt() * even())
         };
         (0..rows).flat_map(&mut row).collect()
@@ -111,8 +128,20 @@ mod tests {
     fn innovations_of_correlated_noise_are_white_and_of_unit_size() {
         let mut column = noise(4000, 0.9, 0.7);
         let rows: Vec<usize> = (0..4000).collect();
-        AutocorrelatedNoise { correlation: 0.9, share: 0.7 }.filter(&rows, 3).apply(&mut column);
-        let product = |lag: usize| column.iter().zip(&column[3 * lag..]).map(|(a, b)| a * b).sum::<f64>() / column.len() as f64;
+        AutocorrelatedNoise {
+            correlation: 0.9,
+            share: 0.7,
+        }
+        .filter(&rows, 3)
+        .apply(&mut column);
+        let product = |lag: usize| {
+            column
+                .iter()
+                .zip(&column[3 * lag..])
+                .map(|(a, b)| a * b)
+                .sum::<f64>()
+                / column.len() as f64
+        };
         assert!((product(0) - 1.0).abs() < 0.05, "{}", product(0));
         for lag in [1, 2, 5] {
             assert!(product(lag).abs() < 0.04, "lag {lag}: {}", product(lag));
@@ -124,11 +153,29 @@ mod tests {
         // Every third row only: what correlation 0.9 from row to row correlation 0.729 from one of these to the next.
         let rows: Vec<usize> = (0..400).map(|k| 3 * k).collect();
         let all = noise(1200, 0.9, 1.0);
-        let mut column: Vec<f64> = rows.iter().flat_map(|row| all[3 * row..3 * row + 3].to_vec()).collect();
+        let mut column: Vec<f64> = rows
+            .iter()
+            .flat_map(|row| all[3 * row..3 * row + 3].to_vec())
+            .collect();
         let mut other = column.clone();
-        AutocorrelatedNoise { correlation: 0.9, share: 1.0 }.filter(&rows, 3).apply(&mut column);
-        AutocorrelatedNoise { correlation: 0.729, share: 1.0 }.filter(&(0..400).collect::<Vec<_>>(), 3).apply(&mut other);
-        assert!(column.iter().zip(&other).all(|(a, b)| (a - b).abs() < 1e-12));
+        AutocorrelatedNoise {
+            correlation: 0.9,
+            share: 1.0,
+        }
+        .filter(&rows, 3)
+        .apply(&mut column);
+        AutocorrelatedNoise {
+            correlation: 0.729,
+            share: 1.0,
+        }
+        .filter(&(0..400).collect::<Vec<_>>(), 3)
+        .apply(&mut other);
+        assert!(
+            column
+                .iter()
+                .zip(&other)
+                .all(|(a, b)| (a - b).abs() < 1e-12)
+        );
     }
 
     #[test]
@@ -140,11 +187,16 @@ mod tests {
             column.iter().map(|value| value * value).sum::<f64>() + innovations.determinant()
         };
         let likeliest = |noise: &[f64]| {
-            let all = AutocorrelatedNoise::all().map(|noise| noise.unwrap_or(AutocorrelatedNoise::NONE));
-            all.min_by(|a, b| cost(*a, noise).total_cmp(&cost(*b, noise))).expect("some")
+            let all =
+                AutocorrelatedNoise::all().map(|noise| noise.unwrap_or(AutocorrelatedNoise::NONE));
+            all.min_by(|a, b| cost(*a, noise).total_cmp(&cost(*b, noise)))
+                .expect("some")
         };
         let found = likeliest(&noise(80, 0.9, 1.0));
-        assert!((0.8..=0.96).contains(&found.correlation) && found.share > 0.6, "{found:?}");
+        assert!(
+            (0.8..=0.96).contains(&found.correlation) && found.share > 0.6,
+            "{found:?}"
+        );
         let white = noise(80, 0.0, 0.0);
         let gain = cost(AutocorrelatedNoise::NONE, &white) - cost(likeliest(&white), &white);
         assert!(gain < 8.0, "{gain}");

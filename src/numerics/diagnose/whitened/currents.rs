@@ -27,14 +27,32 @@ const FOLLOWS: std::ops::Range<f64> = 0.6..1.6;
 
 impl Currents {
     /// The usable motors at `rows` seen as `motions`; `None` where no current is usable.
-    pub fn new(robot: &RobotModel, data: &Measurements, rows: &[usize], motions: &[PointMotion]) -> Option<Self> {
+    pub fn new(
+        robot: &RobotModel,
+        data: &Measurements,
+        rows: &[usize],
+        motions: &[PointMotion],
+    ) -> Option<Self> {
         let mut usable: Vec<(usize, Vec<f64>, f64)> = Vec::new();
         for joint in (0..robot.joints()).filter(|joint| robot.is_revolute(*joint)) {
             let described = &robot.description().joints[joint];
-            let (Some(ratio), Some(constant)) = (described.reduction_ratio, described.motor_constant) else { continue };
-            let current: Option<Vec<f64>> = rows.iter().map(|row| Some(data.current(*row)?[joint])).collect();
-            let Some(current) = current.filter(|all| all.iter().all(|value| value.is_finite())) else { continue };
-            let torque: Vec<f64> = motions.iter().map(|motion| motion.posture.torque[joint]).collect();
+            let (Some(ratio), Some(constant)) =
+                (described.reduction_ratio, described.motor_constant)
+            else {
+                continue;
+            };
+            let current: Option<Vec<f64>> = rows
+                .iter()
+                .map(|row| Some(data.current(*row)?[joint]))
+                .collect();
+            let Some(current) = current.filter(|all| all.iter().all(|value| value.is_finite()))
+            else {
+                continue;
+            };
+            let torque: Vec<f64> = motions
+                .iter()
+                .map(|motion| motion.posture.torque[joint])
+                .collect();
             let most = torque.iter().fold(0.0, |most: f64, t| most.max(t.abs()));
             if most < 1e-6 {
                 continue;
@@ -43,24 +61,46 @@ impl Currents {
             // What the motor holds against the load is minus it, or plus it where the controller counts the other way.
             let features = DMatrix::from_fn(rows.len(), 6, |i, k| {
                 let (sine, cosine) = libm::sincos(data.q(rows[i])[joint]);
-                [torque[i], 1.0, data.direction(rows[i], joint), sine, cosine, torque[i] * f64::from(data.payload[rows[i]] > 0.0)]
-                    [k]
+                [
+                    torque[i],
+                    1.0,
+                    data.direction(rows[i], joint),
+                    sine,
+                    cosine,
+                    torque[i] * f64::from(data.payload[rows[i]] > 0.0),
+                ][k]
             });
             // A balancer takes its share off the slope, unless torques by the joint's own angle are left to it.
-            let slopes = [3, 5].into_iter().filter_map(|count| solve(&features.columns(0, count).into_owned(), &held));
-            let Some(slope) = slopes.map(|x| x[0]).find(|slope| FOLLOWS.contains(&slope.abs())) else { continue };
-            let Some(all) = solve(&features, &held) else { continue };
+            let slopes = [3, 5]
+                .into_iter()
+                .filter_map(|count| solve(&features.columns(0, count).into_owned(), &held));
+            let Some(slope) = slopes
+                .map(|x| x[0])
+                .find(|slope| FOLLOWS.contains(&slope.abs()))
+            else {
+                continue;
+            };
+            let Some(all) = solve(&features, &held) else {
+                continue;
+            };
             let left = DVector::from_vec(held.clone()) - &features * all;
             let sigma = median_deviation(left.as_slice()).max(*CURRENTS * most);
-            let residual = held.iter().zip(&torque).map(|(held, torque)| held * slope.signum() - torque).collect();
+            let residual = held
+                .iter()
+                .zip(&torque)
+                .map(|(held, torque)| held * slope.signum() - torque)
+                .collect();
             usable.push((joint, residual, sigma));
         }
         if usable.is_empty() {
             return None;
         }
         let joints: Vec<usize> = usable.iter().map(|(joint, ..)| *joint).collect();
-        let residual = (0..rows.len()).flat_map(|i| usable.iter().map(move |(_, residual, _)| residual[i]));
-        let direction = rows.iter().flat_map(|row| joints.iter().map(|joint| data.direction(*row, *joint)));
+        let residual =
+            (0..rows.len()).flat_map(|i| usable.iter().map(move |(_, residual, _)| residual[i]));
+        let direction = rows
+            .iter()
+            .flat_map(|row| joints.iter().map(|joint| data.direction(*row, *joint)));
         Some(Self {
             residual: residual.collect(),
             sigma: usable.iter().map(|(.., sigma)| *sigma).collect(),
@@ -75,7 +115,10 @@ impl Currents {
 
     /// Residuals in standard deviations.
     pub fn whitened(&self) -> impl Iterator<Item = f64> + '_ {
-        self.residual.iter().enumerate().map(|(row, value)| value / self.sigma_of(row))
+        self.residual
+            .iter()
+            .enumerate()
+            .map(|(row, value)| value / self.sigma_of(row))
     }
 
     pub fn sigma_of(&self, row: usize) -> f64 {
@@ -103,11 +146,25 @@ impl Currents {
         let seen: Vec<f64> = self
             .whitened()
             .enumerate()
-            .map(|(row, value)| value + columns.iter().zip(values).map(|(column, x)| column[row] * x).sum::<f64>())
+            .map(|(row, value)| {
+                value
+                    + columns
+                        .iter()
+                        .zip(values)
+                        .map(|(column, x)| column[row] * x)
+                        .sum::<f64>()
+            })
             .collect();
-        let scale: Vec<f64> = columns.iter().map(|c| c.iter().map(|v| v * v).sum::<f64>().sqrt().max(1e-300)).collect();
+        let scale: Vec<f64> = columns
+            .iter()
+            .map(|c| c.iter().map(|v| v * v).sum::<f64>().sqrt().max(1e-300))
+            .collect();
         let matrix = DMatrix::from_fn(rows, own + self.nuisances(), |row, k| {
-            if k < own { columns[k][row] / scale[k] } else { self.nuisance(row, k - own) }
+            if k < own {
+                columns[k][row] / scale[k]
+            } else {
+                self.nuisance(row, k - own)
+            }
         });
         let solution = solve(&matrix, &seen)?;
         let left = DVector::from_vec(seen) - &matrix * &solution;
@@ -122,7 +179,11 @@ impl Currents {
 }
 
 fn solve(matrix: &DMatrix<f64>, values: &[f64]) -> Option<DVector<f64>> {
-    matrix.clone().svd(true, true).solve(&DVector::from_column_slice(values), 1e-10).ok()
+    matrix
+        .clone()
+        .svd(true, true)
+        .solve(&DVector::from_column_slice(values), 1e-10)
+        .ok()
 }
 
 fn median_deviation(values: &[f64]) -> f64 {

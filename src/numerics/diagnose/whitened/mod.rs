@@ -9,7 +9,8 @@ mod reading_lines;
 mod travel;
 
 use crate::effect::{
-    Basis, Deflection, Direction, EffectStack, Form, Law, Motion, PlacementBuffers, PointMotion, Term, Unknown, Variable,
+    Basis, Deflection, Direction, EffectStack, Form, Law, Motion, PlacementBuffers, PointMotion,
+    Term, Unknown, Variable,
 };
 use crate::estimate::{Model, Prior};
 use crate::observation::{MeasurementKind, Residual, ResidualNumbers, kinds};
@@ -50,27 +51,51 @@ impl<'a> WhitenedProblem<'a> {
         let kinds = kinds(data);
         let turns = kinds.iter().any(|kind| kind.about().rank.rotations);
         let look = |scratch: &mut PlacementBuffers, row: &usize| {
-            let placed = model.stack.place(&model.robot, data, *row, &model.x, scratch);
+            let placed = model
+                .stack
+                .place(&model.robot, data, *row, &model.x, scratch);
             let seen = |kind: &&'static dyn MeasurementKind| {
                 let residual = Residual::of(*kind, data, *row, &placed)?;
                 let weight = residual.weight(data, 0.0);
                 let (error, lines) = (weight.whiten(&residual.error), kind.lines(data, *row));
-                Some((SeenReading { kind: *kind, lines, sensitivity: residual.sensitivity(data, &placed, weight) }, error))
+                Some((
+                    SeenReading {
+                        kind: *kind,
+                        lines,
+                        sensitivity: residual.sensitivity(data, &placed, weight),
+                    },
+                    error,
+                ))
             };
             let seen: Vec<(SeenReading, ResidualNumbers)> = kinds.iter().filter_map(seen).collect();
-            let motion = if turns { EffectStack::target_motion } else { EffectStack::point_motion };
-            (motion(&model.stack, &model.robot, data, *row, &model.x, scratch), seen)
+            let motion = if turns {
+                EffectStack::target_motion
+            } else {
+                EffectStack::point_motion
+            };
+            (
+                motion(&model.stack, &model.robot, data, *row, &model.x, scratch),
+                seen,
+            )
         };
         let scratch = || model.stack.scratch(&model.robot);
         let looked: Vec<_> = rows.par_iter().map_init(scratch, look).collect();
-        let (mut motions, mut residual) = (Vec::with_capacity(rows.len()), Vec::with_capacity(3 * rows.len()));
+        let (mut motions, mut residual) = (
+            Vec::with_capacity(rows.len()),
+            Vec::with_capacity(3 * rows.len()),
+        );
         let mut readings = ReadingLines::default();
         for (motion, seen) in looked {
             motions.push(motion);
-            residual.extend(seen.iter().flat_map(|(reading, error)| reading.lines.iter().map(|line| error[*line])));
+            residual.extend(
+                seen.iter()
+                    .flat_map(|(reading, error)| reading.lines.iter().map(|line| error[*line])),
+            );
             readings.push(seen.into_iter().map(|(reading, _)| reading).collect());
         }
-        let current_weight = (residual.iter().map(|value| value * value).sum::<f64>() / residual.len().max(1) as f64).sqrt();
+        let current_weight = (residual.iter().map(|value| value * value).sum::<f64>()
+            / residual.len().max(1) as f64)
+            .sqrt();
         Self {
             robot: &model.robot,
             data,
@@ -89,13 +114,21 @@ impl<'a> WhitenedProblem<'a> {
     /// With the motor currents, which say something where a joint yields to torques.
     pub fn with_currents(mut self) -> Self {
         self.currents = Currents::new(self.robot, self.data, &self.rows, &self.motions);
-        self.residual.extend(self.currents.iter().flat_map(Currents::whitened).map(|value| value * self.current_weight));
+        self.residual.extend(
+            self.currents
+                .iter()
+                .flat_map(Currents::whitened)
+                .map(|value| value * self.current_weight),
+        );
         self
     }
 
     /// With autocorrelated noise: all columns become innovations. Of rows that measured different numbers noise stays white.
     pub fn with_autocorrelation(mut self, noise: AutocorrelatedNoise) -> Self {
-        let (filter, measured) = (self.width().map(|width| noise.filter(&self.rows, width)), self.measured());
+        let (filter, measured) = (
+            self.width().map(|width| noise.filter(&self.rows, width)),
+            self.measured(),
+        );
         if let Some(innovations) = filter {
             innovations.apply(&mut self.residual[..measured]);
             self.innovations = Some(innovations);
@@ -124,7 +157,8 @@ impl<'a> WhitenedProblem<'a> {
     pub fn width(&self) -> Option<usize> {
         let of_row = |i: usize| self.readings.of_row(i).len();
         let width = of_row(0);
-        (!self.rows.is_empty() && width > 0 && (0..self.rows.len()).all(|i| of_row(i) == width)).then_some(width)
+        (!self.rows.is_empty() && width > 0 && (0..self.rows.len()).all(|i| of_row(i) == width))
+            .then_some(width)
     }
 
     /// Residuals of what was measured, row by row.
@@ -144,14 +178,19 @@ impl<'a> WhitenedProblem<'a> {
     /// The place in `rows` of a residual row.
     pub fn row_of(&self, residual_row: usize) -> usize {
         match &self.currents {
-            Some(currents) if residual_row >= self.measured() => (residual_row - self.measured()) / currents.joints.len(),
+            Some(currents) if residual_row >= self.measured() => {
+                (residual_row - self.measured()) / currents.joints.len()
+            }
             _ => self.readings.row_of[residual_row],
         }
     }
 
     /// Load torques (Nm), row-major.
     pub fn torques(&self) -> Vec<f64> {
-        self.motions.iter().flat_map(|motion| motion.posture.torque.iter().copied()).collect()
+        self.motions
+            .iter()
+            .flat_map(|motion| motion.posture.torque.iter().copied())
+            .collect()
     }
 
     /// Motion of each row's point by each joint, m/rad; row-major.
@@ -162,22 +201,40 @@ impl<'a> WhitenedProblem<'a> {
     /// How far each joint moves the first three numbers that a row (by its place) measured of a kind, in standard deviations per rad or m;
     /// none where it measured none.
     pub fn reading_by_joint(&self, place: usize, kind: &str) -> Option<Vec<Vector3<f64>>> {
-        let (_, reading) = self.readings.seen(place).find(|(_, reading)| reading.kind.about().name == kind)?;
-        let first_three = |own: &[f64]| Vector3::from_fn(|k, _| own.get(k).copied().unwrap_or_default());
-        let along = |joint| reading.sensitivity.along(&self.motions[place], &Direction::Joint(joint, 1.0), first_three);
+        let (_, reading) = self
+            .readings
+            .seen(place)
+            .find(|(_, reading)| reading.kind.about().name == kind)?;
+        let first_three =
+            |own: &[f64]| Vector3::from_fn(|k, _| own.get(k).copied().unwrap_or_default());
+        let along = |joint| {
+            reading.sensitivity.along(
+                &self.motions[place],
+                &Direction::Joint(joint, 1.0),
+                first_three,
+            )
+        };
         Some((0..self.robot.joints()).map(along).collect())
     }
 
     /// The largest motion of the point by each joint, m/rad.
     pub fn reach(&self) -> Vec<f64> {
         let joints = 0..self.robot.joints();
-        joints.map(|j| self.motions.iter().map(|motion| motion.by_joint[j].norm()).fold(0.0, f64::max)).collect()
+        joints
+            .map(|j| {
+                self.motions
+                    .iter()
+                    .map(|motion| motion.by_joint[j].norm())
+                    .fold(0.0, f64::max)
+            })
+            .collect()
     }
 
     /// Columns of a form, one after another.
     pub fn columns(&self, form: &Form) -> Vec<f64> {
         let mut out = self.motions_by(form);
-        out.chunks_mut(self.residual_rows().max(1)).for_each(|column| self.innovate(column));
+        out.chunks_mut(self.residual_rows().max(1))
+            .for_each(|column| self.innovate(column));
         out
     }
 
@@ -207,11 +264,14 @@ impl<'a> WhitenedProblem<'a> {
                     });
                 }
             }
-            let Some(currents) = &self.currents else { continue };
+            let Some(currents) = &self.currents else {
+                continue;
+            };
             for (parameter, joint, rate) in buffer.loads() {
                 if let Some(k) = currents.joints.iter().position(|usable| *usable == joint) {
                     let row = i * currents.joints.len() + k;
-                    out[parameter * rows + self.measured() + row] += rate * self.current_weight / currents.sigma_of(row);
+                    out[parameter * rows + self.measured() + row] +=
+                        rate * self.current_weight / currents.sigma_of(row);
                 }
             }
         }
@@ -223,12 +283,16 @@ impl<'a> WhitenedProblem<'a> {
         // One from the beginning of time.
         let always = Law::new(Variable::Time, Basis::After { at: f64::MIN });
         let columns = self.motions_by(&Term::new(&Unknown, motion, always).into());
-        columns.chunks(self.residual_rows().max(1)).map(<[f64]>::to_vec).collect()
+        columns
+            .chunks(self.residual_rows().max(1))
+            .map(<[f64]>::to_vec)
+            .collect()
     }
 
     /// A variable of one number at every row; none where some row does not tell.
     pub fn values(&self, of: Variable) -> Option<Vec<f64>> {
-        let one = |(row, motion): (&usize, &PointMotion)| motion.value(self.robot, self.data, *row, of);
+        let one =
+            |(row, motion): (&usize, &PointMotion)| motion.value(self.robot, self.data, *row, of);
         self.rows.iter().zip(&self.motions).map(one).collect()
     }
 
@@ -243,15 +307,20 @@ impl<'a> WhitenedProblem<'a> {
         let mut out = Mat::zeros(self.residual_rows(), free.len() + nuisances);
         let mut scratch = model.stack.scratch(&model.robot);
         for (i, row) in self.rows.iter().enumerate() {
-            let mut placed = model.stack.place(&model.robot, self.data, *row, &model.x, &mut scratch);
+            let mut placed =
+                model
+                    .stack
+                    .place(&model.robot, self.data, *row, &model.x, &mut scratch);
             for (first, reading) in self.readings.seen(i) {
-                reading.sensitivity.derivatives(&mut placed, |parameter, derivative| {
-                    if let Some(j) = column[parameter] {
-                        for (k, line) in reading.lines.iter().enumerate() {
-                            out[(first + k, j)] += derivative[*line];
+                reading
+                    .sensitivity
+                    .derivatives(&mut placed, |parameter, derivative| {
+                        if let Some(j) = column[parameter] {
+                            for (k, line) in reading.lines.iter().enumerate() {
+                                out[(first + k, j)] += derivative[*line];
+                            }
                         }
-                    }
-                });
+                    });
             }
         }
         for j in 0..free.len() {
@@ -260,7 +329,8 @@ impl<'a> WhitenedProblem<'a> {
         if let Some(currents) = &self.currents {
             for row in 0..currents.residual_rows() {
                 for k in 0..nuisances {
-                    out[(self.measured() + row, free.len() + k)] = currents.nuisance(row, k) * self.current_weight;
+                    out[(self.measured() + row, free.len() + k)] =
+                        currents.nuisance(row, k) * self.current_weight;
                 }
             }
         }
@@ -271,20 +341,37 @@ impl<'a> WhitenedProblem<'a> {
     fn present(&self, forms: &[&Form]) -> Vec<f64> {
         let value = |name: &String| {
             let specs = self.model.stack.specs();
-            specs.iter().position(|spec| spec.name == *name).map_or(0.0, |k| self.model.x[k])
+            specs
+                .iter()
+                .position(|spec| spec.name == *name)
+                .map_or(0.0, |k| self.model.x[k])
         };
-        let names = forms.iter().flat_map(|form| form.parameters(self.robot)).map(|spec| spec.name);
+        let names = forms
+            .iter()
+            .flat_map(|form| form.parameters(self.robot))
+            .map(|spec| spec.name);
         names.map(|name| value(&name)).collect()
     }
 
     /// What the currents alone say of the parameters of some forms; nothing where they say nothing.
     pub fn priors_by_currents(&self, forms: &[&Form]) -> Vec<Prior> {
-        let Some(currents) = self.currents.as_ref().filter(|_| !forms.is_empty()) else { return Vec::new() };
+        let Some(currents) = self.currents.as_ref().filter(|_| !forms.is_empty()) else {
+            return Vec::new();
+        };
         let rows = self.residual_rows();
         let all: Vec<f64> = forms.iter().flat_map(|form| self.columns(form)).collect();
-        let columns: Vec<Vec<f64>> =
-            all.chunks(rows).map(|c| c[self.measured()..].iter().map(|value| value / self.current_weight).collect()).collect();
+        let columns: Vec<Vec<f64>> = all
+            .chunks(rows)
+            .map(|c| {
+                c[self.measured()..]
+                    .iter()
+                    .map(|value| value / self.current_weight)
+                    .collect()
+            })
+            .collect();
         // The residual is that of the present model; what is asked is the whole parameter, hence at zero where it is new.
-        currents.priors(&columns, &self.present(forms)).unwrap_or_default()
+        currents
+            .priors(&columns, &self.present(forms))
+            .unwrap_or_default()
     }
 }

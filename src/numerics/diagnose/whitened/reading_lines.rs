@@ -32,7 +32,8 @@ impl ReadingLines {
         let place = self.end.len();
         for reading in readings {
             self.first.push(self.row_of.len());
-            self.row_of.extend(std::iter::repeat_n(place, reading.lines.len()));
+            self.row_of
+                .extend(std::iter::repeat_n(place, reading.lines.len()));
             self.readings.push(reading);
         }
         self.end.push(self.readings.len());
@@ -42,7 +43,10 @@ impl ReadingLines {
     /// Readings of a row, each with its first residual row.
     pub fn seen(&self, place: usize) -> impl Iterator<Item = (usize, &SeenReading)> {
         let own = begin(&self.end, place)..self.end[place];
-        self.first[own.clone()].iter().copied().zip(&self.readings[own])
+        self.first[own.clone()]
+            .iter()
+            .copied()
+            .zip(&self.readings[own])
     }
 
     /// Residual rows of a row.

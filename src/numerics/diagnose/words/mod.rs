@@ -38,19 +38,37 @@ pub(crate) fn of_the_correlation(fitter: &Fitter) -> String {
 }
 
 /// A round in a line.
-pub(crate) fn of_a_round<'f>(round: usize, cells: usize, forms: impl Iterator<Item = &'f Form>) -> String {
-    let mut names: Vec<String> = forms.map(|form| format!("{} at {}", form.name(), form.place())).collect();
+pub(crate) fn of_a_round<'f>(
+    round: usize,
+    cells: usize,
+    forms: impl Iterator<Item = &'f Form>,
+) -> String {
+    let mut names: Vec<String> = forms
+        .map(|form| format!("{} at {}", form.name(), form.place()))
+        .collect();
     names.dedup();
     let causes = counted(names.len(), "cause");
-    let mut shown = names.iter().take(*NAMED).cloned().collect::<Vec<_>>().join(", ");
+    let mut shown = names
+        .iter()
+        .take(*NAMED)
+        .cloned()
+        .collect::<Vec<_>>()
+        .join(", ");
     if names.len() > *NAMED {
         shown.push_str(", ...");
     }
-    let shown = if shown.is_empty() { shown } else { format!(" ({shown})") };
+    let shown = if shown.is_empty() {
+        shown
+    } else {
+        format!(" ({shown})")
+    };
     format!("round {round}: {cells} possible causes compared, {causes}{shown}")
 }
 
 /// What follows the last round in a line.
 pub(crate) fn of_the_conclusions(found: &FitState) -> String {
-    format!("{} in the model; probabilities and formulas follow, the last step", counted(found.causes.len(), "cause"))
+    format!(
+        "{} in the model; probabilities and formulas follow, the last step",
+        counted(found.causes.len(), "cause")
+    )
 }

@@ -6,12 +6,18 @@ use crate::observation::Dimension;
 
 /// A size in the small unit of its dimension, e.g. `31 um`.
 pub(crate) fn small(size: f64, of: Dimension) -> String {
-    format!("{} {}", figure(of.small().from_si(size), 0), of.small().symbol())
+    format!(
+        "{} {}",
+        figure(of.small().from_si(size), 0),
+        of.small().symbol()
+    )
 }
 
 /// The sentence of a finding; `rms` is the size of the whole effect in what was measured.
 pub(crate) fn sentence(effect: &str, summary: &Summary, rms: &str) -> String {
-    let text = summary.cause(effect).map_or_else(String::new, |cause| cause.sentence(summary));
+    let text = summary
+        .cause(effect)
+        .map_or_else(String::new, |cause| cause.sentence(summary));
     told(&text, rms)
 }
 
@@ -22,8 +28,13 @@ pub(crate) fn told(text: &str, rms: &str) -> String {
 
 /// The sentence of a finding whose numbers no such effect can have.
 pub(crate) fn not_so(effect: &str, summary: &Summary, why: &str, rms: &str) -> String {
-    let text = summary.cause(effect).map_or_else(String::new, |cause| cause.sentence(summary));
-    format!("something unknown acts at {}: {effect} fits best ({text}), but {why} ({rms} rms at the tool).", summary.place)
+    let text = summary
+        .cause(effect)
+        .map_or_else(String::new, |cause| cause.sentence(summary));
+    format!(
+        "something unknown acts at {}: {effect} fits best ({text}), but {why} ({rms} rms at the tool).",
+        summary.place
+    )
 }
 
 /// The sentence of a finding whose name the user has excluded.
@@ -35,7 +46,11 @@ pub(crate) fn left_out(summary: &Summary, rms: &str) -> String {
             by.push(name);
         }
     }
-    let by = if by.is_empty() { String::new() } else { format!(" and depends on {}", by.join(" and ")) };
+    let by = if by.is_empty() {
+        String::new()
+    } else {
+        format!(" and depends on {}", by.join(" and "))
+    };
     format!(
         "something unknown acts at {}{by}; the name that it would have is left out by `without` ({rms} rms at the tool).",
         summary.place
@@ -53,8 +68,12 @@ pub(crate) fn slower_than_noise(noise: AutocorrelatedNoise) -> String {
 
 /// How large a cause may be that a path is too short or too slow to show; `limit` in SI.
 pub(crate) fn hidden(name: &str, subjects: &str, of: &HiddenSize, limit: f64) -> String {
-    let size =
-        if limit.is_finite() { format!("by up to {:.1} {}", of.unit.from_si(limit), of.unit) } else { "by any amount".into() };
-    let advice = "geometry absorbs it on this path: measure longer, faster, over the joints' whole range";
+    let size = if limit.is_finite() {
+        format!("by up to {:.1} {}", of.unit.from_si(limit), of.unit)
+    } else {
+        "by any amount".into()
+    };
+    let advice =
+        "geometry absorbs it on this path: measure longer, faster, over the joints' whole range";
     format!("{name}: {subjects} {} {size}; {advice}", of.may)
 }

@@ -36,9 +36,19 @@ impl Ground {
     /// Names the noise with its size and where that is from.
     fn of_noise(&self) -> String {
         match self.basis {
-            NoiseBasis::Repeats => format!("the noise that {} show, {}", counted(self.repeats, "repeat"), self.small(self.noise)),
-            NoiseBasis::Instrument if self.brought => format!("the stated repeatability of closing, {}", self.small(self.noise)),
-            NoiseBasis::Instrument => format!("the noise that the instrument states, {}", self.small(self.noise)),
+            NoiseBasis::Repeats => format!(
+                "the noise that {} show, {}",
+                counted(self.repeats, "repeat"),
+                self.small(self.noise)
+            ),
+            NoiseBasis::Instrument if self.brought => format!(
+                "the stated repeatability of closing, {}",
+                self.small(self.noise)
+            ),
+            NoiseBasis::Instrument => format!(
+                "the noise that the instrument states, {}",
+                self.small(self.noise)
+            ),
             NoiseBasis::Inferred => format!("{}: {}", self.at_random(), self.advice()),
         }
     }
@@ -47,22 +57,34 @@ impl Ground {
     fn of_the_rest(&self) -> String {
         match self.agrees {
             true => format!("the residual agrees with {}", self.of_noise()),
-            false => format!("{} remain, against {}", self.small(self.left), self.of_noise()),
+            false => format!(
+                "{} remain, against {}",
+                self.small(self.left),
+                self.of_noise()
+            ),
         }
     }
 
     /// Why the error is not explained.
     fn of_what_is_missing(&self) -> String {
         let left = self.small(self.left);
-        let points = if self.dimension == Dimension::Length { "points" } else { "rows" };
+        let points = if self.dimension == Dimension::Length {
+            "points"
+        } else {
+            "rows"
+        };
         match self.not_carried {
             Some(held_out) => format!(
                 "the findings do not explain everything: {} remain of held-out {points}, {left} of fitted ones",
                 self.small(held_out)
             ),
-            None if self.nameless => format!("the findings reproduce the error, but none has a name: {left} remain"),
+            None if self.nameless => {
+                format!("the findings reproduce the error, but none has a name: {left} remain")
+            }
             None if self.partly_nameless => {
-                format!("the findings reproduce the error, but a part of it has no name: {left} remain")
+                format!(
+                    "the findings reproduce the error, but a part of it has no name: {left} remain"
+                )
             }
             None => format!("the findings do not explain everything: {left} remain"),
         }
@@ -79,21 +101,34 @@ impl Ground {
                 )
             }
             Some(instrument) => {
-                format!("{scatter} scatter at random, of which the instrument explains {}", self.number(instrument))
+                format!(
+                    "{scatter} scatter at random, of which the instrument explains {}",
+                    self.number(instrument)
+                )
             }
-            None => format!("{scatter} scatter at random, and no instrument is stated that explains any of it"),
+            None => format!(
+                "{scatter} scatter at random, and no instrument is stated that explains any of it"
+            ),
         }
     }
 
     /// Without a stated instrument the noise is but a weight: what is left is what scatters.
     fn scatter(&self) -> f64 {
-        if self.instrument.is_some() { self.noise } else { self.left }
+        if self.instrument.is_some() {
+            self.noise
+        } else {
+            self.left
+        }
     }
 
     /// In the small unit of its dimension, with a decimal where there are few.
     fn number(&self, size: f64) -> String {
         let count = self.dimension.small().from_si(size);
-        if count < 9.95 { format!("{count:.1}") } else { format!("{count:.0}") }
+        if count < 9.95 {
+            format!("{count:.1}")
+        } else {
+            format!("{count:.0}")
+        }
     }
 
     fn small(&self, size: f64) -> String {
@@ -117,14 +152,27 @@ pub(crate) fn statement(verdict: VerdictKind, ground: &Ground) -> String {
     match verdict {
         VerdictKind::NothingMissing if inferred => format!("nothing found; {}", ground.of_noise()),
         VerdictKind::NothingMissing => format!("nothing found; {}", ground.of_the_rest()),
-        VerdictKind::Explained if inferred => format!("the findings explain the error except for noise; {}", ground.of_noise()),
-        VerdictKind::Explained => format!("the findings explain the error; {}", ground.of_the_rest()),
+        VerdictKind::Explained if inferred => format!(
+            "the findings explain the error except for noise; {}",
+            ground.of_noise()
+        ),
+        VerdictKind::Explained => {
+            format!("the findings explain the error; {}", ground.of_the_rest())
+        }
         VerdictKind::Unexplained if inferred => {
             format!("{}; {}", ground.of_what_is_missing(), ground.of_noise())
         }
-        VerdictKind::Unexplained => format!("{}, against {}", ground.of_what_is_missing(), ground.of_noise()),
-        VerdictKind::WrongSetup => "the set-up is wrong: correct it first; no physical cause was tested".into(),
-        VerdictKind::NotAsked => "too few rows were fitted to determine what the simulation lacks".into(),
+        VerdictKind::Unexplained => format!(
+            "{}, against {}",
+            ground.of_what_is_missing(),
+            ground.of_noise()
+        ),
+        VerdictKind::WrongSetup => {
+            "the set-up is wrong: correct it first; no physical cause was tested".into()
+        }
+        VerdictKind::NotAsked => {
+            "too few rows were fitted to determine what the simulation lacks".into()
+        }
     }
 }
 
@@ -151,20 +199,30 @@ mod tests {
 
     #[test]
     fn where_joints_alone_were_recorded_the_noise_is_how_well_it_closes() {
-        let ground = Ground { brought: true, ..ground(NoiseBasis::Instrument, Some(17e-6)) };
+        let ground = Ground {
+            brought: true,
+            ..ground(NoiseBasis::Instrument, Some(17e-6))
+        };
         assert_eq!(
             statement(VerdictKind::Explained, &ground),
             "the findings explain the error; the residual agrees with the stated repeatability of closing, 31 um"
         );
         assert_eq!(
-            statement(VerdictKind::NothingMissing, &Ground { basis: NoiseBasis::Inferred, ..ground }),
+            statement(
+                VerdictKind::NothingMissing,
+                &Ground {
+                    basis: NoiseBasis::Inferred,
+                    ..ground
+                }
+            ),
             "nothing found; 31 um scatter at random, of which the stated repeatability of closing explains 17: close ten postures twice"
         );
     }
 
     #[test]
     fn nothing_found_says_what_its_noise_rests_on() {
-        let said = |basis, instrument| statement(VerdictKind::NothingMissing, &ground(basis, instrument));
+        let said =
+            |basis, instrument| statement(VerdictKind::NothingMissing, &ground(basis, instrument));
         assert_eq!(
             said(NoiseBasis::Repeats, Some(17e-6)),
             "nothing found; the residual agrees with the noise that 24 repeats show, 31 um"
@@ -229,30 +287,62 @@ mod tests {
     fn what_is_left_agrees_with_the_noise_only_where_it_does_and_says_of_which_points_it_is() {
         let ground = ground(NoiseBasis::Repeats, Some(17e-6));
         assert_eq!(
-            statement(VerdictKind::NothingMissing, &Ground { agrees: false, left: 46e-6, ..ground }),
+            statement(
+                VerdictKind::NothingMissing,
+                &Ground {
+                    agrees: false,
+                    left: 46e-6,
+                    ..ground
+                }
+            ),
             "nothing found; 46 um remain, against the noise that 24 repeats show, 31 um"
         );
         assert_eq!(
-            statement(VerdictKind::Unexplained, &Ground { not_carried: Some(80e-6), ..ground }),
+            statement(
+                VerdictKind::Unexplained,
+                &Ground {
+                    not_carried: Some(80e-6),
+                    ..ground
+                }
+            ),
             "the findings do not explain everything: 80 um remain of held-out points, 32 um of fitted ones, against the noise that 24 \
              repeats show, 31 um"
         );
         assert_eq!(
-            statement(VerdictKind::Unexplained, &Ground { partly_nameless: true, ..ground }),
+            statement(
+                VerdictKind::Unexplained,
+                &Ground {
+                    partly_nameless: true,
+                    ..ground
+                }
+            ),
             "the findings reproduce the error, but a part of it has no name: 32 um remain, against the noise that 24 repeats show, 31 um"
         );
         assert_eq!(
-            statement(VerdictKind::Unexplained, &Ground { nameless: true, ..ground }),
+            statement(
+                VerdictKind::Unexplained,
+                &Ground {
+                    nameless: true,
+                    ..ground
+                }
+            ),
             "the findings reproduce the error, but none has a name: 32 um remain, against the noise that 24 repeats show, 31 um"
         );
     }
 
     #[test]
     fn with_an_inferred_noise_nothing_is_ever_said_to_be_complete() {
-        for verdict in [VerdictKind::NothingMissing, VerdictKind::Explained, VerdictKind::Unexplained] {
+        for verdict in [
+            VerdictKind::NothingMissing,
+            VerdictKind::Explained,
+            VerdictKind::Unexplained,
+        ] {
             for instrument in [None, Some(17e-6)] {
                 let said = statement(verdict, &ground(NoiseBasis::Inferred, instrument));
-                assert!(said.contains("scatter at random") && !said.contains("nothing is missing"), "{said}");
+                assert!(
+                    said.contains("scatter at random") && !said.contains("nothing is missing"),
+                    "{said}"
+                );
             }
         }
     }

@@ -28,21 +28,45 @@ impl TorqueCause for Balancer {
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
         let joints = (0..scene.joints()).filter(|joint| *joint == BALANCED);
-        let ends = |joint: usize| scene.position[joint].iter().fold([f64::MAX, f64::MIN], |[a, b], q| [a.min(*q), b.max(*q)]);
-        joints.flat_map(|joint| WIDTHS.map(|width| TorqueForm::at_joint(&Balancer, joint, width).shaped(&ends(joint)))).collect()
+        let ends = |joint: usize| {
+            scene.position[joint]
+                .iter()
+                .fold([f64::MAX, f64::MIN], |[a, b], q| [a.min(*q), b.max(*q)])
+        };
+        joints
+            .flat_map(|joint| {
+                WIDTHS
+                    .map(|width| TorqueForm::at_joint(&Balancer, joint, width).shaped(&ends(joint)))
+            })
+            .collect()
     }
 
-    fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, column: usize, out: &mut [f64]) {
+    fn write(
+        &self,
+        form: &TorqueForm,
+        scene: &DynamicScene,
+        _joint: usize,
+        column: usize,
+        out: &mut [f64],
+    ) {
         let angle = &scene.position[form.joint()];
         fill(out, |row| waves(angle[row])[column]);
     }
 
     /// The second wave only bends the first: what is left of two that cancel each other where the joint moves is another torque.
     fn is_possible(&self, form: &TorqueForm, values: &[f64]) -> bool {
-        let &[least, most] = &form.shape[..] else { return true };
+        let &[least, most] = &form.shape[..] else {
+            return true;
+        };
         let angles = || (0..=CHECKED).map(|k| least + (most - least) * k as f64 / CHECKED as f64);
         let square = |count: usize| {
-            let torque = |q: f64| waves(q).iter().zip(&values[..count]).map(|(wave, value)| wave * value).sum::<f64>();
+            let torque = |q: f64| {
+                waves(q)
+                    .iter()
+                    .zip(&values[..count])
+                    .map(|(wave, value)| wave * value)
+                    .sum::<f64>()
+            };
             angles().map(|q| torque(q).powi(2)).sum::<f64>()
         };
         square(values.len()) >= LEAST_WHOLE * LEAST_WHOLE * square(values.len().min(WIDTHS[0]))
@@ -56,6 +80,9 @@ impl TorqueCause for Balancer {
         let size = fitted[0].value.hypot(fitted[1].value);
         // -size sin(q - zero).
         let zero = fitted[0].value.atan2(-fitted[1].value).to_degrees();
-        format!("a balancing spring acts on {} with up to {size:.3} Nm; it pulls towards {zero:.0} deg", form.place)
+        format!(
+            "a balancing spring acts on {} with up to {size:.3} Nm; it pulls towards {zero:.0} deg",
+            form.place
+        )
     }
 }

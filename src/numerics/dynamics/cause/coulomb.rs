@@ -23,16 +23,32 @@ impl TorqueCause for Coulomb {
         at_each_joint(&Coulomb, scene, 1)
     }
 
-    fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
+    fn write(
+        &self,
+        form: &TorqueForm,
+        scene: &DynamicScene,
+        _joint: usize,
+        _column: usize,
+        out: &mut [f64],
+    ) {
         let joint = form.joint();
         fill(out, |row| scene.direction(joint, row));
     }
 
-    fn friction(&self, _form: &TorqueForm, _column: usize, _velocity: f64, sign: f64) -> Option<f64> {
+    fn friction(
+        &self,
+        _form: &TorqueForm,
+        _column: usize,
+        _velocity: f64,
+        sign: f64,
+    ) -> Option<f64> {
         Some(sign)
     }
 
     fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
-        format!("{} has Coulomb friction of {:.3} Nm", form.place, fitted[0].value)
+        format!(
+            "{} has Coulomb friction of {:.3} Nm",
+            form.place, fitted[0].value
+        )
     }
 }

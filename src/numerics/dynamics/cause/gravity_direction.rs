@@ -19,19 +19,42 @@ impl TorqueCause for GravityDirection {
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
-        let form = TorqueForm { place: Place::Base, ..TorqueForm::at_joint(&GravityDirection, 0, 2) };
-        if scene.declared.is_some() { vec![form] } else { Vec::new() }
+        let form = TorqueForm {
+            place: Place::Base,
+            ..TorqueForm::at_joint(&GravityDirection, 0, 2)
+        };
+        if scene.declared.is_some() {
+            vec![form]
+        } else {
+            Vec::new()
+        }
     }
 
-    fn write(&self, _form: &TorqueForm, scene: &DynamicScene, joint: usize, column: usize, out: &mut [f64]) {
+    fn write(
+        &self,
+        _form: &TorqueForm,
+        scene: &DynamicScene,
+        joint: usize,
+        column: usize,
+        out: &mut [f64],
+    ) {
         out.copy_from_slice(&scene.sideways[column][joint]);
     }
 
     fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
         let (angle, sigma) = tilt(fitted);
         vec![
-            TorqueParameter { name: "tilt".into(), value: angle.to_degrees(), unit: "deg", sigma: Some(sigma.to_degrees()) },
-            shape("azimuth", fitted[1].value.atan2(fitted[0].value).to_degrees(), "deg"),
+            TorqueParameter {
+                name: "tilt".into(),
+                value: angle.to_degrees(),
+                unit: "deg",
+                sigma: Some(sigma.to_degrees()),
+            },
+            shape(
+                "azimuth",
+                fitted[1].value.atan2(fitted[0].value).to_degrees(),
+                "deg",
+            ),
         ]
     }
 
@@ -48,6 +71,7 @@ impl TorqueCause for GravityDirection {
 /// rad, with its standard deviation.
 fn tilt(fitted: &[FittedNumber]) -> (f64, f64) {
     let side = fitted[0].value.hypot(fitted[1].value);
-    let sigma = (fitted[0].value * fitted[0].sigma).hypot(fitted[1].value * fitted[1].sigma) / side.max(f64::MIN_POSITIVE);
+    let sigma = (fitted[0].value * fitted[0].sigma).hypot(fitted[1].value * fitted[1].sigma)
+        / side.max(f64::MIN_POSITIVE);
     (side.min(1.0).asin(), sigma)
 }

@@ -24,17 +24,36 @@ impl TorqueCause for WrongLinkCentre {
         values.iter().all(|shift| shift.abs() < FARTHEST)
     }
 
-    fn inertial(&self, form: &TorqueForm, declared: &DeclaredInertials) -> Option<Vec<(usize, [f64; INERTIAL_NUMBERS])>> {
-        Some(declared.centre_shift[form.link()].iter().map(|ten| (form.link(), *ten)).collect())
+    fn inertial(
+        &self,
+        form: &TorqueForm,
+        declared: &DeclaredInertials,
+    ) -> Option<Vec<(usize, [f64; INERTIAL_NUMBERS])>> {
+        Some(
+            declared.centre_shift[form.link()]
+                .iter()
+                .map(|ten| (form.link(), *ten))
+                .collect(),
+        )
     }
 
     fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
-        let in_mm = |number: &FittedNumber| FittedNumber { value: 1e3 * number.value, sigma: 1e3 * number.sigma };
-        ["centre_x", "centre_y", "centre_z"].iter().zip(fitted).map(|(name, number)| plain(name, in_mm(number), "mm")).collect()
+        let in_mm = |number: &FittedNumber| FittedNumber {
+            value: 1e3 * number.value,
+            sigma: 1e3 * number.sigma,
+        };
+        ["centre_x", "centre_y", "centre_z"]
+            .iter()
+            .zip(fitted)
+            .map(|(name, number)| plain(name, in_mm(number), "mm"))
+            .collect()
     }
 
     fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
         let [x, y, z] = [0, 1, 2].map(|axis| 1e3 * fitted[axis].value);
-        format!("the centre of mass of {} is ({x:.1}, {y:.1}, {z:.1}) mm from where it is declared", form.place)
+        format!(
+            "the centre of mass of {} is ({x:.1}, {y:.1}, {z:.1}) mm from where it is declared",
+            form.place
+        )
     }
 }

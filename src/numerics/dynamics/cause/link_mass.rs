@@ -25,9 +25,16 @@ impl TorqueCause for HeavierLink {
         (LEAST..=MOST).contains(&values[0])
     }
 
-    fn inertial(&self, form: &TorqueForm, declared: &DeclaredInertials) -> Option<Vec<(usize, [f64; INERTIAL_NUMBERS])>> {
+    fn inertial(
+        &self,
+        form: &TorqueForm,
+        declared: &DeclaredInertials,
+    ) -> Option<Vec<(usize, [f64; INERTIAL_NUMBERS])>> {
         let own = &declared.links[INERTIAL_NUMBERS * form.link()..];
-        Some(vec![(form.link(), std::array::from_fn(|number| own[number]))])
+        Some(vec![(
+            form.link(),
+            std::array::from_fn(|number| own[number]),
+        )])
     }
 
     fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
@@ -35,6 +42,10 @@ impl TorqueCause for HeavierLink {
     }
 
     fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
-        format!("{} weighs {:+.1} % against what is declared", form.place, 100.0 * fitted[0].value)
+        format!(
+            "{} weighs {:+.1} % against what is declared",
+            form.place,
+            100.0 * fitted[0].value
+        )
     }
 }

@@ -21,12 +21,25 @@ impl TorqueCause for LoadFriction {
         at_each_joint(&LoadFriction, scene, 1)
     }
 
-    fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
+    fn write(
+        &self,
+        form: &TorqueForm,
+        scene: &DynamicScene,
+        _joint: usize,
+        _column: usize,
+        out: &mut [f64],
+    ) {
         let joint = form.joint();
-        fill(out, |row| scene.direction(joint, row) * scene.rigid[joint][row].abs());
+        fill(out, |row| {
+            scene.direction(joint, row) * scene.rigid[joint][row].abs()
+        });
     }
 
     fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
-        format!("{} loses {:.1} % of the torque that it transmits to friction", form.place, 100.0 * fitted[0].value)
+        format!(
+            "{} loses {:.1} % of the torque that it transmits to friction",
+            form.place,
+            100.0 * fitted[0].value
+        )
     }
 }

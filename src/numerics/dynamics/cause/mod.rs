@@ -176,11 +176,22 @@ pub(super) trait TorqueCause: Sync {
         }
     }
     /// Writes a column of the torque at a joint (Nm per unit of its coefficient), rows as recorded; zero of what is a change of masses alone.
-    fn write(&self, _form: &TorqueForm, _scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
+    fn write(
+        &self,
+        _form: &TorqueForm,
+        _scene: &DynamicScene,
+        _joint: usize,
+        _column: usize,
+        out: &mut [f64],
+    ) {
         out.fill(0.0);
     }
     /// Link and change of its numbers per coefficient, for causes that are wrong masses: these write nothing.
-    fn inertial(&self, _form: &TorqueForm, _declared: &DeclaredInertials) -> Option<Vec<(usize, [f64; INERTIAL_NUMBERS])>> {
+    fn inertial(
+        &self,
+        _form: &TorqueForm,
+        _declared: &DeclaredInertials,
+    ) -> Option<Vec<(usize, [f64; INERTIAL_NUMBERS])>> {
         None
     }
     /// What tells its cells at a place from each other.
@@ -204,7 +215,13 @@ pub(super) trait TorqueCause: Sync {
         Vec::new()
     }
     /// Torque per coefficient of a column at a velocity and its smoothed sign, for causes that are friction over velocity.
-    fn friction(&self, _form: &TorqueForm, _column: usize, _velocity: f64, _sign: f64) -> Option<f64> {
+    fn friction(
+        &self,
+        _form: &TorqueForm,
+        _column: usize,
+        _velocity: f64,
+        _sign: f64,
+    ) -> Option<f64> {
         None
     }
     /// Whether it is a curve of speed, neither proportional to it nor of one size: one without a name stands for all of them.
@@ -223,7 +240,10 @@ pub(super) trait TorqueCause: Sync {
     fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
         let coefficients = self.about().coefficients.iter().zip(fitted);
         let coefficients = coefficients.map(|((name, unit), number)| plain(name, *number, unit));
-        let shapes = form.shape_numbers().into_iter().map(|span| shape(span.name, form.shape[span.index], span.unit));
+        let shapes = form
+            .shape_numbers()
+            .into_iter()
+            .map(|span| shape(span.name, form.shape[span.index], span.unit));
         coefficients.chain(shapes).collect()
     }
     /// A sentence without a full stop, with its size.
@@ -257,7 +277,13 @@ pub(super) struct TorqueForm {
 impl TorqueForm {
     /// A form at a joint, without shape numbers.
     pub fn at_joint(cause: &'static dyn TorqueCause, joint: usize, width: usize) -> Self {
-        Self { cause, place: Place::Joint(joint), with: [0; 2], shape: Vec::new(), width }
+        Self {
+            cause,
+            place: Place::Joint(joint),
+            with: [0; 2],
+            shape: Vec::new(),
+            width,
+        }
     }
 
     /// The same with shape numbers.
@@ -288,14 +314,21 @@ impl TorqueForm {
     /// Whether a curve without a name and another curve of speed would be one sum at one joint.
     pub fn is_one_curve_with(&self, other: &Self) -> bool {
         let [one, two] = [self, other].map(|form| form.cause.bends(form));
-        self.place == other.place && one && two && (self.is_nameless_curve() || other.is_nameless_curve())
+        self.place == other.place
+            && one
+            && two
+            && (self.is_nameless_curve() || other.is_nameless_curve())
     }
 
     /// The same with the numbers that are at an end of their search as they usually are; none where one of them has nothing usual. What is
     /// best at an end would be better beyond it.
     pub fn within_ends(&self) -> Option<Self> {
         let mut within = self.clone();
-        for span in self.shape_numbers().into_iter().filter(|span| span.ends_at(self.shape[span.index])) {
+        for span in self
+            .shape_numbers()
+            .into_iter()
+            .filter(|span| span.ends_at(self.shape[span.index]))
+        {
             within.shape[span.index] = span.usual?;
         }
         (!self.cause.has_ends(self)).then_some(within)
@@ -343,33 +376,71 @@ impl TorqueForm {
 
 /// A parameter that is one coefficient.
 fn plain(name: &str, fitted: FittedNumber, unit: &'static str) -> TorqueParameter {
-    TorqueParameter { name: name.into(), value: fitted.value, unit, sigma: Some(fitted.sigma) }
+    TorqueParameter {
+        name: name.into(),
+        value: fitted.value,
+        unit,
+        sigma: Some(fitted.sigma),
+    }
 }
 
 /// A shape number.
 fn shape(name: &str, value: f64, unit: &'static str) -> TorqueParameter {
-    TorqueParameter { name: name.into(), value, unit, sigma: None }
+    TorqueParameter {
+        name: name.into(),
+        value,
+        unit,
+        sigma: None,
+    }
 }
 
 /// The forms of a cause that sits at each joint.
-fn at_each_joint(cause: &'static dyn TorqueCause, scene: &DynamicScene, width: usize) -> Vec<TorqueForm> {
-    (0..scene.joints()).map(|joint| TorqueForm::at_joint(cause, joint, width)).collect()
+fn at_each_joint(
+    cause: &'static dyn TorqueCause,
+    scene: &DynamicScene,
+    width: usize,
+) -> Vec<TorqueForm> {
+    (0..scene.joints())
+        .map(|joint| TorqueForm::at_joint(cause, joint, width))
+        .collect()
 }
 
 /// The forms of a cause that sits at each link of declared masses.
-fn at_each_link(cause: &'static dyn TorqueCause, scene: &DynamicScene, width: usize) -> Vec<TorqueForm> {
-    let links = if scene.declared.is_some() { scene.joints() } else { 0 };
-    let form = |link| TorqueForm { place: Place::Links(link, link), ..TorqueForm::at_joint(cause, link, width) };
+fn at_each_link(
+    cause: &'static dyn TorqueCause,
+    scene: &DynamicScene,
+    width: usize,
+) -> Vec<TorqueForm> {
+    let links = if scene.declared.is_some() {
+        scene.joints()
+    } else {
+        0
+    };
+    let form = |link| TorqueForm {
+        place: Place::Links(link, link),
+        ..TorqueForm::at_joint(cause, link, width)
+    };
     (0..links).map(form).collect()
 }
 
 /// The forms of a cause at each joint with each of some shape numbers.
-fn at_each_joint_with(cause: &'static dyn TorqueCause, scene: &DynamicScene, width: usize, shapes: &[&[f64]]) -> Vec<TorqueForm> {
-    let of = |joint| shapes.iter().map(move |shape| TorqueForm::at_joint(cause, joint, width).shaped(shape));
+fn at_each_joint_with(
+    cause: &'static dyn TorqueCause,
+    scene: &DynamicScene,
+    width: usize,
+    shapes: &[&[f64]],
+) -> Vec<TorqueForm> {
+    let of = |joint| {
+        shapes
+            .iter()
+            .map(move |shape| TorqueForm::at_joint(cause, joint, width).shaped(shape))
+    };
     (0..scene.joints()).flat_map(of).collect()
 }
 
 /// Writes a function of the row.
 fn fill(out: &mut [f64], of: impl Fn(usize) -> f64) {
-    out.iter_mut().enumerate().for_each(|(row, value)| *value = of(row));
+    out.iter_mut()
+        .enumerate()
+        .for_each(|(row, value)| *value = of(row));
 }

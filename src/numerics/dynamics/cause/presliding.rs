@@ -31,15 +31,34 @@ impl TorqueCause for PreslidingFriction {
     }
 
     fn spans(&self, _form: &TorqueForm) -> Vec<ShapeSpan> {
-        vec![ShapeSpan { name: "travel", unit: "rad", index: 0, least: 3e-4, most: 0.05, by_ratio: true, usual: None }]
+        vec![ShapeSpan {
+            name: "travel",
+            unit: "rad",
+            index: 0,
+            least: 3e-4,
+            most: 0.05,
+            by_ratio: true,
+            usual: None,
+        }]
     }
 
-    fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
+    fn write(
+        &self,
+        form: &TorqueForm,
+        scene: &DynamicScene,
+        _joint: usize,
+        _column: usize,
+        out: &mut [f64],
+    ) {
         let (velocity, travel) = (&scene.velocity[form.joint()], form.shape[0]);
         for stretch in &scene.stretches {
             let mut kept = 0.0;
             for row in stretch.clone() {
-                let moved = if velocity[row].abs() > REST { velocity[row] / scene.rate } else { 0.0 };
+                let moved = if velocity[row].abs() > REST {
+                    velocity[row] / scene.rate
+                } else {
+                    0.0
+                };
                 if moved != 0.0 {
                     kept = moved.signum() + (kept - moved.signum()) * (-moved.abs() / travel).exp();
                 }
@@ -50,6 +69,9 @@ impl TorqueCause for PreslidingFriction {
 
     fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
         let [value, travel] = [fitted[0].value, form.shape[0]];
-        format!("friction of {} turns over a travel of {travel:.2e} rad and is kept at rest, {value:.3} Nm of it", form.place)
+        format!(
+            "friction of {} turns over a travel of {travel:.2e} rad and is kept at rest, {value:.3} Nm of it",
+            form.place
+        )
     }
 }

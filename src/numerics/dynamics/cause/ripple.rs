@@ -15,7 +15,12 @@ const USUAL: usize = 4;
 
 impl Ripple {
     fn periods(form: &TorqueForm) -> f64 {
-        form.with[0] as f64 * if form.with[1] == 1 { form.shape[0] } else { 1.0 }
+        form.with[0] as f64
+            * if form.with[1] == 1 {
+                form.shape[0]
+            } else {
+                1.0
+            }
     }
 }
 
@@ -31,8 +36,12 @@ impl TorqueCause for Ripple {
         let mut forms = Vec::new();
         for joint in 0..scene.joints() {
             let mut add = |order: usize, motor: usize| {
-                let form = TorqueForm::at_joint(&Ripple, joint, 2).shaped(&[scene.arm.ratio[joint].abs()]);
-                forms.push(TorqueForm { with: [order, motor], ..form });
+                let form =
+                    TorqueForm::at_joint(&Ripple, joint, 2).shaped(&[scene.arm.ratio[joint].abs()]);
+                forms.push(TorqueForm {
+                    with: [order, motor],
+                    ..form
+                });
             };
             (1..=ORDERS).for_each(|order| add(order, 0));
             if scene.arm.ratio[joint].abs() > ORDERS as f64 {
@@ -50,7 +59,14 @@ impl TorqueCause for Ripple {
         form.with[1] == 0 && form.with[0] <= USUAL
     }
 
-    fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, column: usize, out: &mut [f64]) {
+    fn write(
+        &self,
+        form: &TorqueForm,
+        scene: &DynamicScene,
+        _joint: usize,
+        column: usize,
+        out: &mut [f64],
+    ) {
         let (angle, periods) = (&scene.position[form.joint()], Self::periods(form));
         match column {
             0 => fill(out, |row| (periods * angle[row]).cos()),
@@ -60,18 +76,34 @@ impl TorqueCause for Ripple {
 
     fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
         let (amplitude, sigma) = amplitude(fitted);
-        let of = if form.with[1] == 1 { "motor_order" } else { "order" };
+        let of = if form.with[1] == 1 {
+            "motor_order"
+        } else {
+            "order"
+        };
         vec![
-            TorqueParameter { name: "amplitude".into(), value: amplitude, unit: "Nm", sigma: Some(sigma) },
+            TorqueParameter {
+                name: "amplitude".into(),
+                value: amplitude,
+                unit: "Nm",
+                sigma: Some(sigma),
+            },
             shape("phase", fitted[1].value.atan2(fitted[0].value), "rad"),
             shape(of, form.with[0] as f64, "1"),
         ]
     }
 
     fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
-        let of = if form.with[1] == 1 { "its motor" } else { "the joint" };
+        let of = if form.with[1] == 1 {
+            "its motor"
+        } else {
+            "the joint"
+        };
         let (amplitude, _) = amplitude(fitted);
-        format!("the torque of {} ripples by {amplitude:.3} Nm, {} times a turn of {of}", form.place, form.with[0])
+        format!(
+            "the torque of {} ripples by {amplitude:.3} Nm, {} times a turn of {of}",
+            form.place, form.with[0]
+        )
     }
 }
 

@@ -23,12 +23,22 @@ impl TorqueCause for Rotor {
         at_each_joint(&Rotor, scene, 1)
     }
 
-    fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
+    fn write(
+        &self,
+        form: &TorqueForm,
+        scene: &DynamicScene,
+        _joint: usize,
+        _column: usize,
+        out: &mut [f64],
+    ) {
         let joint = form.joint();
         out.copy_from_slice(&scene.acceleration[joint]);
     }
 
     fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
-        format!("the rotor of {} adds an inertia of {:.4} kg m2 at the joint", form.place, fitted[0].value)
+        format!(
+            "the rotor of {} adds an inertia of {:.4} kg m2 at the joint",
+            form.place, fitted[0].value
+        )
     }
 }

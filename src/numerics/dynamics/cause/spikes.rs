@@ -26,21 +26,42 @@ impl TorqueCause for Spikes {
     }
 
     fn spans(&self, _form: &TorqueForm) -> Vec<ShapeSpan> {
-        vec![ShapeSpan { name: "time", unit: "s", index: 0, least: 0.01, most: 0.3, by_ratio: true, usual: None }]
+        vec![ShapeSpan {
+            name: "time",
+            unit: "s",
+            index: 0,
+            least: 0.01,
+            most: 0.3,
+            by_ratio: true,
+            usual: None,
+        }]
     }
 
-    fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
+    fn write(
+        &self,
+        form: &TorqueForm,
+        scene: &DynamicScene,
+        _joint: usize,
+        _column: usize,
+        out: &mut [f64],
+    ) {
         let (velocity, lasting) = (&scene.velocity[form.joint()], form.shape[0]);
         out.fill(0.0);
         for stretch in &scene.stretches {
             let mut direction = 0.0;
             for row in stretch.clone() {
-                let now = if velocity[row].abs() > REST { velocity[row].signum() } else { 0.0 };
+                let now = if velocity[row].abs() > REST {
+                    velocity[row].signum()
+                } else {
+                    0.0
+                };
                 if now == 0.0 || now == direction {
                     continue;
                 }
                 direction = now;
-                let end = stretch.end.min(row + (OVER * lasting * scene.rate) as usize + 1);
+                let end = stretch
+                    .end
+                    .min(row + (OVER * lasting * scene.rate) as usize + 1);
                 for (step, value) in out[row..end].iter_mut().enumerate() {
                     let share = step as f64 / scene.rate / lasting;
                     *value += now * share * (1.0 - share).exp();
@@ -51,6 +72,9 @@ impl TorqueCause for Spikes {
 
     fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
         let [value, time] = [fitted[0].value, form.shape[0]];
-        format!("each reversal of {} knocks with {value:.3} Nm, {time:.3} s later: lost motion", form.place)
+        format!(
+            "each reversal of {} knocks with {value:.3} Nm, {time:.3} s later: lost motion",
+            form.place
+        )
     }
 }

@@ -25,29 +25,64 @@ impl TorqueCause for SpringTorque {
     fn about(&self) -> &'static TorqueCauseDescription {
         const CABLE: TorqueCauseDescription = TorqueCauseDescription {
             name: "cable_stiffness",
-            coefficients: &[("stiffness", "Nm/rad"), ("at_zero", "Nm"), ("square", "Nm/rad2"), ("cube", "Nm/rad3")],
+            coefficients: &[
+                ("stiffness", "Nm/rad"),
+                ("at_zero", "Nm"),
+                ("square", "Nm/rad2"),
+                ("cube", "Nm/rad3"),
+            ],
             of_angle: true,
             ..PLAIN
         };
-        if self.balances { &TorqueCauseDescription { name: SPRING_BALANCE_NAME, ..CABLE } } else { &CABLE }
+        if self.balances {
+            &TorqueCauseDescription {
+                name: SPRING_BALANCE_NAME,
+                ..CABLE
+            }
+        } else {
+            &CABLE
+        }
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
-        let cause: &'static dyn TorqueCause = if self.balances { &SPRING_BALANCE } else { &CABLE_STIFFNESS };
-        let joints = (0..scene.joints()).filter(|joint| (*joint == BALANCED) == self.balances);
-        let widths = if self.balances { &WIDTHS[..1] } else { &WIDTHS[..] };
-        let form = |joint: usize, width: usize| {
-            let ends = scene.position[joint].iter().fold([f64::MAX, f64::MIN], |[a, b], q| [a.min(*q), b.max(*q)]);
-            TorqueForm::at_joint(cause, joint, width).shaped(if self.balances { &[] } else { &ends })
+        let cause: &'static dyn TorqueCause = if self.balances {
+            &SPRING_BALANCE
+        } else {
+            &CABLE_STIFFNESS
         };
-        joints.flat_map(|joint| widths.iter().map(move |width| form(joint, *width))).collect()
+        let joints = (0..scene.joints()).filter(|joint| (*joint == BALANCED) == self.balances);
+        let widths = if self.balances {
+            &WIDTHS[..1]
+        } else {
+            &WIDTHS[..]
+        };
+        let form = |joint: usize, width: usize| {
+            let ends = scene.position[joint]
+                .iter()
+                .fold([f64::MAX, f64::MIN], |[a, b], q| [a.min(*q), b.max(*q)]);
+            TorqueForm::at_joint(cause, joint, width).shaped(if self.balances {
+                &[]
+            } else {
+                &ends
+            })
+        };
+        joints
+            .flat_map(|joint| widths.iter().map(move |width| form(joint, *width)))
+            .collect()
     }
 
     fn is_rich(&self, form: &TorqueForm) -> bool {
         form.width == WIDTHS[0]
     }
 
-    fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, column: usize, out: &mut [f64]) {
+    fn write(
+        &self,
+        form: &TorqueForm,
+        scene: &DynamicScene,
+        _joint: usize,
+        column: usize,
+        out: &mut [f64],
+    ) {
         match column {
             0 => out.copy_from_slice(&scene.position[form.joint()]),
             1 => out.fill(1.0),
@@ -66,12 +101,21 @@ impl TorqueCause for SpringTorque {
     fn is_possible(&self, form: &TorqueForm, values: &[f64]) -> bool {
         let number = |power: usize| values.get(power).copied().unwrap_or(0.0);
         let stiffness = |q: f64| number(0) + 2.0 * number(2) * q + 3.0 * number(3) * q * q;
-        let &[least, most] = &form.shape[..] else { return true };
+        let &[least, most] = &form.shape[..] else {
+            return true;
+        };
         (0..=CHECKED).all(|k| stiffness(least + (most - least) * k as f64 / CHECKED as f64) > 0.0)
     }
 
     fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
-        let what = if self.balances { "a balancing spring" } else { "a cable or hose" };
-        format!("{what} acts on {} with {:.3} Nm/rad and {:.3} Nm at zero", form.place, fitted[0].value, fitted[1].value)
+        let what = if self.balances {
+            "a balancing spring"
+        } else {
+            "a cable or hose"
+        };
+        format!(
+            "{what} acts on {} with {:.3} Nm/rad and {:.3} Nm at zero",
+            form.place, fitted[0].value, fitted[1].value
+        )
     }
 }

@@ -27,12 +27,24 @@ impl TorqueCause for TorqueConstant {
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
         // Beside identified masses it is a part of them.
-        let Some(_) = scene.declared else { return Vec::new() };
-        let largest = |joint: usize| scene.rigid[joint].iter().fold(1e-9, |most: f64, torque| most.max(torque.abs()));
-        let falling = |joint: usize| {
-            HALVES.map(|half| TorqueForm::at_joint(&TorqueConstant, joint, 1).shaped(&[half * largest(joint), largest(joint)]))
+        let Some(_) = scene.declared else {
+            return Vec::new();
         };
-        at_each_joint(&TorqueConstant, scene, 1).into_iter().chain((0..scene.joints()).flat_map(falling)).collect()
+        let largest = |joint: usize| {
+            scene.rigid[joint]
+                .iter()
+                .fold(1e-9, |most: f64, torque| most.max(torque.abs()))
+        };
+        let falling = |joint: usize| {
+            HALVES.map(|half| {
+                TorqueForm::at_joint(&TorqueConstant, joint, 1)
+                    .shaped(&[half * largest(joint), largest(joint)])
+            })
+        };
+        at_each_joint(&TorqueConstant, scene, 1)
+            .into_iter()
+            .chain((0..scene.joints()).flat_map(falling))
+            .collect()
     }
 
     fn price(&self, form: &TorqueForm) -> f64 {
@@ -46,7 +58,15 @@ impl TorqueCause for TorqueConstant {
     fn spans(&self, form: &TorqueForm) -> Vec<ShapeSpan> {
         let span = |largest: &f64| {
             let [least, most] = HALF_SPAN.map(|share| share * largest);
-            ShapeSpan { name: "half_at", unit: "Nm", index: 0, least, most, by_ratio: true, usual: None }
+            ShapeSpan {
+                name: "half_at",
+                unit: "Nm",
+                index: 0,
+                least,
+                most,
+                by_ratio: true,
+                usual: None,
+            }
         };
         form.shape.get(1).map(span).into_iter().collect()
     }
@@ -55,18 +75,29 @@ impl TorqueCause for TorqueConstant {
         values[0].abs() < MOST
     }
 
-    fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
+    fn write(
+        &self,
+        form: &TorqueForm,
+        scene: &DynamicScene,
+        _joint: usize,
+        _column: usize,
+        out: &mut [f64],
+    ) {
         let joint = form.joint();
         match form.shape.first() {
             None => out.copy_from_slice(&scene.rigid[joint]),
-            Some(half) => fill(out, |row| scene.rigid[joint][row] / (1.0 + scene.rigid[joint][row].abs() / half)),
+            Some(half) => fill(out, |row| {
+                scene.rigid[joint][row] / (1.0 + scene.rigid[joint][row].abs() / half)
+            }),
         }
     }
 
     fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
         let (place, percent) = (form.place, 100.0 * fitted[0].value);
         match form.shape.first() {
-            None => format!("torques of {place} read {percent:+.1} % off: its torque constant is not the declared one"),
+            None => format!(
+                "torques of {place} read {percent:+.1} % off: its torque constant is not the declared one"
+            ),
             Some(half) => format!(
                 "small torques of {place} read {percent:+.1} % off, half of that at {half:.3} Nm: its torque constant is not the declared one"
             ),

@@ -24,7 +24,10 @@ impl TorqueCause for Unnamed {
         for joint in 0..n {
             for first in 0..n {
                 for second in (0..n).filter(|second| *second != first) {
-                    forms.push(TorqueForm { with: [first, second], ..TorqueForm::at_joint(&Unnamed, joint, 4) });
+                    forms.push(TorqueForm {
+                        with: [first, second],
+                        ..TorqueForm::at_joint(&Unnamed, joint, 4)
+                    });
                 }
             }
         }
@@ -35,7 +38,14 @@ impl TorqueCause for Unnamed {
         form.with
     }
 
-    fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, column: usize, out: &mut [f64]) {
+    fn write(
+        &self,
+        form: &TorqueForm,
+        scene: &DynamicScene,
+        _joint: usize,
+        column: usize,
+        out: &mut [f64],
+    ) {
         let [first, second] = form.with.map(|joint| &scene.position[joint]);
         match column {
             0 => fill(out, |row| first[row].sin() * (2.0 * second[row]).sin()),
@@ -51,6 +61,9 @@ impl TorqueCause for Unnamed {
 
     fn statement(&self, form: &TorqueForm, _fitted: &[FittedNumber]) -> String {
         let [first, second] = form.with.map(|joint| joint + 1);
-        format!("something without a name acts at {}; it depends on the angles of joint {first} and joint {second}", form.place)
+        format!(
+            "something without a name acts at {}; it depends on the angles of joint {first} and joint {second}",
+            form.place
+        )
     }
 }

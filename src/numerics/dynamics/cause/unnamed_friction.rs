@@ -28,9 +28,14 @@ impl TorqueCause for UnnamedFriction {
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
         let form = |joint: usize| {
-            let fastest = scene.velocity[joint].iter().fold(1e-6, |most: f64, velocity| most.max(velocity.abs()));
-            let speeds: Vec<f64> =
-                scene.velocity[joint].iter().map(|v| v.abs() / fastest).filter(|speed| *speed > STILL).collect();
+            let fastest = scene.velocity[joint]
+                .iter()
+                .fold(1e-6, |most: f64, velocity| most.max(velocity.abs()));
+            let speeds: Vec<f64> = scene.velocity[joint]
+                .iter()
+                .map(|v| v.abs() / fastest)
+                .filter(|speed| *speed > STILL)
+                .collect();
             let lines = (0..WAVES).flat_map(|column| line(&speeds, column));
             let shape: Vec<f64> = std::iter::once(fastest).chain(lines).collect();
             TorqueForm::at_joint(&UnnamedFriction, joint, WAVES).shaped(&shape)
@@ -38,9 +43,18 @@ impl TorqueCause for UnnamedFriction {
         (0..scene.joints()).map(form).collect()
     }
 
-    fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, column: usize, out: &mut [f64]) {
+    fn write(
+        &self,
+        form: &TorqueForm,
+        scene: &DynamicScene,
+        _joint: usize,
+        column: usize,
+        out: &mut [f64],
+    ) {
         let velocity = &scene.velocity[form.joint()];
-        fill(out, |row| scene.direction(form.joint(), row) * bent(form, column, velocity[row]));
+        fill(out, |row| {
+            scene.direction(form.joint(), row) * bent(form, column, velocity[row])
+        });
     }
 
     fn friction(&self, form: &TorqueForm, column: usize, velocity: f64, sign: f64) -> Option<f64> {
@@ -67,13 +81,20 @@ impl TorqueCause for UnnamedFriction {
 /// A wave of a speed, as a share of the fastest.
 fn wave(column: usize, speed: f64) -> f64 {
     let phase = PI * [1.0, 2.0][column / 2] * speed;
-    if column.is_multiple_of(2) { phase.sin() } else { phase.cos() }
+    if column.is_multiple_of(2) {
+        phase.sin()
+    } else {
+        phase.cos()
+    }
 }
 
 /// A wave at a velocity without its line. Faster than any row it stays what it was at the fastest.
 fn bent(form: &TorqueForm, column: usize, velocity: f64) -> f64 {
     let speed = (velocity.abs() / form.shape[0]).min(1.0);
-    let line = form.shape.get(1 + 2 * column..3 + 2 * column).map_or(0.0, |line| line[0] + line[1] * speed);
+    let line = form
+        .shape
+        .get(1 + 2 * column..3 + 2 * column)
+        .map_or(0.0, |line| line[0] + line[1] * speed);
     wave(column, speed) - line
 }
 
@@ -85,5 +106,7 @@ fn line(speeds: &[f64], column: usize) -> [f64; 2] {
         normal += row * row.transpose();
         right += row * wave(column, *speed);
     }
-    normal.cholesky().map_or([0.0; 2], |factor| factor.solve(&right).into())
+    normal
+        .cholesky()
+        .map_or([0.0; 2], |factor| factor.solve(&right).into())
 }

@@ -22,7 +22,12 @@ impl TorqueCause for UnnamedHysteresis {
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
         let shapes = TRAVELS.map(|travel| [travel, SPAN[0], SPAN[1]]);
-        at_each_joint_with(&UnnamedHysteresis, scene, 1, &shapes.each_ref().map(|shape| &shape[..]))
+        at_each_joint_with(
+            &UnnamedHysteresis,
+            scene,
+            1,
+            &shapes.each_ref().map(|shape| &shape[..]),
+        )
     }
 
     fn spans(&self, form: &TorqueForm) -> Vec<ShapeSpan> {
@@ -37,7 +42,14 @@ impl TorqueCause for UnnamedHysteresis {
         }]
     }
 
-    fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
+    fn write(
+        &self,
+        form: &TorqueForm,
+        scene: &DynamicScene,
+        _joint: usize,
+        _column: usize,
+        out: &mut [f64],
+    ) {
         let (position, travel) = (&scene.position[form.joint()], form.shape[0]);
         for stretch in &scene.stretches {
             let (mut kept, mut before) = (0.0, position[stretch.start]);
@@ -58,6 +70,8 @@ impl TorqueCause for UnnamedHysteresis {
 
     fn statement(&self, form: &TorqueForm, _fitted: &[FittedNumber]) -> String {
         let [place, travel] = [form.place.to_string(), format!("{:.3}", form.shape[0])];
-        format!("something without a name drags at {place} and turns over only after a travel of {travel} rad")
+        format!(
+            "something without a name drags at {place} and turns over only after a travel of {travel} rad"
+        )
     }
 }

@@ -21,16 +21,37 @@ impl TorqueCause for Viscous {
 
     fn spans(&self, form: &TorqueForm) -> Vec<ShapeSpan> {
         let [least, most] = EXPONENTS;
-        let span = ShapeSpan { name: "exponent", unit: "1", index: 0, least, most, by_ratio: true, usual: Some(1.0) };
+        let span = ShapeSpan {
+            name: "exponent",
+            unit: "1",
+            index: 0,
+            least,
+            most,
+            by_ratio: true,
+            usual: Some(1.0),
+        };
         form.shape.first().map(|_| span).into_iter().collect()
     }
 
-    fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
+    fn write(
+        &self,
+        form: &TorqueForm,
+        scene: &DynamicScene,
+        _joint: usize,
+        _column: usize,
+        out: &mut [f64],
+    ) {
         let joint = form.joint();
         fill(out, |row| power(form, scene.velocity[joint][row]));
     }
 
-    fn friction(&self, form: &TorqueForm, _column: usize, velocity: f64, _sign: f64) -> Option<f64> {
+    fn friction(
+        &self,
+        form: &TorqueForm,
+        _column: usize,
+        velocity: f64,
+        _sign: f64,
+    ) -> Option<f64> {
         Some(power(form, velocity))
     }
 
@@ -39,7 +60,9 @@ impl TorqueCause for Viscous {
         match exponent(form) {
             None => format!("{place} has viscous friction of {size:.3} Nm s/rad"),
             Some(exponent) => {
-                format!("{place} has viscous friction of {size:.3} Nm s/rad, which grows with the power {exponent:.2} of speed")
+                format!(
+                    "{place} has viscous friction of {size:.3} Nm s/rad, which grows with the power {exponent:.2} of speed"
+                )
             }
         }
     }
@@ -52,15 +75,23 @@ pub(in super::super) fn line_of_power(exponent: f64, fastest: f64) -> [f64; 2] {
     let (mean, moment) = (1.0 / (exponent + 1.0), 1.0 / (exponent + 2.0));
     let slope = 12.0 * (moment - 0.5 * mean);
     let scale = fastest.powf(exponent);
-    [scale * (mean - 0.5 * slope), scale * slope / fastest.max(f64::MIN_POSITIVE)]
+    [
+        scale * (mean - 0.5 * slope),
+        scale * slope / fastest.max(f64::MIN_POSITIVE),
+    ]
 }
 
 /// Where it is not 1.
 fn exponent(form: &TorqueForm) -> Option<f64> {
-    form.shape.first().copied().filter(|exponent| *exponent != 1.0)
+    form.shape
+        .first()
+        .copied()
+        .filter(|exponent| *exponent != 1.0)
 }
 
 /// The power of a velocity, with its sign.
 fn power(form: &TorqueForm, velocity: f64) -> f64 {
-    exponent(form).map_or(velocity, |exponent| velocity.signum() * velocity.abs().powf(exponent))
+    exponent(form).map_or(velocity, |exponent| {
+        velocity.signum() * velocity.abs().powf(exponent)
+    })
 }

@@ -26,11 +26,18 @@ impl TorqueCause for Warmup {
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
         let longest = LONGEST * scene.duration();
         let times: Vec<f64> = TIMES.into_iter().filter(|time| *time <= longest).collect();
-        let rich = times.iter().copied().rfind(|time| *time <= USUAL.max(longest / 3.0));
+        let rich = times
+            .iter()
+            .copied()
+            .rfind(|time| *time <= USUAL.max(longest / 3.0));
         let of = |joint| {
             let form = move |time: &f64| {
                 let with = [usize::from(Some(*time) == rich), 0];
-                TorqueForm { with, ..TorqueForm::at_joint(&Warmup, joint, 2).shaped(&[*time, END * scene.duration()]) }
+                TorqueForm {
+                    with,
+                    ..TorqueForm::at_joint(&Warmup, joint, 2)
+                        .shaped(&[*time, END * scene.duration()])
+                }
             };
             times.iter().map(form).collect::<Vec<_>>()
         };
@@ -42,10 +49,25 @@ impl TorqueCause for Warmup {
     }
 
     fn spans(&self, form: &TorqueForm) -> Vec<ShapeSpan> {
-        vec![ShapeSpan { name: "time", unit: "s", index: 0, least: 1.0, most: form.shape[1], by_ratio: true, usual: None }]
+        vec![ShapeSpan {
+            name: "time",
+            unit: "s",
+            index: 0,
+            least: 1.0,
+            most: form.shape[1],
+            by_ratio: true,
+            usual: None,
+        }]
     }
 
-    fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, column: usize, out: &mut [f64]) {
+    fn write(
+        &self,
+        form: &TorqueForm,
+        scene: &DynamicScene,
+        _joint: usize,
+        column: usize,
+        out: &mut [f64],
+    ) {
         let velocity = &scene.velocity[form.joint()];
         let decay = |row: usize| (-scene.time[row] / form.shape[0]).exp();
         match column {
@@ -56,6 +78,9 @@ impl TorqueCause for Warmup {
 
     fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
         let [viscous, coulomb, time] = [fitted[0].value, fitted[1].value, form.shape[0]];
-        format!("friction of {} begins {coulomb:.3} Nm and {viscous:.3} Nm s/rad higher and falls over {time:.1} s", form.place)
+        format!(
+            "friction of {} begins {coulomb:.3} Nm and {viscous:.3} Nm s/rad higher and falls over {time:.1} s",
+            form.place
+        )
     }
 }

@@ -9,7 +9,9 @@ use crate::dynamics::types::TorqueParameter;
 pub(super) struct WristCoupling;
 
 /// k of neighbouring joints of a wrist; of other pairs only gears of one to one are tried.
-const RATIOS: [f64; 14] = [-1.4, -1.2, -1.0, -0.8, -0.6, -0.4, -0.2, 0.2, 0.4, 0.6, 0.8, 1.0, 1.2, 1.4];
+const RATIOS: [f64; 14] = [
+    -1.4, -1.2, -1.0, -0.8, -0.6, -0.4, -0.2, 0.2, 0.4, 0.6, 0.8, 1.0, 1.2, 1.4,
+];
 const PLAIN_RATIOS: [f64; 2] = [-1.0, 1.0];
 /// Ratios that stand in the rich model.
 const USUAL: [f64; 2] = [-0.6, 1.0];
@@ -37,7 +39,10 @@ impl TorqueCause for WristCoupling {
                 }
                 for ratio in ratios {
                     let form = TorqueForm::at_joint(&WristCoupling, moved, 2).shaped(&[*ratio]);
-                    forms.push(TorqueForm { with: [by, usize::from(near)], ..form });
+                    forms.push(TorqueForm {
+                        with: [by, usize::from(near)],
+                        ..form
+                    });
                 }
             }
         }
@@ -62,20 +67,44 @@ impl TorqueCause for WristCoupling {
     }
 
     fn spans(&self, form: &TorqueForm) -> Vec<ShapeSpan> {
-        let [least, most] = if form.shape[0] > 0.0 { [0.05, 2.0] } else { [-2.0, -0.05] };
-        vec![ShapeSpan { name: "ratio", unit: "1", index: 0, least, most, by_ratio: false, usual: None }]
+        let [least, most] = if form.shape[0] > 0.0 {
+            [0.05, 2.0]
+        } else {
+            [-2.0, -0.05]
+        };
+        vec![ShapeSpan {
+            name: "ratio",
+            unit: "1",
+            index: 0,
+            least,
+            most,
+            by_ratio: false,
+            usual: None,
+        }]
     }
 
     fn cell(&self, form: &TorqueForm) -> [usize; 2] {
         form.with
     }
 
-    fn write(&self, form: &TorqueForm, scene: &DynamicScene, joint: usize, column: usize, out: &mut [f64]) {
+    fn write(
+        &self,
+        form: &TorqueForm,
+        scene: &DynamicScene,
+        joint: usize,
+        column: usize,
+        out: &mut [f64],
+    ) {
         let (moved, by, ratio) = (form.joint(), form.with[0], form.shape[0]);
         let share = if joint == moved { 1.0 } else { ratio };
         for (row, value) in out.iter_mut().enumerate() {
             let together = scene.velocity[moved][row] + ratio * scene.velocity[by][row];
-            *value = share * if column == 0 { together } else { scene.sign(together) };
+            *value = share
+                * if column == 0 {
+                    together
+                } else {
+                    scene.sign(together)
+                };
         }
     }
 

@@ -39,37 +39,56 @@ pub(super) fn base_of(arm: &DynamicArm, basis: &SeriesBasis, series: &JointSerie
     let recording = TorqueRecording::of_motion(n, motion.time, motion.position);
     let clock = RecordingClock::even(&recording.time);
     let scene = DynamicScene::new(arm, &recording, &clock, CUTOFF, true);
-    base_parameters(&ReducedRegressor::of(&scene, &Reduction::new(&clock, CUTOFF)))
+    base_parameters(&ReducedRegressor::of(
+        &scene,
+        &Reduction::new(&clock, CUTOFF),
+    ))
 }
 
 impl Information<'_> {
     /// The information of some rows of a motion, each standing for `share` recorded ones.
-    pub fn of(&self, basis: &SeriesBasis, series: &JointSeries, rows: &[usize], share: f64) -> MotionInformation {
+    pub fn of(
+        &self,
+        basis: &SeriesBasis,
+        series: &JointSeries,
+        rows: &[usize],
+        share: f64,
+    ) -> MotionInformation {
         let (n, masses) = (self.arm.joints(), self.base.len());
         let width = masses + 2 * n;
         let mut place = vec![None; INERTIAL_NUMBERS * n];
-        self.base.iter().enumerate().for_each(|(column, number)| place[*number] = Some(column));
+        self.base
+            .iter()
+            .enumerate()
+            .for_each(|(column, number)| place[*number] = Some(column));
         let mut regressor = DMatrix::<f64>::zeros(n * rows.len(), width);
         let mut dynamics = InverseDynamics::new(self.arm);
         let mut motion = vec![0.0; 3 * n];
         for (count, row) in rows.iter().enumerate() {
             basis.row_into(series, *row, &mut motion);
             let first = n * count;
-            dynamics.regressor(split(&motion, n), &self.arm.gravity, |joint, link, numbers| {
-                for (number, value) in numbers.iter().enumerate() {
-                    if let Some(column) = place[INERTIAL_NUMBERS * link + number] {
-                        regressor[(first + joint, column)] = value / self.noise[joint];
+            dynamics.regressor(
+                split(&motion, n),
+                &self.arm.gravity,
+                |joint, link, numbers| {
+                    for (number, value) in numbers.iter().enumerate() {
+                        if let Some(column) = place[INERTIAL_NUMBERS * link + number] {
+                            regressor[(first + joint, column)] = value / self.noise[joint];
+                        }
                     }
-                }
-            });
+                },
+            );
             for joint in 0..n {
                 let velocity = motion[n + joint];
                 regressor[(first + joint, masses + 2 * joint)] = velocity / self.noise[joint];
-                regressor[(first + joint, masses + 2 * joint + 1)] = (velocity / SIGN_WIDTH).tanh() / self.noise[joint];
+                regressor[(first + joint, masses + 2 * joint + 1)] =
+                    (velocity / SIGN_WIDTH).tanh() / self.noise[joint];
             }
         }
         let whole = regressor.tr_mul(&regressor) * share;
-        let scale = DVector::from_fn(width, |column, _| whole[(column, column)].sqrt().max(f64::MIN_POSITIVE));
+        let scale = DVector::from_fn(width, |column, _| {
+            whole[(column, column)].sqrt().max(f64::MIN_POSITIVE)
+        });
         let scaled = DMatrix::from_fn(width, width, |a, b| {
             let value = whole[(a, b)] / (scale[a] * scale[b]);
             if a == b { value + FLOOR } else { value }
@@ -83,20 +102,39 @@ impl MotionInformation {
     pub fn log_determinant(&self) -> f64 {
         let scales: f64 = self.scale.iter().map(|scale| 2.0 * scale.ln()).sum();
         let factor = self.scaled.clone().cholesky();
-        factor
-            .map_or(f64::NEG_INFINITY, |factor| scales + 2.0 * factor.l().diagonal().iter().map(|value| value.ln()).sum::<f64>())
+        factor.map_or(f64::NEG_INFINITY, |factor| {
+            scales
+                + 2.0
+                    * factor
+                        .l()
+                        .diagonal()
+                        .iter()
+                        .map(|value| value.ln())
+                        .sum::<f64>()
+        })
     }
 
     /// How many times other parameters raise the variance of each.
     pub fn inflations(&self) -> Vec<f64> {
-        let inverse = self.scaled.clone().cholesky().map(|factor| factor.inverse());
+        let inverse = self
+            .scaled
+            .clone()
+            .cholesky()
+            .map(|factor| factor.inverse());
         let width = self.scale.len();
-        inverse.map_or_else(|| vec![f64::INFINITY; width], |inverse| inverse.diagonal().iter().copied().collect())
+        inverse.map_or_else(
+            || vec![f64::INFINITY; width],
+            |inverse| inverse.diagonal().iter().copied().collect(),
+        )
     }
 
     /// One standard deviation of each parameter.
     pub fn sigmas(&self) -> Vec<f64> {
-        self.inflations().iter().zip(&self.scale).map(|(inflation, scale)| inflation.sqrt() / scale).collect()
+        self.inflations()
+            .iter()
+            .zip(&self.scale)
+            .map(|(inflation, scale)| inflation.sqrt() / scale)
+            .collect()
     }
 
     /// Condition of the regressor with columns of one length.

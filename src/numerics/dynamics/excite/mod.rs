@@ -104,18 +104,40 @@ pub fn excite(arm: &DynamicArm, request: &ExciteRequest) -> Result<ExcitingMotio
     let coarse = SeriesBasis::new(request.seconds, GRID, request.harmonics);
     let width = 1 + 2 * request.harmonics;
     let mut dice = ChaCha8Rng::seed_from_u64(request.seed);
-    let mut random = || (0..n * width).map(|_| dice.random_range(-1.0..1.0)).collect::<Vec<f64>>();
+    let mut random = || {
+        (0..n * width)
+            .map(|_| dice.random_range(-1.0..1.0))
+            .collect::<Vec<f64>>()
+    };
     let draws: Vec<Vec<f64>> = (0..RANDOM).map(|_| random()).collect();
     let base = base_of(arm, &coarse, &scaled(&coarse, &draws[0], &limits));
-    let information = Information { arm, base: &base, noise: &request.noise };
+    let information = Information {
+        arm,
+        base: &base,
+        noise: &request.noise,
+    };
     let rows = coarse.spread(COUNTED);
     let share = request.rate * request.seconds / rows.len() as f64;
     let of = |x: &[f64]| information.of(&coarse, &scaled(&coarse, x, &limits), &rows, share);
     let bounds = SearchBox::cube(n * width, -1.0, 1.0);
-    let budget =
-        Budget { generations: request.generations, evaluations: None, target: None, seed: request.seed, jobs: request.jobs };
+    let budget = Budget {
+        generations: request.generations,
+        evaluations: None,
+        target: None,
+        seed: request.seed,
+        jobs: request.jobs,
+    };
     let objective = |x: &[f64]| -of(x).log_determinant();
-    let found = minimise(&ParticleSwarm { particles: 40, ..ParticleSwarm::default() }, &objective, &bounds, &budget, |_, _| ());
+    let found = minimise(
+        &ParticleSwarm {
+            particles: 40,
+            ..ParticleSwarm::default()
+        },
+        &objective,
+        &bounds,
+        &budget,
+        |_, _| (),
+    );
     let best = of(&found.position);
     let others: Vec<_> = draws.iter().map(|x| of(x)).collect();
     let fine = SeriesBasis::new(request.seconds, request.rate, request.harmonics);
@@ -123,7 +145,8 @@ pub fn excite(arm: &DynamicArm, request: &ExciteRequest) -> Result<ExcitingMotio
     let sigmas = best.sigmas();
     let inflations = best.inflations();
     let all: Vec<Vec<f64>> = others.iter().map(|other| other.sigmas()).collect();
-    let median = |values: Vec<f64>| crate::statistics::nearest(&mut values.clone(), 0.5).unwrap_or(f64::NAN);
+    let median =
+        |values: Vec<f64>| crate::statistics::nearest(&mut values.clone(), 0.5).unwrap_or(f64::NAN);
     let parameters: Vec<ExpectedSigma> = (names(&base, n).into_iter().enumerate())
         .map(|(place, (name, unit))| ExpectedSigma {
             name,
@@ -133,20 +156,41 @@ pub fn excite(arm: &DynamicArm, request: &ExciteRequest) -> Result<ExcitingMotio
             inflation: inflations[place],
         })
         .collect();
-    let gains = others.iter().map(|other| (best.log_determinant() - other.log_determinant()) / (2.0 * parameters.len() as f64));
+    let gains = others.iter().map(|other| {
+        (best.log_determinant() - other.log_determinant()) / (2.0 * parameters.len() as f64)
+    });
     let gain = median(gains.collect()).exp();
-    let condition = [best.condition(), median(others.iter().map(|other| other.condition()).collect())];
+    let condition = [
+        best.condition(),
+        median(others.iter().map(|other| other.condition()).collect()),
+    ];
     let unseen = unseen(&motion.position, n, &parameters);
     let (inertials, time) = (10 * n, motion.time);
-    let (position, velocity, acceleration) = (motion.position, motion.velocity, motion.acceleration);
-    Ok(ExcitingMotion { time, position, velocity, acceleration, parameters, condition, gain, inertials, unseen })
+    let (position, velocity, acceleration) =
+        (motion.position, motion.velocity, motion.acceleration);
+    Ok(ExcitingMotion {
+        time,
+        position,
+        velocity,
+        acceleration,
+        parameters,
+        condition,
+        gain,
+        inertials,
+        unseen,
+    })
 }
 
 fn names(base: &[usize], joints: usize) -> Vec<(String, &'static str)> {
-    let masses = base.iter().map(|number| (inertial_name(*number), inertial_unit(*number)));
+    let masses = base
+        .iter()
+        .map(|number| (inertial_name(*number), inertial_unit(*number)));
     let friction = (1..=joints).flat_map(|joint| {
         let viscous = (format!("viscous_friction.j{joint}.viscous"), "Nm s/rad");
-        [viscous, (format!("coulomb_friction.j{joint}.coulomb"), "Nm")]
+        [
+            viscous,
+            (format!("coulomb_friction.j{joint}.coulomb"), "Nm"),
+        ]
     });
     masses.chain(friction).collect()
 }
@@ -154,26 +198,53 @@ fn names(base: &[usize], joints: usize) -> Vec<(String, &'static str)> {
 fn check(arm: &DynamicArm, request: &ExciteRequest) -> Result<()> {
     let n = arm.joints();
     let mut faults = Vec::new();
-    let lists = [("speed", &request.speed), ("acceleration", &request.acceleration), ("noise", &request.noise)];
+    let lists = [
+        ("speed", &request.speed),
+        ("acceleration", &request.acceleration),
+        ("noise", &request.noise),
+    ];
     for (name, list) in lists {
-        if list.len() != n || list.iter().any(|value| !(value.is_finite() && *value > 0.0)) {
-            faults.push(Fault::new(name, format!("expected {n} numbers above 0, one a joint")));
+        if list.len() != n
+            || list
+                .iter()
+                .any(|value| !(value.is_finite() && *value > 0.0))
+        {
+            faults.push(Fault::new(
+                name,
+                format!("expected {n} numbers above 0, one a joint"),
+            ));
         }
     }
     let empty = |[least, most]: &[f64; 2]| !(least.is_finite() && most.is_finite() && least < most);
     if request.range.len() != n || request.range.iter().any(empty) {
-        faults.push(Fault::new("range", format!("expected {n} finite ranges, one a joint")));
+        faults.push(Fault::new(
+            "range",
+            format!("expected {n} finite ranges, one a joint"),
+        ));
     }
     if !(4.0..=600.0).contains(&request.seconds) {
-        faults.push(Fault::new("seconds", format!("{}; allowed: 4 to 600", request.seconds)));
+        faults.push(Fault::new(
+            "seconds",
+            format!("{}; allowed: 4 to 600", request.seconds),
+        ));
     }
     if !(20.0..=5000.0).contains(&request.rate) {
-        faults.push(Fault::new("rate", format!("{}; allowed: 20 to 5000 Hz", request.rate)));
+        faults.push(Fault::new(
+            "rate",
+            format!("{}; allowed: 20 to 5000 Hz", request.rate),
+        ));
     }
     if !(2..=12).contains(&request.harmonics) {
-        faults.push(Fault::new("harmonics", format!("{}; allowed: 2 to 12", request.harmonics)));
+        faults.push(Fault::new(
+            "harmonics",
+            format!("{}; allowed: 2 to 12", request.harmonics),
+        ));
     }
-    if faults.is_empty() { Ok(()) } else { Err(Error::Spec(faults)) }
+    if faults.is_empty() {
+        Ok(())
+    } else {
+        Err(Error::Spec(faults))
+    }
 }
 
 fn unseen(position: &[f64], n: usize, parameters: &[ExpectedSigma]) -> Vec<String> {
@@ -192,7 +263,10 @@ fn unseen(position: &[f64], n: usize, parameters: &[ExpectedSigma]) -> Vec<Strin
         }
     }
     for one in parameters.iter().filter(|one| one.inflation > INFLATED) {
-        sentences.push(format!("{}: hardly apart from other parameters (variance raised {:.0} times)", one.name, one.inflation));
+        sentences.push(format!(
+            "{}: hardly apart from other parameters (variance raised {:.0} times)",
+            one.name, one.inflation
+        ));
     }
     sentences
 }

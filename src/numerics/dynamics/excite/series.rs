@@ -44,7 +44,9 @@ impl SeriesBasis {
     /// Over `seconds` with `rate` rows a second.
     pub fn new(seconds: f64, rate: f64, harmonics: usize) -> Self {
         let slowest = TAU * (seconds / PERIOD).ceil() / seconds;
-        let time: Vec<f64> = (0..=(seconds * rate).round() as usize).map(|row| row as f64 / rate).collect();
+        let time: Vec<f64> = (0..=(seconds * rate).round() as usize)
+            .map(|row| row as f64 / rate)
+            .collect();
         let (mut position, mut velocity, mut acceleration) = (Vec::new(), Vec::new(), Vec::new());
         for time in &time {
             let [gate, rise, bend] = gate(*time, seconds);
@@ -58,17 +60,29 @@ impl SeriesBasis {
                 }
             }
         }
-        Self { time, terms: 2 * harmonics, position, velocity, acceleration }
+        Self {
+            time,
+            terms: 2 * harmonics,
+            position,
+            velocity,
+            acceleration,
+        }
     }
 
     /// So many rows, evenly spread, the first and the last apart.
     pub fn spread(&self, count: usize) -> Vec<usize> {
         let count = count.min(self.time.len() - 2).max(1);
-        (0..count).map(|one| 1 + (one * (self.time.len() - 2)) / count).collect()
+        (0..count)
+            .map(|one| 1 + (one * (self.time.len() - 2)) / count)
+            .collect()
     }
 
     fn sum(&self, basis: &[f64], row: usize, coefficients: &[f64]) -> f64 {
-        basis[self.terms * row..self.terms * (row + 1)].iter().zip(coefficients).map(|(a, b)| a * b).sum()
+        basis[self.terms * row..self.terms * (row + 1)]
+            .iter()
+            .zip(coefficients)
+            .map(|(a, b)| a * b)
+            .sum()
     }
 
     /// Positions, velocities and accelerations (3 n) of a row.
@@ -84,8 +98,12 @@ impl SeriesBasis {
     /// All rows.
     pub fn motion(&self, series: &JointSeries) -> SeriesMotion {
         let n = series.0.len();
-        let mut all =
-            SeriesMotion { time: self.time.clone(), position: Vec::new(), velocity: Vec::new(), acceleration: Vec::new() };
+        let mut all = SeriesMotion {
+            time: self.time.clone(),
+            position: Vec::new(),
+            velocity: Vec::new(),
+            acceleration: Vec::new(),
+        };
         let mut motion = vec![0.0; 3 * n];
         for row in 0..self.time.len() {
             self.row_into(series, row, &mut motion);
@@ -103,8 +121,13 @@ pub(super) fn scaled(basis: &SeriesBasis, x: &[f64], limits: &[JointLimits]) -> 
     let width = 1 + basis.terms;
     let of = |(own, limit): (&[f64], &JointLimits)| {
         // Equal speeds of all harmonics are likelier than equal amplitudes.
-        let raw: Vec<f64> = own[1..].iter().enumerate().map(|(term, value)| value / (1 + term / 2) as f64).collect();
-        let (mut least, mut greatest, mut fastest, mut hardest) = (0.0_f64, 0.0_f64, 1e-12_f64, 1e-12_f64);
+        let raw: Vec<f64> = own[1..]
+            .iter()
+            .enumerate()
+            .map(|(term, value)| value / (1 + term / 2) as f64)
+            .collect();
+        let (mut least, mut greatest, mut fastest, mut hardest) =
+            (0.0_f64, 0.0_f64, 1e-12_f64, 1e-12_f64);
         for row in 0..basis.time.len() {
             let position = basis.sum(&basis.position, row, &raw);
             (least, greatest) = (least.min(position), greatest.max(position));
@@ -113,8 +136,14 @@ pub(super) fn scaled(basis: &SeriesBasis, x: &[f64], limits: &[JointLimits]) -> 
         }
         let wide = limit.range[1] - limit.range[0];
         let room = wide / (greatest - least).max(1e-12);
-        let scale = USED * room.min(limit.speed / fastest).min(limit.acceleration / hardest);
-        let (lowest, highest) = (limit.range[0] - scale * least, limit.range[1] - scale * greatest);
+        let scale = USED
+            * room
+                .min(limit.speed / fastest)
+                .min(limit.acceleration / hardest);
+        let (lowest, highest) = (
+            limit.range[0] - scale * least,
+            limit.range[1] - scale * greatest,
+        );
         let margin = 0.5 * (1.0 - USED) * (highest - lowest);
         let middle = lowest + margin + 0.5 * (own[0] + 1.0) * (highest - lowest - 2.0 * margin);
         (middle, raw.iter().map(|value| scale * value).collect())
@@ -124,7 +153,11 @@ pub(super) fn scaled(basis: &SeriesBasis, x: &[f64], limits: &[JointLimits]) -> 
 
 /// 0 at both ends, 1 between, with its derivatives.
 fn gate(time: f64, seconds: f64) -> [f64; 3] {
-    let (near, sign) = if time < 0.5 * seconds { (time, 1.0) } else { (seconds - time, -1.0) };
+    let (near, sign) = if time < 0.5 * seconds {
+        (time, 1.0)
+    } else {
+        (seconds - time, -1.0)
+    };
     let x = (near / RAMP).clamp(0.0, 1.0);
     let rise = 30.0 * x * x * (x * (x - 2.0) + 1.0) / RAMP;
     let bend = 60.0 * x * (x * (2.0 * x - 3.0) + 1.0) / (RAMP * RAMP);
@@ -137,7 +170,11 @@ mod tests {
 
     #[test]
     fn a_series_holds_its_limits_meets_one_and_starts_and_stops_at_rest() {
-        let limits = JointLimits { range: [-0.5, 1.5], speed: 0.8, acceleration: 2.0 };
+        let limits = JointLimits {
+            range: [-0.5, 1.5],
+            speed: 0.8,
+            acceleration: 2.0,
+        };
         let x: Vec<f64> = (0..11).map(|k| (1.7 * f64::from(k)).sin()).collect();
         let basis = SeriesBasis::new(20.0, 100.0, 5);
         let motion = basis.motion(&scaled(&basis, &x, &[limits]));
@@ -145,7 +182,10 @@ mod tests {
         let (speed, acceleration) = (most(&motion.velocity), most(&motion.acceleration));
         assert!(motion.position.iter().all(|q| (-0.5..=1.5).contains(q)));
         assert!(speed <= 0.8 && acceleration <= 2.0);
-        assert!(speed > 0.97 * 0.8 || acceleration > 0.97 * 2.0, "{speed} {acceleration}");
+        assert!(
+            speed > 0.97 * 0.8 || acceleration > 0.97 * 2.0,
+            "{speed} {acceleration}"
+        );
         for end in [0, motion.time.len() - 1] {
             assert!(motion.velocity[end].abs() < 1e-9 && motion.acceleration[end].abs() < 1e-9);
         }

@@ -31,16 +31,28 @@ impl DeclaredCause {
         let pattern = DeclaredPattern::of(declaration)?;
         let content = serde_json::to_string(declaration).expect("numbers and texts serialise");
         let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
-        Ok(kept.entry(content).or_insert_with(|| Box::leak(Box::new(Self::new(declaration.clone(), pattern)))))
+        Ok(kept
+            .entry(content)
+            .or_insert_with(|| Box::leak(Box::new(Self::new(declaration.clone(), pattern)))))
     }
 
     fn new(declaration: EffectDeclaration, pattern: DeclaredPattern) -> Self {
         let kept = |text: String| -> &'static str { Box::leak(text.into_boxed_str()) };
-        let stated = |text: &Option<String>, otherwise: &str| kept(text.clone().unwrap_or_else(|| otherwise.into()));
-        let columns: BTreeSet<&str> =
-            pattern.laws.iter().flat_map(|law| law.quantities()).filter_map(|quantity| quantity.needs()).collect();
+        let stated = |text: &Option<String>, otherwise: &str| {
+            kept(text.clone().unwrap_or_else(|| otherwise.into()))
+        };
+        let columns: BTreeSet<&str> = pattern
+            .laws
+            .iter()
+            .flat_map(|law| law.quantities())
+            .filter_map(|quantity| quantity.needs())
+            .collect();
         let columns: Vec<&str> = columns.into_iter().collect();
-        let needs = if columns.is_empty() { "-".to_string() } else { columns.join(", ") };
+        let needs = if columns.is_empty() {
+            "-".to_string()
+        } else {
+            columns.join(", ")
+        };
         let size = match (declaration.size, &declaration.unit) {
             (Some(size), Some(unit)) => format!("{size} {unit}"),
             (Some(size), None) => size.to_string(),
@@ -55,8 +67,15 @@ impl DeclaredCause {
                 confounded: stated(&declaration.confounded, "-"),
                 needs: stated(&declaration.needs, &needs),
                 of_the_measurement: pattern.seat == Seat::Fixed(Place::Tracker),
-                measure: declaration.advice.clone().map(|advice| Measure { rank: RANK, advice: kept(advice) }),
-                motion: Some(OwnMotion { propose: |_| Vec::new(), sentence: Some(sentence), read: undeclared }),
+                measure: declaration.advice.clone().map(|advice| Measure {
+                    rank: RANK,
+                    advice: kept(advice),
+                }),
+                motion: Some(OwnMotion {
+                    propose: |_| Vec::new(),
+                    sentence: Some(sentence),
+                    read: undeclared,
+                }),
                 ..Cause::PLAIN
             })),
             declaration,
@@ -92,33 +111,60 @@ impl DeclaredCause {
 
 /// What a mechanic is told of a finding that a declared effect is.
 fn sentence(summary: &Summary) -> String {
-    let Some(own) = summary.forms.iter().find_map(|form| form.declared()).map(|form| form.declaration()) else {
+    let Some(own) = summary
+        .forms
+        .iter()
+        .find_map(|form| form.declared())
+        .map(|form| form.declaration())
+    else {
         return String::new();
     };
-    let per = own.declaration.per.as_ref().map(|per| format!(" per {per}")).unwrap_or_default();
+    let per = own
+        .declaration
+        .per
+        .as_ref()
+        .map(|per| format!(" per {per}"))
+        .unwrap_or_default();
     let numbers: Vec<String> = (summary.parameters.iter())
         .map(|number| {
-            let unit = if number.unit == "1" { String::new() } else { format!(" {}", number.unit) };
+            let unit = if number.unit == "1" {
+                String::new()
+            } else {
+                format!(" {}", number.unit)
+            };
             format!("{}{unit}{per}", figure(number.value, 1))
         })
         .collect();
-    let shape: Vec<(String, f64)> = summary.forms.iter().flat_map(|form| form.shape_numbers()).collect();
+    let shape: Vec<(String, f64)> = summary
+        .forms
+        .iter()
+        .flat_map(|form| form.shape_numbers())
+        .collect();
     let known = |word: &str| match word {
         "place" => summary.place.to_string(),
         "value" => numbers.first().cloned().unwrap_or_default(),
         "values" => numbers.join(", "),
-        other => shape.iter().find(|(name, _)| name == other).map_or_else(String::new, |(_, value)| figure(*value, 2)),
+        other => shape
+            .iter()
+            .find(|(name, _)| name == other)
+            .map_or_else(String::new, |(_, value)| figure(*value, 2)),
     };
     let said = match &own.declaration.sentence {
         Some(sentence) => filled(sentence, &known),
         None => {
             let laws = own.about.formula;
-            format!("{} errs as {} says, {laws}: {}", summary.place, own.about.name, known("values"))
+            format!(
+                "{} errs as {} says, {laws}: {}",
+                summary.place,
+                own.about.name,
+                known("values")
+            )
         }
     };
     let ends = |(name, value): &(String, f64)| {
         let range = own.declaration.shape.get(name)?;
-        (*value <= range.from || *value >= range.to).then(|| format!("; {name} ends at its bound {value}"))
+        (*value <= range.from || *value >= range.to)
+            .then(|| format!("; {name} ends at its bound {value}"))
     };
     let ends: Vec<String> = shape.iter().filter_map(ends).collect();
     format!("{said}{}", ends.concat())
@@ -126,5 +172,7 @@ fn sentence(summary: &Summary) -> String {
 
 /// A form of a declared effect is read with its declaration, not by its name.
 fn undeclared(_: &serde_json::Value) -> serde_json::Result<Form> {
-    Err(serde_json::Error::custom("a declared effect without its declaration"))
+    Err(serde_json::Error::custom(
+        "a declared effect without its declaration",
+    ))
 }

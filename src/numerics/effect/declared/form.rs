@@ -4,7 +4,10 @@ use super::cause::DeclaredCause;
 use super::declaration::{EffectDeclaration, ShapeRange};
 use super::formula::Formula;
 use super::quantity::{QuantityKind, RowQuantity};
-use crate::effect::{ArmState, Cause, Deflection, Form, Hypothesis, Motion, NumberSpec, Place, Placed, Survey, Variable};
+use crate::effect::{
+    ArmState, Cause, Deflection, Form, Hypothesis, Motion, NumberSpec, Place, Placed, Survey,
+    Variable,
+};
 use crate::robot::{Measurements, RobotModel};
 use serde::de::Error as _;
 use serde::{Deserialize, Serialize};
@@ -35,14 +38,28 @@ impl DeclaredForm {
         let starts = pattern.starts();
         // Shape numbers are fitted, too: as much as so many numbers in the criterion.
         let values = 3.0 * survey.rows.len() as f64;
-        let tried = starts.len().max(libm::pow(values, 0.5 * pattern.shape.len() as f64) as usize);
+        let tried = starts
+            .len()
+            .max(libm::pow(values, 0.5 * pattern.shape.len() as f64) as usize);
         let mut out = Vec::new();
         for motion in pattern.motions(survey) {
             for shape in &starts {
-                let form = Self { cause, motion, shape: shape.clone() };
-                if form.quantities().iter().all(|quantity| form.variable(quantity, survey.joints()).is_some()) {
+                let form = Self {
+                    cause,
+                    motion,
+                    shape: shape.clone(),
+                };
+                if form
+                    .quantities()
+                    .iter()
+                    .all(|quantity| form.variable(quantity, survey.joints()).is_some())
+                {
                     let hypothesis = Hypothesis::new(form, tried);
-                    out.push(if cause.declaration().positive { hypothesis.positive() } else { hypothesis });
+                    out.push(if cause.declaration().positive {
+                        hypothesis.positive()
+                    } else {
+                        hypothesis
+                    });
                 }
             }
         }
@@ -55,11 +72,15 @@ impl DeclaredForm {
             QuantityKind::Current => survey.data.current.is_some(),
             QuantityKind::Velocity => survey.data.velocity.is_some(),
             QuantityKind::Temperature | QuantityKind::Lagging => survey.reference_c.is_some(),
-            QuantityKind::Circumstance(column) => survey.data.circumstances.contains_key(column.text()),
+            QuantityKind::Circumstance(column) => {
+                survey.data.circumstances.contains_key(column.text())
+            }
             _ => true,
         };
         let quantities = cause.pattern().laws.iter().flat_map(Formula::quantities);
-        quantities.filter(|quantity| !there(quantity)).find_map(|quantity| quantity.needs())
+        quantities
+            .filter(|quantity| !there(quantity))
+            .find_map(|quantity| quantity.needs())
     }
 
     /// Reads what [`Placed::body`] wrote under a name.
@@ -67,16 +88,36 @@ impl DeclaredForm {
         if body.get("declared").is_none() {
             return Err(serde_json::Error::custom(format!("no cause `{name}`")));
         }
-        let KeptForm { declared, motion, shape } = serde_json::from_value(body)?;
+        let KeptForm {
+            declared,
+            motion,
+            shape,
+        } = serde_json::from_value(body)?;
         let cause = DeclaredCause::of(&declared).map_err(|faults| {
-            let faults: Vec<String> = faults.into_iter().map(|fault| format!("{}: {}", fault.path, fault.message)).collect();
-            serde_json::Error::custom(format!("the declaration of `{name}`: {}", faults.join("; ")))
+            let faults: Vec<String> = faults
+                .into_iter()
+                .map(|fault| format!("{}: {}", fault.path, fault.message))
+                .collect();
+            serde_json::Error::custom(format!(
+                "the declaration of `{name}`: {}",
+                faults.join("; ")
+            ))
         })?;
         let pattern = cause.pattern();
-        if declared.name != name || shape.len() != pattern.shape.len() || pattern.moves.at(motion.place()) != Some(motion) {
-            return Err(serde_json::Error::custom(format!("`{name}` is not as it was declared")));
+        if declared.name != name
+            || shape.len() != pattern.shape.len()
+            || pattern.moves.at(motion.place()) != Some(motion)
+        {
+            return Err(serde_json::Error::custom(format!(
+                "`{name}` is not as it was declared"
+            )));
         }
-        Ok(Self { cause, motion, shape }.into())
+        Ok(Self {
+            cause,
+            motion,
+            shape,
+        }
+        .into())
     }
 
     /// Its cause, as it was declared.
@@ -86,7 +127,13 @@ impl DeclaredForm {
 
     fn quantities(&self) -> Vec<RowQuantity> {
         let mut out: Vec<RowQuantity> = Vec::new();
-        for quantity in self.cause.pattern().laws.iter().flat_map(Formula::quantities) {
+        for quantity in self
+            .cause
+            .pattern()
+            .laws
+            .iter()
+            .flat_map(Formula::quantities)
+        {
             if !out.contains(&quantity) {
                 out.push(quantity);
             }
@@ -104,7 +151,10 @@ impl DeclaredForm {
 
     /// The variables of an arm that has all of its joints.
     fn all_variables(&self) -> Vec<Variable> {
-        self.quantities().iter().filter_map(|quantity| self.variable(quantity, usize::MAX)).collect()
+        self.quantities()
+            .iter()
+            .filter_map(|quantity| self.variable(quantity, usize::MAX))
+            .collect()
     }
 
     /// Small steps of its shape numbers, by a share of their ranges, or of themselves where these go in ratios.
@@ -113,13 +163,26 @@ impl DeclaredForm {
             true => share * value,
             false => share * (range.to - range.from),
         };
-        self.shape.iter().zip(&self.cause.pattern().shape).map(step).collect()
+        self.shape
+            .iter()
+            .zip(&self.cause.pattern().shape)
+            .map(step)
+            .collect()
     }
 
     /// The same with other shape numbers.
     pub fn shifted(&self, by: &[f64]) -> Form {
-        let shape = self.shape.iter().zip(by).map(|(value, by)| value + by).collect();
-        Self { shape, ..self.clone() }.into()
+        let shape = self
+            .shape
+            .iter()
+            .zip(by)
+            .map(|(value, by)| value + by)
+            .collect();
+        Self {
+            shape,
+            ..self.clone()
+        }
+        .into()
     }
 
     /// Shapes around its own, closer with every level.
@@ -127,17 +190,30 @@ impl DeclaredForm {
         let around = |(value, range): (&f64, &ShapeRange)| {
             let step = libm::exp2(-f64::from(level));
             let [less, more] = match range.is_of_ratios() {
-                true => [value * libm::pow(RATIO, -step), value * libm::pow(RATIO, step)],
+                true => [
+                    value * libm::pow(RATIO, -step),
+                    value * libm::pow(RATIO, step),
+                ],
                 false => [-STEP, STEP].map(|share| value + share * step * (range.to - range.from)),
             };
             [*value, less.max(range.from), more.min(range.to)]
         };
-        let each = self.shape.iter().zip(&self.cause.pattern().shape).map(around);
+        let each = self
+            .shape
+            .iter()
+            .zip(&self.cause.pattern().shape)
+            .map(around);
         let all = each.fold(vec![Vec::new()], |all, choices| {
-            let with = |begun: &Vec<f64>, choice: f64| begun.iter().copied().chain([choice]).collect::<Vec<f64>>();
-            all.iter().flat_map(|begun| choices.map(|choice| with(begun, choice))).collect()
+            let with = |begun: &Vec<f64>, choice: f64| {
+                begun.iter().copied().chain([choice]).collect::<Vec<f64>>()
+            };
+            all.iter()
+                .flat_map(|begun| choices.map(|choice| with(begun, choice)))
+                .collect()
         });
-        all.into_iter().filter(|shape| *shape != self.shape).collect()
+        all.into_iter()
+            .filter(|shape| *shape != self.shape)
+            .collect()
     }
 }
 
@@ -147,7 +223,9 @@ const RATIO: f64 = 1.7;
 
 impl PartialEq for DeclaredForm {
     fn eq(&self, other: &Self) -> bool {
-        std::ptr::eq(self.cause, other.cause) && self.motion == other.motion && self.shape == other.shape
+        std::ptr::eq(self.cause, other.cause)
+            && self.motion == other.motion
+            && self.shape == other.shape
     }
 }
 
@@ -171,10 +249,17 @@ impl Placed for DeclaredForm {
     /// A row in which a law is no number is left alone by it.
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
         let laws = &self.cause.pattern().laws;
-        let row = |quantity: &RowQuantity| self.variable(quantity, robot.joints())?.value(0, robot, state);
+        let row = |quantity: &RowQuantity| {
+            self.variable(quantity, robot.joints())?
+                .value(0, robot, state)
+        };
         for (k, law) in laws.iter().enumerate() {
-            if let Some(value) = law.value(&self.shape, &row).filter(|value| value.is_finite()) {
-                self.motion.add(robot, state, (k, laws.len()), value, p, out);
+            if let Some(value) = law
+                .value(&self.shape, &row)
+                .filter(|value| value.is_finite())
+            {
+                self.motion
+                    .add(robot, state, (k, laws.len()), value, p, out);
             }
         }
     }
@@ -188,12 +273,24 @@ impl Placed for DeclaredForm {
     }
 
     fn missing(&self, _robot: &RobotModel, data: &Measurements) -> Option<String> {
-        let moving = self.quantities().iter().any(|quantity| quantity.kind == QuantityKind::Velocity);
+        let moving = self
+            .quantities()
+            .iter()
+            .any(|quantity| quantity.kind == QuantityKind::Velocity);
         (moving && data.velocity.is_none()).then(|| "the recording has no joint velocities".into())
     }
 
     fn near(&self, _survey: &Survey, level: i32) -> Vec<Form> {
-        self.shapes(level).into_iter().map(|shape| Self { shape, ..self.clone() }.into()).collect()
+        self.shapes(level)
+            .into_iter()
+            .map(|shape| {
+                Self {
+                    shape,
+                    ..self.clone()
+                }
+                .into()
+            })
+            .collect()
     }
 
     fn declared(&self) -> Option<&DeclaredForm> {
@@ -201,11 +298,21 @@ impl Placed for DeclaredForm {
     }
 
     fn shape_numbers(&self) -> Vec<(String, f64)> {
-        self.cause.pattern().names.iter().cloned().zip(self.shape.iter().copied()).collect()
+        self.cause
+            .pattern()
+            .names
+            .iter()
+            .cloned()
+            .zip(self.shape.iter().copied())
+            .collect()
     }
 
     fn body(&self) -> serde_json::Value {
         let declared = self.cause.declaration().clone();
-        serde_json::json!(KeptForm { declared, motion: self.motion, shape: self.shape.clone() })
+        serde_json::json!(KeptForm {
+            declared,
+            motion: self.motion,
+            shape: self.shape.clone()
+        })
     }
 }

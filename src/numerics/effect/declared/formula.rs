@@ -51,7 +51,10 @@ impl Function {
     ];
 
     fn name(self) -> &'static str {
-        Self::NAMED.iter().find(|(_, function)| *function == self).map_or("-", |(name, _)| name)
+        Self::NAMED
+            .iter()
+            .find(|(_, function)| *function == self)
+            .map_or("-", |(name, _)| name)
     }
 
     fn value(self, x: f64) -> f64 {
@@ -133,7 +136,9 @@ impl Formula {
             Self::Shape(k) => *shape.get(*k)?,
             Self::Row(quantity) => row(quantity)?,
             Self::Call(function, of) => function.value(of.value(shape, row)?),
-            Self::Join(operator, a, b) => operator.value(a.value(shape, row)?, b.value(shape, row)?),
+            Self::Join(operator, a, b) => {
+                operator.value(a.value(shape, row)?, b.value(shape, row)?)
+            }
         })
     }
 
@@ -169,7 +174,11 @@ impl Formula {
 
     /// Its text, with these names of the shape numbers.
     pub fn text(&self, shape: &[String]) -> String {
-        Written { formula: self, shape }.to_string()
+        Written {
+            formula: self,
+            shape,
+        }
+        .to_string()
     }
 
     fn rank(&self) -> u8 {
@@ -190,8 +199,15 @@ struct Written<'a> {
 
 impl Written<'_> {
     fn part(&self, formula: &Formula, least: u8, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let part = Written { formula, shape: self.shape };
-        if formula.rank() < least { write!(f, "({part})") } else { write!(f, "{part}") }
+        let part = Written {
+            formula,
+            shape: self.shape,
+        };
+        if formula.rank() < least {
+            write!(f, "({part})")
+        } else {
+            write!(f, "{part}")
+        }
     }
 }
 
@@ -205,10 +221,22 @@ impl fmt::Display for Written<'_> {
                 f.write_str("-")?;
                 self.part(of, MINUS, f)
             }
-            Formula::Call(function, of) => write!(f, "{}({})", function.name(), Written { formula: of, shape: self.shape }),
+            Formula::Call(function, of) => write!(
+                f,
+                "{}({})",
+                function.name(),
+                Written {
+                    formula: of,
+                    shape: self.shape
+                }
+            ),
             Formula::Join(operator, a, b) => {
                 // Powers bind to the right, all others to the left.
-                let (left, right) = if *operator == Operator::Power { (1, 0) } else { (0, 1) };
+                let (left, right) = if *operator == Operator::Power {
+                    (1, 0)
+                } else {
+                    (0, 1)
+                };
                 self.part(a, operator.rank() + left, f)?;
                 f.write_str(operator.sign())?;
                 self.part(b, operator.rank() + right, f)

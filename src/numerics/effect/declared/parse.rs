@@ -17,12 +17,19 @@ const DEEPEST: usize = 60;
 /// Reads a formula with these names of shape numbers.
 pub fn parse(text: &str, shape: &[String]) -> Result<Formula, FormulaFault> {
     let letters: Vec<char> = text.chars().collect();
-    let mut reader = FormulaReader { letters: &letters, at: 0, depth: 0, shape };
+    let mut reader = FormulaReader {
+        letters: &letters,
+        at: 0,
+        depth: 0,
+        shape,
+    };
     let formula = reader.sum()?;
     match reader.peek() {
         None => Ok(formula),
         Some(')') => Err(reader.fault("`)` without `(`")),
-        Some(letter) => Err(reader.fault(format!("expected an operator (+ - * / ^) or the end, found `{letter}`"))),
+        Some(letter) => Err(reader.fault(format!(
+            "expected an operator (+ - * / ^) or the end, found `{letter}`"
+        ))),
     }
 }
 
@@ -35,12 +42,19 @@ struct FormulaReader<'a> {
 
 impl FormulaReader<'_> {
     fn fault(&self, message: impl Into<String>) -> FormulaFault {
-        FormulaFault { at: self.at + 1, message: message.into() }
+        FormulaFault {
+            at: self.at + 1,
+            message: message.into(),
+        }
     }
 
     /// The next letter that is no blank.
     fn peek(&mut self) -> Option<char> {
-        while self.letters.get(self.at).is_some_and(|letter| letter.is_whitespace()) {
+        while self
+            .letters
+            .get(self.at)
+            .is_some_and(|letter| letter.is_whitespace())
+        {
             self.at += 1;
         }
         self.letters.get(self.at).copied()
@@ -83,14 +97,22 @@ impl FormulaReader<'_> {
         if self.depth > DEEPEST {
             return Err(self.fault(format!("more than {DEEPEST} parts within each other")));
         }
-        let formula = if self.take('-') { Formula::call(Function::Minus, self.signed()?) } else { self.power()? };
+        let formula = if self.take('-') {
+            Formula::call(Function::Minus, self.signed()?)
+        } else {
+            self.power()?
+        };
         self.depth -= 1;
         Ok(formula)
     }
 
     fn power(&mut self) -> Result<Formula, FormulaFault> {
         let base = self.atom()?;
-        if self.take('^') { Ok(Formula::join(Operator::Power, base, self.signed()?)) } else { Ok(base) }
+        if self.take('^') {
+            Ok(Formula::join(Operator::Power, base, self.signed()?))
+        } else {
+            Ok(base)
+        }
     }
 
     fn atom(&mut self) -> Result<Formula, FormulaFault> {
@@ -101,20 +123,30 @@ impl FormulaReader<'_> {
                 self.close()?;
                 Ok(inner)
             }
-            Some(letter) if letter.is_ascii_digit() || letter == '.' => self.number().map(Formula::Number),
+            Some(letter) if letter.is_ascii_digit() || letter == '.' => {
+                self.number().map(Formula::Number)
+            }
             Some(letter) if letter.is_ascii_alphabetic() => self.name(),
-            Some(letter) => Err(self.fault(format!("expected a number, a name or `(`, found `{letter}`"))),
+            Some(letter) => Err(self.fault(format!(
+                "expected a number, a name or `(`, found `{letter}`"
+            ))),
             None => Err(self.fault("expected a number, a name or `(`, found the end")),
         }
     }
 
     fn close(&mut self) -> Result<(), FormulaFault> {
-        if self.take(')') { Ok(()) } else { Err(self.fault("expected `)`")) }
+        if self.take(')') {
+            Ok(())
+        } else {
+            Err(self.fault("expected `)`"))
+        }
     }
 
     fn number(&mut self) -> Result<f64, FormulaFault> {
         let start = self.at;
-        let exponent = |at: usize, letters: &[char]| matches!(letters[at], '+' | '-') && matches!(letters[at - 1], 'e' | 'E');
+        let exponent = |at: usize, letters: &[char]| {
+            matches!(letters[at], '+' | '-') && matches!(letters[at - 1], 'e' | 'E')
+        };
         while self.at < self.letters.len() {
             let letter = self.letters[self.at];
             let inside = letter.is_ascii_digit() || matches!(letter, '.' | 'e' | 'E');
@@ -127,12 +159,19 @@ impl FormulaReader<'_> {
         text.parse::<f64>()
             .ok()
             .filter(|number| number.is_finite())
-            .ok_or_else(|| FormulaFault { at: start + 1, message: format!("`{text}` is no number") })
+            .ok_or_else(|| FormulaFault {
+                at: start + 1,
+                message: format!("`{text}` is no number"),
+            })
     }
 
     fn name(&mut self) -> Result<Formula, FormulaFault> {
         let start = self.at;
-        while self.letters.get(self.at).is_some_and(|letter| letter.is_ascii_alphanumeric() || *letter == '_') {
+        while self
+            .letters
+            .get(self.at)
+            .is_some_and(|letter| letter.is_ascii_alphanumeric() || *letter == '_')
+        {
             self.at += 1;
         }
         let name: String = self.letters[start..self.at].iter().collect();
@@ -142,7 +181,10 @@ impl FormulaReader<'_> {
         if name == "pi" {
             return Ok(Formula::Number(std::f64::consts::PI));
         }
-        let there = |message| FormulaFault { at: start + 1, message };
+        let there = |message| FormulaFault {
+            at: start + 1,
+            message,
+        };
         if let Some((_, function)) = Function::NAMED.iter().find(|(own, _)| *own == name) {
             if !self.take('(') {
                 return Err(there(format!("`{name}` is a function: write {name}(...)")));
@@ -156,7 +198,9 @@ impl FormulaReader<'_> {
             let mut all: Vec<&str> = known.collect();
             all.extend(self.shape.iter().map(String::as_str));
             let near = nearest(&name, all);
-            let near = near.map(|near| format!("; did you mean `{near}`?")).unwrap_or_else(|| ".".into());
+            let near = near
+                .map(|near| format!("; did you mean `{near}`?"))
+                .unwrap_or_else(|| ".".into());
             let functions: Vec<&str> = Function::NAMED.iter().map(|(name, _)| *name).collect();
             let shape = match self.shape {
                 [] => "none".into(),
@@ -168,13 +212,19 @@ impl FormulaReader<'_> {
                 functions.join(", ")
             )));
         };
-        let constant = if remembers { Some(self.constant(&name)?) } else { None };
+        let constant = if remembers {
+            Some(self.constant(&name)?)
+        } else {
+            None
+        };
         Ok(Formula::Row(RowQuantity { kind, of, constant }))
     }
 
     /// The constant of a memory: a positive number or a shape number, in brackets.
     fn constant(&mut self, name: &str) -> Result<Constant, FormulaFault> {
-        let wanted = format!("`{name}` takes a constant: a positive number or a shape number, e.g. {name}(0.02)");
+        let wanted = format!(
+            "`{name}` takes a constant: a positive number or a shape number, e.g. {name}(0.02)"
+        );
         if !self.take('(') {
             return Err(self.fault(wanted));
         }
@@ -183,7 +233,12 @@ impl FormulaReader<'_> {
         let constant = match self.sum()? {
             Formula::Number(number) if number > 0.0 => Constant::Number(number),
             Formula::Shape(k) => Constant::Shape(k),
-            _ => return Err(FormulaFault { at, message: wanted }),
+            _ => {
+                return Err(FormulaFault {
+                    at,
+                    message: wanted,
+                });
+            }
         };
         self.close()?;
         Ok(constant)
@@ -195,7 +250,10 @@ mod tests {
     use super::*;
 
     fn value(text: &str) -> f64 {
-        parse(text, &[]).unwrap_or_else(|fault| panic!("{text}: {fault:?}")).value(&[], &|_| None).expect("a number")
+        parse(text, &[])
+            .unwrap_or_else(|fault| panic!("{text}: {fault:?}"))
+            .value(&[], &|_| None)
+            .expect("a number")
     }
 
     #[test]
@@ -209,11 +267,18 @@ mod tests {
             ("-(1 + 2) * 3", -9.0),
             ("2e-1 + 1.5E+1", 15.2),
             ("abs(-3) + sign(-7) + sign(0) + step(2) + step(0)", 3.0),
-            ("sqrt(16) - exp(0) + ln(1) + tanh(0) + atan(0) + tan(0)", 3.0),
+            (
+                "sqrt(16) - exp(0) + ln(1) + tanh(0) + atan(0) + tan(0)",
+                3.0,
+            ),
             ("sin(pi / 2) + cos(pi)", 0.0),
         ];
         for (text, expected) in worked_out {
-            assert!((value(text) - expected).abs() < 1e-15, "{text} is {}", value(text));
+            assert!(
+                (value(text) - expected).abs() < 1e-15,
+                "{text} is {}",
+                value(text)
+            );
         }
     }
 
@@ -255,9 +320,17 @@ mod tests {
         ];
         for (text, at, message) in faults {
             let fault = parse(text, &[]).expect_err(text);
-            assert!(fault.at == at && fault.message.contains(message), "{text}: {fault:?}");
+            assert!(
+                fault.at == at && fault.message.contains(message),
+                "{text}: {fault:?}"
+            );
         }
         let deep = "(".repeat(10_000);
-        assert!(parse(&deep, &[]).expect_err("deep").message.contains("within each other"));
+        assert!(
+            parse(&deep, &[])
+                .expect_err("deep")
+                .message
+                .contains("within each other")
+        );
     }
 }

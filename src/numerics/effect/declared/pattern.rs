@@ -40,7 +40,10 @@ impl DeclaredPattern {
         let laws = faults.laws(declaration, &names);
         let unit = moves.and_then(|moves| faults.unit(moves, declaration.unit.as_deref()));
         if let Some(size) = declaration.size.filter(|size| *size <= 0.0) {
-            faults.add("size", format!("expected the usual size of a coefficient, more than 0; found {size}"));
+            faults.add(
+                "size",
+                format!("expected the usual size of a coefficient, more than 0; found {size}"),
+            );
         }
         if let (Some(seat), Some(moves)) = (seat, moves) {
             faults.agreement(seat, moves, &laws);
@@ -56,7 +59,9 @@ impl DeclaredPattern {
                 shape: declaration.shape.values().cloned().collect(),
                 names,
                 unit,
-                size: declaration.size.map(|size| unit.or(moves.unit()).map_or(size, |unit| unit.to_si(size))),
+                size: declaration
+                    .size
+                    .map(|size| unit.or(moves.unit()).map_or(size, |unit| unit.to_si(size))),
             }),
             _ => Err(faults.0),
         }
@@ -65,8 +70,11 @@ impl DeclaredPattern {
     /// Whether a law jumps, so that what is left has no curvature by its shape numbers.
     pub fn jumps(&self) -> bool {
         let mut found = false;
-        let jump = |part: &Formula| matches!(part, Formula::Call(Function::Step | Function::Sign, _));
-        self.laws.iter().for_each(|law| law.walk(&mut |part| found |= jump(part)));
+        let jump =
+            |part: &Formula| matches!(part, Formula::Call(Function::Step | Function::Sign, _));
+        self.laws
+            .iter()
+            .for_each(|law| law.walk(&mut |part| found |= jump(part)));
         found
     }
 
@@ -75,10 +83,16 @@ impl DeclaredPattern {
         let joints = survey.joints();
         let one = |place: Place| self.moves.at(place);
         match self.seat {
-            Seat::AnyJoint => survey.revolute().filter_map(|joint| one(Place::Joint(joint))).collect(),
+            Seat::AnyJoint => survey
+                .revolute()
+                .filter_map(|joint| one(Place::Joint(joint)))
+                .collect(),
             Seat::AnyLink => {
                 let long = |link: &usize| extent(survey.robot, *link).norm() > SHORT;
-                (0..joints.saturating_sub(1)).filter(long).filter_map(|link| one(Place::Links(link, link))).collect()
+                (0..joints.saturating_sub(1))
+                    .filter(long)
+                    .filter_map(|link| one(Place::Links(link, link)))
+                    .collect()
             }
             Seat::Fixed(Place::Joint(joint)) if joint >= joints => Vec::new(),
             Seat::Fixed(Place::Links(_, last)) if last >= joints => Vec::new(),
@@ -88,33 +102,62 @@ impl DeclaredPattern {
 
     /// All combinations of starts.
     pub fn starts(&self) -> Vec<Vec<f64>> {
-        let each = self.shape.iter().map(|range| range.starts(self.shape.len()));
+        let each = self
+            .shape
+            .iter()
+            .map(|range| range.starts(self.shape.len()));
         each.fold(vec![Vec::new()], |all, starts| {
-            let with = |begun: &Vec<f64>, start: &f64| begun.iter().copied().chain([*start]).collect();
-            all.iter().flat_map(|begun| starts.iter().map(move |start| with(begun, start))).collect()
+            let with =
+                |begun: &Vec<f64>, start: &f64| begun.iter().copied().chain([*start]).collect();
+            all.iter()
+                .flat_map(|begun| starts.iter().map(move |start| with(begun, start)))
+                .collect()
         })
     }
 
     /// The coefficients at a place.
     pub fn numbers(&self, motion: Motion, robot: &RobotModel) -> Vec<NumberSpec> {
         let many = self.laws.len() > 1;
-        let counted = |k: usize| if many { (k + 1).to_string() } else { String::new() };
+        let counted = |k: usize| {
+            if many {
+                (k + 1).to_string()
+            } else {
+                String::new()
+            }
+        };
         let sigma = self.size.map_or(WIDE, |size| WIDER * size);
         let of_frame = |k: usize| motion.frame_numbers(move |axis| format!("{axis}{}", counted(k)));
         let unit = self.unit.unwrap_or_else(|| motion.unit(robot));
-        let unit = if self.unit.is_none() && self.moves == Moves::Growth { Unit::One } else { unit };
+        let unit = if self.unit.is_none() && self.moves == Moves::Growth {
+            Unit::One
+        } else {
+            unit
+        };
         let plain = |name: String| (name, unit, sigma);
         match self.moves {
             Moves::Frame(_) => {
                 let all = (0..self.laws.len()).flat_map(of_frame);
-                all.map(|(name, own, _)| (name, self.unit.unwrap_or(own), sigma)).collect()
+                all.map(|(name, own, _)| (name, self.unit.unwrap_or(own), sigma))
+                    .collect()
             }
             Moves::Axis { .. } => {
                 let sides = robot.normals(motion_joint(motion)).len();
                 let names = ["across", "along"].into_iter().take(sides);
-                names.flat_map(|side| (0..self.laws.len()).map(move |k| plain(format!("{side}{}", counted(k))))).collect()
+                names
+                    .flat_map(|side| {
+                        (0..self.laws.len()).map(move |k| plain(format!("{side}{}", counted(k))))
+                    })
+                    .collect()
             }
-            _ => (0..self.laws.len()).map(|k| plain(if many { format!("c{}", k + 1) } else { String::new() })).collect(),
+            _ => (0..self.laws.len())
+                .map(|k| {
+                    plain(if many {
+                        format!("c{}", k + 1)
+                    } else {
+                        String::new()
+                    })
+                })
+                .collect(),
         }
     }
 }

@@ -88,17 +88,38 @@ const NAMES: [(&str, QuantityKind, bool, bool); 19] = [
 fn all() -> impl Iterator<Item = (&'static str, QuantityKind, bool, bool)> {
     let declared = law_columns().filter_map(|column| {
         let name = CircumstanceName::of(column.setting)?;
-        Some((column.setting, K::Circumstance(name), column.is_of_joints(), false))
+        Some((
+            column.setting,
+            K::Circumstance(name),
+            column.is_of_joints(),
+            false,
+        ))
     });
     NAMES.into_iter().chain(declared)
 }
 
 /// All names, for "allowed: ...".
 pub fn known() -> String {
-    let word = |(name, _, _, constant): (&str, K, bool, bool)| if constant { format!("{name}(constant)") } else { name.into() };
-    let of_joints = all().filter(|row| row.2).map(word).collect::<Vec<_>>().join(", ");
-    let of_rows = all().filter(|row| !row.2).map(word).collect::<Vec<_>>().join(", ");
-    format!("{of_joints} of this joint, of joint 3 as q3, of a neighbour as q_next or q_before; {of_rows}")
+    let word = |(name, _, _, constant): (&str, K, bool, bool)| {
+        if constant {
+            format!("{name}(constant)")
+        } else {
+            name.into()
+        }
+    };
+    let of_joints = all()
+        .filter(|row| row.2)
+        .map(word)
+        .collect::<Vec<_>>()
+        .join(", ");
+    let of_rows = all()
+        .filter(|row| !row.2)
+        .map(word)
+        .collect::<Vec<_>>()
+        .join(", ");
+    format!(
+        "{of_joints} of this joint, of joint 3 as q3, of a neighbour as q_next or q_before; {of_rows}"
+    )
 }
 
 /// All names without what may follow them.
@@ -110,13 +131,24 @@ impl RowQuantity {
     /// The quantity of a name, and whether it takes a constant.
     pub fn named(text: &str) -> Option<(QuantityKind, Whose, bool)> {
         if let Some((_, kind, jointed, constant)) = all().find(|row| row.0 == text) {
-            return Some((kind, if jointed { Whose::Own } else { Whose::Row }, constant));
+            return Some((
+                kind,
+                if jointed { Whose::Own } else { Whose::Row },
+                constant,
+            ));
         }
         let split = text.find(|c: char| c.is_ascii_digit());
-        let (name, of) = match (text.strip_suffix("_next"), text.strip_suffix("_before"), split) {
+        let (name, of) = match (
+            text.strip_suffix("_next"),
+            text.strip_suffix("_before"),
+            split,
+        ) {
             (Some(name), ..) => (name, Whose::Next),
             (_, Some(name), _) => (name, Whose::Before),
-            (_, _, Some(at)) => (&text[..at], Whose::Joint(text[at..].parse::<usize>().ok()?.checked_sub(1)?)),
+            (_, _, Some(at)) => (
+                &text[..at],
+                Whose::Joint(text[at..].parse::<usize>().ok()?.checked_sub(1)?),
+            ),
             _ => return None,
         };
         let (_, kind, _, constant) = all().find(|row| row.0 == name && row.2)?;
@@ -167,8 +199,14 @@ impl RowQuantity {
             K::Approach => Variable::Approach { joint },
             K::Move => Variable::Move { joint },
             K::Velocity => Variable::Velocity { joint },
-            K::Slip => Variable::Slip { joint, travel: constant()? },
-            K::Work => Variable::Work { joint, cooling: constant()? },
+            K::Slip => Variable::Slip {
+                joint,
+                travel: constant()?,
+            },
+            K::Work => Variable::Work {
+                joint,
+                cooling: constant()?,
+            },
             K::Payload => Variable::Payload,
             K::Temperature => Variable::Temperature,
             K::Lagging => Variable::Lagging { lag: constant()? },
@@ -179,7 +217,10 @@ impl RowQuantity {
             K::Azimuth => Variable::Azimuth,
             K::Elevation => Variable::Elevation,
             K::Range => Variable::Range,
-            K::Circumstance(column) => Variable::Circumstance { column, joint: (self.of != Whose::Row).then_some(joint) },
+            K::Circumstance(column) => Variable::Circumstance {
+                column,
+                joint: (self.of != Whose::Row).then_some(joint),
+            },
         })
     }
 
@@ -210,19 +251,38 @@ impl Variable {
             Self::Circumstance { column, joint } => (K::Circumstance(column), joint),
             _ => return None,
         };
-        let whose = |of| if of == joint { Whose::Own } else { Whose::Joint(of) };
-        Some(RowQuantity { kind, of: of.map_or(Whose::Row, whose), constant: None }.text(&[]))
+        let whose = |of| {
+            if of == joint {
+                Whose::Own
+            } else {
+                Whose::Joint(of)
+            }
+        };
+        Some(
+            RowQuantity {
+                kind,
+                of: of.map_or(Whose::Row, whose),
+                constant: None,
+            }
+            .text(&[]),
+        )
     }
 
     /// Whether it is a joint's own, or the whole row's.
     pub fn is_of(self, joint: usize) -> bool {
         match self {
-            Self::Angle { joint: of } | Self::Load { joint: of } | Self::Approach { joint: of } | Self::Move { joint: of } => {
-                of == joint
-            }
+            Self::Angle { joint: of }
+            | Self::Load { joint: of }
+            | Self::Approach { joint: of }
+            | Self::Move { joint: of } => of == joint,
             Self::Velocity { joint: of } => of == joint,
-            Self::Circumstance { joint: Some(of), .. } => of == joint,
-            Self::Payload | Self::Temperature | Self::Time | Self::Circumstance { joint: None, .. } => true,
+            Self::Circumstance {
+                joint: Some(of), ..
+            } => of == joint,
+            Self::Payload
+            | Self::Temperature
+            | Self::Time
+            | Self::Circumstance { joint: None, .. } => true,
             _ => false,
         }
     }

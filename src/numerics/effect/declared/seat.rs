@@ -24,11 +24,17 @@ pub enum Moves {
 }
 
 /// Motions of each kind of place; the first is the usual one.
-const OF_JOINTS: [(&str, Moves); 3] =
-    [("angle", Moves::Angle), ("axis", Moves::Axis { turning: false }), ("turning_axis", Moves::Axis { turning: true })];
+const OF_JOINTS: [(&str, Moves); 3] = [
+    ("angle", Moves::Angle),
+    ("axis", Moves::Axis { turning: false }),
+    ("turning_axis", Moves::Axis { turning: true }),
+];
 const OF_LINKS: [(&str, Moves); 1] = [("growth", Moves::Growth)];
-const OF_FRAMES: [(&str, Moves); 3] =
-    [("displacement", Moves::Frame(Axes::Place)), ("rotation", Moves::Frame(Axes::Rotation)), ("both", Moves::Frame(Axes::Both))];
+const OF_FRAMES: [(&str, Moves); 3] = [
+    ("displacement", Moves::Frame(Axes::Place)),
+    ("rotation", Moves::Frame(Axes::Rotation)),
+    ("both", Moves::Frame(Axes::Both)),
+];
 const OF_TRACKERS: [(&str, Moves); 6] = [
     ("displacement", Moves::Frame(Axes::Place)),
     ("rotation", Moves::Frame(Axes::Rotation)),
@@ -50,7 +56,11 @@ impl Seat {
             "tracker" => Self::Fixed(Place::Tracker),
             other => match other.parse().ok()? {
                 place @ Place::Joint(_) if other.starts_with("joint ") => Self::Fixed(place),
-                place @ Place::Links(first, last) if other.starts_with("link ") && first <= last => Self::Fixed(place),
+                place @ Place::Links(first, last)
+                    if other.starts_with("link ") && first <= last =>
+                {
+                    Self::Fixed(place)
+                }
                 _ => return None,
             },
         })
@@ -75,7 +85,12 @@ impl Moves {
     pub fn at(self, place: Place) -> Option<Motion> {
         Some(match (self, place) {
             (Self::Angle, Place::Joint(joint)) => Motion::Joint { joint },
-            (Self::Axis { turning }, Place::Joint(joint)) => Motion::Axis { joint, about: None, turning, at: AxisPoint::Own },
+            (Self::Axis { turning }, Place::Joint(joint)) => Motion::Axis {
+                joint,
+                about: None,
+                turning,
+                at: AxisPoint::Own,
+            },
             (Self::Growth, Place::Links(first, last)) => Motion::Links { first, last },
             (Self::Frame(axes), Place::Base) => Motion::Base { axes },
             (Self::Frame(axes), Place::Tool) => Motion::Tool { axes },
@@ -100,8 +115,17 @@ impl Moves {
     pub fn quantities(self) -> &'static [Quantity] {
         use Quantity::*;
         match self {
-            Self::Angle => &[Angle, Length, Number, Compliance, CurrentCompliance, Trailing],
-            Self::Axis { .. } | Self::Frame(Axes::Rotation) => &[Angle, Number, Compliance, CurrentCompliance],
+            Self::Angle => &[
+                Angle,
+                Length,
+                Number,
+                Compliance,
+                CurrentCompliance,
+                Trailing,
+            ],
+            Self::Axis { .. } | Self::Frame(Axes::Rotation) => {
+                &[Angle, Number, Compliance, CurrentCompliance]
+            }
             Self::Reading(Polar::Azimuth | Polar::Elevation) => &[Angle, Number],
             Self::Frame(Axes::Place) | Self::Reading(Polar::Range) => &[Length, Number],
             Self::Growth => &[Number],

@@ -13,7 +13,9 @@ use crate::estimate::closure::closed;
 use crate::estimate::factor::TriangularFactor;
 use crate::estimate::model::Model;
 use crate::observation::{MeasurementKind, SocketKind, rank};
-use crate::robot::{Anchor, MeasurementSetup, Measurements, Named, PointReadings, Readings, RobotModel, Target};
+use crate::robot::{
+    Anchor, MeasurementSetup, Measurements, Named, PointReadings, Readings, RobotModel, Target,
+};
 use crate::spatial::Pose;
 use faer::Mat;
 use nalgebra::Vector3;
@@ -101,16 +103,45 @@ const GEOMETRY: [&str; 3] = ["tool_offset.", "joint_offset.", "link_geometry."];
 
 /// The nominal arm with sockets, and what is to be told of it.
 fn model(robot: &RobotModel, places: &[Vector3<f64>], ball: Option<Vector3<f64>>) -> Model {
-    let anchors = places.iter().enumerate().map(|(k, place)| Anchor::point(&name(k), *place)).collect();
+    let anchors = places
+        .iter()
+        .enumerate()
+        .map(|(k, place)| Anchor::point(&name(k), *place))
+        .collect();
     let home = robot.home();
-    let target = ball.map(|place| Target { name: String::new(), mounting: Pose::new(home.rotation, place), oriented: false });
-    let robot = robot.clone().measured_by(MeasurementSetup { targets: target.into_iter().collect(), anchors });
-    let setting = EffectContext { base: Pose::identity(), load: Load::GravityTorque };
-    let probe = Measurements { joints: robot.joints(), q: vec![0.0; robot.joints()], ..socketed(vec![0], 1.0) };
-    let effects = [names::ANCHOR, names::TOOL_OFFSET, names::JOINT_OFFSET, names::LINK_GEOMETRY, names::JOINT_COMPLIANCE];
-    let made =
-        effects.iter().filter_map(|name| arm_effect(name, &setting)).filter(|effect| effect.missing(&robot, &probe).is_none());
-    Model::nominal(robot.clone(), EffectStack::new(&robot, setting.base, made.collect()))
+    let target = ball.map(|place| Target {
+        name: String::new(),
+        mounting: Pose::new(home.rotation, place),
+        oriented: false,
+    });
+    let robot = robot.clone().measured_by(MeasurementSetup {
+        targets: target.into_iter().collect(),
+        anchors,
+    });
+    let setting = EffectContext {
+        base: Pose::identity(),
+        load: Load::GravityTorque,
+    };
+    let probe = Measurements {
+        joints: robot.joints(),
+        q: vec![0.0; robot.joints()],
+        ..socketed(vec![0], 1.0)
+    };
+    let effects = [
+        names::ANCHOR,
+        names::TOOL_OFFSET,
+        names::JOINT_OFFSET,
+        names::LINK_GEOMETRY,
+        names::JOINT_COMPLIANCE,
+    ];
+    let made = effects
+        .iter()
+        .filter_map(|name| arm_effect(name, &setting))
+        .filter(|effect| effect.missing(&robot, &probe).is_none());
+    Model::nominal(
+        robot.clone(),
+        EffectStack::new(&robot, setting.base, made.collect()),
+    )
 }
 
 fn name(socket: usize) -> String {
@@ -119,9 +150,17 @@ fn name(socket: usize) -> String {
 
 /// Rows without joints that lie in these sockets.
 fn socketed(sockets: Vec<usize>, sigma: f64) -> Measurements {
-    let (rows, names) = (sockets.len(), sockets.into_iter().map(name).collect::<Vec<_>>());
+    let (rows, names) = (
+        sockets.len(),
+        sockets.into_iter().map(name).collect::<Vec<_>>(),
+    );
     let anchor = Some(Named::of(names.iter().map(String::as_str)));
-    let readings = Readings { kind: SocketKind.about().name, sigma: vec![sigma; rows], anchor, ..Readings::default() };
+    let readings = Readings {
+        kind: SocketKind.about().name,
+        sigma: vec![sigma; rows],
+        anchor,
+        ..Readings::default()
+    };
     Measurements {
         points: PointReadings::none(rows),
         payload: vec![0.0; rows],
@@ -131,7 +170,11 @@ fn socketed(sockets: Vec<usize>, sigma: f64) -> Measurements {
 }
 
 /// Random postures within the site at which the ball lies in the sockets, so many for each. Fails with a sentence where one is out of reach.
-fn candidates(model: &Model, site: &Site, request: &BroughtRequest) -> Result<(Measurements, Vec<usize>), String> {
+fn candidates(
+    model: &Model,
+    site: &Site,
+    request: &BroughtRequest,
+) -> Result<(Measurements, Vec<usize>), String> {
     let mut draw = ChaCha8Rng::seed_from_u64(request.seed);
     let payload = site.payloads.first().copied().unwrap_or_default();
     let mut found: Vec<(usize, Vec<f64>)> = Vec::new();
@@ -145,7 +188,10 @@ fn candidates(model: &Model, site: &Site, request: &BroughtRequest) -> Result<(M
                      or the ball lies too near the base"
                 ));
             }
-            let mut data = Measurements { joints: site.ranges.len(), ..socketed(vec![socket; BATCH], request.sigma) };
+            let mut data = Measurements {
+                joints: site.ranges.len(),
+                ..socketed(vec![socket; BATCH], request.sigma)
+            };
             data.payload.fill(payload);
             data.q = (0..BATCH)
                 .flat_map(|_| site.ranges.clone())
@@ -157,8 +203,15 @@ fn candidates(model: &Model, site: &Site, request: &BroughtRequest) -> Result<(M
             tried += BATCH;
             for row in rows {
                 let q = there.q(row);
-                let within = q.iter().zip(&site.ranges).all(|(q, [lower, upper])| (lower..=upper).contains(&q));
-                if own < request.candidates && within && (points[row] - place).norm() < THERE && site.allows(&model.robot, q) {
+                let within = q
+                    .iter()
+                    .zip(&site.ranges)
+                    .all(|(q, [lower, upper])| (lower..=upper).contains(&q));
+                if own < request.candidates
+                    && within
+                    && (points[row] - place).norm() < THERE
+                    && site.allows(&model.robot, q)
+                {
                     found.push((socket, q.to_vec()));
                     own += 1;
                 }
@@ -166,10 +219,16 @@ fn candidates(model: &Model, site: &Site, request: &BroughtRequest) -> Result<(M
         }
     }
     let sockets: Vec<usize> = found.iter().map(|(socket, _)| *socket).collect();
-    let mut data = Measurements { joints: site.ranges.len(), ..socketed(sockets.clone(), request.sigma) };
+    let mut data = Measurements {
+        joints: site.ranges.len(),
+        ..socketed(sockets.clone(), request.sigma)
+    };
     data.q = found.into_iter().flat_map(|(_, q)| q).collect();
     data.payload.fill(payload);
-    data.points.position = sockets.iter().map(|socket| request.places[*socket]).collect();
+    data.points.position = sockets
+        .iter()
+        .map(|socket| request.places[*socket])
+        .collect();
     Ok((data, sockets))
 }
 
@@ -177,54 +236,108 @@ fn candidates(model: &Model, site: &Site, request: &BroughtRequest) -> Result<(M
 fn known(model: &Model, priors: &[PriorSigma]) -> Vec<f64> {
     let sigma = |name: &str| {
         let own = priors.iter().find(|prior| name.starts_with(prior.begins))?;
-        let turns = name.rsplit('.').next().is_some_and(|ending| matches!(ending, "rx" | "ry" | "rz"));
+        let turns = name
+            .rsplit('.')
+            .next()
+            .is_some_and(|ending| matches!(ending, "rx" | "ry" | "rz"));
         Some(if turns { own.turns } else { own.others })
     };
-    model.stack.specs().iter().map(|spec| sigma(&spec.name).map_or(1.0, |sigma| sigma / spec.prior_sigma)).collect()
+    model
+        .stack
+        .specs()
+        .iter()
+        .map(|spec| sigma(&spec.name).map_or(1.0, |sigma| sigma / spec.prior_sigma))
+        .collect()
 }
 
 fn factor_of(known: &[f64]) -> TriangularFactor {
     let p = known.len();
-    TriangularFactor::of(&Mat::from_fn(p, p + 1, |i, j| if i == j { 1.0 / known[i] } else { 0.0 }))
+    TriangularFactor::of(&Mat::from_fn(p, p + 1, |i, j| {
+        if i == j { 1.0 / known[i] } else { 0.0 }
+    }))
 }
 
 /// Standard deviations of all parameters after postures whose rows these are, in units of their priors in the stack.
 fn sigmas(rows: &Mat<f64>, known: &TriangularFactor) -> Vec<f64> {
-    let all = if rows.nrows() > 0 { known.stack(&factor(rows)) } else { known.clone() };
+    let all = if rows.nrows() > 0 {
+        known.stack(&factor(rows))
+    } else {
+        known.clone()
+    };
     let p = rows.ncols();
-    let Some(inverse) = all.inverse() else { return vec![f64::INFINITY; p] };
-    (0..p).map(|i| (i..p).map(|j| inverse.at(i, j).powi(2)).sum::<f64>().sqrt()).collect()
+    let Some(inverse) = all.inverse() else {
+        return vec![f64::INFINITY; p];
+    };
+    (0..p)
+        .map(|i| (i..p).map(|j| inverse.at(i, j).powi(2)).sum::<f64>().sqrt())
+        .collect()
 }
 
 /// Proposes postures. Fails with a sentence where a socket is out of reach or nothing can be told.
-pub fn propose_brought(robot: &RobotModel, site: &Site, request: &BroughtRequest) -> Result<BroughtProposal, String> {
+pub fn propose_brought(
+    robot: &RobotModel,
+    site: &Site,
+    request: &BroughtRequest,
+) -> Result<BroughtProposal, String> {
     let model = model(robot, &request.places, None);
     let (drawn, sockets) = candidates(&model, site, request)?;
     let specs = model.stack.specs();
     let jacobian = PointJacobian::given(&model, (0..specs.len()).collect(), Vec::new());
     let known = known(&model, &request.priors);
     let before = factor_of(&known);
-    let term = DesignTerm::beside(1.0, jacobian.clone(), &before).ok_or("nothing is known of some direction beforehand")?;
+    let term = DesignTerm::beside(1.0, jacobian.clone(), &before)
+        .ok_or("nothing is known of some direction beforehand")?;
     let mut chosen = Criterion { terms: vec![term] }.exchange(&model, &drawn, &[], request.count);
     chosen.sort_by_key(|row| (sockets[*row], *row));
     let rows = jacobian.rows(&model, &drawn);
     let own = gather(&rows, &chosen);
     let proposed = sigmas(&own, &before);
     let sets = random_sets(&drawn, chosen.len(), request.seed);
-    let random: Vec<Vec<f64>> = sets.iter().step_by(4).map(|set| sigmas(&gather(&rows, set), &before)).collect();
+    let random: Vec<Vec<f64>> = sets
+        .iter()
+        .step_by(4)
+        .map(|set| sigmas(&gather(&rows, set), &before))
+        .collect();
     let prior: Vec<f64> = specs.iter().map(|spec| spec.prior_sigma).collect();
     let usual = |k: usize| median(random.iter().map(|all| all[k]).collect());
-    let arm: Vec<usize> = (0..specs.len()).filter(|k| !specs[*k].name.starts_with(names::ANCHOR)).collect();
-    let sigma = arm.iter().map(|k| (*k, known[*k] * prior[*k], proposed[*k] * prior[*k], usual(*k) * prior[*k])).collect();
+    let arm: Vec<usize> = (0..specs.len())
+        .filter(|k| !specs[*k].name.starts_with(names::ANCHOR))
+        .collect();
+    let sigma = arm
+        .iter()
+        .map(|k| {
+            (
+                *k,
+                known[*k] * prior[*k],
+                proposed[*k] * prior[*k],
+                usual(*k) * prior[*k],
+            )
+        })
+        .collect();
     let without = (0..request.places.len()).map(|socket| {
-        let left: Vec<usize> = chosen.iter().copied().filter(|row| sockets[*row] != socket).collect();
+        let left: Vec<usize> = chosen
+            .iter()
+            .copied()
+            .filter(|row| sockets[*row] != socket)
+            .collect();
         let less = sigmas(&gather(&rows, &left), &before);
-        LeftOutPlace { count: chosen.len() - left.len(), growth: median(arm.iter().map(|k| less[*k] / proposed[*k]).collect()) }
+        LeftOutPlace {
+            count: chosen.len() - left.len(),
+            growth: median(arm.iter().map(|k| less[*k] / proposed[*k]).collect()),
+        }
     });
     let (sets, without) = (random.len(), without.collect());
     let poses = subset(&drawn, &chosen);
     let offsets = offsets(robot, request, &poses);
-    Ok(BroughtProposal { socket: chosen.iter().map(|row| sockets[*row]).collect(), poses, model, sigma, sets, without, offsets })
+    Ok(BroughtProposal {
+        socket: chosen.iter().map(|row| sockets[*row]).collect(),
+        poses,
+        model,
+        sigma,
+        sets,
+        without,
+        offsets,
+    })
 }
 
 /// How well the postures alone tell the geometry with the ball farther and farther off the last axis: of last joint and ball nothing is seen
@@ -234,7 +347,9 @@ fn offsets(robot: &RobotModel, request: &BroughtRequest, poses: &Measurements) -
     let (axis, home) = (robot.axis(last), robot.home().translation);
     let arm = home - robot.point(last);
     let from_axis = arm - axis * axis.dot(&arm);
-    let side = from_axis.try_normalize(1e-6).unwrap_or_else(|| axis.cross(&Vector3::ith(axis.iamin(), 1.0)).normalize());
+    let side = from_axis
+        .try_normalize(1e-6)
+        .unwrap_or_else(|| axis.cross(&Vector3::ith(axis.iamin(), 1.0)).normalize());
     let now = from_axis.norm();
     let tried = std::iter::once(now).chain(OFF.into_iter().filter(|off| *off > now + 1e-3));
     let one = |off: f64| {
@@ -242,10 +357,16 @@ fn offsets(robot: &RobotModel, request: &BroughtRequest, poses: &Measurements) -
         let rows: Vec<usize> = (0..poses.rows()).collect();
         let data = closed(&model, poses, &rows)?;
         let theory = rank(&model.robot, &data, &rows, false, 0)?;
-        let directions = theory.saturating_sub(model.robot.setup().first_of_anchor(request.places.len()));
+        let directions =
+            theory.saturating_sub(model.robot.setup().first_of_anchor(request.places.len()));
         let sigmas = geometry(&model, &data, directions);
         let known = sigmas.iter().filter(|sigma| **sigma <= UNIT).count();
-        Some(BallOffset { off, directions, known, weakest: sigmas.last().copied()? })
+        Some(BallOffset {
+            off,
+            directions,
+            known,
+            weakest: sigmas.last().copied()?,
+        })
     };
     tried.filter_map(one).collect()
 }
@@ -262,9 +383,21 @@ fn geometry(model: &Model, data: &Measurements, count: usize) -> Vec<f64> {
     let scale: Vec<f64> = last.iter().map(|k| UNIT / specs[*k].prior_sigma).collect();
     let all = factor(&PointJacobian::given(model, order, Vec::new()).rows(model, data));
     let p = last.len();
-    let rest = Mat::from_fn(p, p + 1, |i, j| if j < p && i <= j { all.entry(first + i, first + j) } else { 0.0 });
+    let rest = Mat::from_fn(p, p + 1, |i, j| {
+        if j < p && i <= j {
+            all.entry(first + i, first + j)
+        } else {
+            0.0
+        }
+    });
     let seen = TriangularFactor::of(&rest).singular_values(&scale);
     let largest = seen.first().copied().unwrap_or_default();
-    let sigma = |value: &f64| if *value > UNSEEN * largest { UNIT / value } else { f64::INFINITY };
+    let sigma = |value: &f64| {
+        if *value > UNSEEN * largest {
+            UNIT / value
+        } else {
+            f64::INFINITY
+        }
+    };
     seen.iter().take(count).map(sigma).collect()
 }

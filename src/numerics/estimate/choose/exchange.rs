@@ -30,24 +30,51 @@ pub(super) struct Criterion {
 
 impl DesignTerm {
     /// `None` where the candidates do not tell the parameters.
-    pub fn new(weight: f64, jacobian: PointJacobian, model: &Model, drawn: &Measurements) -> Option<Self> {
+    pub fn new(
+        weight: f64,
+        jacobian: PointJacobian,
+        model: &Model,
+        drawn: &Measurements,
+    ) -> Option<Self> {
         let scale = (drawn.rows() as f64).sqrt();
         let inverse = factor(&jacobian.rows(model, drawn)).inverse()?;
-        let round = Mat::from_fn(inverse.size(), inverse.size(), |i, j| inverse.at(i, j) * scale);
-        Some(Self { weight, jacobian, round, ridge: *RIDGE })
+        let round = Mat::from_fn(inverse.size(), inverse.size(), |i, j| {
+            inverse.at(i, j) * scale
+        });
+        Some(Self {
+            weight,
+            jacobian,
+            round,
+            ridge: *RIDGE,
+        })
     }
 
     /// Beside what is known before: the factor of its rows. `None` where that leaves a direction free.
     pub fn beside(weight: f64, jacobian: PointJacobian, known: &TriangularFactor) -> Option<Self> {
         let inverse = known.inverse()?;
         let round = Mat::from_fn(inverse.size(), inverse.size(), |i, j| inverse.at(i, j));
-        Some(Self { weight, jacobian, round, ridge: 1.0 })
+        Some(Self {
+            weight,
+            jacobian,
+            round,
+            ridge: 1.0,
+        })
     }
 
     fn state(&self, model: &Model, pool: &Measurements) -> State {
-        let rows = product(self.jacobian.rows(model, pool).as_ref(), self.round.as_ref());
+        let rows = product(
+            self.jacobian.rows(model, pool).as_ref(),
+            self.round.as_ref(),
+        );
         let (p, spread) = (self.round.ncols(), vec![[0.0; 6]; pool.rows()]);
-        State { weight: self.weight, p, ridge: self.ridge, rows, cover: Mat::zeros(0, 0), spread }
+        State {
+            weight: self.weight,
+            p,
+            ridge: self.ridge,
+            rows,
+            cover: Mat::zeros(0, 0),
+            spread,
+        }
     }
 }
 
@@ -77,22 +104,33 @@ impl State {
         let p = self.p;
         let mut seen = Mat::zeros(3 * chosen.len(), p);
         for (i, candidate) in chosen.iter().enumerate() {
-            seen.as_mut().subrows_mut(3 * i, 3).copy_from(self.block(*candidate));
+            seen.as_mut()
+                .subrows_mut(3 * i, 3)
+                .copy_from(self.block(*candidate));
         }
         let mut information = DMatrix::<f64>::identity(p, p) * self.ridge;
         let squares = product(seen.transpose(), seen.as_ref());
         for j in 0..p {
-            axpy(1.0, squares.col_as_slice(j), information.column_mut(j).as_mut_slice());
+            axpy(
+                1.0,
+                squares.col_as_slice(j),
+                information.column_mut(j).as_mut_slice(),
+            );
         }
         // Positive definite by its ridge.
-        let cover = information.cholesky().map_or_else(|| DMatrix::identity(p, p), |factor| factor.inverse());
+        let cover = information
+            .cholesky()
+            .map_or_else(|| DMatrix::identity(p, p), |factor| factor.inverse());
         self.cover = Mat::from_fn(p, p, |i, j| cover[(i, j)]);
         let wide = product(self.rows.as_ref(), self.cover.as_ref());
         self.spread.fill([0.0; 6]);
         for j in 0..p {
             let (rows, wide) = (self.rows.col_as_slice(j), wide.col_as_slice(j));
             for (candidate, spread) in self.spread.iter_mut().enumerate() {
-                let (a, b) = (&rows[3 * candidate..3 * candidate + 3], &wide[3 * candidate..3 * candidate + 3]);
+                let (a, b) = (
+                    &rows[3 * candidate..3 * candidate + 3],
+                    &wide[3 * candidate..3 * candidate + 3],
+                );
                 spread[0] += a[0] * b[0];
                 spread[1] += a[1] * b[1];
                 spread[2] += a[2] * b[2];
@@ -107,17 +145,30 @@ impl State {
     fn update(&mut self, candidate: usize, sign: f64) {
         let wide = product(self.cover.as_ref(), self.block(candidate).transpose());
         let own = Matrix3::from_fn(|a, c| self.spread[candidate][PLACE[a][c]]);
-        let Some(small) = (Matrix3::identity() * sign + own).try_inverse() else { return };
+        let Some(small) = (Matrix3::identity() * sign + own).try_inverse() else {
+            return;
+        };
         let small = Mat::from_fn(3, 3, |a, c| small[(a, c)]);
         let left = product(wide.as_ref(), small.as_ref());
-        matmul(&mut self.cover, Accum::Add, &left, wide.transpose(), -1.0, Par::Seq);
+        matmul(
+            &mut self.cover,
+            Accum::Add,
+            &left,
+            wide.transpose(),
+            -1.0,
+            Par::Seq,
+        );
         let across = product(self.rows.as_ref(), wide.as_ref());
         let inside = product(across.as_ref(), small.as_ref());
-        let [across, inside] = [&across, &inside].map(|m| [m.col_as_slice(0), m.col_as_slice(1), m.col_as_slice(2)]);
+        let [across, inside] =
+            [&across, &inside].map(|m| [m.col_as_slice(0), m.col_as_slice(1), m.col_as_slice(2)]);
         for (other, spread) in self.spread.iter_mut().enumerate() {
             let (x, y, z) = (3 * other, 3 * other + 1, 3 * other + 2);
-            let part =
-                |a: usize, c: usize| inside[0][a] * across[0][c] + inside[1][a] * across[1][c] + inside[2][a] * across[2][c];
+            let part = |a: usize, c: usize| {
+                inside[0][a] * across[0][c]
+                    + inside[1][a] * across[1][c]
+                    + inside[2][a] * across[2][c]
+            };
             spread[0] -= part(x, x);
             spread[1] -= part(y, y);
             spread[2] -= part(z, z);
@@ -138,8 +189,18 @@ impl State {
 
 impl Criterion {
     /// `count` rows of the pool, from `start` or, where that is shorter, filled up greedily.
-    pub fn exchange(&self, model: &Model, pool: &Measurements, start: &[usize], count: usize) -> Vec<usize> {
-        let mut states: Vec<State> = self.terms.iter().map(|term| term.state(model, pool)).collect();
+    pub fn exchange(
+        &self,
+        model: &Model,
+        pool: &Measurements,
+        start: &[usize],
+        count: usize,
+    ) -> Vec<usize> {
+        let mut states: Vec<State> = self
+            .terms
+            .iter()
+            .map(|term| term.state(model, pool))
+            .collect();
         let mut chosen = start.to_vec();
         let mut taken = vec![false; pool.rows()];
         for candidate in &chosen {
@@ -147,7 +208,9 @@ impl Criterion {
         }
         states.iter_mut().for_each(|state| state.reset(&chosen));
         while chosen.len() < count {
-            let Some((best, _)) = best(&states, &taken) else { break };
+            let Some((best, _)) = best(&states, &taken) else {
+                break;
+            };
             states.iter_mut().for_each(|state| state.update(best, 1.0));
             taken[best] = true;
             chosen.push(best);
@@ -158,7 +221,9 @@ impl Criterion {
                 let old = *slot;
                 states.iter_mut().for_each(|state| state.update(old, -1.0));
                 let stay: f64 = states.iter().map(|state| state.gain(old)).sum();
-                let next = best(&states, &taken).filter(|(_, gain)| *gain > stay + *WORTH).map_or(old, |(other, _)| other);
+                let next = best(&states, &taken)
+                    .filter(|(_, gain)| *gain > stay + *WORTH)
+                    .map_or(old, |(other, _)| other);
                 if next != old {
                     (taken[old], taken[next]) = (false, true);
                     *slot = next;

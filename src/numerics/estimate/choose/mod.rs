@@ -12,11 +12,15 @@ mod spread;
 mod t_optimal;
 mod visit_order;
 
-pub use brought::{BallOffset, BroughtProposal, BroughtRequest, LeftOutPlace, PriorSigma, propose_brought};
+pub use brought::{
+    BallOffset, BroughtProposal, BroughtRequest, LeftOutPlace, PriorSigma, propose_brought,
+};
 pub use point_jacobian::{PointJacobian, Score};
 pub use site::{Circumstances, Site};
 pub use spread::spread;
-pub use t_optimal::{Alternative, Discrimination, DiscriminationProblem, MIN_SEPARATION_L, Proposed, tell};
+pub use t_optimal::{
+    Alternative, Discrimination, DiscriminationProblem, MIN_SEPARATION_L, Proposed, tell,
+};
 
 use super::model::Model;
 use crate::criteria::choose::{RANDOM_SETS, STEPS, WORKSPACE};
@@ -89,10 +93,19 @@ pub struct Separation {
 /// Proposes poses for a model; fails with a sentence when no such poses are possible.
 pub fn propose(model: Model, site: &Site, wish: &DesignRequest) -> Result<Proposal, String> {
     let mut drawn = site.draw(&model.robot, wish.candidates, wish.sigma, wish.seed)?;
-    let workspace =
-        site.draw(&model.robot, WORKSPACE.div_ceil(site.payloads.len()), wish.sigma, wish.seed ^ *WORKSPACE as u64)?;
+    let workspace = site.draw(
+        &model.robot,
+        WORKSPACE.div_ceil(site.payloads.len()),
+        wish.sigma,
+        wish.seed ^ *WORKSPACE as u64,
+    )?;
     if drawn.rows() < 2 * wish.count {
-        return Err(format!("{} candidates are few for {} poses: take at least {}", drawn.rows(), wish.count, 20 * wish.count));
+        return Err(format!(
+            "{} candidates are few for {} poses: take at least {}",
+            drawn.rows(),
+            wish.count,
+            20 * wish.count
+        ));
     }
     drawn.points.position = model.predict(&drawn);
     let all: Vec<usize> = (0..model.stack.specs().len()).collect();
@@ -100,17 +113,33 @@ pub fn propose(model: Model, site: &Site, wish: &DesignRequest) -> Result<Propos
         Aim::Information => vec![(1.0, all)],
         Aim::Separation([a, b]) => {
             let (a, b) = (parameters(&model, a)?, parameters(&model, b)?);
-            let rest: Vec<usize> = all.into_iter().filter(|k| !a.contains(k) && !b.contains(k)).collect();
-            vec![(2.0, [&rest[..], &b, &a].concat()), (-1.0, [&rest[..], &b].concat()), (-1.0, [&rest[..], &a].concat())]
+            let rest: Vec<usize> = all
+                .into_iter()
+                .filter(|k| !a.contains(k) && !b.contains(k))
+                .collect();
+            vec![
+                (2.0, [&rest[..], &b, &a].concat()),
+                (-1.0, [&rest[..], &b].concat()),
+                (-1.0, [&rest[..], &a].concat()),
+            ]
         }
     };
-    let jacobians: Vec<(f64, PointJacobian)> =
-        orders.iter().map(|(weight, order)| (*weight, PointJacobian::of(&model, &drawn, order))).collect();
-    let Some((_, whole)) = jacobians.first() else { return Err("nothing to choose for".into()) };
+    let jacobians: Vec<(f64, PointJacobian)> = orders
+        .iter()
+        .map(|(weight, order)| (*weight, PointJacobian::of(&model, &drawn, order)))
+        .collect();
+    let Some((_, whole)) = jacobians.first() else {
+        return Err("nothing to choose for".into());
+    };
     check(wish, &jacobians, whole)?;
-    let terms = jacobians.iter().map(|(weight, jacobian)| DesignTerm::new(*weight, jacobian.clone(), &model, &drawn));
-    let criterion =
-        Criterion { terms: terms.collect::<Option<_>>().ok_or("the candidate poses do not separate the parameters")? };
+    let terms = jacobians
+        .iter()
+        .map(|(weight, jacobian)| DesignTerm::new(*weight, jacobian.clone(), &model, &drawn));
+    let criterion = Criterion {
+        terms: terms
+            .collect::<Option<_>>()
+            .ok_or("the candidate poses do not separate the parameters")?,
+    };
 
     let chosen = criterion.exchange(&model, &drawn, &[], wish.count);
     let mut poses = subset(&drawn, &chosen);
@@ -118,7 +147,10 @@ pub fn propose(model: Model, site: &Site, wish: &DesignRequest) -> Result<Propos
     for step in *STEPS {
         let pool = site.around(&model.robot, &poses, step, &mut draw);
         let start: Vec<usize> = (0..wish.count).collect();
-        poses = subset(&pool, &criterion.exchange(&model, &pool, &start, wish.count));
+        poses = subset(
+            &pool,
+            &criterion.exchange(&model, &pool, &start, wish.count),
+        );
     }
     let mut poses = subset(&poses, &visit_order::order(&poses, &site.ranges));
     poses.points.position = model.predict(&poses);
@@ -127,22 +159,43 @@ pub fn propose(model: Model, site: &Site, wish: &DesignRequest) -> Result<Propos
 
     let sets = random_sets(&drawn, wish.count, wish.seed);
     let (rows, around) = (whole.rows(&model, &drawn), whole.rows(&model, &workspace));
-    let random: Vec<Score> = sets.par_iter().map(|set| whole.score_rows(&gather(&rows, set), &around, &workspace)).collect();
+    let random: Vec<Score> = sets
+        .par_iter()
+        .map(|set| whole.score_rows(&gather(&rows, set), &around, &workspace))
+        .collect();
     let score = whole.score_rows(&whole.rows(&model, &poses), &around, &workspace);
     let separation = match &wish.aim {
         Aim::Information => Vec::new(),
         Aim::Separation(names) => separations(&model, names, &drawn, &poses, &sets)?,
     };
-    Ok(Proposal { poses, direction, approach_seen, jacobian: whole, score, random, separation, workspace })
+    Ok(Proposal {
+        poses,
+        direction,
+        approach_seen,
+        jacobian: whole,
+        score,
+        random,
+        separation,
+        workspace,
+    })
 }
 
 /// Positions in the stack of an effect's parameters.
 fn parameters(model: &Model, name: &str) -> Result<Vec<usize>, String> {
-    let found = model.stack.effects().find(|(effect, _)| effect.name() == name);
-    found.map(|(_, range)| range.collect()).ok_or_else(|| format!("`{name}` is not among the effects of this model"))
+    let found = model
+        .stack
+        .effects()
+        .find(|(effect, _)| effect.name() == name);
+    found
+        .map(|(_, range)| range.collect())
+        .ok_or_else(|| format!("`{name}` is not among the effects of this model"))
 }
 
-fn check(wish: &DesignRequest, jacobians: &[(f64, PointJacobian)], whole: &PointJacobian) -> Result<(), String> {
+fn check(
+    wish: &DesignRequest,
+    jacobians: &[(f64, PointJacobian)],
+    whole: &PointJacobian,
+) -> Result<(), String> {
     let parameters = whole.free().len();
     if parameters == 0 {
         return Err("no parameter of these effects shows at the allowed poses".into());
@@ -176,19 +229,34 @@ fn separations(
     let mut out = Vec::new();
     for (effect, rival) in [(a, b), (b, a)] {
         let (own, other) = (parameters(model, effect)?, parameters(model, rival)?);
-        let rest: Vec<usize> = (0..model.stack.specs().len()).filter(|k| !own.contains(k) && !other.contains(k)).collect();
+        let rest: Vec<usize> = (0..model.stack.specs().len())
+            .filter(|k| !own.contains(k) && !other.contains(k))
+            .collect();
         let jacobian = PointJacobian::of(model, drawn, &[&rest[..], &other, &own].concat());
-        let told: Vec<usize> = jacobian.free().iter().copied().filter(|k| own.contains(k)).collect();
+        let told: Vec<usize> = jacobian
+            .free()
+            .iter()
+            .copied()
+            .filter(|k| own.contains(k))
+            .collect();
         let (log, sigma) = jacobian.remainder(&jacobian.rows(model, poses), told.len());
         let rows = jacobian.rows(model, drawn);
-        let random: Vec<(f64, Vec<f64>)> =
-            sets.par_iter().map(|set| jacobian.remainder(&gather(&rows, set), told.len())).collect();
+        let random: Vec<(f64, Vec<f64>)> = sets
+            .par_iter()
+            .map(|set| jacobian.remainder(&gather(&rows, set), told.len()))
+            .collect();
         let usual = median(random.iter().map(|(log, _)| *log).collect());
         let sigma = told
             .iter()
             .zip(&sigma)
             .enumerate()
-            .map(|(i, (parameter, sigma))| (*parameter, *sigma, median(random.iter().map(|(_, all)| all[i]).collect())));
+            .map(|(i, (parameter, sigma))| {
+                (
+                    *parameter,
+                    *sigma,
+                    median(random.iter().map(|(_, all)| all[i]).collect()),
+                )
+            });
         out.push(Separation {
             effect: effect.clone(),
             rival: rival.clone(),
@@ -204,14 +272,33 @@ fn separations(
 pub(super) fn subset(data: &Measurements, rows: &[usize]) -> Measurements {
     Measurements {
         joints: data.joints,
-        q: rows.iter().flat_map(|row| data.q(*row).iter().copied()).collect(),
+        q: rows
+            .iter()
+            .flat_map(|row| data.q(*row).iter().copied())
+            .collect(),
         points: data.points.subset(rows),
         payload: rows.iter().map(|row| data.payload[*row]).collect(),
-        time: data.time.as_ref().map(|all| rows.iter().map(|row| all[*row]).collect()),
-        temperature: data.temperature.as_ref().map(|all| rows.iter().map(|row| all[*row]).collect()),
-        circumstances: data.circumstances.iter().map(|(name, all)| (*name, picked(all, data.rows(), rows))).collect(),
-        direction: data.direction.as_ref().map(|all| picked(all, data.rows(), rows)),
-        target: data.target.as_ref().map(|all| Named::of(rows.iter().map(|row| all.name(*row)))),
+        time: data
+            .time
+            .as_ref()
+            .map(|all| rows.iter().map(|row| all[*row]).collect()),
+        temperature: data
+            .temperature
+            .as_ref()
+            .map(|all| rows.iter().map(|row| all[*row]).collect()),
+        circumstances: data
+            .circumstances
+            .iter()
+            .map(|(name, all)| (*name, picked(all, data.rows(), rows)))
+            .collect(),
+        direction: data
+            .direction
+            .as_ref()
+            .map(|all| picked(all, data.rows(), rows)),
+        target: data
+            .target
+            .as_ref()
+            .map(|all| Named::of(rows.iter().map(|row| all.name(*row)))),
         readings: data.readings.iter().map(|own| own.subset(rows)).collect(),
         ..Measurements::default()
     }
@@ -220,7 +307,9 @@ pub(super) fn subset(data: &Measurements, rows: &[usize]) -> Measurements {
 /// The numbers of these rows, of a quantity with as many for each of `count` rows.
 fn picked(all: &[f64], count: usize, rows: &[usize]) -> Vec<f64> {
     let width = all.len() / count.max(1);
-    rows.iter().flat_map(|row| all[row * width..(row + 1) * width].iter().copied()).collect()
+    rows.iter()
+        .flat_map(|row| all[row * width..(row + 1) * width].iter().copied())
+        .collect()
 }
 
 /// Sets of `count` different candidates, drawn evenly.

@@ -46,16 +46,38 @@ impl PointJacobian {
     /// Which of the parameters in `order` the data would see; the earlier one stays where two do the same.
     pub(super) fn of(model: &Model, data: &Measurements, order: &[usize]) -> Self {
         let rows: Vec<usize> = (0..data.rows()).collect();
-        let factor = Problem { data, rows: &rows, excess: ExcessSigma::default() }.evaluate(model, order).factor;
+        let factor = Problem {
+            data,
+            rows: &rows,
+            excess: ExcessSigma::default(),
+        }
+        .evaluate(model, order)
+        .factor;
         let prior = |k: &usize| model.stack.specs()[*k].prior_sigma;
         let seen = visibility(&factor, &order.iter().map(prior).collect::<Vec<_>>());
-        let free: Vec<usize> = order.iter().zip(&seen).filter(|(_, v)| **v == Visibility::Seen).map(|(k, _)| *k).collect();
-        Self { prior: free.iter().map(prior).collect(), free, sized: Vec::new() }
+        let free: Vec<usize> = order
+            .iter()
+            .zip(&seen)
+            .filter(|(_, v)| **v == Visibility::Seen)
+            .map(|(k, _)| *k)
+            .collect();
+        Self {
+            prior: free.iter().map(prior).collect(),
+            free,
+            sized: Vec::new(),
+        }
     }
 
     /// All parameters in `free`, seen or not; last, as one, what those in `sized` do at these sizes (SI).
     pub(super) fn given(model: &Model, free: Vec<usize>, sized: Vec<(usize, f64)>) -> Self {
-        Self { prior: free.iter().map(|k| model.stack.specs()[*k].prior_sigma).collect(), free, sized }
+        Self {
+            prior: free
+                .iter()
+                .map(|k| model.stack.specs()[*k].prior_sigma)
+                .collect(),
+            free,
+            sized,
+        }
     }
 
     /// Positions in the stack.
@@ -71,7 +93,9 @@ impl PointJacobian {
         for (j, parameter) in self.free.iter().enumerate() {
             column[*parameter] = j;
         }
-        self.sized.iter().for_each(|(parameter, of)| size[*parameter] += of);
+        self.sized
+            .iter()
+            .for_each(|(parameter, of)| size[*parameter] += of);
         let mut scale = self.prior.clone();
         scale.extend((!self.sized.is_empty()).then_some(1.0));
         let p = scale.len();
@@ -101,8 +125,13 @@ impl PointJacobian {
                 },
             )
             .collect();
-        let closing = |row: usize| data.reading(SocketKind.about().name, row).map(|reading| Vector3::repeat(reading.sigma));
-        let sigma: Vec<Vector3<f64>> = (0..data.rows()).map(|row| closing(row).unwrap_or(data.points.sigma[row])).collect();
+        let closing = |row: usize| {
+            data.reading(SocketKind.about().name, row)
+                .map(|reading| Vector3::repeat(reading.sigma))
+        };
+        let sigma: Vec<Vector3<f64>> = (0..data.rows())
+            .map(|row| closing(row).unwrap_or(data.points.sigma[row]))
+            .collect();
         let mut out = Mat::zeros(3 * data.rows(), p);
         for (j, scale) in scale.iter().enumerate() {
             let column = out.col_as_slice_mut(j);
@@ -118,11 +147,20 @@ impl PointJacobian {
 
     /// What measuring `data` would give, with the prediction's uncertainty at the poses of `workspace`.
     pub fn score(&self, model: &Model, data: &Measurements, workspace: &Measurements) -> Score {
-        self.score_rows(&self.rows(model, data), &self.rows(model, workspace), workspace)
+        self.score_rows(
+            &self.rows(model, data),
+            &self.rows(model, workspace),
+            workspace,
+        )
     }
 
     /// The same of [`Self::rows`] of the data and of the workspace.
-    pub(super) fn score_rows(&self, rows: &Mat<f64>, around: &Mat<f64>, workspace: &Measurements) -> Score {
+    pub(super) fn score_rows(
+        &self,
+        rows: &Mat<f64>,
+        around: &Mat<f64>,
+        workspace: &Measurements,
+    ) -> Score {
         let (p, points) = (self.free.len(), rows.nrows() / 3);
         let factor = factor(rows);
         // The singular values' product is that of the diagonal.
@@ -130,7 +168,14 @@ impl PointJacobian {
         let o1 = mean_log.exp() / (points as f64).sqrt();
         let Some(inverse) = factor.inverse() else {
             let (sigma, none) = (vec![f64::INFINITY; p], f64::INFINITY);
-            return Score { points, o1, sigma, median: none, p95: none, max: none };
+            return Score {
+                points,
+                o1,
+                sigma,
+                median: none,
+                p95: none,
+                max: none,
+            };
         };
         let inverse = Mat::from_fn(p, p, |i, j| inverse.at(i, j));
         let sigma = (0..p).map(|i| self.prior[i] * norm((i..p).map(|j| inverse[(i, j)])));
@@ -141,10 +186,23 @@ impl PointJacobian {
                 *sum += value * value;
             }
         }
-        let length = |(squares, sigma): (&[f64], &Vector3<f64>)| norm((0..3).map(|axis| squares[axis].sqrt() * sigma[axis]));
-        let mut lengths: Vec<f64> = squares.chunks_exact(3).zip(&workspace.points.sigma).map(length).collect();
+        let length = |(squares, sigma): (&[f64], &Vector3<f64>)| {
+            norm((0..3).map(|axis| squares[axis].sqrt() * sigma[axis]))
+        };
+        let mut lengths: Vec<f64> = squares
+            .chunks_exact(3)
+            .zip(&workspace.points.sigma)
+            .map(length)
+            .collect();
         let mut at = |share: f64| nearest(&mut lengths, share).unwrap_or(f64::NAN);
-        Score { points, o1, sigma: sigma.collect(), p95: at(0.95), max: at(1.0), median: at(0.5) }
+        Score {
+            points,
+            o1,
+            sigma: sigma.collect(),
+            p95: at(0.95),
+            max: at(1.0),
+            median: at(0.5),
+        }
     }
 
     /// The log determinant of what [`Self::rows`] leave of the last `count` parameters when all others were fitted, and their
@@ -152,9 +210,18 @@ impl PointJacobian {
     pub(super) fn remainder(&self, rows: &Mat<f64>, count: usize) -> (f64, Vec<f64>) {
         let p = self.free.len();
         let factor = factor(rows);
-        let log = (p - count..p).map(|j| 2.0 * factor.column(j)[j].abs().ln()).sum();
-        let Some(inverse) = factor.inverse() else { return (log, vec![f64::INFINITY; count]) };
-        (log, (p - count..p).map(|i| self.prior[i] * norm((i..p).map(|j| inverse.at(i, j)))).collect())
+        let log = (p - count..p)
+            .map(|j| 2.0 * factor.column(j)[j].abs().ln())
+            .sum();
+        let Some(inverse) = factor.inverse() else {
+            return (log, vec![f64::INFINITY; count]);
+        };
+        (
+            log,
+            (p - count..p)
+                .map(|i| self.prior[i] * norm((i..p).map(|j| inverse.at(i, j))))
+                .collect(),
+        )
     }
 }
 

@@ -38,21 +38,39 @@ impl Circumstances {
         let rows = data.rows();
         data.time = self.time.map(|time| vec![time; rows]);
         data.temperature = self.temperature.map(|temperature| vec![temperature; rows]);
-        data.target = self.target.as_deref().map(|name| Named::of((0..rows).map(|_| name)));
+        data.target = self
+            .target
+            .as_deref()
+            .map(|name| Named::of((0..rows).map(|_| name)));
         let sides = data.direction.get_or_insert_default();
-        sides.extend((sides.len()..rows * data.joints).map(|_| if draw.random::<bool>() { 1.0 } else { -1.0 }));
+        sides.extend(
+            (sides.len()..rows * data.joints)
+                .map(|_| if draw.random::<bool>() { 1.0 } else { -1.0 }),
+        );
     }
 }
 
 impl Site {
     /// `count` even random poses, each once with every payload; fails with a sentence when the region is (nearly) empty.
-    pub fn draw(&self, robot: &RobotModel, count: usize, sigma: f64, seed: u64) -> Result<Measurements, String> {
+    pub fn draw(
+        &self,
+        robot: &RobotModel,
+        count: usize,
+        sigma: f64,
+        seed: u64,
+    ) -> Result<Measurements, String> {
         let mut draw = ChaCha8Rng::seed_from_u64(seed);
-        let mut out = Measurements { joints: robot.joints(), ..Measurements::default() };
+        let mut out = Measurements {
+            joints: robot.joints(),
+            ..Measurements::default()
+        };
         for _ in 0..count {
             let q = (0..*TRIES).find_map(|_| {
-                let q: Vec<f64> =
-                    self.ranges.iter().map(|[lower, upper]| lower + (upper - lower) * draw.random::<f64>()).collect();
+                let q: Vec<f64> = self
+                    .ranges
+                    .iter()
+                    .map(|[lower, upper]| lower + (upper - lower) * draw.random::<f64>())
+                    .collect();
                 self.allows(robot, &q).then_some(q)
             });
             let Some(q) = q else {
@@ -68,7 +86,13 @@ impl Site {
 
     /// The poses themselves, then allowed neighbours of each: every joint alone moved by up to `step` of its range, or to its ends,
     /// and all joints together; with every payload.
-    pub(super) fn around(&self, robot: &RobotModel, poses: &Measurements, step: f64, draw: &mut ChaCha8Rng) -> Measurements {
+    pub(super) fn around(
+        &self,
+        robot: &RobotModel,
+        poses: &Measurements,
+        step: f64,
+        draw: &mut ChaCha8Rng,
+    ) -> Measurements {
         let mut out = poses.clone();
         for row in 0..poses.rows() {
             let here = poses.q(row);
@@ -87,12 +111,20 @@ impl Site {
                 };
                 offer(by(here[joint] - width * draw.random::<f64>()));
                 offer(by(here[joint] + width * draw.random::<f64>()));
-                offer(by(if here[joint] > 0.5 * (lower + upper) { *upper } else { *lower }));
+                offer(by(if here[joint] > 0.5 * (lower + upper) {
+                    *upper
+                } else {
+                    *lower
+                }));
             }
             for _ in 0..2 {
-                let moved = here.iter().zip(&self.ranges).map(|(value, [lower, upper])| {
-                    (value + step * (upper - lower) * (draw.random::<f64>() - 0.5)).clamp(*lower, *upper)
-                });
+                let moved = here
+                    .iter()
+                    .zip(&self.ranges)
+                    .map(|(value, [lower, upper])| {
+                        (value + step * (upper - lower) * (draw.random::<f64>() - 0.5))
+                            .clamp(*lower, *upper)
+                    });
                 offer(moved.collect());
             }
             offer(here.to_vec());
@@ -103,7 +135,12 @@ impl Site {
     /// Whether a pose is inside the box and above the floor.
     pub fn allows(&self, robot: &RobotModel, q: &[f64]) -> bool {
         let mut frame = Pose::identity();
-        for ((twist, value), joint) in robot.screws().iter().zip(q).zip(&robot.description().joints) {
+        for ((twist, value), joint) in robot
+            .screws()
+            .iter()
+            .zip(q)
+            .zip(&robot.description().joints)
+        {
             frame = frame * Pose::exp(&(twist * *value));
             if let Some(centre) = joint.centre.filter(|centre| centre[2] >= self.floor)
                 && frame.point(&Vector3::from(centre)).z < self.floor
@@ -112,7 +149,11 @@ impl Site {
             }
         }
         let point = frame.point(&robot.home().translation);
-        point.z >= self.floor && point.iter().zip(&self.bounds).all(|(value, [lower, upper])| (lower..=upper).contains(&value))
+        point.z >= self.floor
+            && point
+                .iter()
+                .zip(&self.bounds)
+                .all(|(value, [lower, upper])| (lower..=upper).contains(&value))
     }
 
     fn push(&self, out: &mut Measurements, robot: &RobotModel, q: &[f64], sigma: f64) {

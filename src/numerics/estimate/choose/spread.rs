@@ -9,11 +9,13 @@ pub fn spread(robot: &RobotModel, rows: usize) -> Measurements {
     let n = robot.joints();
     let golden = (0..60).fold(1.5f64, |x, _| (1.0 + x).powf(1.0 / (n as f64 + 1.0)));
     let limits = |j: usize| robot.description().joints[j].limits.unwrap_or([-1.0, 1.0]);
-    let q = (0..rows).flat_map(|row| (0..n).map(move |j| (row, j))).map(|(row, j)| {
-        let share = (0.5 + (row as f64 + 1.0) * golden.powi(-(j as i32) - 1)).fract();
-        let [lower, upper] = limits(j);
-        lower + share * (upper - lower)
-    });
+    let q = (0..rows)
+        .flat_map(|row| (0..n).map(move |j| (row, j)))
+        .map(|(row, j)| {
+            let share = (0.5 + (row as f64 + 1.0) * golden.powi(-(j as i32) - 1)).fract();
+            let [lower, upper] = limits(j);
+            lower + share * (upper - lower)
+        });
     Measurements {
         joints: n,
         q: q.collect(),

@@ -75,22 +75,41 @@ struct View {
 }
 
 impl View {
-    fn of(problem: &DiscriminationProblem, truth: usize, data: &Measurements, rows: &[usize]) -> Self {
+    fn of(
+        problem: &DiscriminationProblem,
+        truth: usize,
+        data: &Measurements,
+        rows: &[usize],
+    ) -> Self {
         let (side, other) = (&problem.sides[truth], &problem.sides[1 - truth]);
-        let more = other.parameters.iter().filter(|k| !problem.nuisances.contains(k));
+        let more = other
+            .parameters
+            .iter()
+            .filter(|k| !problem.nuisances.contains(k));
         let free: Vec<usize> = problem.nuisances.iter().chain(more).copied().collect();
-        let sized = side.parameters.iter().copied().zip(side.sizes.iter().copied()).collect();
+        let sized = side
+            .parameters
+            .iter()
+            .copied()
+            .zip(side.sizes.iter().copied())
+            .collect();
         let jacobian = PointJacobian::given(&problem.model, free.clone(), sized);
         let seen = gather(&jacobian.rows(&problem.model, data), rows);
         // One prior sigma of every parameter, and one of L, keep what no row tells apart from being nothing.
         let known = factor(&stacked(&Mat::identity(seen.ncols(), seen.ncols()), &seen));
-        Self { jacobian, rest: PointJacobian::given(&problem.model, free, Vec::new()), known }
+        Self {
+            jacobian,
+            rest: PointJacobian::given(&problem.model, free, Vec::new()),
+            known,
+        }
     }
 
     /// L of the recorded rows and these.
     fn separation(&self, rows: &Mat<f64>) -> f64 {
         let size = self.known.parameters();
-        let known = Mat::from_fn(size, size, |i, j| if i <= j { self.known.column(j)[i] } else { 0.0 });
+        let known = Mat::from_fn(size, size, |i, j| {
+            if i <= j { self.known.column(j)[i] } else { 0.0 }
+        });
         let last = factor(&stacked(&known, rows)).column(size - 1)[size - 1];
         (last * last - 1.0).max(0.0)
     }
@@ -99,7 +118,10 @@ impl View {
     fn terms(&self) -> Option<[DesignTerm; 2]> {
         let all: Vec<usize> = (0..self.known.parameters() - 1).collect();
         let rest = self.known.select(&all);
-        Some([DesignTerm::beside(1.0, self.jacobian.clone(), &self.known)?, DesignTerm::beside(-1.0, self.rest.clone(), &rest)?])
+        Some([
+            DesignTerm::beside(1.0, self.jacobian.clone(), &self.known)?,
+            DesignTerm::beside(-1.0, self.rest.clone(), &rest)?,
+        ])
     }
 }
 
@@ -115,24 +137,43 @@ pub fn tell(
     let mut draw = ChaCha8Rng::seed_from_u64(wish.seed.wrapping_add(1));
     let mut drawn = site.draw(&model.robot, wish.candidates, wish.sigma, wish.seed)?;
     if drawn.rows() < 2 * wish.count {
-        return Err(format!("{} candidates are few for {} poses: take at least {}", drawn.rows(), wish.count, 20 * wish.count));
+        return Err(format!(
+            "{} candidates are few for {} poses: take at least {}",
+            drawn.rows(),
+            wish.count,
+            20 * wish.count
+        ));
     }
     circumstances.complete(&mut drawn, &mut draw);
     let views = [0, 1].map(|truth| View::of(problem, truth, data, rows));
-    let all: Vec<Mat<f64>> = views.iter().map(|view| view.jacobian.rows(model, &drawn)).collect();
+    let all: Vec<Mat<f64>> = views
+        .iter()
+        .map(|view| view.jacobian.rows(model, &drawn))
+        .collect();
     let before = [0, 1].map(|truth| views[truth].separation(&Mat::zeros(0, all[truth].ncols())));
     let alike = [0, 1].map(|truth| {
         let whole = |rows: &Mat<f64>| rows.col(rows.ncols() - 1).squared_norm_l2();
         let seen = gather(&views[truth].jacobian.rows(model, data), rows);
-        before[truth] < MIN_SEPARATION_L && views[truth].separation(&all[truth]) <= NOTHING * (whole(&all[truth]) + whole(&seen))
+        before[truth] < MIN_SEPARATION_L
+            && views[truth].separation(&all[truth]) <= NOTHING * (whole(&all[truth]) + whole(&seen))
     });
     if alike == [true; 2] {
-        return Ok(Discrimination { before, alike, proposed: None });
+        return Ok(Discrimination {
+            before,
+            alike,
+            proposed: None,
+        });
     }
-    let terms = views.iter().zip(alike).filter(|(_, alike)| !alike).map(|(view, _)| view.terms());
+    let terms = views
+        .iter()
+        .zip(alike)
+        .filter(|(_, alike)| !alike)
+        .map(|(view, _)| view.terms());
     let terms: Option<Vec<[DesignTerm; 2]>> = terms.collect();
     let terms = terms.ok_or("the recording leaves the parameters undefined")?;
-    let criterion = Criterion { terms: terms.into_iter().flatten().collect() };
+    let criterion = Criterion {
+        terms: terms.into_iter().flatten().collect(),
+    };
     let mut poses = subset(&drawn, &criterion.exchange(model, &drawn, &[], wish.count));
     for step in *STEPS {
         let mut pool = site.around(&model.robot, &poses, step, &mut draw);
@@ -141,25 +182,48 @@ pub fn tell(
         poses = subset(&pool, &criterion.exchange(model, &pool, &start, wish.count));
     }
     let mut poses = subset(&poses, &visit_order::order(&poses, &site.ranges));
-    let separations = |poses: &Measurements| [0, 1].map(|k: usize| views[k].separation(&views[k].jacobian.rows(model, poses)));
+    let separations = |poses: &Measurements| {
+        [0, 1].map(|k: usize| views[k].separation(&views[k].jacobian.rows(model, poses)))
+    };
     let mut after = separations(&poses);
     // Where the side of approach says nothing of the two, it is chosen so that it may say something of others.
     let seen = PointJacobian::of(model, &drawn, &problem.nuisances);
     let (direction, approach_seen) = visit_order::approach(model, &seen, &poses, wish.seed);
-    let turned = Measurements { direction: Some(direction), ..poses.clone() };
+    let turned = Measurements {
+        direction: Some(direction),
+        ..poses.clone()
+    };
     let other = separations(&turned);
     if (0..2).all(|k| other[k] >= after[k] * (1.0 - NOTHING)) {
         (poses, after) = (turned, other);
     }
     let sets = random_sets(&drawn, wish.count, wish.seed);
-    let random = [0, 1].map(|k| median(sets.par_iter().map(|set| views[k].separation(&gather(&all[k], set))).collect()));
+    let random = [0, 1].map(|k| {
+        median(
+            sets.par_iter()
+                .map(|set| views[k].separation(&gather(&all[k], set)))
+                .collect(),
+        )
+    });
     let direction = poses.direction.clone().unwrap_or_default();
-    Ok(Discrimination { before, alike, proposed: Some(Proposed { poses, direction, approach_seen, after, random }) })
+    Ok(Discrimination {
+        before,
+        alike,
+        proposed: Some(Proposed {
+            poses,
+            direction,
+            approach_seen,
+            after,
+            random,
+        }),
+    })
 }
 
 fn stacked(above: &Mat<f64>, below: &Mat<f64>) -> Mat<f64> {
     let mut out = Mat::zeros(above.nrows() + below.nrows(), above.ncols());
     out.as_mut().subrows_mut(0, above.nrows()).copy_from(above);
-    out.as_mut().subrows_mut(above.nrows(), below.nrows()).copy_from(below);
+    out.as_mut()
+        .subrows_mut(above.nrows(), below.nrows())
+        .copy_from(below);
     out
 }

@@ -23,7 +23,11 @@ const ROUNDER: f64 = 6_755_399_441_055_744.0 + 1023.0;
 const EXPONENT: u32 = 52;
 /// Coefficients of `E` (even powers of `f`) and `O` (odd ones): 30240 + 15120 x + 3360 x^2 + 420 x^3 + 30 x^4 + x^5 at `x = f ln 2`,
 /// divided by that of `f^5`.
-const EVEN: [f64; 3] = [30240.0 / (LN_2 * LN_2 * LN_2 * LN_2 * LN_2), 3360.0 / (LN_2 * LN_2 * LN_2), 30.0 / LN_2];
+const EVEN: [f64; 3] = [
+    30240.0 / (LN_2 * LN_2 * LN_2 * LN_2 * LN_2),
+    3360.0 / (LN_2 * LN_2 * LN_2),
+    30.0 / LN_2,
+];
 const ODD: [f64; 2] = [15120.0 / (LN_2 * LN_2 * LN_2 * LN_2), 420.0 / (LN_2 * LN_2)];
 
 /// `1 / (1 + 2^t)` for `t` within [`FARTHEST`].

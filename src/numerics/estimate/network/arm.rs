@@ -62,11 +62,20 @@ impl ScrewArm {
         for (hinge, travel) in self.hinges.iter().zip(q) {
             let (axis, point) = (Vector3::from(hinge.axis), Vector3::from(hinge.point));
             axes.push((station.rotation * axis, station.point(&point), hinge.slides));
-            let twist = if hinge.slides { Twist::new(axis.x, axis.y, axis.z, 0.0, 0.0, 0.0) } else { screw(&axis, &point) };
+            let twist = if hinge.slides {
+                Twist::new(axis.x, axis.y, axis.z, 0.0, 0.0, 0.0)
+            } else {
+                screw(&axis, &point)
+            };
             station = station * Pose::exp(&(twist * *travel));
             stations.push(station);
         }
-        Stance { tool: station.point(&Vector3::from(self.tool)), stations, axes, down: Vector3::from(self.down) }
+        Stance {
+            tool: station.point(&Vector3::from(self.tool)),
+            stations,
+            axes,
+            down: Vector3::from(self.down),
+        }
     }
 }
 
@@ -74,7 +83,11 @@ impl Stance {
     /// What a turn (or travel) of `joint` does to the measured point, m per rad or per m.
     pub fn turn(&self, joint: usize) -> Vector3<f64> {
         let (axis, point, slides) = &self.axes[joint];
-        if *slides { *axis } else { axis.cross(&(self.tool - point)) }
+        if *slides {
+            *axis
+        } else {
+            axis.cross(&(self.tool - point))
+        }
     }
 
     /// What a shift of `station` along its `axis` does, m per m.
@@ -84,13 +97,21 @@ impl Stance {
 
     /// What a tilt of `station` about its `axis` through the next joint does, m per rad; nothing at the tool.
     pub fn tilt(&self, station: usize, axis: usize) -> Vector3<f64> {
-        self.axes.get(station).map_or_else(Vector3::zeros, |(_, point, _)| self.shift(station, axis).cross(&(self.tool - point)))
+        self.axes
+            .get(station)
+            .map_or_else(Vector3::zeros, |(_, point, _)| {
+                self.shift(station, axis).cross(&(self.tool - point))
+            })
     }
 
     /// The torque (or force) on `joint` of a unit weight where the body moved by joint `body` ends, m (or 1).
     pub fn torque(&self, joint: usize, body: usize) -> f64 {
         let (axis, point, slides) = &self.axes[joint];
         let end = self.axes.get(body + 1).map_or(self.tool, |next| next.1);
-        if *slides { axis.dot(&self.down) } else { axis.dot(&(end - point).cross(&self.down)) }
+        if *slides {
+            axis.dot(&self.down)
+        } else {
+            axis.dot(&(end - point).cross(&self.down))
+        }
     }
 }

@@ -55,26 +55,48 @@ pub fn harmonics(prismatic: &[bool]) -> Vec<Vec<BasisTerm>> {
     };
     let joints = 0..prismatic.len();
     let mut groups = vec![vec![Vec::new()]];
-    groups.push(joints.clone().flat_map(first).map(|wave| vec![wave]).collect());
+    groups.push(
+        joints
+            .clone()
+            .flat_map(first)
+            .map(|wave| vec![wave])
+            .collect(),
+    );
     let higher = joints.clone().filter(|joint| !prismatic[*joint]);
-    let higher =
-        higher.flat_map(|joint| (2..=HARMONICS).flat_map(move |k| [vec![Wave::Sin(joint, k)], vec![Wave::Cos(joint, k)]]));
+    let higher = higher.flat_map(|joint| {
+        (2..=HARMONICS).flat_map(move |k| [vec![Wave::Sin(joint, k)], vec![Wave::Cos(joint, k)]])
+    });
     groups.push(higher.collect());
     let mut pairs = Vec::new();
     for a in joints.clone() {
         for b in a + 1..prismatic.len() {
-            pairs.extend(first(a).into_iter().flat_map(|x| first(b).into_iter().map(move |y| vec![x, y])));
+            pairs.extend(
+                first(a)
+                    .into_iter()
+                    .flat_map(|x| first(b).into_iter().map(move |y| vec![x, y])),
+            );
         }
     }
     groups.push(pairs);
-    let along = |waves: Vec<Wave>| (0..3).map(move |axis| BasisTerm { way: OutputMotion::Along(axis), waves: waves.clone() });
-    groups.into_iter().map(|group| group.into_iter().flat_map(along).collect()).collect()
+    let along = |waves: Vec<Wave>| {
+        (0..3).map(move |axis| BasisTerm {
+            way: OutputMotion::Along(axis),
+            waves: waves.clone(),
+        })
+    };
+    groups
+        .into_iter()
+        .map(|group| group.into_iter().flat_map(along).collect())
+        .collect()
 }
 
 /// Joint curves as fine as `rows` can show, small motions of all stations, and wind-up by weight.
 pub fn curves(arm: &ScrewArm, rows: usize) -> Vec<Vec<BasisTerm>> {
     let joints = arm.hinges.len();
-    let single = |way: OutputMotion, wave: Wave| BasisTerm { way, waves: vec![wave] };
+    let single = |way: OutputMotion, wave: Wave| BasisTerm {
+        way,
+        waves: vec![wave],
+    };
     let mut groups: Vec<Vec<BasisTerm>> = Vec::new();
     for (joint, hinge) in arm.hinges.iter().enumerate() {
         let mut low = 1;
@@ -82,16 +104,36 @@ pub fn curves(arm: &ScrewArm, rows: usize) -> Vec<Vec<BasisTerm>> {
             if hinge.slides || ROWS_EACH * high > rows.max(ROWS_EACH * BANDS[0]) {
                 break;
             }
-            let waves = (low..=high).flat_map(|order| [Wave::Sin(joint, order), Wave::Cos(joint, order)]);
-            groups.push(waves.map(|wave| single(OutputMotion::Turn(joint), wave)).collect());
+            let waves =
+                (low..=high).flat_map(|order| [Wave::Sin(joint, order), Wave::Cos(joint, order)]);
+            groups.push(
+                waves
+                    .map(|wave| single(OutputMotion::Turn(joint), wave))
+                    .collect(),
+            );
             low = high + 1;
         }
     }
-    let rigid = (0..=joints)
-        .flat_map(|station| (0..3).flat_map(move |axis| [OutputMotion::Shift(station, axis), OutputMotion::Tilt(station, axis)]));
-    groups.push(rigid.map(|way| BasisTerm { way, waves: Vec::new() }).collect());
-    let weights = (0..joints)
-        .flat_map(|joint| (joint..joints).map(move |body| single(OutputMotion::Turn(joint), Wave::Torque(joint, body))));
+    let rigid = (0..=joints).flat_map(|station| {
+        (0..3).flat_map(move |axis| {
+            [
+                OutputMotion::Shift(station, axis),
+                OutputMotion::Tilt(station, axis),
+            ]
+        })
+    });
+    groups.push(
+        rigid
+            .map(|way| BasisTerm {
+                way,
+                waves: Vec::new(),
+            })
+            .collect(),
+    );
+    let weights = (0..joints).flat_map(|joint| {
+        (joint..joints)
+            .map(move |body| single(OutputMotion::Turn(joint), Wave::Torque(joint, body)))
+    });
     groups.push(weights.collect());
     groups
 }
@@ -114,7 +156,14 @@ impl<'a> BasisFunctions<'a> {
                 highest[joint] = highest[joint].max(order);
             }
         }
-        Self { arm, terms, multiples: highest.into_iter().map(|order| vec![[0.0, 1.0]; order + 1]).collect() }
+        Self {
+            arm,
+            terms,
+            multiples: highest
+                .into_iter()
+                .map(|order| vec![[0.0, 1.0]; order + 1])
+                .collect(),
+        }
     }
 
     /// What each term does at joint positions `q`, m per unit of its coefficient. Terms through the arm are nothing without it.
@@ -127,7 +176,11 @@ impl<'a> BasisFunctions<'a> {
         }
         let stance = self.arm.map(|arm| arm.stance(q));
         for (t, term) in self.terms.iter().enumerate() {
-            let factor: f64 = term.waves.iter().map(|wave| self.wave(*wave, q, stance.as_ref())).product();
+            let factor: f64 = term
+                .waves
+                .iter()
+                .map(|wave| self.wave(*wave, q, stance.as_ref()))
+                .product();
             let way = direction(term.way, stance.as_ref());
             put(t, way.map(|value| value * factor));
         }
@@ -145,7 +198,9 @@ impl<'a> BasisFunctions<'a> {
 
 fn direction(way: OutputMotion, stance: Option<&Stance>) -> [f64; 3] {
     match (way, stance) {
-        (OutputMotion::Along(axis), _) => std::array::from_fn(|k| if k == axis { 1.0 } else { 0.0 }),
+        (OutputMotion::Along(axis), _) => {
+            std::array::from_fn(|k| if k == axis { 1.0 } else { 0.0 })
+        }
         (_, None) => [0.0; 3],
         (OutputMotion::Turn(joint), Some(stance)) => stance.turn(joint).into(),
         (OutputMotion::Shift(station, axis), Some(stance)) => stance.shift(station, axis).into(),

@@ -48,11 +48,17 @@ pub fn features(prismatic: &[bool], sin_cos: bool, payload: bool) -> Vec<Feature
         if sin_cos && !prismatic {
             features.extend([Map::Sin, Map::Cos].map(|map| Feature { source, map }));
         } else {
-            features.push(Feature { source, map: Map::Value });
+            features.push(Feature {
+                source,
+                map: Map::Value,
+            });
         }
     }
     if payload {
-        features.push(Feature { source: prismatic.len(), map: Map::Value });
+        features.push(Feature {
+            source: prismatic.len(),
+            map: Map::Value,
+        });
     }
     features
 }
@@ -72,7 +78,10 @@ impl Scaling {
         let count = values.clone().count().max(1) as f64;
         let mean = values.clone().sum::<f64>() / count;
         let scale = (values.map(|v| (v - mean) * (v - mean)).sum::<f64>() / count).sqrt();
-        Self { mean, scale: if scale > 1e-12 { scale } else { 1.0 } }
+        Self {
+            mean,
+            scale: if scale > 1e-12 { scale } else { 1.0 },
+        }
     }
     /// (value - mean) / scale.
     pub fn scaled(&self, value: f64) -> f64 {
@@ -94,7 +103,11 @@ pub struct NetworkScaling {
 impl NetworkScaling {
     /// Standardised inputs at `sources`.
     pub fn scaled(&self, sources: &[f64]) -> Vec<f64> {
-        self.features.iter().zip(&self.inputs).map(|(f, scaling)| scaling.scaled(f.of(sources))).collect()
+        self.features
+            .iter()
+            .zip(&self.inputs)
+            .map(|(f, scaling)| scaling.scaled(f.of(sources)))
+            .collect()
     }
     /// Outputs in m.
     fn worn(&self, y: [f64; OUTPUTS]) -> [f64; 3] {
@@ -119,7 +132,11 @@ impl JointMotion {
     /// What each output does to the measured point at joint positions `q`, m per unit.
     pub fn ways(&self, q: &[f64]) -> Vec<[f64; OUTPUTS]> {
         let stance = self.arm.stance(q);
-        self.scales.iter().enumerate().map(|(joint, scale)| (stance.turn(joint) * *scale).into()).collect()
+        self.scales
+            .iter()
+            .enumerate()
+            .map(|(joint, scale)| (stance.turn(joint) * *scale).into())
+            .collect()
     }
 }
 
@@ -181,11 +198,19 @@ impl Correction {
     pub fn at(&self, sources: &[f64]) -> AppliedCorrection {
         let share = self.region.share(sources);
         if share == 0.0 {
-            return AppliedCorrection { delta: [0.0; 3], share: 0.0, spread: None };
+            return AppliedCorrection {
+                delta: [0.0; 3],
+                share: 0.0,
+                spread: None,
+            };
         }
         let (whole, doubt) = self.inside(&self.region.held(sources));
         let spread = (share == 1.0).then(|| doubt.hypot(self.left));
-        AppliedCorrection { delta: whole.map(|value| share * value), share, spread }
+        AppliedCorrection {
+            delta: whole.map(|value| share * value),
+            share,
+            spread,
+        }
     }
 
     /// The correction within the region, and how far it is in doubt per axis, m.
@@ -199,17 +224,34 @@ impl Correction {
             Body::Networks(dress, networks) => {
                 let x = dress.scaled(sources);
                 let each: Vec<[f64; OUTPUTS]> = match &networks.joints {
-                    None => networks.outputs(&x).map(|y| std::array::from_fn(|k| y[k])).collect(),
+                    None => networks
+                        .outputs(&x)
+                        .map(|y| std::array::from_fn(|k| y[k]))
+                        .collect(),
                     Some(motion) => {
                         let ways = motion.ways(sources);
-                        let along = |y: &[f64], k: usize| y.iter().zip(&ways).map(|(y, way)| y * way[k]).sum::<f64>();
-                        networks.outputs(&x).map(|y| std::array::from_fn(|k| along(&y, k) / dress.outputs[k].scale)).collect()
+                        let along = |y: &[f64], k: usize| {
+                            y.iter().zip(&ways).map(|(y, way)| y * way[k]).sum::<f64>()
+                        };
+                        networks
+                            .outputs(&x)
+                            .map(|y| std::array::from_fn(|k| along(&y, k) / dress.outputs[k].scale))
+                            .collect()
                     }
                 };
                 let count = each.len().max(1) as f64;
-                let mean: [f64; OUTPUTS] = std::array::from_fn(|k| each.iter().map(|y| y[k]).sum::<f64>() / count);
-                let squares: f64 = each.iter().flatten().zip(mean.iter().cycle()).map(|(y, mean)| (y - mean).powi(2)).sum();
-                (dress.worn(mean), (squares / (count * OUTPUTS as f64)).sqrt() * dress.size())
+                let mean: [f64; OUTPUTS] =
+                    std::array::from_fn(|k| each.iter().map(|y| y[k]).sum::<f64>() / count);
+                let squares: f64 = each
+                    .iter()
+                    .flatten()
+                    .zip(mean.iter().cycle())
+                    .map(|(y, mean)| (y - mean).powi(2))
+                    .sum();
+                (
+                    dress.worn(mean),
+                    (squares / (count * OUTPUTS as f64)).sqrt() * dress.size(),
+                )
             }
         }
     }

@@ -72,7 +72,13 @@ pub fn descend(
     let mut index = 0;
     let stop = loop {
         let checked = check(&x);
-        history.push(DescentIteration { index, loss, train: squares, check: checked, evaluations });
+        history.push(DescentIteration {
+            index,
+            loss,
+            train: squares,
+            check: checked,
+            evaluations,
+        });
         let judged = checked.map_or(loss, |squares| squares.iter().sum());
         if judged < kept.0 {
             kept = (judged, x.clone());
@@ -96,7 +102,11 @@ pub fn descend(
         }
         let length = norm(&direction);
         // The first step has no curvature to go by: one unit of length is about one weight.
-        let mut step = if memory.is_empty() { 1.0 / length.max(1.0) } else { 1.0 };
+        let mut step = if memory.is_empty() {
+            1.0 / length.max(1.0)
+        } else {
+            1.0
+        };
         let found = loop {
             for ((n, x), d) in next.iter_mut().zip(&x).zip(&direction) {
                 *n = x + step * d;
@@ -111,9 +121,15 @@ pub fn descend(
                 break None;
             }
         };
-        let Some((value, at_next)) = found else { break DescentStop::Flat };
+        let Some((value, at_next)) = found else {
+            break DescentStop::Flat;
+        };
         let s: Vec<f64> = next.iter().zip(&x).map(|(n, x)| n - x).collect();
-        let y: Vec<f64> = next_gradient.iter().zip(&gradient).map(|(n, g)| n - g).collect();
+        let y: Vec<f64> = next_gradient
+            .iter()
+            .zip(&gradient)
+            .map(|(n, g)| n - g)
+            .collect();
         let curvature = dot(&s, &y);
         // Only positive curvature keeps the approximation positive definite.
         if curvature > 1e-10 * norm(&s) * norm(&y) {
@@ -131,7 +147,11 @@ pub fn descend(
             break DescentStop::Flat;
         }
     };
-    Descent { parameters: kept.1, history, stop }
+    Descent {
+        parameters: kept.1,
+        history,
+        stop,
+    }
 }
 
 /// A step and the change of the gradient along it.

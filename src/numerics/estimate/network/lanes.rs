@@ -52,12 +52,16 @@ impl LaneProduct<'_> {
             *start = simd.splat_f64s(*bias);
         }
         let count = out.len();
-        let Some(out) = out[first..].first_chunk_mut::<M>() else { return };
+        let Some(out) = out[first..].first_chunk_mut::<M>() else {
+            return;
+        };
         for row in (0..self.length).step_by(LANES) {
             // Only the first `vectors` of each are used, a number that is known when this is compiled for a machine.
             let mut sums = start.map(|start| [start; LANES]);
             for (weights, column) in self.weights.chunks_exact(count).zip(self.columns) {
-                let Some(weights) = weights[first..].first_chunk::<M>() else { return };
+                let Some(weights) = weights[first..].first_chunk::<M>() else {
+                    return;
+                };
                 let column = S::as_simd_f64s(&column[row..row + LANES]).0;
                 for (sums, weight) in sums.iter_mut().zip(weights) {
                     let weight = simd.splat_f64s(*weight);
@@ -67,7 +71,9 @@ impl LaneProduct<'_> {
                 }
             }
             for (out, sums) in out.iter_mut().zip(&sums) {
-                S::as_mut_simd_f64s(&mut out[row..row + LANES]).0.copy_from_slice(&sums[..vectors]);
+                S::as_mut_simd_f64s(&mut out[row..row + LANES])
+                    .0
+                    .copy_from_slice(&sums[..vectors]);
             }
         }
     }

@@ -42,13 +42,20 @@ pub struct Linear {
 
 impl Linear {
     /// Fits `groups` of terms. `None` where nothing moves or the matrix is singular.
-    pub fn fit(samples: &TrainingSamples, arm: Option<&ScrewArm>, groups: &[Vec<BasisTerm>], seed: u64) -> Option<Self> {
+    pub fn fit(
+        samples: &TrainingSamples,
+        arm: Option<&ScrewArm>,
+        groups: &[Vec<BasisTerm>],
+        seed: u64,
+    ) -> Option<Self> {
         let every = samples.rows().div_ceil(ROWS).max(1);
         let rows: Vec<usize> = (0..samples.rows()).step_by(every).collect();
         let (terms, group) = Self::lively(samples, &rows, arm, groups);
         let mut sums = Sums::new(samples, &rows, arm, &terms.0, &terms.1)?;
         let p = group.len();
-        let counts: Vec<f64> = (0..groups.len()).map(|g| group.iter().filter(|of| **of == g).count() as f64).collect();
+        let counts: Vec<f64> = (0..groups.len())
+            .map(|g| group.iter().filter(|of| **of == g).count() as f64)
+            .collect();
         // In units of the residual: each column starts as a tenth of it, and half of it as noise.
         let (mut alpha, mut beta) = (vec![100.0; groups.len()], 4.0);
         let mut weights = vec![1.0; rows.len()];
@@ -57,7 +64,9 @@ impl Linear {
         for _ in 0..ROUNDS {
             sums.add_up(&weights);
             for _ in 0..PRIORS {
-                let posterior = Mat::from_fn(p, p, |i, j| beta * sums.h[(i, j)] + if i == j { alpha[group[i]] } else { 0.0 });
+                let posterior = Mat::from_fn(p, p, |i, j| {
+                    beta * sums.h[(i, j)] + if i == j { alpha[group[i]] } else { 0.0 }
+                });
                 let llt = Llt::new(posterior.as_ref(), Side::Lower).ok()?;
                 let right = Mat::from_fn(p, 1, |i, _| beta * sums.g[i]);
                 x = llt.solve(&right).col_as_slice(0).to_vec();
@@ -65,7 +74,9 @@ impl Linear {
                 let mut determined = 0.0;
                 for (g, alpha) in alpha.iter_mut().enumerate() {
                     let own = (0..p).filter(|i| group[*i] == g);
-                    let (trace, squares) = own.fold((0.0, 0.0), |sum, i| (sum.0 + variances[i], sum.1 + x[i] * x[i]));
+                    let (trace, squares) = own.fold((0.0, 0.0), |sum, i| {
+                        (sum.0 + variances[i], sum.1 + x[i] * x[i])
+                    });
                     let gamma = (counts[g] - *alpha * trace).clamp(1e-3, counts[g].max(1e-3));
                     determined += gamma;
                     *alpha = (gamma / squares.max(1e-12)).clamp(1e-2, 1e10);
@@ -82,8 +93,14 @@ impl Linear {
         let unit = sums.unit;
         let scaled = |i: usize, value: f64| value * unit / sums.scale[i];
         let mut members = vec![(0..p).map(|i| scaled(i, x[i])).collect()];
-        members.extend((0..DRAWS).map(|d| (0..p).map(|i| scaled(i, x[i] + draws[(i, d)])).collect()));
-        Some(Self { arm: arm.cloned(), terms: terms.0, members, noise: unit / beta.sqrt() })
+        members
+            .extend((0..DRAWS).map(|d| (0..p).map(|i| scaled(i, x[i] + draws[(i, d)])).collect()));
+        Some(Self {
+            arm: arm.cloned(),
+            terms: terms.0,
+            members,
+            noise: unit / beta.sqrt(),
+        })
     }
 
     /// The terms that move the point anywhere with the root mean square of each, and the group of each.
@@ -94,17 +111,29 @@ impl Linear {
         groups: &[Vec<BasisTerm>],
     ) -> ((Vec<BasisTerm>, Vec<f64>), Vec<usize>) {
         let all: Vec<BasisTerm> = groups.iter().flatten().cloned().collect();
-        let of: Vec<usize> = groups.iter().enumerate().flat_map(|(g, terms)| terms.iter().map(move |_| g)).collect();
+        let of: Vec<usize> = groups
+            .iter()
+            .enumerate()
+            .flat_map(|(g, terms)| terms.iter().map(move |_| g))
+            .collect();
         let mut squares = vec![0.0; all.len()];
         let mut basis = BasisFunctions::new(arm, &all);
         for row in rows {
-            basis.at(&samples.sources[*row], |t, way| squares[t] += way.iter().map(|v| v * v).sum::<f64>());
+            basis.at(&samples.sources[*row], |t, way| {
+                squares[t] += way.iter().map(|v| v * v).sum::<f64>()
+            });
         }
-        let scale: Vec<f64> = squares.iter().map(|sum| (sum / (3 * rows.len().max(1)) as f64).sqrt()).collect();
+        let scale: Vec<f64> = squares
+            .iter()
+            .map(|sum| (sum / (3 * rows.len().max(1)) as f64).sqrt())
+            .collect();
         // A metre of lever arm times a hundredth of a microradian is nothing.
         let kept: Vec<usize> = (0..all.len()).filter(|t| scale[*t] > 1e-8).collect();
         let terms = kept.iter().map(|t| all[*t].clone()).collect();
-        ((terms, kept.iter().map(|t| scale[*t]).collect()), kept.iter().map(|t| of[*t]).collect())
+        (
+            (terms, kept.iter().map(|t| scale[*t]).collect()),
+            kept.iter().map(|t| of[*t]).collect(),
+        )
     }
 
     /// The correction and its standard deviation per axis beside the noise, m.
@@ -117,8 +146,15 @@ impl Linear {
                 }
             }
         });
-        let Some((mean, draws)) = sums.split_first() else { return ([0.0; 3], 0.0) };
-        let squares: f64 = draws.iter().flatten().zip(mean.iter().cycle()).map(|(draw, mean)| (draw - mean).powi(2)).sum();
+        let Some((mean, draws)) = sums.split_first() else {
+            return ([0.0; 3], 0.0);
+        };
+        let squares: f64 = draws
+            .iter()
+            .flatten()
+            .zip(mean.iter().cycle())
+            .map(|(draw, mean)| (draw - mean).powi(2))
+            .sum();
         (*mean, (squares / (3 * draws.len().max(1)) as f64).sqrt())
     }
 }
@@ -146,11 +182,25 @@ impl<'a> Sums<'a> {
         terms: &'a [BasisTerm],
         scale: &'a [f64],
     ) -> Option<Self> {
-        let squares: f64 = rows.iter().flat_map(|row| samples.residual[*row]).map(|v| v * v).sum();
+        let squares: f64 = rows
+            .iter()
+            .flat_map(|row| samples.residual[*row])
+            .map(|v| v * v)
+            .sum();
         let unit = (squares / (3 * rows.len().max(1)) as f64).sqrt();
         let p = terms.len();
-        let empty =
-            Self { samples, rows, arm, terms, scale, unit, h: Mat::zeros(p, p), g: vec![0.0; p], squares: 0.0, count: 0.0 };
+        let empty = Self {
+            samples,
+            rows,
+            arm,
+            terms,
+            scale,
+            unit,
+            h: Mat::zeros(p, p),
+            g: vec![0.0; p],
+            squares: 0.0,
+            count: 0.0,
+        };
         (unit > 0.0 && p > 0).then_some(empty)
     }
 
@@ -177,7 +227,11 @@ impl<'a> Sums<'a> {
             }
             self.squares += residual.iter().map(|v| v * v).sum::<f64>();
             for (t, g) in self.g.iter_mut().enumerate() {
-                *g += residual.iter().enumerate().map(|(r, value)| columns[(r, t)] * value).sum::<f64>();
+                *g += residual
+                    .iter()
+                    .enumerate()
+                    .map(|(r, value)| columns[(r, t)] * value)
+                    .sum::<f64>();
             }
             let whole = BlockStructure::Rectangular;
             triangular::matmul(
@@ -201,7 +255,9 @@ impl<'a> Sums<'a> {
 
     /// Weighted sum of squares that coefficients `x` leave.
     fn misfit(&self, x: &[f64]) -> f64 {
-        let quadratic: f64 = (0..x.len()).map(|j| x[j] * (0..x.len()).map(|i| self.h[(i, j)] * x[i]).sum::<f64>()).sum();
+        let quadratic: f64 = (0..x.len())
+            .map(|j| x[j] * (0..x.len()).map(|i| self.h[(i, j)] * x[i]).sum::<f64>())
+            .sum();
         self.squares - 2.0 * x.iter().zip(&self.g).map(|(x, g)| x * g).sum::<f64>() + quadratic
     }
 
@@ -227,7 +283,14 @@ fn variances(llt: &Llt<f64>) -> Vec<f64> {
     let lower = llt.L();
     let mut inverse = Mat::zeros(lower.nrows(), lower.ncols());
     invert_lower_triangular(inverse.as_mut(), lower, Par::Seq);
-    (0..inverse.ncols()).map(|j| inverse.col_as_slice(j)[j..].iter().map(|value| value * value).sum()).collect()
+    (0..inverse.ncols())
+        .map(|j| {
+            inverse.col_as_slice(j)[j..]
+                .iter()
+                .map(|value| value * value)
+                .sum()
+        })
+        .collect()
 }
 
 /// A standard normal number (Box and Muller).

@@ -29,7 +29,9 @@ impl Batch {
     pub fn new(x: &[Vec<f64>], y: &[[f64; OUTPUTS]]) -> Self {
         assert_eq!(x.len(), y.len(), "one target per row");
         let width = x.first().map_or(0, Vec::len);
-        let largest = (0..width).map(|i| x.iter().map(|x| x[i].abs()).fold(0.0, f64::max)).collect();
+        let largest = (0..width)
+            .map(|i| x.iter().map(|x| x[i].abs()).fold(0.0, f64::max))
+            .collect();
         Self {
             rows: x.len(),
             inputs: columns(x, width, |x, i| x[i]),
@@ -140,7 +142,8 @@ impl WithSimd for Asked<'_> {
     type Output = [f64; OUTPUTS];
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> [f64; OUTPUTS] {
-        self.loss.sums(simd, self.parameters, self.gradient, self.scratch)
+        self.loss
+            .sums(simd, self.parameters, self.gradient, self.scratch)
     }
 }
 
@@ -153,14 +156,29 @@ impl Loss<'_> {
 
     /// Mean squared error of each axis over the rows, without decay.
     pub fn mean_squares(&self, parameters: &[f64], scratch: &mut LossBuffers) -> [f64; OUTPUTS] {
-        let sums = Arch::new().dispatch(Asked { loss: self, parameters, gradient: None, scratch });
+        let sums = Arch::new().dispatch(Asked {
+            loss: self,
+            parameters,
+            gradient: None,
+            scratch,
+        });
         sums.map(|sum| sum / self.batch.rows as f64)
     }
 
     /// The loss and the mean squared error of each axis; the loss's gradient is written to `gradient`. Allocates nothing.
-    pub fn gradient(&self, parameters: &[f64], gradient: &mut [f64], scratch: &mut LossBuffers) -> (f64, [f64; OUTPUTS]) {
+    pub fn gradient(
+        &self,
+        parameters: &[f64],
+        gradient: &mut [f64],
+        scratch: &mut LossBuffers,
+    ) -> (f64, [f64; OUTPUTS]) {
         let per_row = 1.0 / self.batch.rows as f64;
-        let squares = Arch::new().dispatch(Asked { loss: self, parameters, gradient: Some(gradient), scratch });
+        let squares = Arch::new().dispatch(Asked {
+            loss: self,
+            parameters,
+            gradient: Some(gradient),
+            scratch,
+        });
         for g in gradient.iter_mut() {
             *g *= per_row;
         }
@@ -169,7 +187,9 @@ impl Loss<'_> {
                 *g += self.decay * per_row * w;
             }
         }
-        let loss = 0.5 * per_row * (squares.iter().sum::<f64>() + self.decay * self.weight_squares(parameters));
+        let loss = 0.5
+            * per_row
+            * (squares.iter().sum::<f64>() + self.decay * self.weight_squares(parameters));
         (loss, squares.map(|square| square * per_row))
     }
 
@@ -185,7 +205,8 @@ impl Loss<'_> {
             }
             sums.iter().sum::<f64>() + rest.iter().map(|w| w * w).sum::<f64>()
         };
-        squares(&parameters[self.shape.hidden_weights()]) + squares(&parameters[self.shape.output_weights()])
+        squares(&parameters[self.shape.hidden_weights()])
+            + squares(&parameters[self.shape.output_weights()])
     }
 
     /// Summed squared errors of each axis; the gradient of half their sum is written where it is wanted.
@@ -221,18 +242,31 @@ impl Loss<'_> {
     /// Puts the weights where the products want them; whether no exponent of any row can be too far for the activation.
     #[inline(always)]
     fn lay_out(&self, parameters: &[f64], scratch: &mut LossBuffers) -> bool {
-        let LayerSizes { inputs, hidden, outputs, activation } = self.shape;
+        let LayerSizes {
+            inputs,
+            hidden,
+            outputs,
+            activation,
+        } = self.shape;
         let factor = activation.factor();
-        let biases = scratch.hidden_biases.iter_mut().zip(&parameters[self.shape.hidden_biases()]);
+        let biases = scratch
+            .hidden_biases
+            .iter_mut()
+            .zip(&parameters[self.shape.hidden_biases()]);
         for ((bias, parameter), farthest) in biases.zip(&mut scratch.farthest) {
             *bias = factor * parameter;
             *farthest = bias.abs();
         }
         let weights = &parameters[self.shape.hidden_weights()];
-        let columns = scratch.hidden_weights.chunks_exact_mut(hidden).zip(&self.batch.largest);
+        let columns = scratch
+            .hidden_weights
+            .chunks_exact_mut(hidden)
+            .zip(&self.batch.largest);
         for (i, (column, largest)) in columns.enumerate() {
-            for ((slot, weight), farthest) in
-                column.iter_mut().zip(weights[i..].iter().step_by(inputs)).zip(&mut scratch.farthest)
+            for ((slot, weight), farthest) in column
+                .iter_mut()
+                .zip(weights[i..].iter().step_by(inputs))
+                .zip(&mut scratch.farthest)
             {
                 *slot = factor * weight;
                 *farthest += slot.abs() * largest;
@@ -249,20 +283,40 @@ impl Loss<'_> {
 
     /// Activations, outputs and errors of the first `length` rows of a block.
     #[inline(always)]
-    fn forward<S: Simd>(&self, simd: S, parameters: &[f64], block: usize, length: usize, tame: bool, scratch: &mut LossBuffers) {
+    fn forward<S: Simd>(
+        &self,
+        simd: S,
+        parameters: &[f64],
+        block: usize,
+        length: usize,
+        tame: bool,
+        scratch: &mut LossBuffers,
+    ) {
         let inputs = self.shape.inputs;
         let columns = &self.batch.inputs[block * inputs..(block + 1) * inputs];
-        let first = LaneProduct { biases: &scratch.hidden_biases, weights: &scratch.hidden_weights, columns, length };
+        let first = LaneProduct {
+            biases: &scratch.hidden_biases,
+            weights: &scratch.hidden_weights,
+            columns,
+            length,
+        };
         first.write(simd, &mut scratch.hidden);
         for exponents in &mut scratch.hidden {
             let exponents = &mut exponents[..length];
             if !tame {
-                exponents.iter_mut().for_each(|t| *t = t.clamp(-FARTHEST, FARTHEST));
+                exponents
+                    .iter_mut()
+                    .for_each(|t| *t = t.clamp(-FARTHEST, FARTHEST));
             }
             self.shape.activation.apply(exponents);
         }
         let biases = &parameters[self.shape.output_biases()];
-        let second = LaneProduct { biases, weights: &scratch.output_weights, columns: &scratch.hidden, length };
+        let second = LaneProduct {
+            biases,
+            weights: &scratch.output_weights,
+            columns: &scratch.hidden,
+            length,
+        };
         second.write(simd, &mut scratch.outputs);
         let targets = &self.batch.targets[block * OUTPUTS..(block + 1) * OUTPUTS];
         for (k, (errors, targets)) in scratch.errors.iter_mut().zip(targets).enumerate() {
@@ -277,7 +331,11 @@ impl Loss<'_> {
                 *e = -target;
             }
             for (j, outputs) in scratch.outputs.iter().enumerate() {
-                for ((e, y), way) in errors[..length].iter_mut().zip(outputs).zip(self.way(block, j, k)) {
+                for ((e, y), way) in errors[..length]
+                    .iter_mut()
+                    .zip(outputs)
+                    .zip(self.way(block, j, k))
+                {
                     *e += y * way;
                 }
             }
@@ -295,14 +353,23 @@ impl Loss<'_> {
         gradient: &mut [f64],
         scratch: &mut LossBuffers,
     ) {
-        let LayerSizes { inputs, hidden, activation, .. } = self.shape;
+        let LayerSizes {
+            inputs,
+            hidden,
+            activation,
+            ..
+        } = self.shape;
         for (j, back) in scratch.back.iter_mut().enumerate() {
             if self.batch.ways.is_empty() {
                 back[..length].copy_from_slice(&scratch.errors[j][..length]);
             } else {
                 back[..length].fill(0.0);
                 for (k, errors) in scratch.errors.iter().enumerate() {
-                    for ((d, e), way) in back[..length].iter_mut().zip(errors).zip(self.way(block, j, k)) {
+                    for ((d, e), way) in back[..length]
+                        .iter_mut()
+                        .zip(errors)
+                        .zip(self.way(block, j, k))
+                    {
                         *d += e * way;
                     }
                 }
@@ -311,7 +378,12 @@ impl Loss<'_> {
         }
         let weights = self.shape.output_weights();
         // Row after row of the output weights is column after column of what leads back.
-        let product = LaneProduct { biases: &[], weights: &parameters[weights.clone()], columns: &scratch.back, length };
+        let product = LaneProduct {
+            biases: &[],
+            weights: &parameters[weights.clone()],
+            columns: &scratch.back,
+            length,
+        };
         product.write(simd, &mut scratch.delta);
         let columns = &self.batch.inputs[block * inputs..(block + 1) * inputs];
         for (h, (values, delta)) in scratch.hidden.iter().zip(&mut scratch.delta).enumerate() {

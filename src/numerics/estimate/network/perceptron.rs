@@ -54,7 +54,9 @@ impl LayerSizes {
         let mut y = parameters[self.output_biases()].to_vec();
         for h in 0..self.hidden {
             let row = &weights[h * self.inputs..(h + 1) * self.inputs];
-            let a = self.activation.value(row.iter().zip(x).fold(biases[h], |sum, (w, x)| sum + w * x));
+            let a = self
+                .activation
+                .value(row.iter().zip(x).fold(biases[h], |sum, (w, x)| sum + w * x));
             for (k, y) in y.iter_mut().enumerate() {
                 *y += out[k * self.hidden + h] * a;
             }

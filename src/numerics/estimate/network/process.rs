@@ -46,33 +46,73 @@ impl Process {
             y: tuned.iter().map(|r| y[*r]).collect(),
             start: prior(width),
         };
-        let chosen = descend(|theta, gradient| (few.value(theta, gradient), [0.0; OUTPUTS]), |_| None, prior(width), ITERATIONS);
+        let chosen = descend(
+            |theta, gradient| (few.value(theta, gradient), [0.0; OUTPUTS]),
+            |_| None,
+            prior(width),
+            ITERATIONS,
+        );
         let theta = chosen.parameters;
         let lengths = theta[..width].iter().map(|l| l.exp()).collect();
         let rows: Vec<Vec<f64>> = thin(ROWS).map(|r| x[r].clone()).collect();
         let targets: Vec<[f64; OUTPUTS]> = thin(ROWS).map(|r| y[r]).collect();
-        let mut process = Self::remember(lengths, theta[width].exp(), theta[width + 1].exp(), rows, Vec::new())?;
+        let mut process = Self::remember(
+            lengths,
+            theta[width].exp(),
+            theta[width + 1].exp(),
+            rows,
+            Vec::new(),
+        )?;
         let llt = Llt::new(process.matrix().as_ref(), Side::Lower).ok()?;
         let solved = llt.solve(Mat::from_fn(targets.len(), OUTPUTS, |r, k| targets[r][k]));
-        process.alpha = (0..targets.len()).map(|r| std::array::from_fn(|k| solved[(r, k)])).collect();
+        process.alpha = (0..targets.len())
+            .map(|r| std::array::from_fn(|k| solved[(r, k)]))
+            .collect();
         Some(process)
     }
 
     /// The process from what its table holds. `None` where its matrix is singular.
-    pub fn remember(lengths: Vec<f64>, signal: f64, noise: f64, rows: Vec<Vec<f64>>, alpha: Vec<[f64; OUTPUTS]>) -> Option<Self> {
-        let mut process = Self { lengths, signal, noise, rows, alpha, factor: Mat::new() };
-        process.factor = Llt::new(process.matrix().as_ref(), Side::Lower).ok()?.L().to_owned();
+    pub fn remember(
+        lengths: Vec<f64>,
+        signal: f64,
+        noise: f64,
+        rows: Vec<Vec<f64>>,
+        alpha: Vec<[f64; OUTPUTS]>,
+    ) -> Option<Self> {
+        let mut process = Self {
+            lengths,
+            signal,
+            noise,
+            rows,
+            alpha,
+            factor: Mat::new(),
+        };
+        process.factor = Llt::new(process.matrix().as_ref(), Side::Lower)
+            .ok()?
+            .L()
+            .to_owned();
         Some(process)
     }
 
     fn matrix(&self) -> Mat<f64> {
         let n = self.rows.len();
         let diagonal = self.signal * self.signal + self.noise * self.noise;
-        Mat::from_fn(n, n, |i, j| if i == j { diagonal } else { self.kernel(&self.rows[i], &self.rows[j]) })
+        Mat::from_fn(n, n, |i, j| {
+            if i == j {
+                diagonal
+            } else {
+                self.kernel(&self.rows[i], &self.rows[j])
+            }
+        })
     }
 
     fn kernel(&self, a: &[f64], b: &[f64]) -> f64 {
-        let square: f64 = a.iter().zip(b).zip(&self.lengths).map(|((a, b), l)| ((a - b) / l).powi(2)).sum();
+        let square: f64 = a
+            .iter()
+            .zip(b)
+            .zip(&self.lengths)
+            .map(|((a, b), l)| ((a - b) / l).powi(2))
+            .sum();
         self.signal * self.signal * (-0.5 * square).exp()
     }
 
@@ -114,17 +154,27 @@ impl Tuning {
         let noise = (2.0 * theta[width + 1]).exp();
         let rates: Vec<f64> = theta[..width].iter().map(|l| (-2.0 * l).exp()).collect();
         let smooth = Mat::from_fn(n, n, |i, j| {
-            let square: f64 = self.x[i].iter().zip(&self.x[j]).zip(&rates).map(|((a, b), rate)| (a - b).powi(2) * rate).sum();
+            let square: f64 = self.x[i]
+                .iter()
+                .zip(&self.x[j])
+                .zip(&rates)
+                .map(|((a, b), rate)| (a - b).powi(2) * rate)
+                .sum();
             signal * (-0.5 * square).exp()
         });
-        let matrix = Mat::from_fn(n, n, |i, j| smooth[(i, j)] + if i == j { noise + 1e-9 } else { 0.0 });
+        let matrix = Mat::from_fn(n, n, |i, j| {
+            smooth[(i, j)] + if i == j { noise + 1e-9 } else { 0.0 }
+        });
         let Ok(llt) = Llt::new(matrix.as_ref(), Side::Lower) else {
             gradient.fill(0.0);
             return f64::INFINITY;
         };
         let inverse = llt.inverse();
         let alpha = llt.solve(Mat::from_fn(n, OUTPUTS, |r, k| self.y[r][k]));
-        let fit: f64 = (0..n).flat_map(|r| (0..OUTPUTS).map(move |k| (r, k))).map(|(r, k)| self.y[r][k] * alpha[(r, k)]).sum();
+        let fit: f64 = (0..n)
+            .flat_map(|r| (0..OUTPUTS).map(move |k| (r, k)))
+            .map(|(r, k)| self.y[r][k] * alpha[(r, k)])
+            .sum();
         let determinant: f64 = (0..n).map(|i| llt.L()[(i, i)].ln()).sum::<f64>() * 2.0;
         let each = 1.0 / n as f64;
         gradient.fill(0.0);

@@ -33,7 +33,11 @@ impl Valid {
     fn of(values: impl Iterator<Item = f64> + Clone, least: impl Fn(f64) -> f64) -> Self {
         let lower = values.clone().fold(f64::INFINITY, f64::min);
         let upper = values.fold(f64::NEG_INFINITY, f64::max);
-        Self { lower, upper, margin: (MARGIN * (upper - lower)).max(least(upper)) }
+        Self {
+            lower,
+            upper,
+            margin: (MARGIN * (upper - lower)).max(least(upper)),
+        }
     }
     /// 1 inside, 0 from one margin outside on.
     fn share(&self, value: f64) -> f64 {
@@ -58,15 +62,42 @@ impl Jointly {
     fn of(postures: &[&[f64]]) -> Option<Self> {
         let joints = postures.first()?.len();
         let count = postures.len() as f64;
-        let mean: Vec<f64> = (0..joints).map(|j| postures.iter().map(|q| q[j]).sum::<f64>() / count).collect();
-        let product = |i: usize, j: usize| postures.iter().map(|q| (q[i] - mean[i]) * (q[j] - mean[j])).sum::<f64>() / count;
+        let mean: Vec<f64> = (0..joints)
+            .map(|j| postures.iter().map(|q| q[j]).sum::<f64>() / count)
+            .collect();
+        let product = |i: usize, j: usize| {
+            postures
+                .iter()
+                .map(|q| (q[i] - mean[i]) * (q[j] - mean[j]))
+                .sum::<f64>()
+                / count
+        };
         // A joint that hardly moved still has its least margin.
-        let covariance =
-            DMatrix::from_fn(joints, joints, |i, j| product(i, j) + if i == j { LEAST_MARGIN * LEAST_MARGIN } else { 0.0 });
-        let factor = covariance.cholesky()?.l().solve_lower_triangular(&DMatrix::identity(joints, joints))?;
-        let factor = (0..joints).map(|i| (0..=i).map(|j| factor[(i, j)]).collect()).collect();
-        let mut region = Self { mean, factor, limit: 0.0, margin: 0.0 };
-        region.limit = postures.iter().map(|q| region.distance(q)).fold(0.0, f64::max);
+        let covariance = DMatrix::from_fn(joints, joints, |i, j| {
+            product(i, j)
+                + if i == j {
+                    LEAST_MARGIN * LEAST_MARGIN
+                } else {
+                    0.0
+                }
+        });
+        let factor = covariance
+            .cholesky()?
+            .l()
+            .solve_lower_triangular(&DMatrix::identity(joints, joints))?;
+        let factor = (0..joints)
+            .map(|i| (0..=i).map(|j| factor[(i, j)]).collect())
+            .collect();
+        let mut region = Self {
+            mean,
+            factor,
+            limit: 0.0,
+            margin: 0.0,
+        };
+        region.limit = postures
+            .iter()
+            .map(|q| region.distance(q))
+            .fold(0.0, f64::max);
         region.margin = MARGIN * region.limit.max(1.0);
         Some(region)
     }
@@ -74,7 +105,11 @@ impl Jointly {
     fn distance(&self, q: &[f64]) -> f64 {
         let off = |j: usize| q[j] - self.mean[j];
         let along = |row: &Vec<f64>| row.iter().enumerate().map(|(j, f)| f * off(j)).sum::<f64>();
-        self.factor.iter().map(|row| along(row).powi(2)).sum::<f64>().sqrt()
+        self.factor
+            .iter()
+            .map(|row| along(row).powi(2))
+            .sum::<f64>()
+            .sqrt()
     }
 }
 
@@ -92,9 +127,20 @@ impl Region {
     pub fn of(sources: &[Vec<f64>], joints: usize) -> Self {
         let width = sources.first().map_or(0, Vec::len);
         let column = |s: usize| sources.iter().map(move |row| row[s]);
-        let ranges = (0..width).map(|s| if s < joints { Valid::joint(column(s)) } else { Valid::payload(column(s)) }).collect();
+        let ranges = (0..width)
+            .map(|s| {
+                if s < joints {
+                    Valid::joint(column(s))
+                } else {
+                    Valid::payload(column(s))
+                }
+            })
+            .collect();
         let postures: Vec<&[f64]> = sources.iter().filter_map(|row| row.get(..joints)).collect();
-        Self { ranges, jointly: Jointly::of(&postures) }
+        Self {
+            ranges,
+            jointly: Jointly::of(&postures),
+        }
     }
 
     /// 1 inside, 0 where nothing is known, between on the margin. A source that is missing or no number is outside.
@@ -103,13 +149,24 @@ impl Region {
         if sources.len() < count || sources.iter().take(count).any(|v| !v.is_finite()) {
             return 0.0;
         }
-        let each: f64 = self.ranges.iter().zip(sources).map(|(valid, value)| valid.share(*value)).product();
-        each * self.jointly.as_ref().map_or(1.0, |all| fade(all.distance(sources) - all.limit, all.margin))
+        let each: f64 = self
+            .ranges
+            .iter()
+            .zip(sources)
+            .map(|(valid, value)| valid.share(*value))
+            .product();
+        each * self.jointly.as_ref().map_or(1.0, |all| {
+            fade(all.distance(sources) - all.limit, all.margin)
+        })
     }
 
     /// The nearest sources within the ranges.
     pub fn held(&self, sources: &[f64]) -> Vec<f64> {
-        self.ranges.iter().zip(sources).map(|(valid, value)| value.clamp(valid.lower, valid.upper)).collect()
+        self.ranges
+            .iter()
+            .zip(sources)
+            .map(|(valid, value)| value.clamp(valid.lower, valid.upper))
+            .collect()
     }
 }
 

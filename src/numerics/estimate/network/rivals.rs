@@ -168,15 +168,24 @@ pub fn fits(contest: &RivalContest) -> usize {
 impl RivalContest<'_> {
     /// Whether networks of a kind take part, from whatever start.
     fn has(&self, kind: fn(TrainingStart) -> Rival) -> bool {
-        self.rivals.iter().any(|rival| rival.start().is_some_and(|start| kind(start) == *rival))
+        self.rivals
+            .iter()
+            .any(|rival| rival.start().is_some_and(|start| kind(start) == *rival))
     }
 }
 
 /// Judges all rivals in the contest's folds; `observe` sees how many fits are done, and of which rival the last was.
 ///
 /// Panics with fewer than two folds or rows.
-pub fn compare(samples: &TrainingSamples, contest: &RivalContest, observe: &(dyn Fn(usize, &str) + Sync)) -> RivalComparison {
-    assert!(contest.folds >= 2 && samples.rows() >= 2, "something to choose from");
+pub fn compare(
+    samples: &TrainingSamples,
+    contest: &RivalContest,
+    observe: &(dyn Fn(usize, &str) + Sync),
+) -> RivalComparison {
+    assert!(
+        contest.folds >= 2 && samples.rows() >= 2,
+        "something to choose from"
+    );
     let done = Mutex::new(0);
     let poses = samples.poses();
     let run = |tasks: &[Task]| {
@@ -184,49 +193,96 @@ pub fn compare(samples: &TrainingSamples, contest: &RivalContest, observe: &(dyn
             let result = tasks[t].run(samples, &poses, contest);
             let mut done = done.lock().expect("no fit panics");
             *done += 1;
-            let best = result.as_ref().map_or(f64::NAN, |r| r.left.iter().map(|left| left.1).sum::<f64>() / r.left.len() as f64);
-            let place =
-                format!("{}, part {} of {}: {:.4} mm", tasks[t].rival.name(), tasks[t].fold + 1, contest.folds, best * 1e3);
+            let best = result.as_ref().map_or(f64::NAN, |r| {
+                r.left.iter().map(|left| left.1).sum::<f64>() / r.left.len() as f64
+            });
+            let place = format!(
+                "{}, part {} of {}: {:.4} mm",
+                tasks[t].rival.name(),
+                tasks[t].fold + 1,
+                contest.folds,
+                best * 1e3
+            );
             observe(*done, &place);
             result
         })
     };
     let tasks = |rivals: &[(Rival, Recipe)]| -> Vec<Task> {
         let each = |(rival, recipe): &(Rival, Recipe)| {
-            (0..contest.folds).map(|fold| Task { rival: *rival, recipe: recipe.clone(), fold }).collect::<Vec<Task>>()
+            (0..contest.folds)
+                .map(|fold| Task {
+                    rival: *rival,
+                    recipe: recipe.clone(),
+                    fold,
+                })
+                .collect::<Vec<Task>>()
         };
         rivals.iter().flat_map(each).collect()
     };
     let before: Vec<f64> = samples.residual.iter().map(|r| length(*r)).collect();
-    let nothing =
-        JudgedRival { rival: None, left: before.clone(), gain: 0.0, sigma: 0.0, numbers: 0, evaluations: 0, settings: None };
+    let nothing = JudgedRival {
+        rival: None,
+        left: before.clone(),
+        gain: 0.0,
+        sigma: 0.0,
+        numbers: 0,
+        evaluations: 0,
+        settings: None,
+    };
     let mut judged = vec![nothing];
-    let trial = Recipe { jobs: 1, ..contest.trial.clone() };
-    let mut entered: Vec<(Rival, Recipe)> = contest.rivals.iter().map(|rival| (*rival, trial.clone())).collect();
+    let trial = Recipe {
+        jobs: 1,
+        ..contest.trial.clone()
+    };
+    let mut entered: Vec<(Rival, Recipe)> = contest
+        .rivals
+        .iter()
+        .map(|rival| (*rival, trial.clone()))
+        .collect();
     for kind in KINDS.into_iter().filter(|kind| contest.has(*kind)) {
         let mut grid = Vec::new();
         for hidden in &contest.hidden {
             for decay in &contest.decays {
-                grid.push((kind(TrainingStart::Random), Recipe { hidden: *hidden, decay: *decay, ..trial.clone() }));
+                grid.push((
+                    kind(TrainingStart::Random),
+                    Recipe {
+                        hidden: *hidden,
+                        decay: *decay,
+                        ..trial.clone()
+                    },
+                ));
             }
         }
         let results = run(&tasks(&grid));
-        let errors: Vec<f64> =
-            results.chunks(contest.folds).map(|folds| together(folds, &before, &poses).map_or(f64::NAN, |j| j.mean())).collect();
+        let errors: Vec<f64> = results
+            .chunks(contest.folds)
+            .map(|folds| together(folds, &before, &poses).map_or(f64::NAN, |j| j.mean()))
+            .collect();
         if let Some(best) = (0..grid.len()).min_by(|a, b| errors[*a].total_cmp(&errors[*b])) {
-            let own = entered.iter_mut().filter(|(rival, _)| rival.start().is_some_and(|start| kind(start) == *rival));
+            let own = entered
+                .iter_mut()
+                .filter(|(rival, _)| rival.start().is_some_and(|start| kind(start) == *rival));
             own.for_each(|(_, recipe)| *recipe = grid[best].1.clone());
         }
     }
     let results = run(&tasks(&entered));
     for ((rival, recipe), folds) in entered.iter().zip(results.chunks(contest.folds)) {
-        let settings = rival.start().is_some().then_some((recipe.hidden, recipe.decay));
+        let settings = rival
+            .start()
+            .is_some()
+            .then_some((recipe.hidden, recipe.decay));
         if let Some(row) = together(folds, &before, &poses) {
-            judged.push(JudgedRival { rival: Some(*rival), settings, ..row });
+            judged.push(JudgedRival {
+                rival: Some(*rival),
+                settings,
+                ..row
+            });
         }
     }
     let helping = (0..judged.len()).filter(|j| judged[*j].helps());
-    let chosen = helping.min_by(|a, b| judged[*a].mean().total_cmp(&judged[*b].mean())).unwrap_or(0);
+    let chosen = helping
+        .min_by(|a, b| judged[*a].mean().total_cmp(&judged[*b].mean()))
+        .unwrap_or(0);
     RivalComparison { judged, chosen }
 }
 
@@ -237,9 +293,20 @@ pub fn learn(
     judged: &JudgedRival,
     observe: &mut dyn FnMut(&Generation),
 ) -> Option<(Correction, Vec<TrainingStep>)> {
-    let (hidden, decay) = judged.settings.unwrap_or((contest.recipe.hidden, contest.recipe.decay));
-    let (mut correction, course) =
-        fit(judged.rival?, samples, contest, &Recipe { hidden, decay, ..contest.recipe.clone() }, observe)?;
+    let (hidden, decay) = judged
+        .settings
+        .unwrap_or((contest.recipe.hidden, contest.recipe.decay));
+    let (mut correction, course) = fit(
+        judged.rival?,
+        samples,
+        contest,
+        &Recipe {
+            hidden,
+            decay,
+            ..contest.recipe.clone()
+        },
+        observe,
+    )?;
     correction.left = judged.rms() / 3.0_f64.sqrt();
     Some((correction, course))
 }
@@ -253,37 +320,100 @@ fn fit(
 ) -> Option<(Correction, Vec<TrainingStep>)> {
     let region = || Region::of(&samples.sources, recipe.joints);
     let body = match rival {
-        Rival::Network(start) => return Some(train(samples, &Recipe { start, through: None, ..recipe.clone() }, observe)),
+        Rival::Network(start) => {
+            return Some(train(
+                samples,
+                &Recipe {
+                    start,
+                    through: None,
+                    ..recipe.clone()
+                },
+                observe,
+            ));
+        }
         Rival::JointNetwork(start) => {
             let through = Some(contest.arm?.clone());
-            return Some(train(samples, &Recipe { start, through, ..recipe.clone() }, observe));
+            return Some(train(
+                samples,
+                &Recipe {
+                    start,
+                    through,
+                    ..recipe.clone()
+                },
+                observe,
+            ));
         }
-        Rival::Ridge => Body::Linear(Linear::fit(samples, None, &harmonics(contest.prismatic), recipe.seed)?),
-        Rival::Curves => Body::Linear(Linear::fit(samples, contest.arm, &curves(contest.arm?, samples.rows()), recipe.seed)?),
+        Rival::Ridge => Body::Linear(Linear::fit(
+            samples,
+            None,
+            &harmonics(contest.prismatic),
+            recipe.seed,
+        )?),
+        Rival::Curves => Body::Linear(Linear::fit(
+            samples,
+            contest.arm,
+            &curves(contest.arm?, samples.rows()),
+            recipe.seed,
+        )?),
         Rival::Process => {
             let (dress, x, y) = dressed(samples, &recipe.features);
             Body::Process(dress, Process::fit(&x, &y)?)
         }
     };
-    Some((Correction { body, region: region(), left: 0.0 }, Vec::new()))
+    Some((
+        Correction {
+            body,
+            region: region(),
+            left: 0.0,
+        },
+        Vec::new(),
+    ))
 }
 
 impl Task {
     /// `poses`: that of each row.
-    fn run(&self, samples: &TrainingSamples, poses: &[usize], contest: &RivalContest) -> Option<Done> {
+    fn run(
+        &self,
+        samples: &TrainingSamples,
+        poses: &[usize],
+        contest: &RivalContest,
+    ) -> Option<Done> {
         let count = poses.iter().max()? + 1;
-        let (inside, outside): (Vec<usize>, Vec<usize>) =
-            (0..samples.rows()).partition(|row| poses[*row] * contest.folds * RUNS / count % contest.folds != self.fold);
-        let recipe = Recipe { seed: self.recipe.seed ^ (self.fold as u64 + 1), ..self.recipe.clone() };
-        let (correction, course) = fit(self.rival, &samples.pick(&inside), contest, &recipe, &mut |_| {})?;
+        let (inside, outside): (Vec<usize>, Vec<usize>) = (0..samples.rows()).partition(|row| {
+            poses[*row] * contest.folds * RUNS / count % contest.folds != self.fold
+        });
+        let recipe = Recipe {
+            seed: self.recipe.seed ^ (self.fold as u64 + 1),
+            ..self.recipe.clone()
+        };
+        let (correction, course) = fit(
+            self.rival,
+            &samples.pick(&inside),
+            contest,
+            &recipe,
+            &mut |_| {},
+        )?;
         let left = outside.iter().map(|row| {
-            let (delta, residual) = (correction.at(&samples.sources[*row]).delta, samples.residual[*row]);
-            (*row, length(std::array::from_fn(|k| residual[k] - delta[k])))
+            let (delta, residual) = (
+                correction.at(&samples.sources[*row]).delta,
+                samples.residual[*row],
+            );
+            (
+                *row,
+                length(std::array::from_fn(|k| residual[k] - delta[k])),
+            )
         });
         // A course counts up within each member, and the swarm's is member 0.
-        let ends = course.iter().enumerate().filter(|(i, c)| course.get(i + 1).is_none_or(|next| next.member != c.member));
+        let ends = course
+            .iter()
+            .enumerate()
+            .filter(|(i, c)| course.get(i + 1).is_none_or(|next| next.member != c.member));
         let evaluations = ends.map(|(_, end)| end.evaluations).sum();
-        Some(Done { left: left.collect(), numbers: correction.numbers(), evaluations })
+        Some(Done {
+            left: left.collect(),
+            numbers: correction.numbers(),
+            evaluations,
+        })
     }
 }
 
@@ -296,15 +426,32 @@ fn together(folds: &[Option<Done>], before: &[f64], poses: &[usize]) -> Option<J
         }
     }
     let first = folds.first()?.as_ref()?;
-    let gains: Vec<f64> = before.iter().zip(&left).map(|(before, left)| before - left).collect();
+    let gains: Vec<f64> = before
+        .iter()
+        .zip(&left)
+        .map(|(before, left)| before - left)
+        .collect();
     let gain = mean(&gains);
     // Targets of one pose are moved together: the gain's scatter is that of poses.
     let mut off = vec![0.0; poses.iter().max()? + 1];
-    poses.iter().zip(&gains).for_each(|(pose, own)| off[*pose] += own - gain);
+    poses
+        .iter()
+        .zip(&gains)
+        .for_each(|(pose, own)| off[*pose] += own - gain);
     let (count, rows) = (off.len() as f64, gains.len() as f64);
-    let sigma = (off.iter().map(|off| off * off).sum::<f64>() * count / (count - 1.0).max(1.0)).sqrt() / rows;
+    let sigma = (off.iter().map(|off| off * off).sum::<f64>() * count / (count - 1.0).max(1.0))
+        .sqrt()
+        / rows;
     let (numbers, evaluations) = (first.numbers, first.evaluations);
-    Some(JudgedRival { rival: None, left, gain, sigma, numbers, evaluations, settings: None })
+    Some(JudgedRival {
+        rival: None,
+        left,
+        gain,
+        sigma,
+        numbers,
+        evaluations,
+        settings: None,
+    })
 }
 
 fn length(v: [f64; 3]) -> f64 {

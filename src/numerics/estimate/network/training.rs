@@ -4,7 +4,9 @@
 
 use super::activation::Activation;
 use super::arm::ScrewArm;
-use super::correction::{Body, Correction, Feature, JointMotion, NetworkScaling, Networks, Scaling};
+use super::correction::{
+    Body, Correction, Feature, JointMotion, NetworkScaling, Networks, Scaling,
+};
 use super::descent::{DescentIteration, descend};
 use super::loss::{Batch, Loss, LossBuffers};
 use super::perceptron::{LayerSizes, OUTPUTS};
@@ -106,10 +108,15 @@ pub fn train(
     recipe: &Recipe,
     observe: &mut dyn FnMut(&Generation),
 ) -> (Correction, Vec<TrainingStep>) {
-    assert!(samples.rows() > 0 && !recipe.features.is_empty(), "something to learn from");
+    assert!(
+        samples.rows() > 0 && !recipe.features.is_empty(),
+        "something to learn from"
+    );
     let prepared = Prepared::new(samples, recipe);
     let (starts, mut course) = prepared.starts(observe);
-    let trained = in_order(recipe.jobs, recipe.members, |m| prepared.member(m, starts[m % starts.len()].clone()));
+    let trained = in_order(recipe.jobs, recipe.members, |m| {
+        prepared.member(m, starts[m % starts.len()].clone())
+    });
     let mut members = Vec::with_capacity(recipe.members);
     for (parameters, history) in trained {
         members.push(parameters);
@@ -132,22 +139,50 @@ struct Prepared<'a> {
 }
 
 /// Standardised inputs and outputs with their scaling.
-pub(super) fn dressed(samples: &TrainingSamples, features: &[Feature]) -> (NetworkScaling, Vec<Vec<f64>>, Vec<[f64; OUTPUTS]>) {
-    let inputs = features.iter().map(|f| Scaling::of(samples.sources.iter().map(move |row| f.of(row)))).collect();
-    let outputs: [Scaling; OUTPUTS] = std::array::from_fn(|k| Scaling::of(samples.residual.iter().map(move |r| r[k])));
-    let dress = NetworkScaling { features: features.to_vec(), inputs, outputs };
-    let x = samples.sources.iter().map(|row| dress.scaled(row)).collect();
-    let y = samples.residual.iter().map(|r| std::array::from_fn(|k| outputs[k].scaled(r[k]))).collect();
+pub(super) fn dressed(
+    samples: &TrainingSamples,
+    features: &[Feature],
+) -> (NetworkScaling, Vec<Vec<f64>>, Vec<[f64; OUTPUTS]>) {
+    let inputs = features
+        .iter()
+        .map(|f| Scaling::of(samples.sources.iter().map(move |row| f.of(row))))
+        .collect();
+    let outputs: [Scaling; OUTPUTS] =
+        std::array::from_fn(|k| Scaling::of(samples.residual.iter().map(move |r| r[k])));
+    let dress = NetworkScaling {
+        features: features.to_vec(),
+        inputs,
+        outputs,
+    };
+    let x = samples
+        .sources
+        .iter()
+        .map(|row| dress.scaled(row))
+        .collect();
+    let y = samples
+        .residual
+        .iter()
+        .map(|r| std::array::from_fn(|k| outputs[k].scaled(r[k])))
+        .collect();
     (dress, x, y)
 }
 
 /// Joint motions of such sizes that each alone would make the residual's root mean square, which is given too, m.
 fn motion(samples: &TrainingSamples, arm: &ScrewArm) -> (JointMotion, f64) {
     let count = (OUTPUTS * samples.rows()) as f64;
-    let squares = |values: &[[f64; OUTPUTS]]| values.iter().flatten().map(|value| value * value).sum::<f64>();
+    let squares = |values: &[[f64; OUTPUTS]]| {
+        values
+            .iter()
+            .flatten()
+            .map(|value| value * value)
+            .sum::<f64>()
+    };
     let size = (squares(&samples.residual) / count).sqrt();
     let size = if size > 1e-12 { size } else { 1.0 };
-    let mut motion = JointMotion { arm: arm.clone(), scales: vec![1.0; arm.hinges.len()] };
+    let mut motion = JointMotion {
+        arm: arm.clone(),
+        scales: vec![1.0; arm.hinges.len()],
+    };
     let mut levers = vec![0.0; motion.scales.len()];
     for q in &samples.sources {
         for (lever, way) in levers.iter_mut().zip(motion.ways(q)) {
@@ -155,7 +190,13 @@ fn motion(samples: &TrainingSamples, arm: &ScrewArm) -> (JointMotion, f64) {
         }
     }
     // A joint whose axis goes through the point moves nothing, whatever its scale.
-    let scale = |lever: f64| if lever > 1e-18 { size / (lever / count).sqrt() } else { 0.0 };
+    let scale = |lever: f64| {
+        if lever > 1e-18 {
+            size / (lever / count).sqrt()
+        } else {
+            0.0
+        }
+    };
     motion.scales = levers.into_iter().map(scale).collect();
     (motion, size)
 }
@@ -167,15 +208,42 @@ impl<'a> Prepared<'a> {
         let mut ways = Vec::new();
         if let Some((motion, size)) = &joints {
             // Lengths are compared, so all axes have one scale.
-            dress.outputs = [Scaling { mean: 0.0, scale: *size }; OUTPUTS];
-            y = samples.residual.iter().map(|r| r.map(|value| value / size)).collect();
+            dress.outputs = [Scaling {
+                mean: 0.0,
+                scale: *size,
+            }; OUTPUTS];
+            y = samples
+                .residual
+                .iter()
+                .map(|r| r.map(|value| value / size))
+                .collect();
             let scaled = |way: [f64; OUTPUTS]| way.map(|value| value / size);
-            ways = samples.sources.iter().map(|q| motion.ways(q).into_iter().map(scaled).collect()).collect();
+            ways = samples
+                .sources
+                .iter()
+                .map(|q| motion.ways(q).into_iter().map(scaled).collect())
+                .collect();
         }
-        let outputs = joints.as_ref().map_or(OUTPUTS, |(motion, _)| motion.scales.len());
-        let shape = LayerSizes { inputs: recipe.features.len(), hidden: recipe.hidden, outputs, activation: recipe.activation };
+        let outputs = joints
+            .as_ref()
+            .map_or(OUTPUTS, |(motion, _)| motion.scales.len());
+        let shape = LayerSizes {
+            inputs: recipe.features.len(),
+            hidden: recipe.hidden,
+            outputs,
+            activation: recipe.activation,
+        };
         let joints = joints.map(|(motion, _)| motion);
-        Self { recipe, shape, x, y, joints, ways, dress, region: Region::of(&samples.sources, recipe.joints) }
+        Self {
+            recipe,
+            shape,
+            x,
+            y,
+            joints,
+            ways,
+            dress,
+            region: Region::of(&samples.sources, recipe.joints),
+        }
     }
 
     /// Where members start, best first, and the course of the swarm; chance has none.
@@ -183,7 +251,12 @@ impl<'a> Prepared<'a> {
         let mut rng = self.rng(0);
         let bounds = SearchBox::cube(self.shape.parameters(), -SWARM_BOUND, SWARM_BOUND);
         match self.recipe.start {
-            TrainingStart::Random => ((0..self.recipe.members).map(|_| bounds.random(&mut rng)).collect(), Vec::new()),
+            TrainingStart::Random => (
+                (0..self.recipe.members)
+                    .map(|_| bounds.random(&mut rng))
+                    .collect(),
+                Vec::new(),
+            ),
             TrainingStart::Swarm(algorithm) => self.swarm(algorithm, &bounds, &mut rng, observe),
         }
     }
@@ -195,14 +268,27 @@ impl<'a> Prepared<'a> {
         rng: &mut ChaCha8Rng,
         observe: &mut dyn FnMut(&Generation),
     ) -> (Vec<Vec<f64>>, Vec<TrainingStep>) {
-        let rows = if self.y.len() > SWARM_ROWS { draw(rng, self.y.len(), SWARM_ROWS).0 } else { (0..self.y.len()).collect() };
+        let rows = if self.y.len() > SWARM_ROWS {
+            draw(rng, self.y.len(), SWARM_ROWS).0
+        } else {
+            (0..self.y.len()).collect()
+        };
         let batch = self.batch(&rows);
-        let loss = Loss { shape: self.shape, batch: &batch, decay: self.recipe.decay * rows.len() as f64 / self.y.len() as f64 };
+        let loss = Loss {
+            shape: self.shape,
+            batch: &batch,
+            decay: self.recipe.decay * rows.len() as f64 / self.y.len() as f64,
+        };
         let mut scratch = LossBuffers::new(self.shape);
         let mut course: Vec<TrainingStep> = Vec::new();
         // A lone beetle knows one place: each member has a search of its own, at a share of the cost.
-        let searches = if algorithm == Algorithm::Bas { self.recipe.members } else { 1 };
-        let spent = Algorithm::Bso.evaluations(self.recipe.beetles, self.recipe.generations) / searches as u64;
+        let searches = if algorithm == Algorithm::Bas {
+            self.recipe.members
+        } else {
+            1
+        };
+        let spent = Algorithm::Bso.evaluations(self.recipe.beetles, self.recipe.generations)
+            / searches as u64;
         let mut starts = Vec::new();
         for search in 0..searches {
             let budget = Budget {
@@ -212,25 +298,31 @@ impl<'a> Prepared<'a> {
                 seed: rng.random(),
                 jobs: self.recipe.jobs,
             };
-            let outcome = algorithm.minimise(self.recipe.beetles, &loss, bounds, &budget, |generation, best| {
-                if search > 0 {
-                    return;
-                }
-                observe(generation);
-                let train_rms = match course.last() {
-                    Some(last) if last.best == generation.best => last.train_rms,
-                    _ => self.rms(loss.mean_squares(best, &mut scratch)),
-                };
-                course.push(TrainingStep {
-                    phase: Phase::Swarm,
-                    member: 0,
-                    index: generation.index,
-                    best: generation.best,
-                    train_rms,
-                    check_rms: None,
-                    evaluations: generation.evaluations,
-                });
-            });
+            let outcome = algorithm.minimise(
+                self.recipe.beetles,
+                &loss,
+                bounds,
+                &budget,
+                |generation, best| {
+                    if search > 0 {
+                        return;
+                    }
+                    observe(generation);
+                    let train_rms = match course.last() {
+                        Some(last) if last.best == generation.best => last.train_rms,
+                        _ => self.rms(loss.mean_squares(best, &mut scratch)),
+                    };
+                    course.push(TrainingStep {
+                        phase: Phase::Swarm,
+                        member: 0,
+                        index: generation.index,
+                        best: generation.best,
+                        train_rms,
+                        check_rms: None,
+                        evaluations: generation.evaluations,
+                    });
+                },
+            );
             starts.extend(outcome.elite.into_iter().map(|(_, position)| position));
         }
         (starts, course)
@@ -244,9 +336,18 @@ impl<'a> Prepared<'a> {
         let batch = self.batch(&rest);
         let check = self.batch(&kept_back);
         let decay = self.recipe.decay;
-        let train = Loss { shape: self.shape, batch: &batch, decay };
-        let check = (check.rows() > 0).then_some(Loss { shape: self.shape, batch: &check, decay });
-        let (mut scratch, mut beside) = (LossBuffers::new(self.shape), LossBuffers::new(self.shape));
+        let train = Loss {
+            shape: self.shape,
+            batch: &batch,
+            decay,
+        };
+        let check = (check.rows() > 0).then_some(Loss {
+            shape: self.shape,
+            batch: &check,
+            decay,
+        });
+        let (mut scratch, mut beside) =
+            (LossBuffers::new(self.shape), LossBuffers::new(self.shape));
         let descent = descend(
             |x, gradient| train.gradient(x, gradient, &mut scratch),
             |x| check.map(|check| check.mean_squares(x, &mut beside)),
@@ -262,13 +363,24 @@ impl<'a> Prepared<'a> {
             check_rms: i.check.map(|squares| self.rms(squares)),
             evaluations: i.evaluations,
         };
-        (descent.parameters, descent.history.into_iter().map(course).collect())
+        (
+            descent.parameters,
+            descent.history.into_iter().map(course).collect(),
+        )
     }
 
     fn correction(self, members: Vec<Vec<f64>>) -> Correction {
         let left = 0.0;
-        let networks = Networks { shape: self.shape, joints: self.joints, members };
-        Correction { body: Body::Networks(self.dress, networks), region: self.region, left }
+        let networks = Networks {
+            shape: self.shape,
+            joints: self.joints,
+            members,
+        };
+        Correction {
+            body: Body::Networks(self.dress, networks),
+            region: self.region,
+            left,
+        }
     }
 
     /// A stream of its own for each purpose, so that none depends on how much another drew.
@@ -284,13 +396,23 @@ impl<'a> Prepared<'a> {
         let batch = Batch::new(&x, &y);
         match self.ways.is_empty() {
             true => batch,
-            false => batch.through(&rows.iter().map(|r| self.ways[*r].clone()).collect::<Vec<_>>()),
+            false => batch.through(
+                &rows
+                    .iter()
+                    .map(|r| self.ways[*r].clone())
+                    .collect::<Vec<_>>(),
+            ),
         }
     }
 
     /// Root of the mean squared length, m, from mean squares of the scaled outputs.
     fn rms(&self, squares: [f64; OUTPUTS]) -> f64 {
-        squares.iter().zip(&self.dress.outputs).map(|(s, o)| s * o.scale * o.scale).sum::<f64>().sqrt()
+        squares
+            .iter()
+            .zip(&self.dress.outputs)
+            .map(|(s, o)| s * o.scale * o.scale)
+            .sum::<f64>()
+            .sqrt()
     }
 }
 

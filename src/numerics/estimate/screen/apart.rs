@@ -21,9 +21,15 @@ pub(super) fn apart(data: &Measurements, predicted: &[Vector3<f64>]) -> Vec<i64>
     for first in (0..predicted.len()).step_by(*STEP) {
         let last = (first + *STRETCH).min(predicted.len());
         let rows = last.saturating_sub(*STRETCH)..last;
-        let Some(own) = AlignedStretch::fit(data, predicted, rows.clone(), 0).filter(|own| own.left > *NOMINAL) else { continue };
+        let Some(own) =
+            AlignedStretch::fit(data, predicted, rows.clone(), 0).filter(|own| own.left > *NOMINAL)
+        else {
+            continue;
+        };
         let tried = (1..=MOST).flat_map(|k| [k, -k]);
-        let tried = tried.filter_map(|k| AlignedStretch::fit(data, predicted, rows.clone(), k).map(|stretch| (stretch, k)));
+        let tried = tried.filter_map(|k| {
+            AlignedStretch::fit(data, predicted, rows.clone(), k).map(|stretch| (stretch, k))
+        });
         if let Some((stretch, offset)) = tried.min_by(|a, b| a.0.left.total_cmp(&b.0.left))
             && stretch.left < *NOMINAL
             && *SLIPPED_BETTER * stretch.left < own.left
@@ -44,21 +50,29 @@ fn under_one_base(data: &Measurements, predicted: &[Vector3<f64>], apart: &mut [
     if apart.iter().all(|offset| *offset == 0) {
         return;
     }
-    let paired = (0..apart.len()).filter_map(|row| Some((*other(predicted, row, apart[row])?, data.point(row)?)));
+    let paired = (0..apart.len())
+        .filter_map(|row| Some((*other(predicted, row, apart[row])?, data.point(row)?)));
     let (from, to): (Vec<_>, Vec<_>) = paired.unzip();
     if from.len() < *STRETCH {
         return;
     }
     let base = align_points(&from, &to);
-    let off = |row: usize, offset: i64| Some((base.point(other(predicted, row, offset)?) - data.point(row)?).norm());
+    let off = |row: usize, offset: i64| {
+        Some((base.point(other(predicted, row, offset)?) - data.point(row)?).norm())
+    };
     let rows: Vec<usize> = (0..apart.len()).collect();
     let claimed: Vec<i64> = apart.to_vec();
-    for run in rows.chunk_by(|a, b| claimed[*a] == claimed[*b]).filter(|run| claimed[run[0]] != 0) {
+    for run in rows
+        .chunk_by(|a, b| claimed[*a] == claimed[*b])
+        .filter(|run| claimed[run[0]] != 0)
+    {
         let middle = |offset: i64| {
             let mut all: Vec<f64> = run.iter().filter_map(|row| off(*row, offset)).collect();
             nearest(&mut all, 0.5)
         };
-        let better = middle(claimed[run[0]]).zip(middle(0)).is_some_and(|(there, own)| *TOGETHER * there < own);
+        let better = middle(claimed[run[0]])
+            .zip(middle(0))
+            .is_some_and(|(there, own)| *TOGETHER * there < own);
         if !better {
             run.iter().for_each(|row| apart[*row] = 0);
         }
@@ -68,7 +82,12 @@ fn under_one_base(data: &Measurements, predicted: &[Vector3<f64>], apart: &mut [
 /// Where a slip reaches an end of the log, the joints of the rows past it were never logged.
 fn beyond_the_log(apart: &mut [i64]) {
     let rows = apart.len();
-    for offset in apart.iter().copied().filter(|offset| *offset != 0).collect::<BTreeSet<i64>>() {
+    for offset in apart
+        .iter()
+        .copied()
+        .filter(|offset| *offset != 0)
+        .collect::<BTreeSet<i64>>()
+    {
         let lost = offset.unsigned_abs() as usize;
         let (past, beside) = if offset > 0 {
             let edge = rows.saturating_sub(lost);
@@ -92,26 +111,50 @@ struct AlignedStretch {
 
 impl AlignedStretch {
     /// With the joints `offset` rows further on; `None` where too few rows have both.
-    fn fit(data: &Measurements, predicted: &[Vector3<f64>], rows: Range<usize>, offset: i64) -> Option<Self> {
-        let (from, to): (Vec<_>, Vec<_>) =
-            rows.filter_map(|row| Some((*other(predicted, row, offset)?, data.point(row)?))).unzip();
+    fn fit(
+        data: &Measurements,
+        predicted: &[Vector3<f64>],
+        rows: Range<usize>,
+        offset: i64,
+    ) -> Option<Self> {
+        let (from, to): (Vec<_>, Vec<_>) = rows
+            .filter_map(|row| Some((*other(predicted, row, offset)?, data.point(row)?)))
+            .unzip();
         if 2 * from.len() < *STRETCH {
             return None;
         }
         let all: Vec<usize> = (0..from.len()).collect();
         let motion = kabsch(&from, &to, &all);
         let centre = to.iter().sum::<Vector3<f64>>() / to.len() as f64;
-        let size = to.iter().map(|point| (point - centre).norm_squared()).sum::<f64>();
-        let rest = from.iter().zip(&to).map(|(a, b)| (motion.point(a) - b).norm_squared()).sum::<f64>();
-        (size > 0.0).then(|| Self { motion, left: (rest / size).sqrt() })
+        let size = to
+            .iter()
+            .map(|point| (point - centre).norm_squared())
+            .sum::<f64>();
+        let rest = from
+            .iter()
+            .zip(&to)
+            .map(|(a, b)| (motion.point(a) - b).norm_squared())
+            .sum::<f64>();
+        (size > 0.0).then(|| Self {
+            motion,
+            left: (rest / size).sqrt(),
+        })
     }
 
     /// Whether the measured point of a row is far nearer with the joints `offset` rows further on than with its own.
-    fn nearer(&self, data: &Measurements, predicted: &[Vector3<f64>], row: usize, offset: i64) -> bool {
-        data.point(row).zip(other(predicted, row, offset)).is_some_and(|(measured, there)| {
-            let off = |point: &Vector3<f64>| (self.motion.point(point) - measured).norm();
-            *SLIPPED_BETTER * off(there) < off(&predicted[row])
-        })
+    fn nearer(
+        &self,
+        data: &Measurements,
+        predicted: &[Vector3<f64>],
+        row: usize,
+        offset: i64,
+    ) -> bool {
+        data.point(row)
+            .zip(other(predicted, row, offset))
+            .is_some_and(|(measured, there)| {
+                let off = |point: &Vector3<f64>| (self.motion.point(point) - measured).norm();
+                *SLIPPED_BETTER * off(there) < off(&predicted[row])
+            })
     }
 }
 

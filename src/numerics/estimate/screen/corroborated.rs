@@ -11,9 +11,16 @@ pub(super) fn is_wrong(data: &Measurements, row: usize, off: f64) -> bool {
     if off > *IMPOSSIBLE {
         return true;
     }
-    let Some(point) = data.point(row) else { return false };
-    let again = |other: &usize| *other != row && data.target(*other) == data.target(row) && data.same_pose(row, *other);
-    let mut repeats = (0..data.rows()).filter(again).filter_map(|other| Some((other, data.point(other)?))).peekable();
+    let Some(point) = data.point(row) else {
+        return false;
+    };
+    let again = |other: &usize| {
+        *other != row && data.target(*other) == data.target(row) && data.same_pose(row, *other)
+    };
+    let mut repeats = (0..data.rows())
+        .filter(again)
+        .filter_map(|other| Some((other, data.point(other)?)))
+        .peekable();
     let apart = |(other, measured): (usize, Vector3<f64>)| {
         let noise = data.noise(row).hypot(data.noise(other));
         (point - measured).norm() > (*DISAGREES * noise).max(*JOINTS)

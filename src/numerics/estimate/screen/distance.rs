@@ -39,8 +39,13 @@ pub(super) fn leave_one_out(problem: &Problem, model: &Model, free: &[usize]) ->
     for row in problem.rows {
         fitted[*row] = true;
     }
-    let inverse = inverse.map(|inverse| Mat::from_fn(free.len(), free.len(), |i, j| inverse.at(i, j)));
-    let screened: Vec<&dyn MeasurementKind> = KINDS.iter().copied().filter(|kind| kind.about().is_screened).collect();
+    let inverse =
+        inverse.map(|inverse| Mat::from_fn(free.len(), free.len(), |i, j| inverse.at(i, j)));
+    let screened: Vec<&dyn MeasurementKind> = KINDS
+        .iter()
+        .copied()
+        .filter(|kind| kind.about().is_screened)
+        .collect();
     let chunk = |chunk: usize| {
         let rows = chunk * CHUNK..((chunk + 1) * CHUNK).min(data.rows());
         let mut scratch = model.stack.scratch(&model.robot);
@@ -50,12 +55,18 @@ pub(super) fn leave_one_out(problem: &Problem, model: &Model, free: &[usize]) ->
             let mut placed = model.place(data, row, &mut scratch);
             let predicted = placed.point;
             for kind in &screened {
-                let Some((term, _)) = ObservationTerm::of(*kind, data, row, &placed, problem.excess) else { continue };
+                let Some((term, _)) =
+                    ObservationTerm::of(*kind, data, row, &placed, problem.excess)
+                else {
+                    continue;
+                };
                 let first = 3 * terms.len();
                 term.derivatives(&mut placed, |parameter, derivative| {
                     if column[parameter] < free.len() {
                         let line = &mut lines.col_as_slice_mut(column[parameter])[first..first + 3];
-                        line.iter_mut().zip(derivative).for_each(|(value, d)| *value += d);
+                        line.iter_mut()
+                            .zip(derivative)
+                            .for_each(|(value, d)| *value += d);
                     }
                 });
                 terms.push((i, fitted[row], term.error.first_three()));
@@ -68,9 +79,15 @@ pub(super) fn leave_one_out(problem: &Problem, model: &Model, free: &[usize]) ->
             });
         }
         // H = G G', G = J R^-1 of the whitened derivatives.
-        let seen = inverse.as_ref().map_or_else(|| Mat::zeros(lines.nrows(), 1), |inverse| &lines * inverse);
+        let seen = inverse
+            .as_ref()
+            .map_or_else(|| Mat::zeros(lines.nrows(), 1), |inverse| &lines * inverse);
         for (k, (i, fitted, error)) in terms.into_iter().enumerate() {
-            let leverage = Matrix3::from_fn(|a, b| (0..seen.ncols()).map(|j| seen[(3 * k + a, j)] * seen[(3 * k + b, j)]).sum());
+            let leverage = Matrix3::from_fn(|a, b| {
+                (0..seen.ncols())
+                    .map(|j| seen[(3 * k + a, j)] * seen[(3 * k + b, j)])
+                    .sum()
+            });
             let weight = match error.norm() {
                 _ if !fitted => 0.0,
                 length if length > HUBER => HUBER / length,
@@ -81,7 +98,10 @@ pub(super) fn leave_one_out(problem: &Problem, model: &Model, free: &[usize]) ->
         }
         standings
     };
-    (0..data.rows().div_ceil(CHUNK)).into_par_iter().flat_map_iter(chunk).collect()
+    (0..data.rows().div_ceil(CHUNK))
+        .into_par_iter()
+        .flat_map_iter(chunk)
+        .collect()
 }
 
 fn distance(whitened: &Vector3<f64>, leverage: Matrix3<f64>, weight: f64) -> f64 {
@@ -90,7 +110,11 @@ fn distance(whitened: &Vector3<f64>, leverage: Matrix3<f64>, weight: f64) -> f64
     let squares = (0..3).map(|k| {
         let h = eigen.eigenvalues[k].max(0.0);
         let rest = 1.0 - weight * h;
-        if rest < 1.0 - *SOLE { 0.0 } else { along[k] * along[k] / (rest * (rest + h)) }
+        if rest < 1.0 - *SOLE {
+            0.0
+        } else {
+            along[k] * along[k] / (rest * (rest + h))
+        }
     });
     squares.sum::<f64>().sqrt()
 }

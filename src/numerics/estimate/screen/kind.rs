@@ -26,7 +26,18 @@ pub enum SuspectKind {
 }
 
 /// m, cm, inch and foot for mm, and the other way round.
-const SLIPS: [f64; 10] = [1000.0, 1e-3, 25.4, 1.0 / 25.4, 100.0, 0.01, 10.0, 0.1, 304.8, 1.0 / 304.8];
+const SLIPS: [f64; 10] = [
+    1000.0,
+    1e-3,
+    25.4,
+    1.0 / 25.4,
+    100.0,
+    0.01,
+    10.0,
+    0.1,
+    304.8,
+    1.0 / 304.8,
+];
 
 /// Names every row in `flagged` (ascending), with its partner. Points are matched within `limit` standard deviations, but not where
 /// the arm moves: there the rows beside one are always near.
@@ -39,15 +50,23 @@ pub(super) fn name(
 ) -> Vec<(usize, SuspectKind, Option<usize>)> {
     let mut kinds: BTreeMap<usize, (SuspectKind, Option<usize>)> = BTreeMap::new();
     for &row in flagged {
-        let misread = data.point(row).and_then(|point| misread(&point, &standings[row].predicted, *SLIP_TOLERANCE));
+        let misread = data
+            .point(row)
+            .and_then(|point| misread(&point, &standings[row].predicted, *SLIP_TOLERANCE));
         if let Some(kind) = misread {
             kinds.insert(row, (kind, None));
         }
     }
     let index = Index::new(standings);
-    let moved: Vec<usize> = flagged.iter().copied().filter(|row| !moving && !kinds.contains_key(row)).collect();
-    let fits: BTreeMap<usize, Vec<(usize, f64)>> =
-        moved.iter().map(|row| (*row, index.fits(data, standings, *row, limit))).collect();
+    let moved: Vec<usize> = flagged
+        .iter()
+        .copied()
+        .filter(|row| !moving && !kinds.contains_key(row))
+        .collect();
+    let fits: BTreeMap<usize, Vec<(usize, f64)>> = moved
+        .iter()
+        .map(|row| (*row, index.fits(data, standings, *row, limit)))
+        .collect();
     exchange(&fits, &mut kinds);
     shift(data, &fits, &mut kinds);
     for (row, candidates) in &fits {
@@ -68,13 +87,22 @@ pub(super) fn name(
         };
         kinds.extend(run.iter().map(|row| (*row, (kind, None))));
     }
-    kinds.into_iter().map(|(row, (kind, partner))| (row, kind, partner)).collect()
+    kinds
+        .into_iter()
+        .map(|(row, (kind, partner))| (row, kind, partner))
+        .collect()
 }
 
 /// A zero, or a point that a change of unit brings to where it was predicted, to a share `tolerance` of its distance.
-pub(super) fn misread(measured: &Vector3<f64>, predicted: &Vector3<f64>, tolerance: f64) -> Option<SuspectKind> {
+pub(super) fn misread(
+    measured: &Vector3<f64>,
+    predicted: &Vector3<f64>,
+    tolerance: f64,
+) -> Option<SuspectKind> {
     let distance = predicted.norm();
-    let slip = SLIPS.iter().find(|factor| (measured / **factor - predicted).norm() < tolerance * distance);
+    let slip = SLIPS
+        .iter()
+        .find(|factor| (measured / **factor - predicted).norm() < tolerance * distance);
     match slip {
         Some(factor) => Some(SuspectKind::UnitSlip(*factor)),
         None => (measured.norm() < *ZERO * distance).then_some(SuspectKind::Zero),
@@ -88,20 +116,33 @@ struct Index {
 
 impl Index {
     fn new(standings: &[LeaveOneOut]) -> Self {
-        let mut by_x: Vec<(f64, usize)> =
-            standings.iter().enumerate().map(|(row, standing)| (standing.predicted.x, row)).collect();
+        let mut by_x: Vec<(f64, usize)> = standings
+            .iter()
+            .enumerate()
+            .map(|(row, standing)| (standing.predicted.x, row))
+            .collect();
         by_x.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         Self { by_x }
     }
 
     /// Rows of other poses whose joints fit the point of `row` far better than its own, with their distance (m).
-    fn fits(&self, data: &Measurements, standings: &[LeaveOneOut], row: usize, limit: f64) -> Vec<(usize, f64)> {
-        let Some(point) = data.point(row) else { return Vec::new() };
+    fn fits(
+        &self,
+        data: &Measurements,
+        standings: &[LeaveOneOut],
+        row: usize,
+        limit: f64,
+    ) -> Vec<(usize, f64)> {
+        let Some(point) = data.point(row) else {
+            return Vec::new();
+        };
         let own = &standings[row];
         let typical = median_sigma(standings, row);
         let reach = (limit * typical * 3f64.sqrt()).min(own.residual.norm() / *BETTER);
         let start = self.by_x.partition_point(|(x, _)| *x < point.x - reach);
-        let slab = self.by_x[start..].iter().take_while(|(x, _)| *x <= point.x + reach);
+        let slab = self.by_x[start..]
+            .iter()
+            .take_while(|(x, _)| *x <= point.x + reach);
         let mut found: Vec<(usize, f64)> = slab
             .map(|(_, other)| (*other, (point - standings[*other].predicted).norm()))
             .filter(|(other, distance)| *distance <= reach && !data.near_pose(row, *other))
@@ -115,7 +156,10 @@ impl Index {
 /// The row's own standard deviation (m); its neighbour's where a wrong point makes it absurd.
 fn median_sigma(standings: &[LeaveOneOut], row: usize) -> f64 {
     let around = row.saturating_sub(2)..(row + 3).min(standings.len());
-    let mut sigmas: Vec<f64> = standings[around].iter().map(|standing| standing.sigma).collect();
+    let mut sigmas: Vec<f64> = standings[around]
+        .iter()
+        .map(|standing| standing.sigma)
+        .collect();
     sigmas.sort_by(f64::total_cmp);
     sigmas[sigmas.len() / 2]
 }
@@ -127,7 +171,10 @@ fn exchange(fits: &BTreeMap<usize, Vec<(usize, f64)>>, kinds: &mut Kinds) {
     let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
     for (&a, candidates) in fits {
         for &(b, there) in candidates.iter().filter(|(b, _)| *b > a) {
-            if let Some((_, back)) = fits.get(&b).and_then(|other| other.iter().find(|(row, _)| *row == a)) {
+            if let Some((_, back)) = fits
+                .get(&b)
+                .and_then(|other| other.iter().find(|(row, _)| *row == a))
+            {
                 pairs.push((there.hypot(*back), a, b));
             }
         }
@@ -145,9 +192,17 @@ fn exchange(fits: &BTreeMap<usize, Vec<(usize, f64)>>, kinds: &mut Kinds) {
 /// a row of it closes the circle.
 fn shift(data: &Measurements, fits: &BTreeMap<usize, Vec<(usize, f64)>>, kinds: &mut Kinds) {
     let offsets = |row: usize| -> BTreeSet<i64> {
-        fits.get(&row).into_iter().flatten().map(|(other, _)| *other as i64 - row as i64).collect()
+        fits.get(&row)
+            .into_iter()
+            .flatten()
+            .map(|(other, _)| *other as i64 - row as i64)
+            .collect()
     };
-    let rows: Vec<usize> = fits.keys().copied().filter(|row| !kinds.contains_key(row)).collect();
+    let rows: Vec<usize> = fits
+        .keys()
+        .copied()
+        .filter(|row| !kinds.contains_key(row))
+        .collect();
     let mut at = 0;
     while at < rows.len() {
         let mut common = offsets(rows[at]);
@@ -162,14 +217,20 @@ fn shift(data: &Measurements, fits: &BTreeMap<usize, Vec<(usize, f64)>>, kinds: 
         }
         let (first, last) = (rows[at], rows[end - 1]);
         if stops(data, &rows[at..end]) >= *RUN
-            && let Some(offset) = common.into_iter().min_by_key(|offset| (offset.abs(), *offset))
+            && let Some(offset) = common
+                .into_iter()
+                .min_by_key(|offset| (offset.abs(), *offset))
         {
             let to = |row: usize| usize::try_from(row as i64 + offset).ok();
             for &row in &rows[at..end] {
                 kinds.insert(row, (SuspectKind::ShiftedBlock(offset), to(row)));
             }
             for row in [first.wrapping_sub(1), last + 1] {
-                let inside = fits.get(&row).and_then(|found| found.iter().find(|(other, _)| (first..=last).contains(other)));
+                let inside = fits.get(&row).and_then(|found| {
+                    found
+                        .iter()
+                        .find(|(other, _)| (first..=last).contains(other))
+                });
                 if let (false, Some((partner, _))) = (kinds.contains_key(&row), inside) {
                     kinds.insert(row, (SuspectKind::ShiftedBlock(offset), Some(*partner)));
                 }
@@ -198,12 +259,17 @@ fn beyond_the_log(run: &[usize], kinds: &Kinds, rows: usize) -> Option<i64> {
 
 /// So many stops of the arm some rows are of.
 pub(super) fn stops(data: &Measurements, rows: &[usize]) -> usize {
-    rows.iter().map(|row| data.stop(*row)).collect::<BTreeSet<usize>>().len()
+    rows.iter()
+        .map(|row| data.stop(*row))
+        .collect::<BTreeSet<usize>>()
+        .len()
 }
 
 fn is_event(data: &Measurements, run: &[usize], standings: &[LeaveOneOut]) -> bool {
     let sizes = run.iter().map(|row| standings[*row].residual.norm());
-    let (least, most) = sizes.fold((f64::INFINITY, 0.0f64), |(least, most), size| (least.min(size), most.max(size)));
+    let (least, most) = sizes.fold((f64::INFINITY, 0.0f64), |(least, most), size| {
+        (least.min(size), most.max(size))
+    });
     let stops = stops(data, run);
     stops >= *LONG_RUN || stops >= *RUN && most <= *ALIKE * least
 }

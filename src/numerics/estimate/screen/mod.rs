@@ -14,7 +14,9 @@ pub use kind::SuspectKind;
 use super::fit::{FitOptions, Fitted, fit};
 use super::model::Model;
 use super::problem::Problem;
-use crate::criteria::screen::{BEYOND_CROWD, BULK, CROWD, FAR, GROSS, NOMINAL_TOLERANCE, READMITTING};
+use crate::criteria::screen::{
+    BEYOND_CROWD, BULK, CROWD, FAR, GROSS, NOMINAL_TOLERANCE, READMITTING,
+};
 use crate::effect::Effect;
 use crate::robot::Measurements;
 use crate::statistics::{MEDIAN_CHI2, nearest};
@@ -64,49 +66,125 @@ pub struct Screening {
 ///
 /// All rows of the recording are screened. `set[row]` numbers the set of a row: every set is measured by its own spread, since
 /// held-out rows may see physics that the fitted ones do not. Where more than half of the rows to fit would go, none goes.
-pub fn fit_screened(start: &Model, data: &Measurements, options: &FitOptions, set: &[usize]) -> (Model, Fitted, Screening) {
+pub fn fit_screened(
+    start: &Model,
+    data: &Measurements,
+    options: &FitOptions,
+    set: &[usize],
+) -> (Model, Fitted, Screening) {
     // Whole blocks may be in metres, zero, or beside other joints: more than a robust loss can bear, and plain to see even from the nominal robot.
     let predicted = start.predict(data);
     // A stretch of a path looks like itself a little further on: there only the velocities tell.
     let moving = data.in_motion(options.rows);
-    let apart = if moving { vec![0; data.rows()] } else { apart::apart(data, &predicted) };
+    let apart = if moving {
+        vec![0; data.rows()]
+    } else {
+        apart::apart(data, &predicted)
+    };
     let plain = |row: &usize| {
-        let misread = data.point(*row).and_then(|point| kind::misread(&point, &predicted[*row], *NOMINAL_TOLERANCE));
+        let misread = data
+            .point(*row)
+            .and_then(|point| kind::misread(&point, &predicted[*row], *NOMINAL_TOLERANCE));
         apart[*row] == 0 && misread.is_none()
     };
     let mut kept: Vec<usize> = options.rows.iter().copied().filter(plain).collect();
     // Where the whole log slipped there is nothing else to fit.
-    let mut slipped: BTreeMap<usize, i64> = (0..apart.len()).zip(apart.iter().copied()).filter(|(_, off)| *off != 0).collect();
+    let mut slipped: BTreeMap<usize, i64> = (0..apart.len())
+        .zip(apart.iter().copied())
+        .filter(|(_, off)| *off != 0)
+        .collect();
     if 2 * kept.len() < options.rows.len() {
         kept = options.rows.to_vec();
         slipped.clear();
     }
     let throughout = throughout(&apart);
-    let (mut model, mut fitted) = fit(start, data, &FitOptions { rows: &kept, ..*options });
+    let (mut model, mut fitted) = fit(
+        start,
+        data,
+        &FitOptions {
+            rows: &kept,
+            ..*options
+        },
+    );
     let mut aside = BTreeSet::new();
     for round in 0.. {
-        let held = if round < *READMITTING { BTreeSet::new() } else { aside.clone() };
-        let Screened { suspects, crowd, reach, followed } =
-            screen(&model, data, &Rows { asked: options.rows, kept: &kept, set }, &fitted, &held, &slipped);
+        let held = if round < *READMITTING {
+            BTreeSet::new()
+        } else {
+            aside.clone()
+        };
+        let Screened {
+            suspects,
+            crowd,
+            reach,
+            followed,
+        } = screen(
+            &model,
+            data,
+            &Rows {
+                asked: options.rows,
+                kept: &kept,
+                set,
+            },
+            &fitted,
+            &held,
+            &slipped,
+        );
         // What the fitted model follows never slipped.
         slipped.retain(|row, _| !followed.contains(row));
-        aside = suspects.iter().filter(|suspect| !suspect.used()).map(|suspect| suspect.row).collect();
-        let next: Vec<usize> = options.rows.iter().copied().filter(|row| !aside.contains(row)).collect();
+        aside = suspects
+            .iter()
+            .filter(|suspect| !suspect.used())
+            .map(|suspect| suspect.row)
+            .collect();
+        let next: Vec<usize> = options
+            .rows
+            .iter()
+            .copied()
+            .filter(|row| !aside.contains(row))
+            .collect();
         if next == kept {
-            return (model, fitted, Screening { kept, suspects, crowd, reach, apart: throughout });
+            return (
+                model,
+                fitted,
+                Screening {
+                    kept,
+                    suspects,
+                    crowd,
+                    reach,
+                    apart: throughout,
+                },
+            );
         }
         if 2 * next.len() < options.rows.len() {
             break;
         }
         kept = next;
         // From the very start: which of two redundant parameters is kept must not depend on rows that are gone.
-        (model, fitted) = fit(start, data, &FitOptions { rows: &kept, ..*options });
+        (model, fitted) = fit(
+            start,
+            data,
+            &FitOptions {
+                rows: &kept,
+                ..*options
+            },
+        );
     }
     if kept.len() < options.rows.len() {
         (model, fitted) = fit(start, data, options);
     }
     let kept = options.rows.to_vec();
-    (model, fitted, Screening { kept, suspects: Vec::new(), crowd: aside.len(), reach: *GROSS, apart: throughout })
+    (
+        model,
+        fitted,
+        Screening {
+            kept,
+            suspects: Vec::new(),
+            crowd: aside.len(),
+            reach: *GROSS,
+            apart: throughout,
+        },
+    )
 }
 
 /// The offset of more than half of the rows.
@@ -147,49 +225,94 @@ fn screen(
     slipped: &BTreeMap<usize, i64>,
 ) -> Screened {
     let Rows { asked, kept, set } = *rows;
-    let problem = Problem { data, rows: kept, excess: fitted.excess() };
+    let problem = Problem {
+        data,
+        rows: kept,
+        excess: fitted.excess(),
+    };
     let mut standings = leave_one_out(&problem, model, &fitted.free());
     measure_by_set(&mut standings, set);
     let bulk = bulk(&standings, asked);
     let limit = limit(&bulk);
-    let flagged: Vec<usize> = (0..standings.len()).filter(|row| standings[*row].distance > limit || held.contains(row)).collect();
+    let flagged: Vec<usize> = (0..standings.len())
+        .filter(|row| standings[*row].distance > limit || held.contains(row))
+        .collect();
     let mut named = kind::name(data, &standings, &flagged, limit, data.in_motion(kept));
     named.extend(beside(data, &named));
     let crowded = crowded(data, &named, set);
     // What a free form does not follow is its own fault before it is a row's, but where the row is off by more than such forms move any.
-    let free = if named.is_empty() { 0.0 } else { moved_by_free_forms(model, data) };
+    let free = if named.is_empty() {
+        0.0
+    } else {
+        moved_by_free_forms(model, data)
+    };
     let mut crowd = 0;
     let mut suspects = Vec::new();
-    for (row, kind, partner) in named.into_iter().filter(|(row, ..)| !slipped.contains_key(row)) {
-        let LeaveOneOut { residual, distance, .. } = &standings[row];
-        let kind = if kind == SuspectKind::Event && held.contains(&row) { SuspectKind::Outlier } else { kind };
+    for (row, kind, partner) in named
+        .into_iter()
+        .filter(|(row, ..)| !slipped.contains_key(row))
+    {
+        let LeaveOneOut {
+            residual, distance, ..
+        } = &standings[row];
+        let kind = if kind == SuspectKind::Event && held.contains(&row) {
+            SuspectKind::Outlier
+        } else {
+            kind
+        };
         // A row that judges the model is not set aside by the model alone.
         let needs_more = residual.norm() <= 2.0 * free || asked.binary_search(&row).is_err();
         let corroborated = corroborated::is_wrong(data, row, residual.norm());
-        let among_many = crowded.contains(&set[row]) && *distance < *BEYOND_CROWD * limit && !held.contains(&row);
+        let among_many = crowded.contains(&set[row])
+            && *distance < *BEYOND_CROWD * limit
+            && !held.contains(&row);
         if kind == SuspectKind::Outlier && (needs_more && !corroborated || among_many) {
             crowd += 1;
         } else {
-            suspects.push(Suspect { row, kind, partner, size: residual.norm(), statistic: *distance, corroborated });
+            suspects.push(Suspect {
+                row,
+                kind,
+                partner,
+                size: residual.norm(),
+                statistic: *distance,
+                corroborated,
+            });
         }
     }
-    let followed: BTreeSet<usize> = slipped.keys().copied().filter(|row| standings[*row].distance <= limit).collect();
+    let followed: BTreeSet<usize> = slipped
+        .keys()
+        .copied()
+        .filter(|row| standings[*row].distance <= limit)
+        .collect();
     // Plain from the nominal robot, but where the fitted model follows them.
-    suspects.extend(slipped.iter().filter(|(row, _)| !followed.contains(row)).map(|(row, offset)| Suspect {
-        row: *row,
-        kind: SuspectKind::ShiftedBlock(*offset),
-        partner: row.checked_add_signed(*offset as isize).filter(|row| *row < data.rows()),
-        size: standings[*row].residual.norm(),
-        statistic: standings[*row].distance,
-        corroborated: true,
-    }));
+    suspects.extend(
+        slipped
+            .iter()
+            .filter(|(row, _)| !followed.contains(row))
+            .map(|(row, offset)| Suspect {
+                row: *row,
+                kind: SuspectKind::ShiftedBlock(*offset),
+                partner: row
+                    .checked_add_signed(*offset as isize)
+                    .filter(|row| *row < data.rows()),
+                size: standings[*row].residual.norm(),
+                statistic: standings[*row].distance,
+                corroborated: true,
+            }),
+    );
     suspects.sort_by_key(|suspect| suspect.row);
-    Screened { suspects, crowd, reach: tail::reach(&bulk, standings.len()), followed }
+    Screened {
+        suspects,
+        crowd,
+        reach: tail::reach(&bulk, standings.len()),
+        followed,
+    }
 }
 
 /// How far free forms move the point of any row at most, m.
 fn moved_by_free_forms(model: &Model, data: &Measurements) -> f64 {
-    let is_free = |effect: &dyn Effect| effect.form().is_some_and(|form| form.cause().is_nameless());
+    let is_free =
+        |effect: &dyn Effect| effect.form().is_some_and(|form| form.cause().is_nameless());
     let mut x = model.x.clone();
     for (_, range) in model.stack.effects().filter(|(effect, _)| is_free(*effect)) {
         x[range].fill(0.0);
@@ -198,7 +321,11 @@ fn moved_by_free_forms(model: &Model, data: &Measurements) -> f64 {
         return 0.0;
     }
     let without = Model { x, ..model.clone() }.predict(data);
-    let moved = model.predict(data).into_iter().zip(without).map(|(with, without)| (with - without).norm());
+    let moved = model
+        .predict(data)
+        .into_iter()
+        .zip(without)
+        .map(|(with, without)| (with - without).norm());
     moved.fold(0.0, f64::max)
 }
 
@@ -206,10 +333,18 @@ fn moved_by_free_forms(model: &Model, data: &Measurements) -> f64 {
 fn measure_by_set(standings: &mut [LeaveOneOut], set: &[usize]) {
     let sets: BTreeSet<usize> = set.iter().copied().collect();
     for number in sets {
-        let mut distances: Vec<f64> =
-            standings.iter().zip(set).filter(|(_, of)| **of == number).map(|(standing, _)| standing.distance).collect();
+        let mut distances: Vec<f64> = standings
+            .iter()
+            .zip(set)
+            .filter(|(_, of)| **of == number)
+            .map(|(standing, _)| standing.distance)
+            .collect();
         let spread = (nearest(&mut distances, 0.5).unwrap_or(0.0) / MEDIAN_CHI2[3].sqrt()).max(1.0);
-        for (standing, _) in standings.iter_mut().zip(set).filter(|(_, of)| **of == number) {
+        for (standing, _) in standings
+            .iter_mut()
+            .zip(set)
+            .filter(|(_, of)| **of == number)
+        {
             standing.distance /= spread;
             standing.sigma *= spread;
         }
@@ -223,22 +358,36 @@ fn limit(bulk: &[f64]) -> f64 {
 
 /// Distances of those of the rows that are not gross.
 fn bulk(standings: &[LeaveOneOut], rows: &[usize]) -> Vec<f64> {
-    rows.iter().map(|row| standings[*row].distance).filter(|distance| *distance <= *GROSS).collect()
+    rows.iter()
+        .map(|row| standings[*row].distance)
+        .filter(|distance| *distance <= *GROSS)
+        .collect()
 }
 
 /// The other targets of stops at which most are off without a reason of their own: it is the joints of the stop that are wrong.
 fn beside(data: &Measurements, named: &[ClassedRow]) -> Vec<ClassedRow> {
-    let off: Vec<usize> = named.iter().filter(|(_, kind, _)| *kind == SuspectKind::Outlier).map(|(row, ..)| *row).collect();
+    let off: Vec<usize> = named
+        .iter()
+        .filter(|(_, kind, _)| *kind == SuspectKind::Outlier)
+        .map(|(row, ..)| *row)
+        .collect();
     let listed = |row: &usize| named.iter().any(|(other, ..)| other == row);
     let mut found = Vec::new();
     let mut stops: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-    off.into_iter().for_each(|row| stops.entry(data.stop(row)).or_default().push(row));
+    off.into_iter()
+        .for_each(|row| stops.entry(data.stop(row)).or_default().push(row));
     for (first, stop) in stops.into_iter().filter(|(_, stop)| stop.len() > 1) {
         let from = data.rank_in_time(first);
-        let rows: Vec<usize> =
-            (from..data.rows()).map(|place| data.at_place(place)).take_while(|row| data.stop(*row) == first).collect();
+        let rows: Vec<usize> = (from..data.rows())
+            .map(|place| data.at_place(place))
+            .take_while(|row| data.stop(*row) == first)
+            .collect();
         if 2 * stop.len() > rows.len() {
-            found.extend(rows.into_iter().filter(|row| !listed(row)).map(|row| (row, SuspectKind::Outlier, None)));
+            found.extend(
+                rows.into_iter()
+                    .filter(|row| !listed(row))
+                    .map(|row| (row, SuspectKind::Outlier, None)),
+            );
         }
     }
     found
@@ -253,9 +402,21 @@ fn crowded(data: &Measurements, named: &[ClassedRow], set: &[usize]) -> BTreeSet
     sets.into_iter()
         .filter(|number| {
             let stops = |rows: &[usize]| kind::stops(data, rows) as f64;
-            let all = stops(&(0..set.len()).filter(|row| set[*row] == *number).collect::<Vec<_>>());
-            let outlier = |(row, kind, _): &&ClassedRow| set[*row] == *number && *kind == SuspectKind::Outlier;
-            let unexplained = stops(&named.iter().filter(outlier).map(|(row, ..)| *row).collect::<Vec<_>>());
+            let all = stops(
+                &(0..set.len())
+                    .filter(|row| set[*row] == *number)
+                    .collect::<Vec<_>>(),
+            );
+            let outlier = |(row, kind, _): &&ClassedRow| {
+                set[*row] == *number && *kind == SuspectKind::Outlier
+            };
+            let unexplained = stops(
+                &named
+                    .iter()
+                    .filter(outlier)
+                    .map(|(row, ..)| *row)
+                    .collect::<Vec<_>>(),
+            );
             unexplained > *CROWD * all + 2.0 * (*CROWD * (1.0 - *CROWD) * all).sqrt()
         })
         .collect()

@@ -12,9 +12,12 @@ const FINE: f64 = 40.0;
 /// The distance (standard deviations) beyond which noise with the tails of these `distances` has a row of `rows` by chance at
 /// most [`CHANCE`] times. Zero without distances.
 pub(super) fn reach(distances: &[f64], rows: usize) -> f64 {
-    let fits = FREEDOMS.iter().map(|freedom| Tail::fitted(distances, *freedom));
+    let fits = FREEDOMS
+        .iter()
+        .map(|freedom| Tail::fitted(distances, *freedom));
     let best = fits.max_by(|a, b| a.likelihood.total_cmp(&b.likelihood));
-    best.filter(|_| !distances.is_empty()).map_or(0.0, |tail| tail.quantile(*CHANCE / rows.max(1) as f64))
+    best.filter(|_| !distances.is_empty())
+        .map_or(0.0, |tail| tail.quantile(*CHANCE / rows.max(1) as f64))
 }
 
 /// Lengths of vectors that follow Student's t.
@@ -31,18 +34,29 @@ impl Tail {
         let count = distances.len() as f64;
         let mut square = distances.iter().map(|r| r * r).sum::<f64>() / (3.0 * count.max(1.0));
         for _ in 0..STEPS {
-            let weighted = distances.iter().map(|r| (freedom + 3.0) / (freedom + r * r / square) * r * r);
+            let weighted = distances
+                .iter()
+                .map(|r| (freedom + 3.0) / (freedom + r * r / square) * r * r);
             square = (weighted.sum::<f64>() / (3.0 * count.max(1.0))).max(f64::MIN_POSITIVE);
         }
-        let mut tail = Self { freedom, scale: square.sqrt(), likelihood: 0.0 };
-        tail.likelihood = distances.iter().map(|r| tail.density(r / tail.scale).ln() - tail.scale.ln()).sum();
+        let mut tail = Self {
+            freedom,
+            scale: square.sqrt(),
+            likelihood: 0.0,
+        };
+        tail.likelihood = distances
+            .iter()
+            .map(|r| tail.density(r / tail.scale).ln() - tail.scale.ln())
+            .sum();
         tail
     }
 
     /// Density of a length in units of the scale.
     fn density(&self, length: f64) -> f64 {
         let v = self.freedom;
-        let gammas = libm::lgamma((v + 3.0) / 2.0) - libm::lgamma(v / 2.0) - 1.5 * (v * std::f64::consts::PI).ln();
+        let gammas = libm::lgamma((v + 3.0) / 2.0)
+            - libm::lgamma(v / 2.0)
+            - 1.5 * (v * std::f64::consts::PI).ln();
         let shape = -(v + 3.0) / 2.0 * (length * length / v).ln_1p();
         4.0 * std::f64::consts::PI * length * length * (gammas + shape).exp()
     }

@@ -1,12 +1,17 @@
 //! The five optimisers by name, with the parameters of their papers.
 
-use super::{BeeColony, BeetleAntennae, BeetleSwarm, Budget, Generation, Genetic, Method, Objective, SearchBox, SwarmResult};
+use super::{
+    BeeColony, BeetleAntennae, BeetleSwarm, Budget, Generation, Genetic, Method, Objective,
+    SearchBox, SwarmResult,
+};
 use super::{ParticleSwarm, minimise};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// An optimiser with the parameters of its paper.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum Algorithm {
     /// Beetle antennae search.
@@ -30,19 +35,31 @@ macro_rules! with {
                 $body
             }
             Algorithm::Bso => {
-                let $method = BeetleSwarm { beetles: $population, ..BeetleSwarm::default() };
+                let $method = BeetleSwarm {
+                    beetles: $population,
+                    ..BeetleSwarm::default()
+                };
                 $body
             }
             Algorithm::Pso => {
-                let $method = ParticleSwarm { particles: $population, ..ParticleSwarm::default() };
+                let $method = ParticleSwarm {
+                    particles: $population,
+                    ..ParticleSwarm::default()
+                };
                 $body
             }
             Algorithm::Ga => {
-                let $method = Genetic { individuals: $population, ..Genetic::default() };
+                let $method = Genetic {
+                    individuals: $population,
+                    ..Genetic::default()
+                };
                 $body
             }
             Algorithm::Abc => {
-                let $method = BeeColony { sources: $population.div_ceil(2), ..BeeColony::default() };
+                let $method = BeeColony {
+                    sources: $population.div_ceil(2),
+                    ..BeeColony::default()
+                };
                 $body
             }
         }
@@ -74,7 +91,11 @@ impl Algorithm {
 
     /// Evaluations that `generations` of a `population` take; a colony's scouts come on top.
     pub fn evaluations(self, population: usize, generations: usize) -> u64 {
-        with!(self, population, |method| (method.first() + generations * method.further()) as u64)
+        with!(
+            self,
+            population,
+            |method| (method.first() + generations * method.further()) as u64
+        )
     }
 
     /// Minimises with a `population` (at least 4; a lone beetle has none); see [`minimise`].
@@ -86,6 +107,8 @@ impl Algorithm {
         budget: &Budget,
         observe: impl FnMut(&Generation, &[f64]),
     ) -> SwarmResult {
-        with!(self, population, |method| minimise(&method, objective, bounds, budget, observe))
+        with!(self, population, |method| minimise(
+            &method, objective, bounds, budget, observe
+        ))
     }
 }

@@ -18,7 +18,10 @@ pub struct BeeColony {
 
 impl Default for BeeColony {
     fn default() -> Self {
-        Self { sources: 25, limit: 1.0 }
+        Self {
+            sources: 25,
+            limit: 1.0,
+        }
     }
 }
 
@@ -42,16 +45,26 @@ impl Method for BeeColony {
     }
 
     fn start<O: Objective>(&self, search: &mut Search<O>) -> Colony {
-        let positions: Vec<Vec<f64>> = (0..self.sources).map(|_| search.bounds.random(&mut search.rng)).collect();
+        let positions: Vec<Vec<f64>> = (0..self.sources)
+            .map(|_| search.bounds.random(&mut search.rng))
+            .collect();
         let values = search.visit(&positions);
         let sources: Vec<(f64, Vec<f64>)> = values.into_iter().zip(positions).collect();
-        Colony { trials: vec![0; self.sources], best: sources.clone(), sources }
+        Colony {
+            trials: vec![0; self.sources],
+            best: sources.clone(),
+            sources,
+        }
     }
 
     fn step<O: Objective>(&self, colony: &mut Colony, search: &mut Search<O>) {
         let employed: Vec<usize> = (0..self.sources).collect();
         colony.fly(&employed, search);
-        let fitness: Vec<f64> = colony.sources.iter().map(|source| fitness(source.0)).collect();
+        let fitness: Vec<f64> = colony
+            .sources
+            .iter()
+            .map(|source| fitness(source.0))
+            .collect();
         let total: f64 = fitness.iter().sum();
         let onlookers: Vec<usize> = (0..self.sources)
             .map(|_| {
@@ -65,14 +78,17 @@ impl Method for BeeColony {
             .collect();
         colony.fly(&onlookers, search);
         let limit = self.limit * (self.sources * search.bounds.dimensions()) as f64;
-        let tired = (0..self.sources).max_by_key(|i| (colony.trials[*i], self.sources - i)).unwrap_or(0);
+        let tired = (0..self.sources)
+            .max_by_key(|i| (colony.trials[*i], self.sources - i))
+            .unwrap_or(0);
         if colony.trials[tired] as f64 > limit {
             let position = search.bounds.random(&mut search.rng);
             let value = search.visit(std::slice::from_ref(&position))[0];
             colony.sources[tired] = (value, position);
             colony.trials[tired] = 0;
         }
-        search.mean = colony.sources.iter().map(|source| source.0).sum::<f64>() / self.sources as f64;
+        search.mean =
+            colony.sources.iter().map(|source| source.0).sum::<f64>() / self.sources as f64;
     }
 
     fn elite(&self, colony: &Colony) -> Vec<(f64, Vec<f64>)> {
@@ -111,5 +127,9 @@ impl Colony {
 }
 
 fn fitness(value: f64) -> f64 {
-    if value >= 0.0 { 1.0 / (1.0 + value) } else { 1.0 - value }
+    if value >= 0.0 {
+        1.0 / (1.0 + value)
+    } else {
+        1.0 - value
+    }
 }

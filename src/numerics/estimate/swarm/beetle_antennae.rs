@@ -21,7 +21,12 @@ pub struct BeetleAntennae {
 
 impl Default for BeetleAntennae {
     fn default() -> Self {
-        Self { antenna: 2.0, step: 0.5, decay: 0.95, antenna_floor: 0.01 }
+        Self {
+            antenna: 2.0,
+            step: 0.5,
+            decay: 0.95,
+            antenna_floor: 0.01,
+        }
     }
 }
 
@@ -47,13 +52,23 @@ impl Method for BeetleAntennae {
     fn start<O: Objective>(&self, search: &mut Search<O>) -> Beetle {
         let position = search.bounds.random(&mut search.rng);
         let value = search.visit(std::slice::from_ref(&position))[0];
-        Beetle { best: (value, position.clone()), position, antenna: self.antenna, step: self.step }
+        Beetle {
+            best: (value, position.clone()),
+            position,
+            antenna: self.antenna,
+            step: self.step,
+        }
     }
 
     fn step<O: Objective>(&self, beetle: &mut Beetle, search: &mut Search<O>) {
         let direction = unit_vector(search);
         let smell_at = |sign: f64| {
-            let mut x: Vec<f64> = beetle.position.iter().zip(&direction).map(|(x, b)| x + sign * beetle.antenna * b).collect();
+            let mut x: Vec<f64> = beetle
+                .position
+                .iter()
+                .zip(&direction)
+                .map(|(x, b)| x + sign * beetle.antenna * b)
+                .collect();
             search.bounds.clamp(&mut x);
             x
         };
@@ -80,7 +95,9 @@ impl Method for BeetleAntennae {
 /// Eq. 31: components in -1..1, scaled to length one.
 fn unit_vector<O: Objective>(search: &mut Search<O>) -> Vec<f64> {
     loop {
-        let b: Vec<f64> = (0..search.bounds.dimensions()).map(|_| search.rng.random_range(-1.0..1.0)).collect();
+        let b: Vec<f64> = (0..search.bounds.dimensions())
+            .map(|_| search.rng.random_range(-1.0..1.0))
+            .collect();
         let length = b.iter().map(|x| x * x).sum::<f64>().sqrt();
         // A direction cannot be told from a vector this short; with one coordinate or more it is drawn again at once.
         if length > 1e-9 {

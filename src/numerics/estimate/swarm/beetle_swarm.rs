@@ -73,20 +73,40 @@ impl Method for BeetleSwarm {
 
     fn start<O: Objective>(&self, search: &mut Search<O>) -> Swarm {
         let bounds = search.bounds;
-        let positions: Vec<Vec<f64>> = (0..self.beetles).map(|_| bounds.random(&mut search.rng)).collect();
-        let mut speed = |s: usize| self.fastest * bounds.width(s) * search.rng.random_range(-1.0..1.0);
-        let velocities = (0..self.beetles).map(|_| (0..bounds.dimensions()).map(&mut speed).collect()).collect();
+        let positions: Vec<Vec<f64>> = (0..self.beetles)
+            .map(|_| bounds.random(&mut search.rng))
+            .collect();
+        let mut speed =
+            |s: usize| self.fastest * bounds.width(s) * search.rng.random_range(-1.0..1.0);
+        let velocities = (0..self.beetles)
+            .map(|_| (0..bounds.dimensions()).map(&mut speed).collect())
+            .collect();
         let values = search.visit(&positions);
         let best = values.into_iter().zip(positions.iter().cloned()).collect();
-        Swarm { positions, velocities, best, antenna: self.antenna, step: self.step }
+        Swarm {
+            positions,
+            velocities,
+            best,
+            antenna: self.antenna,
+            step: self.step,
+        }
     }
 
     fn step<O: Objective>(&self, swarm: &mut Swarm, search: &mut Search<O>) {
         let inertia = search.falling(self.inertia);
-        let limits: Vec<f64> = (0..search.bounds.dimensions()).map(|s| self.fastest * search.bounds.width(s)).collect();
-        for ((velocity, position), own) in swarm.velocities.iter_mut().zip(&swarm.positions).zip(&swarm.best) {
+        let limits: Vec<f64> = (0..search.bounds.dimensions())
+            .map(|s| self.fastest * search.bounds.width(s))
+            .collect();
+        for ((velocity, position), own) in swarm
+            .velocities
+            .iter_mut()
+            .zip(&swarm.positions)
+            .zip(&swarm.best)
+        {
             let goals = own.1.iter().zip(&search.best.1);
-            for (((v, x), (own, group)), limit) in velocity.iter_mut().zip(position).zip(goals).zip(&limits) {
+            for (((v, x), (own, group)), limit) in
+                velocity.iter_mut().zip(position).zip(goals).zip(&limits)
+            {
                 let own = self.c1 * search.rng.random::<f64>() * (own - x);
                 let group = self.c2 * search.rng.random::<f64>() * (group - x);
                 *v = (inertia * *v + own + group).clamp(-limit, *limit);
@@ -96,7 +116,11 @@ impl Method for BeetleSwarm {
         let mut antennae = Vec::with_capacity(2 * self.beetles);
         for (position, velocity) in swarm.positions.iter().zip(&swarm.velocities) {
             for side in [half, -half] {
-                let mut end: Vec<f64> = position.iter().zip(velocity).map(|(x, v)| x + side * v).collect();
+                let mut end: Vec<f64> = position
+                    .iter()
+                    .zip(velocity)
+                    .map(|(x, v)| x + side * v)
+                    .collect();
                 search.bounds.clamp(&mut end);
                 antennae.push(end);
             }

@@ -53,7 +53,9 @@ impl Method for Genetic {
     }
 
     fn start<O: Objective>(&self, search: &mut Search<O>) -> Population {
-        let positions: Vec<Vec<f64>> = (0..self.individuals).map(|_| search.bounds.random(&mut search.rng)).collect();
+        let positions: Vec<Vec<f64>> = (0..self.individuals)
+            .map(|_| search.bounds.random(&mut search.rng))
+            .collect();
         let values = search.visit(&positions);
         Population(ranked(values.into_iter().zip(positions).collect()))
     }
@@ -84,7 +86,10 @@ impl Method for Genetic {
 impl Genetic {
     /// The winner of a tournament: positions are best first, so the smallest number wins.
     fn parent(&self, rng: &mut ChaCha8Rng) -> usize {
-        (0..self.tournament.max(1)).map(|_| rng.random_range(0..self.individuals)).min().unwrap_or(0)
+        (0..self.tournament.max(1))
+            .map(|_| rng.random_range(0..self.individuals))
+            .min()
+            .unwrap_or(0)
     }
 
     /// Spreads two children about the middle of their parents as a one-point crossover of binary numbers would.
@@ -99,7 +104,11 @@ impl Genetic {
             }
             let u: f64 = search.rng.random();
             let power = 1.0 / (self.crossover_index + 1.0);
-            let spread = if u <= 0.5 { (2.0 * u).powf(power) } else { (0.5 / (1.0 - u)).powf(power) };
+            let spread = if u <= 0.5 {
+                (2.0 * u).powf(power)
+            } else {
+                (0.5 / (1.0 - u)).powf(power)
+            };
             let (middle, half) = (0.5 * (*a + *b), 0.5 * spread * (*b - *a));
             (*a, *b) = (middle - half, middle + half);
         }
@@ -113,7 +122,11 @@ impl Genetic {
             }
             let u: f64 = search.rng.random();
             let power = 1.0 / (self.mutation_index + 1.0);
-            let shift = if u < 0.5 { (2.0 * u).powf(power) - 1.0 } else { 1.0 - (2.0 * (1.0 - u)).powf(power) };
+            let shift = if u < 0.5 {
+                (2.0 * u).powf(power) - 1.0
+            } else {
+                1.0 - (2.0 * (1.0 - u)).powf(power)
+            };
             *x += shift * search.bounds.width(s);
         }
     }

@@ -9,7 +9,9 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::{E, PI};
 
 /// A function to be minimised in any number of dimensions.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum Landscape {
     /// Flat with narrow valleys; the paper's. In 2, 5 or 10 dimensions.
@@ -37,11 +39,19 @@ impl Landscape {
     pub fn value(self, x: &[f64]) -> f64 {
         let n = x.len() as f64;
         match self {
-            Self::Michalewicz => {
-                -x.iter().zip(1..).map(|(x, i)| x.sin() * (f64::from(i) * x * x / PI).sin().powi(20)).sum::<f64>()
-            }
-            Self::Rastrigin => x.iter().map(|x| x * x - 10.0 * (2.0 * PI * x).cos() + 10.0).sum(),
-            Self::Rosenbrock => x.windows(2).map(|x| 100.0 * (x[1] - x[0] * x[0]).powi(2) + (1.0 - x[0]).powi(2)).sum(),
+            Self::Michalewicz => -x
+                .iter()
+                .zip(1..)
+                .map(|(x, i)| x.sin() * (f64::from(i) * x * x / PI).sin().powi(20))
+                .sum::<f64>(),
+            Self::Rastrigin => x
+                .iter()
+                .map(|x| x * x - 10.0 * (2.0 * PI * x).cos() + 10.0)
+                .sum(),
+            Self::Rosenbrock => x
+                .windows(2)
+                .map(|x| 100.0 * (x[1] - x[0] * x[0]).powi(2) + (1.0 - x[0]).powi(2))
+                .sum(),
             Self::Ackley => {
                 let squares: f64 = x.iter().map(|x| x * x).sum::<f64>() / n;
                 let cosines: f64 = x.iter().map(|x| (2.0 * PI * x).cos()).sum::<f64>() / n;
@@ -62,8 +72,20 @@ impl Landscape {
     }
 
     /// One search for its minimum; `population` as of [`Algorithm::minimise`].
-    pub fn search(self, dimensions: usize, method: Algorithm, population: usize, budget: &Budget) -> SwarmResult {
-        method.minimise(population, &|x: &[f64]| self.value(x), &self.bounds(dimensions), budget, |_, _| {})
+    pub fn search(
+        self,
+        dimensions: usize,
+        method: Algorithm,
+        population: usize,
+        budget: &Budget,
+    ) -> SwarmResult {
+        method.minimise(
+            population,
+            &|x: &[f64]| self.value(x),
+            &self.bounds(dimensions),
+            budget,
+            |_, _| {},
+        )
     }
 
     /// The smallest value, where it is known.

@@ -52,7 +52,13 @@ impl SearchBox {
     /// The box between two corners. Panics where they differ in length, are not finite or are in the wrong order.
     pub fn new(lower: Vec<f64>, upper: Vec<f64>) -> Self {
         assert_eq!(lower.len(), upper.len(), "corners of one box");
-        assert!(lower.iter().zip(&upper).all(|(l, u)| l.is_finite() && u.is_finite() && l <= u), "lower <= upper");
+        assert!(
+            lower
+                .iter()
+                .zip(&upper)
+                .all(|(l, u)| l.is_finite() && u.is_finite() && l <= u),
+            "lower <= upper"
+        );
         Self { lower, upper }
     }
     /// The cube `lower..=upper` in `dimensions` dimensions.
@@ -75,7 +81,9 @@ impl SearchBox {
     }
     /// A point anywhere in the box.
     pub(super) fn random(&self, rng: &mut ChaCha8Rng) -> Vec<f64> {
-        (0..self.dimensions()).map(|s| self.lower[s] + self.width(s) * rng.random::<f64>()).collect()
+        (0..self.dimensions())
+            .map(|s| self.lower[s] + self.width(s) * rng.random::<f64>())
+            .collect()
     }
 }
 
@@ -174,14 +182,20 @@ impl<O: Objective> Search<'_, O> {
         let number = |value: f64| if value.is_nan() { f64::INFINITY } else { value };
         if self.jobs <= 1 {
             let (objective, scratch) = (self.objective, &mut self.scratch);
-            return positions.iter().map(|x| number(objective.value(x, scratch))).collect();
+            return positions
+                .iter()
+                .map(|x| number(objective.value(x, scratch)))
+                .collect();
         }
         // A chunk is all that a thread evaluates, so that scratch memory is made once per chunk.
         let size = positions.len().div_ceil(self.jobs).max(1);
         let chunks: Vec<&[Vec<f64>]> = positions.chunks(size).collect();
         let values = in_order(self.jobs, chunks.len(), |c| {
             let mut scratch = self.objective.scratch();
-            chunks[c].iter().map(|x| self.objective.value(x, &mut scratch)).collect::<Vec<f64>>()
+            chunks[c]
+                .iter()
+                .map(|x| self.objective.value(x, &mut scratch))
+                .collect::<Vec<f64>>()
         });
         values.into_iter().flatten().map(number).collect()
     }
@@ -234,8 +248,12 @@ pub fn minimise<M: Method, O: Objective>(
     let mut state = method.start(&mut search);
     let mut history = Vec::with_capacity(budget.generations + 1);
     let stop = loop {
-        let generation =
-            Generation { index: search.generation, best: search.best.0, mean: search.mean, evaluations: search.evaluations };
+        let generation = Generation {
+            index: search.generation,
+            best: search.best.0,
+            mean: search.mean,
+            evaluations: search.evaluations,
+        };
         observe(&generation, &search.best.1);
         history.push(generation);
         if budget.target.is_some_and(|target| search.best.0 <= target) {
@@ -244,7 +262,10 @@ pub fn minimise<M: Method, O: Objective>(
         if search.generation >= budget.generations {
             break SearchStop::Generations;
         }
-        if budget.evaluations.is_some_and(|most| search.evaluations >= most) {
+        if budget
+            .evaluations
+            .is_some_and(|most| search.evaluations >= most)
+        {
             break SearchStop::Evaluations;
         }
         search.generation += 1;
@@ -253,5 +274,12 @@ pub fn minimise<M: Method, O: Objective>(
     let mut elite = method.elite(&state);
     elite.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (value, position) = search.best;
-    SwarmResult { position, value, elite, history, evaluations: search.evaluations, stop }
+    SwarmResult {
+        position,
+        value,
+        elite,
+        history,
+        evaluations: search.evaluations,
+        stop,
+    }
 }

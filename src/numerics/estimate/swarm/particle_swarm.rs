@@ -22,7 +22,13 @@ pub struct ParticleSwarm {
 
 impl Default for ParticleSwarm {
     fn default() -> Self {
-        Self { particles: 50, c1: 2.0, c2: 2.0, inertia: [0.9, 0.4], fastest: 0.2 }
+        Self {
+            particles: 50,
+            c1: 2.0,
+            c2: 2.0,
+            inertia: [0.9, 0.4],
+            fastest: 0.2,
+        }
     }
 }
 
@@ -46,17 +52,30 @@ impl Method for ParticleSwarm {
 
     fn start<O: Objective>(&self, search: &mut Search<O>) -> Particles {
         let bounds = search.bounds;
-        let positions: Vec<Vec<f64>> = (0..self.particles).map(|_| bounds.random(&mut search.rng)).collect();
-        let mut speed = |s: usize| self.fastest * bounds.width(s) * search.rng.random_range(-1.0..1.0);
-        let velocities = (0..self.particles).map(|_| (0..bounds.dimensions()).map(&mut speed).collect()).collect();
+        let positions: Vec<Vec<f64>> = (0..self.particles)
+            .map(|_| bounds.random(&mut search.rng))
+            .collect();
+        let mut speed =
+            |s: usize| self.fastest * bounds.width(s) * search.rng.random_range(-1.0..1.0);
+        let velocities = (0..self.particles)
+            .map(|_| (0..bounds.dimensions()).map(&mut speed).collect())
+            .collect();
         let values = search.visit(&positions);
         let best = values.into_iter().zip(positions.iter().cloned()).collect();
-        Particles { positions, velocities, best }
+        Particles {
+            positions,
+            velocities,
+            best,
+        }
     }
 
     fn step<O: Objective>(&self, swarm: &mut Particles, search: &mut Search<O>) {
         let inertia = search.falling(self.inertia);
-        let Particles { positions, velocities, best } = swarm;
+        let Particles {
+            positions,
+            velocities,
+            best,
+        } = swarm;
         for ((position, velocity), own) in positions.iter_mut().zip(velocities).zip(best.iter()) {
             for (s, v) in velocity.iter_mut().enumerate() {
                 let own = self.c1 * search.rng.random::<f64>() * (own.1[s] - position[s]);

@@ -3,11 +3,15 @@
 use super::dh::{self, DhConvention};
 use super::place::{DocumentNode, Faults};
 use super::{ChainBody, FrameChain, Imported, RobotFileText, about, inertia, screws, urdf};
-use crate::description::{Coupling, DeclaredInertias, JointDescription, JointKind, RobotDescription};
+use crate::description::{
+    Coupling, DeclaredInertias, JointDescription, JointKind, RobotDescription,
+};
 use crate::error::Result;
 use crate::robot::Bound;
 use crate::units::{Quantity, Unit};
-use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{
+    Isometry3, Matrix3, Point3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3,
+};
 
 const FORMAT: f64 = 1.0;
 /// m: a point of an axis that is farther from base and tool is nothing that anyone sees at an arm.
@@ -39,39 +43,79 @@ pub(super) fn read(file: RobotFileText, urdf: Option<RobotFileText>) -> Result<I
     let format = root.get("calib_robot");
     let version = format.number();
     if version.is_finite() && version != FORMAT {
-        format.fault(format!("format {version} is not known to this calib; expected {FORMAT}"));
+        format.fault(format!(
+            "format {version} is not known to this calib; expected {FORMAT}"
+        ));
     }
     let units = units(root.get("units").map(&["length", "angle"]));
     let chain = chain(root.get("kinematics").map(&FORMATS), units, urdf, &faults)?;
-    let mut notes = chain.as_ref().map(|chain| chain.notes.clone()).unwrap_or_default();
+    let mut notes = chain
+        .as_ref()
+        .map(|chain| chain.notes.clone())
+        .unwrap_or_default();
     let robot = chain.map(|chain| describe(&root, chain, units));
-    let about = about::read(root.get("about"), robot.as_ref().map_or(0, |robot| robot.joints.len()), units.length);
+    let about = about::read(
+        root.get("about"),
+        robot.as_ref().map_or(0, |robot| robot.joints.len()),
+        units.length,
+    );
     notes.extend(faults.finish()?);
     match robot {
-        Some(robot) => Ok(Imported { robot, notes, about }),
-        None => Err(crate::error::Error::Bug("a robot file without kinematics had no fault".into())),
+        Some(robot) => Ok(Imported {
+            robot,
+            notes,
+            about,
+        }),
+        None => Err(crate::error::Error::Bug(
+            "a robot file without kinematics had no fault".into(),
+        )),
     }
 }
 
 fn units(value: DocumentNode) -> FileUnits {
     let unit = |key: &str, quantity: Quantity, fallback: Unit| {
-        let allowed: Vec<_> = (Unit::symbols(quantity).into_iter()).filter_map(|s| Some((s, Unit::parse(s)?))).collect();
+        let allowed: Vec<_> = (Unit::symbols(quantity).into_iter())
+            .filter_map(|s| Some((s, Unit::parse(s)?)))
+            .collect();
         value.get(key).choice(&allowed).unwrap_or(fallback)
     };
-    FileUnits { length: unit("length", Quantity::Length, Unit::Millimetre), angle: unit("angle", Quantity::Angle, Unit::Degree) }
+    FileUnits {
+        length: unit("length", Quantity::Length, Unit::Millimetre),
+        angle: unit("angle", Quantity::Angle, Unit::Degree),
+    }
 }
 
 /// The one kinematic format of the file, or none after a fault.
-fn chain(value: DocumentNode, units: FileUnits, urdf: Option<RobotFileText>, faults: &Faults) -> Result<Option<FrameChain>> {
-    let mut given = FORMATS.into_iter().filter(|format| value.get(format).given().is_some());
+fn chain(
+    value: DocumentNode,
+    units: FileUnits,
+    urdf: Option<RobotFileText>,
+    faults: &Faults,
+) -> Result<Option<FrameChain>> {
+    let mut given = FORMATS
+        .into_iter()
+        .filter(|format| value.get(format).given().is_some());
     let chain = match (given.next(), given.next()) {
         (Some(_), Some(_)) => {
-            value.fault(format!("more than one description of the arm; expected one of {}", FORMATS.join(", ")));
+            value.fault(format!(
+                "more than one description of the arm; expected one of {}",
+                FORMATS.join(", ")
+            ));
             return Ok(None);
         }
         (Some("screws"), _) => screws::read(&value.get("screws"), units.length),
-        (Some("dh"), _) => dh::read(&value.get("dh"), DhConvention::Standard, units.length, units.angle),
-        (Some("mdh"), _) => dh::read(&value.get("mdh"), DhConvention::Modified, units.length, units.angle),
+        (Some("dh"), _) => dh::read(
+            &value.get("dh"),
+            DhConvention::Standard,
+            units.length,
+            units.angle,
+        ),
+        (Some("mdh"), _) => dh::read(
+            &value.get("mdh"),
+            DhConvention::Modified,
+            units.length,
+            units.angle,
+        ),
         (Some(_), _) => {
             let ends = value.get("urdf").map(&["base", "tip"]);
             let (base, tip) = (ends.get("base").text(), ends.get("tip").text());
@@ -82,13 +126,18 @@ fn chain(value: DocumentNode, units: FileUnits, urdf: Option<RobotFileText>, fau
             if base.is_empty() || tip.is_empty() {
                 return Ok(None);
             }
-            let Some(chain) = faults.absorb(urdf::read(urdf, &base, &tip))? else { return Ok(None) };
+            let Some(chain) = faults.absorb(urdf::read(urdf, &base, &tip))? else {
+                return Ok(None);
+            };
             chain
         }
         (None, _) => {
             // Faults of a `kinematics` that is no map were noted when it was read.
             if value.given().is_some() && value.keys().all(|key| FORMATS.contains(&key)) {
-                value.fault(format!("no description of the arm; expected one of {}", FORMATS.join(", ")));
+                value.fault(format!(
+                    "no description of the arm; expected one of {}",
+                    FORMATS.join(", ")
+                ));
             }
             return Ok(None);
         }
@@ -102,7 +151,10 @@ fn chain(value: DocumentNode, units: FileUnits, urdf: Option<RobotFileText>, fau
 
 fn describe(root: &DocumentNode, chain: FrameChain, units: FileUnits) -> RobotDescription {
     let tool = tool(root.get("tool"), &chain, units);
-    let name = root.get("name").given().map_or_else(|| "robot".into(), |name| name.text());
+    let name = root
+        .get("name")
+        .given()
+        .map_or_else(|| "robot".into(), |name| name.text());
     let mut joints: Vec<JointDescription> = (chain.joints.iter().enumerate())
         .map(|(i, joint)| JointDescription {
             name: joint.name.clone().unwrap_or_else(|| format!("J{}", i + 1)),
@@ -124,9 +176,18 @@ fn describe(root: &DocumentNode, chain: FrameChain, units: FileUnits) -> RobotDe
     }
     distinct(root, &joints);
     slide(&mut joints, &tool.translation.vector);
-    let mut inertias: Vec<_> = chain.joints.iter().map(|joint| joint.body.as_ref().and_then(|body| body.inertia)).collect();
+    let mut inertias: Vec<_> = chain
+        .joints
+        .iter()
+        .map(|joint| joint.body.as_ref().and_then(|body| body.inertia))
+        .collect();
     if let Some(list) = root.get("links").given() {
-        for (i, value) in list.per_joint(joints.len()).into_iter().enumerate().take(joints.len()) {
+        for (i, value) in list
+            .per_joint(joints.len())
+            .into_iter()
+            .enumerate()
+            .take(joints.len())
+        {
             if value.given().is_some() {
                 let body = link(value, chain.joints[i].frame, units);
                 joints[i].mass = Some(body.mass);
@@ -136,11 +197,18 @@ fn describe(root: &DocumentNode, chain: FrameChain, units: FileUnits) -> RobotDe
         }
     }
     let tolerance = root.get("mass_tolerance");
-    let tolerance = tolerance.given().map(|value| inertia::tolerance(value, ["mass", "centre", "inertia"], units.length));
+    let tolerance = tolerance
+        .given()
+        .map(|value| inertia::tolerance(value, ["mass", "centre", "inertia"], units.length));
     let couplings = root.get("couplings");
-    let couplings = couplings.given().map_or_else(Vec::new, |list| self::couplings(list, joints.len()));
-    let ChainBody { mass: payload_mass, centre: payload_centre, inertia: payload_inertia } =
-        payload(root.get("payload"), &tool, units);
+    let couplings = couplings
+        .given()
+        .map_or_else(Vec::new, |list| self::couplings(list, joints.len()));
+    let ChainBody {
+        mass: payload_mass,
+        centre: payload_centre,
+        inertia: payload_inertia,
+    } = payload(root.get("payload"), &tool, units);
     RobotDescription {
         name,
         joints,
@@ -149,8 +217,15 @@ fn describe(root: &DocumentNode, chain: FrameChain, units: FileUnits) -> RobotDe
         couplings,
         payload_mass,
         payload_centre: payload_centre.into(),
-        gravity: root.get("gravity").given().map_or(super::GRAVITY, super::gravity),
-        inertias: DeclaredInertias { links: inertias, payload: payload_inertia, tolerance },
+        gravity: root
+            .get("gravity")
+            .given()
+            .map_or(super::GRAVITY, super::gravity),
+        inertias: DeclaredInertias {
+            links: inertias,
+            payload: payload_inertia,
+            tolerance,
+        },
     }
 }
 
@@ -178,8 +253,15 @@ fn tool(value: DocumentNode, chain: &FrameChain, units: FileUnits) -> Isometry3<
         return chain.tip;
     }
     let value = value.map(&["point", "orientation"]);
-    let point = Vector3::from(value.get("point").sized_vector::<3>(Bound::Length, units.length));
-    let orientation = value.get("orientation").given().map_or_else(UnitQuaternion::identity, |o| orientation(o, units.angle));
+    let point = Vector3::from(
+        value
+            .get("point")
+            .sized_vector::<3>(Bound::Length, units.length),
+    );
+    let orientation = value
+        .get("orientation")
+        .given()
+        .map_or_else(UnitQuaternion::identity, |o| orientation(o, units.angle));
     chain.tip * Isometry3::from_parts(Translation3::from(point), orientation)
 }
 
@@ -195,13 +277,18 @@ fn orientation(value: &DocumentNode, angle: Unit) -> UnitQuaternion<f64> {
             let q = Quaternion::new(w, x, y, z);
             // Four decimals of a unit quaternion are a unit quaternion; anything else is a slip of the pen.
             if (q.norm() - 1.0).abs() > 1e-3 {
-                quaternion.fault(format!("has length {}; expected a unit quaternion [w, x, y, z]", q.norm()));
+                quaternion.fault(format!(
+                    "has length {}; expected a unit quaternion [w, x, y, z]",
+                    q.norm()
+                ));
             }
             UnitQuaternion::from_quaternion(q)
         }
         _ => {
             if value.given().is_some() {
-                value.fault("expected either `rpy: [roll, pitch, yaw]` or `quaternion: [w, x, y, z]`");
+                value.fault(
+                    "expected either `rpy: [roll, pitch, yaw]` or `quaternion: [w, x, y, z]`",
+                );
             }
             UnitQuaternion::identity()
         }
@@ -218,13 +305,24 @@ fn drive(joint: &mut JointDescription, value: DocumentNode, units: FileUnits) {
         joint.name = name.text();
     }
     if let Some(limits) = value.get("limits").given() {
-        let unit = if joint.kind == JointKind::Revolute { units.angle } else { units.length };
+        let unit = if joint.kind == JointKind::Revolute {
+            units.angle
+        } else {
+            units.length
+        };
         let travel = limits.vector::<2>();
         let [lower, upper] = travel.map(|x| unit.to_si(x));
         if lower >= upper {
-            limits.fault(format!("expected [lower, upper] with lower < upper, found [{}, {}]", travel[0], travel[1]));
+            limits.fault(format!(
+                "expected [lower, upper] with lower < upper, found [{}, {}]",
+                travel[0], travel[1]
+            ));
         } else {
-            let bound = if joint.kind == JointKind::Revolute { Bound::Angle } else { Bound::Length };
+            let bound = if joint.kind == JointKind::Revolute {
+                Bound::Angle
+            } else {
+                Bound::Length
+            };
             let beyond = [lower, upper].into_iter().find_map(|end| bound.fault(end));
             beyond.into_iter().for_each(|message| limits.fault(message));
         }
@@ -247,12 +345,27 @@ fn drive(joint: &mut JointDescription, value: DocumentNode, units: FileUnits) {
 /// Columns of targets and recordings name joints: a name stands for one.
 fn distinct(root: &DocumentNode, joints: &[JointDescription]) {
     for (k, joint) in joints.iter().enumerate() {
-        if let Some(other) = joints[..k].iter().position(|other| other.name == joint.name) {
-            let places = root.get("joints").given().map_or_else(Vec::new, DocumentNode::items);
-            let own = |k: usize| places.get(k).map(|value| value.get("name")).filter(|name| name.given().is_some());
+        if let Some(other) = joints[..k]
+            .iter()
+            .position(|other| other.name == joint.name)
+        {
+            let places = root
+                .get("joints")
+                .given()
+                .map_or_else(Vec::new, DocumentNode::items);
+            let own = |k: usize| {
+                places
+                    .get(k)
+                    .map(|value| value.get("name"))
+                    .filter(|name| name.given().is_some())
+            };
             // A name that was not given is `J` and the joint's number: the other one has taken it.
             let (at, other) = own(k).map_or_else(|| (own(other), k), |at| (Some(at), other));
-            let message = format!("joint {} is called `{}` too; expected a name of its own", other + 1, joint.name);
+            let message = format!(
+                "joint {} is called `{}` too; expected a name of its own",
+                other + 1,
+                joint.name
+            );
             at.unwrap_or_else(|| root.clone()).fault(message);
         }
     }
@@ -260,9 +373,16 @@ fn distinct(root: &DocumentNode, joints: &[JointDescription]) {
 
 fn link(value: DocumentNode, frame: Option<Isometry3<f64>>, units: FileUnits) -> ChainBody {
     let value = value.map(&["mass", "centre", "inertia", "frame"]);
-    let centre = Point3::from(value.get("centre").sized_vector::<3>(Bound::Length, units.length));
+    let centre = Point3::from(
+        value
+            .get("centre")
+            .sized_vector::<3>(Bound::Length, units.length),
+    );
     let of_link = value.get("frame");
-    let in_link = of_link.given().and_then(|f| f.choice(&[("base", false), ("link", true)])).unwrap_or(false);
+    let in_link = of_link
+        .given()
+        .and_then(|f| f.choice(&[("base", false), ("link", true)]))
+        .unwrap_or(false);
     let centre = match frame {
         Some(frame) if in_link => frame * centre,
         None if in_link => {
@@ -273,23 +393,39 @@ fn link(value: DocumentNode, frame: Option<Isometry3<f64>>, units: FileUnits) ->
     };
     let moments = value.get("inertia").given().map(inertia::moments);
     let moments = match frame {
-        Some(frame) if in_link => moments.map(|moments| inertia::turned(&moments, &frame.rotation.to_rotation_matrix())),
+        Some(frame) if in_link => {
+            moments.map(|moments| inertia::turned(&moments, &frame.rotation.to_rotation_matrix()))
+        }
         _ => moments,
     };
-    ChainBody { mass: value.get("mass").not_negative(), centre, inertia: moments }
+    ChainBody {
+        mass: value.get("mass").not_negative(),
+        centre,
+        inertia: moments,
+    }
 }
 
 fn couplings(list: &DocumentNode, joints: usize) -> Vec<Coupling> {
     let mut couplings: Vec<Coupling> = Vec::new();
     for value in list.items() {
         let value = value.map(&["moved", "by", "ratio"]);
-        let ratio = value.get("ratio").given().map_or(0.0, |ratio| ratio.sized(Bound::Factor, Unit::One));
-        if let (Some(moved), Some(by)) = (value.get("moved").joint(joints), value.get("by").joint(joints)) {
+        let ratio = value
+            .get("ratio")
+            .given()
+            .map_or(0.0, |ratio| ratio.sized(Bound::Factor, Unit::One));
+        if let (Some(moved), Some(by)) = (
+            value.get("moved").joint(joints),
+            value.get("by").joint(joints),
+        ) {
             if moved == by {
                 value.fault("a joint cannot move itself; expected two different joints");
             }
             if couplings.iter().any(|c| (c.moved, c.by) == (moved, by)) {
-                value.fault(format!("the coupling of joint {} to joint {} is given twice", moved + 1, by + 1));
+                value.fault(format!(
+                    "the coupling of joint {} to joint {} is given twice",
+                    moved + 1,
+                    by + 1
+                ));
             }
             couplings.push(Coupling { moved, by, ratio });
         }
@@ -302,15 +438,36 @@ fn couplings(list: &DocumentNode, joints: usize) -> Vec<Coupling> {
 fn payload(value: DocumentNode, tool: &Isometry3<f64>, units: FileUnits) -> ChainBody {
     let point = Point3::from(tool.translation.vector);
     if value.given().is_none() {
-        return ChainBody { mass: 0.0, centre: point, inertia: None };
+        return ChainBody {
+            mass: 0.0,
+            centre: point,
+            inertia: None,
+        };
     }
     let value = value.map(&["mass", "offset", "inertia", "frame"]);
-    let offset = value.get("offset").given().map_or([0.0; 3], |offset| offset.sized_vector(Bound::Length, units.length));
+    let offset = value.get("offset").given().map_or([0.0; 3], |offset| {
+        offset.sized_vector(Bound::Length, units.length)
+    });
     let offset = Vector3::from(offset);
-    let in_tool = value.get("frame").given().and_then(|f| f.choice(&[("base", false), ("tool", true)])).unwrap_or(false);
-    let rotation = if in_tool { tool.rotation.to_rotation_matrix() } else { Rotation3::identity() };
-    let moments = value.get("inertia").given().map(|value| inertia::turned(&inertia::moments(value), &rotation));
-    ChainBody { mass: value.get("mass").not_negative(), centre: point + rotation * offset, inertia: moments }
+    let in_tool = value
+        .get("frame")
+        .given()
+        .and_then(|f| f.choice(&[("base", false), ("tool", true)]))
+        .unwrap_or(false);
+    let rotation = if in_tool {
+        tool.rotation.to_rotation_matrix()
+    } else {
+        Rotation3::identity()
+    };
+    let moments = value
+        .get("inertia")
+        .given()
+        .map(|value| inertia::turned(&inertia::moments(value), &rotation));
+    ChainBody {
+        mass: value.get("mass").not_negative(),
+        centre: point + rotation * offset,
+        inertia: moments,
+    }
 }
 
 fn rows(rotation: &UnitQuaternion<f64>) -> [[f64; 3]; 3] {

@@ -3,7 +3,9 @@
 use super::place::{DocumentNode, Faults};
 use super::screws::direction;
 use super::{Imported, RobotFileText, inertia};
-use crate::description::{Coupling, DeclaredInertias, JointDescription, JointKind, RobotDescription};
+use crate::description::{
+    Coupling, DeclaredInertias, JointDescription, JointKind, RobotDescription,
+};
 use crate::error::Result;
 use crate::robot::Bound;
 use crate::units::Unit;
@@ -38,50 +40,98 @@ pub(super) fn read(file: RobotFileText) -> Result<Imported> {
     let root = DocumentNode::root(&node, &faults).open_map(&KEYS);
     let axes = root.get("axes").items();
     if root.get("axes").given().is_some() && axes.is_empty() {
-        root.get("axes").fault("no joints; expected at least one axis");
+        root.get("axes")
+            .fault("no joints; expected at least one axis");
     }
     let n = axes.len();
     let points = root.get("points").per_joint(n);
-    let per_joint = |key: &str| root.get(key).given().map(|list| list.per_joint(n)).unwrap_or_default();
-    let (masses, centres, ratios, constants) = (per_joint("mass"), per_joint("com"), per_joint("ratio"), per_joint("kt"));
+    let per_joint = |key: &str| {
+        root.get(key)
+            .given()
+            .map(|list| list.per_joint(n))
+            .unwrap_or_default()
+    };
+    let (masses, centres, ratios, constants) = (
+        per_joint("mass"),
+        per_joint("com"),
+        per_joint("ratio"),
+        per_joint("kt"),
+    );
     let number = |list: &[DocumentNode], i: usize| {
-        list.get(i).and_then(DocumentNode::given).map(|value| value.sized(Bound::Factor, Unit::One))
+        list.get(i)
+            .and_then(DocumentNode::given)
+            .map(|value| value.sized(Bound::Factor, Unit::One))
     };
     let joints = (axes.iter().enumerate())
         .map(|(i, axis)| JointDescription {
             name: format!("J{}", i + 1),
             kind: JointKind::Revolute,
             axis: direction(axis).into(),
-            point: points.get(i).map_or([f64::NAN; 3], |point| metres(point).into()),
+            point: points
+                .get(i)
+                .map_or([f64::NAN; 3], |point| metres(point).into()),
             limits: None,
             reduction_ratio: number(&ratios, i),
             motor_constant: number(&constants, i),
-            mass: masses.get(i).and_then(DocumentNode::given).map(DocumentNode::not_negative),
-            centre: centres.get(i).and_then(DocumentNode::given).map(|centre| metres(centre).into()),
+            mass: masses
+                .get(i)
+                .and_then(DocumentNode::given)
+                .map(DocumentNode::not_negative),
+            centre: centres
+                .get(i)
+                .and_then(DocumentNode::given)
+                .map(|centre| metres(centre).into()),
             coulomb: None,
         })
         .collect();
     let tool = metres(&root.get("tool"));
-    let offset = root.get("payload_com").given().map_or_else(Vector3::zeros, |offset| metres(offset).coords);
+    let offset = root
+        .get("payload_com")
+        .given()
+        .map_or_else(Vector3::zeros, |offset| metres(offset).coords);
     let robot = RobotDescription {
-        name: root.get("name").given().map_or_else(|| "robot".into(), DocumentNode::text),
+        name: root
+            .get("name")
+            .given()
+            .map_or_else(|| "robot".into(), DocumentNode::text),
         joints,
         tool: tool.into(),
         tool_rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
-        couplings: root.get("coupling").given().map_or_else(Vec::new, |list| couplings(list, n)),
-        payload_mass: root.get("payload").given().map_or(0.0, DocumentNode::not_negative),
+        couplings: root
+            .get("coupling")
+            .given()
+            .map_or_else(Vec::new, |list| couplings(list, n)),
+        payload_mass: root
+            .get("payload")
+            .given()
+            .map_or(0.0, DocumentNode::not_negative),
         payload_centre: (tool + offset).into(),
-        gravity: root.get("gravity").given().map_or(super::GRAVITY, super::gravity),
+        gravity: root
+            .get("gravity")
+            .given()
+            .map_or(super::GRAVITY, super::gravity),
         inertias: DeclaredInertias {
-            links: per_joint("inertia").iter().map(|value| value.given().map(inertia::moments)).collect(),
+            links: per_joint("inertia")
+                .iter()
+                .map(|value| value.given().map(inertia::moments))
+                .collect(),
             payload: root.get("payload_inertia").given().map(inertia::moments),
-            tolerance: root.get("inertia_tolerance").given().map(|value| inertia::tolerance(value, TOLERANCE, Unit::Millimetre)),
+            tolerance: root
+                .get("inertia_tolerance")
+                .given()
+                .map(|value| inertia::tolerance(value, TOLERANCE, Unit::Millimetre)),
         },
     };
     let unused = root.keys().filter(|key| !KEYS.contains(key));
-    let mut notes: Vec<String> = unused.map(|key| format!("{}: the key `{key}` is not used", file.label)).collect();
+    let mut notes: Vec<String> = unused
+        .map(|key| format!("{}: the key `{key}` is not used", file.label))
+        .collect();
     notes.extend(faults.finish()?);
-    Ok(Imported { robot, notes, about: super::About::default() })
+    Ok(Imported {
+        robot,
+        notes,
+        about: super::About::default(),
+    })
 }
 
 fn metres(value: &DocumentNode) -> Point3<f64> {

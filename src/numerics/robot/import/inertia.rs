@@ -21,18 +21,25 @@ pub(super) fn moments(value: &DocumentNode) -> InertiaMoments {
 }
 
 /// What impossible moments are no hindrance for.
-pub(super) const UNUSED: &str = "; positions do not depend on it, torques are not diagnosed with it";
+pub(super) const UNUSED: &str =
+    "; positions do not depend on it, torques are not diagnosed with it";
 
 /// Why no body has these moments, if so; a body without any moment is a point.
 pub fn impossible_inertia(moments: &InertiaMoments) -> Option<String> {
-    if moments.iter().any(|moment| !moment.is_finite()) || moments.iter().all(|moment| *moment == 0.0) {
+    if moments.iter().any(|moment| !moment.is_finite())
+        || moments.iter().all(|moment| *moment == 0.0)
+    {
         return None;
     }
     let mut principal: [f64; 3] = tensor(moments).symmetric_eigenvalues().into();
     principal.sort_by(f64::total_cmp);
     let [least, middle, most] = principal;
     if least < NONE * most {
-        let least = if least < -NONE * most.abs() { "negative" } else { "zero" };
+        let least = if least < -NONE * most.abs() {
+            "negative"
+        } else {
+            "zero"
+        };
         return Some(format!(
             "no body has a principal moment of inertia that is {least}; expected [xx, xy, xz, yy, yz, zz] about the centre"
         ));
@@ -52,7 +59,14 @@ pub(super) fn tensor([xx, xy, xz, yy, yz, zz]: &InertiaMoments) -> Matrix3<f64> 
 
 /// The six moments of a symmetric tensor.
 pub(super) fn of_tensor(t: &Matrix3<f64>) -> InertiaMoments {
-    [t[(0, 0)], t[(0, 1)], t[(0, 2)], t[(1, 1)], t[(1, 2)], t[(2, 2)]]
+    [
+        t[(0, 0)],
+        t[(0, 1)],
+        t[(0, 2)],
+        t[(1, 1)],
+        t[(1, 2)],
+        t[(2, 2)],
+    ]
 }
 
 /// The moments in the axes that `rotation` turns the body's own into.

@@ -96,7 +96,9 @@ fn gravity(value: &DocumentNode) -> [f64; 3] {
     let gravity = value.vector();
     let size = Vector3::from(gravity).norm();
     if size != 0.0 && !size.is_nan() && !GRAVITY_RANGE.contains(&size) {
-        value.fault(format!("is {size} m/s2 long; expected about 9.81 m/s2, or [0, 0, 0] for none"));
+        value.fault(format!(
+            "is {size} m/s2 long; expected about 9.81 m/s2, or [0, 0, 0] for none"
+        ));
     }
     gravity
 }

@@ -21,9 +21,19 @@ impl<'f> Faults<'f> {
     /// Parses YAML or JSON, which is YAML too; fails where nothing of the file can be read.
     pub fn parse(file: RobotFileText<'f>) -> Result<(Node, Self)> {
         let (node, troubles) = yaml::parse(file.text);
-        let list: Vec<Fault> = troubles.into_iter().map(|trouble| trouble.fault(file.label)).collect();
+        let list: Vec<Fault> = troubles
+            .into_iter()
+            .map(|trouble| trouble.fault(file.label))
+            .collect();
         match node {
-            Some(node) => Ok((node, Self { file: file.label, list: RefCell::new(list), notes: RefCell::default() })),
+            Some(node) => Ok((
+                node,
+                Self {
+                    file: file.label,
+                    list: RefCell::new(list),
+                    notes: RefCell::default(),
+                },
+            )),
             None => Err(Error::Spec(list)),
         }
     }
@@ -44,7 +54,11 @@ impl<'f> Faults<'f> {
     /// What was noted, a sentence each with its place. Fails with all faults.
     pub fn finish(self) -> Result<Vec<String>> {
         let list = self.list.into_inner();
-        if list.is_empty() { Ok(self.notes.into_inner()) } else { Err(Error::Spec(list)) }
+        if list.is_empty() {
+            Ok(self.notes.into_inner())
+        } else {
+            Err(Error::Spec(list))
+        }
     }
 }
 
@@ -67,30 +81,53 @@ pub(super) struct DocumentNode<'a> {
 
 impl<'a> DocumentNode<'a> {
     pub fn root(node: &'a Node, faults: &'a Faults<'a>) -> Self {
-        Self { content: Content::There(node), path: String::new(), mark: node.mark, faults }
+        Self {
+            content: Content::There(node),
+            path: String::new(),
+            mark: node.mark,
+            faults,
+        }
     }
     fn child(&self, node: Option<&'a Node>, path: String) -> Self {
         let given = node.filter(|node| !matches!(node.value, YamlValue::Null));
         let mark = node.map_or(self.mark, |node| node.mark);
-        Self { content: given.map_or(Content::Missing, Content::There), path, mark, faults: self.faults }
+        Self {
+            content: given.map_or(Content::Missing, Content::There),
+            path,
+            mark,
+            faults: self.faults,
+        }
     }
     pub fn fault(&self, message: impl Into<String>) {
-        self.faults.push(Trouble::new(message).at(self.mark).below(&self.path));
+        self.faults
+            .push(Trouble::new(message).at(self.mark).below(&self.path));
     }
     /// Something that a person should know and that is no fault.
     pub fn note(&self, message: impl Into<String>) {
-        let fault = Trouble::new(message).at(self.mark).below(&self.path).fault(self.faults.file);
-        self.faults.notes.borrow_mut().push(format!("{}: {}", fault.place, fault.message));
+        let fault = Trouble::new(message)
+            .at(self.mark)
+            .below(&self.path)
+            .fault(self.faults.file);
+        self.faults
+            .notes
+            .borrow_mut()
+            .push(format!("{}: {}", fault.place, fault.message));
     }
     fn expected(&self, what: &str) {
         match self.content {
-            Content::There(node) => self.fault(format!("expected {what}, found {}", describe(node))),
+            Content::There(node) => {
+                self.fault(format!("expected {what}, found {}", describe(node)))
+            }
             Content::Missing => self.fault(format!("missing; expected {what}")),
             Content::Unreadable => {}
         }
     }
     fn node(&self) -> Option<&'a Node> {
-        if let Content::There(node) = self.content { Some(node) } else { None }
+        if let Content::There(node) = self.content {
+            Some(node)
+        } else {
+            None
+        }
     }
     fn value(&self) -> Option<&'a YamlValue> {
         self.node().map(|node| &node.value)
@@ -101,14 +138,22 @@ impl<'a> DocumentNode<'a> {
     }
     /// The keys of a map; none for anything else.
     pub fn keys(&self) -> impl Iterator<Item = &'a str> + use<'a> {
-        self.node().map(Node::entries).unwrap_or_default().iter().map(|(key, _, _)| key.as_str())
+        self.node()
+            .map(Node::entries)
+            .unwrap_or_default()
+            .iter()
+            .map(|(key, _, _)| key.as_str())
     }
     /// The same place, checked to be a map with no other keys than `allowed`.
     pub fn map(self, allowed: &[&str]) -> Self {
         let place = self.open_map(allowed);
         for (key, mark, _) in place.node().map(Node::entries).unwrap_or_default() {
             if !allowed.contains(&key.as_str()) {
-                place.faults.push(Trouble::unknown_key(key, allowed).at(*mark).below(&join(&place.path, key)));
+                place.faults.push(
+                    Trouble::unknown_key(key, allowed)
+                        .at(*mark)
+                        .below(&join(&place.path, key)),
+                );
             }
         }
         place
@@ -119,21 +164,32 @@ impl<'a> DocumentNode<'a> {
             return self;
         }
         self.expected(&format!("a map with the keys {}", known.join(", ")));
-        Self { content: Content::Unreadable, ..self }
+        Self {
+            content: Content::Unreadable,
+            ..self
+        }
     }
     pub fn get(&self, key: &str) -> Self {
         let path = join(&self.path, key);
         match self.content {
-            Content::There(node) if matches!(node.value, YamlValue::Map(_)) => self.child(node.get(key), path),
-            Content::There(_) | Content::Unreadable => Self { content: Content::Unreadable, path, ..self.clone() },
+            Content::There(node) if matches!(node.value, YamlValue::Map(_)) => {
+                self.child(node.get(key), path)
+            }
+            Content::There(_) | Content::Unreadable => Self {
+                content: Content::Unreadable,
+                path,
+                ..self.clone()
+            },
             Content::Missing => self.child(None, path),
         }
     }
     pub fn items(&self) -> Vec<Self> {
         match self.value() {
-            Some(YamlValue::List(items)) => {
-                items.iter().enumerate().map(|(i, node)| self.child(Some(node), format!("{}[{i}]", self.path))).collect()
-            }
+            Some(YamlValue::List(items)) => items
+                .iter()
+                .enumerate()
+                .map(|(i, node)| self.child(Some(node), format!("{}[{i}]", self.path)))
+                .collect(),
             _ => {
                 self.expected("a list");
                 Vec::new()
@@ -144,7 +200,10 @@ impl<'a> DocumentNode<'a> {
     pub fn per_joint(&self, joints: usize) -> Vec<Self> {
         let items = self.items();
         if matches!(self.value(), Some(YamlValue::List(_))) && items.len() != joints {
-            self.fault(format!("{} entries for {joints} joints; expected one per joint", items.len()));
+            self.fault(format!(
+                "{} entries for {joints} joints; expected one per joint",
+                items.len()
+            ));
         }
         items
     }
@@ -170,7 +229,9 @@ impl<'a> DocumentNode<'a> {
     pub fn not_negative(&self) -> f64 {
         let number = self.sized(Bound::Mass, Unit::Kilogram);
         if number < 0.0 {
-            self.fault(format!("expected a mass in kg, not less than 0, found {number}"));
+            self.fault(format!(
+                "expected a mass in kg, not less than 0, found {number}"
+            ));
         }
         number
     }
@@ -208,12 +269,19 @@ impl<'a> DocumentNode<'a> {
     }
     /// The one of `allowed` that is named here.
     pub fn choice<T: Copy>(&self, allowed: &[(&str, T)]) -> Option<T> {
-        let list = allowed.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
+        let list = allowed
+            .iter()
+            .map(|(name, _)| *name)
+            .collect::<Vec<_>>()
+            .join(", ");
         let Some(YamlValue::Text(text)) = self.value() else {
             self.expected(&format!("one of {list}"));
             return None;
         };
-        let found = allowed.iter().find(|(name, _)| name == text).map(|(_, value)| *value);
+        let found = allowed
+            .iter()
+            .find(|(name, _)| name == text)
+            .map(|(_, value)| *value);
         if found.is_none() {
             // No nearest name: for units it would mislead (`cm` is not `m`).
             self.fault(format!("unknown value `{text}` (allowed: {list})"));
@@ -228,7 +296,9 @@ impl<'a> DocumentNode<'a> {
         }
         let found = (1..=joints).find(|j| *j as f64 == value);
         if found.is_none() {
-            self.fault(format!("there is no joint {value}; expected a number from 1 to {joints}"));
+            self.fault(format!(
+                "there is no joint {value}; expected a number from 1 to {joints}"
+            ));
         }
         found.map(|j| j - 1)
     }
@@ -240,6 +310,8 @@ fn describe(node: &Node) -> String {
         YamlValue::Text(text) => format!("the text `{text}`"),
         YamlValue::List(items) => format!("a list of {}", items.len()),
         YamlValue::Map(_) => "a map".into(),
-        YamlValue::Bool(_) | YamlValue::Integer(_) | YamlValue::Float(_) => format!("`{}`", node.text().unwrap_or_default()),
+        YamlValue::Bool(_) | YamlValue::Integer(_) | YamlValue::Float(_) => {
+            format!("`{}`", node.text().unwrap_or_default())
+        }
     }
 }

@@ -10,16 +10,30 @@ use nalgebra::{Isometry3, Point3, Vector3};
 // A direction shorter than this carries no direction; a pitch larger than this, per unit of the screw's size, is not rounding.
 const SMALL: f64 = 1e-9;
 
-const KINDS: &[(&str, JointKind)] = &[("revolute", JointKind::Revolute), ("prismatic", JointKind::Prismatic)];
+const KINDS: &[(&str, JointKind)] = &[
+    ("revolute", JointKind::Revolute),
+    ("prismatic", JointKind::Prismatic),
+];
 
 pub(super) fn read(screws: &DocumentNode, length: Unit) -> FrameChain {
-    let joints = screws.items().into_iter().map(|screw| joint(screw, length)).collect();
-    FrameChain { joints, tip: Isometry3::identity(), notes: Vec::new() }
+    let joints = screws
+        .items()
+        .into_iter()
+        .map(|screw| joint(screw, length))
+        .collect();
+    FrameChain {
+        joints,
+        tip: Isometry3::identity(),
+        notes: Vec::new(),
+    }
 }
 
 fn joint(screw: DocumentNode, length: Unit) -> ChainJoint {
     let screw = screw.map(&["kind", "axis", "point", "twist"]);
-    let kind = screw.get("kind").given().and_then(|kind| kind.choice(KINDS));
+    let kind = screw
+        .get("kind")
+        .given()
+        .and_then(|kind| kind.choice(KINDS));
     let (kind, axis, point) = match screw.get("twist").given() {
         Some(twist) => {
             if screw.get("axis").given().is_some() || screw.get("point").given().is_some() {
@@ -36,11 +50,23 @@ fn joint(screw: DocumentNode, length: Unit) -> ChainJoint {
             let point = screw.get("point");
             // The place of a prismatic axis changes nothing.
             let unread = kind == JointKind::Prismatic && point.given().is_none();
-            let point = if unread { [0.0; 3] } else { point.sized_vector(Bound::Length, length) };
+            let point = if unread {
+                [0.0; 3]
+            } else {
+                point.sized_vector(Bound::Length, length)
+            };
             (kind, direction(&screw.get("axis")), Point3::from(point))
         }
     };
-    ChainJoint { name: None, kind, axis, point, limits: None, frame: None, body: None }
+    ChainJoint {
+        name: None,
+        kind,
+        axis,
+        point,
+        limits: None,
+        frame: None,
+        body: None,
+    }
 }
 
 /// A direction of any length but zero, as a unit vector.
@@ -58,13 +84,20 @@ pub(super) fn unit(vector: Vector3<f64>) -> Option<Vector3<f64>> {
         return Some(vector);
     }
     let size = vector.amax();
-    if size < SMALL { None } else { Some((vector / size).normalize()) }
+    if size < SMALL {
+        None
+    } else {
+        Some((vector / size).normalize())
+    }
 }
 
 /// Kind, unit axis and the point of the axis nearest to the origin, m.
 fn from_twist(value: &DocumentNode, length: Unit) -> (JointKind, Vector3<f64>, Point3<f64>) {
     let twist = value.sized_vector::<6>(Bound::Factor, Unit::One);
-    let (v, w) = (Vector3::new(twist[0], twist[1], twist[2]), Vector3::new(twist[3], twist[4], twist[5]));
+    let (v, w) = (
+        Vector3::new(twist[0], twist[1], twist[2]),
+        Vector3::new(twist[3], twist[4], twist[5]),
+    );
     if w.norm() < SMALL {
         if v.norm() < SMALL {
             value.fault("is no screw: all six numbers are zero");

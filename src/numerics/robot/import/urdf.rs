@@ -39,8 +39,14 @@ struct Reader<'a> {
 
 /// Reads the chain from `base` to `tip`; fails with every fault found, each with its line.
 pub(super) fn read(file: RobotFileText, base: &str, tip: &str) -> Result<FrameChain> {
-    let document = Document::parse(file.text).map_err(|e| Error::spec(file.label, format!("not readable as XML: {e}")))?;
-    let mut reader = Reader { label: file.label, document: &document, faults: Vec::new(), notes: Vec::new() };
+    let document = Document::parse(file.text)
+        .map_err(|e| Error::spec(file.label, format!("not readable as XML: {e}")))?;
+    let mut reader = Reader {
+        label: file.label,
+        document: &document,
+        faults: Vec::new(),
+        notes: Vec::new(),
+    };
     let chain = reader.chain(base, tip);
     match chain {
         Some(chain) if reader.faults.is_empty() => Ok(chain),
@@ -51,19 +57,42 @@ pub(super) fn read(file: RobotFileText, base: &str, tip: &str) -> Result<FrameCh
 /// The first link of the chain that ends at `tip`, and which of its joints slide: the link `base_link` where it stands on the way, else the
 /// one that nothing carries. Fails as [`read`] does.
 pub(super) fn outline(file: RobotFileText, tip: &str) -> Result<UrdfOutline> {
-    let document = Document::parse(file.text).map_err(|e| Error::spec(file.label, format!("not readable as XML: {e}")))?;
-    let joints = document.root_element().children().filter(|node| node.has_tag_name("joint"));
+    let document = Document::parse(file.text)
+        .map_err(|e| Error::spec(file.label, format!("not readable as XML: {e}")))?;
+    let joints = document
+        .root_element()
+        .children()
+        .filter(|node| node.has_tag_name("joint"));
     let end = |joint: &Node, name: &str| {
-        joint.children().find(|node| node.has_tag_name(name)).and_then(|node| node.attribute("link")).map(String::from)
+        joint
+            .children()
+            .find(|node| node.has_tag_name(name))
+            .and_then(|node| node.attribute("link"))
+            .map(String::from)
     };
-    let parents: BTreeMap<String, String> = joints.filter_map(|joint| end(&joint, "child").zip(end(&joint, "parent"))).collect();
+    let parents: BTreeMap<String, String> = joints
+        .filter_map(|joint| end(&joint, "child").zip(end(&joint, "parent")))
+        .collect();
     let way = std::iter::successors(Some(tip.to_string()), |link| parents.get(link).cloned());
     // Joints that run in a circle are a fault of the chain.
     let way: Vec<String> = way.take(parents.len() + 1).collect();
-    let base = way.iter().find(|link| *link == "base_link" && *link != tip).or(way.last()).cloned().unwrap_or_default();
+    let base = way
+        .iter()
+        .find(|link| *link == "base_link" && *link != tip)
+        .or(way.last())
+        .cloned()
+        .unwrap_or_default();
     let chain = read(file, &base, tip)?;
-    let sliding = chain.joints.iter().map(|joint| joint.kind == JointKind::Prismatic).collect();
-    Ok(UrdfOutline { base, sliding, notes: chain.notes })
+    let sliding = chain
+        .joints
+        .iter()
+        .map(|joint| joint.kind == JointKind::Prismatic)
+        .collect();
+    Ok(UrdfOutline {
+        base,
+        sliding,
+        notes: chain.notes,
+    })
 }
 
 impl<'a> Reader<'a> {
@@ -73,17 +102,34 @@ impl<'a> Reader<'a> {
     }
 
     fn place(&self, node: Node) -> String {
-        format!("{}:{}", self.label, self.document.text_pos_at(node.range().start).row)
+        format!(
+            "{}:{}",
+            self.label,
+            self.document.text_pos_at(node.range().start).row
+        )
     }
 
     fn chain(&mut self, base: &str, tip: &str) -> Option<FrameChain> {
         let root = self.document.root_element();
         if root.tag_name().name() != "robot" {
-            self.fault(root, format!("expected a URDF, whose root is <robot>, found <{}>", root.tag_name().name()));
+            self.fault(
+                root,
+                format!(
+                    "expected a URDF, whose root is <robot>, found <{}>",
+                    root.tag_name().name()
+                ),
+            );
             return None;
         }
-        if root.descendants().any(|node| node.tag_name().namespace().is_some_and(|space| space.contains("xacro"))) {
-            self.fault(root, "is a xacro file; expand it first: `xacro arm.urdf.xacro > arm.urdf`");
+        if root.descendants().any(|node| {
+            node.tag_name()
+                .namespace()
+                .is_some_and(|space| space.contains("xacro"))
+        }) {
+            self.fault(
+                root,
+                "is a xacro file; expand it first: `xacro arm.urdf.xacro > arm.urdf`",
+            );
             return None;
         }
         let mut links: BTreeMap<&str, Node> = BTreeMap::new();
@@ -95,8 +141,9 @@ impl<'a> Reader<'a> {
         }
         for name in [base].into_iter().chain((tip != base).then_some(tip)) {
             if !links.contains_key(name) {
-                let hint =
-                    nearest(name, links.keys().copied()).map(|near| format!("; did you mean `{near}`?")).unwrap_or_default();
+                let hint = nearest(name, links.keys().copied())
+                    .map(|near| format!("; did you mean `{near}`?"))
+                    .unwrap_or_default();
                 let all = links.keys().copied().collect::<Vec<_>>().join(", ");
                 self.fault(root, format!("no link `{name}`{hint} (links: {all})"));
             }
@@ -110,7 +157,11 @@ impl<'a> Reader<'a> {
     }
 
     /// Every joint of the file, by the link it moves.
-    fn joints(&mut self, root: Node<'a, 'a>, links: &BTreeMap<&'a str, Node>) -> Option<BTreeMap<&'a str, UrdfJoint<'a>>> {
+    fn joints(
+        &mut self,
+        root: Node<'a, 'a>,
+        links: &BTreeMap<&'a str, Node>,
+    ) -> Option<BTreeMap<&'a str, UrdfJoint<'a>>> {
         let mut joints = BTreeMap::new();
         let mut names = BTreeSet::new();
         for node in root.children().filter(|node| node.has_tag_name("joint")) {
@@ -118,27 +169,56 @@ impl<'a> Reader<'a> {
             if !names.insert(name) {
                 self.fault(node, format!("joint `{name}` is there twice"));
             }
-            let parent = self.child(node, "parent").and_then(|end| self.attribute(end, "link"))?;
-            let child = self.child(node, "child").and_then(|end| self.attribute(end, "link"))?;
+            let parent = self
+                .child(node, "parent")
+                .and_then(|end| self.attribute(end, "link"))?;
+            let child = self
+                .child(node, "child")
+                .and_then(|end| self.attribute(end, "link"))?;
             for end in [parent, child] {
                 if !links.contains_key(end) {
-                    let hint = nearest(end, links.keys().copied()).map(|near| format!("; did you mean `{near}`?"));
+                    let hint = nearest(end, links.keys().copied())
+                        .map(|near| format!("; did you mean `{near}`?"));
                     self.fault(
                         node,
-                        format!("joint `{name}` refers to link `{end}`, which does not exist{}", hint.unwrap_or_default()),
+                        format!(
+                            "joint `{name}` refers to link `{end}`, which does not exist{}",
+                            hint.unwrap_or_default()
+                        ),
                     );
                 }
             }
             let origin = self.origin(node);
-            if joints.insert(child, UrdfJoint { node, name, parent, child, origin }).is_some() {
-                self.fault(node, format!("joint `{name}`: link `{child}` has two parents; expected a tree"));
+            if joints
+                .insert(
+                    child,
+                    UrdfJoint {
+                        node,
+                        name,
+                        parent,
+                        child,
+                        origin,
+                    },
+                )
+                .is_some()
+            {
+                self.fault(
+                    node,
+                    format!("joint `{name}`: link `{child}` has two parents; expected a tree"),
+                );
             }
         }
         Some(joints)
     }
 
     /// The joints from base to tip.
-    fn path(&mut self, root: Node, joints: &BTreeMap<&'a str, UrdfJoint<'a>>, base: &str, tip: &str) -> Option<Vec<&'a str>> {
+    fn path(
+        &mut self,
+        root: Node,
+        joints: &BTreeMap<&'a str, UrdfJoint<'a>>,
+        base: &str,
+        tip: &str,
+    ) -> Option<Vec<&'a str>> {
         let mut path = Vec::new();
         let mut link = tip;
         while link != base {
@@ -148,7 +228,10 @@ impl<'a> Reader<'a> {
                     link = joint.parent;
                 }
                 Some(_) => {
-                    self.fault(root, format!("the joints from `{tip}` run in a circle; expected a tree"));
+                    self.fault(
+                        root,
+                        format!("the joints from `{tip}` run in a circle; expected a tree"),
+                    );
                     return None;
                 }
                 None => {
@@ -175,13 +258,21 @@ impl<'a> Reader<'a> {
             if joint.node.attribute("type") == Some("fixed") {
                 continue;
             }
-            let Some(kind) = self.kind(joint) else { continue };
+            let Some(kind) = self.kind(joint) else {
+                continue;
+            };
             let axis = match joint.node.children().find(|node| node.has_tag_name("axis")) {
                 None => Vector3::x(),
                 Some(node) => Vector3::from(self.numbers(node, "xyz", [1.0, 0.0, 0.0], None)),
             };
             let axis = unit(axis).unwrap_or_else(|| {
-                self.fault(joint.node, format!("joint `{}`: the axis has no direction, its length is zero", joint.name));
+                self.fault(
+                    joint.node,
+                    format!(
+                        "joint `{}`: the axis has no direction, its length is zero",
+                        joint.name
+                    ),
+                );
                 Vector3::x()
             });
             let body = self.body(joints, links, path, joint.child, frame);
@@ -195,12 +286,20 @@ impl<'a> Reader<'a> {
                 body,
             });
         }
-        FrameChain { joints: chain, tip: frame, notes: std::mem::take(&mut self.notes) }
+        FrameChain {
+            joints: chain,
+            tip: frame,
+            notes: std::mem::take(&mut self.notes),
+        }
     }
 
     fn kind(&mut self, joint: &UrdfJoint) -> Option<JointKind> {
         let name = joint.name;
-        if let Some(mimic) = joint.node.children().find(|node| node.has_tag_name("mimic")) {
+        if let Some(mimic) = joint
+            .node
+            .children()
+            .find(|node| node.has_tag_name("mimic"))
+        {
             self.fault(mimic, format!("joint `{name}` mimics another joint; expected a serial chain of independent joints"));
             return None;
         }
@@ -219,15 +318,30 @@ impl<'a> Reader<'a> {
     }
 
     fn limits(&mut self, joint: &UrdfJoint<'a>) -> Option<[f64; 2]> {
-        let node = joint.node.children().find(|node| node.has_tag_name("limit"))?;
-        if joint.node.attribute("type") == Some("continuous") || !node.has_attribute("lower") && !node.has_attribute("upper") {
+        let node = joint
+            .node
+            .children()
+            .find(|node| node.has_tag_name("limit"))?;
+        if joint.node.attribute("type") == Some("continuous")
+            || !node.has_attribute("lower") && !node.has_attribute("upper")
+        {
             return None;
         }
-        let bound = if joint.node.attribute("type") == Some("prismatic") { Bound::Length } else { Bound::Angle };
+        let bound = if joint.node.attribute("type") == Some("prismatic") {
+            Bound::Length
+        } else {
+            Bound::Angle
+        };
         let [lower] = self.numbers(node, "lower", [0.0], Some(bound));
         let [upper] = self.numbers(node, "upper", [0.0], Some(bound));
         if lower > upper {
-            self.fault(node, format!("joint `{}`: expected lower <= upper, found {lower} and {upper}", joint.name));
+            self.fault(
+                node,
+                format!(
+                    "joint `{}`: expected lower <= upper, found {lower} and {upper}",
+                    joint.name
+                ),
+            );
         }
         Some([lower, upper])
     }
@@ -245,11 +359,15 @@ impl<'a> Reader<'a> {
         // Every link has one parent and lies below `link`, so this ends.
         let mut open = vec![(link, frame)];
         while let Some((link, frame)) = open.pop() {
-            if let Some(inertial) = links[link].children().find(|node| node.has_tag_name("inertial")) {
+            if let Some(inertial) = links[link]
+                .children()
+                .find(|node| node.has_tag_name("inertial"))
+            {
                 parts.push(self.part(link, inertial, frame));
             }
             for joint in joints.values().filter(|joint| joint.parent == link) {
-                let moves_on = path.contains(&joint.child) && joint.node.attribute("type") != Some("fixed");
+                let moves_on =
+                    path.contains(&joint.child) && joint.node.attribute("type") != Some("fixed");
                 if !moves_on {
                     open.push((joint.child, frame * joint.origin));
                 }
@@ -259,13 +377,24 @@ impl<'a> Reader<'a> {
         if mass == 0.0 {
             return None;
         }
-        let moment: Vector3<f64> = parts.iter().map(|part| part.mass * part.centre.coords).sum();
+        let moment: Vector3<f64> = parts
+            .iter()
+            .map(|part| part.mass * part.centre.coords)
+            .sum();
         let centre = Point3::from(moment / mass);
-        let about =
-            |part: &ChainBody| Some(inertia::tensor(&part.inertia?) + inertia::offset(part.mass, &(part.centre - centre)));
+        let about = |part: &ChainBody| {
+            Some(
+                inertia::tensor(&part.inertia?)
+                    + inertia::offset(part.mass, &(part.centre - centre)),
+            )
+        };
         let tensors: Option<Vec<_>> = parts.iter().map(about).collect();
         let inertia = tensors.map(|all| inertia::of_tensor(&all.iter().sum()));
-        Some(ChainBody { mass, centre, inertia })
+        Some(ChainBody {
+            mass,
+            centre,
+            inertia,
+        })
     }
 
     /// The `<inertial>` of a link whose frame stands so at the zero pose.
@@ -276,24 +405,46 @@ impl<'a> Reader<'a> {
             None => f64::NAN,
         };
         if mass < 0.0 {
-            self.fault(inertial, format!("link `{link}`: expected a mass in kg, not less than 0, found {mass}"));
+            self.fault(
+                inertial,
+                format!("link `{link}`: expected a mass in kg, not less than 0, found {mass}"),
+            );
         }
-        let tensor = inertial.children().find(|node| node.has_tag_name("inertia"));
+        let tensor = inertial
+            .children()
+            .find(|node| node.has_tag_name("inertia"));
         let moments = tensor.map(|node| {
-            let moments = ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"]
-                .map(|name| self.numbers(node, name, [if name == "ixx" { f64::NAN } else { 0.0 }], Some(Bound::Inertia))[0]);
+            let moments = ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"].map(|name| {
+                self.numbers(
+                    node,
+                    name,
+                    [if name == "ixx" { f64::NAN } else { 0.0 }],
+                    Some(Bound::Inertia),
+                )[0]
+            });
             if let Some(message) = inertia::impossible_inertia(&moments) {
-                self.notes.push(format!("{}: link `{link}`: {message}{}", self.place(node), inertia::UNUSED));
+                self.notes.push(format!(
+                    "{}: link `{link}`: {message}{}",
+                    self.place(node),
+                    inertia::UNUSED
+                ));
             }
             inertia::turned(&moments, &place.rotation.to_rotation_matrix())
         });
-        ChainBody { mass, centre: place * Point3::origin(), inertia: moments }
+        ChainBody {
+            mass,
+            centre: place * Point3::origin(),
+            inertia: moments,
+        }
     }
 
     fn child(&mut self, node: Node<'a, 'a>, name: &str) -> Option<Node<'a, 'a>> {
         let found = node.children().find(|child| child.has_tag_name(name));
         if found.is_none() {
-            self.fault(node, format!("<{}> has no <{name}>", node.tag_name().name()));
+            self.fault(
+                node,
+                format!("<{}> has no <{name}>", node.tag_name().name()),
+            );
         }
         found
     }
@@ -301,36 +452,70 @@ impl<'a> Reader<'a> {
     fn attribute(&mut self, node: Node<'a, 'a>, name: &str) -> Option<&'a str> {
         let found = node.attribute(name);
         if found.is_none() {
-            self.fault(node, format!("<{}> has no attribute `{name}`", node.tag_name().name()));
+            self.fault(
+                node,
+                format!("<{}> has no attribute `{name}`", node.tag_name().name()),
+            );
         }
         found
     }
 
     fn origin(&mut self, node: Node<'a, 'a>) -> Isometry3<f64> {
-        let Some(origin) = node.children().find(|child| child.has_tag_name("origin")) else { return Isometry3::identity() };
+        let Some(origin) = node.children().find(|child| child.has_tag_name("origin")) else {
+            return Isometry3::identity();
+        };
         let [roll, pitch, yaw] = self.numbers(origin, "rpy", [0.0; 3], Some(Bound::Angle));
         let shift = Vector3::from(self.numbers(origin, "xyz", [0.0; 3], Some(Bound::Length)));
-        Isometry3::from_parts(Translation3::from(shift), UnitQuaternion::from_euler_angles(roll, pitch, yaw))
+        Isometry3::from_parts(
+            Translation3::from(shift),
+            UnitQuaternion::from_euler_angles(roll, pitch, yaw),
+        )
     }
 
     /// The numbers of an attribute, or `fallback` where the attribute is missing (NaN there: it may not be).
-    fn numbers<const N: usize>(&mut self, node: Node<'a, 'a>, name: &str, fallback: [f64; N], bound: Option<Bound>) -> [f64; N] {
+    fn numbers<const N: usize>(
+        &mut self,
+        node: Node<'a, 'a>,
+        name: &str,
+        fallback: [f64; N],
+        bound: Option<Bound>,
+    ) -> [f64; N] {
         let Some(text) = node.attribute(name) else {
             if fallback.iter().any(|x| x.is_nan()) {
                 self.attribute(node, name);
             }
             return fallback;
         };
-        let numbers: Option<Vec<f64>> =
-            text.split_whitespace().map(|word| word.parse().ok().filter(|x: &f64| x.is_finite())).collect();
-        let beyond = numbers.iter().flatten().find_map(|number| bound?.fault(*number));
+        let numbers: Option<Vec<f64>> = text
+            .split_whitespace()
+            .map(|word| word.parse().ok().filter(|x: &f64| x.is_finite()))
+            .collect();
+        let beyond = numbers
+            .iter()
+            .flatten()
+            .find_map(|number| bound?.fault(*number));
         if let Some(message) = beyond {
-            self.fault(node, format!("<{} {name}>: {message}", node.tag_name().name()));
+            self.fault(
+                node,
+                format!("<{} {name}>: {message}", node.tag_name().name()),
+            );
         }
-        numbers.and_then(|numbers| <[f64; N]>::try_from(numbers).ok()).unwrap_or_else(|| {
-            let what = if N == 1 { "a finite number".into() } else { format!("{N} finite numbers") };
-            self.fault(node, format!("<{} {name}>: expected {what}, found `{text}`", node.tag_name().name()));
-            [f64::NAN; N]
-        })
+        numbers
+            .and_then(|numbers| <[f64; N]>::try_from(numbers).ok())
+            .unwrap_or_else(|| {
+                let what = if N == 1 {
+                    "a finite number".into()
+                } else {
+                    format!("{N} finite numbers")
+                };
+                self.fault(
+                    node,
+                    format!(
+                        "<{} {name}>: expected {what}, found `{text}`",
+                        node.tag_name().name()
+                    ),
+                );
+                [f64::NAN; N]
+            })
     }
 }

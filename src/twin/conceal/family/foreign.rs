@@ -1,7 +1,9 @@
 //! Effects drawn at random, so that no list holds them: any shape over any variable in any direction of motion.
 
 use super::{Bench, Column, Draft, joint, link, sized};
-use crate::effect::{Foreign, ForeignCourse, ForeignMotion, ForeignShape, ForeignVariable, Physical};
+use crate::effect::{
+    Foreign, ForeignCourse, ForeignMotion, ForeignShape, ForeignVariable, Physical,
+};
 use crate::matrix::{self, Vector};
 use crate::noise::Noise;
 use std::f64::consts::TAU;
@@ -38,7 +40,9 @@ pub(crate) fn foreign(bench: &Bench, draw: &mut Noise) -> Draft {
     let mut courses = vec![course(bench, motion, seat, &[], draw)];
     let alone = match &courses[0].over {
         // Those alone are a gap and a payload: names of the list.
-        ForeignVariable::Approach(number) => !(motion == ForeignMotion::JointTurn && *number == seat),
+        ForeignVariable::Approach(number) => {
+            !(motion == ForeignMotion::JointTurn && *number == seat)
+        }
         ForeignVariable::Payload => false,
         _ => true,
     };
@@ -48,18 +52,41 @@ pub(crate) fn foreign(bench: &Bench, draw: &mut Noise) -> Draft {
     }
     let direction = direction(bench, motion, seat, draw);
     let size = draw.sign() * draw.size(40.0, 200.0);
-    let columns: Vec<Column> = courses.iter().filter_map(|course| column(&course.over)).collect();
+    let columns: Vec<Column> = courses
+        .iter()
+        .filter_map(|course| column(&course.over))
+        .collect();
     let form = form(&courses);
     // Time only goes on, and so does the temperature of these recordings: what jumps with them does so once and for good.
-    let passes = |course: &ForeignCourse| matches!(course.over, ForeignVariable::Time | ForeignVariable::Temperature);
-    let is_step = matches!(&courses[..], [one] if passes(one) && matches!(one.shape, ForeignShape::Jumps(_)));
-    let effect = Physical::Foreign(Foreign { motion, seat, direction, size, courses });
+    let passes = |course: &ForeignCourse| {
+        matches!(
+            course.over,
+            ForeignVariable::Time | ForeignVariable::Temperature
+        )
+    };
+    let is_step =
+        matches!(&courses[..], [one] if passes(one) && matches!(one.shape, ForeignShape::Jumps(_)));
+    let effect = Physical::Foreign(Foreign {
+        motion,
+        seat,
+        direction,
+        size,
+        courses,
+    });
     let (place, same) = places(bench, motion, seat);
     let all: Vec<String> = std::iter::once(place.clone()).chain(same.clone()).collect();
     let draft = Draft::new(form, vec![sized("unknown", place, vec![effect])]).needing(&columns);
-    let draft = same.into_iter().fold(draft, |draft, place| draft.accepting("unknown", place));
-    let names = is_step.then(|| all.into_iter().filter_map(|place| Some((step(motion, &place)?, place))));
-    names.into_iter().flatten().fold(draft, |draft, (name, place)| draft.accepting(name, place))
+    let draft = same
+        .into_iter()
+        .fold(draft, |draft, place| draft.accepting("unknown", place));
+    let names = is_step.then(|| {
+        all.into_iter()
+            .filter_map(|place| Some((step(motion, &place)?, place)))
+    });
+    names
+        .into_iter()
+        .flatten()
+        .fold(draft, |draft, (name, place)| draft.accepting(name, place))
 }
 
 /// The name of what moves at a place so, once and for good, if there is one.
@@ -74,7 +101,9 @@ fn step(motion: ForeignMotion, place: &str) -> Option<&'static str> {
 /// The joint or link that moves: not the last joint's turn, which hardly moves the tool, and links with a length.
 fn seat(bench: &Bench, motion: ForeignMotion, draw: &mut Noise) -> usize {
     match motion {
-        ForeignMotion::JointTurn | ForeignMotion::JointShift | ForeignMotion::JointTilt => bench.turning(draw),
+        ForeignMotion::JointTurn | ForeignMotion::JointShift | ForeignMotion::JointTilt => {
+            bench.turning(draw)
+        }
         ForeignMotion::LinkShift | ForeignMotion::LinkBend => {
             let long = bench.long_links();
             long.get(draw.index(long.len())).copied().unwrap_or(1)
@@ -88,7 +117,11 @@ fn direction(bench: &Bench, motion: ForeignMotion, seat: usize, draw: &mut Noise
     let arrow = draw.vector(1.0, 1.0);
     let along = draw.chance(0.5);
     let own = &bench.robot.joints[seat - 1];
-    let end = bench.robot.joints.get(seat).map_or(bench.robot.tool, |next| next.point);
+    let end = bench
+        .robot
+        .joints
+        .get(seat)
+        .map_or(bench.robot.tool, |next| next.point);
     let (line, along) = match motion {
         ForeignMotion::JointShift => (own.axis, along),
         ForeignMotion::JointTilt => (own.axis, false),
@@ -98,48 +131,103 @@ fn direction(bench: &Bench, motion: ForeignMotion, seat: usize, draw: &mut Noise
     };
     let line = matrix::scale(line, 1.0 / matrix::norm(line).max(1e-9));
     let across = matrix::minus(arrow, matrix::scale(line, matrix::dot(line, arrow)));
-    if along { line } else { matrix::scale(across, 1.0 / matrix::norm(across).max(1e-9)) }
+    if along {
+        line
+    } else {
+        matrix::scale(across, 1.0 / matrix::norm(across).max(1e-9))
+    }
 }
 
 /// A shape over a variable that is none of `others`; only one of an effect's variables remembers.
-fn course(bench: &Bench, motion: ForeignMotion, seat: usize, others: &[ForeignCourse], draw: &mut Noise) -> ForeignCourse {
+fn course(
+    bench: &Bench,
+    motion: ForeignMotion,
+    seat: usize,
+    others: &[ForeignCourse],
+    draw: &mut Noise,
+) -> ForeignCourse {
     loop {
         let (over, between) = variable(bench, motion, seat, draw);
         let kind = std::mem::discriminant(&over);
         let taken = |other: &ForeignCourse| {
-            std::mem::discriminant(&other.over) == kind || (other.over.is_remembered() && over.is_remembered())
+            std::mem::discriminant(&other.over) == kind
+                || (other.over.is_remembered() && over.is_remembered())
         };
         if others.iter().any(taken) {
             continue;
         }
-        let two_values = matches!(over, ForeignVariable::Approach(_) | ForeignVariable::Payload);
-        let shape = if two_values { ForeignShape::Straight } else { shape(draw) };
-        return ForeignCourse { over, between, shape };
+        let two_values = matches!(
+            over,
+            ForeignVariable::Approach(_) | ForeignVariable::Payload
+        );
+        let shape = if two_values {
+            ForeignShape::Straight
+        } else {
+            shape(draw)
+        };
+        return ForeignCourse {
+            over,
+            between,
+            shape,
+        };
     }
 }
 
 /// A variable, and the values between which it moves.
-fn variable(bench: &Bench, motion: ForeignMotion, seat: usize, draw: &mut Noise) -> (ForeignVariable, [f64; 2]) {
-    let instrument = matches!(motion, ForeignMotion::Range | ForeignMotion::Azimuth | ForeignMotion::Elevation);
-    let anywhere = instrument || matches!(motion, ForeignMotion::BaseShift | ForeignMotion::BaseTurn | ForeignMotion::ToolShift);
+fn variable(
+    bench: &Bench,
+    motion: ForeignMotion,
+    seat: usize,
+    draw: &mut Noise,
+) -> (ForeignVariable, [f64; 2]) {
+    let instrument = matches!(
+        motion,
+        ForeignMotion::Range | ForeignMotion::Azimuth | ForeignMotion::Elevation
+    );
+    let anywhere = instrument
+        || matches!(
+            motion,
+            ForeignMotion::BaseShift | ForeignMotion::BaseTurn | ForeignMotion::ToolShift
+        );
     // Half of what sits on the chain depends on its own joint.
     let other = 1 + draw.index(bench.joints());
-    let number = if !anywhere && draw.chance(0.5) { seat } else { other };
+    let number = if !anywhere && draw.chance(0.5) {
+        seat
+    } else {
+        other
+    };
     let range = bench.ranges_deg[number - 1].map(f64::to_radians);
     let width = range[1] - range[0];
     let reach: f64 = {
-        let ends = bench.robot.joints.iter().skip(1).map(|joint| joint.point).chain([bench.robot.tool]);
-        let spans = bench.robot.joints.iter().zip(ends).map(|(joint, end)| matrix::norm(matrix::minus(end, joint.point)));
+        let ends = bench
+            .robot
+            .joints
+            .iter()
+            .skip(1)
+            .map(|joint| joint.point)
+            .chain([bench.robot.tool]);
+        let spans = bench
+            .robot
+            .joints
+            .iter()
+            .zip(ends)
+            .map(|(joint, end)| matrix::norm(matrix::minus(end, joint.point)));
         spans.sum()
     };
     match draw.index(11) {
         0..=2 => (ForeignVariable::Angle(number), range),
         3 => (ForeignVariable::Approach(number), [-1.0, 1.0]),
-        4 => (ForeignVariable::LastMove(number), [-0.7 * width, 0.7 * width]),
+        4 => (
+            ForeignVariable::LastMove(number),
+            [-0.7 * width, 0.7 * width],
+        ),
         5 if !instrument => {
             let loaded = bench.loaded();
             let number = loaded.get(draw.index(loaded.len())).copied().unwrap_or(1);
-            (ForeignVariable::Load(number), [-bench.peak[number - 1], bench.peak[number - 1]])
+            (
+                ForeignVariable::Load(number),
+                [-bench.peak[number - 1], bench.peak[number - 1]],
+            )
         }
         6 => (ForeignVariable::Payload, [0.0, bench.robot.payload_mass]),
         7 => (ForeignVariable::Temperature, WARMTH_C),
@@ -147,7 +235,10 @@ fn variable(bench: &Bench, motion: ForeignMotion, seat: usize, draw: &mut Noise)
             let far = if instrument { 2.0 * reach } else { reach };
             (ForeignVariable::Space(draw.vector(1.0, 1.0)), [-far, far])
         }
-        9 => (ForeignVariable::Relaxing(number, draw.size(10.0, 120.0)), [-0.7 * width, 0.7 * width]),
+        9 => (
+            ForeignVariable::Relaxing(number, draw.size(10.0, 120.0)),
+            [-0.7 * width, 0.7 * width],
+        ),
         10 => {
             let limit = draw.uniform(0.05, 0.4) * width;
             (ForeignVariable::Slipping(number, limit), [-limit, limit])
@@ -164,7 +255,15 @@ fn shape(draw: &mut Noise) -> ForeignShape {
             let length = draw.size(LENGTHS[0], LENGTHS[1]);
             let amplitude = (2.0 / WAVES as f64).sqrt();
             ForeignShape::Smooth(
-                (0..WAVES).map(|_| [amplitude * draw.normal(), draw.normal() / length, draw.uniform(0.0, TAU)]).collect(),
+                (0..WAVES)
+                    .map(|_| {
+                        [
+                            amplitude * draw.normal(),
+                            draw.normal() / length,
+                            draw.uniform(0.0, TAU),
+                        ]
+                    })
+                    .collect(),
             )
         }
         2 => {
@@ -215,16 +314,25 @@ fn form(courses: &[ForeignCourse]) -> &'static str {
 
 /// Its place, and those where the same motion of the chain may be put as well.
 fn places(bench: &Bench, motion: ForeignMotion, seat: usize) -> (String, Vec<String>) {
-    let carrier = if seat == 1 { "base".to_string() } else { link(seat - 1) };
+    let carrier = if seat == 1 {
+        "base".to_string()
+    } else {
+        link(seat - 1)
+    };
     let (base, tracker) = ("base".to_string(), "tracker".to_string());
     match motion {
         ForeignMotion::JointTurn if seat == 1 => (joint(1), vec![base]),
         ForeignMotion::JointTurn => (joint(seat), vec![]),
         ForeignMotion::JointShift | ForeignMotion::JointTilt => (joint(seat), vec![carrier]),
-        ForeignMotion::LinkShift | ForeignMotion::LinkBend if seat < bench.joints() => (link(seat), vec![joint(seat + 1)]),
+        ForeignMotion::LinkShift | ForeignMotion::LinkBend if seat < bench.joints() => {
+            (link(seat), vec![joint(seat + 1)])
+        }
         ForeignMotion::LinkShift | ForeignMotion::LinkBend => (link(seat), vec!["tool".into()]),
         ForeignMotion::BaseShift | ForeignMotion::BaseTurn => (base, vec![tracker, joint(1)]),
-        ForeignMotion::ToolShift => ("tool".into(), vec![link(bench.joints()), joint(bench.joints())]),
+        ForeignMotion::ToolShift => (
+            "tool".into(),
+            vec![link(bench.joints()), joint(bench.joints())],
+        ),
         // The turn of the whole instrument about its standing axis.
         ForeignMotion::Azimuth => (tracker, vec![base]),
         ForeignMotion::Range | ForeignMotion::Elevation => (tracker, vec![]),

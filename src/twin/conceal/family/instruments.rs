@@ -2,7 +2,8 @@
 
 use super::{Bench, Column, Draft, Form, sized};
 use crate::effect::{
-    Circle, Physical, TrackerCircle, TrackerElevation, TrackerKnock, TrackerOffset, TrackerRefraction, TrackerSway,
+    Circle, Physical, TrackerCircle, TrackerElevation, TrackerKnock, TrackerOffset,
+    TrackerRefraction, TrackerSway,
 };
 use crate::noise::Noise;
 
@@ -20,36 +21,87 @@ pub(super) fn circle(_bench: &Bench, form: Form, draw: &mut Noise) -> Option<Dra
         (Form::Other, true) => (Circle::Elliptic, "elliptic"),
         (Form::Other, false) => (Circle::OffCentre, "centre off the axis"),
     };
-    let circle = TrackerCircle { circle, amplitude_arcsec: draw.size(4.0, 40.0), phase_deg: phase(draw) };
-    Some(tracker("tracker_circle", name, Physical::TrackerCircle(circle)))
+    let circle = TrackerCircle {
+        circle,
+        amplitude_arcsec: draw.size(4.0, 40.0),
+        phase_deg: phase(draw),
+    };
+    Some(tracker(
+        "tracker_circle",
+        name,
+        Physical::TrackerCircle(circle),
+    ))
 }
 
 pub(super) fn elevation(_bench: &Bench, form: Form, draw: &mut Noise) -> Option<Draft> {
     let (size, second) = (draw.sign() * draw.size(5.0, 40.0), draw.uniform(-1.0, 1.0));
     let (head, name) = match (form, draw.chance(0.5)) {
-        (Form::Obvious, _) => {
-            (TrackerElevation { index_arcsec: size * second, sag_arcsec: size, ..TrackerElevation::default() }, "index and sag")
-        }
+        (Form::Obvious, _) => (
+            TrackerElevation {
+                index_arcsec: size * second,
+                sag_arcsec: size,
+                ..TrackerElevation::default()
+            },
+            "index and sag",
+        ),
         (Form::Other, true) => {
-            let head = TrackerElevation { circle_arcsec: size, phase_deg: phase(draw), ..TrackerElevation::default() };
+            let head = TrackerElevation {
+                circle_arcsec: size,
+                phase_deg: phase(draw),
+                ..TrackerElevation::default()
+            };
             (head, "eccentric vertical circle")
         }
-        (Form::Other, false) => (TrackerElevation { transit_arcsec: size, ..TrackerElevation::default() }, "tilted transit axis"),
+        (Form::Other, false) => (
+            TrackerElevation {
+                transit_arcsec: size,
+                ..TrackerElevation::default()
+            },
+            "tilted transit axis",
+        ),
     };
-    Some(tracker("tracker_elevation", name, Physical::TrackerElevation(head)))
+    Some(tracker(
+        "tracker_elevation",
+        name,
+        Physical::TrackerElevation(head),
+    ))
 }
 
 pub(super) fn offset(_bench: &Bench, form: Form, draw: &mut Noise) -> Option<Draft> {
     let size = draw.sign() * draw.size(30.0, 300.0);
     let (ranges, name) = match (form, draw.chance(0.5)) {
-        (Form::Obvious, _) => (TrackerOffset { constant_um: size, ..TrackerOffset::default() }, "dead path"),
+        (Form::Obvious, _) => (
+            TrackerOffset {
+                constant_um: size,
+                ..TrackerOffset::default()
+            },
+            "dead path",
+        ),
         (Form::Other, true) => {
             let (wave_mm, phase_deg) = (draw.size(300.0, 1500.0).round(), phase(draw));
-            (TrackerOffset { cyclic_um: 0.3 * size, wave_mm, phase_deg, ..TrackerOffset::default() }, "cyclic")
+            (
+                TrackerOffset {
+                    cyclic_um: 0.3 * size,
+                    wave_mm,
+                    phase_deg,
+                    ..TrackerOffset::default()
+                },
+                "cyclic",
+            )
         }
-        (Form::Other, false) => (TrackerOffset { um_per_m2: 0.2 * size, ..TrackerOffset::default() }, "square of the range"),
+        (Form::Other, false) => (
+            TrackerOffset {
+                um_per_m2: 0.2 * size,
+                ..TrackerOffset::default()
+            },
+            "square of the range",
+        ),
     };
-    Some(tracker("tracker_offset", name, Physical::TrackerOffset(ranges)))
+    Some(tracker(
+        "tracker_offset",
+        name,
+        Physical::TrackerOffset(ranges),
+    ))
 }
 
 pub(super) fn refraction(bench: &Bench, form: Form, draw: &mut Noise) -> Option<Draft> {
@@ -61,14 +113,30 @@ pub(super) fn refraction(bench: &Bench, form: Form, draw: &mut Noise) -> Option<
         warm_up_h: 1.0,
     };
     let (air, name, needs): (_, _, &[Column]) = match (form, draw.chance(0.5)) {
-        (Form::Obvious, _) => (as_logged, "with the logged temperature", &[Column::Temperature]),
+        (Form::Obvious, _) => (
+            as_logged,
+            "with the logged temperature",
+            &[Column::Temperature],
+        ),
         (Form::Other, true) => {
             let lag_s = (bench.end_s * draw.uniform(0.05, 0.2)).round();
-            (TrackerRefraction { lag_s, ..as_logged }, "behind the logged temperature", &[Column::Temperature, Column::Time])
+            (
+                TrackerRefraction { lag_s, ..as_logged },
+                "behind the logged temperature",
+                &[Column::Temperature, Column::Time],
+            )
         }
         (Form::Other, false) => {
             let warm_up_h = draw.uniform(0.15, 0.6) * bench.end_s / 3600.0;
-            (TrackerRefraction { own_rise_k: 12.0, warm_up_h, ..as_logged }, "air that warms by its own", &[Column::Time])
+            (
+                TrackerRefraction {
+                    own_rise_k: 12.0,
+                    warm_up_h,
+                    ..as_logged
+                },
+                "air that warms by its own",
+                &[Column::Time],
+            )
         }
     };
     Some(tracker("tracker_refraction", name, Physical::TrackerRefraction(air)).needing(needs))
@@ -76,7 +144,11 @@ pub(super) fn refraction(bench: &Bench, form: Form, draw: &mut Noise) -> Option<
 
 /// A direction of motion of the stand: along, or about the tracker's origin.
 fn stand(draw: &mut Noise) -> ([f64; 3], [f64; 3]) {
-    if draw.chance(0.5) { (draw.vector(30.0, 150.0).map(f64::round), [0.0; 3]) } else { ([0.0; 3], draw.vector(3.0, 15.0)) }
+    if draw.chance(0.5) {
+        (draw.vector(30.0, 150.0).map(f64::round), [0.0; 3])
+    } else {
+        ([0.0; 3], draw.vector(3.0, 15.0))
+    }
 }
 
 pub(super) fn swing(bench: &Bench, form: Form, draw: &mut Noise) -> Option<Draft> {
@@ -84,21 +156,51 @@ pub(super) fn swing(bench: &Bench, form: Form, draw: &mut Noise) -> Option<Draft
     let (period_s, phase_deg) = ((bench.end_s / draw.uniform(2.0, 6.0)).round(), phase(draw));
     let (fading_s, name) = match form {
         Form::Obvious => (0.0, "slow swing"),
-        Form::Other => ((draw.uniform(0.3, 0.8) * bench.end_s).round(), "fading swing"),
+        Form::Other => (
+            (draw.uniform(0.3, 0.8) * bench.end_s).round(),
+            "fading swing",
+        ),
     };
-    let sway = Physical::TrackerSway(TrackerSway { shift_um, turn_arcsec, period_s, phase_deg, fading_s });
+    let sway = Physical::TrackerSway(TrackerSway {
+        shift_um,
+        turn_arcsec,
+        period_s,
+        phase_deg,
+        fading_s,
+    });
     // The base may swing as well as the stand.
-    Some(tracker("unknown", name, sway).needing(&[Column::Time]).accepting("unknown", "base".into()))
+    Some(
+        tracker("unknown", name, sway)
+            .needing(&[Column::Time])
+            .accepting("unknown", "base".into()),
+    )
 }
 
 pub(super) fn knock(bench: &Bench, form: Form, draw: &mut Noise) -> Option<Draft> {
-    let (shift_um, turn_arcsec) = (draw.vector(30.0, 150.0).map(f64::round), draw.vector(2.0, 15.0));
+    let (shift_um, turn_arcsec) = (
+        draw.vector(30.0, 150.0).map(f64::round),
+        draw.vector(2.0, 15.0),
+    );
     let (back_share, name) = match form {
         Form::Obvious => (0.0, "knock"),
         Form::Other => (draw.uniform(0.3, 0.7), "knock, settling back in part"),
     };
     let back_s = (draw.uniform(0.05, 0.15) * bench.end_s).round().max(1.0);
-    let knock = TrackerKnock { shift_um, turn_arcsec, at_s: bench.moment(draw), back_share, back_s };
-    let cause = sized("base_shift", "base".into(), vec![Physical::TrackerKnock(knock)]);
-    Some(Draft::new(name, vec![cause]).needing(&[Column::Time]).accepting("tracker_drift", "tracker".into()))
+    let knock = TrackerKnock {
+        shift_um,
+        turn_arcsec,
+        at_s: bench.moment(draw),
+        back_share,
+        back_s,
+    };
+    let cause = sized(
+        "base_shift",
+        "base".into(),
+        vec![Physical::TrackerKnock(knock)],
+    );
+    Some(
+        Draft::new(name, vec![cause])
+            .needing(&[Column::Time])
+            .accepting("tracker_drift", "tracker".into()),
+    )
 }

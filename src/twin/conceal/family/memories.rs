@@ -11,11 +11,29 @@ pub(super) fn presliding(bench: &Bench, form: Form, draw: &mut Noise) -> Option<
         Form::Obvious => (travel, Vec::new(), "Dahl"),
         Form::Other => {
             let elements = 3 + draw.index(2);
-            (0.0, (0..elements).map(|_| travel * draw.size(0.3, 3.0)).collect(), "Maxwell slip")
+            (
+                0.0,
+                (0..elements)
+                    .map(|_| travel * draw.size(0.3, 3.0))
+                    .collect(),
+                "Maxwell slip",
+            )
         }
     };
-    let friction = Presliding { joint: number, amplitude_arcsec, dahl_deg, slip_deg };
-    let draft = Draft::new(name, vec![sized("presliding", joint(number), vec![Physical::Presliding(friction)])]);
+    let friction = Presliding {
+        joint: number,
+        amplitude_arcsec,
+        dahl_deg,
+        slip_deg,
+    };
+    let draft = Draft::new(
+        name,
+        vec![sized(
+            "presliding",
+            joint(number),
+            vec![Physical::Presliding(friction)],
+        )],
+    );
     Some(draft.needing(&[Column::Direction]))
 }
 
@@ -38,8 +56,14 @@ pub(super) fn warming(number: usize, heat: Heat, time_s: f64) -> JointWarming {
 fn off(warming: JointWarming, usual: f64, draw: &mut Noise) -> JointWarming {
     let size = draw.sign() * draw.size(15.0, 80.0) / usual;
     match draw.chance(0.6) {
-        true => JointWarming { zero_arcsec: size, ..warming },
-        false => JointWarming { ratio_arcsec_per_rad: size, ..warming },
+        true => JointWarming {
+            zero_arcsec: size,
+            ..warming
+        },
+        false => JointWarming {
+            ratio_arcsec_per_rad: size,
+            ..warming
+        },
     }
 }
 
@@ -56,11 +80,24 @@ pub(super) fn own_heat(bench: &Bench, form: Form, draw: &mut Noise) -> Option<Dr
         Form::Other => {
             let oil_s = (time_s * draw.uniform(0.1, 0.4)).round();
             let full = usual * draw.uniform(0.5, 1.0);
-            (JointWarming { oil_s, full, ..warming(number, Heat::Oil, time_s) }, "casing and oil, saturating")
+            (
+                JointWarming {
+                    oil_s,
+                    full,
+                    ..warming(number, Heat::Oil, time_s)
+                },
+                "casing and oil, saturating",
+            )
         }
     };
     let warm = Physical::JointWarming(off(heat, usual, draw));
-    Some(Draft::new(name, vec![sized("joint_warming", joint(number), vec![warm])]).needing(&[Column::Time]))
+    Some(
+        Draft::new(
+            name,
+            vec![sized("joint_warming", joint(number), vec![warm])],
+        )
+        .needing(&[Column::Time]),
+    )
 }
 
 /// Usual rise of the arm's temperature, K.
@@ -73,7 +110,10 @@ pub(super) fn late_heat(bench: &Bench, form: Form, draw: &mut Noise) -> Option<D
     let (parts, name) = match form {
         Form::Obvious => (vec![first], "behind the temperature"),
         Form::Other => {
-            let second = JointWarming { time_s: (time_s * draw.uniform(3.0, 6.0)).round(), ..first.clone() };
+            let second = JointWarming {
+                time_s: (time_s * draw.uniform(3.0, 6.0)).round(),
+                ..first.clone()
+            };
             (vec![first, second], "behind the temperature by two times")
         }
     };
@@ -89,8 +129,24 @@ pub(super) fn lagging_link(bench: &Bench, form: Form, draw: &mut Noise) -> Optio
         Form::Obvious => (0.0, "behind the temperature"),
         Form::Other => (draw.uniform(0.2, 0.5) * bench.end_s, "skin and core"),
     };
-    let (um_per_m_k, lag_s) = (draw.uniform(8.0, 16.0), draw.uniform(0.05, 0.2) * bench.end_s);
-    let growth = ThermalLag { link: number, um_per_m_k, reference_c: 20.0, lag_s: lag_s.round(), core_s: core_s.round() };
-    let draft = Draft::new(name, vec![sized("thermal_growth", link(number), vec![Physical::ThermalLag(growth)])]);
+    let (um_per_m_k, lag_s) = (
+        draw.uniform(8.0, 16.0),
+        draw.uniform(0.05, 0.2) * bench.end_s,
+    );
+    let growth = ThermalLag {
+        link: number,
+        um_per_m_k,
+        reference_c: 20.0,
+        lag_s: lag_s.round(),
+        core_s: core_s.round(),
+    };
+    let draft = Draft::new(
+        name,
+        vec![sized(
+            "thermal_growth",
+            link(number),
+            vec![Physical::ThermalLag(growth)],
+        )],
+    );
     Some(draft.needing(&[Column::Temperature, Column::Time]))
 }

@@ -22,16 +22,31 @@ impl ForeignShape {
     pub(super) fn value(&self, x: f64) -> f64 {
         match self {
             Self::Straight => 2.0 * x - 1.0,
-            Self::Smooth(waves) => waves.iter().map(|[amplitude, rate, phase]| amplitude * (rate * x + phase).cos()).sum(),
+            Self::Smooth(waves) => waves
+                .iter()
+                .map(|[amplitude, rate, phase]| amplitude * (rate * x + phase).cos())
+                .sum(),
             Self::Corners(points) => {
-                let after = points.iter().position(|[at, _]| *at > x).unwrap_or(points.len());
-                match (after.checked_sub(1).and_then(|before| points.get(before)), points.get(after)) {
-                    (Some([from, low]), Some([to, high])) => low + (high - low) * (x - from) / (to - from),
+                let after = points
+                    .iter()
+                    .position(|[at, _]| *at > x)
+                    .unwrap_or(points.len());
+                match (
+                    after.checked_sub(1).and_then(|before| points.get(before)),
+                    points.get(after),
+                ) {
+                    (Some([from, low]), Some([to, high])) => {
+                        low + (high - low) * (x - from) / (to - from)
+                    }
                     (Some([_, value]), None) | (None, Some([_, value])) => *value,
                     (None, None) => 0.0,
                 }
             }
-            Self::Jumps(steps) => steps.iter().rev().find(|[at, _]| *at <= x).map_or(0.0, |[_, value]| *value),
+            Self::Jumps(steps) => steps
+                .iter()
+                .rev()
+                .find(|[at, _]| *at <= x)
+                .map_or(0.0, |[_, value]| *value),
         }
     }
 }

@@ -60,11 +60,15 @@ impl ForeignVariable {
     /// Its value row by row where it depends on the rows before; else nothing.
     pub(super) fn remember(&self, past: &[Moment]) -> Vec<f64> {
         match *self {
-            Self::LastMove(joint) => past.iter().map(|moment| moment.travels(joint).last().unwrap_or(0.0)).collect(),
+            Self::LastMove(joint) => past
+                .iter()
+                .map(|moment| moment.travels(joint).last().unwrap_or(0.0))
+                .collect(),
             Self::Relaxing(joint, time_s) => {
                 let (mut then, mut left) = (0.0, 0.0);
                 let live = |moment: &Moment| {
-                    left = left * (-(moment.time_s - then) / time_s).exp() + moment.travels(joint).sum::<f64>();
+                    left = left * (-(moment.time_s - then) / time_s).exp()
+                        + moment.travels(joint).sum::<f64>();
                     then = moment.time_s;
                     left
                 };
@@ -73,7 +77,9 @@ impl ForeignVariable {
             Self::Slipping(joint, limit) => {
                 let mut stretch: f64 = 0.0;
                 let live = |moment: &Moment| {
-                    moment.travels(joint).for_each(|way| stretch = (stretch + way).max(-limit).min(limit));
+                    moment
+                        .travels(joint)
+                        .for_each(|way| stretch = (stretch + way).max(-limit).min(limit));
                     stretch
                 };
                 past.iter().map(live).collect()
@@ -84,6 +90,9 @@ impl ForeignVariable {
 
     /// Whether it depends on the rows before.
     pub fn is_remembered(&self) -> bool {
-        matches!(self, Self::LastMove(_) | Self::Relaxing(..) | Self::Slipping(..))
+        matches!(
+            self,
+            Self::LastMove(_) | Self::Relaxing(..) | Self::Slipping(..)
+        )
     }
 }
