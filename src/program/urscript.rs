@@ -390,7 +390,7 @@ impl<'p> Reader<'p> {
         }
         match argument {
             [word] if word.sort == TokenKind::Word => {
-                drop(self.uses.moved_to.insert(self.name(word)))
+                self.uses.moved_to.insert(self.name(word));
             }
             [word, open, inside @ .., _]
                 if self.is(word, INVERSE)

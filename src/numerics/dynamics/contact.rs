@@ -16,6 +16,8 @@ const DEVIATIONS: f64 = 6.0;
 const TIMES_USUAL: f64 = 1.7;
 /// s that are tried.
 const DURATIONS: [f64; 6] = [0.6, 0.9, 1.2, 1.6, 2.0, 2.6];
+/// Share of a push in which it rises and falls: all of it, or one that is held between.
+const TAPERS: [f64; 3] = [1.0, 0.4, 0.1];
 /// s beside the highest point that are tried as middles: steps on either side, and their length.
 const STEPS: i32 = 6;
 const STEP: f64 = 0.1;
@@ -146,13 +148,19 @@ fn best_window(
         let first = time.partition_point(|time| *time < start);
         let last = time.partition_point(|time| *time <= start + duration);
         if last >= first + FEWEST {
-            let (event, share) =
-                pushed(problem, residual, noise, time, start, duration, first..last);
-            if best
-                .as_ref()
-                .is_none_or(|(known, _)| event.gain > known.gain)
-            {
-                best = Some((event, share));
+            for taper in TAPERS {
+                let window = PushWindow {
+                    start,
+                    duration,
+                    taper,
+                };
+                let (event, share) = pushed(problem, residual, noise, time, window, first..last);
+                if best
+                    .as_ref()
+                    .is_none_or(|(known, _)| event.gain > known.gain)
+                {
+                    best = Some((event, share));
+                }
             }
         }
         best.as_ref()
@@ -177,14 +185,34 @@ fn best_window(
         .map(|(event, _)| event)
 }
 
-/// A push that rises and falls as sin^2 over a window, fitted; and the share that it explains of the squared residual above the noise.
+/// When a push begins, how long it lasts, s, and the share of this time in which it rises and falls.
+#[derive(Clone, Copy)]
+struct PushWindow {
+    start: f64,
+    duration: f64,
+    taper: f64,
+}
+
+impl PushWindow {
+    /// The force at a time over the greatest one: sin^2 at both ends, 1 between (a Tukey window).
+    fn force(&self, time: f64) -> f64 {
+        let from_end = (time - self.start).min(self.start + self.duration - time);
+        let rise = 0.5 * self.taper * self.duration;
+        if from_end < rise {
+            (0.5 * PI * from_end / rise).sin().powi(2)
+        } else {
+            1.0
+        }
+    }
+}
+
+/// A push over a window, fitted; and the share that it explains of the squared residual above the noise.
 fn pushed(
     problem: &TorqueProblem,
     residual: &[Vec<f64>],
     EffectiveNoise { sigma, usual }: EffectiveNoise,
     time: &[f64],
-    start: f64,
-    duration: f64,
+    window: PushWindow,
     rows: std::ops::Range<usize>,
 ) -> (ContactEvent, f64) {
     let usual = usual * rows.len() as f64;
@@ -192,7 +220,7 @@ fn pushed(
     let mut by_joint = vec![0.0; sigma.len()];
     let mut along_force = vec![(Matrix3::zeros(), Vector3::zeros()); sigma.len()];
     for row in rows {
-        let push = (PI * (time[row] - start) / duration).sin().powi(2);
+        let push = window.force(time[row]);
         let jacobian = problem.scene.tool_jacobian(problem.reduction.rows[row]);
         for (joint, along) in jacobian.iter().enumerate() {
             let (column, value) = (
@@ -221,8 +249,8 @@ fn pushed(
     joints.sort_by(|a, b| by_joint[*b].total_cmp(&by_joint[*a]));
     joints.truncate(2);
     let event = ContactEvent {
-        start,
-        end: start + duration,
+        start: window.start,
+        end: window.start + window.duration,
         joints,
         force: force.into(),
         sigma: [0, 1, 2].map(|axis| inverse[(axis, axis)].max(0.0).sqrt()),

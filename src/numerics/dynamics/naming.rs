@@ -90,7 +90,11 @@ pub(super) fn settle_names(
 }
 
 /// A form as a number of the problem.
-fn push(problem: &mut TorqueProblem, weighted: &mut WeightedColumns, form: TorqueForm) -> usize {
+pub(super) fn push(
+    problem: &mut TorqueProblem,
+    weighted: &mut WeightedColumns,
+    form: TorqueForm,
+) -> usize {
     let number = problem.push(form);
     let runs = problem.runs(false);
     problem

@@ -1,9 +1,12 @@
 //! Shape numbers of what was found: finer and finer grids about each.
 
-use super::cause::ShapeSpan;
+use super::cause::{COULOMB, ShapeSpan, VISCOUS};
+use super::choice::CauseChoice;
+use super::naming::push;
 use super::problem::TorqueProblem;
 use super::sweep::SweptColumns;
 use super::weighted::WeightedColumns;
+use crate::effect::Place;
 
 /// Half widths of the grids: of the logarithm, or of the number itself.
 const HALVES: [f64; 4] = [0.3, 0.1, 0.03, 0.01];
@@ -11,6 +14,8 @@ const HALVES: [f64; 4] = [0.3, 0.1, 0.03, 0.01];
 const POINTS: i32 = 3;
 /// The same, beyond the logarithm of the number of rows, for a number that is what it usually is.
 const UNUSUAL: f64 = 4.0;
+/// The power of speed from which one is looked for.
+const START_POWER: f64 = 0.7;
 /// A gain that is worth a new shape.
 const BETTER: f64 = 0.05;
 
@@ -18,13 +23,50 @@ const BETTER: f64 = 0.05;
 pub(super) fn refine(
     problem: &mut TorqueProblem,
     weighted: &mut WeightedColumns,
-    set: &mut [usize],
+    set: &mut Vec<usize>,
 ) -> bool {
     let before = set.to_vec();
     for place in 0..set.len() {
         refine_one(problem, weighted, set, place);
     }
-    before != set
+    for joint in 0..problem.scene.joints() {
+        one_power_of_speed(problem, weighted, set, joint);
+    }
+    before != *set
+}
+
+/// Replaces viscous and Coulomb friction of a joint by friction that grows with a power of speed where it leaves less than the two.
+fn one_power_of_speed(
+    problem: &mut TorqueProblem,
+    weighted: &mut WeightedColumns,
+    set: &mut Vec<usize>,
+    joint: usize,
+) {
+    let at = |name: &str| {
+        let form = |number: &usize| &problem.all.forms[*number];
+        set.iter().position(|number| {
+            form(number).cause.name() == name && form(number).place == Place::Joint(joint)
+        })
+    };
+    let (Some(viscous), Some(coulomb)) = (at(VISCOUS), at(COULOMB)) else {
+        return;
+    };
+    let mut alone = set.clone();
+    alone[viscous] = {
+        let form = problem.all.forms[set[viscous]].with_shape(0, START_POWER);
+        push(problem, weighted, form)
+    };
+    alone.remove(coulomb);
+    let is_whole = CauseChoice::new(problem, weighted).is_whole(&alone);
+    let place = viscous - usize::from(coulomb < viscous);
+    if !is_whole {
+        return;
+    }
+    refine_one(problem, weighted, &mut alone, place);
+    let square = |set: &[usize]| SweptColumns::base(&problem.all, weighted).with(set).square;
+    if square(&alone) + UNUSUAL + (weighted.rows as f64).ln() < square(set) {
+        *set = alone;
+    }
 }
 
 /// Replaces one form of a set.
@@ -77,11 +119,7 @@ fn try_grid(
         }
         let mut trial = form.clone();
         trial.shape[span.index] = moved;
-        let number = problem.push(trial);
-        problem.all.of(number).for_each(|column| {
-            let runs = problem.runs(false);
-            weighted.push(&problem.all.columns[column], problem.weighing(&runs));
-        });
+        let number = push(problem, weighted, trial);
         trials.push(number);
     }
     let rest: Vec<usize> = (0..set.len())

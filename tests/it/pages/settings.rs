@@ -8,23 +8,25 @@ use std::collections::BTreeSet;
 const VARIABLE: &str = "calib.variable";
 /// Named by the word `file` and needing no table of its own.
 const FILE: &str = "RawFile";
+/// Words of a setting that are listed.
+const MOST_WORDS: usize = 12;
 
 /// The settings of an object, or of each of its variants.
-pub fn settings(schema: &Value) -> String {
+pub fn settings(schema: &Value, definitions: &Value) -> String {
     match schema["properties"].as_object() {
         Some(fields) if fields.is_empty() => "It has no settings.\n".into(),
-        Some(_) => table(schema),
-        None => definition(schema),
+        Some(_) => table(schema, definitions),
+        None => definition(schema, definitions),
     }
 }
 
 /// A structure: its fields, its variants, or nothing where its description says all.
-pub fn definition(schema: &Value) -> String {
+fn definition(schema: &Value, definitions: &Value) -> String {
     if schema["properties"]
         .as_object()
         .is_some_and(|fields| !fields.is_empty())
     {
-        return table(schema);
+        return table(schema, definitions);
     }
     let variants = variants(schema);
     let words: Vec<&Value> = variants
@@ -62,7 +64,10 @@ pub fn definition(schema: &Value) -> String {
         } else {
             format!(": {description}")
         };
-        text.push_str(&format!("\n{head}{after}\n\n{}", table(variant)));
+        text.push_str(&format!(
+            "\n{head}{after}\n\n{}",
+            table(variant, definitions)
+        ));
     }
     text.trim_start_matches('\n').to_string()
 }
@@ -92,7 +97,7 @@ fn keys(variant: &Value) -> String {
     names.collect::<Vec<_>>().join(", ")
 }
 
-fn table(schema: &Value) -> String {
+fn table(schema: &Value, definitions: &Value) -> String {
     let required: BTreeSet<&str> = schema["required"]
         .as_array()
         .into_iter()
@@ -115,7 +120,7 @@ fn table(schema: &Value) -> String {
             };
             format!(
                 "| `{name}` | {} | {default} | {} |\n",
-                kind(field),
+                kind(field, definitions),
                 about(field)
             )
         })
@@ -177,20 +182,25 @@ fn reference(schema: &Value) -> Option<&str> {
         .map(|path| path.trim_start_matches("#/definitions/"))
 }
 
-/// What may stand there, in words; structures as links.
-pub fn kind(schema: &Value) -> String {
+/// What may stand there, in words; structures by their names in the JSON Schema.
+fn kind(schema: &Value, definitions: &Value) -> String {
     if let Some(name) = reference(schema) {
+        let words = variants(&definitions[name]);
+        let is_word = |word: &&Value| word.get("const").is_some();
         return if name == FILE {
             "file".into()
+        } else if !words.is_empty() && words.len() <= MOST_WORDS && words.iter().all(is_word) {
+            let word = |word: &&Value| format!("`{}`", plain(&word["const"]));
+            words.iter().map(word).collect::<Vec<_>>().join(", ")
         } else {
-            format!("[{name}](#{})", name.to_lowercase())
+            name.into()
         };
     }
     if let Some(word) = schema.get("const") {
         return format!("`{}`", plain(word));
     }
     if let Some([one]) = schema["allOf"].as_array().map(Vec::as_slice) {
-        return kind(one);
+        return kind(one, definitions);
     }
     let variants = variants(schema);
     if !variants.is_empty() {
@@ -198,7 +208,7 @@ pub fn kind(schema: &Value) -> String {
         for word in variants
             .iter()
             .filter(|variant| variant["type"] != "null")
-            .map(|variant| kind(variant))
+            .map(|variant| kind(variant, definitions))
         {
             if !words.contains(&word) {
                 words.push(word);
@@ -217,23 +227,26 @@ pub fn kind(schema: &Value) -> String {
     };
     types
         .into_iter()
-        .map(|one| simple(one, schema))
+        .map(|one| simple(one, schema, definitions))
         .collect::<Vec<_>>()
         .join(" or ")
 }
 
-fn simple(kind_of: &str, schema: &Value) -> String {
+fn simple(kind_of: &str, schema: &Value, definitions: &Value) -> String {
     match kind_of {
         "string" => "text".into(),
         "boolean" => "`true` or `false`".into(),
         "array" => match (schema["minItems"].as_u64(), schema["maxItems"].as_u64()) {
             (Some(low), Some(high)) if low == high => {
-                format!("{low} {}", several(&kind(&schema["items"])))
+                format!("{low} {}", several(&kind(&schema["items"], definitions)))
             }
-            _ => format!("list of {}", several(&kind(&schema["items"]))),
+            _ => format!("list of {}", several(&kind(&schema["items"], definitions))),
         },
         "object" if schema["additionalProperties"].is_object() => {
-            format!("name: {}", kind(&schema["additionalProperties"]))
+            format!(
+                "name: {}",
+                kind(&schema["additionalProperties"], definitions)
+            )
         }
         "object" => keys(schema),
         other => other.into(),
@@ -246,19 +259,5 @@ fn several(kind: &str) -> String {
         format!("{kind}s")
     } else {
         kind.into()
-    }
-}
-
-/// Adds the structures that a schema refers to.
-pub fn links(schema: &Value, out: &mut BTreeSet<String>) {
-    match schema {
-        Value::Object(fields) => {
-            if let Some(name) = reference(schema).filter(|name| ![VARIABLE, FILE].contains(name)) {
-                out.insert(name.to_string());
-            }
-            fields.values().for_each(|field| links(field, out));
-        }
-        Value::Array(items) => items.iter().for_each(|item| links(item, out)),
-        _ => (),
     }
 }

@@ -51,11 +51,6 @@ impl TorqueCause for SpringTorque {
             &CABLE_STIFFNESS
         };
         let joints = (0..scene.joints()).filter(|joint| (*joint == BALANCED) == self.balances);
-        let widths = if self.balances {
-            &WIDTHS[..1]
-        } else {
-            &WIDTHS[..]
-        };
         let form = |joint: usize, width: usize| {
             let ends = scene.position[joint]
                 .iter()
@@ -67,7 +62,7 @@ impl TorqueCause for SpringTorque {
             })
         };
         joints
-            .flat_map(|joint| widths.iter().map(move |width| form(joint, *width)))
+            .flat_map(|joint| WIDTHS.map(|width| form(joint, width)))
             .collect()
     }
 

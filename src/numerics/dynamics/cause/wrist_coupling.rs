@@ -62,6 +62,11 @@ impl TorqueCause for WristCoupling {
         form.shape[0].abs() > LEAST_RATIO
     }
 
+    /// Friction brakes: neither of its numbers drives.
+    fn is_possible(&self, _form: &TorqueForm, values: &[f64]) -> bool {
+        values.iter().all(|value| *value >= 0.0)
+    }
+
     fn is_rich(&self, form: &TorqueForm) -> bool {
         form.with[1] == 1 && USUAL.contains(&form.shape[0])
     }
