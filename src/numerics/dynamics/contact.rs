@@ -34,7 +34,7 @@ const SHARE: f64 = 0.6;
 /// The same beside a rich model, which takes part of it away: there rows are only set aside.
 const RICH_SHARE: f64 = 0.35;
 /// Share of the gain that is not of one joint, and that gain itself: what only one joint feels is no force at the tool.
-const OTHERS: f64 = 0.1;
+const OTHERS: f64 = 0.03;
 const OTHERS_GAIN: f64 = 25.0;
 /// Share of the rows in which the arm must move: at rest a slow change of torque is stiction.
 const MOVING: f64 = 0.3;

@@ -35,7 +35,8 @@ pub(super) fn refine(
     before != *set
 }
 
-/// Replaces viscous and Coulomb friction of a joint by friction that grows with a power of speed where it leaves less than the two.
+/// Replaces viscous and Coulomb friction of a joint by friction that grows with a power of speed where it leaves no more than the two: with a
+/// sign that turns slowly they are nearly this power.
 fn one_power_of_speed(
     problem: &mut TorqueProblem,
     weighted: &mut WeightedColumns,
@@ -64,7 +65,7 @@ fn one_power_of_speed(
     }
     refine_one(problem, weighted, &mut alone, place);
     let square = |set: &[usize]| SweptColumns::base(&problem.all, weighted).with(set).square;
-    if square(&alone) + UNUSUAL + (weighted.rows as f64).ln() < square(set) {
+    if square(&alone) <= square(set) {
         *set = alone;
     }
 }
