@@ -117,9 +117,6 @@
 //! | cause | a physical reason of position error, in a list; an effect is the motion that it makes on the chain |
 //! | form | a cause at a place with its shape numbers: a term, or a motion with physics of its own; a hypothesis is a form that a cause proposes |
 //! | term | a form that is a law times a motion at a place |
-//! | reading | what a row measured of one kind; a point is a reading like any other, and may lack axes |
-//! | declared effect | a cause that a user states in YAML: place, motion, laws as formulas; its forms carry the declaration |
-//! | closed form | a formula proposed for a finding without a name |
 //! | place | where on the chain (or in the measurement) a cause acts: joint 2, link 3, base, tool, recording |
 //! | law | a function of what a row offers (angle, load, time ...): a basis of one variable, or a product of two |
 //! | shape number | a parameter that enters a law nonlinearly (a threshold, a time, a width); coefficients enter linearly |
@@ -134,13 +131,10 @@
 //! | held out | rows that no step is fitted to: they judge in the end and choose nothing |
 //! | set-up error | what is wrong between files and robot file before any physics: a unit, sign, zero, order, frame, typed number |
 //! | suspect | a row that no smooth model can follow; it is set aside and kept |
-//! | brought | of a target: laid into a socket, or to a plane or a sphere, so that joints alone are recorded; it closes where model and place agree |
-//! | volume term | the logarithm of how far joint noise spreads a point that was brought to a place: without it least squares shrinks the arm |
+//! | contact constraint | a ball or tip in a socket, on a plane or a sphere, so that joints alone are recorded; it closes where model and place agree |
+//! | volume term | the logarithm of how far joint noise spreads a point that is held at a place: without it least squares shrinks the arm |
 //! | redundant | a parameter whose effect other free parameters have too; unseen: one that the data do not show |
 //! | observable | what these data determine; unobservable: what they cannot, however good the fit |
-//! | down-weighted | a row that counts for less than its noise says, by Huber's weights |
-//! | separable | two causes whose difference these data show; confounded: causes whose difference they do not show |
-//! | depends on | the variable over which a residual has structure, whatever its cause |
 //! | twin | the simulated robot whose truth is known; it shares no code with the estimator |
 //! | compliance | turn of a joint per torque, rad/Nm |
 //! | datum freedom | a motion of everything that no measurement shows; targets and anchors are what is measured from and to |
