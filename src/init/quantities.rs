@@ -40,7 +40,12 @@ impl ExaminedFile {
     /// A list of points, or of joints, without a header: perhaps names, then three lengths, or six or seven angles.
     fn bare(&mut self) {
         let width = self.sheet.names.len();
-        let named = usize::from(self.may_be_names(0) && [4, 7, 8].contains(&width));
+        // A name in parts (collection, group, point) stands in columns of its own.
+        let texts = (0..width)
+            .take_while(|column| !self.sheet.is_numeric(*column))
+            .count();
+        let numbered = usize::from(self.may_be_names(0) && [4, 7, 8].contains(&width));
+        let named = texts.max(numbered);
         let columns: Vec<usize> = (named..width).collect();
         if !columns.iter().all(|column| self.sheet.is_numeric(*column)) {
             return;

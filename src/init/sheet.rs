@@ -310,7 +310,11 @@ fn delimiter(content: &[Content]) -> char {
         let usual = usual.map_or(0, |(width, _)| width);
         let of_width = rows.iter().filter(|row| row.len() == usual);
         of_width
-            .map(|row| (1 + numeric(row)) as f64 / (1 + row.len()) as f64)
+            .map(|row| {
+                // A cell that is left blank is of any kind.
+                let stated = row.iter().filter(|cell| !cell.is_empty()).count();
+                (1 + numeric(row)) as f64 / (1 + stated) as f64
+            })
             .sum::<f64>()
     };
     let mut best = (0.0, ',');

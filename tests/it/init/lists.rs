@@ -239,3 +239,51 @@ fn quaternions_are_orientations_to_take_in_and_u95_is_two_standard_deviations() 
     std::fs::write(made.path().join("pipeline.yaml"), taken).expect("a file");
     made.runs(30);
 }
+
+#[test]
+fn exports_of_metrology_software_are_read_as_they_stand() {
+    let controller = || {
+        table("name,J1,J2,J3,J4,J5,J6", |k| {
+            format!("P{k:03},{}", joints(k, ","))
+        })
+    };
+    let listed =
+        |row: &dyn Fn(usize) -> String| -> String { (0..30).map(|k| row(k) + "\n").collect() };
+    // Collection, group and point; an inspection report with blank nominal values; points in quotes below a comment.
+    let spatial_analyzer = listed(&|k| format!("A   Main   P{k:03}   {}", point(k, "   ")));
+    let collections = String::from("// Units: mm\n")
+        + &listed(&|k| format!("Tracker::Main::P{k:03}, {}", point(k, ", ")));
+    let report =
+        String::from("Name\tNominal X\tNominal Y\tNominal Z\tActual X\tActual Y\tActual Z\tRMS\n")
+            + &listed(&|k| format!("P{k:03}\t\t\t\t{}\t0.0123", point(k, "\t")));
+    let inspector =
+        String::from("# point X Y Z\n") + &listed(&|k| format!("\"P{k:03}\" {}", point(k, " ")));
+    for (text, lines) in [
+        (
+            spatial_analyzer,
+            ["point_id: {column: 3}", "x: {column: 4, unit: mm}"],
+        ),
+        (
+            collections,
+            [
+                "point_id: {column: 1, match: number}",
+                "x: {column: 2, unit: mm}",
+            ],
+        ),
+        (
+            report,
+            ["delimiter: tab", "x: {column: \"Actual X\", unit: mm}"],
+        ),
+        (
+            inspector,
+            ["header_in_comment: true", "x: {column: \"X\", unit: mm}"],
+        ),
+    ] {
+        let made = made(&[
+            ("controller.csv", controller().into()),
+            ("tracker.txt", text.into()),
+        ]);
+        made.has(&lines);
+        made.runs(30);
+    }
+}
