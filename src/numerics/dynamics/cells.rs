@@ -1,7 +1,7 @@
 //! Torques by the evidence of the table of causes: a cell is a cause at a place in every shape that it may have; what was accepted stands in the
 //! covariance with its amplitude, and every other cell is compared given these.
 
-use super::cause::TORQUE_CONSTANT;
+use super::cause::{TORQUE_CONSTANT, UNKNOWN};
 use super::choice::CauseChoice;
 use crate::criteria::cells::{COMMON, NU, SWAPS};
 use crate::criteria::torque::{APART, COMPONENTS, EXCHANGES, LEAST_NOISE, PER_METRE, USUAL};
@@ -13,6 +13,9 @@ use nalgebra::{DMatrix, DVector};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::rc::Rc;
+
+/// Named causes that are tried instead of one without a name, at most.
+const UNFOLDED: usize = 3;
 
 /// A cause at a place in every shape that is listed of it.
 struct TorqueCell {
@@ -473,8 +476,37 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
     /// Exchanges, merges and removals.
     fn settled(&mut self, components: Vec<TorqueComponent>) -> Vec<TorqueComponent> {
         let components = self.prune(components);
-        let components = self.merge(self.swap(components));
+        let components = self.unfold(self.merge(self.swap(components)));
         self.prune(components)
+    }
+
+    /// Several named causes at a place instead of one without a name.
+    fn unfold(&self, mut components: Vec<TorqueComponent>) -> Vec<TorqueComponent> {
+        let nameless: Vec<usize> = forms(&components)
+            .into_iter()
+            .filter(|form| self.choice.form(*form).cause.name() == UNKNOWN)
+            .collect();
+        for form in nameless {
+            let at = self.choice.form(form).place;
+            let mut next: Vec<TorqueComponent> = components.clone();
+            next.retain(|own| own.form != form);
+            for _ in 0..UNFOLDED {
+                let state = self.state(&next, None);
+                let named = |cell: &usize| {
+                    self.cells[*cell].name != UNKNOWN && self.cells[*cell].place == at
+                };
+                let best = self.strongest((0..self.cells.len()).filter(named), &state);
+                let Some(best) = best.filter(|best| best.log_odds > 0.0) else {
+                    break;
+                };
+                next.push(best.best);
+                next = self.backfit(next);
+            }
+            if self.choice.is_whole(&forms(&next)) && self.total(&next) > self.total(&components) {
+                components = next;
+            }
+        }
+        components
     }
 
     /// The odds of a component and of all that could stand in its place.

@@ -23,26 +23,23 @@ const BETTER: f64 = 0.05;
 pub(super) fn refine(
     problem: &mut TorqueProblem,
     weighted: &mut WeightedColumns,
-    set: &mut Vec<usize>,
+    set: &mut [usize],
 ) -> bool {
     let before = set.to_vec();
     for place in 0..set.len() {
         refine_one(problem, weighted, set, place);
     }
-    for joint in 0..problem.scene.joints() {
-        one_power_of_speed(problem, weighted, set, joint);
-    }
-    before != *set
+    before != set
 }
 
 /// Replaces viscous and Coulomb friction of a joint by friction that grows with a power of speed where it leaves no more than the two: with a
-/// sign that turns slowly they are nearly this power.
-fn one_power_of_speed(
+/// sign that turns slowly they are nearly this power. Tells whether it did.
+pub(super) fn one_power_of_speed(
     problem: &mut TorqueProblem,
     weighted: &mut WeightedColumns,
     set: &mut Vec<usize>,
     joint: usize,
-) {
+) -> bool {
     let at = |name: &str| {
         let form = |number: &usize| &problem.all.forms[*number];
         set.iter().position(|number| {
@@ -50,7 +47,7 @@ fn one_power_of_speed(
         })
     };
     let (Some(viscous), Some(coulomb)) = (at(VISCOUS), at(COULOMB)) else {
-        return;
+        return false;
     };
     let mut alone = set.clone();
     alone[viscous] = {
@@ -61,13 +58,15 @@ fn one_power_of_speed(
     let is_whole = CauseChoice::new(problem, weighted).is_whole(&alone);
     let place = viscous - usize::from(coulomb < viscous);
     if !is_whole {
-        return;
+        return false;
     }
     refine_one(problem, weighted, &mut alone, place);
     let square = |set: &[usize]| SweptColumns::base(&problem.all, weighted).with(set).square;
-    if square(&alone) <= square(set) {
+    let is_better = square(&alone) <= square(set);
+    if is_better {
         *set = alone;
     }
+    is_better
 }
 
 /// Replaces one form of a set.

@@ -12,7 +12,7 @@ use super::naming::{JudgedSet, settle_names, take_out_ends};
 use super::polish::polish;
 use super::problem::TorqueProblem;
 use super::recording::TorqueRecording;
-use super::refine::refine;
+use super::refine::{one_power_of_speed, refine};
 use super::rich::{noise_beside, rich_forms};
 use super::shape_slopes::ShapeSlopes;
 use super::sign_width::sign_width;
@@ -177,7 +177,11 @@ fn again(
     learn(problem, &set);
     *weighted = problem.weighted(&set);
     let mut set = search(&CauseChoice::new(problem, weighted), &set);
-    if refine(problem, weighted, &mut set) {
+    let mut changed = refine(problem, weighted, &mut set);
+    for joint in 0..problem.scene.joints() {
+        changed |= one_power_of_speed(problem, weighted, &mut set, joint);
+    }
+    if changed {
         set = settle(&CauseChoice::new(problem, weighted), &set);
     }
     set
