@@ -29,7 +29,7 @@ pub(super) fn stage(
 ) -> Result<Vec<(String, PendingTable)>> {
     let stage = &state.plan.stages[index];
     let inputs = load(state, index, place.store)?;
-    let services = StageServices::new(&stage.id, place.store, &stage.files, place.observer);
+    let services = StageServices::new(&stage.id, Some(place.store), &stage.files, place.observer);
     let context = Context {
         id: &stage.id,
         seed: state.seed(index),
