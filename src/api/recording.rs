@@ -1,4 +1,4 @@
-//! Arrays -> the table `recording`: its columns are the arguments, its schema what they may hold.
+//! Arrays -> the table `recording`: its columns are the arguments, its schema says what they may hold.
 
 use super::Robot;
 use crate::error::{Error, Fault, Result, counted, instead};
@@ -11,7 +11,6 @@ use crate::store::schema::{self, ColumnType, FieldSchema};
 use crate::table::{Recording as RecordingTable, SIGMA_SOURCE, Table};
 use crate::units::Unit;
 use nalgebra::Vector3;
-use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
 /// Joints of an arm, and under which circumstances.
@@ -19,8 +18,8 @@ use std::collections::BTreeMap;
 pub struct Poses {
     /// Rows times joints, as the controller counts them; mm of a joint that slides.
     pub joints_rad: Vec<f64>,
-    /// Columns of the table `recording` by their names, a number a row; of columns of each joint without the joint (`i_a`, `dir`), rows times
-    /// joints. NaN where a row has none.
+    /// Columns of the table `recording` by their names, a number a row (NaN where there is none); of columns of each joint without the joint
+    /// (`i_a`, `dir`), rows times joints.
     pub columns: BTreeMap<String, Vec<f64>>,
 }
 
@@ -55,74 +54,52 @@ pub struct Recording {
 const TOLD: usize = 5;
 
 /// Columns that have fields of their own.
-const OWN: [&str; 8] = [
-    "q_rad",
-    "q_mm",
-    "x_mm",
-    "y_mm",
-    "z_mm",
-    "sigma_x_mm",
-    "sigma_y_mm",
-    "sigma_z_mm",
-];
+const OWN: [&str; 5] = ["q_rad", "q_mm", "sequence", "usage", SIGMA_SOURCE];
 
 /// A column's name without its joint.
 fn short(field: &FieldSchema) -> String {
     field.name.replace("{j}", "")
 }
 
-/// What a stage finds in the table after a file was read in this unit.
-fn stored(field: &FieldSchema, value: f64) -> f64 {
-    let unit = field.unit.as_deref().and_then(Unit::parse);
-    unit.map_or(value, |unit| unit.from_si(unit.to_si(value)))
+/// mm as they stand in a table after a file was read.
+fn as_read(mm: f64) -> f64 {
+    Unit::Millimetre.from_si(Unit::Millimetre.to_si(mm))
 }
 
 impl Poses {
     /// How many. Fails where the numbers are no rows of this robot, or degrees.
     pub fn rows(&self, robot: &Robot) -> Result<usize> {
-        let joints = robot.joints();
-        let numbers = self.joints_rad.len();
-        if numbers % joints != 0 || numbers == 0 {
-            let message = format!(
-                "{} are no rows of {}",
-                counted(numbers, "number"),
-                counted(joints, "joint")
-            );
+        let (joints, found) = (robot.joints(), self.joints_rad.len());
+        let rows = found / joints;
+        if rows == 0 || found % joints != 0 {
+            let message = format!("{found} numbers are no rows of {joints} joints");
             return Err(Error::data("joints", message));
         }
-        let mut faults = Vec::new();
-        let missing = self.joints_rad.iter().enumerate();
-        for (at, value) in missing.filter(|(_, value)| !value.is_finite()).take(TOLD) {
+        let values = self.joints_rad.iter().enumerate();
+        let missing = values.filter(|(_, value)| !value.is_finite()).take(TOLD);
+        let fault = |(at, value): (usize, &f64)| {
             let place = format!("joints, row {}, joint {}", at / joints, at % joints + 1);
-            faults.push(Fault::new(place, format!("{value} is not a number")));
-        }
-        let turns: Vec<bool> = robot.prismatic().iter().map(|slides| !slides).collect();
-        let far = |row: &[f64]| {
-            row.iter()
-                .zip(&turns)
-                .position(|(q, turns)| *turns && q.abs() > ONE_AND_A_HALF_TURNS)
+            Fault::new(place, format!("{value} is not a number"))
         };
-        let rows = self.joints_rad.chunks(joints).enumerate();
-        let mut beyond = rows.filter_map(|(row, q)| far(q).map(|joint| (row, joint, q[joint])));
-        if let Some((row, joint, value)) = beyond.next() {
-            let (count, rows) = (1 + beyond.count(), numbers / joints);
+        let mut faults: Vec<Fault> = missing.map(fault).collect();
+        let slides = robot.prismatic();
+        let far = |q: &[f64]| {
+            let mut each = q.iter().zip(&slides);
+            each.position(|(q, slides)| !slides && q.abs() > ONE_AND_A_HALF_TURNS)
+        };
+        let all = self.joints_rad.chunks(joints).enumerate();
+        let mut beyond = all.filter_map(|(row, q)| Some((row, far(q)?)));
+        if let Some((row, joint)) = beyond.next() {
+            let count = 1 + beyond.count();
             if count * 2 > rows {
-                let message = too_far(
-                    "joints",
-                    "rad",
-                    [count, rows].map(|rows| rows as u64),
-                    joint,
-                    value,
-                );
-                let place = format!("joints, row {row}");
+                let value = self.joints_rad[row * joints + joint];
+                let counts = [count, rows].map(|rows| rows as u64);
+                let message = too_far("joints", "rad", counts, joint, value);
                 let advice = "; if the array holds degrees, convert it to radians";
-                faults.push(Fault::new(place, message + advice));
+                faults.push(Fault::new(format!("joints, row {row}"), message + advice));
             }
         }
-        match faults.is_empty() {
-            true => Ok(numbers / joints),
-            false => Err(Error::Data(faults)),
-        }
+        sound(rows, faults)
     }
 
     /// As the numerics take them; where no time is stated, long after whatever was recorded.
@@ -138,154 +115,131 @@ impl Poses {
                 ..Measurements::default()
             });
         }
-        let recording = Recording {
+        let unmeasured = Recording {
             poses: self.clone(),
             points_mm: vec![[f64::NAN; 3]; rows],
+            sigma: Sigma::Mm(vec![f64::NAN]),
             ..Recording::default()
         };
-        let frame = recording.unchecked(robot, rows)?;
-        let mut data = RecordingTable::from_frame(&frame)?.measurements();
+        let mut data = RecordingTable::from_frame(&unmeasured.frame(robot, rows)?)?.measurements();
         data.long_after = data.time.is_none();
         Ok(data)
     }
 }
 
 impl Recording {
-    /// Settings of the stage `split`.
-    pub(super) fn split(&self) -> Value {
-        match self.held_out {
-            Some(_) => json!({ "by": "usage" }),
-            None => json!({ "by": "every", "n": 4 }),
-        }
-    }
-
     /// The table. Fails with what is wrong with the arrays.
     pub(super) fn table(&self, robot: &Robot) -> Result<Frame> {
         let rows = self.poses.rows(robot)?;
-        let mut faults = Vec::new();
-        if self.points_mm.len() != rows {
-            let message = format!(
-                "{}, but {} of joints: expected as many",
-                counted(self.points_mm.len(), "row"),
-                rows
-            );
-            faults.push(Fault::new("points", message));
+        same("points", self.points_mm.len(), rows)?;
+        let points = self.points_mm.iter().enumerate();
+        let wrong = points.filter_map(|(row, point)| {
+            let message = match point.iter().find(|value| !value.is_finite()) {
+                Some(value) => format!("{value} is not a number"),
+                None if *point == [0.0; 3] => {
+                    "the position is 0, 0, 0: the tracker saw nothing".into()
+                }
+                None => return None,
+            };
+            Some(Fault::new(format!("points, row {row}"), message))
+        });
+        let mut faults: Vec<Fault> = wrong.take(TOLD).collect();
+        if let Sigma::Mm(given) = &self.sigma
+            && let Some(value) = given.iter().find(|mm| !(mm.is_finite() && **mm > 0.0))
+        {
+            let message = format!("{value} mm; expected a number above 0");
+            faults.push(Fault::new("sigma", message));
         }
-        for (row, point) in self.points_mm.iter().enumerate() {
-            let place = format!("points, row {row}");
-            if let Some(value) = point.iter().find(|value| !value.is_finite()) {
-                faults.push(Fault::new(place, format!("{value} is not a number")));
-            } else if *point == [0.0; 3] {
-                let message = "the position is 0, 0, 0: the tracker saw nothing";
-                faults.push(Fault::new(place, message));
-            }
-        }
-        faults.truncate(TOLD);
-        if !faults.is_empty() {
-            return Err(Error::Data(faults));
-        }
-        self.unchecked(robot, rows)
+        sound((), faults)?;
+        self.frame(robot, rows)
     }
 
-    /// The table of arrays whose joints and points are numbers.
-    fn unchecked(&self, robot: &Robot, rows: usize) -> Result<Frame> {
-        let schema = schema::of(RecordingTable::KIND)?;
+    /// The table of numbers that were looked at.
+    fn frame(&self, robot: &Robot, rows: usize) -> Result<Frame> {
+        let fields = &schema::of(RecordingTable::KIND)?.fields;
+        let named = |name: &str| fields.iter().find(|field| short(field) == name);
         let mut frame = FrameBuilder::new(RecordingTable::KIND);
-        frame.push("sequence", Cell::to_array((1..=rows as i64).collect()));
-        let of_joints = |name: &str, prismatic: bool| {
-            let names: &[&str] = match (name, prismatic) {
-                ("q_rad", true) => &["q_mm"],
-                ("dq_rad_s", true) => &["dq_mm_s"],
-                _ => &[name],
-            };
-            schema
-                .fields
-                .iter()
-                .find(|field| names.contains(&short(field).as_str()))
-        };
-        let prismatic = robot.prismatic();
-        let numbers = self.poses.columns.iter();
-        let numbers = numbers.map(|(name, values)| (name.as_str(), values));
-        for (name, values) in numbers.chain([("q_rad", &self.poses.joints_rad)]) {
-            let field = of_joints(name, false)
-                .filter(|field| field.column_type == ColumnType::Float64)
-                .filter(|_| name == "q_rad" || !OWN.contains(&name));
-            let Some(field) = field else {
-                return Err(unknown(name, ColumnType::Float64));
-            };
+        let columns = self.poses.columns.iter();
+        let columns = columns.filter(|(name, _)| !OWN.contains(&name.as_str()));
+        let columns = columns.map(|(name, values)| (name.as_str(), values));
+        for (name, values) in columns.chain([("q_rad", &self.poses.joints_rad)]) {
+            let field = named(name).filter(|field| field.column_type == ColumnType::Float64);
+            let field = field.ok_or_else(|| unknown(name, fields))?;
             let width = if field.per_joint { robot.joints() } else { 1 };
             same(name, values.len(), rows * width)?;
-            for joint in 0..width {
-                let slides = field.per_joint && prismatic.get(joint) == Some(&true);
-                let field = of_joints(name, slides).unwrap_or(field);
+            for (joint, slides) in robot.prismatic().into_iter().enumerate().take(width) {
+                // Of `q_rad` and `dq_rad_s` a joint that slides has `q_mm` and `dq_mm_s`.
+                let own = named(&name.replace("_rad", "_mm")).filter(|_| slides);
+                let field = own.unwrap_or(field);
+                let unit = field.unit.as_deref().and_then(Unit::parse);
+                let stored = |value| unit.map_or(value, |unit| unit.from_si(unit.to_si(value)));
+                let name = field.column(field.per_joint.then_some(joint + 1));
                 let own = values.iter().skip(joint).step_by(width);
-                frame.push_numbers(
-                    field.column(field.per_joint.then_some(joint + 1)),
-                    own.map(|value| stored(field, *value)),
-                );
+                frame.push_numbers(name, own.copied().map(stored));
             }
         }
-        let measured = self.points_mm.iter().flatten().all(|x| x.is_finite());
-        let sigma = measured.then(|| self.sigmas(rows)).transpose()?;
+        let sigma = self.sigmas(rows)?;
         for (axis, name) in ["x_mm", "y_mm", "z_mm"].into_iter().enumerate() {
-            let own = self.points_mm.iter().map(|point| as_read(point[axis]));
-            frame.push_numbers(name, own);
-            if let Some(sigma) = &sigma {
-                let own = sigma.iter().copied().skip(axis).step_by(3);
-                frame.push_numbers(format!("sigma_{name}"), own);
-            }
+            let points = self.points_mm.iter();
+            frame.push_numbers(name, points.map(|point| as_read(point[axis])));
+            let own = sigma.iter().copied().skip(axis).step_by(3);
+            frame.push_numbers(format!("sigma_{name}"), own);
         }
         let source = match self.sigma {
             Sigma::Inferred => SigmaSource::Inferred,
             Sigma::Instrument(_) => SigmaSource::Instrument,
             Sigma::Mm(_) => SigmaSource::Recorded,
         };
-        let source = Some(source.name().to_string());
-        frame.push(SIGMA_SOURCE, Cell::to_array(vec![source; rows]));
-        self.texts(rows, frame)
-    }
-
-    fn texts(&self, rows: usize, mut frame: FrameBuilder) -> Result<Frame> {
-        let mut ids: Vec<String> = (1..=rows).map(|row| format!("row {row}")).collect();
-        for (name, texts) in &self.names {
-            same(name, texts.len(), rows)?;
-            let field = schema::of(RecordingTable::KIND)?.fields.iter();
-            let mut own = field.filter(|field| field.column_type == ColumnType::Utf8);
-            if name == "point_id" {
-                ids.clone_from(texts);
-            } else if name == SIGMA_SOURCE || name == "usage" || !own.any(|own| own.name == *name) {
-                return Err(unknown(name, ColumnType::Utf8));
-            } else {
-                let texts = texts.iter();
-                let texts = texts.map(|text| (!text.is_empty()).then(|| text.clone()));
-                frame.push(name.as_str(), Cell::to_array(texts.collect::<Vec<_>>()));
-            }
-        }
-        frame.push("point_id", Cell::to_array(ids));
-        let held_out = self.held_out.as_deref().unwrap_or_default();
-        if self.held_out.is_some() {
-            same("held_out", held_out.len(), rows)?;
-        }
         let set = |row: usize| {
-            let held_out = held_out.get(row)?;
+            let held_out = self.held_out.as_ref()?.get(row)?;
             Some(if *held_out { "validate" } else { "fit" }.to_string())
         };
-        let usage: Vec<Option<String>> = (0..rows).map(set).collect();
-        frame.push("usage", Cell::to_array(usage));
+        if let Some(held_out) = &self.held_out {
+            same("held_out", held_out.len(), rows)?;
+        }
+        let source = vec![Some(source.name().to_string()); rows];
+        frame.push(SIGMA_SOURCE, Cell::to_array(source));
+        frame.push(
+            "usage",
+            Cell::to_array((0..rows).map(set).collect::<Vec<_>>()),
+        );
+        frame.push("sequence", Cell::to_array((1..=rows as i64).collect()));
+        if !self.names.contains_key("point_id") {
+            let ids = (1..=rows).map(|row| format!("row {row}"));
+            frame.push("point_id", Cell::to_array(ids.collect::<Vec<String>>()));
+        }
+        for (name, texts) in &self.names {
+            let field = named(name).filter(|field| field.column_type == ColumnType::Utf8);
+            if field.is_none() || OWN.contains(&name.as_str()) {
+                return Err(unknown(name, fields));
+            }
+            same(name, texts.len(), rows)?;
+            let texts = texts.iter();
+            let texts = texts.map(|text| (!text.is_empty()).then(|| text.clone()));
+            frame.push(name.as_str(), Cell::to_array(texts.collect::<Vec<_>>()));
+        }
         frame.finish()
     }
 
     /// Standard deviations, mm, three a row.
     fn sigmas(&self, rows: usize) -> Result<Vec<f64>> {
         let figures = match &self.sigma {
-            Sigma::Mm(given) => return stated(given, rows),
+            Sigma::Mm(given) => {
+                let counts = [1, rows, 3 * rows];
+                let Some(count) = counts.into_iter().find(|count| *count == given.len()) else {
+                    let message = format!(
+                        "{}; expected one for all, {rows}, or three for each of {rows} rows",
+                        counted(given.len(), "number")
+                    );
+                    return Err(Error::data("sigma", message));
+                };
+                let each = |mm: &f64| std::iter::repeat_n(as_read(*mm), 3 * rows / count);
+                return Ok(given.iter().flat_map(each).collect());
+            }
             Sigma::Inferred => START,
             Sigma::Instrument(name) => Instrument::named(name).ok_or_else(|| {
-                let message = format!(
-                    "unknown instrument `{name}`{}",
-                    instead(name, &instruments())
-                );
-                Error::spec("sigma", message)
+                let other = instead(name, &instruments());
+                Error::spec("sigma", format!("unknown instrument `{name}`{other}"))
             })?,
         };
         let sigma = |point: &[f64; 3]| {
@@ -296,53 +250,26 @@ impl Recording {
     }
 }
 
-/// One for all, one a row, or three a row -> three a row, as stored.
-fn stated(given: &[f64], rows: usize) -> Result<Vec<f64>> {
-    if let Some(at) = given
-        .iter()
-        .position(|value| !(value.is_finite() && *value > 0.0))
-    {
-        let message = format!("{} mm; expected a number above 0", given[at]);
-        return Err(Error::data("sigma", message));
+fn sound<T>(value: T, faults: Vec<Fault>) -> Result<T> {
+    match faults.is_empty() {
+        true => Ok(value),
+        false => Err(Error::Data(faults)),
     }
-    let repeats = [1, rows, 3 * rows]
-        .into_iter()
-        .find(|count| *count == given.len())
-        .map(|count| 3 * rows / count);
-    let Some(repeats) = repeats else {
-        let message = format!(
-            "{}; expected one for all, {rows}, or three for each of {rows} rows",
-            counted(given.len(), "number")
-        );
-        return Err(Error::data("sigma", message));
-    };
-    let each = given
-        .iter()
-        .flat_map(|value| std::iter::repeat_n(as_read(*value), repeats));
-    Ok(each.collect())
-}
-
-/// mm as they stand in the table after a file was read.
-fn as_read(mm: f64) -> f64 {
-    Unit::Millimetre.from_si(Unit::Millimetre.to_si(mm))
 }
 
 fn same(name: &str, found: usize, expected: usize) -> Result<()> {
-    if found == expected {
-        return Ok(());
-    }
-    let message = format!("{}; expected {expected}", counted(found, "value"));
-    Err(Error::data(name, message))
+    let message = || format!("{}; expected {expected}", counted(found, "value"));
+    (found == expected)
+        .then_some(())
+        .ok_or_else(|| Error::data(name, message()))
 }
 
-fn unknown(name: &str, column_type: ColumnType) -> Error {
-    let fields = schema::of(RecordingTable::KIND).map_or(&[][..], |schema| &schema.fields);
-    let names: Vec<String> = fields
-        .iter()
-        .filter(|field| field.column_type == column_type)
-        .map(short)
-        .filter(|name| !OWN.contains(&name.as_str()) && name != SIGMA_SOURCE && name != "usage")
-        .collect();
+fn unknown(name: &str, fields: &[FieldSchema]) -> Error {
+    let names: Vec<String> = fields.iter().map(short).collect();
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
-    Error::spec(name, format!("no such column{}", instead(name, &names)))
+    let allowed: Vec<&str> = names
+        .into_iter()
+        .filter(|name| !OWN.contains(name))
+        .collect();
+    Error::spec(name, format!("no such column{}", instead(name, &allowed)))
 }

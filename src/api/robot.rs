@@ -82,27 +82,25 @@ impl Robot {
             .collect()
     }
 
-    /// The unit of each joint's position in arrays.
-    fn units(&self) -> Vec<Unit> {
-        let unit = |slides: &bool| match slides {
-            true => Unit::Millimetre,
-            false => Unit::Radian,
-        };
-        self.prismatic().iter().map(unit).collect()
-    }
-
     /// Positions of arrays, row-major -> rad and m.
     pub fn to_si(&self, joints: &[f64]) -> Vec<f64> {
-        let units = self.units();
-        let each = joints.iter().zip(units.iter().cycle());
-        each.map(|(value, unit)| unit.to_si(*value)).collect()
+        self.converted(joints, Unit::to_si)
     }
 
     /// The other way.
     pub fn from_si(&self, joints: &[f64]) -> Vec<f64> {
-        let units = self.units();
-        let each = joints.iter().zip(units.iter().cycle());
-        each.map(|(value, unit)| unit.from_si(*value)).collect()
+        self.converted(joints, Unit::from_si)
+    }
+
+    fn converted(&self, joints: &[f64], by: fn(Unit, f64) -> f64) -> Vec<f64> {
+        let slides = self.prismatic();
+        let unit = |slides: &bool| match slides {
+            true => Unit::Millimetre,
+            false => Unit::Radian,
+        };
+        let each = joints.iter().zip(slides.iter().cycle());
+        each.map(|(value, slides)| by(unit(slides), *value))
+            .collect()
     }
 
     pub(super) fn table(&self) -> Result<Frame> {

@@ -101,10 +101,10 @@ impl CalibRun {
         Ok(Model::new(own))
     }
 
-    /// What a stage `diagnose` said.
-    pub fn diagnosis(&self, step: Option<&str>) -> Result<Diagnosed> {
+    /// The stage that diagnosed, `step` where there are several, and what it said.
+    pub fn diagnosis(&self, step: Option<&str>) -> Result<(String, Diagnosed)> {
         let run = &self.manifest.run_id;
         let (_, stage) = diagnosis(&self.store, run, step, &DIAGNOSES)?;
-        Diagnosed::read(run, &stage, &self.store)
+        Ok((stage.id.clone(), Diagnosed::read(run, &stage, &self.store)?))
     }
 }

@@ -36,6 +36,8 @@ mod tag;
 mod verify;
 mod verify_robot;
 
+pub use surroundings::{cores, open_store, surroundings};
+
 use crate::error::{Error, Result, counted, nearest};
 use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};

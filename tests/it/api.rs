@@ -93,8 +93,8 @@ fn arrays_give_to_the_last_digit_what_a_pipeline_gives_for_the_same_numbers_in_a
     let told = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{told}");
     let run = run(folder.path());
-    let identified = identify(&robot(), &recording, &Options::default()).expect("a model");
-    let diagnosed = diagnose(&robot(), &recording, &Options::default()).expect("a diagnosis");
+    let identified = identify(&robot(), &recording, &Options::with(json!({}))).expect("a model");
+    let diagnosed = diagnose(&robot(), &recording, &Options::with(json!({}))).expect("a diagnosis");
     let same = |stage: &str, given: &StageTables| {
         for (port, frame) in &given.tables {
             let stored = run.table(&format!("{stage}.{port}")).expect("a table");
@@ -127,7 +127,7 @@ fn arrays_that_are_no_recording_are_refused_with_row_and_what_is_allowed() {
     let with = |change: &dyn Fn(&mut Recording)| {
         let mut recording = arrays();
         change(&mut recording);
-        refused(identify(&robot(), &recording, &Options::default()))
+        refused(identify(&robot(), &recording, &Options::with(json!({}))))
     };
     let degrees = with(&|one| {
         one.poses
@@ -166,7 +166,7 @@ fn arrays_that_are_no_recording_are_refused_with_row_and_what_is_allowed() {
     let starts = [
         "joints, row 2, joint 3: NaN is not a number",
         "points, row 7: inf is not a number",
-        "points: 79 rows, but 80 of joints: expected as many",
+        "points: 79 values; expected 80",
         "sigma: 7 numbers; expected one for all, 80, or three for each of 80 rows",
         "sigma: unknown instrument `leica_at96`; did you mean `leica_at960`?",
         "payload: no such column; did you mean `payload_kg`?",
