@@ -56,7 +56,10 @@ impl Robot {
         let base = urdf_outline(urdf, tip)?.base;
         let name = path.file_stem().unwrap_or_default().to_string_lossy();
         let kinematics = json!({ "urdf": { "base": base, "tip": tip } });
-        let own = json!({ "calib_robot": 1, "name": name, "kinematics": kinematics }).to_string();
+        let units = json!({ "length": "mm", "angle": "rad" });
+        let own =
+            json!({ "calib_robot": 1, "name": name, "units": units, "kinematics": kinematics });
+        let own = own.to_string();
         let own = RobotFileText {
             label: &label,
             text: &own,

@@ -64,6 +64,18 @@ pub(super) fn columns() -> Option<usize> {
     size.map(|(width, _)| usize::from(width.0))
 }
 
+/// The program to start calib with. In the process of an interpreter that is the script that it runs.
+pub(super) fn program() -> std::io::Result<PathBuf> {
+    let own = std::env::current_exe()?;
+    let is_python = own
+        .file_name()
+        .is_some_and(|name| name.to_string_lossy().starts_with("python"));
+    match std::env::args_os().nth(1).filter(|_| is_python) {
+        Some(script) => std::path::absolute(script),
+        None => Ok(own),
+    }
+}
+
 /// How many cores there are.
 pub fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
