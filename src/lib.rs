@@ -93,7 +93,8 @@
 //! `CALIB_UPDATE=1 cargo test --test it pages`; golden answers of the command line: `TRYCMD=overwrite cargo test --test it cmd`.
 //!
 //! # As a library
-//! The command line is one user of this crate; a program is another. Numbers are SI, arrays are row-major, joints count from 0.
+//! The command line is one user of this crate; a program is another, by [`api`]; the Python package (`src/python`) is made of it too. Inside,
+//! numbers are SI, arrays are row-major, joints count from 0.
 //!
 //! Identify an arm from arrays:
 //! ```
