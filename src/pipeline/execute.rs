@@ -2,7 +2,7 @@
 
 use super::place;
 use super::run_state::{self, RunState};
-use super::services::{Observer, StageServices};
+use super::services::{Interrupted, Observer, StageServices};
 use crate::error::{Error, Result};
 use crate::stage::{Context, InputTable, Output, StoredTable};
 use crate::store::frame::Frame;
@@ -38,6 +38,9 @@ pub(super) fn stage(
     };
     let body = || place.threads.install(|| stage.stage.run(inputs, &context));
     let outputs = catch_unwind(AssertUnwindSafe(body)).unwrap_or_else(|panic| {
+        if panic.is::<Interrupted>() {
+            return Err(Error::store(&stage.id, "was interrupted: run it again"));
+        }
         Err(Error::Bug(format!(
             "stage {} panicked: {}",
             stage.id,

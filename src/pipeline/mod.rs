@@ -39,5 +39,5 @@ pub use reason::{KeyChange, changes_of};
 pub use run::{CompletedRun, run};
 pub use schema::json_schema;
 pub use select::Selection;
-pub use services::{Observer, Unwatched};
+pub use services::{Interrupted, Observer, Unwatched};
 pub(crate) use spec::misnamed;

@@ -23,6 +23,9 @@ pub trait Observer: Sync {
     fn warn(&self, _id: &str, _line: &str) {}
 }
 
+/// What an observer unwinds with where nobody waits for the run any more: the stage ends as interrupted.
+pub struct Interrupted;
+
 /// Nobody watches.
 pub struct Unwatched;
 

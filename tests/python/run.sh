@@ -6,7 +6,7 @@ cd "$(dirname "$0")/../.."
 
 python=${PYTHON:-python3}
 "$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "Python 3.11 or newer is needed; name one with PYTHON=..." >&2; exit 1; }
-target=$(pwd)/${CARGO_TARGET_DIR:-target}
+target=$(realpath -m "${CARGO_TARGET_DIR:-target}")
 work=$target/python
 rm -rf "$work"
 mkdir -p "$work"

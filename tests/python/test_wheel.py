@@ -237,6 +237,25 @@ def test_a_callable_that_fails_and_ctrl_c_end_the_work_at_once(arm, arrays):
     assert time.monotonic() - begun < 1.5
 
 
+def test_a_run_that_is_interrupted_is_recorded_as_such_and_can_be_run_again(run_by_command):
+    store = run_by_command / ".interrupted"
+
+    def failing(stage, *_):
+        if stage == "diagnose":
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        calib.run(run_by_command / "pipeline.yaml", store=store, progress=failing)
+    # The work ends at its next step.
+    for _ in range(100):
+        last = json.loads(command("log", "--json", "--store", str(store)))[0]
+        if last["status"] == "failed":
+            break
+        time.sleep(0.1)
+    assert (last["status"], last["error"]) == ("failed", "diagnose: was interrupted: run it again")
+    assert calib.run(run_by_command / "pipeline.yaml", store=store).manifest["status"] == "done"
+
+
 def test_other_threads_go_on_while_one_computes(arm, arrays):
     ticks, ended = [], threading.Event()
 

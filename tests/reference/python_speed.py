@@ -7,12 +7,9 @@ pybotics fits the same table of Denavit-Hartenberg by scipy's least squares, whi
 with base and tool.
 """
 
-import json
-import subprocess
-import sys
-import tempfile
+import contextlib
+import inspect
 import time
-from pathlib import Path
 
 import calib
 import numpy as np
@@ -69,24 +66,26 @@ def with_pybotics(joints, points, held_out):
     return predicted(found.x, np.arange(len(joints)))
 
 
-def rate(model, robot_text: str, rows: int = 1_000_000) -> None:
-    """Predictions of many poses by the wheel, and by the Rust call in the same process without Python's part."""
+def rate(model: calib.Model, rows: int = 1_000_000) -> None:
+    """Predictions of many poses, and the part that only takes them from numpy: an array of another shape, which is refused."""
     joints = np.random.default_rng(1).uniform(-2.5, 2.5, (rows, 6))
     model.predict(joints[:1000])
-    seconds = []
+    seconds, taken = [], []
     for _ in range(3):
         begun = time.perf_counter()
         model.predict(joints)
         seconds.append(time.perf_counter() - begun)
-    print(f"predict: {rows} poses in {min(seconds):.2f} s")
+        begun = time.perf_counter()
+        with contextlib.suppress(ValueError):
+            model.predict(joints.reshape(-1, 3))
+        taken.append(time.perf_counter() - begun)
+    print(f"predict: {rows} poses in {min(seconds):.2f} s, {min(taken):.2f} s of it to take the array")
 
 
 def main() -> None:
     joints, points, held_out = measured()
     print(f"{'':10}  lines  seconds  held-out mean mm  max mm")
     for name, solve in (("calib", with_calib), ("pybotics", with_pybotics)):
-        import inspect
-
         lines = sum(bool(line.strip()) and not line.strip().startswith("#") for line in inspect.getsource(solve).splitlines())
         begun = time.perf_counter()
         try:
@@ -98,7 +97,7 @@ def main() -> None:
         error = np.linalg.norm(predicted - points, axis=1)[held_out]
         print(f"{name:10}  {lines:5}  {seconds:7.2f}  {error.mean():16.4f}  {error.max():6.4f}")
     robot = calib.Robot.from_dh(UR10, tool_mm=TOOL)
-    rate(robot.identify(joints, points, NOISE), "")
+    rate(robot.identify(joints, points, NOISE))
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 use crate::raised;
 use calib::error::{Error, Result};
-use calib::pipeline::Observer;
+use calib::pipeline::{Interrupted, Observer};
 use pyo3::prelude::*;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -32,7 +32,7 @@ impl<T> Watch<T> {
     /// Hands a step on, or leaves the work of one who does not wait any more.
     fn tell(&self, stage: &str, done: u64, text: &str) {
         if self.stopped.load(Ordering::Relaxed) {
-            resume_unwind(Box::new("interrupted"));
+            resume_unwind(Box::new(Interrupted));
         }
         let bar = self.bar.lock().unwrap_or_else(PoisonError::into_inner);
         let text = if text.is_empty() { &bar.1 } else { text };
