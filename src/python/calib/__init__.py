@@ -159,17 +159,18 @@ class Diagnosis:
     @property
     def verdict(self) -> str:
         """`explained`, `unexplained`, `wrong_setup`, ..."""
-        return self.document["verdict"]
+        return str(self.document["verdict"])
 
     @property
     def statement(self) -> str:
         """The verdict in a sentence."""
-        return self.document["statement"]
+        return str(self.document["statement"])
 
     @property
     def findings(self) -> list[dict[str, Any]]:
         """A dictionary a finding: effect, where, statement, probability, parameters, evidence, rivals, ..."""
-        return self.document["findings"]
+        findings: list[dict[str, Any]] = self.document["findings"]
+        return findings
 
     @property
     def rivals(self) -> Table:
@@ -315,7 +316,7 @@ class Run:
     @property
     def id(self) -> str:
         """As `calib log` shows it."""
-        return self.manifest["run_id"]
+        return str(self.manifest["run_id"])
 
     @property
     def tables(self) -> list[str]:
@@ -364,7 +365,8 @@ def open_run(name: str = "HEAD", *, store: Path | None = None) -> Run:
 
 def effects() -> list[dict[str, Any]]:
     """The causes that calib knows: name, place, formula, size, confounded, needs and measure, as `calib effects --json` prints them."""
-    return json.loads(_calib.effects())
+    causes: list[dict[str, Any]] = json.loads(_calib.effects())
+    return causes
 
 
 def main() -> None:
