@@ -42,6 +42,7 @@
 //! | [`proof`] | sets of concealed recordings, their seal, diagnoses held against the truth | estimate, raw, robot, table, twin |
 //! | [`poses`] | which poses to measure, for a robot file or for a finding of a run | audit, identified, numerics, pipeline, raw, store, table |
 //! | [`summary`] | what runs, tables and diagnoses say, as text and as JSON | audit, diagnose, diff, effect, pipeline, report, shell, stage, store, table |
+//! | [`api`] | calib from arrays: a robot and a recording, and what the stages make of them in memory | audit, compensate, identified, pipeline, raw, stage, store, summary, table, numerics |
 //! | [`cli`], [`progress`] | the only places that print, and the only ones that know a terminal | all |
 //!
 //! # A measurement, from file to report
@@ -92,7 +93,8 @@
 //! `CALIB_UPDATE=1 cargo test --test it pages`; golden answers of the command line: `TRYCMD=overwrite cargo test --test it cmd`.
 //!
 //! # As a library
-//! The command line is one user of this crate; a program is another. Numbers are SI, arrays are row-major, joints count from 0.
+//! The command line is one user of this crate; a program is another, by [`api`]; the Python package (`src/python`) is made of it too. Inside,
+//! numbers are SI, arrays are row-major, joints count from 0.
 //!
 //! Identify an arm from arrays:
 //! ```
@@ -168,6 +170,7 @@ pub mod stage;
 
 pub mod pipeline;
 
+pub mod api;
 pub mod audit;
 pub mod excitation;
 pub mod export;

@@ -3,8 +3,8 @@
 use super::{emit, emit_json};
 use crate::effect::{CAUSES, Cause, cause};
 use crate::error::{Error, Result};
+use crate::summary::effects_json;
 use clap::Args;
-use serde_json::json;
 
 /// List the effects that calib knows: formula, usual size, what each is confounded with, and what a recording needs to show it.
 #[derive(Args)]
@@ -27,14 +27,7 @@ pub(super) fn main(arguments: &EffectsArguments) -> Result<()> {
         Some(name) => vec![cause(name).ok_or_else(|| unknown(name))?],
     };
     if arguments.json {
-        let one = |about: &&Cause| {
-            json!({
-                "name": about.name, "place": about.place, "formula": about.formula, "size": about.size,
-                "confounded": about.confounded, "needs": about.needs,
-                "measure": about.measure.map(|measure| measure.advice),
-            })
-        };
-        return emit_json(&json!(chosen.iter().map(one).collect::<Vec<_>>()));
+        return emit_json(&effects_json(&chosen));
     }
     let text: Vec<String> = chosen.iter().map(|about| entry(about)).collect();
     emit(&text.join("\n"))

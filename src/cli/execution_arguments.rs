@@ -1,13 +1,12 @@
 //! What every verb that runs a pipeline, or takes its result, may be told: overrides, the store, worker threads.
 
 use super::surroundings::{cores, open_store, surroundings};
-use crate::error::{Error, Fault, Result};
+use crate::error::Result;
 use crate::pipeline::{
-    CompletedRun, Override, Plan, Purpose, RunOptions, Selection, faults_of_robots, run,
+    CompletedRun, Override, Plan, Purpose, RunOptions, Selection, checked_plan, run,
 };
 use crate::progress::{Progress, Verbosity};
 use crate::shell::typed;
-use crate::stage::STAGES;
 use crate::store::Store;
 use clap::Args;
 use std::ffi::OsString;
@@ -50,18 +49,7 @@ impl ExecutionArguments {
 
     /// The same with more overrides, behind those of the command line.
     pub fn plan_with(&self, pipeline: &Path, more: &[Override]) -> Result<Plan> {
-        Plan::load(pipeline, &[&self.set, more].concat(), STAGES).map_err(|error| match error {
-            Error::Spec(mut faults) => {
-                let robots = faults_of_robots(pipeline, &self.set, STAGES);
-                let new: Vec<Fault> = robots
-                    .into_iter()
-                    .filter(|fault| !faults.contains(fault))
-                    .collect();
-                faults.extend(new);
-                Error::Spec(faults)
-            }
-            other => other,
-        })
+        checked_plan(pipeline, &[&self.set, more].concat())
     }
 
     pub fn store(&self) -> Result<Store> {

@@ -12,6 +12,7 @@ const GROUPS: &[(&str, &[&str])] = &[
             "run",
             "diagnose",
             "compensate",
+            "serve-model",
             "verify-robot",
             "export",
             "check-export",

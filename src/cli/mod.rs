@@ -27,6 +27,7 @@ mod query;
 mod robots;
 mod run;
 mod schema;
+mod serve_model;
 mod shell;
 mod show;
 mod simulate;
@@ -34,6 +35,8 @@ mod surroundings;
 mod tag;
 mod verify;
 mod verify_robot;
+
+pub use surroundings::{cores, open_store, surroundings};
 
 use crate::error::{Error, Result, counted, nearest};
 use clap::error::{ContextKind, ContextValue};
@@ -58,6 +61,7 @@ enum Verb {
     Run(run::RunArguments),
     Diagnose(diagnose::DiagnoseArguments),
     Compensate(Box<compensate::CompensateArguments>),
+    ServeModel(Box<serve_model::ServeModelArguments>),
     VerifyRobot(verify_robot::VerifyRobotArguments),
     Export(export::ExportArguments),
     CheckExport(Box<check_export::CheckExportArguments>),
@@ -155,6 +159,7 @@ fn done(verb: Verb, arguments: &[OsString]) -> u8 {
         Verb::Completions(verb) => shell::completions(&verb),
         Verb::Man(verb) => shell::man(&verb),
         Verb::Schema(verb) => schema::main(&verb),
+        Verb::ServeModel(verb) => serve_model::main(&verb, arguments),
         Verb::Show(verb) => show::main(&verb),
         Verb::Simulate(verb) => simulate::main(&verb, arguments),
         Verb::Tag(verb) => tag::main(&verb),

@@ -1,7 +1,7 @@
 //! The identified model that a verb works with: from a pipeline, a run in the store, or a table of parameters.
 
 use super::execution_arguments::{CommandTask, ExecutionArguments, shown};
-use crate::compensate::{Gate, GateLimits};
+use crate::compensate::GateLimits;
 use crate::error::{Error, Fault, Result};
 use crate::identified::{Files, IdentifiedModel, judges_of, steps_of};
 use crate::pipeline::{Manifest, Purpose, Selection, find_run};
@@ -82,32 +82,18 @@ impl ModelArguments {
             tilt: self.max_tilt.to_radians(),
             ..GateLimits::default()
         };
-        identified.refusals.extend(
-            Gate {
-                limits,
-                ..Gate::default()
-            }
-            .beyond(&identified.model),
-        );
-        if identified.refusals.is_empty() {
-            return Ok(identified);
+        let gate = identified.gate(limits, self.force);
+        if !self.force {
+            identified.accepted(&gate, "--force")?;
         }
-        if self.force {
-            for reason in &identified.refusals {
-                let _ = writeln!(
-                    std::io::stderr(),
-                    "warning: used because of --force: {reason}"
-                );
-            }
-            return Ok(identified);
+        identified.refusals = gate.model;
+        for reason in &identified.refusals {
+            let _ = writeln!(
+                std::io::stderr(),
+                "warning: used because of --force: {reason}"
+            );
         }
-        let fault = |reason: &String| {
-            Fault::new(
-                &identified.origin,
-                format!("refused: {reason}. Correct that, or insist with --force"),
-            )
-        };
-        Err(Error::Data(identified.refusals.iter().map(fault).collect()))
+        Ok(identified)
     }
 
     fn identified(&self, purpose: Purpose, command_line: &[OsString]) -> Result<IdentifiedModel> {

@@ -1,7 +1,7 @@
 //! `calib robots`: the library of common arms.
 
 use super::emit;
-use crate::error::{Error, Result, nearest};
+use crate::error::Result;
 use crate::robot::{LIBRARY, LibraryArm};
 use crate::units::Unit;
 use clap::Args;
@@ -22,17 +22,7 @@ pub(super) fn main(arguments: &RobotsArguments) -> Result<()> {
     let Some(name) = &arguments.name else {
         return emit(&list()?);
     };
-    let arm = LibraryArm::find(name).ok_or_else(|| {
-        let near = nearest(name, LIBRARY.iter().map(|arm| arm.name));
-        let near = near
-            .map(|near| format!("; did you mean `{near}`?"))
-            .unwrap_or_default();
-        Error::spec(
-            "NAME",
-            format!("no arm `{name}` in the library{near} (`calib robots` lists all)"),
-        )
-    })?;
-    emit(arm.text)
+    emit(LibraryArm::named(name)?.text)
 }
 
 /// One line an arm.

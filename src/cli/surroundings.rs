@@ -8,7 +8,8 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-pub(super) fn surroundings(command_line: &[OsString]) -> Surroundings {
+/// Who runs calib, where and when.
+pub fn surroundings(command_line: &[OsString]) -> Surroundings {
     Surroundings {
         tool: Tool {
             name: env!("CARGO_PKG_NAME").into(),
@@ -63,7 +64,20 @@ pub(super) fn columns() -> Option<usize> {
     size.map(|(width, _)| usize::from(width.0))
 }
 
-pub(super) fn cores() -> usize {
+/// The program to start calib with. In the process of an interpreter that is the script that it runs.
+pub(super) fn program() -> std::io::Result<PathBuf> {
+    let own = std::env::current_exe()?;
+    let is_python = own
+        .file_name()
+        .is_some_and(|name| name.to_string_lossy().starts_with("python"));
+    match std::env::args_os().nth(1).filter(|_| is_python) {
+        Some(script) => std::path::absolute(script),
+        None => Ok(own),
+    }
+}
+
+/// How many cores there are.
+pub fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
@@ -117,7 +131,7 @@ pub(super) fn bucket(store: &Path) -> Option<&str> {
 }
 
 /// Opens what `--store` names: a folder, or a bucket with what was fetched from it below the user's cache.
-pub(super) fn open_store(given: Option<&Path>) -> Result<Store> {
+pub fn open_store(given: Option<&Path>) -> Result<Store> {
     let Some(url) = given.and_then(bucket) else {
         return Store::open(given.map_or_else(default_store, Path::to_path_buf));
     };

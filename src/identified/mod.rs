@@ -15,10 +15,10 @@ use standing::unexplained_of;
 pub use standing::{standing_of, wrong_setup_of};
 pub use torques::IdentifiedTorques;
 
-use crate::compensate::{Coverage, IdentifiedArm, Scatter, Uncertainty};
+use crate::compensate::{Coverage, Gate, GateLimits, IdentifiedArm, Scatter, Uncertainty};
 use crate::description::RobotDescription;
 use crate::effect::Load;
-use crate::error::{Error, Result, nearest};
+use crate::error::{Error, Fault, Result, nearest};
 use crate::estimate::network::Correction;
 use crate::estimate::{Covariance, Model};
 use crate::pipeline::{Manifest, Plan, RunStatus, StageReport};
@@ -29,10 +29,9 @@ use crate::store::frame::Frame;
 use crate::store::{Store, TableRef};
 use crate::table::{
     Corrected, CovarianceTable, Document, Loose, Network, Parameters, Recording, Robot, Standing,
-    Table, TorqueParameters, from_file,
+    Table, TablesByKind, TorqueParameters, from_file, of_kind,
 };
 use std::path::{Path, PathBuf};
-use written::written;
 
 /// How a stage's warning of a wrong set-up begins.
 const WRONG_SETUP: &str = "the set-up is wrong";
@@ -179,7 +178,6 @@ impl IdentifiedModel {
             other => other,
         };
         let (stage, table) = chosen(manifest, step, stands.as_ref())?;
-        let parameters = Parameters::from_frame(&load(table)?)?;
         // A correction was learned on top of one model and belongs to no other.
         let withdrawn = |id: &str| {
             stands
@@ -246,18 +244,19 @@ impl IdentifiedModel {
             .chain(learned)
             .flat_map(said)
             .collect();
-        let covariance: Option<CovarianceTable> = written(stage, load)?;
-        let own = Self::of(robot, parameters, origin)?;
-        let covariance = covariance.and_then(|table| table.of_model(&own.model));
-        let scatter = scatter::of(stage, learned, load)?;
+        let of_stage = |stage: &StageReport, kind: &str| {
+            let own = stage.outputs.iter().find(|output| output.kind == kind);
+            own.map(|output| load(&output.table)).transpose()
+        };
+        let of_learned = learned.map(|learned| move |kind: &str| of_stage(learned, kind));
+        let of_learned = of_learned.as_ref().map(|tables| tables as &TablesByKind);
+        let own = Self::of_tables(robot, origin, &|kind| of_stage(stage, kind), of_learned)?;
         let convention = Some(convention);
         let serial = serial(&manifest.pipeline.resolved);
         let known = Self {
             serial,
             torques,
             correction,
-            covariance,
-            scatter,
             data,
             convention,
             ..own
@@ -270,6 +269,51 @@ impl IdentifiedModel {
             sources,
             ..known
         })
+    }
+
+    /// The model that a stage identified, by the tables that it wrote; `learned`: those of the stage that learned a correction on top.
+    pub fn of_tables(
+        robot: RobotDescription,
+        origin: String,
+        tables: &TablesByKind,
+        learned: Option<&TablesByKind>,
+    ) -> Result<Self> {
+        let own = Self::of(robot, of_kind(tables)?.unwrap_or_default(), origin)?;
+        let covariance = of_kind::<CovarianceTable>(tables)?;
+        Ok(Self {
+            covariance: covariance.and_then(|table| table.of_model(&own.model)),
+            scatter: scatter::of(tables, learned)?,
+            ..own
+        })
+    }
+
+    /// Limits of corrections, with why the model is refused where one insists on it.
+    pub fn gate(&self, limits: GateLimits, insisted: bool) -> Gate {
+        let mut gate = Gate {
+            limits,
+            insisted,
+            model: Vec::new(),
+        };
+        if insisted {
+            gate.model.clone_from(&self.refusals);
+            gate.model.extend(gate.beyond(&self.model));
+        }
+        gate
+    }
+
+    /// Fails with all reasons why no commands are to be made of the model; `insist` says how one insists on it.
+    pub fn accepted(&self, gate: &Gate, insist: &str) -> Result<()> {
+        let reasons = [self.refusals.clone(), gate.beyond(&self.model)].concat();
+        let fault = |reason: &String| {
+            Fault::new(
+                &self.origin,
+                format!("refused: {reason}. Correct that, or insist with {insist}"),
+            )
+        };
+        match reasons.is_empty() {
+            true => Ok(()),
+            false => Err(Error::Data(reasons.iter().map(fault).collect())),
+        }
     }
 
     /// Torques alone: positions are those of the robot file.

@@ -1,24 +1,15 @@
 //! How an arm scatters about its identified model, by the tables of the stages that identified it.
 
-use super::written::written;
 use crate::compensate::Scatter;
 use crate::error::Result;
-use crate::pipeline::StageReport;
-use crate::store::TableRef;
-use crate::store::frame::Frame;
-use crate::table::{Corrections, Observability, Prediction, Verdict};
+use crate::table::{Corrections, Observability, Prediction, TablesByKind, Verdict, of_kind};
 
 /// The scatter by the stage whose model stands, and by the one that learned a correction on top of it.
-pub(super) fn of(
-    stage: &StageReport,
-    learned: Option<&StageReport>,
-    load: impl Fn(&TableRef) -> Result<Frame>,
-) -> Result<Scatter> {
-    let diagnosed: Option<Verdict> = written(stage, &load)?;
-    let fitted: Option<Observability> = written(stage, &load)?;
-    let prediction: Option<Prediction> = written(stage, &load)?;
-    let corrections: Option<Corrections> =
-        learned.map_or(Ok(None), |learned| written(learned, &load))?;
+pub(super) fn of(stage: &TablesByKind, learned: Option<&TablesByKind>) -> Result<Scatter> {
+    let diagnosed: Option<Verdict> = of_kind(stage)?;
+    let fitted: Option<Observability> = of_kind(stage)?;
+    let prediction: Option<Prediction> = of_kind(stage)?;
+    let corrections: Option<Corrections> = learned.map_or(Ok(None), of_kind)?;
     let repeatability = diagnosed
         .and_then(|verdict| verdict.0.first().map(|row| row.repeatability_rad))
         .or_else(|| {

@@ -2,7 +2,7 @@
 
 use super::place;
 use super::run_state::{self, RunState};
-use super::services::{Observer, StageServices};
+use super::services::{Interrupted, Observer, StageServices};
 use crate::error::{Error, Result};
 use crate::stage::{Context, InputTable, Output, StoredTable};
 use crate::store::frame::Frame;
@@ -29,7 +29,7 @@ pub(super) fn stage(
 ) -> Result<Vec<(String, PendingTable)>> {
     let stage = &state.plan.stages[index];
     let inputs = load(state, index, place.store)?;
-    let services = StageServices::new(&stage.id, place.store, &stage.files, place.observer);
+    let services = StageServices::new(&stage.id, Some(place.store), &stage.files, place.observer);
     let context = Context {
         id: &stage.id,
         seed: state.seed(index),
@@ -38,6 +38,9 @@ pub(super) fn stage(
     };
     let body = || place.threads.install(|| stage.stage.run(inputs, &context));
     let outputs = catch_unwind(AssertUnwindSafe(body)).unwrap_or_else(|panic| {
+        if panic.is::<Interrupted>() {
+            return Err(Error::store(&stage.id, "was interrupted: run it again"));
+        }
         Err(Error::Bug(format!(
             "stage {} panicked: {}",
             stage.id,

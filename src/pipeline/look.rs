@@ -4,7 +4,9 @@ use super::plan::{InputFile, PlannedStage};
 use super::{Override, Plan, services, spec};
 use crate::error::{Error, Fault, Result};
 use crate::raw;
-use crate::stage::{Context, InputTable, OpenedInput, Output, RawFile, Services, Sink, StageEntry};
+use crate::stage::{
+    Context, InputTable, OpenedInput, Output, RawFile, STAGES, Services, Sink, StageEntry,
+};
 use crate::store::frame::Frame;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
@@ -64,9 +66,25 @@ pub fn look(plan: &Plan) -> Result<Vec<String>> {
     }
 }
 
+/// Reads a pipeline. Fails with every fault of its YAML and of the robot file at once.
+pub fn checked_plan(file: &Path, overrides: &[Override]) -> Result<Plan> {
+    Plan::load(file, overrides, STAGES).map_err(|error| match error {
+        Error::Spec(mut faults) => {
+            let robots = faults_of_robots(file, overrides, STAGES);
+            let new: Vec<Fault> = robots
+                .into_iter()
+                .filter(|fault| !faults.contains(fault))
+                .collect();
+            faults.extend(new);
+            Error::Spec(faults)
+        }
+        other => other,
+    })
+}
+
 /// The faults of the robot files of a pipeline whose YAML has faults of its own: where the stage that names one can be read, all are told
 /// in one pass.
-pub fn faults_of_robots(
+fn faults_of_robots(
     file: &Path,
     overrides: &[Override],
     registry: &'static [StageEntry],

@@ -4,6 +4,7 @@ mod execute;
 mod globs;
 mod history;
 mod identity;
+mod in_memory;
 mod lock;
 mod look;
 mod manifest;
@@ -25,7 +26,8 @@ mod tests;
 mod wiring;
 
 pub use history::find_run;
-pub use look::{faults_of_robots, look};
+pub use in_memory::{StageCall, StageTables, run_in_memory};
+pub use look::{checked_plan, look};
 pub use manifest::{
     Host, Manifest, OutputRecord, RunStatus, StageReport, StageStatus, Surroundings, Tool,
 };
@@ -37,5 +39,5 @@ pub use reason::{KeyChange, changes_of};
 pub use run::{CompletedRun, run};
 pub use schema::json_schema;
 pub use select::Selection;
-pub use services::Observer;
+pub use services::{Interrupted, Observer, Unwatched};
 pub(crate) use spec::misnamed;

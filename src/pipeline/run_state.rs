@@ -108,11 +108,9 @@ impl<'a> RunState<'a> {
         }))
     }
 
-    /// The seed of a stage: its own, so that stages do not share random numbers.
+    /// The seed of a stage.
     pub fn seed(&self, index: usize) -> u64 {
-        let text = format!("{} {}", self.plan.seed, self.plan.stages[index].id);
-        let hash = blake3::hash(text.as_bytes());
-        u64::from_le_bytes(*hash.as_bytes().first_chunk().expect("a hash has 32 bytes"))
+        seed(self.plan.seed, &self.plan.stages[index].id)
     }
 
     /// The hash of a raw input file, read once a run.
@@ -168,6 +166,12 @@ impl<'a> RunState<'a> {
         }
         Ok(())
     }
+}
+
+/// The seed of a stage: its own, so that stages do not share random numbers.
+pub(super) fn seed(pipeline: u64, id: &str) -> u64 {
+    let hash = blake3::hash(format!("{pipeline} {id}").as_bytes());
+    u64::from_le_bytes(*hash.as_bytes().first_chunk().expect("a hash has 32 bytes"))
 }
 
 /// The table of an output port, which the record of a stage must have.

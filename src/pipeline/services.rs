@@ -10,22 +10,31 @@ use std::sync::{Mutex, PoisonError};
 /// Whoever watches a run: a terminal, a log, nobody.
 pub trait Observer: Sync {
     /// A stage starts to execute, with the reason.
-    fn stage_begins(&self, id: &str, uses: &str, reason: &str);
+    fn stage_begins(&self, _id: &str, _uses: &str, _reason: &str) {}
     /// A stage is over; the report says how.
-    fn stage_ends(&self, report: &super::manifest::StageReport);
+    fn stage_ends(&self, _report: &super::manifest::StageReport) {}
     /// Units of work: what is done, how many in all, and what a unit is called.
-    fn begin(&self, id: &str, what: &str, total: Option<u64>, unit: &str);
+    fn begin(&self, _id: &str, _what: &str, _total: Option<u64>, _unit: &str) {}
     /// So much of the bar of a stage is done.
-    fn advance(&self, id: &str, done: u64, message: &str);
+    fn advance(&self, _id: &str, _done: u64, _message: &str) {}
     /// Lines while the stage runs; they are in its report too.
-    fn note(&self, id: &str, line: &str);
+    fn note(&self, _id: &str, _line: &str) {}
     /// A warning of a stage.
-    fn warn(&self, id: &str, line: &str);
+    fn warn(&self, _id: &str, _line: &str) {}
 }
+
+/// What an observer unwinds with where nobody waits for the run any more: the stage ends as interrupted.
+pub struct Interrupted;
+
+/// Nobody watches.
+pub struct Unwatched;
+
+impl Observer for Unwatched {}
 
 pub(super) struct StageServices<'a> {
     pub id: &'a str,
-    pub store: &'a Store,
+    /// None where tables stay in memory.
+    pub store: Option<&'a Store>,
     pub files: &'a [super::plan::InputFile],
     pub observer: &'a dyn Observer,
     lines: Mutex<StageMessages>,
@@ -41,7 +50,7 @@ pub(super) struct StageMessages {
 impl<'a> StageServices<'a> {
     pub fn new(
         id: &'a str,
-        store: &'a Store,
+        store: Option<&'a Store>,
         files: &'a [super::plan::InputFile],
         observer: &'a dyn Observer,
     ) -> Self {
@@ -65,9 +74,13 @@ impl Services for StageServices<'_> {
         open(self.id, self.files, file)
     }
     fn sink(&self, kind: &'static str) -> Result<Box<dyn Sink>> {
+        let Some(store) = self.store else {
+            let message = "writes a table that may be longer than memory: run it in a pipeline";
+            return Err(Error::spec(self.id, message));
+        };
         Ok(Box::new(StoreSink {
             kind,
-            writer: self.store.writer(kind)?,
+            writer: store.writer(kind)?,
         }))
     }
     fn begin(&self, what: &str, total: Option<u64>, unit: &str) {

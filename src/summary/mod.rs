@@ -4,6 +4,7 @@ mod columns;
 mod corrections;
 mod diagnosed;
 mod diagnosis;
+mod effects;
 mod estimate;
 mod explanation;
 mod first_look;
@@ -29,6 +30,7 @@ pub use columns::{columns, columns_json};
 pub use corrections::{corrections, corrections_json};
 pub use diagnosed::Diagnosed;
 pub use diagnosis::DiagnosisSummary;
+pub use effects::effects_json;
 pub use explanation::explanation;
 pub use first_look::first_look;
 #[cfg(feature = "query")]

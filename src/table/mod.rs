@@ -36,6 +36,16 @@ fn typed<T: Table>(loose: Loose<Frame>) -> Result<Loose<T>> {
     })
 }
 
+/// Tables of one stage by their kind, none of what it did not write.
+pub type TablesByKind<'a> = dyn Fn(&str) -> Result<Option<Frame>> + 'a;
+
+/// The table of a kind as Rust values, if there is one.
+pub fn of_kind<T: Table>(tables: &TablesByKind) -> Result<Option<T>> {
+    tables(T::KIND)?
+        .map(|frame| T::from_frame(&frame))
+        .transpose()
+}
+
 /// Declares a table as a list of rows. It is handed the columns of `schemas/<kind>.json` by a macro of the kind's name (schemas/build.rs).
 macro_rules! rows {
     ($kind:literal, $(#[$doc:meta])* pub struct $table:ident of $row:ident { $( $(#[$fdoc:meta])* $field:ident: $ty:ty, )+ }) => {

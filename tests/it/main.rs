@@ -9,6 +9,7 @@
 
 #[cfg(target_os = "linux")]
 mod alone;
+mod api;
 mod arms;
 mod bags;
 mod beyond;

@@ -1,5 +1,6 @@
 //! Robots on a cluster: what is asked of it, and the wait for their records.
 
+use super::super::surroundings::program;
 use crate::error::{Error, Fault, Result, counted};
 use crate::fleet::cluster::ClusterOptions;
 use crate::fleet::ledger::RunNote;
@@ -46,7 +47,7 @@ impl ClusterArguments {
     /// What to ask of the cluster; paths as all nodes know them.
     pub(super) fn options(&self, store: &std::path::Path) -> Result<ClusterOptions> {
         let fault = |error: std::io::Error| Error::store("--store", error.to_string());
-        let program: PathBuf = std::env::current_exe().map_err(fault)?;
+        let program: PathBuf = program().map_err(fault)?;
         Ok(ClusterOptions {
             program,
             store: std::path::absolute(store).map_err(fault)?,

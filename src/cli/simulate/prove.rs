@@ -1,5 +1,6 @@
 //! `calib simulate prove`: conceals, has every recording diagnosed by a process that sees nothing else, and reveals.
 
+use super::super::surroundings::program;
 use super::super::{emit, emit_json};
 use super::conceal::{self, ConcealArguments};
 use crate::error::{Error, Result, counted};
@@ -83,7 +84,7 @@ pub(super) fn main(arguments: &ProveArguments) -> Result<()> {
     };
     let verdicts = folder.join(VERDICTS);
     std::fs::create_dir_all(&verdicts).map_err(store)?;
-    let program = std::env::current_exe().map_err(store)?;
+    let program = program().map_err(store)?;
     let blind = BlindDiagnosis {
         program: &program,
         pipeline: &pipeline,

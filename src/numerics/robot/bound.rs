@@ -3,6 +3,19 @@
 /// rad: more is seldom a position of a joint, but a common one in degrees.
 pub const ONE_AND_A_HALF_TURNS: f64 = 3.0 * std::f64::consts::PI;
 
+/// What is wrong with joints of which most rows turn too far; `value`: that of a joint (from 0), rad.
+pub fn too_far(name: &str, unit: &str, rows: [u64; 2], joint: usize, value: f64) -> String {
+    let [far, all] = rows;
+    let (shown, symbol, most) = match unit {
+        "rad" => (value, "rad", "9.42"),
+        _ => (value.to_degrees(), "deg", "540"),
+    };
+    format!(
+        "`{name}` is declared in {unit}, but {far} of {all} rows hold a joint beyond one and a half turns, here joint {} at {shown:.4} {symbol}; allowed: up to {most} {symbol}",
+        joint + 1
+    )
+}
+
 /// What a number is of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Bound {

@@ -2,7 +2,7 @@
 //! maker or a public model states them. Each file names its sources and what it leaves out.
 
 use super::import::{Imported, RobotFileText, read_calib};
-use crate::error::Result;
+use crate::error::{Error, Result, nearest};
 
 /// An arm of the library.
 #[derive(Debug, PartialEq, Eq)]
@@ -23,6 +23,19 @@ impl LibraryArm {
             },
             None,
         )
+    }
+
+    /// The same, or which name is near.
+    pub fn named(name: &str) -> Result<&'static Self> {
+        Self::find(name).ok_or_else(|| {
+            let near = nearest(name, LIBRARY.iter().map(|arm| arm.name))
+                .map(|near| format!("; did you mean `{near}`?"))
+                .unwrap_or_default();
+            Error::spec(
+                "NAME",
+                format!("no arm `{name}` in the library{near} (`calib robots` lists all)"),
+            )
+        })
     }
 
     /// The arm of that name; capitals, blanks and dashes do not matter.

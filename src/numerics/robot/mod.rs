@@ -21,7 +21,7 @@ mod setup;
 mod travel;
 mod visited;
 
-pub use bound::{Bound, ONE_AND_A_HALF_TURNS};
+pub use bound::{Bound, ONE_AND_A_HALF_TURNS, too_far};
 pub use circumstances::{CIRCUMSTANCES, CircumstanceName, law_columns};
 pub use column::{ColumnShape, Convention, Conventions, DeclaredColumn, Part};
 pub use instrument::{

@@ -8,6 +8,7 @@ use super::pair::FileDecision;
 use super::refusal::Reason;
 use super::scan::{RefusalCount, Scan};
 use crate::error::{Error, Fault, Result, counted};
+use crate::robot::too_far;
 use crate::stage::Context;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -95,20 +96,11 @@ fn implausible(
     if scan.turns.rows * 2 > judged
         && let Some((line, joint, value)) = scan.turns.first
     {
-        let (shown, advice) = if unit == "rad" {
-            (
-                value,
-                "allowed: up to 9.42 rad; if the file holds degrees, say `unit: deg`",
-            )
-        } else {
-            (value.to_degrees(), "allowed: up to 540 deg")
+        let advice = match unit {
+            "rad" => "; if the file holds degrees, say `unit: deg`",
+            _ => "",
         };
-        let shown_unit = if unit == "rad" { "rad" } else { "deg" };
-        let message = format!(
-            "`q` is declared in {unit}, but {} of {judged} rows hold a joint beyond one and a half turns, here joint {} at {shown:.4} {shown_unit}; {advice}",
-            scan.turns.rows,
-            joint + 1
-        );
+        let message = too_far("q", unit, [scan.turns.rows, judged], joint, value) + advice;
         return Some(Fault::new(format!("{}:{line}", scan.label), message));
     }
     if limits == LimitPolicy::Warn

@@ -13,8 +13,8 @@ use crate::stage::{Diagnose, Stage};
 use crate::store::Store;
 use crate::table::{
     CauseGrid, Cells, FindingNumbers, Findings, FormRow, Forms, RivalRow, Rivals, ShareRow, Shares,
-    Suspects, SuspectsRow, Table, Verdict, VerdictRow, VerdictSentences, VerdictTopic,
-    formula_in_words, is_separable_by_poses,
+    Suspects, SuspectsRow, Table, TablesByKind, Verdict, VerdictRow, VerdictSentences,
+    VerdictTopic, formula_in_words, is_separable_by_poses, of_kind,
 };
 use serde_json::{Value, json};
 
@@ -46,12 +46,8 @@ const ASIDE: usize = 4;
 /// Places and variables that are shown.
 const SHOWN: usize = 5;
 
-fn table<T: Table + Default>(stage: &StageReport, store: &Store) -> Result<T> {
-    let own = stage.outputs.iter().find(|output| output.kind == T::KIND);
-    own.map_or_else(
-        || Ok(T::default()),
-        |output| T::from_frame(&store.load(&output.table)?),
-    )
+fn table<T: Table + Default>(tables: &TablesByKind) -> Result<T> {
+    Ok(of_kind(tables)?.unwrap_or_default())
 }
 
 fn rival_words(rival: &RivalRow) -> String {
@@ -124,33 +120,47 @@ impl DiagnosisSummary {
 
     /// What a stage `diagnose` of a run wrote. Fails where a table has left the store.
     pub fn read(run: &str, stage: &StageReport, store: &Store) -> Result<Self> {
-        let verdict: Verdict = table(stage, store)?;
-        let verdict = verdict
-            .0
-            .into_iter()
-            .next()
-            .ok_or_else(|| Error::Bug("a diagnosis without a verdict".into()))?;
-        let (findings, numbers) = (table(stage, store)?, table(stage, store)?);
-        let (run, step) = (run.to_string(), stage.id.clone());
+        let load = |kind: &str| {
+            let own = stage.outputs.iter().find(|output| output.kind == kind);
+            own.map(|output| store.load(&output.table)).transpose()
+        };
+        let recording = stage.inputs.iter().find(|input| input.port == "recording");
         Ok(Self {
-            run,
-            step,
-            verdict,
-            sentences: table(stage, store)?,
-            findings,
-            numbers,
-            rivals: table(stage, store)?,
-            shares: table(stage, store)?,
-            cells: table(stage, store)?,
-            forms: table(stage, store)?,
-            suspects: table(stage, store)?,
             robot: robot_of(stage, store)?,
-            rows: stage
-                .inputs
-                .iter()
-                .find(|input| input.port == "recording")
-                .map_or(0, |input| input.table.rows),
+            rows: recording.map_or(0, |input| input.table.rows),
+            ..Self::of_tables(run, &stage.id, &load)?
         })
+    }
+
+    /// What a stage `diagnose` says by its tables; the robot's name and the rows of the recording are not in them.
+    pub fn of_tables(run: &str, step: &str, tables: &TablesByKind) -> Result<Self> {
+        let verdict: Verdict = table(tables)?;
+        let verdict = verdict.0.into_iter().next();
+        let verdict = verdict.ok_or_else(|| Error::Bug("a diagnosis without a verdict".into()))?;
+        Ok(Self {
+            run: run.into(),
+            step: step.into(),
+            verdict,
+            sentences: table(tables)?,
+            findings: table(tables)?,
+            numbers: table(tables)?,
+            rivals: table(tables)?,
+            shares: table(tables)?,
+            cells: table(tables)?,
+            forms: table(tables)?,
+            suspects: table(tables)?,
+            robot: None,
+            rows: 0,
+        })
+    }
+
+    /// The same of a robot and a recording with so many rows.
+    pub fn with_subject(self, robot: &str, rows: u64) -> Self {
+        Self {
+            robot: Some(robot.into()),
+            rows,
+            ..self
+        }
     }
 
     fn said(&self, topic: VerdictTopic) -> Vec<&str> {

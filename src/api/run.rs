@@ -1,0 +1,110 @@
+//! A pipeline that was run: its tables, its models, its diagnosis.
+
+use super::Model;
+use crate::audit::{QueryTables, diagnosis};
+use crate::error::{Error, Fault, Result};
+use crate::identified::IdentifiedModel;
+use crate::pipeline::{
+    self, Manifest, Observer, Override, Purpose, RunOptions, Selection, Surroundings, checked_plan,
+    find_run,
+};
+use crate::stage::DIAGNOSES;
+use crate::store::Store;
+use crate::store::frame::Frame;
+use crate::summary::{Diagnosed, LimitsSummary};
+use std::path::Path;
+
+/// What is to be run, and how.
+pub struct RunRequest<'a> {
+    /// The YAML file.
+    pub pipeline: &'a Path,
+    /// `TARGET=VALUE`, as `--set` of the command line.
+    pub overrides: &'a [String],
+    /// Worker threads; no result depends on it.
+    pub jobs: usize,
+    /// Who runs it, where and when.
+    pub surroundings: &'a Surroundings,
+    /// Who watches.
+    pub observer: &'a dyn Observer,
+}
+
+/// Runs a pipeline as `calib run` does: what is done already is not done again.
+pub fn run(request: &RunRequest, store: Store) -> Result<CalibRun> {
+    let overrides = request.overrides.iter().map(|text| {
+        Override::parse(text).map_err(|message| Error::spec("set", message.to_string()))
+    });
+    let overrides = overrides.collect::<Result<Vec<Override>>>()?;
+    let plan = checked_plan(request.pipeline, &overrides)?;
+    let options = RunOptions {
+        selection: Selection::default(),
+        jobs: request.jobs,
+        purpose: Purpose::Run,
+    };
+    let done = pipeline::run(
+        &plan,
+        &store,
+        &options,
+        request.surroundings,
+        request.observer,
+    )?;
+    Ok(CalibRun {
+        manifest: done.manifest,
+        store,
+    })
+}
+
+/// A run in a store.
+pub struct CalibRun {
+    /// What was done.
+    pub manifest: Manifest,
+    store: Store,
+}
+
+impl CalibRun {
+    /// A run as `calib log` names it: HEAD, HEAD~1, a tag, or an id.
+    pub fn open(store: Store, name: &str) -> Result<Self> {
+        let manifest = Manifest::of(&store, &find_run(&store, name)?)?;
+        Ok(Self { manifest, store })
+    }
+
+    /// Names of its tables, `stage.port`, in the order of the pipeline.
+    pub fn tables(&self) -> Vec<String> {
+        let tables = QueryTables::of(&self.manifest);
+        let named = tables
+            .iter()
+            .map(|table| format!("{}.{}", table.stage, table.port));
+        named.collect()
+    }
+
+    /// A table: `stage.port`, `stage/port`, or the kind where one stage alone writes it. Fails where it has left the store.
+    pub fn table(&self, name: &str) -> Result<Frame> {
+        let tables = QueryTables::of(&self.manifest);
+        let found = tables.find(name).map_err(|error| match error {
+            Error::Spec(faults) => {
+                let messages = faults.into_iter();
+                Error::Spec(
+                    messages
+                        .map(|fault| Fault::new(name, fault.message))
+                        .collect(),
+                )
+            }
+            other => other,
+        })?;
+        self.store.load(&found.table)
+    }
+
+    /// The model of a step, else of the step that stands for the run, with its refusals.
+    pub fn model(&self, step: Option<&str>) -> Result<Model> {
+        let mut own = IdentifiedModel::of_run(&self.store, &self.manifest, step)?;
+        let exceeded = LimitsSummary::of(&self.manifest, &self.store)?.exceeded();
+        own.refusals.extend(exceeded);
+        Ok(Model::new(own))
+    }
+
+    /// The stage that diagnosed, `step` where there are several, and what it said.
+    pub fn diagnosis(&self, step: Option<&str>) -> Result<(String, Diagnosed)> {
+        let run = &self.manifest.run_id;
+        let (_, stage) = diagnosis(&self.store, run, step, &DIAGNOSES)?;
+        Ok((stage.id.clone(), Diagnosed::read(run, &stage, &self.store)?))
+    }
+}

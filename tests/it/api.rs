@@ -1,0 +1,228 @@
+//! calib from arrays: to the last digit what a pipeline gives for the same numbers in a file.
+
+use crate::compensate::{ROBOT, calib, cell};
+use calib::api::{CalibRun, Options, Poses, Recording, Robot, Sigma, diagnose, identify};
+use calib::error::{Error, Result};
+use calib::pipeline::StageTables;
+use calib::store::Store;
+use calib::table::{Recording as RecordingTable, Table};
+use serde_json::{Value, json};
+use std::fmt::Write;
+use std::path::Path;
+
+const PIPELINE: &str = "calib: 1
+name: arrays
+seed: 1
+stages:
+  - uses: robot
+    with: {file: robot.yaml}
+  - uses: ingest
+    with:
+      files:
+        - file: measured.csv
+          columns:
+            q: {column: 'q{j}', unit: rad}
+            x: {column: x, unit: mm}
+            y: {column: y, unit: mm}
+            z: {column: z, unit: mm}
+            sigma_x: {value: 0.013, unit: mm}
+            sigma_y: {value: 0.013, unit: mm}
+            sigma_z: {value: 0.013, unit: mm}
+            temperature: {column: temp, unit: C}
+  - uses: split
+    with: {by: every, n: 4}
+  - uses: identify
+  - uses: diagnose
+";
+
+fn robot() -> Robot {
+    Robot::from_text("robot.yaml", ROBOT).expect("a robot")
+}
+
+fn run(folder: &Path) -> CalibRun {
+    let store = Store::open(folder.join(".calib")).expect("a store");
+    CalibRun::open(store, "HEAD").expect("a run")
+}
+
+/// The recording of the cell that all tests share, as arrays.
+fn arrays() -> Recording {
+    let frame = run(cell()).table("recording").expect("a table");
+    let table = RecordingTable::from_frame(&frame).expect("a recording");
+    let rows = table.rows() as u32;
+    let temperature = (0..rows).map(|row| 21.0 + f64::from(row) / 7.0).collect();
+    Recording {
+        poses: Poses {
+            joints_rad: table.q.clone(),
+            columns: [("temp_c".to_string(), temperature)].into(),
+        },
+        points_mm: table
+            .position
+            .iter()
+            .map(|point| point.map(|value| value * 1e3))
+            .collect(),
+        sigma: Sigma::Mm(vec![0.013]),
+        ..Recording::default()
+    }
+}
+
+#[test]
+fn arrays_give_to_the_last_digit_what_a_pipeline_gives_for_the_same_numbers_in_a_file() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let recording = arrays();
+    let mut csv = "q1,q2,q3,q4,q5,q6,x,y,z,temp\n".to_string();
+    let temperature = &recording.poses.columns["temp_c"];
+    let rows = recording
+        .poses
+        .joints_rad
+        .chunks(6)
+        .zip(&recording.points_mm);
+    for ((q, point), temperature) in rows.zip(temperature) {
+        q.iter()
+            .chain(point)
+            .for_each(|value| write!(csv, "{value},").expect("a text"));
+        writeln!(csv, "{temperature}").expect("a text");
+    }
+    for (name, text) in [
+        ("robot.yaml", ROBOT),
+        ("pipeline.yaml", PIPELINE),
+        ("measured.csv", &csv),
+    ] {
+        std::fs::write(folder.path().join(name), text).expect("a file");
+    }
+    let output = calib(folder.path(), &["run", "pipeline.yaml", "--quiet"], "");
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{told}");
+    let run = run(folder.path());
+    let identified = identify(&robot(), &recording, &Options::with(json!({}))).expect("a model");
+    let diagnosed = diagnose(&robot(), &recording, &Options::with(json!({}))).expect("a diagnosis");
+    let same = |stage: &str, given: &StageTables| {
+        for (port, frame) in &given.tables {
+            let stored = run.table(&format!("{stage}.{port}")).expect("a table");
+            assert_eq!(&stored, frame, "{stage}.{port}");
+        }
+    };
+    same("identify", &identified.given);
+    same("diagnose", &diagnosed.given);
+    let stored = run.table("identify.prediction").expect("a table");
+    let [x, y, z] =
+        ["x_mm", "y_mm", "z_mm"].map(|name| stored.read::<f64>(name).expect("a column"));
+    let predicted = identified.model.predict(&recording.poses).expect("points");
+    for (row, point) in predicted.iter().enumerate() {
+        let off = |(axis, told): (usize, &f64)| (told - [x[row], y[row], z[row]][axis]).abs();
+        let off = point.iter().enumerate().map(off).fold(0.0, f64::max);
+        assert!(off < 1e-9, "row {row}: {off} mm");
+    }
+}
+
+fn refused<T>(found: Result<T>) -> String {
+    match found {
+        Ok(_) => "nothing is wrong".into(),
+        Err(error @ (Error::Spec(_) | Error::Data(_))) => error.to_string(),
+        Err(error) => panic!("{error}"),
+    }
+}
+
+#[test]
+fn arrays_that_are_no_recording_are_refused_with_row_and_what_is_allowed() {
+    let with = |change: &dyn Fn(&mut Recording)| {
+        let mut recording = arrays();
+        change(&mut recording);
+        refused(identify(&robot(), &recording, &Options::with(json!({}))))
+    };
+    let degrees = with(&|one| {
+        one.poses
+            .joints_rad
+            .iter_mut()
+            .for_each(|q| *q = q.to_degrees())
+    });
+    assert!(
+        degrees.starts_with("joints, row 0: `joints` is declared in rad, but 8"),
+        "{degrees}"
+    );
+    assert!(
+        degrees.ends_with(
+            "allowed: up to 9.42 rad; if the array holds degrees, convert it to radians"
+        ),
+        "{degrees}"
+    );
+    let faults = [
+        with(&|one| one.poses.joints_rad[14] = f64::NAN),
+        with(&|one| one.points_mm[7][1] = f64::INFINITY),
+        with(&|one| one.points_mm.truncate(79)),
+        with(&|one| one.sigma = Sigma::Mm(vec![0.01; 7])),
+        with(&|one| one.sigma = Sigma::Instrument("leica_at96".into())),
+        with(&|one| {
+            one.poses
+                .columns
+                .insert("payload".into(), vec![1.0; one.points_mm.len()]);
+        }),
+        refused(identify(
+            &robot(),
+            &arrays(),
+            &Options::with(json!({ "efects": ["backlash"] })),
+        )),
+        refused(Robot::library("ur5ee")),
+    ];
+    let starts = [
+        "joints, row 2, joint 3: NaN is not a number",
+        "points, row 7: inf is not a number",
+        "points: 79 values; expected 80",
+        "sigma: 7 numbers; expected one for all, 80, or three for each of 80 rows",
+        "sigma: unknown instrument `leica_at96`; did you mean `leica_at960`?",
+        "payload: no such column; did you mean `payload_kg`?",
+        "identify: with.efects: unknown key; did you mean `effects`?",
+        "NAME: no arm `ur5ee` in the library; did you mean `ur5e`?",
+    ];
+    for (fault, start) in faults.iter().zip(starts) {
+        assert!(fault.starts_with(start), "{fault}");
+    }
+}
+
+fn served(arguments: &[&str], input: &str) -> Vec<Value> {
+    let arguments = [&["serve-model", "HEAD", "--quiet"], arguments].concat();
+    let output = calib(cell(), &arguments, input);
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let text = String::from_utf8(output.stdout).expect("a text");
+    text.lines()
+        .map(|line| serde_json::from_str(line).expect("a line of JSON"))
+        .collect()
+}
+
+#[test]
+fn a_served_model_answers_every_line_with_what_the_library_computes() {
+    let model = run(cell()).model(None).expect("a model");
+    let poses = Poses {
+        joints_rad: vec![
+            0.3, 0.2, -0.4, 0.5, 0.8, -1.0, 0.1, -0.3, 0.4, 0.2, -0.6, 1.1,
+        ],
+        ..Poses::default()
+    };
+    let [first, second] = [&poses.joints_rad[..6], &poses.joints_rad[6..]];
+    let input = format!(
+        "{}\n[1, 2]\n{}\n",
+        json!(first),
+        json!({ "joints_rad": second, "id": "b" })
+    );
+    let commands = model.compensate(&poses, false).expect("commands");
+    let answers = served(&[], &input);
+    assert_eq!(answers.len(), 3);
+    assert_eq!(answers[0]["joints_rad"], json!(commands.joints_rad[..6]));
+    assert_eq!(answers[2]["joints_rad"], json!(commands.joints_rad[6..]));
+    assert_eq!(answers[2]["id"], "b");
+    assert_eq!(
+        answers[1]["error"],
+        "line 2: joints_rad: 2 numbers; the robot has 6 joints"
+    );
+    let points = model.predict(&poses).expect("points");
+    let answers = served(&["--predict"], &input);
+    for (answer, point) in [&answers[0], &answers[2]].into_iter().zip(points) {
+        for (axis, value) in point.iter().enumerate() {
+            let told = answer["point_mm"][axis].as_f64().expect("a number");
+            assert!((told - value).abs() < 1e-9, "{told} {value}");
+        }
+    }
+}
