@@ -84,7 +84,7 @@ impl Stage for Report {
     const NAME: &'static str = "report";
     const SUMMARY: &'static str =
         "writes one self-contained HTML file: errors before and after, parameters, rejected rows";
-    const IMPLEMENTATION: u32 = 21;
+    const IMPLEMENTATION: u32 = 22;
     type Reads = ReportReads;
     type Writes = ReportWrites;
 

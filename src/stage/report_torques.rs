@@ -47,7 +47,7 @@ impl Stage for ReportTorques {
     const NAME: &'static str = "report_torques";
     const SUMMARY: &'static str =
         "writes one self-contained HTML file: torques before and after, friction, what was found";
-    const IMPLEMENTATION: u32 = 4;
+    const IMPLEMENTATION: u32 = 5;
     type Reads = ReportTorquesReads;
     type Writes = ReportTorquesWrites;
 
