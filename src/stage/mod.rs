@@ -3,6 +3,7 @@
 mod advice;
 mod blank_payload;
 mod brought;
+mod cell_evidence;
 mod compare;
 mod compare_torques;
 mod computed;
@@ -42,6 +43,7 @@ mod unmoved;
 mod validate;
 mod weightless;
 
+pub use cell_evidence::{CellEvidence, CellEvidenceWrites, Given};
 pub use compare::{Compare, CompareReads};
 pub use compare_torques::{CompareTorques, CompareTorquesReads};
 pub use diagnose::{Diagnose, DiagnoseReads};
@@ -393,6 +395,7 @@ pub const STAGES: &[StageEntry] = &[
     StageEntry::of::<Stiffness>(),
     StageEntry::of::<Transfer>(),
     StageEntry::of::<Diagnose>(),
+    StageEntry::of::<CellEvidence>(),
     StageEntry::of::<ingest::IngestTorques>(),
     StageEntry::of::<DiagnoseTorques>(),
     StageEntry::of::<Masses>(),

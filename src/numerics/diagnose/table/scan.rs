@@ -1,6 +1,6 @@
 //! All cells of a recording with their columns, and what each of them says given the components of a model.
 
-use super::cell::{CauseCell, FreeShape, Over, Shapes};
+use super::cell::{CauseCell, FreeShape, Over, ShapeGroup, Shapes};
 use super::evidence::log_sum;
 use super::frame::{SearchRows, UnitColumns};
 use super::state::{CellColumns, ColumnProducts, Component, KnownState, PartProducts};
@@ -345,6 +345,17 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         state: &KnownState,
         components: &[&Component],
     ) -> Option<CellEvidence> {
+        self.closely_in(cell, state, components, &|_| true)
+    }
+
+    /// The same of some of its shapes.
+    pub fn closely_in(
+        &self,
+        cell: usize,
+        state: &KnownState,
+        components: &[&Component],
+        is_asked: &dyn Fn(&ShapeGroup) -> bool,
+    ) -> Option<CellEvidence> {
         let block = self.fine(cell);
         let across = self.across_block(block, state, components);
         let mut all: Vec<(f64, usize, usize, f64)> = Vec::new();
@@ -362,7 +373,9 @@ impl<'f, 'a> CauseTable<'f, 'a> {
                 .any(|form| keys.contains(&form.key()))
         };
         let there: Vec<bool> = (0..block.groups.len())
-            .map(|group| !keys.is_empty() && is_there(group))
+            .map(|group| {
+                !keys.is_empty() && is_there(group) || !is_asked(&block.groups[group].group)
+            })
             .collect();
         state.shapes(block, &across, 0, |group, shape, found| {
             if !there[group] {
