@@ -167,8 +167,7 @@ pub(super) fn of(
         });
         let limit = normal_quantile(0.5 * ALPHA / tests);
         for robot in robots {
-            let deviation =
-                (robot.size - population.usual) / population.spread.hypot(robot.sigma);
+            let deviation = (robot.size - population.usual) / population.spread.hypot(robot.sigma);
             let ratio = robot.size / population.usual.max(1e-9);
             let kind = if have < SIBLINGS {
                 None
@@ -267,7 +266,9 @@ fn population(robots: &mut [Sized]) -> Population {
         let error = nearest(&mut errors, 0.5).unwrap_or(0.0);
         // That few robots scatter by little is chance.
         let least = 0.1 * usual;
-        let spread = (scatter * scatter - error * error).max(least * least).sqrt();
+        let spread = (scatter * scatter - error * error)
+            .max(least * least)
+            .sqrt();
         population = Population { usual, spread };
         for robot in robots.iter_mut() {
             let wide = spread.hypot(robot.sigma);
@@ -291,8 +292,13 @@ fn named(sums: &GroupSums, cell: &str, name: [&str; 2]) -> (f64, f64, Option<Str
         .find(|own| own.cell == cell)
         .map_or(0.0, |own| own.odds);
     let whole: f64 = all.iter().map(|one| (one.odds - odds).exp()).sum::<f64>() + (-odds).exp();
-    let is_same = |one: &&super::cause_sums::CellTotal| [&one.sum.effect[..], &one.sum.place] == name;
-    let own: f64 = all.iter().filter(is_same).map(|one| (one.odds - odds).exp()).sum();
+    let is_same =
+        |one: &&super::cause_sums::CellTotal| [&one.sum.effect[..], &one.sum.place] == name;
+    let own: f64 = all
+        .iter()
+        .filter(is_same)
+        .map(|one| (one.odds - odds).exp())
+        .sum();
     let rival = all
         .iter()
         .filter(|one| !is_same(one))
@@ -311,7 +317,8 @@ fn named(sums: &GroupSums, cell: &str, name: [&str; 2]) -> (f64, f64, Option<Str
 
 /// How sizes differ by plant or campaign, where that is no chance (weighted means, Fisher's F with the scatter inside the labels).
 fn trend(robots: &[Sized], tests: f64) -> Option<String> {
-    let labels: [fn(&Groups) -> Option<&String>; 2] = [|g| g.plant.as_ref(), |g| g.campaign.as_ref()];
+    let labels: [fn(&Groups) -> Option<&String>; 2] =
+        [|g| g.plant.as_ref(), |g| g.campaign.as_ref()];
     let sentence = |label: fn(&Groups) -> Option<&String>| {
         let mut by: BTreeMap<&str, Vec<&Sized>> = BTreeMap::new();
         for robot in robots.iter().filter(|robot| robot.has >= 0.5) {
@@ -330,12 +337,17 @@ fn trend(robots: &[Sized], tests: f64) -> Option<String> {
         for robots in by.values() {
             let own = mean(robots);
             between += robots.len() as f64 * (own - all).powi(2);
-            within += robots.iter().map(|robot| (robot.size - own).powi(2)).sum::<f64>();
+            within += robots
+                .iter()
+                .map(|robot| (robot.size - own).powi(2))
+                .sum::<f64>();
         }
         let freedom = [(by.len() - 1) as f64, (count - by.len()) as f64];
         let ratio = between / freedom[0] / (within / freedom[1]).max(f64::MIN_POSITIVE);
         (tail(ratio, freedom[0], freedom[1]) < ALPHA / tests.min(20.0)).then(|| {
-            let told = by.iter().map(|(label, robots)| format!("{:.3} mm at {label}", mean(robots)));
+            let told = by
+                .iter()
+                .map(|(label, robots)| format!("{:.3} mm at {label}", mean(robots)));
             told.collect::<Vec<_>>().join(", ")
         })
     };

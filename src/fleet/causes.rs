@@ -110,7 +110,9 @@ impl CauseSearch {
             let search = self.groups.entry(group.clone()).or_default();
             if search.step(sums) {
                 goes_on = true;
-                self.round.groups.insert(group.clone(), search.given.clone());
+                self.round
+                    .groups
+                    .insert(group.clone(), search.given.clone());
                 continue;
             }
             // What is plain in single robots comes when their group has all of its causes.
@@ -281,8 +283,14 @@ pub fn publish(
         &answers.outliers,
     )?;
     let robots = fleet.roster.0.iter().zip(records).map(|(robot, record)| {
-        let table = record.as_ref().and_then(|record| record.last(CellEvidence::KIND));
-        json!([robot.name, robot.groups, table.map(|table| table.table_hash.to_string())])
+        let table = record
+            .as_ref()
+            .and_then(|record| record.last(CellEvidence::KIND));
+        json!([
+            robot.name,
+            robot.groups,
+            table.map(|table| table.table_hash.to_string())
+        ])
     });
     let key = StageKey {
         key_format: KEY_FORMAT,
@@ -308,7 +316,9 @@ pub fn publish(
     }
     // By this note a sweep knows that the tables are needed, and a later fleet finds them.
     let note = json!({ "action": published.record.id, "tables": published.record.tables });
-    ledger.store.put_note(&["fleets", fleet.name()], NOTE, &note)?;
+    ledger
+        .store
+        .put_note(&["fleets", fleet.name()], NOTE, &note)?;
     let page = ledger
         .store
         .expose_document(fleet.name(), "causes.html", html.as_bytes())?;
@@ -323,6 +333,7 @@ pub fn publish(
 /// A table of the diagnosis of a fleet; none where it was not diagnosed.
 pub(super) fn noted<T: Table>(ledger: &Ledger, port: &str) -> Result<Option<T>> {
     let note = ledger.store.note(&["fleets", &ledger.fleet], NOTE)?;
-    let table = note.and_then(|note| serde_json::from_value::<TableRef>(note["tables"][port].clone()).ok());
+    let table =
+        note.and_then(|note| serde_json::from_value::<TableRef>(note["tables"][port].clone()).ok());
     ledger.load(table.as_ref())
 }

@@ -2,6 +2,7 @@
 //! it in the place of a stage `diagnose`, with that stage's settings.
 
 use crate::diagnose::{CellAnswer, GivenCell, cell_evidence};
+use crate::effect::names;
 use crate::error::{Error, Fault, Result};
 use crate::stage::diagnose::{AskedRows, Diagnose, DiagnoseReads};
 use crate::stage::{Context, RawFile, Stage};
@@ -40,12 +41,14 @@ crate::stage::writes! {
     }
 }
 
-/// ln of the evidence below which a row is left out: a fleet counts it as the least that a cell can say.
-const LEAST: f64 = -2.0;
+/// ln of the evidence, of whole cells with a name and of all other rows, below which a row is left out: a fleet counts it as the least that a
+/// cell can say.
+const LEAST: [f64; 2] = [-2.0, -1.0];
 
 impl Stage for CellEvidence {
     const NAME: &'static str = "cell_evidence";
-    const SUMMARY: &'static str = "says what every possible cause explains of one robot, for the sum over a fleet";
+    const SUMMARY: &'static str =
+        "says what every possible cause explains of one robot, for the sum over a fleet";
     const IMPLEMENTATION: u32 = 1;
     type Reads = DiagnoseReads;
     type Writes = CellEvidenceWrites;
@@ -65,7 +68,10 @@ impl Stage for CellEvidence {
 
     fn files(&self) -> Vec<(String, RawFile)> {
         let below = |(place, file)| (format!("diagnose.{place}"), file);
-        Stage::files(&self.diagnose).into_iter().map(below).collect()
+        Stage::files(&self.diagnose)
+            .into_iter()
+            .map(below)
+            .collect()
     }
 
     fn sets_named(&self) -> Vec<(String, String)> {
@@ -94,7 +100,11 @@ impl Stage for CellEvidence {
 }
 
 fn table(answers: Vec<CellAnswer>) -> CellEvidenceTable {
-    let kept = |answer: &CellAnswer| answer.log >= LEAST || answer.sigma.is_some();
+    let kept = |answer: &CellAnswer| {
+        let is_plain = answer.shape.is_none() && answer.effect != names::UNKNOWN;
+        let least = if is_plain { LEAST[0] } else { LEAST[1] };
+        answer.log >= least || answer.sigma.is_some()
+    };
     // So many digits decide nothing, and they would fill the store.
     let rounded = |value: f64| (1e3 * value).round() / 1e3;
     let row = |answer: CellAnswer| CellEvidenceRow {

@@ -1,7 +1,7 @@
 //! `diagnose`: where the recording and the robot as its user believes it differ, what physics was left out, and the gain of it.
 
 use crate::diagnose::{
-    Diagnosis, Question, VerdictKind as Said, against_simulation, diagnose, wrong_setup,
+    Diagnosis, KnownCell, Question, VerdictKind as Said, against_simulation, diagnose, wrong_setup,
 };
 use crate::effect::{CAUSES, DeclaredCause, names};
 use crate::error::{Error, Fault, Result, instead};
@@ -43,9 +43,43 @@ pub struct Diagnose {
     /// `unknown` at its place; of geometry and ratios the numbers of the robot file stay.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub without: Vec<String>,
+    /// What other robots of the model say of causes: cells of the table `fleet_findings` with the share of robots that have each and their
+    /// sizes. `prior: {fleet: F, stage: diagnose, by: causes}` of a fleet's file fills it in.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub prior: Vec<CellPrior>,
     /// Files with effects of your own, which are compared with those of the library.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub effects: Vec<RawFile>,
+}
+
+/// What other robots of the model say of a cause.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CellPrior {
+    /// Key of the cell, e.g. `backlash@joint 3`.
+    pub cell: String,
+    /// Share of the robots that have it, 0 to 1.
+    pub share: f64,
+    /// Usual rms motion at the tool, mm.
+    pub size_mm: f64,
+    /// Its standard deviation from robot to robot, mm.
+    #[serde(default)]
+    pub spread_mm: f64,
+}
+
+impl CellPrior {
+    /// Poses and payloads differ as well: sizes of three times more or less stay possible.
+    fn known(&self) -> KnownCell {
+        let [low, high] = [self.size_mm / 3.0, 3.0 * self.size_mm];
+        KnownCell {
+            cell: self.cell.clone(),
+            probability: self.share,
+            between: [
+                1e-3 * low.min(self.size_mm - 2.0 * self.spread_mm).max(0.0),
+                1e-3 * high.max(self.size_mm + 2.0 * self.spread_mm),
+            ],
+        }
+    }
 }
 
 fn as_believed() -> f64 {
@@ -120,6 +154,21 @@ impl Stage for Diagnose {
                 "open_world",
                 format!("expected a probability from {MOST_CLOSED} to {MOST_OPEN}"),
             ));
+        }
+        for (k, prior) in self.prior.iter().enumerate() {
+            let sizes = [prior.size_mm, prior.size_mm + prior.spread_mm];
+            if !(0.0..=1.0).contains(&prior.share) {
+                faults.push(Fault::new(
+                    format!("prior[{k}].share"),
+                    "expected a share from 0 to 1",
+                ));
+            }
+            if !sizes.iter().all(|size| (1e-3..=30.0).contains(size)) || prior.spread_mm < 0.0 {
+                faults.push(Fault::new(
+                    format!("prior[{k}].size_mm"),
+                    "expected sizes from 0.001 to 30 mm and a spread_mm of 0 or more",
+                ));
+            }
         }
         let tried = || {
             CAUSES
@@ -258,6 +307,7 @@ impl Stage for Diagnose {
 /// The rows that a diagnosis is asked of, and the robot that they belong to.
 pub(super) struct AskedRows {
     own: Vec<&'static DeclaredCause>,
+    known: Vec<KnownCell>,
     data: Measurements,
     corrected: Corrected,
     fit: Vec<usize>,
@@ -298,6 +348,7 @@ impl AskedRows {
         let set = screened::numbered(&reads.split);
         Ok(Self {
             own,
+            known: settings.prior.iter().map(CellPrior::known).collect(),
             data,
             corrected,
             fit,
@@ -320,6 +371,7 @@ impl AskedRows {
             without: &settings.without,
             own: &self.own,
             beside_simulation: self.corrected == Corrected::OutsideSimulation,
+            known: &self.known,
             seed,
         }
     }

@@ -108,7 +108,9 @@ pub(super) fn main(arguments: &FleetDiagnoseArguments, command_line: &[OsString]
                 let waited = on_slurm(&workshop, &mut note, &chosen, &arguments.cluster, &progress);
                 progress.finish();
                 let Some(now) = waited? else {
-                    return emit("submitted the robots of one round; the same command again goes on\n");
+                    return emit(
+                        "submitted the robots of one round; the same command again goes on\n",
+                    );
                 };
                 computed += now;
                 records(&workshop)?
@@ -127,7 +129,11 @@ pub(super) fn main(arguments: &FleetDiagnoseArguments, command_line: &[OsString]
                 "round {}: {}; given now: {}",
                 search.rounds,
                 counted(cells, "cell"),
-                if found.is_empty() { "nothing".into() } else { found.join(", ") }
+                if found.is_empty() {
+                    "nothing".into()
+                } else {
+                    found.join(", ")
+                }
             );
         }
         if !goes_on || search.rounds >= ROUNDS {
@@ -138,7 +144,10 @@ pub(super) fn main(arguments: &FleetDiagnoseArguments, command_line: &[OsString]
     let made = causes::publish(&fleet, &workshop.ledger, &search, &last)?;
     let seconds = begun.elapsed().as_secs_f64();
     if arguments.json {
-        let rejected = last.iter().flatten().filter(|record| record.ending != Ending::Done);
+        let rejected = last
+            .iter()
+            .flatten()
+            .filter(|record| record.ending != Ending::Done);
         let findings = made.answers.findings.0.iter().map(|row| {
             json!({
                 "group": row.group, "robot": row.robot, "effect": row.effect, "place": row.place, "follows": row.follows, "cell": row.cell,
@@ -199,7 +208,10 @@ fn text(made: &Published, robots: usize, rounds: usize, computed: usize, seconds
         text.push_str(&format!("  {}\n", visible(&row.statement)));
     }
     if outliers.len() > SHOWN {
-        text.push_str(&format!("  and {} more in fleet_outliers\n", outliers.len() - SHOWN));
+        text.push_str(&format!(
+            "  and {} more in fleet_outliers\n",
+            outliers.len() - SHOWN
+        ));
     }
     for path in &made.tables {
         text.push_str(&format!("table: {}\n", path.display()));

@@ -33,8 +33,8 @@ pub use setup::wrong_setup;
 pub use table::{CellAnswer, GivenCell};
 pub use types::{
     ClosedForm, Diagnosis, ErrorLengths, Evidence, ExplainedCell, ExplainedShare, Finding,
-    JointRepeatability, Located, Probabilities, Question, RivalCause, SETUP, SpectrumLine,
-    VerdictKind,
+    JointRepeatability, KnownCell, Located, Probabilities, Question, RivalCause, SETUP,
+    SpectrumLine, VerdictKind,
 };
 pub use verdict::other_means;
 

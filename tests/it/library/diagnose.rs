@@ -18,6 +18,7 @@ pub fn missing_physics(robot: &RobotModel, data: &Measurements) -> Diagnosis {
         without: &[],
         own: &[],
         beside_simulation: false,
+        known: &[],
         seed: 1,
     };
     // A wrong unit, sign or zero comes before physics.

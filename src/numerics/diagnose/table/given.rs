@@ -178,17 +178,18 @@ impl CauseTable<'_, '_> {
         let of = |k: usize| {
             let (cell, block) = (&self.cells[cells[k]], &self.coarse[cells[k]]);
             let mut groups: Vec<Vec<f64>> = vec![Vec::new(); block.groups.len()];
-            let mut best = (f64::NEG_INFINITY, 0.0);
+            let mut best = (f64::NEG_INFINITY, 0.0, 0);
             state.shapes(block, &across, first[k], |group, _, found| {
                 groups[group].push(found.log);
                 if found.log > best.0 {
-                    best = (found.log, found.amplitude);
+                    best = (found.log, found.amplitude, group);
                 }
             });
             let logs: Vec<f64> = groups.iter().map(|logs| log_sum(logs)).collect();
-            let follows = block.groups.first().map_or("constant", |group| {
-                group.group.forms[0].follows(cell.place)
-            });
+            let follows = block
+                .groups
+                .get(best.2)
+                .map_or("constant", |group| group.group.forms[0].follows(cell.place));
             let whole = CellAnswer {
                 left_out: left_out.map(Into::into),
                 cell: cell.key.clone(),
@@ -212,7 +213,8 @@ impl CauseTable<'_, '_> {
                     ..whole.clone()
                 }
             };
-            let steps = |form: &Form| matches!(form.term().map(Term::basis), Some(Basis::After { .. }));
+            let steps =
+                |form: &Form| matches!(form.term().map(Term::basis), Some(Basis::After { .. }));
             let shapes = block.groups.iter().zip(&logs);
             let shapes = shapes.filter(|(seen, log)| {
                 shared && log.is_finite() && !seen.group.forms.iter().any(steps)

@@ -5,8 +5,10 @@ use super::evidence::log_sum;
 use super::frame::{SearchRows, UnitColumns};
 use super::state::{CellColumns, ColumnProducts, Component, KnownState, PartProducts};
 use super::{generated, listed};
-use crate::criteria::cells::{ALIKE, BENDS, COMPONENTS, FAR_BELOW, JOINS, PAIR, PAIRS, UNLIKELY};
-use crate::diagnose::types::Question;
+use crate::criteria::cells::{
+    ALIKE, BENDS, COMPONENTS, FAR_BELOW, JOINS, PAIR, PAIRS, UNLIKELY, USUAL_MOST,
+};
+use crate::diagnose::types::{KnownCell, Question};
 use crate::effect::{Form, Place, Survey, Variable, cause};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -97,6 +99,15 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         let mut named = listed::cells(survey, &values, question);
         named.append(&mut cells);
         named.retain(keeps);
+        for cell in &mut named {
+            let of = |known: &&KnownCell| known.cell == cell.key;
+            if let Some(known) = question.known.iter().find(of) {
+                // However usual a cause is, a recording has to show something of it.
+                let probability = known.probability.clamp(1e-6, *USUAL_MOST);
+                cell.log_prior = (probability / (1.0 - probability)).ln();
+                cell.between = Some(known.between);
+            }
+        }
         let mut motions = Vec::new();
         let mut variables = Vec::new();
         for form in named
@@ -121,7 +132,10 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         let values = |of: Variable| frame.values(of);
         let coarse: Vec<CellColumns> = named
             .par_iter()
-            .map(|cell| CellColumns::of(cell.groups(survey, &values, false), frame))
+            .map(|cell| {
+                let block = CellColumns::of(cell.groups(survey, &values, false), frame);
+                block.between(cell.between)
+            })
             .collect();
         let fine = named.iter().map(|_| OnceLock::new()).collect();
         let mut columns = 0;
@@ -169,6 +183,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
                 self.cells[cell].groups(self.survey, &values, true),
                 self.frame,
             )
+            .between(self.cells[cell].between)
         })
     }
 

@@ -4,7 +4,7 @@
 //! component is left out, or another one put in, without a pass over the rows.
 
 use super::cell::{CellShape, ShapeGroup};
-use super::evidence::{EvidenceRows, GroupEvidence, evidence};
+use super::evidence::{EvidenceRows, GroupEvidence, evidence_between};
 use super::frame::{SearchRows, UnitColumns, product, view};
 use crate::criteria::cells::NU;
 use crate::diagnose::linear::dot;
@@ -34,7 +34,12 @@ pub(super) struct SeenGroup {
 pub(super) struct CellColumns {
     pub groups: Vec<SeenGroup>,
     pub columns: UnitColumns,
+    /// Its possible amplitudes, m.
+    pub between: [f64; 2],
 }
+
+/// Any amplitude.
+const ANY: [f64; 2] = [0.0, f64::INFINITY];
 
 impl CellColumns {
     pub fn of(groups: Vec<ShapeGroup>, frame: &SearchRows) -> Self {
@@ -69,6 +74,7 @@ impl CellColumns {
         Self {
             groups: groups.into_iter().map(seen).collect(),
             columns,
+            between: ANY,
         }
     }
 }
@@ -92,6 +98,15 @@ impl CellColumns {
                 values,
                 square: (*own.square).clone(),
             },
+            between: ANY,
+        }
+    }
+
+    /// With the possible amplitudes that other robots show.
+    pub fn between(self, between: Option<[f64; 2]>) -> Self {
+        Self {
+            between: between.unwrap_or(ANY),
+            ..self
         }
     }
 
@@ -622,7 +637,8 @@ impl KnownState {
                 }
             }
             for (s, shape) in group.group.shapes.iter().enumerate() {
-                let found = evidence(&gram, &gradient, &shape.shares, self.rows);
+                let found =
+                    evidence_between(&gram, &gradient, &shape.shares, self.rows, block.between);
                 each(
                     g,
                     s,
