@@ -111,10 +111,7 @@ impl GroupSums {
     pub fn add(&mut self, rows: &[CellEvidenceRow]) {
         self.robots += 1;
         for row in rows {
-            // Of a given cell the row says which shape the robot has.
-            let is_given = row.sigma_mm.is_some();
-            let shape = if is_given { "" } else { &row.shape };
-            let key = (row.given.clone(), row.cell.clone(), shape.to_string());
+            let key = (row.given.clone(), row.cell.clone(), row.shape.clone());
             self.sums
                 .entry(key)
                 .or_insert_with(|| Sum::new(row))

@@ -214,7 +214,7 @@ impl GroupSearch {
                 continue;
             };
             let mut next = self.given.clone();
-            next[i] = given(best.cell, None, best.sum.size_mm());
+            next[i] = given(best.cell, best.shape, best.sum.size_mm());
             self.seen.insert(Self::key(&self.given));
             if self.seen.insert(Self::key(&next)) {
                 self.given = next;

@@ -116,8 +116,9 @@ pub(crate) fn answers(
                 let left_out = table.cells[own.cell].key.clone();
                 let mut alike = table.alike(own, 40);
                 alike.retain(|cell| components.iter().all(|other| other.cell != *cell));
+                alike.push(own.cell);
                 let mut rivals = table.answers(&alike, &state, &rest, Some(&left_out));
-                rivals.retain(|rival| rival.shape.is_none());
+                rivals.retain(|rival| rival.cell != left_out || rival.shape.is_some());
                 out.extend(rivals);
                 out.extend(table.of_given(own, &state, &rest, left_out));
             }
@@ -263,7 +264,7 @@ impl CauseTable<'_, '_> {
         Some(CellAnswer {
             left_out: Some(key.clone()),
             cell: key,
-            shape: Some(shape_key(&own.group)),
+            shape: None,
             effect: cell.name,
             place: cell.place,
             follows: own.forms.first()?.follows(cell.place),
