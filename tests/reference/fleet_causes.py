@@ -140,12 +140,14 @@ def main():
         j = r.choice([2, 3, 4])
         place = place_of(kind, j)
         store = os.path.join(args.out, "store")
-        for turn in range(2):
+        for turn in range(7):
             path = fleet(args.out, f"scale{f}-{turn}", [[make(j, strength, r)] for _ in range(6)], r)
             diagnose(path, store, args)
             seen = [log for log, _ in logs(store, f"scale{f}-{turn}", effect, place)]
             mean = sum(seen) / len(seen)
-            strength *= math.sqrt((args.evidence + 4) / max(mean + 4, 1.5))
+            if abs(mean - args.evidence) < 1:
+                break
+            strength *= math.sqrt((args.evidence + 4) / max(mean + 4, 1.2)) if mean > 0 else 2.5
         lacking = r.randrange(args.robots)
         effects = [[] if k == lacking else [make(j, strength * r.gauss(1, 0.1), r)] for k in range(args.robots)]
         begun = time.time()
