@@ -8,7 +8,7 @@ use super::round::{GroupColumn, Round};
 use super::{Fleet, Ledger};
 use crate::criteria::cells::{COMPONENTS, JOINS, LEAVES};
 use crate::effect::names;
-use crate::error::Result;
+use crate::error::{Result, visible};
 use crate::report::fleet_causes as page;
 use crate::stage::Given;
 use crate::store::{Account, KEY_FORMAT, PendingTable, StageKey, TableRef};
@@ -49,7 +49,6 @@ pub struct CauseSearch {
     groups: BTreeMap<String, GroupSearch>,
     /// Rounds so far.
     pub rounds: usize,
-    cells: usize,
 }
 
 impl CauseSearch {
@@ -59,7 +58,6 @@ impl CauseSearch {
             round: Round::first(by),
             groups: BTreeMap::new(),
             rounds: 0,
-            cells: 0,
         }
     }
 
@@ -68,14 +66,10 @@ impl CauseSearch {
         &self.round
     }
 
-    /// The causes of the groups so far, `effect at place` each with its group, and how many cells were compared in the last round.
-    pub fn so_far(&self) -> (Vec<(String, String)>, usize) {
-        let cells = self.round.groups.iter().flat_map(|(group, given)| {
-            given
-                .iter()
-                .map(|given| (group.clone(), given.cell.replace('@', " at ")))
-        });
-        (cells.collect(), self.cells)
+    /// Keys of the cells that the groups have so far.
+    pub fn so_far(&self) -> Vec<String> {
+        let given = self.round.groups.values().flatten();
+        given.map(|given| visible(&given.cell)).collect()
     }
 
     /// Takes the robots' answers; whether they are to be asked again.
@@ -100,11 +94,6 @@ impl CauseSearch {
             }
             sums.entry(group).or_default().add(rows);
         })?;
-        self.cells = sums
-            .values()
-            .map(|sums| sums.cells("").count())
-            .max()
-            .unwrap_or(0);
         let mut goes_on = false;
         for (group, sums) in &sums {
             let search = self.groups.entry(group.clone()).or_default();

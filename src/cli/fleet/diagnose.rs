@@ -8,7 +8,7 @@ use super::{FleetLocation, records, workshop};
 use crate::error::{Error, Result, counted, visible};
 use crate::fleet::causes::{self, CauseSearch, Published};
 use crate::fleet::round::GroupColumn;
-use crate::fleet::{Ending, Fleet, RobotRecord, local};
+use crate::fleet::{Ending, Fleet, local};
 use crate::progress::{FleetProgress, Verbosity};
 use clap::{Args, ValueEnum};
 use serde_json::json;
@@ -85,36 +85,28 @@ pub(super) fn main(arguments: &FleetDiagnoseArguments, command_line: &[OsString]
     let last = loop {
         let mut note = note(&fleet, &arguments.place, &fresh().run_id)?;
         note.round.clone_from(&workshop.round);
-        let records: Vec<Option<RobotRecord>> = match arguments.engine {
-            Engine::Local => {
-                workshop.ledger.put_run(&note)?;
-                let workers = arguments.jobs.map_or_else(cores, usize::from);
-                let progress = FleetProgress::new(verbosity, workers, chosen.len());
-                let stop = || workshop.ledger.cancelled(&note.run);
-                let options = local::WorkerOptions {
-                    workers,
-                    fail_fast: false,
-                    stop: &stop,
-                };
-                let worked = local::work(&workshop, &chosen, &options, &progress);
-                progress.finish();
-                let worked = worked?;
-                computed += worked.computed;
-                worked.records
-            }
-            Engine::Slurm => {
-                note.engine = "slurm".into();
-                let progress = FleetProgress::new(verbosity, 0, chosen.len());
-                let waited = on_slurm(&workshop, &mut note, &chosen, &arguments.cluster, &progress);
-                progress.finish();
-                let Some(now) = waited? else {
-                    return emit(
-                        "submitted the robots of one round; the same command again goes on\n",
-                    );
-                };
-                computed += now;
-                records(&workshop)?
-            }
+        let slurm = arguments.engine == Engine::Slurm;
+        let workers = arguments.jobs.map_or_else(cores, usize::from);
+        let shown = if slurm { 0 } else { workers };
+        let progress = FleetProgress::new(verbosity, shown, chosen.len());
+        let records = if slurm {
+            note.engine = "slurm".into();
+            let waited = on_slurm(&workshop, &mut note, &chosen, &arguments.cluster, &progress);
+            let Some(now) = waited? else {
+                return emit("submitted the robots of one round; the same command again goes on\n");
+            };
+            computed += now;
+            records(&workshop)?
+        } else {
+            workshop.ledger.put_run(&note)?;
+            let options = local::WorkerOptions {
+                workers,
+                fail_fast: false,
+                stop: &|| workshop.ledger.cancelled(&note.run),
+            };
+            let worked = local::work(&workshop, &chosen, &options, &progress)?;
+            computed += worked.computed;
+            worked.records
         };
         let missing = records.iter().filter(|record| record.is_none()).count();
         if missing > 0 {
@@ -122,20 +114,15 @@ pub(super) fn main(arguments: &FleetDiagnoseArguments, command_line: &[OsString]
             return Err(Error::store(fleet.name(), message));
         }
         let goes_on = search.take(&fleet, &workshop.ledger, &records)?;
-        if !arguments.quiet {
-            let (found, cells) = search.so_far();
-            let found: Vec<String> = found.into_iter().map(|(_, cell)| cell).collect();
-            eprintln!(
-                "round {}: {}; given now: {}",
-                search.rounds,
-                counted(cells, "cell"),
-                if found.is_empty() {
-                    "nothing".into()
-                } else {
-                    found.join(", ")
-                }
-            );
-        }
+        let found = search.so_far();
+        progress.say(&format!(
+            "round {}: {} given now{}{}",
+            search.rounds,
+            counted(found.len(), "cause"),
+            if found.is_empty() { "" } else { ": " },
+            found.join(", ")
+        ));
+        progress.finish();
         if !goes_on || search.rounds >= ROUNDS {
             break records;
         }

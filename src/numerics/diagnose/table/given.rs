@@ -1,17 +1,18 @@
 //! What every cell says of one robot given cells that its fleet has accepted: the numbers that a fleet sums.
 
-use super::cell::{CauseCell, ShapeGroup};
+use super::cell::CauseCell;
 use super::evidence::log_sum;
 use super::frame::{NoiseShape, SearchRows, product, view as matrix};
 use super::scan::CauseTable;
 use super::search::without;
-use super::state::{CellColumns, Component, KnownState};
+use super::state::{CellColumns, Component, KnownState, SeenGroup};
 use super::{by_currents, estimated, is_kept};
 use crate::criteria::cells::{CLOSELY, OPEN};
 use crate::diagnose::round::{EstimatedCause, FitState, Fitter, RoundView};
 use crate::effect::{Basis, Form, Place, Term};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 
 /// A cell that is taken to be in the robot.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,10 +50,20 @@ pub struct CellAnswer {
     pub sigma: Option<f64>,
 }
 
-/// The key of a shape.
-fn shape_key(group: &ShapeGroup) -> String {
-    let keys: Vec<String> = group.forms.iter().map(Form::key).collect();
-    keys.join("+")
+/// Keys of the shapes of a cell: their forms, numbered where several have the same.
+pub(super) fn shape_keys(groups: &[SeenGroup]) -> Vec<String> {
+    let mut times: BTreeMap<String, usize> = BTreeMap::new();
+    let key = |seen: &SeenGroup| {
+        let keys: Vec<String> = seen.group.forms.iter().map(Form::key).collect();
+        let key = keys.join("+");
+        let before = times.entry(key.clone()).or_default();
+        *before += 1;
+        match *before {
+            1 => key,
+            count => format!("{key}~{count}"),
+        }
+    };
+    groups.iter().map(key).collect()
 }
 
 /// Does something with the table of the cells that `keeps` leaves, around a fitted model.
@@ -139,12 +150,8 @@ impl CauseTable<'_, '_> {
                 let others = out.iter().filter(|(other, _)| *other != i);
                 let others: Vec<&Component> = others.map(|(_, own)| own).collect();
                 let state = self.state(&others, None);
-                let is_shared = |group: &ShapeGroup| {
-                    one.shape
-                        .as_ref()
-                        .is_none_or(|shape| shape_key(group) == *shape)
-                };
-                let Some(found) = self.closely_in(cell, &state, &others, &is_shared) else {
+                let shape = one.shape.as_deref();
+                let Some(found) = self.closely_in(cell, &state, &others, shape) else {
                     continue;
                 };
                 let own = Component {
@@ -204,11 +211,11 @@ impl CauseTable<'_, '_> {
                 sigma: None,
             };
             let shared = cell.is_named() && logs.len() > 1;
-            let shape = |(seen, log): (&super::state::SeenGroup, &f64)| {
+            let shape = |((seen, log), key): ((&SeenGroup, &f64), String)| {
                 let weights = seen.group.shapes.iter().map(|shape| shape.log_weight);
                 let weight = log_sum(&weights.collect::<Vec<_>>());
                 CellAnswer {
-                    shape: Some(shape_key(&seen.group)),
+                    shape: Some(key),
                     log: log - weight,
                     log_prior: weight,
                     ..whole.clone()
@@ -216,8 +223,12 @@ impl CauseTable<'_, '_> {
             };
             let steps =
                 |form: &Form| matches!(form.term().map(Term::basis), Some(Basis::After { .. }));
-            let shapes = block.groups.iter().zip(&logs);
-            let shapes = shapes.filter(|(seen, log)| {
+            let shapes = block
+                .groups
+                .iter()
+                .zip(&logs)
+                .zip(shape_keys(&block.groups));
+            let shapes = shapes.filter(|((seen, log), _)| {
                 shared && log.is_finite() && !seen.group.forms.iter().any(steps)
             });
             let shapes: Vec<CellAnswer> = shapes.map(shape).collect();

@@ -1,8 +1,9 @@
 //! All cells of a recording with their columns, and what each of them says given the components of a model.
 
-use super::cell::{CauseCell, FreeShape, Over, ShapeGroup, Shapes};
+use super::cell::{CauseCell, FreeShape, Over, Shapes};
 use super::evidence::log_sum;
 use super::frame::{SearchRows, UnitColumns};
+use super::given::shape_keys;
 use super::state::{CellColumns, ColumnProducts, Component, KnownState, PartProducts};
 use super::{generated, listed};
 use crate::criteria::cells::{
@@ -360,16 +361,16 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         state: &KnownState,
         components: &[&Component],
     ) -> Option<CellEvidence> {
-        self.closely_in(cell, state, components, &|_| true)
+        self.closely_in(cell, state, components, None)
     }
 
-    /// The same of some of its shapes.
+    /// The same of one of its shapes, where that is given.
     pub fn closely_in(
         &self,
         cell: usize,
         state: &KnownState,
         components: &[&Component],
-        is_asked: &dyn Fn(&ShapeGroup) -> bool,
+        shape: Option<&str>,
     ) -> Option<CellEvidence> {
         let block = self.fine(cell);
         let across = self.across_block(block, state, components);
@@ -387,9 +388,14 @@ impl<'f, 'a> CauseTable<'f, 'a> {
                 .iter()
                 .any(|form| keys.contains(&form.key()))
         };
+        let shapes = match shape {
+            Some(_) => shape_keys(&block.groups),
+            None => Vec::new(),
+        };
         let there: Vec<bool> = (0..block.groups.len())
             .map(|group| {
-                !keys.is_empty() && is_there(group) || !is_asked(&block.groups[group].group)
+                let is_other = shape.is_some_and(|shape| shapes[group] != shape);
+                !keys.is_empty() && is_there(group) || is_other
             })
             .collect();
         state.shapes(block, &across, 0, |group, shape, found| {
