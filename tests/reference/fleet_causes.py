@@ -24,7 +24,7 @@ ROOT = os.path.abspath(os.path.join(os.path.dirname(os.path.abspath(__file__)), 
 CAUSES = [
     ("backlash", "joint", lambda j, a, r: {"backlash": {"joint": j, "gap_arcsec": a}}, 6.0),
     ("gear_cyclic", "joint", lambda j, a, r: {"gear_cyclic": {"joint": j, "order": 2 + j % 3, "amplitude_arcsec": a, "phase_deg": r.uniform(0, 360)}}, 4.0),
-    ("axis_wobble", "joint", lambda j, a, r: {"axis_wobble": {"joint": j, "order": 1, "amplitude_arcsec": a, "ellipse": 1, "phase_deg": r.uniform(0, 360)}}, 4.0),
+    ("axis_wobble", "joint", lambda j, a, r: {"axis_wobble": {"joint": j, "order": 2, "amplitude_arcsec": a, "ellipse": 1, "phase_deg": r.uniform(0, 360)}}, 4.0),
     ("joint_compliance", "joint", lambda j, a, r: {"joint_compliance": {"joint": j, "rad_per_nm": 1e-9 * a}}, 20.0),
 ]
 
