@@ -1,7 +1,6 @@
 //! What the sums of a fleet mean: causes of groups with their size, spread and trend; robots that lack one, or have another size, or one alone.
 
-use super::cause_sums::GroupSums;
-use super::causes::each;
+use super::cause_sums::{GroupSums, each};
 use super::ledger::{Ending, RobotRecord};
 use super::round::Round;
 use super::{Fleet, Groups, Ledger};

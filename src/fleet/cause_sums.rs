@@ -1,8 +1,14 @@
 //! Log evidence summed over the robots of a group: a robot may lack a cause, and what is one in one robot alone is none of the group.
 
-use crate::table::CellEvidenceRow;
+use super::ledger::{Ledger, RobotRecord};
+use super::{Fleet, FleetRobot};
+use crate::error::Result;
+use crate::table::{CellEvidence, CellEvidenceRow, Table};
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 
+/// Robots whose tables are in memory at once.
+const CHUNK: usize = 64;
 /// Shares of a group's robots that may have a cause, all alike probable.
 const SHARES: usize = 20;
 /// ln of the least evidence of a cell: its amplitude may be one that no row shows, one of the 28 that are weighed.
@@ -154,6 +160,31 @@ impl GroupSums {
                 }
             })
     }
+}
+
+/// Hands every robot's rows over, in the order of the roster; few are in memory at once.
+pub(super) fn each(
+    fleet: &Fleet,
+    ledger: &Ledger,
+    records: &[Option<RobotRecord>],
+    take: &mut dyn FnMut(&FleetRobot, &[CellEvidenceRow]),
+) -> Result<()> {
+    let robots: Vec<_> = fleet.roster.0.iter().zip(records).collect();
+    for some in robots.chunks(CHUNK) {
+        let tables: Vec<Option<CellEvidence>> = some
+            .par_iter()
+            .map(|(_, record)| {
+                let record = record.as_ref();
+                ledger.load(record.and_then(|record| record.last(CellEvidence::KIND)))
+            })
+            .collect::<Result<_>>()?;
+        for ((robot, _), table) in some.iter().zip(tables) {
+            if let Some(table) = table {
+                take(robot, &table.0);
+            }
+        }
+    }
+    Ok(())
 }
 
 fn log_add(a: f64, b: f64) -> f64 {

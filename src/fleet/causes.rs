@@ -2,7 +2,7 @@
 //! pays; then what single robots show alone.
 
 use super::cause_answers::{self, Answers};
-use super::cause_sums::{CellTotal, GroupSums};
+use super::cause_sums::{CellTotal, GroupSums, each};
 use super::ledger::RobotRecord;
 use super::round::{GroupColumn, Round};
 use super::{Fleet, Ledger};
@@ -13,7 +13,6 @@ use crate::report::fleet_causes as page;
 use crate::stage::Given;
 use crate::store::{Account, KEY_FORMAT, PendingTable, StageKey, TableRef};
 use crate::table::{CellEvidence, CellEvidenceRow, Table};
-use rayon::prelude::*;
 use serde_json::json;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -22,8 +21,6 @@ use std::path::PathBuf;
 const STAGE: &str = "fleet_diagnose";
 /// Where its tables are noted among the fleet's.
 pub(super) const NOTE: &str = "causes.json";
-/// Robots whose tables are in memory at once.
-const CHUNK: usize = 64;
 /// Causes of a single robot that its group does not have, at most.
 const ALONE: usize = 3;
 /// By how much the odds of a rival must be larger to take the place of a cause.
@@ -115,31 +112,6 @@ impl CauseSearch {
         }
         Ok(goes_on)
     }
-}
-
-/// Hands every robot's rows over, in the order of the roster; few are in memory at once.
-pub(super) fn each(
-    fleet: &Fleet,
-    ledger: &Ledger,
-    records: &[Option<RobotRecord>],
-    take: &mut dyn FnMut(&super::FleetRobot, &[CellEvidenceRow]),
-) -> Result<()> {
-    let robots: Vec<_> = fleet.roster.0.iter().zip(records).collect();
-    for some in robots.chunks(CHUNK) {
-        let tables: Vec<Option<CellEvidence>> = some
-            .par_iter()
-            .map(|(_, record)| {
-                let record = record.as_ref();
-                ledger.load(record.and_then(|record| record.last(CellEvidence::KIND)))
-            })
-            .collect::<Result<_>>()?;
-        for ((robot, _), table) in some.iter().zip(tables) {
-            if let Some(table) = table {
-                take(robot, &table.0);
-            }
-        }
-    }
-    Ok(())
 }
 
 /// The cell that a robot by itself shows, if its odds alone are strong.

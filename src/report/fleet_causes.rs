@@ -2,12 +2,13 @@
 
 use super::page::render;
 use super::svg::Svg;
-use crate::effect::names;
 use crate::error::{Result, counted, visible};
 use crate::table::{FleetCellRow, FleetCells, FleetFindingRow, FleetFindings, FleetOutliers};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 
+/// Name of an effect that no cause of the list is.
+const UNNAMED: &str = "unknown";
 /// Robots that are named at the head, at most.
 const NAMED: usize = 40;
 /// Standard deviations from its siblings from which a robot is marked.
@@ -125,7 +126,7 @@ fn group(name: &str, findings: &[&FleetFindingRow], cells: &FleetCells) -> Value
             let strong = (size / SCALE[0]).max(1.0).ln() / (SCALE[1] / SCALE[0]).ln();
             json!({
                 "name": effects.join(", "),
-                "open": here.iter().any(|row| row.effect == names::UNKNOWN),
+                "open": here.iter().any(|row| row.effect == UNNAMED),
                 "size": length(size),
                 "share": format!("{} of {}", first.robots, first.of_robots),
                 "height": (100.0 * share).round(),

@@ -4,8 +4,7 @@
 use crate::diagnose::{CellAnswer, GivenCell, cell_evidence};
 use crate::effect::names;
 use crate::error::{Error, Fault, Result};
-use crate::stage::diagnose::{AskedRows, Diagnose, DiagnoseReads};
-use crate::stage::{Context, RawFile, Stage};
+use crate::stage::{AskedRows, Context, Diagnose, DiagnoseReads, RawFile, Stage};
 use crate::table::{CellEvidence as CellEvidenceTable, CellEvidenceRow};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

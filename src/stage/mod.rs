@@ -46,7 +46,8 @@ mod weightless;
 pub use cell_evidence::{CellEvidence, CellEvidenceWrites, Given};
 pub use compare::{Compare, CompareReads};
 pub use compare_torques::{CompareTorques, CompareTorquesReads};
-pub use diagnose::{Diagnose, DiagnoseReads};
+use diagnose::AskedRows;
+pub use diagnose::{CellPrior, Diagnose, DiagnoseReads};
 pub use diagnose_torques::{
     ConsistencySetting, DiagnoseTorques, DiagnoseTorquesReads, DiagnoseTorquesWrites, HoldOut,
     InertialSetting,

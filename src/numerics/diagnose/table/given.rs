@@ -5,14 +5,13 @@ use super::evidence::log_sum;
 use super::frame::{NoiseShape, SearchRows, product, view as matrix};
 use super::scan::CauseTable;
 use super::search::without;
-use super::state::{CellColumns, Component, KnownState, SeenGroup};
+use super::state::{CellColumns, Component, KnownState, SeenGroup, shape_keys};
 use super::{by_currents, estimated, is_kept};
 use crate::criteria::cells::{CLOSELY, OPEN};
 use crate::diagnose::round::{EstimatedCause, FitState, Fitter, RoundView};
 use crate::effect::{Basis, Form, Place, Term};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use std::collections::BTreeMap;
 
 /// A cell that is taken to be in the robot.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,22 +47,6 @@ pub struct CellAnswer {
     pub size: f64,
     /// One standard deviation of the size of a given cell, m.
     pub sigma: Option<f64>,
-}
-
-/// Keys of the shapes of a cell: their forms, numbered where several have the same.
-pub(super) fn shape_keys(groups: &[SeenGroup]) -> Vec<String> {
-    let mut times: BTreeMap<String, usize> = BTreeMap::new();
-    let key = |seen: &SeenGroup| {
-        let keys: Vec<String> = seen.group.forms.iter().map(Form::key).collect();
-        let key = keys.join("+");
-        let before = times.entry(key.clone()).or_default();
-        *before += 1;
-        match *before {
-            1 => key,
-            count => format!("{key}~{count}"),
-        }
-    };
-    groups.iter().map(key).collect()
 }
 
 /// Does something with the table of the cells that `keeps` leaves, around a fitted model.

@@ -3,8 +3,7 @@
 use super::cell::{CauseCell, FreeShape, Over, Shapes};
 use super::evidence::log_sum;
 use super::frame::{SearchRows, UnitColumns};
-use super::given::shape_keys;
-use super::state::{CellColumns, ColumnProducts, Component, KnownState, PartProducts};
+use super::state::{CellColumns, ColumnProducts, Component, KnownState, PartProducts, shape_keys};
 use super::{generated, listed};
 use crate::criteria::cells::{
     ALIKE, BENDS, COMPONENTS, FAR_BELOW, JOINS, PAIR, PAIRS, UNLIKELY, USUAL_MOST,

@@ -30,6 +30,22 @@ pub(super) struct SeenGroup {
     gradient: DVector<f64>,
 }
 
+/// Keys of the shapes of a cell: their forms, numbered where several have the same.
+pub(super) fn shape_keys(groups: &[SeenGroup]) -> Vec<String> {
+    let mut times: BTreeMap<String, usize> = BTreeMap::new();
+    let key = |seen: &SeenGroup| {
+        let keys: Vec<String> = seen.group.forms.iter().map(Form::key).collect();
+        let key = keys.join("+");
+        let before = times.entry(key.clone()).or_default();
+        *before += 1;
+        match *before {
+            1 => key,
+            count => format!("{key}~{count}"),
+        }
+    };
+    groups.iter().map(key).collect()
+}
+
 /// All shapes of a cell with their columns.
 pub(super) struct CellColumns {
     pub groups: Vec<SeenGroup>,
@@ -37,9 +53,6 @@ pub(super) struct CellColumns {
     /// Its possible amplitudes, m.
     pub between: [f64; 2],
 }
-
-/// Any amplitude.
-const ANY: [f64; 2] = [0.0, f64::INFINITY];
 
 impl CellColumns {
     pub fn of(groups: Vec<ShapeGroup>, frame: &SearchRows) -> Self {
@@ -74,7 +87,7 @@ impl CellColumns {
         Self {
             groups: groups.into_iter().map(seen).collect(),
             columns,
-            between: ANY,
+            between: [0.0, f64::INFINITY],
         }
     }
 }
@@ -98,14 +111,14 @@ impl CellColumns {
                 values,
                 square: (*own.square).clone(),
             },
-            between: ANY,
+            between: [0.0, f64::INFINITY],
         }
     }
 
     /// With the possible amplitudes that other robots show.
     pub fn between(self, between: Option<[f64; 2]>) -> Self {
         Self {
-            between: between.unwrap_or(ANY),
+            between: between.unwrap_or([0.0, f64::INFINITY]),
             ..self
         }
     }
