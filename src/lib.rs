@@ -37,7 +37,7 @@
 //! | [`export`] | the identified model for other programs, one file per format | compensate, criteria, dynamics, effect, estimate, identified, raw, robot, spatial, table, yaml |
 //! | [`init`] | what a folder of files is, and the pipeline that reads it | program, raw, robot, stage, yaml |
 //! | [`excitation`] | which motion to record for torques, for a robot file | identified, numerics, stage |
-//! | [`fleet`] | many robots: roster, records, workers, cluster, tables | pipeline, raw, report, shell, stage, store, table, yaml |
+//! | [`fleet`] | many robots: roster, records, workers, cluster, causes, tables | criteria, effect, estimate, pipeline, raw, report, shell, stage, store, table, yaml |
 //! | [`audit`] | runs told, explained, compared, asked, traced, swept | diff, pipeline, raw, shell, stage, store |
 //! | [`proof`] | sets of concealed recordings, their seal, diagnoses held against the truth | estimate, raw, robot, table, twin |
 //! | [`poses`] | which poses to measure, for a robot file or for a finding of a run | audit, identified, numerics, pipeline, raw, store, table |

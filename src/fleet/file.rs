@@ -137,7 +137,8 @@ pub struct PriorFrom {
     pub stage: String,
     /// Whose values are taken.
     pub by: PriorBy,
-    /// Effects that it speaks of, by canonical name.
+    /// Effects that it speaks of, by canonical name; of `causes` none.
+    #[serde(default)]
     pub effects: Vec<String>,
 }
 
@@ -149,6 +150,9 @@ pub enum PriorBy {
     Robot,
     /// Mean and spread over all robots of the same `groups.model`, with the robot's own left out.
     Model,
+    /// Causes that `calib fleet diagnose` found in the robots of the same `groups.model`: how usual and how large each is, for a stage
+    /// `diagnose`.
+    Causes,
 }
 
 fn robot_id() -> String {
@@ -230,6 +234,13 @@ impl FleetFile {
                 let message = "missing: the variable of the pipeline that takes a robot's part of the recording";
                 fault(&format!("robots[{index}].variable"), message.into());
             }
+        }
+        if let Some(prior) = &self.prior
+            && prior.effects.is_empty() != (prior.by == PriorBy::Causes)
+        {
+            let message =
+                "expected names of effects for `by: robot` and `by: model`, none for `by: causes`";
+            fault("prior.effects", message.into());
         }
         if let Some(previous) = &self.previous {
             if !(previous.alpha > 0.0 && previous.alpha < 1.0) {

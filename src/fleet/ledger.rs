@@ -5,6 +5,7 @@
 
 use super::file::Groups;
 use super::robot::FleetRobot;
+use super::round::Round;
 use crate::error::Result;
 use crate::store::{Store, TableRef};
 use crate::table::Table;
@@ -142,6 +143,9 @@ pub struct RunNote {
     /// Ids of the cluster's jobs.
     #[serde(default)]
     pub jobs: Vec<String>,
+    /// The round of a fleet's diagnosis that it computes; none where it is the whole pipeline.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub round: Option<Round>,
 }
 
 /// A robot of a run.

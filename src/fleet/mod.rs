@@ -3,6 +3,9 @@
 //! A robot is done when its record is in the store, whoever computed it: threads of this process ([`local`]) or tasks of a
 //! cluster ([`cluster`]). Names of robots are data: they become hashes in paths and never reach a shell.
 
+mod cause_answers;
+mod cause_sums;
+pub mod causes;
 pub mod cluster;
 pub mod file;
 pub mod ledger;
@@ -13,6 +16,7 @@ mod pool;
 mod recalibration;
 pub mod robot;
 pub mod roster;
+pub mod round;
 pub mod slurm;
 pub mod tables;
 mod work;

@@ -4,11 +4,12 @@
 //! value is left out of the prior that it gets, so that nothing is counted twice.
 
 use super::Fleet;
+use super::causes::noted;
 use super::file::{Groups, PriorBy, PriorFrom};
 use super::ledger::{Ending, Ledger};
 use super::recalibration::Earlier;
-use crate::error::Result;
-use crate::table::{Parameters, Table};
+use crate::error::{Error, Result};
+use crate::table::{FleetFindingRow, FleetFindings, Parameters, Table};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
@@ -46,13 +47,18 @@ impl Fleet {
                 }
             }
         }
-        if let Some(wanted) = self.file.prior.clone() {
+        let by_causes = |prior: &PriorFrom| prior.by == PriorBy::Causes;
+        if let Some(wanted) = self.file.prior.clone().filter(by_causes) {
+            self.expect_causes(&wanted, ledger)?;
+        }
+        let by_parameters = |prior: &PriorFrom| prior.by != PriorBy::Causes;
+        if let Some(wanted) = self.file.prior.clone().filter(by_parameters) {
             let earlier = Earlier::named(&wanted.fleet, "prior.fleet", ledger)?;
             let known = EarlierChanges::read(&earlier, &wanted, ledger)?;
             for robot in &mut self.roster.0 {
                 let priors = match wanted.by {
                     PriorBy::Robot => known.own(&robot.name),
-                    PriorBy::Model => known.pooled(&robot.name, &robot.groups),
+                    PriorBy::Model | PriorBy::Causes => known.pooled(&robot.name, &robot.groups),
                 };
                 if !priors.is_empty() {
                     let entry =
@@ -64,6 +70,36 @@ impl Fleet {
                     )]));
                 }
             }
+        }
+        Ok(())
+    }
+
+    /// Sets for every robot what the diagnosis of an earlier fleet says of the causes of its model.
+    fn expect_causes(&mut self, wanted: &PriorFrom, ledger: &Ledger) -> Result<()> {
+        let earlier = Ledger::new(ledger.store, &wanted.fleet);
+        let findings = noted::<FleetFindings>(&earlier, "fleet_findings")?.ok_or_else(|| {
+            let message = format!(
+                "no fleet `{}` was diagnosed in store {}: calib fleet diagnose",
+                wanted.fleet,
+                ledger.store.root().display()
+            );
+            Error::spec("prior.fleet", message)
+        })?;
+        for robot in &mut self.roster.0 {
+            let model = robot.groups.model.clone().unwrap_or_default();
+            let of_model = findings
+                .0
+                .iter()
+                .filter(|row| row.robot.is_empty() && row.group == model);
+            let prior = |row: &FleetFindingRow| {
+                json!({
+                    "cell": row.cell, "share": row.robots as f64 / row.of_robots as f64,
+                    "size_mm": row.size_mm.max(1e-3), "spread_mm": row.spread_mm.unwrap_or(0.0),
+                })
+            };
+            let priors: Vec<Value> = of_model.map(prior).collect();
+            let target = format!("{}.prior", wanted.stage);
+            robot.set_values(&BTreeMap::from([(target, Value::Array(priors))]));
         }
         Ok(())
     }

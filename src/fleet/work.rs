@@ -3,6 +3,7 @@
 use super::Fleet;
 use super::ledger::{Ending, LATER, Ledger, RobotRecord, RobotTable};
 use super::robot::FleetRobot;
+use super::round::Round;
 use crate::error::{Error, Result};
 use crate::pipeline::{
     Observer, Plan, Purpose, RunOptions, Selection, StageReport, Surroundings, run,
@@ -44,6 +45,8 @@ pub struct Workshop<'a> {
     pub log: Option<String>,
     /// Threads inside one robot's run; no result depends on it.
     pub threads: usize,
+    /// The round of a fleet's diagnosis that is computed; none where the whole pipeline is.
+    pub round: Option<Round>,
 }
 
 /// Longer reasons are cut; the run's manifest has them whole.
@@ -63,7 +66,10 @@ impl Workshop<'_> {
         )?;
         // Tables and documents of every robot have a folder of their own.
         plan.name = format!("{}.{}", self.fleet.name(), robot.handle());
-        Ok(plan)
+        match &self.round {
+            Some(round) => round.plan(plan, robot),
+            None => Ok(plan),
+        }
     }
 
     /// The plan, or why there is none, and the key of the robot's record.

@@ -15,6 +15,7 @@ mod errors;
 mod findings;
 mod fits;
 pub mod fleet;
+pub mod fleet_causes;
 mod json;
 mod language;
 mod limits;

@@ -1,9 +1,9 @@
 //! `diagnose`: where the recording and the robot as its user believes it differ, what physics was left out, and the gain of it.
 
 use crate::diagnose::{
-    Diagnosis, Question, VerdictKind as Said, against_simulation, diagnose, wrong_setup,
+    Diagnosis, KnownCell, Question, VerdictKind as Said, against_simulation, diagnose, wrong_setup,
 };
-use crate::effect::{CAUSES, names};
+use crate::effect::{CAUSES, DeclaredCause, names};
 use crate::error::{Error, Fault, Result, instead};
 use crate::estimate::{Suspect, gauge};
 use crate::observation::values;
@@ -43,9 +43,43 @@ pub struct Diagnose {
     /// `unknown` at its place; of geometry and ratios the numbers of the robot file stay.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub without: Vec<String>,
+    /// What other robots of the model say of causes: cells of the table `fleet_findings` with the share of robots that have each and their
+    /// sizes. `prior: {fleet: F, stage: diagnose, by: causes}` of a fleet's file fills it in.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub prior: Vec<CellPrior>,
     /// Files with effects of your own, which are compared with those of the library.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub effects: Vec<RawFile>,
+}
+
+/// What other robots of the model say of a cause.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CellPrior {
+    /// Key of the cell, e.g. `backlash@joint 3`.
+    pub cell: String,
+    /// Share of the robots that have it, 0 to 1.
+    pub share: f64,
+    /// Usual rms motion at the tool, mm.
+    pub size_mm: f64,
+    /// Its standard deviation from robot to robot, mm.
+    #[serde(default)]
+    pub spread_mm: f64,
+}
+
+impl CellPrior {
+    /// Poses and payloads differ as well: sizes of three times more or less stay possible.
+    fn known(&self) -> KnownCell {
+        let [low, high] = [self.size_mm / 3.0, 3.0 * self.size_mm];
+        KnownCell {
+            cell: self.cell.clone(),
+            probability: self.share,
+            between: [
+                1e-3 * low.min(self.size_mm - 2.0 * self.spread_mm).max(0.0),
+                1e-3 * high.max(self.size_mm + 2.0 * self.spread_mm),
+            ],
+        }
+    }
 }
 
 fn as_believed() -> f64 {
@@ -121,6 +155,21 @@ impl Stage for Diagnose {
                 format!("expected a probability from {MOST_CLOSED} to {MOST_OPEN}"),
             ));
         }
+        for (k, prior) in self.prior.iter().enumerate() {
+            let sizes = [prior.size_mm, prior.size_mm + prior.spread_mm];
+            if !(0.0..=1.0).contains(&prior.share) {
+                faults.push(Fault::new(
+                    format!("prior[{k}].share"),
+                    "expected a share from 0 to 1",
+                ));
+            }
+            if !sizes.iter().all(|size| (1e-3..=30.0).contains(size)) || prior.spread_mm < 0.0 {
+                faults.push(Fault::new(
+                    format!("prior[{k}].size_mm"),
+                    "expected sizes from 0.001 to 30 mm and a spread_mm of 0 or more",
+                ));
+            }
+        }
         let tried = || {
             CAUSES
                 .iter()
@@ -171,9 +220,108 @@ impl Stage for Diagnose {
     }
 
     fn run(&self, reads: DiagnoseReads, context: &Context) -> Result<DiagnoseWrites> {
-        let own = own_effects(&self.effects, context)?;
-        let asked = reads.split.rows(&reads.recording, &self.on)?;
-        let (data, corrected) = mismatch(&reads, &asked, context)?;
+        let asked = AskedRows::of(self, &reads, context)?;
+        let question = asked.question(self, context.seed);
+        let AskedRows {
+            data,
+            corrected,
+            fit,
+            ..
+        } = &asked;
+        let corrected = *corrected;
+        context
+            .services
+            .begin("looking for what the model lacks", None, "steps");
+        let mut steps = 0;
+        let tell = |line: String| {
+            steps += 1;
+            context.services.note(line.clone());
+            context.services.advance(steps, &line);
+        };
+        let diagnosis = wrong_setup(&question).unwrap_or_else(|| diagnose(&question, tell));
+        let mut diagnosis = said(diagnosis, &question, context)?;
+        blank_payload(&reads.recording)
+            .into_iter()
+            .for_each(|line| context.services.warn(line));
+        if !matches!(diagnosis.verdict, Said::WrongSetup | Said::NotAsked) {
+            remark(&mut diagnosis, data, &reads.recording, context);
+        }
+        let step = context.id;
+        let mut held_out = vec![true; data.rows()];
+        fit.iter().for_each(|row| held_out[*row] = false);
+        let parameters = Parameters::of(step, &diagnosis.model, &diagnosis.fitted, &[], None);
+        let covariance = diagnosis.fitted.covariance.as_ref();
+        let kept = &diagnosis.kept;
+        let errors = diagnosis
+            .folds
+            .iter()
+            .flat_map(|folds| kept.iter().zip(folds.random.iter().zip(&folds.blocks)));
+        let aside = diagnosis
+            .screening
+            .suspects
+            .iter()
+            .filter(|suspect| !suspect.used())
+            .map(|Suspect { row, .. }| *row);
+        let unseen: Vec<usize> = (0..data.rows()).filter(|row| held_out[*row]).collect();
+        let known = covariance
+            .filter(|_| corrected == Corrected::RobotFile && diagnosis.verdict != Said::WrongSetup);
+        let doubtful = KnownModel {
+            model: &diagnosis.model,
+            covariance: known,
+            measured: data,
+        };
+        let prediction = Prediction::of(
+            step,
+            &diagnosis.model,
+            data,
+            &reads.recording,
+            &reads.split,
+            &held_out,
+            covariance,
+        )
+        .with_suspects(aside)
+        .with_weights(&diagnosis.kept, &diagnosis.fitted)
+        .with_folds(errors)
+        .with_remarks(doubtful.remarks(data, &unseen));
+        if let Some(line) = doubtful::sentence(&prediction) {
+            diagnosis.statement.push_str(&format!("; {line}"));
+        }
+        Ok(DiagnoseWrites {
+            verdict: Verdict::of(step, &diagnosis),
+            sentences: VerdictSentences::of_positions(step, &diagnosis),
+            findings: Findings::of(&diagnosis),
+            finding_numbers: FindingNumbers::of(&diagnosis),
+            rivals: Rivals::of(&diagnosis),
+            forms: Forms::of(&diagnosis),
+            shares: Shares::of(&diagnosis),
+            cells: Cells::of(&diagnosis),
+            spectrum: Spectrum::of(&diagnosis),
+            parameters: parameters.correcting(corrected),
+            covariance: CovarianceTable::of(&diagnosis.model, &diagnosis.fitted, None),
+            prediction,
+            suspects: Suspects::of(step, &diagnosis.screening, &reads.recording, &reads.split),
+        })
+    }
+}
+
+/// The rows that a diagnosis is asked of, and the robot that they belong to.
+pub(super) struct AskedRows {
+    own: Vec<&'static DeclaredCause>,
+    known: Vec<KnownCell>,
+    data: Measurements,
+    corrected: Corrected,
+    fit: Vec<usize>,
+    validate: Vec<usize>,
+    robot: RobotModel,
+    set: Vec<usize>,
+}
+
+impl AskedRows {
+    /// Of the tables of a stage with these settings; fails where they do not place the robot.
+    pub fn of(settings: &Diagnose, reads: &DiagnoseReads, context: &Context) -> Result<Self> {
+        let own = own_effects(&settings.effects, context)?;
+        let asked = reads.split.rows(&reads.recording, &settings.on)?;
+        let (data, corrected) = mismatch(reads, &asked, context)?;
         if data.sequence.is_some() {
             context.services.warn(SORTED_OTHERWISE.into());
         }
@@ -198,91 +346,34 @@ impl Stage for Diagnose {
         )
         .map_err(|message| Error::data("table recording", message))?;
         let set = screened::numbered(&reads.split);
-        let question = Question {
-            robot: &robot,
-            data: &data,
-            fit: &fit,
-            validate: &validate,
-            set: &set,
-            prior_weight: self.prior_weight,
-            open_world: self.open_world,
-            without: &self.without,
-            own: &own,
-            beside_simulation: corrected == Corrected::OutsideSimulation,
-            seed: context.seed,
-        };
-        context
-            .services
-            .begin("looking for what the model lacks", None, "steps");
-        let mut steps = 0;
-        let tell = |line: String| {
-            steps += 1;
-            context.services.note(line.clone());
-            context.services.advance(steps, &line);
-        };
-        let diagnosis = wrong_setup(&question).unwrap_or_else(|| diagnose(&question, tell));
-        let mut diagnosis = said(diagnosis, &question, context)?;
-        blank_payload(&reads.recording)
-            .into_iter()
-            .for_each(|line| context.services.warn(line));
-        if !matches!(diagnosis.verdict, Said::WrongSetup | Said::NotAsked) {
-            remark(&mut diagnosis, &data, &reads.recording, context);
-        }
-        let step = context.id;
-        let mut held_out = vec![true; data.rows()];
-        fit.iter().for_each(|row| held_out[*row] = false);
-        let parameters = Parameters::of(step, &diagnosis.model, &diagnosis.fitted, &[], None);
-        let covariance = diagnosis.fitted.covariance.as_ref();
-        let kept = &diagnosis.kept;
-        let errors = diagnosis
-            .folds
-            .iter()
-            .flat_map(|folds| kept.iter().zip(folds.random.iter().zip(&folds.blocks)));
-        let aside = diagnosis
-            .screening
-            .suspects
-            .iter()
-            .filter(|suspect| !suspect.used())
-            .map(|Suspect { row, .. }| *row);
-        let unseen: Vec<usize> = (0..data.rows()).filter(|row| held_out[*row]).collect();
-        let known = covariance
-            .filter(|_| corrected == Corrected::RobotFile && diagnosis.verdict != Said::WrongSetup);
-        let doubtful = KnownModel {
-            model: &diagnosis.model,
-            covariance: known,
-            measured: &data,
-        };
-        let prediction = Prediction::of(
-            step,
-            &diagnosis.model,
-            &data,
-            &reads.recording,
-            &reads.split,
-            &held_out,
-            covariance,
-        )
-        .with_suspects(aside)
-        .with_weights(&diagnosis.kept, &diagnosis.fitted)
-        .with_folds(errors)
-        .with_remarks(doubtful.remarks(&data, &unseen));
-        if let Some(line) = doubtful::sentence(&prediction) {
-            diagnosis.statement.push_str(&format!("; {line}"));
-        }
-        Ok(DiagnoseWrites {
-            verdict: Verdict::of(step, &diagnosis),
-            sentences: VerdictSentences::of_positions(step, &diagnosis),
-            findings: Findings::of(&diagnosis),
-            finding_numbers: FindingNumbers::of(&diagnosis),
-            rivals: Rivals::of(&diagnosis),
-            forms: Forms::of(&diagnosis),
-            shares: Shares::of(&diagnosis),
-            cells: Cells::of(&diagnosis),
-            spectrum: Spectrum::of(&diagnosis),
-            parameters: parameters.correcting(corrected),
-            covariance: CovarianceTable::of(&diagnosis.model, &diagnosis.fitted, None),
-            prediction,
-            suspects: Suspects::of(step, &diagnosis.screening, &reads.recording, &reads.split),
+        Ok(Self {
+            own,
+            known: settings.prior.iter().map(CellPrior::known).collect(),
+            data,
+            corrected,
+            fit,
+            validate,
+            robot,
+            set,
         })
+    }
+
+    /// What is asked of them.
+    pub fn question<'a>(&'a self, settings: &'a Diagnose, seed: u64) -> Question<'a> {
+        Question {
+            robot: &self.robot,
+            data: &self.data,
+            fit: &self.fit,
+            validate: &self.validate,
+            set: &self.set,
+            prior_weight: settings.prior_weight,
+            open_world: settings.open_world,
+            without: &settings.without,
+            own: &self.own,
+            beside_simulation: self.corrected == Corrected::OutsideSimulation,
+            known: &self.known,
+            seed,
+        }
     }
 }
 

@@ -233,6 +233,7 @@ impl Identify {
             without: &[],
             own: &[],
             beside_simulation: reads.recording.simulated.is_some(),
+            known: &[],
             seed: context.seed,
         };
         if let Some(wrong) = wrong_setup(&question) {

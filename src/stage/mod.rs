@@ -3,6 +3,7 @@
 mod advice;
 mod blank_payload;
 mod brought;
+mod cell_evidence;
 mod compare;
 mod compare_torques;
 mod computed;
@@ -42,9 +43,11 @@ mod unmoved;
 mod validate;
 mod weightless;
 
+pub use cell_evidence::{CellEvidence, CellEvidenceWrites, Given};
 pub use compare::{Compare, CompareReads};
 pub use compare_torques::{CompareTorques, CompareTorquesReads};
-pub use diagnose::{Diagnose, DiagnoseReads};
+use diagnose::AskedRows;
+pub use diagnose::{CellPrior, Diagnose, DiagnoseReads};
 pub use diagnose_torques::{
     ConsistencySetting, DiagnoseTorques, DiagnoseTorquesReads, DiagnoseTorquesWrites, HoldOut,
     InertialSetting,
@@ -393,6 +396,7 @@ pub const STAGES: &[StageEntry] = &[
     StageEntry::of::<Stiffness>(),
     StageEntry::of::<Transfer>(),
     StageEntry::of::<Diagnose>(),
+    StageEntry::of::<CellEvidence>(),
     StageEntry::of::<ingest::IngestTorques>(),
     StageEntry::of::<DiagnoseTorques>(),
     StageEntry::of::<Masses>(),

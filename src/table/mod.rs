@@ -136,6 +136,7 @@ pub use verdict_sentences::VerdictTopic;
 tables! {
     acceptance => Acceptance of AcceptanceRow,
     body_consistency => BodyConsistencies of BodyConsistencyRow,
+    cell_evidence => CellEvidence of CellEvidenceRow,
     cells => Cells of CellRow,
     changes => Changes of ChangeRow,
     contacts => Contacts of ContactRow,
@@ -148,7 +149,10 @@ tables! {
     findings => Findings of FindingRow,
     fit => Fit of FitRow,
     fleet => FleetTable of FleetRow,
+    fleet_cells => FleetCells of FleetCellRow,
     fleet_changes => FleetChanges of FleetChangeRow,
+    fleet_findings => FleetFindings of FleetFindingRow,
+    fleet_outliers => FleetOutliers of FleetOutlierRow,
     forms => Forms of FormRow,
     friction_curves => FrictionCurves of FrictionCurveRow,
     inertials => Inertials of InertialRow,

@@ -57,6 +57,11 @@ const TRIALS: &[(&str, &str, &str)] = &[
     ),
     ("transfer", "points", "{on: [validate]}"),
     ("diagnose", "points", "{on: [fit]}"),
+    (
+        "cell_evidence",
+        "points",
+        "{diagnose: {on: [fit]}, given: [{cell: \"joint_compliance@joint 2\", size_mm: 0.1}]}",
+    ),
     ("ingest_torques", "torques", ""),
     ("diagnose_torques", "torques", "{}"),
     ("masses", "torques", "{}"),

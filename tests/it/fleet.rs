@@ -1,6 +1,7 @@
 //! Fleets: many robots through one pipeline, whatever their names, whoever is killed.
 
 mod browser;
+mod causes;
 mod killed;
 mod names;
 mod recalibrated;

@@ -176,6 +176,7 @@ fn diagnosed(data: &Measurements, stated: f64) -> Diagnosis {
         without: &[],
         own: &[],
         beside_simulation: false,
+        known: &[],
         seed: 1,
     };
     diagnose(&question, |_| ())

@@ -95,6 +95,7 @@ fn diagnosed(case: &Case, data: &Measurements, without: &[String]) -> Diagnosis 
         without,
         own: &[],
         beside_simulation: false,
+        known: &[],
         seed: case.seed,
     };
     wrong_setup(&question).unwrap_or_else(|| diagnose(&question, |_| ()))

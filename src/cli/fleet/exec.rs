@@ -52,6 +52,7 @@ pub(super) fn main(arguments: &ExecArguments, command_line: &[OsString]) -> Resu
     let told = |name: &str| std::env::var(name).ok();
     workshop.name = told("SLURMD_NODENAME").unwrap_or(workshop.name);
     let task = told("SLURM_ARRAY_JOB_ID").zip(told("SLURM_ARRAY_TASK_ID"));
+    workshop.round.clone_from(&note.round);
     workshop.log = task.map(|(job, task)| format!("{job}_{task}.out"));
     let progress = FleetProgress::new(Verbosity::Normal, 1, chosen.len());
     let stop = || workshop.ledger.cancelled(&note.run);

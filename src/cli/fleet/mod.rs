@@ -1,6 +1,7 @@
 //! `calib fleet`: one pipeline over many robots, on this machine or on a cluster.
 
 mod cluster;
+mod diagnose;
 mod exec;
 mod render;
 mod run;
@@ -26,6 +27,7 @@ pub(super) struct FleetArguments {
 #[derive(Subcommand)]
 enum FleetVerb {
     Run(run::FleetRunArguments),
+    Diagnose(diagnose::FleetDiagnoseArguments),
     Status(status::StatusArguments),
     Retry(run::RetryArguments),
     Cancel(status::CancelArguments),
@@ -63,6 +65,7 @@ fn folder(store: &Path) -> Result<Store> {
 pub(super) fn main(arguments: &FleetArguments, command_line: &[OsString]) -> Result<()> {
     match &arguments.verb {
         FleetVerb::Run(verb) => run::main(verb, command_line),
+        FleetVerb::Diagnose(verb) => diagnose::main(verb, command_line),
         FleetVerb::Status(verb) => status::main(verb, command_line),
         FleetVerb::Retry(verb) => run::retry(verb, command_line),
         FleetVerb::Cancel(verb) => status::cancel(verb),
@@ -84,6 +87,7 @@ fn workshop<'a>(
         name,
         log: None,
         threads: 1,
+        round: None,
     }
 }
 

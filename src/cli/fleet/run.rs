@@ -188,7 +188,7 @@ fn run(
 }
 
 /// Fails with the pipeline's faults where not a single robot could be planned: then they are not the robots'.
-fn sound(workshop: &Workshop) -> Result<()> {
+pub(super) fn sound(workshop: &Workshop) -> Result<()> {
     let mut first = None;
     for robot in &workshop.fleet.roster.0 {
         match workshop.plan(robot) {
@@ -243,6 +243,7 @@ pub(super) fn note(fleet: &Fleet, place: &FleetLocation, run: &str) -> Result<Ru
         robots: fleet.roster.0.iter().map(member).collect(),
         tasks: Vec::new(),
         jobs: Vec::new(),
+        round: None,
     })
 }
 

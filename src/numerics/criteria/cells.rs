@@ -18,6 +18,8 @@ criteria! {
     OPEN: usize = 60, "rows", "count: twice the numbers of an arm's geometry, in rows of three", "";
     /// Probability of a cause in no list for which these odds are.
     USUAL: f64 = 0.3, "probability", "judgement: the default of the setting `open_world`", "";
+    /// Probability of a cause, by other robots of the model, above which it counts as no more usual.
+    USUAL_MOST: f64 = 0.9, "probability", "judgement: a recording has to show something of a cause", "";
     /// Prior odds of a product without a name, where one of its variables already shows there.
     PRODUCT: f64 = 0.0007, "odds", "judgement: less than a rare cause", "";
     /// Prior odds of a product without a name of which neither variable shows by itself.

@@ -30,17 +30,18 @@ pub use outside::against_simulation;
 pub use round::BASE;
 pub use separate::{DiagnosedModel, discrimination_problem};
 pub use setup::wrong_setup;
+pub use table::{CellAnswer, GivenCell};
 pub use types::{
     ClosedForm, Diagnosis, ErrorLengths, Evidence, ExplainedCell, ExplainedShare, Finding,
-    JointRepeatability, Located, Probabilities, Question, RivalCause, SETUP, SpectrumLine,
-    VerdictKind,
+    JointRepeatability, KnownCell, Located, Probabilities, Question, RivalCause, SETUP,
+    SpectrumLine, VerdictKind,
 };
 pub use verdict::other_means;
 
 use crate::criteria::cells::SETTLED;
 use crate::criteria::search::FEWEST;
 use round::{FitState, Fitter, RoundView, correlation_left_by};
-use table::{Answer, FoundCell, Rounds};
+use table::{Answer, FoundCell, Rounds, answers, given_causes};
 use verdict::{LastRound, conclude};
 
 /// Diagnoses a recording; of very few rows only what the nominal robot makes of them. `tell` receives the progress, a line each. Ask for
@@ -109,6 +110,35 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         };
         return conclude(last, &fitter, &before);
     }
+}
+
+/// What every cell of the table says of a recording given some of them, for the sum over a fleet; why nothing can be asked of it where that is
+/// so.
+pub fn cell_evidence(question: &Question, given: &[GivenCell]) -> Result<Vec<CellAnswer>, String> {
+    if question.fit.len() < *FEWEST {
+        return Err(format!("{} rows to fit are too few", question.fit.len()));
+    }
+    if let Some(wrong) = wrong_setup(question) {
+        return Err(wrong.statement);
+    }
+    let (mut fitter, mut now) = Fitter::start(question);
+    if let Some(wrong) = setup::wrong_when_identified(question, &now) {
+        return Err(wrong.statement);
+    }
+    // Around a model without them, then around one with them inside the chain.
+    for _ in 0..if given.is_empty() { 0 } else { 2 } {
+        let view = RoundView::of(&now, &fitter);
+        let causes = given_causes(&view, &now, &fitter, given);
+        now = fitter.fit(&now.model, causes);
+        fitter.follow(&now);
+    }
+    if let Some(sigma) = fitter.noise_left_by(&now) {
+        fitter.learn(sigma);
+        now = fitter.fit(&now.model, now.causes);
+        fitter.follow(&now);
+    }
+    let view = RoundView::of(&now, &fitter);
+    Ok(answers(&view, &now, &fitter, given))
 }
 
 /// The model without findings that are smaller than their own uncertainty in the whole model: the search saw a linear picture of each.

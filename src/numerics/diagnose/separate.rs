@@ -139,6 +139,7 @@ fn rivals(
         without: &[],
         own: &own,
         beside_simulation: false,
+        known: &[],
         seed: 0,
     };
     forms_of((effect, place), &question, survey, problem).map_err(|places| {

@@ -28,8 +28,21 @@ pub struct Question<'a> {
     pub own: &'a [&'static DeclaredCause],
     /// Whether the points stand beside an outside simulation: what moves them says nothing of the robot file.
     pub beside_simulation: bool,
+    /// What other robots of the model say of cells; empty where nothing is known of any.
+    pub known: &'a [KnownCell],
     /// The seed of the folds.
     pub seed: u64,
+}
+
+/// A cell of which other robots say how usual and how large it is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct KnownCell {
+    /// Key of the cell.
+    pub cell: String,
+    /// Probability that a robot has it.
+    pub probability: f64,
+    /// The smallest and largest usual rms motion at the tool, m.
+    pub between: [f64; 2],
 }
 
 /// One joint repeatability (rad) and what it rests on.

@@ -43,7 +43,7 @@ pub use change::{ParameterChange, changes};
 pub use covariance::Covariance;
 pub use error_scale::ErrorScale;
 pub(crate) use error_scale::noise;
-pub(crate) use fisher::tail;
+pub use fisher::tail;
 pub(crate) use fit::{CLEARLY, seen};
 pub use fit::{FitOptions, Fitted, ParameterStatus, fit};
 pub(crate) use fold_factors::NearbyFits;

@@ -301,6 +301,7 @@ impl Recorded {
             without: &[],
             own: &[],
             beside_simulation: false,
+            known: &[],
             seed: 7,
         };
         assert!(wrong_setup(&question).is_none());

@@ -38,6 +38,7 @@ fn said(cell: &Cell, mut data: Measurements) -> Diagnosis {
         without: &[],
         own: &[],
         beside_simulation: false,
+        known: &[],
         seed: 1,
     };
     diagnose(&question, |_| ())

@@ -60,6 +60,7 @@ fn said(cell: &Cell, data: &Measurements) -> Diagnosis {
         without: &[],
         own: &[],
         beside_simulation: false,
+        known: &[],
         seed: 1,
     };
     diagnose(&question, |_| ())

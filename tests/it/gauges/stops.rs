@@ -80,6 +80,7 @@ fn a_diagnosis_learns_the_repeatability_from_the_same_target_again() {
         without: &[],
         own: &[],
         beside_simulation: false,
+        known: &[],
         seed: 1,
     };
     let found = diagnose(&question, |_| ());
@@ -255,6 +256,7 @@ fn near_repeats_count_less_the_known_motion() {
         without: &[],
         own: &[],
         beside_simulation: false,
+        known: &[],
         seed: 1,
     };
     let said = diagnose(&question, |_| ());

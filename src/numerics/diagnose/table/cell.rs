@@ -15,6 +15,8 @@ pub(super) struct CauseCell {
     /// ln of its prior odds.
     pub log_prior: f64,
     pub shapes: Shapes,
+    /// Its usual sizes, m, where other robots say so.
+    pub between: Option<[f64; 2]>,
 }
 
 /// The shapes of a cell.

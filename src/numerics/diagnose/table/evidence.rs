@@ -47,6 +47,17 @@ pub(crate) fn evidence(
     shares: &[f64],
     rows: EvidenceRows,
 ) -> GroupEvidence {
+    evidence_between(gram, gradient, shares, rows, [0.0, f64::INFINITY])
+}
+
+/// The same where only amplitudes between two are possible, m.
+pub(crate) fn evidence_between(
+    gram: &DMatrix<f64>,
+    gradient: &DVector<f64>,
+    shares: &[f64],
+    rows: EvidenceRows,
+    [low, high]: [f64; 2],
+) -> GroupEvidence {
     let kept: Vec<usize> = (0..shares.len()).filter(|k| shares[*k] > 0.0).collect();
     let scaled;
     let (diagonal, off_diagonal, along) = if let [k] = kept[..] {
@@ -82,7 +93,7 @@ pub(crate) fn evidence(
         *fit_there = fit;
         // Noise is always left: what leaves none is rounding.
         let left = 1.0 - fit / whole;
-        let sound = left > 1e-9 && square * trace < *EXACT;
+        let sound = left > 1e-9 && square * trace < *EXACT && amplitude >= low && amplitude <= high;
         *log = if sound {
             -0.5 * determinant - half * left.ln()
         } else {
@@ -95,8 +106,9 @@ pub(crate) fn evidence(
     let best = (0..AMPLITUDES)
         .max_by(|a, b| logs[*a].total_cmp(&logs[*b]))
         .unwrap_or(0);
+    let possible = amplitudes().filter(|amplitude| *amplitude >= low && *amplitude <= high);
     GroupEvidence {
-        log: log_mean(&logs),
+        log: log_sum(&logs) - (possible.count().max(1) as f64).ln(),
         amplitude: amplitudes().nth(best).unwrap_or(*SMALLEST),
         fit: fits[best],
     }
@@ -181,6 +193,7 @@ pub(crate) fn log_sum(logs: &[f64]) -> f64 {
 }
 
 /// ln of a mean of exponentials: equal prior odds.
+#[cfg(test)]
 fn log_mean(logs: &[f64]) -> f64 {
     log_sum(logs) - (logs.len().max(1) as f64).ln()
 }

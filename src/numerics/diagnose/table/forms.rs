@@ -70,6 +70,7 @@ fn unnamed(place: Place, survey: &Survey) -> Vec<CauseCell> {
                     key: String::new(),
                     log_prior: 0.0,
                     shapes,
+                    between: None,
                 });
             }
         }

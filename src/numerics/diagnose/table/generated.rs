@@ -214,6 +214,7 @@ fn cell(free: FreeShape, log_prior: f64) -> CauseCell {
         key: format!("{:?} by {:?}{times}{step}", free.motion, free.of),
         log_prior,
         shapes: Shapes::Free(free),
+        between: None,
     }
 }
 

@@ -101,6 +101,7 @@ pub(super) fn cells(
             key: format!("{name}@{place}"),
             log_prior: log_prior(name, place, prior_weight) - prior_weight * unusual,
             shapes: Shapes::Listed(groups),
+            between: None,
         }
     };
     all.into_iter().map(cell).collect()

@@ -10,6 +10,7 @@ mod evidence;
 mod forms;
 mod frame;
 mod generated;
+mod given;
 mod listed;
 mod refine;
 mod scan;
@@ -19,13 +20,15 @@ mod state;
 pub(crate) use answer::{Answer, FoundCell};
 pub(crate) use evidence::{AMPLITUDES, EvidenceRows, evidence, log_sum};
 pub(crate) use forms::forms_of;
+pub use given::{CellAnswer, GivenCell};
+pub(crate) use given::{answers, given_causes};
 pub(crate) use search::ComponentSearch;
 pub(crate) use state::KnownState;
 
 use super::round::{EstimatedCause, FitState, Fitter, RoundView};
 use super::types::Located;
 use crate::criteria::cells::{IDLE, OPEN, ROUNDS, UNEXPLAINED};
-use crate::effect::{Basis, Form, Law, Motion, Place, Variable, names};
+use crate::effect::{Basis, Form, Law, Motion, Place, Survey, Variable, names};
 use crate::estimate::Prior;
 use crate::observation::only_brought;
 use cell::FreeShape;
@@ -81,21 +84,8 @@ impl Rounds {
         };
         let mut frame = SearchRows::of(view, now, fitter, noise);
         let question = fitter.question;
-        let slow = |form: &Form| form.variables().contains(&Variable::Time);
         let brought = only_brought(&fitter.data, question.fit);
-        let keeps = |cell: &cell::CauseCell| {
-            // Where nothing but joints was recorded, base and first joint move with all places that the target was laid into.
-            let unseen = brought
-                && (cell.place == Place::Base
-                    || cell.place == Place::Joint(0) && cell.name == names::ZERO_SHIFT);
-            let values = |of| view.problem.values(of);
-            let is_slow = || {
-                cell.groups(&survey, &values, false)
-                    .iter()
-                    .any(|group| group.forms.iter().any(slow))
-            };
-            !(unseen || fitter.causes_of_the_arm_first() && is_slow())
-        };
+        let keeps = |cell: &cell::CauseCell| is_kept(cell, view, &survey, fitter);
         let all_pairs = if self.pairs.is_none() {
             generated::pairs(&survey, &mut frame)
         } else {
@@ -177,6 +167,22 @@ impl Rounds {
             cells,
         }
     }
+}
+
+/// Whether a cell may be asked of a recording.
+fn is_kept(cell: &cell::CauseCell, view: &RoundView, survey: &Survey, fitter: &Fitter) -> bool {
+    let slow = |form: &Form| form.variables().contains(&Variable::Time);
+    // Where nothing but joints was recorded, base and first joint move with all places that the target was laid into.
+    let unseen = only_brought(&fitter.data, fitter.question.fit)
+        && (cell.place == Place::Base
+            || cell.place == Place::Joint(0) && cell.name == names::ZERO_SHIFT);
+    let values = |of| view.problem.values(of);
+    let is_slow = || {
+        cell.groups(survey, &values, false)
+            .iter()
+            .any(|group| group.forms.iter().any(slow))
+    };
+    !(unseen || fitter.causes_of_the_arm_first() && is_slow())
 }
 
 /// Components as causes of the whole model, each with what the evidence says of the size of its coefficients; waves that the rows could not

@@ -3,10 +3,12 @@
 use super::cell::{CauseCell, FreeShape, Over, Shapes};
 use super::evidence::log_sum;
 use super::frame::{SearchRows, UnitColumns};
-use super::state::{CellColumns, ColumnProducts, Component, KnownState, PartProducts};
+use super::state::{CellColumns, ColumnProducts, Component, KnownState, PartProducts, shape_keys};
 use super::{generated, listed};
-use crate::criteria::cells::{ALIKE, BENDS, COMPONENTS, FAR_BELOW, JOINS, PAIR, PAIRS, UNLIKELY};
-use crate::diagnose::types::Question;
+use crate::criteria::cells::{
+    ALIKE, BENDS, COMPONENTS, FAR_BELOW, JOINS, PAIR, PAIRS, UNLIKELY, USUAL_MOST,
+};
+use crate::diagnose::types::{KnownCell, Question};
 use crate::effect::{Form, Place, Survey, Variable, cause};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -97,6 +99,15 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         let mut named = listed::cells(survey, &values, question);
         named.append(&mut cells);
         named.retain(keeps);
+        for cell in &mut named {
+            let of = |known: &&KnownCell| known.cell == cell.key;
+            if let Some(known) = question.known.iter().find(of) {
+                // However usual a cause is, a recording has to show something of it.
+                let probability = known.probability.clamp(1e-6, *USUAL_MOST);
+                cell.log_prior = (probability / (1.0 - probability)).ln();
+                cell.between = Some(known.between);
+            }
+        }
         let mut motions = Vec::new();
         let mut variables = Vec::new();
         for form in named
@@ -121,7 +132,10 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         let values = |of: Variable| frame.values(of);
         let coarse: Vec<CellColumns> = named
             .par_iter()
-            .map(|cell| CellColumns::of(cell.groups(survey, &values, false), frame))
+            .map(|cell| {
+                let block = CellColumns::of(cell.groups(survey, &values, false), frame);
+                block.between(cell.between)
+            })
             .collect();
         let fine = named.iter().map(|_| OnceLock::new()).collect();
         let mut columns = 0;
@@ -169,6 +183,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
                 self.cells[cell].groups(self.survey, &values, true),
                 self.frame,
             )
+            .between(self.cells[cell].between)
         })
     }
 
@@ -345,6 +360,17 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         state: &KnownState,
         components: &[&Component],
     ) -> Option<CellEvidence> {
+        self.closely_in(cell, state, components, None)
+    }
+
+    /// The same of one of its shapes, where that is given.
+    pub fn closely_in(
+        &self,
+        cell: usize,
+        state: &KnownState,
+        components: &[&Component],
+        shape: Option<&str>,
+    ) -> Option<CellEvidence> {
         let block = self.fine(cell);
         let across = self.across_block(block, state, components);
         let mut all: Vec<(f64, usize, usize, f64)> = Vec::new();
@@ -361,8 +387,15 @@ impl<'f, 'a> CauseTable<'f, 'a> {
                 .iter()
                 .any(|form| keys.contains(&form.key()))
         };
+        let shapes = match shape {
+            Some(_) => shape_keys(&block.groups),
+            None => Vec::new(),
+        };
         let there: Vec<bool> = (0..block.groups.len())
-            .map(|group| !keys.is_empty() && is_there(group))
+            .map(|group| {
+                let is_other = shape.is_some_and(|shape| shapes[group] != shape);
+                !keys.is_empty() && is_there(group) || is_other
+            })
             .collect();
         state.shapes(block, &across, 0, |group, shape, found| {
             if !there[group] {

@@ -4,7 +4,7 @@
 //! component is left out, or another one put in, without a pass over the rows.
 
 use super::cell::{CellShape, ShapeGroup};
-use super::evidence::{EvidenceRows, GroupEvidence, evidence};
+use super::evidence::{EvidenceRows, GroupEvidence, evidence_between};
 use super::frame::{SearchRows, UnitColumns, product, view};
 use crate::criteria::cells::NU;
 use crate::diagnose::linear::dot;
@@ -30,10 +30,28 @@ pub(super) struct SeenGroup {
     gradient: DVector<f64>,
 }
 
+/// Keys of the shapes of a cell: their forms, numbered where several have the same.
+pub(super) fn shape_keys(groups: &[SeenGroup]) -> Vec<String> {
+    let mut times: BTreeMap<String, usize> = BTreeMap::new();
+    let key = |seen: &SeenGroup| {
+        let keys: Vec<String> = seen.group.forms.iter().map(Form::key).collect();
+        let key = keys.join("+");
+        let before = times.entry(key.clone()).or_default();
+        *before += 1;
+        match *before {
+            1 => key,
+            count => format!("{key}~{count}"),
+        }
+    };
+    groups.iter().map(key).collect()
+}
+
 /// All shapes of a cell with their columns.
 pub(super) struct CellColumns {
     pub groups: Vec<SeenGroup>,
     pub columns: UnitColumns,
+    /// Its possible amplitudes, m.
+    pub between: [f64; 2],
 }
 
 impl CellColumns {
@@ -69,6 +87,7 @@ impl CellColumns {
         Self {
             groups: groups.into_iter().map(seen).collect(),
             columns,
+            between: [0.0, f64::INFINITY],
         }
     }
 }
@@ -92,6 +111,15 @@ impl CellColumns {
                 values,
                 square: (*own.square).clone(),
             },
+            between: [0.0, f64::INFINITY],
+        }
+    }
+
+    /// With the possible amplitudes that other robots show.
+    pub fn between(self, between: Option<[f64; 2]>) -> Self {
+        Self {
+            between: between.unwrap_or([0.0, f64::INFINITY]),
+            ..self
         }
     }
 
@@ -622,7 +650,8 @@ impl KnownState {
                 }
             }
             for (s, shape) in group.group.shapes.iter().enumerate() {
-                let found = evidence(&gram, &gradient, &shape.shares, self.rows);
+                let found =
+                    evidence_between(&gram, &gradient, &shape.shares, self.rows, block.between);
                 each(
                     g,
                     s,

@@ -1,0 +1,239 @@
+//! Log evidence summed over the robots of a group: a robot may lack a cause, and what is one in one robot alone is none of the group.
+
+use super::ledger::{Ledger, RobotRecord};
+use super::{Fleet, FleetRobot};
+use crate::error::Result;
+use crate::table::{CellEvidence, CellEvidenceRow, Table};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+
+/// Robots whose tables are in memory at once.
+const CHUNK: usize = 64;
+/// Shares of a group's robots that may have a cause, all alike probable.
+const SHARES: usize = 20;
+/// ln of the least evidence of a cell: its amplitude may be one that no row shows, one of the 28 that are weighed.
+const LEAST: f64 = -3.3;
+
+/// ln of what a robot contributes where a share of all has a cause: it may have it or lack it.
+fn mixed(log: f64, share: f64) -> f64 {
+    let most = log.max(0.0);
+    most + (share * (log - most).exp() + (1.0 - share) * (-most).exp()).ln()
+}
+
+fn shares() -> impl Iterator<Item = f64> + Clone {
+    (1..=SHARES).map(|k| k as f64 / SHARES as f64)
+}
+
+fn log_mean(logs: impl Iterator<Item = f64> + Clone) -> f64 {
+    let most = logs.clone().fold(f64::NEG_INFINITY, f64::max);
+    let count = logs.clone().count() as f64;
+    most + (logs.map(|log| (log - most).exp()).sum::<f64>() / count).ln()
+}
+
+/// What a cell, or one of its shapes, says of a group.
+#[derive(Debug, Clone)]
+pub(super) struct Sum {
+    pub effect: String,
+    pub place: String,
+    pub follows: String,
+    pub log_prior: f64,
+    /// At each share, over that of robots of which no more is known than the least.
+    logs: [f64; SHARES],
+    /// Of the robot in which it is plainest.
+    strongest: f64,
+    /// Sizes weighed by how plain they are, and the weights.
+    sized: (f64, f64),
+}
+
+impl Sum {
+    fn new(row: &CellEvidenceRow) -> Self {
+        Self {
+            effect: row.effect.clone(),
+            place: row.place.clone(),
+            follows: row.follows.clone(),
+            log_prior: row.log_prior,
+            logs: [0.0; SHARES],
+            strongest: LEAST,
+            sized: (0.0, 0.0),
+        }
+    }
+
+    fn add(&mut self, row: &CellEvidenceRow) {
+        let log = row.log_evidence.max(LEAST);
+        for (sum, share) in self.logs.iter_mut().zip(shares()) {
+            *sum += mixed(log, share) - mixed(LEAST, share);
+        }
+        self.strongest = self.strongest.max(log);
+        let weight = 1.0 / (1.0 + (-log).exp());
+        self.sized.0 += weight * row.size_mm.max(1e-6).ln();
+        self.sized.1 += weight;
+    }
+
+    /// ln of the evidence for it over that of nothing, of so many robots.
+    pub fn total(&self, robots: usize) -> f64 {
+        let at = |(log, share): (&f64, f64)| log + robots as f64 * mixed(LEAST, share);
+        log_mean(self.logs.iter().zip(shares()).map(at))
+    }
+
+    /// The same without the robot in which it is plainest.
+    pub fn of_the_others(&self, robots: usize) -> f64 {
+        let at = |(log, share): (&f64, f64)| {
+            log + robots as f64 * mixed(LEAST, share) - mixed(self.strongest, share)
+        };
+        log_mean(self.logs.iter().zip(shares()).map(at))
+    }
+
+    /// A usual size, mm.
+    pub fn size_mm(&self) -> f64 {
+        (self.sized.0 / self.sized.1.max(f64::MIN_POSITIVE))
+            .exp()
+            .clamp(1e-3, 100.0)
+    }
+}
+
+/// A row's cell with all others, or in the place of a given one; and its shape.
+type CellKey = (String, String, String);
+
+/// The sums of a group.
+#[derive(Debug, Default)]
+pub(super) struct GroupSums {
+    pub robots: usize,
+    sums: BTreeMap<CellKey, Sum>,
+}
+
+/// What a cell says of a group, with the shape that all robots share where that says more.
+pub(super) struct CellTotal<'a> {
+    pub cell: &'a str,
+    pub shape: Option<&'a str>,
+    pub sum: &'a Sum,
+    /// ln of its posterior odds.
+    pub odds: f64,
+    /// The same without the robot in which it is plainest.
+    pub of_the_others: f64,
+}
+
+impl GroupSums {
+    /// Takes a robot.
+    pub fn add(&mut self, rows: &[CellEvidenceRow]) {
+        self.robots += 1;
+        for row in rows {
+            let key = (row.given.clone(), row.cell.clone(), row.shape.clone());
+            self.sums
+                .entry(key)
+                .or_insert_with(|| Sum::new(row))
+                .add(row);
+        }
+    }
+
+    /// All cells in the place of a given one; of none: next to all.
+    pub fn cells<'a>(&'a self, given: &'a str) -> impl Iterator<Item = CellTotal<'a>> {
+        let mut shared: BTreeMap<&str, (f64, f64, f64, &str)> = BTreeMap::new();
+        let here = move || self.sums.iter().filter(move |(key, _)| key.0 == given);
+        for ((_, cell, shape), sum) in here().filter(|(key, _)| !key.2.is_empty()) {
+            let [all, others] = [sum.total(self.robots), sum.of_the_others(self.robots)]
+                .map(|total| total + sum.log_prior);
+            let best = shared
+                .entry(cell)
+                .or_insert((all, others, f64::NEG_INFINITY, shape));
+            if best.2 > f64::NEG_INFINITY {
+                best.0 = log_add(best.0, all);
+                best.1 = log_add(best.1, others);
+            }
+            if all > best.2 {
+                (best.2, best.3) = (all, shape);
+            }
+        }
+        here()
+            .filter(|(key, _)| key.2.is_empty())
+            .map(move |((_, cell, _), sum)| {
+                let own = sum.total(self.robots);
+                let together = shared.get(cell.as_str()).filter(|shared| shared.0 > own);
+                let total = together.map_or(own, |shared| shared.0);
+                let others =
+                    together.map_or_else(|| sum.of_the_others(self.robots), |shared| shared.1);
+                CellTotal {
+                    cell,
+                    shape: together.map(|shared| shared.3),
+                    sum,
+                    odds: total + sum.log_prior,
+                    of_the_others: others + sum.log_prior,
+                }
+            })
+    }
+}
+
+/// Hands every robot's rows over, in the order of the roster; few are in memory at once.
+pub(super) fn each(
+    fleet: &Fleet,
+    ledger: &Ledger,
+    records: &[Option<RobotRecord>],
+    take: &mut dyn FnMut(&FleetRobot, &[CellEvidenceRow]),
+) -> Result<()> {
+    let robots: Vec<_> = fleet.roster.0.iter().zip(records).collect();
+    for some in robots.chunks(CHUNK) {
+        let tables: Vec<Option<CellEvidence>> = some
+            .par_iter()
+            .map(|(_, record)| {
+                let record = record.as_ref();
+                ledger.load(record.and_then(|record| record.last(CellEvidence::KIND)))
+            })
+            .collect::<Result<_>>()?;
+        for ((robot, _), table) in some.iter().zip(tables) {
+            if let Some(table) = table {
+                take(robot, &table.0);
+            }
+        }
+    }
+    Ok(())
+}
+
+fn log_add(a: f64, b: f64) -> f64 {
+    let most = a.max(b);
+    most + ((a - most).exp() + (b - most).exp()).ln()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(log: f64) -> CellEvidenceRow {
+        CellEvidenceRow {
+            given: String::new(),
+            cell: "backlash@joint 2".into(),
+            shape: String::new(),
+            effect: "backlash".into(),
+            place: "joint 2".into(),
+            follows: "approach".into(),
+            log_evidence: log,
+            log_prior: 0.0,
+            size_mm: 0.05,
+            sigma_mm: None,
+        }
+    }
+
+    fn odds(logs: &[f64], robots: usize) -> (f64, f64) {
+        let mut sums = GroupSums::default();
+        logs.iter().for_each(|log| sums.add(&[row(*log)]));
+        sums.robots = robots;
+        let cell = sums.cells("").next().expect("a cell");
+        (cell.odds, cell.of_the_others)
+    }
+
+    #[test]
+    fn weak_causes_add_up_and_robots_without_one_cost_little() {
+        // Of 10 robots with e^2 each: 20 less the price of the share, which is at most ln 20.
+        let (all, _) = odds(&[2.0; 10], 10);
+        assert!(all < 20.0 && all > 20.0 - 20f64.ln(), "{all}");
+        // Ten more robots that show nothing (by Beta(11, 11) at the least: 10 ln 0.5 and the price).
+        let (half, _) = odds(&[2.0; 10], 20);
+        assert!(half > 2.0 && half < all, "{half}");
+    }
+
+    #[test]
+    fn what_one_robot_alone_shows_is_not_of_the_others() {
+        let mut logs = vec![-1.0; 19];
+        logs.push(30.0);
+        let (all, others) = odds(&logs, 20);
+        assert!(all > 20.0 && others < 0.0, "{all} {others}");
+    }
+}

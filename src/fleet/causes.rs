@@ -1,0 +1,300 @@
+//! The search for what robots of a group have in common: round after round the cell with the largest sum of evidence joins, as long as that
+//! pays; then what single robots show alone.
+
+use super::cause_answers::{self, Answers};
+use super::cause_sums::{CellTotal, GroupSums, each};
+use super::ledger::RobotRecord;
+use super::round::{GroupColumn, Round};
+use super::{Fleet, Ledger};
+use crate::criteria::cells::{COMPONENTS, JOINS, LEAVES};
+use crate::effect::names;
+use crate::error::{Result, visible};
+use crate::report::fleet_causes as page;
+use crate::stage::Given;
+use crate::store::{Account, KEY_FORMAT, PendingTable, StageKey, TableRef};
+use crate::table::{CellEvidence, CellEvidenceRow, Table};
+use serde_json::json;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
+
+/// The stage's id and name in keys and paths.
+const STAGE: &str = "fleet_diagnose";
+/// Where its tables are noted among the fleet's.
+pub(super) const NOTE: &str = "causes.json";
+/// Causes of a single robot that its group does not have, at most.
+const ALONE: usize = 3;
+/// By how much the odds of a rival must be larger to take the place of a cause.
+const EXCHANGED: f64 = 1.0;
+
+/// What a group has so far, and what was tried.
+#[derive(Default)]
+struct GroupSearch {
+    given: Vec<Given>,
+    dropped: BTreeMap<String, usize>,
+    seen: BTreeSet<Vec<String>>,
+}
+
+/// The likeliest cause of a robot by itself.
+struct Alone {
+    robot: String,
+    given: Given,
+}
+
+/// The search over a fleet's groups.
+pub struct CauseSearch {
+    round: Round,
+    groups: BTreeMap<String, GroupSearch>,
+    /// Rounds so far.
+    pub rounds: usize,
+}
+
+impl CauseSearch {
+    /// Nothing is given yet.
+    pub fn new(by: GroupColumn) -> Self {
+        Self {
+            round: Round::first(by),
+            groups: BTreeMap::new(),
+            rounds: 0,
+        }
+    }
+
+    /// What robots are to be asked now.
+    pub fn round(&self) -> &Round {
+        &self.round
+    }
+
+    /// Keys of the cells that the groups have so far.
+    pub fn so_far(&self) -> Vec<String> {
+        let given = self.round.groups.values().flatten();
+        given.map(|given| visible(&given.cell)).collect()
+    }
+
+    /// Takes the robots' answers; whether they are to be asked again.
+    pub fn take(
+        &mut self,
+        fleet: &Fleet,
+        ledger: &Ledger,
+        records: &[Option<RobotRecord>],
+    ) -> Result<bool> {
+        self.rounds += 1;
+        let mut sums: BTreeMap<String, GroupSums> = BTreeMap::new();
+        let mut alone: BTreeMap<String, Vec<Alone>> = BTreeMap::new();
+        each(fleet, ledger, records, &mut |robot, rows| {
+            let group = self.round.by.of(&robot.groups).to_string();
+            let known = self.round.robots.get(&robot.name);
+            if known.is_none_or(|known| known.len() < ALONE)
+                && let Some(given) = likeliest(rows)
+            {
+                let robot = robot.name.clone();
+                let one = Alone { robot, given };
+                alone.entry(group.clone()).or_default().push(one);
+            }
+            sums.entry(group).or_default().add(rows);
+        })?;
+        let mut goes_on = false;
+        for (group, sums) in &sums {
+            let search = self.groups.entry(group.clone()).or_default();
+            if search.step(sums) {
+                goes_on = true;
+                self.round
+                    .groups
+                    .insert(group.clone(), search.given.clone());
+                continue;
+            }
+            // What is plain in single robots comes when their group has all of its causes.
+            for Alone { robot, given } in alone.remove(group).unwrap_or_default() {
+                let own = self.round.robots.entry(robot).or_default();
+                if !own.iter().any(|known| known.cell == given.cell) {
+                    own.push(given);
+                    goes_on = true;
+                }
+            }
+        }
+        Ok(goes_on)
+    }
+}
+
+/// The cell that a robot by itself shows, if its odds alone are strong.
+fn likeliest(rows: &[CellEvidenceRow]) -> Option<Given> {
+    let odds = |row: &CellEvidenceRow| row.log_evidence + row.log_prior;
+    let best = rows
+        .iter()
+        .filter(|row| row.given.is_empty() && row.shape.is_empty())
+        .max_by(|a, b| odds(a).total_cmp(&odds(b)))?;
+    (odds(best) >= *JOINS).then(|| given(&best.cell, None, best.size_mm))
+}
+
+/// A cell with a size of two digits: equal rounds have equal keys.
+fn given(cell: &str, shape: Option<&str>, size_mm: f64) -> Given {
+    Given {
+        cell: cell.into(),
+        shape: shape.map(Into::into),
+        size_mm: format!("{:.1e}", size_mm.max(1e-3)).parse().unwrap_or(0.01),
+    }
+}
+
+impl GroupSearch {
+    /// Drops, exchanges or adds cells by the sums; whether any did.
+    fn step(&mut self, sums: &GroupSums) -> bool {
+        self.drop_weak(sums) || self.exchange(sums) || self.add(sums)
+    }
+
+    fn key(given: &[Given]) -> Vec<String> {
+        let mut cells: Vec<String> = given.iter().map(|given| given.cell.clone()).collect();
+        cells.sort();
+        cells
+    }
+
+    fn drop_weak(&mut self, sums: &GroupSums) -> bool {
+        let odds = |given: &Given| {
+            let own = sums.cells(&given.cell).find(|own| own.cell == given.cell);
+            own.map_or(f64::NEG_INFINITY, |own| own.odds.min(own.of_the_others))
+        };
+        let weak: Vec<String> = self
+            .given
+            .iter()
+            .filter(|given| odds(given) < *LEAVES)
+            .map(|given| given.cell.clone())
+            .collect();
+        for cell in &weak {
+            *self.dropped.entry(cell.clone()).or_default() += 1;
+        }
+        self.given.retain(|given| !weak.contains(&given.cell));
+        !weak.is_empty()
+    }
+
+    fn exchange(&mut self, sums: &GroupSums) -> bool {
+        for i in 0..self.given.len() {
+            let all: Vec<CellTotal> = sums.cells(&self.given[i].cell).collect();
+            let own = all.iter().find(|own| own.cell == self.given[i].cell);
+            let Some(stays) = own.map(|own| own.odds) else {
+                continue;
+            };
+            let best = all.iter().max_by(|a, b| a.odds.total_cmp(&b.odds));
+            let Some(best) = best.filter(|best| best.odds > stays + EXCHANGED) else {
+                continue;
+            };
+            let mut next = self.given.clone();
+            next[i] = given(best.cell, best.shape, best.sum.size_mm());
+            self.seen.insert(Self::key(&self.given));
+            if self.seen.insert(Self::key(&next)) {
+                self.given = next;
+                return true;
+            }
+        }
+        false
+    }
+
+    fn add(&mut self, sums: &GroupSums) -> bool {
+        if self.given.len() >= *COMPONENTS {
+            return false;
+        }
+        let may = |total: &CellTotal| {
+            // What is plain in one robot alone is that robot's.
+            total.odds >= *JOINS
+                && total.of_the_others > 0.0
+                && self.dropped.get(total.cell).is_none_or(|times| *times < 2)
+        };
+        let all: Vec<CellTotal> = sums.cells("").collect();
+        let best = all
+            .iter()
+            .filter(|total| may(total))
+            .max_by(|a, b| a.odds.total_cmp(&b.odds));
+        let Some(best) = best else { return false };
+        // One link that bends may look better than any one joint that yields, and worse than all of them.
+        let is_first = self.given.is_empty() && self.dropped.is_empty();
+        if is_first && best.sum.follows == "load" {
+            let yields = all
+                .iter()
+                .filter(|total| total.sum.effect == names::JOINT_COMPLIANCE);
+            self.given = yields
+                .map(|total| given(total.cell, None, total.sum.size_mm()))
+                .collect();
+        }
+        if !self.given.iter().any(|given| given.cell == best.cell) {
+            self.given
+                .push(given(best.cell, best.shape, best.sum.size_mm()));
+        }
+        true
+    }
+}
+
+/// What a fleet's diagnosis came to.
+pub struct Published {
+    /// What was found.
+    pub answers: Answers,
+    /// Where people find the tables and the page.
+    pub tables: Vec<PathBuf>,
+    /// The page.
+    pub page: PathBuf,
+}
+
+/// Makes the tables and the page from the last round's records and publishes them.
+pub fn publish(
+    fleet: &Fleet,
+    ledger: &Ledger,
+    search: &CauseSearch,
+    records: &[Option<RobotRecord>],
+) -> Result<Published> {
+    let answers = cause_answers::of(fleet, ledger, search.round(), records)?;
+    let html = page::html(
+        fleet.name(),
+        &answers.findings,
+        &answers.cells,
+        &answers.outliers,
+    )?;
+    let robots = fleet.roster.0.iter().zip(records).map(|(robot, record)| {
+        let table = record
+            .as_ref()
+            .and_then(|record| record.last(CellEvidence::KIND));
+        json!([
+            robot.name,
+            robot.groups,
+            table.map(|table| table.table_hash.to_string())
+        ])
+    });
+    let key = StageKey {
+        key_format: KEY_FORMAT,
+        id: STAGE.into(),
+        stage: STAGE.into(),
+        implementation: 1,
+        settings: json!({ "robots": robots.collect::<Vec<_>>(), "round": search.round() }),
+        reads: BTreeMap::new(),
+        files: BTreeMap::new(),
+        schemas: BTreeMap::new(),
+        seed: 0,
+    };
+    let frame = |port: &str, frame| (port.to_string(), PendingTable::Frame(frame));
+    let products = vec![
+        frame("fleet_findings", answers.findings.to_frame()?),
+        frame("fleet_cells", answers.cells.to_frame()?),
+        frame("fleet_outliers", answers.outliers.to_frame()?),
+    ];
+    let published = ledger.store.publish(&key, products, Account::default())?;
+    let mut tables = Vec::new();
+    for (port, made) in &published.record.tables {
+        tables.push(ledger.store.expose(fleet.name(), STAGE, port, made)?);
+    }
+    // By this note a sweep knows that the tables are needed, and a later fleet finds them.
+    let note = json!({ "action": published.record.id, "tables": published.record.tables });
+    ledger
+        .store
+        .put_note(&["fleets", fleet.name()], NOTE, &note)?;
+    let page = ledger
+        .store
+        .expose_document(fleet.name(), "causes.html", html.as_bytes())?;
+    ledger.store.sync()?;
+    Ok(Published {
+        answers,
+        tables,
+        page,
+    })
+}
+
+/// A table of the diagnosis of a fleet; none where it was not diagnosed.
+pub(super) fn noted<T: Table>(ledger: &Ledger, port: &str) -> Result<Option<T>> {
+    let note = ledger.store.note(&["fleets", &ledger.fleet], NOTE)?;
+    let table =
+        note.and_then(|note| serde_json::from_value::<TableRef>(note["tables"][port].clone()).ok());
+    ledger.load(table.as_ref())
+}

@@ -1,0 +1,309 @@
+//! What every cell says of one robot given cells that its fleet has accepted: the numbers that a fleet sums.
+
+use super::cell::CauseCell;
+use super::evidence::log_sum;
+use super::frame::{NoiseShape, SearchRows, product, view as matrix};
+use super::scan::CauseTable;
+use super::search::without;
+use super::state::{CellColumns, Component, KnownState, SeenGroup, shape_keys};
+use super::{by_currents, estimated, is_kept};
+use crate::criteria::cells::{CLOSELY, OPEN};
+use crate::diagnose::round::{EstimatedCause, FitState, Fitter, RoundView};
+use crate::effect::{Basis, Form, Place, Term};
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+/// A cell that is taken to be in the robot.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GivenCell {
+    /// Key of the cell.
+    pub cell: String,
+    /// Key of its shape (an order, a knee), where all robots share it; else the robot's likeliest.
+    pub shape: Option<String>,
+    /// Rms motion at the tool that is expected of it, m.
+    pub size: f64,
+}
+
+/// What a cell, or a shape of it, says of a robot.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CellAnswer {
+    /// The given cell that is left out; none where all that are given stay.
+    pub left_out: Option<String>,
+    /// Key of the cell.
+    pub cell: String,
+    /// Key of one shape of it; none of all its shapes together.
+    pub shape: Option<String>,
+    /// Canonical name of its cause.
+    pub effect: &'static str,
+    /// Where it acts.
+    pub place: Place,
+    /// Kind of variable.
+    pub follows: &'static str,
+    /// ln of the evidence for it over that of nothing.
+    pub log: f64,
+    /// ln of its prior odds; of a shape ln of its weight within its cell.
+    pub log_prior: f64,
+    /// Rms motion at the tool, m: the likeliest amplitude, of a given cell its estimate.
+    pub size: f64,
+    /// One standard deviation of the size of a given cell, m.
+    pub sigma: Option<f64>,
+}
+
+/// Does something with the table of the cells that `keeps` leaves, around a fitted model.
+fn with_table<T>(
+    (view, now, fitter): (&RoundView, &FitState, &Fitter),
+    keeps: impl Fn(&CauseCell) -> bool,
+    ask: impl FnOnce(&mut CauseTable) -> T,
+) -> T {
+    let survey = view.survey();
+    let rows = fitter.data.rows();
+    let noise = match now.causes.is_empty() {
+        true => NoiseShape::at_first(view, rows),
+        false => NoiseShape::of(view, rows),
+    };
+    let mut frame = SearchRows::of(view, now, fitter, noise);
+    let is_open = survey.rows.len() >= *OPEN;
+    let kept = |cell: &CauseCell| keeps(cell) && is_kept(cell, view, &survey, fitter);
+    let question = fitter.question;
+    let mut table = CauseTable::new(&mut frame, &survey, question, (&[], &[]), is_open, kept);
+    ask(&mut table)
+}
+
+/// Given cells as causes of the whole model around a fitted one.
+pub(crate) fn given_causes(
+    view: &RoundView,
+    now: &FitState,
+    fitter: &Fitter,
+    given: &[GivenCell],
+) -> Vec<EstimatedCause> {
+    let keeps = |cell: &CauseCell| given.iter().any(|one| one.cell == cell.key);
+    let mut causes = with_table((view, now, fitter), keeps, |table| {
+        let components = table.given(given);
+        estimated(table, &components)
+    });
+    by_currents(&mut causes, view);
+    causes
+}
+
+/// What all cells say given some, and what each of those says and its rivals say in its place.
+pub(crate) fn answers(
+    view: &RoundView,
+    now: &FitState,
+    fitter: &Fitter,
+    given: &[GivenCell],
+) -> Vec<CellAnswer> {
+    with_table(
+        (view, now, fitter),
+        |_| true,
+        |table| {
+            let components = table.given(given);
+            let all: Vec<&Component> = components.iter().collect();
+            let state = table.state(&all, None);
+            let others: Vec<usize> = (0..table.cells.len())
+                .filter(|cell| components.iter().all(|own| own.cell != *cell))
+                .collect();
+            let mut out = table.answers(&others, &state, &all, None);
+            for (i, own) in components.iter().enumerate() {
+                let rest = without(&components, &[i]);
+                let rest: Vec<&Component> = rest.iter().collect();
+                let state = table.state(&rest, Some(state.kappa));
+                let left_out = table.cells[own.cell].key.clone();
+                let mut alike = table.alike(own, 40);
+                alike.retain(|cell| components.iter().all(|other| other.cell != *cell));
+                alike.push(own.cell);
+                let mut rivals = table.answers(&alike, &state, &rest, Some(&left_out));
+                rivals.retain(|rival| rival.cell != left_out || rival.shape.is_some());
+                out.extend(rivals);
+                out.extend(table.of_given(own, &state, &rest, left_out));
+            }
+            out
+        },
+    )
+}
+
+impl CauseTable<'_, '_> {
+    /// Given cells as components of the expected size, each in its likeliest shape given the others.
+    fn given(&mut self, given: &[GivenCell]) -> Vec<Component> {
+        let mut out: Vec<(usize, Component)> = Vec::new();
+        for turn in 0..2 {
+            for (i, one) in given.iter().enumerate() {
+                let Some(cell) = self.cell(&one.cell) else {
+                    continue;
+                };
+                let others = out.iter().filter(|(other, _)| *other != i);
+                let others: Vec<&Component> = others.map(|(_, own)| own).collect();
+                let state = self.state(&others, None);
+                let shape = one.shape.as_deref();
+                let Some(found) = self.closely_in(cell, &state, &others, shape) else {
+                    continue;
+                };
+                let own = Component {
+                    amplitude: one.size,
+                    ..self.as_found(cell, &found)
+                };
+                self.next += 1;
+                let own = own.with_part(self.next);
+                match out.iter_mut().find(|(other, _)| *other == i) {
+                    Some((_, before)) => *before = own,
+                    None => out.push((i, own)),
+                }
+            }
+            if out.len() < 2 && turn == 0 {
+                break;
+            }
+        }
+        let out: Vec<Component> = out.into_iter().map(|(_, own)| own).collect();
+        self.know(&out);
+        out
+    }
+
+    /// What some cells say given a state, and each shape of those with a name; closely of the likeliest.
+    fn answers(
+        &self,
+        cells: &[usize],
+        state: &KnownState,
+        components: &[&Component],
+        left_out: Option<&str>,
+    ) -> Vec<CellAnswer> {
+        let (across, first) = self.across_cells(cells, state);
+        let of = |k: usize| {
+            let (cell, block) = (&self.cells[cells[k]], &self.coarse[cells[k]]);
+            let mut groups: Vec<Vec<f64>> = vec![Vec::new(); block.groups.len()];
+            let mut best = (f64::NEG_INFINITY, 0.0, 0);
+            state.shapes(block, &across, first[k], |group, _, found| {
+                groups[group].push(found.log);
+                if found.log > best.0 {
+                    best = (found.log, found.amplitude, group);
+                }
+            });
+            let logs: Vec<f64> = groups.iter().map(|logs| log_sum(logs)).collect();
+            let follows = block
+                .groups
+                .get(best.2)
+                .map_or("constant", |group| group.group.forms[0].follows(cell.place));
+            let whole = CellAnswer {
+                left_out: left_out.map(Into::into),
+                cell: cell.key.clone(),
+                shape: None,
+                effect: cell.name,
+                place: cell.place,
+                follows,
+                log: log_sum(&logs),
+                log_prior: cell.log_prior,
+                size: best.1,
+                sigma: None,
+            };
+            let shared = cell.is_named() && logs.len() > 1;
+            let shape = |((seen, log), key): ((&SeenGroup, &f64), String)| {
+                let weights = seen.group.shapes.iter().map(|shape| shape.log_weight);
+                let weight = log_sum(&weights.collect::<Vec<_>>());
+                CellAnswer {
+                    shape: Some(key),
+                    log: log - weight,
+                    log_prior: weight,
+                    ..whole.clone()
+                }
+            };
+            let steps =
+                |form: &Form| matches!(form.term().map(Term::basis), Some(Basis::After { .. }));
+            let shapes = block
+                .groups
+                .iter()
+                .zip(&logs)
+                .zip(shape_keys(&block.groups));
+            let shapes = shapes.filter(|((seen, log), _)| {
+                shared && log.is_finite() && !seen.group.forms.iter().any(steps)
+            });
+            let shapes: Vec<CellAnswer> = shapes.map(shape).collect();
+            (whole, shapes)
+        };
+        let mut out: Vec<(CellAnswer, Vec<CellAnswer>)> =
+            (0..cells.len()).into_par_iter().map(of).collect();
+        let mut order: Vec<usize> = (0..out.len())
+            .filter(|k| out[*k].0.log.is_finite())
+            .collect();
+        let odds = |k: &usize| out[*k].0.log + out[*k].0.log_prior;
+        order.sort_by(|a, b| odds(b).total_cmp(&odds(a)).then(a.cmp(b)));
+        order.truncate(*CLOSELY);
+        order.retain(|k| self.cells[cells[*k]].is_coarse());
+        let closely: Vec<_> = order
+            .par_iter()
+            .filter_map(|k| Some((*k, self.closely(cells[*k], state, components)?)))
+            .collect();
+        for (k, found) in closely {
+            if found.log > out[k].0.log {
+                (out[k].0.log, out[k].0.size) = (found.log, found.amplitude);
+            }
+        }
+        out.into_iter()
+            .filter(|(whole, _)| whole.log.is_finite())
+            .flat_map(|(whole, shapes)| std::iter::once(whole).chain(shapes))
+            .collect()
+    }
+
+    /// What a given cell says given the others, and its size.
+    fn of_given(
+        &self,
+        own: &Component,
+        state: &KnownState,
+        others: &[&Component],
+        key: String,
+    ) -> Option<CellAnswer> {
+        let cell = &self.cells[own.cell];
+        let found = self.closely(own.cell, state, others)?;
+        let log = self
+            .of_component(own, state, others)
+            .map_or(found.log, |(log, _)| log.max(found.log));
+        let (size, sigma) = self.sized(own, state, others)?;
+        Some(CellAnswer {
+            left_out: Some(key.clone()),
+            cell: key,
+            shape: None,
+            effect: cell.name,
+            place: cell.place,
+            follows: own.forms.first()?.follows(cell.place),
+            log,
+            log_prior: cell.log_prior,
+            size,
+            sigma: Some(sigma),
+        })
+    }
+
+    /// Rms motion of a component given others and the standard deviation of that, m; what noise adds to the square is taken off.
+    fn sized(
+        &self,
+        own: &Component,
+        state: &KnownState,
+        others: &[&Component],
+    ) -> Option<(f64, f64)> {
+        let block = CellColumns::of_component(own, self.frame);
+        let across = self.across_block(&block, state, others);
+        let whole = product(matrix(&own.values), matrix(&own.values));
+        let along = self.frame.along(&own.values);
+        let (gram, gradient) = state.see((&whole, &along), &across, 0);
+        let prior: Vec<f64> = own
+            .shape
+            .shares
+            .iter()
+            .map(|share| own.amplitude * own.amplitude * share)
+            .collect();
+        let seen: Vec<usize> = (0..prior.len()).filter(|k| prior[*k] > 0.0).collect();
+        let pick = |matrix: &DMatrix<f64>| {
+            DMatrix::from_fn(seen.len(), seen.len(), |i, j| matrix[(seen[i], seen[j])])
+        };
+        let mut precision = pick(&gram);
+        (0..seen.len()).for_each(|i| precision[(i, i)] += 1.0 / prior[seen[i]]);
+        let covariance = precision.cholesky()?.inverse();
+        let values = &covariance * DVector::from_fn(seen.len(), |i, _| gradient[seen[i]]);
+        // Motion of unit columns together, by how alike they are.
+        let length = |k: usize| whole[(k, k)].sqrt().max(f64::MIN_POSITIVE);
+        let alike = DMatrix::from_fn(seen.len(), seen.len(), |i, j| {
+            whole[(seen[i], seen[j])] / length(seen[i]) / length(seen[j])
+        });
+        let square = (values.transpose() * &alike * &values)[0].max(f64::MIN_POSITIVE);
+        let by = &alike * &values;
+        let variance = (by.transpose() * &covariance * &by)[0] / square;
+        let noise = (&alike * &covariance).trace() - variance;
+        Some(((square - noise.max(0.0)).max(0.0).sqrt(), variance.sqrt()))
+    }
+}

@@ -1,0 +1,126 @@
+//! `cell_evidence`: what every cell of the table of causes says of a robot given cells that its fleet has accepted. `calib fleet diagnose` puts
+//! it in the place of a stage `diagnose`, with that stage's settings.
+
+use crate::diagnose::{CellAnswer, GivenCell, cell_evidence};
+use crate::effect::names;
+use crate::error::{Error, Fault, Result};
+use crate::stage::{AskedRows, Context, Diagnose, DiagnoseReads, RawFile, Stage};
+use crate::table::{CellEvidence as CellEvidenceTable, CellEvidenceRow};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Settings of `cell_evidence`.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CellEvidence {
+    /// Settings as of a stage `diagnose`.
+    pub diagnose: Diagnose,
+    /// Cells that are taken to be in the robot.
+    #[serde(default)]
+    pub given: Vec<Given>,
+}
+
+/// A cell that is taken to be in the robot.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Given {
+    /// Its key, as the table cell_evidence has it.
+    pub cell: String,
+    /// Key of the shape that all robots share; the robot's likeliest if none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shape: Option<String>,
+    /// Rms motion at the tool that is expected of it, mm.
+    pub size_mm: f64,
+}
+
+crate::stage::writes! {
+    /// Output ports of [`CellEvidence`].
+    pub struct CellEvidenceWrites {
+        cell_evidence: CellEvidenceTable,
+    }
+}
+
+/// ln of the evidence, of whole cells with a name and of all other rows, below which a row is left out: a fleet counts it as the least that a
+/// cell can say.
+const LEAST: [f64; 2] = [-2.0, -1.0];
+
+impl Stage for CellEvidence {
+    const NAME: &'static str = "cell_evidence";
+    const SUMMARY: &'static str =
+        "says what every possible cause explains of one robot, for the sum over a fleet";
+    const IMPLEMENTATION: u32 = 1;
+    type Reads = DiagnoseReads;
+    type Writes = CellEvidenceWrites;
+
+    fn check(&self) -> Vec<Fault> {
+        let below = |fault: Fault| Fault::new(format!("diagnose.{}", fault.place), fault.message);
+        let mut faults: Vec<Fault> = self.diagnose.check().into_iter().map(below).collect();
+        let wrong = |given: &Given| !(given.size_mm > 0.0 && given.size_mm < 1e3);
+        if let Some(k) = self.given.iter().position(wrong) {
+            faults.push(Fault::new(
+                format!("given[{k}].size_mm"),
+                "expected a length above 0 and below 1000 mm",
+            ));
+        }
+        faults
+    }
+
+    fn files(&self) -> Vec<(String, RawFile)> {
+        let below = |(place, file)| (format!("diagnose.{place}"), file);
+        Stage::files(&self.diagnose)
+            .into_iter()
+            .map(below)
+            .collect()
+    }
+
+    fn sets_named(&self) -> Vec<(String, String)> {
+        let below = |(place, set)| (format!("diagnose.{place}"), set);
+        self.diagnose.sets_named().into_iter().map(below).collect()
+    }
+
+    fn run(&self, reads: DiagnoseReads, context: &Context) -> Result<CellEvidenceWrites> {
+        let asked = AskedRows::of(&self.diagnose, &reads, context)?;
+        let question = asked.question(&self.diagnose, context.seed);
+        let given: Vec<GivenCell> = self
+            .given
+            .iter()
+            .map(|given| GivenCell {
+                cell: given.cell.clone(),
+                shape: given.shape.clone(),
+                size: 1e-3 * given.size_mm,
+            })
+            .collect();
+        let answers = cell_evidence(&question, &given)
+            .map_err(|message| Error::data("table recording", message))?;
+        Ok(CellEvidenceWrites {
+            cell_evidence: table(answers),
+        })
+    }
+}
+
+fn table(answers: Vec<CellAnswer>) -> CellEvidenceTable {
+    let kept = |answer: &CellAnswer| {
+        let is_plain = answer.shape.is_none() && answer.effect != names::UNKNOWN;
+        let least = if is_plain { LEAST[0] } else { LEAST[1] };
+        answer.log >= least || answer.sigma.is_some()
+    };
+    // So many digits decide nothing, and they would fill the store.
+    let rounded = |value: f64| (1e3 * value).round() / 1e3;
+    let row = |answer: CellAnswer| CellEvidenceRow {
+        given: answer.left_out.unwrap_or_default(),
+        cell: answer.cell,
+        shape: answer.shape.unwrap_or_default(),
+        effect: answer.effect.into(),
+        place: answer.place.to_string(),
+        follows: answer.follows.into(),
+        log_evidence: rounded(answer.log),
+        log_prior: rounded(answer.log_prior),
+        size_mm: rounded(1e6 * answer.size) / 1e3,
+        sigma_mm: answer.sigma.map(|sigma| rounded(1e6 * sigma) / 1e3),
+    };
+    let mut rows: Vec<CellEvidenceRow> = answers.into_iter().filter(kept).map(row).collect();
+    let key = |row: &CellEvidenceRow| (row.given.clone(), row.cell.clone(), row.shape.clone());
+    rows.sort_by_cached_key(key);
+    rows.dedup_by_key(|row| key(row));
+    CellEvidenceTable(rows)
+}

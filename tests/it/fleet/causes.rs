@@ -1,0 +1,205 @@
+//! A fleet's causes: what each recording alone hardly shows, the sum over robots names; a fleet without a cause names nothing.
+
+use super::{fleet, output, write};
+use crate::fixture::spread;
+use calib::report::fleet_causes::html;
+use calib::table::{FleetCellRow, FleetCells, FleetFindingRow, FleetFindings, FleetOutliers};
+use serde_json::Value;
+use std::fmt::Write as _;
+use std::path::Path;
+
+const ROBOTS: usize = 8;
+const LACKING: usize = 5;
+
+/// Twins with rigid errors of their own and what `effects` says of each.
+fn twins(folder: &Path, name: &str, effects: impl Fn(usize) -> String) -> std::path::PathBuf {
+    let robot = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sr210d/robot.yaml");
+    let pipeline = format!(
+        "calib: 1\nname: twins\nseed: 5\nstages:\n  - uses: robot\n    with: {{file: {}}}\n  - uses: simulate\n    with:\n      \
+         truth: {{}}\n      tracker: {{position_mm: [4500, -1800, 900], roll_pitch_yaw_deg: [0.3, -0.2, 155]}}\n      \
+         blocks: [{{usage: fit, points: 100}}]\n  - uses: split\n    with: {{by: usage}}\n  - uses: diagnose\n",
+        robot.display()
+    );
+    write(folder.join("twins.yaml"), &pipeline);
+    let mut list =
+        "robot,model,set.simulate.seed,set.simulate.truth.offset_deg,set.simulate.effects\n"
+            .to_string();
+    for robot in 0..ROBOTS {
+        let offset = |joint: usize| 0.1 * spread(robot * 31 + joint, joint) - 0.05;
+        let offsets: Vec<String> = (0..6)
+            .map(|joint| format!("{:.6}", offset(joint)))
+            .collect();
+        let (offsets, effects) = (offsets.join(", "), effects(robot));
+        writeln!(
+            list,
+            "robot {robot},sr210d,{},\"[{offsets}]\",\"{effects}\"",
+            4000 + robot
+        )
+        .unwrap();
+    }
+    write(folder.join(format!("{name}.csv")), &list);
+    let text =
+        format!("calib: 1\nname: {name}\npipeline: twins.yaml\nrobots:\n  - list: {name}.csv\n");
+    write(folder.join(format!("{name}.yaml")), &text)
+}
+
+fn diagnose(file: &Path, store: &Path, more: &[&str]) -> Value {
+    let (result, said) = output(
+        fleet("diagnose", file, store)
+            .args(["--json", "--quiet"])
+            .args(more),
+    );
+    assert!(result.status.success(), "{said}");
+    serde_json::from_slice(&result.stdout).unwrap()
+}
+
+fn rows<'a>(told: &'a Value, list: &str) -> Vec<&'a Value> {
+    told[list].as_array().unwrap().iter().collect()
+}
+
+#[test]
+fn robots_together_name_a_weak_cause_its_order_and_the_robot_that_lacks_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let (folder, store) = (folder.path(), folder.path().join("store"));
+    let wave = |robot: usize| match robot {
+        LACKING => "[]".into(),
+        _ => format!(
+            "[{{gear_cyclic: {{joint: 4, order: 3, amplitude_arcsec: 12, phase_deg: {}}}}}]",
+            37 * robot
+        ),
+    };
+    let file = twins(folder, "shared", wave);
+    let told = diagnose(&file, &store, &[]);
+    let findings = rows(&told, "findings");
+    assert_eq!(findings.len(), 1, "{told:#}");
+    let finding = findings[0];
+    assert_eq!(
+        [
+            &finding["effect"],
+            &finding["place"],
+            &finding["robot"],
+            &finding["shape"]
+        ],
+        ["gear_cyclic", "joint 4", "", "gear_cyclic@joint 4#order3"],
+        "{told:#}"
+    );
+    assert_eq!(finding["robots"], 7, "{told:#}");
+    let outliers = rows(&told, "outliers");
+    assert_eq!(outliers.len(), 1, "{told:#}");
+    assert_eq!(
+        [&outliers[0]["kind"], &outliers[0]["robot"]],
+        ["lacks", "robot 5"]
+    );
+    // Nothing is computed again, however many work at it.
+    let again = diagnose(&file, &store, &["-j", "1"]);
+    assert_eq!(again["computed"], 0);
+    assert_eq!(again["findings"], told["findings"]);
+    // The next robot of the model is expected to have it.
+    let text = std::fs::read_to_string(&file).unwrap();
+    let text = text.replace("name: shared", "name: next")
+        + "prior: {fleet: shared, stage: diagnose, by: causes}\n";
+    let next = write(folder.join("next.yaml"), &text);
+    let (result, said) =
+        output(fleet("run", &next, &store).args(["--json", "--quiet", "--robot", "robot 3"]));
+    assert!(result.status.success(), "{said}");
+    let told: Value = serde_json::from_slice(&result.stdout).unwrap();
+    let causes = |told: &Value| told["robots"][3]["causes"].as_str().map(str::to_string);
+    assert_eq!(
+        causes(&told).as_deref(),
+        Some("gear_cyclic at joint 4"),
+        "{told:#}"
+    );
+}
+
+#[test]
+fn a_prior_of_causes_of_a_fleet_that_was_not_diagnosed_is_a_fault_of_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let (folder, store) = (folder.path(), folder.path().join("store"));
+    let file = twins(folder, "first", |_| "[]".into());
+    let text = std::fs::read_to_string(&file).unwrap();
+    let with = |rest: &str| write(folder.join("next.yaml"), &format!("{text}prior: {rest}\n"));
+    let said = |rest: &str| {
+        let (result, said) = output(fleet("run", &with(rest), &store).arg("--quiet"));
+        assert_eq!(result.status.code(), Some(2), "{said}");
+        said
+    };
+    let lacks = said("{fleet: other, stage: diagnose, by: causes}");
+    assert!(lacks.contains("no fleet `other` was diagnosed"), "{lacks}");
+    let named = said("{fleet: other, stage: diagnose, by: causes, effects: [backlash]}");
+    assert!(named.contains("prior.effects"), "{named}");
+}
+
+fn size(robot: usize) -> FleetCellRow {
+    let deviation = if robot == 7 {
+        9.0
+    } else {
+        (robot % 7) as f64 / 3.0 - 1.0
+    };
+    FleetCellRow {
+        cell: "backlash@joint 3".into(),
+        robot: format!("<b>{robot}</b>"),
+        group: "sr210d".into(),
+        plant: Some(if robot % 2 == 0 { "north" } else { "south" }.into()),
+        campaign: None,
+        effect: "backlash".into(),
+        place: "joint 3".into(),
+        log_evidence: 5.0,
+        probability: 1.0,
+        size_mm: 0.03 + 0.003 * deviation,
+        sigma_mm: 0.003,
+        deviation: Some(deviation),
+    }
+}
+
+#[test]
+fn the_page_of_two_thousand_robots_is_small_and_the_furthest_robot_comes_first() {
+    let finding = FleetFindingRow {
+        group: "sr210d".into(),
+        cell: "backlash@joint 3".into(),
+        robot: String::new(),
+        effect: "backlash".into(),
+        place: "joint 3".into(),
+        follows: "approach".into(),
+        shape: None,
+        robots: 1500,
+        of_robots: 2000,
+        log_odds: 900.0,
+        probability: 0.97,
+        rival: None,
+        size_mm: 0.03,
+        spread_mm: Some(0.002),
+        trend: None,
+        statement: "backlash at joint 3 in 1500 of 2000 robots".into(),
+    };
+    let cells = FleetCells((0..2000).map(size).collect());
+    let page = html(
+        "line",
+        &FleetFindings(vec![finding]),
+        &cells,
+        &FleetOutliers::default(),
+    );
+    let page = page.unwrap();
+    assert!(page.len() < 2_000_000, "{}", page.len());
+    assert!(page.contains("height: 75.0%") && !page.contains("<b>7"));
+    assert_eq!(page.matches("class=\"sigma\"").count(), 2000);
+    let rows: Vec<&str> = page.split("<td class=\"name\">").skip(1).collect();
+    assert!(rows.len() == 2000 && rows[0].starts_with("&lt;b&gt;7&lt;"));
+}
+
+#[test]
+fn a_fleet_without_a_common_cause_names_none_and_a_robot_alone_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let (folder, store) = (folder.path(), folder.path().join("store"));
+    let one = |robot: usize| match robot {
+        2 => "[{backlash: {joint: 3, gap_arcsec: 20}}]".into(),
+        _ => "[]".into(),
+    };
+    let told = diagnose(&twins(folder, "single", one), &store, &[]);
+    let findings = rows(&told, "findings");
+    assert_eq!(findings.len(), 1, "{told:#}");
+    assert_eq!(
+        (&findings[0]["robot"], &findings[0]["effect"]),
+        (&"robot 2".into(), &"backlash".into())
+    );
+    assert_eq!(rows(&told, "outliers")[0]["kind"], "alone");
+}
