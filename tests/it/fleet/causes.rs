@@ -139,7 +139,14 @@ fn size(robot: usize) -> FleetCellRow {
         cell: "backlash@joint 3".into(),
         robot: format!("<b>{robot}</b>"),
         group: "sr210d".into(),
-        plant: Some(if robot % 2 == 0 { "north" } else { "south" }.into()),
+        plant: Some(
+            if robot.is_multiple_of(2) {
+                "north"
+            } else {
+                "south"
+            }
+            .into(),
+        ),
         campaign: None,
         effect: "backlash".into(),
         place: "joint 3".into(),
