@@ -50,7 +50,7 @@ pub struct Recording {
     pub held_out: Option<Vec<bool>>,
 }
 
-/// Faults that are told of one array.
+/// Faults that are reported for one array.
 const TOLD: usize = 5;
 
 /// Columns that have fields of their own.

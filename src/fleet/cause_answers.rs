@@ -344,14 +344,14 @@ fn trend(robots: &[Sized], tests: f64) -> Option<String> {
         let freedom = [(by.len() - 1) as f64, (count - by.len()) as f64];
         let ratio = between / freedom[0] / (within / freedom[1]).max(f64::MIN_POSITIVE);
         (tail(ratio, freedom[0], freedom[1]) < ALPHA / tests.min(20.0)).then(|| {
-            let told = by
+            let sentences = by
                 .iter()
                 .map(|(label, robots)| format!("{:.3} mm at {label}", mean(robots)));
-            told.collect::<Vec<_>>().join(", ")
+            sentences.collect::<Vec<_>>().join(", ")
         })
     };
-    let told: Vec<String> = labels.into_iter().filter_map(sentence).collect();
-    (!told.is_empty()).then(|| told.join("; "))
+    let sentences: Vec<String> = labels.into_iter().filter_map(sentence).collect();
+    (!sentences.is_empty()).then(|| sentences.join("; "))
 }
 
 fn length(size: f64, sigma: f64) -> String {

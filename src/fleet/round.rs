@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
-/// By what robots are grouped.
+/// The label by which robots are grouped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum GroupColumn {
@@ -37,7 +37,7 @@ impl GroupColumn {
 /// Which cells robots are taken to have.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Round {
-    /// By what robots are grouped.
+    /// The label by which robots are grouped.
     pub by: GroupColumn,
     /// Of all robots of a group.
     pub groups: BTreeMap<String, Vec<Given>>,

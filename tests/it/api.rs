@@ -90,8 +90,8 @@ fn arrays_give_to_the_last_digit_what_a_pipeline_gives_for_the_same_numbers_in_a
         std::fs::write(folder.path().join(name), text).expect("a file");
     }
     let output = calib(folder.path(), &["run", "pipeline.yaml", "--quiet"], "");
-    let told = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{told}");
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{stderr}");
     let run = run(folder.path());
     let identified = identify(&robot(), &recording, &Options::with(json!({}))).expect("a model");
     let diagnosed = diagnose(&robot(), &recording, &Options::with(json!({}))).expect("a diagnosis");
@@ -108,7 +108,8 @@ fn arrays_give_to_the_last_digit_what_a_pipeline_gives_for_the_same_numbers_in_a
         ["x_mm", "y_mm", "z_mm"].map(|name| stored.read::<f64>(name).expect("a column"));
     let predicted = identified.model.predict(&recording.poses).expect("points");
     for (row, point) in predicted.iter().enumerate() {
-        let off = |(axis, told): (usize, &f64)| (told - [x[row], y[row], z[row]][axis]).abs();
+        let off =
+            |(axis, value_mm): (usize, &f64)| (value_mm - [x[row], y[row], z[row]][axis]).abs();
         let off = point.iter().enumerate().map(off).fold(0.0, f64::max);
         assert!(off < 1e-9, "row {row}: {off} mm");
     }
@@ -221,8 +222,8 @@ fn a_served_model_answers_every_line_with_what_the_library_computes() {
     let answers = served(&["--predict"], &input);
     for (answer, point) in [&answers[0], &answers[2]].into_iter().zip(points) {
         for (axis, value) in point.iter().enumerate() {
-            let told = answer["point_mm"][axis].as_f64().expect("a number");
-            assert!((told - value).abs() < 1e-9, "{told} {value}");
+            let value_mm = answer["point_mm"][axis].as_f64().expect("a number");
+            assert!((value_mm - value).abs() < 1e-9, "{value_mm} {value}");
         }
     }
 }

@@ -94,9 +94,9 @@ def test_tables_are_those_of_the_command_line_to_the_last_digit(run_by_command, 
     for stage, tables in (("identify", model), ("diagnose", diagnosis.model)):
         for name in tables.tables:
             assert pyarrow.table(tables.table(name)).equals(pyarrow.table(run.table(f"{stage}.{name}"))), f"{stage}.{name}"
-    told = json.loads(command("diagnose", "HEAD", "--json", cwd=run_by_command))
-    assert diagnosis.findings == told["findings"]
-    assert run.diagnosis().document == {**told, "next_measurements": run.diagnosis().document["next_measurements"]}
+    printed = json.loads(command("diagnose", "HEAD", "--json", cwd=run_by_command))
+    assert diagnosis.findings == printed["findings"]
+    assert run.diagnosis().document == {**printed, "next_measurements": run.diagnosis().document["next_measurements"]}
 
 
 def test_a_cause_is_named_from_arrays_in_ten_lines(diagnosis):
@@ -112,8 +112,8 @@ def test_predictions_are_those_of_the_table(model, arrays):
     joints, points, held_out, columns = arrays
     predicted = model.predict(joints, **columns)
     table = model.table("prediction")
-    told = np.column_stack([table[name] for name in ("x_mm", "y_mm", "z_mm")])
-    assert np.abs(predicted - told).max() < 1e-9
+    printed = np.column_stack([table[name] for name in ("x_mm", "y_mm", "z_mm")])
+    assert np.abs(predicted - printed).max() < 1e-9
     # Concealed: 17.6 arcsec of joint 1 at 3 m; without it the arm is known to the noise.
     assert np.linalg.norm(predicted - points, axis=1)[held_out].mean() < 0.2
 
@@ -123,13 +123,13 @@ def test_commands_are_those_of_the_command_line(run_by_command, model, arrays):
     commands = model.compensate(joints, payload_kg=0.0)
     header = ",".join(f"q{j}_rad" for j in range(1, 7)) + ",payload_kg"
     lines = [",".join([*(repr(float(q)) for q in row), "0"]) for row in joints]
-    told = command("compensate", "HEAD", "-", "--step", "identify", "--quiet", cwd=run_by_command, input="\n".join([header, *lines]) + "\n")
-    told = np.array([[float(cell) for cell in line.split(",")[:6]] for line in told.splitlines()[1:]])
+    printed = command("compensate", "HEAD", "-", "--step", "identify", "--quiet", cwd=run_by_command, input="\n".join([header, *lines]) + "\n")
+    printed = np.array([[float(cell) for cell in line.split(",")[:6]] for line in printed.splitlines()[1:]])
     # The command line writes ten digits.
-    assert np.abs(commands.joints - told).max() < 1e-9
+    assert np.abs(commands.joints - printed).max() < 1e-9
     lines = "\n".join(json.dumps({"joints_rad": row, "payload_kg": 0}) for row in joints.tolist())
-    told = command("serve-model", "HEAD", "--step", "identify", "--quiet", cwd=run_by_command, input=lines)
-    answers = [json.loads(line) for line in told.splitlines()]
+    printed = command("serve-model", "HEAD", "--step", "identify", "--quiet", cwd=run_by_command, input=lines)
+    answers = [json.loads(line) for line in printed.splitlines()]
     assert [answer["joints_rad"] for answer in answers] == commands.joints.tolist()
     assert len(commands) == 20
 

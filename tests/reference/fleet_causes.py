@@ -151,15 +151,15 @@ def main():
         lacking = r.randrange(args.robots)
         effects = [[] if k == lacking else [make(j, strength * r.gauss(1, 0.1), r)] for k in range(args.robots)]
         begun = time.time()
-        told = diagnose(fleet(args.out, f"fleet{f}", effects, r), store, args)
+        answer = diagnose(fleet(args.out, f"fleet{f}", effects, r), store, args)
         seconds = time.time() - begun
         single = logs(store, f"fleet{f}", effect, place)
-        shared = [row for row in told["findings"] if not row["robot"]]
+        shared = [row for row in answer["findings"] if not row["robot"]]
         names = [(row["effect"], row["place"]) for row in shared]
         named = (effect, place) in names
         others = [name for name in names if name != (effect, place)]
-        listed = {row["robot"] for row in told["outliers"] if row["kind"] == "lacks"}
-        alone = {row["robot"] for row in told["outliers"] if row["kind"] != "lacks"}
+        listed = {row["robot"] for row in answer["outliers"] if row["kind"] == "lacks"}
+        alone = {row["robot"] for row in answer["outliers"] if row["kind"] != "lacks"}
         score["named"] += named
         score["other"] += bool(others)
         score["lacking listed"] += f"r{lacking:03}" in listed
@@ -169,14 +169,14 @@ def main():
         mean = sum(log for log, _ in single) / len(single)
         print(f"fleet {f}: {effect} at {place}, strength {strength:.3g}, ln E {mean:.1f} a robot: named {named}, others {others}, "
               f"r{lacking:03} listed {f'r{lacking:03}' in listed}, also listed {sorted((listed | alone) - {f'r{lacking:03}'})}; "
-              f"{told['rounds']} rounds, {seconds:.0f} s", flush=True)
+              f"{answer['rounds']} rounds, {seconds:.0f} s", flush=True)
         shutil.rmtree(store)
     null = alone = 0
     for f in range(args.nulls):
         store = os.path.join(args.out, "store")
-        told = diagnose(fleet(args.out, f"null{f}", [[] for _ in range(args.robots)], r), store, args)
-        shared = [row["statement"] for row in told["findings"] if not row["robot"]]
-        single = [row["statement"] for row in told["findings"] if row["robot"]]
+        answer = diagnose(fleet(args.out, f"null{f}", [[] for _ in range(args.robots)], r), store, args)
+        shared = [row["statement"] for row in answer["findings"] if not row["robot"]]
+        single = [row["statement"] for row in answer["findings"] if row["robot"]]
         null += bool(shared)
         alone += len(single)
         print(f"null {f}: {shared or 'nothing'}; single {single}", flush=True)

@@ -260,12 +260,12 @@ impl Run {
 
     /// The stage that diagnosed, the diagnosis as JSON and as text, and its page.
     fn diagnosis(&self, step: Option<&str>) -> PyResult<(String, String, String, Option<String>)> {
-        let (stage, told) = self.0.diagnosis(step).map_err(raised)?;
+        let (stage, summary) = self.0.diagnosis(step).map_err(raised)?;
         Ok((
             stage,
-            told.document("").to_string(),
-            told.text(""),
-            told.page("").ok(),
+            summary.document("").to_string(),
+            summary.text(""),
+            summary.page("").ok(),
         ))
     }
 }

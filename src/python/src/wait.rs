@@ -13,7 +13,7 @@ use std::time::Duration;
 /// Time between two looks at signals: Ctrl-C is answered within it.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Stage, units done, units in all, and a text: what the callable is told.
+/// Stage, units done, units in all, and a text: the arguments of the callable.
 type Step = (String, u64, Option<u64>, String);
 
 enum Event<T> {
@@ -82,7 +82,7 @@ pub fn wait<T: Send + 'static>(
             let event = received.recv_timeout(LOOK);
             (received, event)
         });
-        let mut told = Ok(());
+        let mut sent = Ok(());
         match event {
             Ok(Event::Ended(Ok(ended))) => return ended.map_err(raised),
             Ok(Event::Ended(Err(_))) | Err(RecvTimeoutError::Disconnected) => {
@@ -90,12 +90,12 @@ pub fn wait<T: Send + 'static>(
             }
             Ok(Event::Step(step)) => {
                 if let Some(progress) = &progress {
-                    told = progress.call1(py, step).map(drop);
+                    sent = progress.call1(py, step).map(drop);
                 }
             }
             Err(RecvTimeoutError::Timeout) => (),
         }
-        if let Err(error) = told.and_then(|()| py.check_signals()) {
+        if let Err(error) = sent.and_then(|()| py.check_signals()) {
             stopped.store(true, Ordering::Relaxed);
             return Err(error);
         }

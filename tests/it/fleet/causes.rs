@@ -53,8 +53,8 @@ fn diagnose(file: &Path, store: &Path, more: &[&str]) -> Value {
     serde_json::from_slice(&result.stdout).unwrap()
 }
 
-fn rows<'a>(told: &'a Value, list: &str) -> Vec<&'a Value> {
-    told[list].as_array().unwrap().iter().collect()
+fn rows<'a>(answer: &'a Value, list: &str) -> Vec<&'a Value> {
+    answer[list].as_array().unwrap().iter().collect()
 }
 
 #[test]
@@ -69,9 +69,9 @@ fn robots_together_name_a_weak_cause_its_order_and_the_robot_that_lacks_it() {
         ),
     };
     let file = twins(folder, "shared", wave);
-    let told = diagnose(&file, &store, &[]);
-    let findings = rows(&told, "findings");
-    assert_eq!(findings.len(), 1, "{told:#}");
+    let answer = diagnose(&file, &store, &[]);
+    let findings = rows(&answer, "findings");
+    assert_eq!(findings.len(), 1, "{answer:#}");
     let finding = findings[0];
     assert_eq!(
         [
@@ -81,11 +81,11 @@ fn robots_together_name_a_weak_cause_its_order_and_the_robot_that_lacks_it() {
             &finding["shape"]
         ],
         ["gear_cyclic", "joint 4", "", "gear_cyclic@joint 4#order3"],
-        "{told:#}"
+        "{answer:#}"
     );
-    assert_eq!(finding["robots"], 7, "{told:#}");
-    let outliers = rows(&told, "outliers");
-    assert_eq!(outliers.len(), 1, "{told:#}");
+    assert_eq!(finding["robots"], 7, "{answer:#}");
+    let outliers = rows(&answer, "outliers");
+    assert_eq!(outliers.len(), 1, "{answer:#}");
     assert_eq!(
         [&outliers[0]["kind"], &outliers[0]["robot"]],
         ["lacks", "robot 5"]
@@ -93,7 +93,7 @@ fn robots_together_name_a_weak_cause_its_order_and_the_robot_that_lacks_it() {
     // Nothing is computed again, however many work at it.
     let again = diagnose(&file, &store, &["-j", "1"]);
     assert_eq!(again["computed"], 0);
-    assert_eq!(again["findings"], told["findings"]);
+    assert_eq!(again["findings"], answer["findings"]);
     // The next robot of the model is expected to have it.
     let text = std::fs::read_to_string(&file).unwrap();
     let text = text.replace("name: shared", "name: next")
@@ -102,12 +102,12 @@ fn robots_together_name_a_weak_cause_its_order_and_the_robot_that_lacks_it() {
     let (result, said) =
         output(fleet("run", &next, &store).args(["--json", "--quiet", "--robot", "robot 3"]));
     assert!(result.status.success(), "{said}");
-    let told: Value = serde_json::from_slice(&result.stdout).unwrap();
-    let causes = |told: &Value| told["robots"][3]["causes"].as_str().map(str::to_string);
+    let answer: Value = serde_json::from_slice(&result.stdout).unwrap();
+    let causes = |answer: &Value| answer["robots"][3]["causes"].as_str().map(str::to_string);
     assert_eq!(
-        causes(&told).as_deref(),
+        causes(&answer).as_deref(),
         Some("gear_cyclic at joint 4"),
-        "{told:#}"
+        "{answer:#}"
     );
 }
 
@@ -194,19 +194,19 @@ fn the_page_of_two_thousand_robots_is_small_and_the_furthest_robot_comes_first()
 }
 
 #[test]
-fn a_fleet_without_a_common_cause_names_none_and_a_robot_alone_is_told() {
+fn a_fleet_without_a_common_cause_names_none_and_a_robot_alone_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     let (folder, store) = (folder.path(), folder.path().join("store"));
     let one = |robot: usize| match robot {
         2 => "[{backlash: {joint: 3, gap_arcsec: 20}}]".into(),
         _ => "[]".into(),
     };
-    let told = diagnose(&twins(folder, "single", one), &store, &[]);
-    let findings = rows(&told, "findings");
-    assert_eq!(findings.len(), 1, "{told:#}");
+    let answer = diagnose(&twins(folder, "single", one), &store, &[]);
+    let findings = rows(&answer, "findings");
+    assert_eq!(findings.len(), 1, "{answer:#}");
     assert_eq!(
         (&findings[0]["robot"], &findings[0]["effect"]),
         (&"robot 2".into(), &"backlash".into())
     );
-    assert_eq!(rows(&told, "outliers")[0]["kind"], "alone");
+    assert_eq!(rows(&answer, "outliers")[0]["kind"], "alone");
 }

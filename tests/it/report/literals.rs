@@ -77,7 +77,7 @@ pub(crate) fn sentences() -> BTreeSet<(String, String)> {
         said.map(|literal| (name.clone(), literal))
             .collect::<Vec<_>>()
     });
-    // Units and sources of criteria are read in their tables, and nobody else is told them.
+    // Units and sources of criteria are read in their tables, and appear nowhere else.
     each.filter(|(name, _)| !name.ends_with("tests.rs") && !name.starts_with("numerics/criteria/"))
         .collect()
 }
