@@ -2,11 +2,10 @@
 
 use super::surroundings::open_store;
 use super::{emit, emit_json};
-use crate::effect::identified;
-use crate::error::{Error, Fault, Result, nearest};
+use crate::error::{Error, Fault, Result};
+use crate::identified::robot_file;
 use crate::poses::{
-    PoseAnswer, PoseRequest, RobotFiles, RunStage, apart, fault, is_known, places, proposal,
-    sockets, write,
+    PoseAnswer, PoseRequest, RunStage, apart, fault, places, proposal, sockets, write,
 };
 use clap::Args;
 use std::io::Write;
@@ -101,9 +100,9 @@ const EXAMPLES: &str = "Examples:
   calib poses robot.json --limits -170:170,-60:75,-80:75,-180:180,-120:120,-180:180 --json";
 
 pub(super) fn main(arguments: &PosesArguments) -> Result<()> {
-    check(arguments)?;
     let request = request(arguments);
     let pair = arguments.separate.as_deref().unwrap_or_default();
+    check(arguments, &request, pair)?;
     match (&arguments.run, &arguments.robot) {
         (Some(run), _) => {
             let store = open_store(arguments.store.as_deref())?;
@@ -121,16 +120,15 @@ pub(super) fn main(arguments: &PosesArguments) -> Result<()> {
             )
         }
         (None, Some(file)) => {
-            let robot = RobotFiles {
-                file,
-                urdf: arguments.urdf.as_deref(),
-            };
+            let robot = robot_file(file, arguments.urdf.as_deref())?;
+            let place = file.display().to_string();
             if let Some(places) = &arguments.sockets {
-                return show(arguments, &sockets(&request, &robot, &places.0)?);
+                return show(arguments, &sockets(&request, robot, &place, &places.0)?);
             }
+            let against = arguments.against.as_deref();
             show(
                 arguments,
-                &proposal(&request, &robot, pair, arguments.against.as_deref())?,
+                &proposal(&request, robot, &place, pair, against)?,
             )
         }
         (None, None) => Err(Error::spec("ROBOT", "expected a robot file, or --run")),
@@ -209,86 +207,13 @@ pub(super) fn ranges(text: &str) -> Result<Ranges, String> {
 }
 
 /// Everything that can be said without a file, all at once.
-fn check(arguments: &PosesArguments) -> Result<()> {
-    let mut faults = Vec::new();
-    let none = Vec::new();
-    let separate = arguments
-        .separate
-        .as_ref()
-        .filter(|_| arguments.run.is_none());
-    for (option, names) in [
-        ("--effects", &arguments.effects),
-        ("--separate", separate.unwrap_or(&none)),
-    ] {
-        for name in names.iter().filter(|name| !is_known(name)) {
-            let known: Vec<&str> = identified().map(|cause| cause.name()).collect();
-            let hint = nearest(name, known.iter().copied())
-                .map(|near| format!("did you mean `{near}`? "))
-                .unwrap_or_default();
-            faults.push(Fault::new(
-                option,
-                format!(
-                    "unknown effect `{name}`; {hint}allowed: {}",
-                    known.join(", ")
-                ),
-            ));
-        }
-    }
-    if separate.is_some_and(|names| names.len() != 2) {
+fn check(arguments: &PosesArguments, request: &PoseRequest, pair: &[String]) -> Result<()> {
+    let of_robot = arguments.run.is_none();
+    let mut faults = request.faults(if of_robot { pair } else { &[] });
+    if of_robot && arguments.separate.is_some() && pair.len() != 2 {
         faults.push(Fault::new(
             "--separate",
             "expected two effects, or a run whose findings have rivals (--run)",
-        ));
-    }
-    if let Some([a, b]) = separate.map(Vec::as_slice) {
-        if a == b {
-            faults.push(Fault::new(
-                "--separate",
-                format!("expected two different effects, found `{a}` twice"),
-            ));
-        }
-        let chosen =
-            |name: &String| arguments.effects.is_empty() || arguments.effects.contains(name);
-        for name in [a, b].into_iter().filter(|name| !chosen(name)) {
-            faults.push(Fault::new(
-                "--effects",
-                format!("`{name}` is named by --separate but not here: add it"),
-            ));
-        }
-    }
-    for mass in arguments
-        .payload
-        .iter()
-        .filter(|mass| !(mass.is_finite() && **mass >= 0.0))
-    {
-        faults.push(Fault::new(
-            "--payload",
-            format!("expected masses of 0 or more, kg, found {mass}"),
-        ));
-    }
-    if let Some(sigma) = arguments
-        .sigma
-        .filter(|sigma| !(sigma.is_finite() && *sigma > 0.0))
-    {
-        faults.push(Fault::new(
-            "--sigma",
-            format!("expected a length above 0, mm, found {sigma}"),
-        ));
-    }
-    if !(0.0..=45.0).contains(&arguments.margin) {
-        faults.push(Fault::new(
-            "--margin",
-            format!("expected 0 to 45 percent, found {}", arguments.margin),
-        ));
-    }
-    if let Some(bounds) = arguments
-        .bounds
-        .as_ref()
-        .filter(|bounds| bounds.0.len() != 3)
-    {
-        faults.push(Fault::new(
-            "--box",
-            format!("expected three ranges, x, y, z, found {}", bounds.0.len()),
         ));
     }
     if let Some(path) = &arguments.out {

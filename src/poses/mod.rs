@@ -11,14 +11,18 @@ mod sockets;
 
 pub use apart::{RunStage, apart};
 pub use drive::{Drive, fault, write};
-pub use proposal::{RobotFiles, is_known, proposal};
+pub use proposal::proposal;
 pub use sockets::{SocketProposal, places, sockets};
 
+use crate::effect::identified;
+use crate::error::{Fault, instead};
 use crate::estimate::choose::{Aim, DesignRequest};
+use serde::Deserialize;
 use std::path::PathBuf;
 
 /// What is asked for, in the units of the command line.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct PoseRequest {
     /// How many poses.
     pub count: usize,
@@ -41,7 +45,72 @@ pub struct PoseRequest {
     /// Standard deviation per axis of a measured point, mm.
     pub sigma: Option<f64>,
     /// The file that the poses go to.
+    #[serde(skip)]
     pub out: Option<PathBuf>,
+}
+
+/// The defaults of `calib poses`.
+impl Default for PoseRequest {
+    fn default() -> Self {
+        Self {
+            count: 50,
+            candidates: 1000,
+            seed: 1,
+            effects: Vec::new(),
+            limits: None,
+            margin: 2.0,
+            bounds: None,
+            floor: None,
+            payloads: Vec::new(),
+            sigma: None,
+            out: None,
+        }
+    }
+}
+
+impl PoseRequest {
+    /// What can be said against it without a robot, and against two effects to separate; places are options of `calib poses`.
+    pub fn faults(&self, pair: &[String]) -> Vec<Fault> {
+        let known: Vec<&str> = identified().map(|cause| cause.name()).collect();
+        let mut faults = Vec::new();
+        let mut fault = |place: &str, message: String| faults.push(Fault::new(place, message));
+        for (option, names) in [("--effects", &self.effects[..]), ("--separate", pair)] {
+            for name in names.iter().filter(|name| !proposal::is_known(name)) {
+                let other = instead(name, &known);
+                fault(option, format!("unknown effect `{name}`{other}"));
+            }
+        }
+        if let [a, b] = pair {
+            if a == b {
+                let message = format!("expected two different effects, found `{a}` twice");
+                fault("--separate", message);
+            }
+            let chosen = |name: &String| self.effects.is_empty() || self.effects.contains(name);
+            for name in pair.iter().filter(|name| !chosen(name)) {
+                let message = format!("`{name}` is named by --separate but not here: add it");
+                fault("--effects", message);
+            }
+        }
+        let masses = self.payloads.iter();
+        for mass in masses.filter(|mass| !(mass.is_finite() && **mass >= 0.0)) {
+            let message = format!("expected masses of 0 or more, kg, found {mass}");
+            fault("--payload", message);
+        }
+        let sigma = self.sigma;
+        if let Some(sigma) = sigma.filter(|sigma| !(sigma.is_finite() && *sigma > 0.0)) {
+            let message = format!("expected a length above 0, mm, found {sigma}");
+            fault("--sigma", message);
+        }
+        if !(0.0..=45.0).contains(&self.margin) {
+            let message = format!("expected 0 to 45 percent, found {}", self.margin);
+            fault("--margin", message);
+        }
+        if let Some(bounds) = self.bounds.as_ref().filter(|bounds| bounds.len() != 3) {
+            let message = format!("expected three ranges, x, y, z, found {}", bounds.len());
+            fault("--box", message);
+        }
+        faults
+    }
 }
 
 /// Poses and what they promise.

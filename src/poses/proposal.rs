@@ -7,7 +7,6 @@ use crate::effect::{EffectContext, EffectStack, Load, arm_effect, identified};
 use crate::error::{Error, Result};
 use crate::estimate::Model;
 use crate::estimate::choose::{Aim, Proposal, Score, Site, propose};
-use crate::identified::robot_file;
 use crate::robot::{JointConvention, Measurements, PointReadings, RobotModel};
 use crate::spatial::Pose;
 use crate::units::Unit;
@@ -36,24 +35,15 @@ pub struct PoseProposal<'a> {
 /// mm; where neither the request nor a recording says one.
 const SIGMA: f64 = 0.02;
 
-/// A robot file, and the URDF that it refers to.
-pub struct RobotFiles<'a> {
-    /// The robot file.
-    pub file: &'a Path,
-    /// The URDF that it refers to.
-    pub urdf: Option<&'a Path>,
-}
-
-/// Proposes poses; `pair` are two effects to separate, or none, `against` a recording to compare with.
+/// Proposes poses; `place` names the robot in errors, `pair` are two effects to separate, or none, `against` a recording to compare with.
 pub fn proposal<'a>(
     request: &'a PoseRequest,
-    robot: &RobotFiles,
+    imported: RobotDescription,
+    place: &str,
     pair: &[String],
     against: Option<&Path>,
 ) -> Result<PoseProposal<'a>> {
-    let imported = robot_file(robot.file, robot.urdf)?;
-    let place = robot.file.display().to_string();
-    let site = site(request, &imported, &place, None)?;
+    let site = site(request, &imported, place, None)?;
     let robot = RobotModel::new(imported.clone());
     let (effects, left_out) = effects(&request.effects, &robot, &site);
     let model = || model(&robot, &effects);
@@ -141,7 +131,7 @@ fn effects(chosen: &[String], robot: &RobotModel, site: &Site) -> NamedEffects {
 }
 
 /// Whether poses can be asked for an effect of this name.
-pub fn is_known(effect: &str) -> bool {
+pub(super) fn is_known(effect: &str) -> bool {
     arm_effect(effect, &setting()).is_some()
 }
 

@@ -1,13 +1,11 @@
 //! Postures for a ball that is brought to sockets, no instrument at hand: `calib poses ROBOT --sockets`.
 
-use super::proposal::RobotFiles;
 use super::show::closing;
 use super::site::site;
 use super::{Drive, PoseAnswer, PoseRequest, drive};
 use crate::description::RobotDescription;
 use crate::error::{Error, Fault, Result, counted};
 use crate::estimate::choose::{BroughtProposal, BroughtRequest, PriorSigma, propose_brought};
-use crate::identified::robot_file;
 use crate::robot::{JointConvention, RobotModel};
 use crate::units::Unit;
 use nalgebra::Vector3;
@@ -62,12 +60,11 @@ pub fn places(text: &str) -> std::result::Result<Vec<[f64; 3]>, String> {
 /// Proposes postures for sockets in the base frame, m.
 pub fn sockets<'a>(
     request: &'a PoseRequest,
-    robot: &RobotFiles,
+    imported: RobotDescription,
+    place: &str,
     places: &[[f64; 3]],
 ) -> Result<SocketProposal<'a>> {
-    let imported = robot_file(robot.file, robot.urdf)?;
-    let place = robot.file.display().to_string();
-    let site = site(request, &imported, &place, None)?;
+    let site = site(request, &imported, place, None)?;
     if request.payloads.len() > 1 {
         return Err(Error::Spec(vec![Fault::new(
             "--payload",

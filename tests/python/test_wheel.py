@@ -206,6 +206,25 @@ def test_robots_come_from_tables_files_and_the_library(tmp_path):
     assert any(cause["name"] == "backlash" for cause in calib.effects())
 
 
+def test_poses_are_those_of_the_command_line(tmp_path):
+    arm = calib.Robot.library("ur10e")
+    asked = {"payloads": [0.0, 5.0], "floor": 200.0, "candidates": 200, "seed": 3}
+    limits = np.tile(np.radians([-170.0, 170.0]), (6, 1))
+    found = arm.poses(20, limits=limits, settings=asked)
+    (tmp_path / "arm.yaml").write_text(command("robots", "ur10e"))
+    options = ["--limits", ",".join(["-170:170"] * 6), "--payload", "0,5", "--floor", "200", "--candidates", "200", "--seed", "3", "--json"]
+    answer = json.loads(command("poses", str(tmp_path / "arm.yaml"), "--count", "20", *options))
+    assert found.joints.shape == (20, 6) and len(found) == 20 and set(found.payload_kg) <= {0.0, 5.0}
+    assert found.document["poses"] == answer["poses"]
+    assert np.allclose(np.degrees(found.joints[:, 0]), [pose["q1_deg"] for pose in answer["poses"]], atol=1e-9)
+    with pytest.raises(calib.SpecError, match="did you mean `joint_compliance`"):
+        arm.poses(separate=("reduction_ratio", "joint_complience"))
+    with pytest.raises(ValueError, match="unknown field `flor`"):
+        arm.poses(settings={"flor": 200.0})
+    with pytest.raises(calib.SpecError, match="has no limits"):
+        calib.Robot.from_dh([[0.0, 400.0, 25.0, -1.57]] * 3).poses()
+
+
 def test_a_pipeline_is_run_with_progress_and_its_tables_are_read(run_by_command):
     seen = []
     run = calib.run(

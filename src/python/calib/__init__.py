@@ -22,7 +22,7 @@ from . import _calib
 from ._calib import DataError, SpecError, StoreError, __version__, robots
 
 __all__ = [
-    "Commands", "DataError", "Diagnosis", "Model", "Robot", "Run", "SpecError", "StoreError", "Table", "__version__", "effects", "open_run",
+    "Commands", "DataError", "Diagnosis", "Model", "Proposal", "Robot", "Run", "SpecError", "StoreError", "Table", "__version__", "effects", "open_run",
     "robots", "run",
 ]
 
@@ -89,6 +89,27 @@ class Commands:
 
     def __len__(self) -> int:
         return len(self.remarks)
+
+
+class Proposal:
+    """Poses to measure, and what they promise."""
+
+    def __init__(self, arrays: list[Array], document: str, text: str) -> None:
+        #: Shape (rows, joints), rad (mm of a joint that slides), in the order of driving.
+        self.joints: Array = arrays[0]
+        #: Shape (rows,), kg.
+        self.payload_kg: Array = arrays[1]
+        #: Shape (rows, joints): 1 where the joint's last move goes upwards, -1 where downwards.
+        self.direction: Array = arrays[2]
+        #: All of it, as `calib poses --json` prints it.
+        self.document: dict[str, Any] = json.loads(document)
+        self._text = text
+
+    def __len__(self) -> int:
+        return len(self.payload_kg)
+
+    def __str__(self) -> str:
+        return self._text
 
 
 class Model:
@@ -295,6 +316,23 @@ class Robot:
         outcome = self._stage("diagnose", joints, points, sigma, held_out, settings, seed, progress, columns)
         model = Model(outcome.model, outcome)
         return Diagnosis(outcome.document or "", outcome.text or "", outcome.page, model.table, model.warnings, model)
+
+    def poses(
+        self, count: int = 50, *, separate: tuple[str, str] | None = None, limits: Array | None = None, settings: Mapping[str, Any] | None = None,
+    ) -> Proposal:
+        """Proposes poses to measure, as `calib poses` does: the best for all parameters together, or to separate two effects.
+
+        Self-collision is not checked, nor collision with the cell: drive them slowly first.
+
+        separate: names of two effects, e.g. ("reduction_ratio", "joint_compliance").
+        limits: float64, shape (joints, 2), rad (mm of a joint that slides), instead of the robot's.
+        settings: effects (names), bounds ([[x, x], [y, y], [z, z]], mm), floor (mm), payloads (kg), sigma (mm), margin (percent of the travel
+            left free at either end), candidates, seed.
+
+        Raises SpecError where a setting is wrong, a joint has no limits, or the arm cannot go there; ValueError for unknown settings.
+        """
+        request = json.dumps({"count": count, **(settings or {})})
+        return Proposal(*self._robot.poses(request, list(separate or ()), limits))
 
     def _stage(
         self, uses: str, joints: Array, points: Array, sigma: float | str | Array | None, held_out: Any, settings: Mapping[str, Any] | None,

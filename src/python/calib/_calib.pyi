@@ -57,6 +57,7 @@ class Robot:
         self, uses: str, joints: Array, points: Array, sigma: Any, held_out: list[bool] | None, columns: dict[str, Any], settings: str, seed: int,
         progress: Any,
     ) -> Outcome: ...
+    def poses(self, request: str, pair: list[str], limits: Array | None) -> tuple[list[Array], str, str]: ...
 
 class Run:
     manifest: str

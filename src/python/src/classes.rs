@@ -7,6 +7,7 @@ use crate::wait::wait;
 use calib::api::{self, Options, RunRequest};
 use calib::cli::{cores, open_store, surroundings};
 use calib::pipeline::StageTables;
+use calib::poses::PoseRequest;
 use calib::table::Table;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -69,6 +70,45 @@ impl Robot {
                 .collect::<Vec<_>>(),
             2,
         )
+    }
+
+    /// Proposed poses: joints, payloads, directions; the answer as JSON and as text. `request` is JSON.
+    fn poses<'py>(
+        &self,
+        py: Python<'py>,
+        request: &str,
+        pair: Vec<String>,
+        limits: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<(Vec<Bound<'py, PyAny>>, String, String)> {
+        let mut request: PoseRequest = serde_json::from_str(request)
+            .map_err(|error| PyValueError::new_err(error.to_string()))?;
+        if let Some(limits) = limits {
+            let given = matrix(
+                "limits",
+                limits,
+                2,
+                "lower and upper end of each joint, rad",
+            )?;
+            let ends = given.as_chunks().0.iter().zip(self.0.prismatic());
+            let shown = ends.map(|(ends, slides): (&[f64; 2], _)| match slides {
+                true => *ends,
+                false => ends.map(f64::to_degrees),
+            });
+            request.limits = Some(shown.collect());
+        }
+        let robot = self.0.clone();
+        let found = wait(py, None, move |_| {
+            api::propose_poses(&robot, &request, &pair)
+        })?;
+        let (poses, joints) = (&found.poses, self.0.joints());
+        let arrays = [
+            (&poses.joints_rad, joints),
+            (&poses.columns["payload_kg"], 1),
+            (&poses.columns["dir"], joints),
+        ];
+        let arrays = arrays.map(|(values, columns)| array(py, values, columns));
+        let arrays = arrays.into_iter().collect::<PyResult<_>>()?;
+        Ok((arrays, found.document.to_string(), found.text))
     }
 
     /// Runs a stage: `identify` or `diagnose`.
