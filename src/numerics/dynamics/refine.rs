@@ -1,6 +1,6 @@
 //! Shape numbers of what was found: finer and finer grids about each.
 
-use super::cause::{COULOMB, ShapeSpan, VISCOUS};
+use super::cause::{COULOMB, ShapeSpan, TorqueForm, VISCOUS};
 use super::choice::CauseChoice;
 use super::naming::push;
 use super::problem::TorqueProblem;
@@ -32,41 +32,59 @@ pub(super) fn refine(
     before != set
 }
 
-/// Replaces viscous and Coulomb friction of a joint by friction that grows with a power of speed where it leaves no more than the two: with a
-/// sign that turns slowly they are nearly this power. Tells whether it did.
+/// Describes friction of a joint by one power of speed where that explains as much: in place of a curve without a name, and in place of viscous
+/// and Coulomb friction, which with a sign that turns slowly are nearly such a power. Tells whether it did.
 pub(super) fn one_power_of_speed(
     problem: &mut TorqueProblem,
     weighted: &mut WeightedColumns,
     set: &mut Vec<usize>,
     joint: usize,
 ) -> bool {
-    let at = |name: &str| {
-        let form = |number: &usize| &problem.all.forms[*number];
-        set.iter().position(|number| {
-            form(number).cause.name() == name && form(number).place == Place::Joint(joint)
-        })
+    let is_at = |form: &TorqueForm| form.place == Place::Joint(joint);
+    let viscous = |form: &TorqueForm| is_at(form) && form.cause.name() == VISCOUS;
+    let coulomb = |form: &TorqueForm| is_at(form) && form.cause.name() == COULOMB;
+    let curve = |form: &TorqueForm| is_at(form) && form.is_nameless_curve();
+    // The curve has three numbers more than the power that takes its place.
+    let worth = 3.0 * (weighted.rows as f64).ln();
+    let mut replace = |is_replaced: IsForm, worth: f64| {
+        let at = |is: IsForm| {
+            let mut forms = set.iter().map(|number| &problem.all.forms[*number]);
+            forms.position(is)
+        };
+        let both = at(&viscous).zip(at(is_replaced));
+        let next = both.and_then(|both| powered(problem, weighted, set, both, worth));
+        let is_better = next.is_some();
+        *set = next.unwrap_or_else(|| set.clone());
+        is_better
     };
-    let (Some(viscous), Some(coulomb)) = (at(VISCOUS), at(COULOMB)) else {
-        return false;
-    };
-    let mut alone = set.clone();
-    alone[viscous] = {
-        let form = problem.all.forms[set[viscous]].with_shape(0, START_POWER);
-        push(problem, weighted, form)
-    };
-    alone.remove(coulomb);
-    let is_whole = CauseChoice::new(problem, weighted).is_whole(&alone);
-    let place = viscous - usize::from(coulomb < viscous);
-    if !is_whole {
-        return false;
+    replace(&curve, worth) | replace(&coulomb, 0.0)
+}
+
+type IsForm<'a> = &'a dyn Fn(&TorqueForm) -> bool;
+
+/// A set without its form `replaced`, whose viscous friction grows with a power of speed, where the sum of squares so rises by no more than
+/// `worth`.
+fn powered(
+    problem: &mut TorqueProblem,
+    weighted: &mut WeightedColumns,
+    set: &[usize],
+    (viscous, replaced): (usize, usize),
+    worth: f64,
+) -> Option<Vec<usize>> {
+    let mut next = set.to_vec();
+    let form = &problem.all.forms[set[viscous]];
+    if form.shape.first() == Some(&1.0) {
+        let form = form.with_shape(0, START_POWER);
+        next[viscous] = push(problem, weighted, form);
     }
-    refine_one(problem, weighted, &mut alone, place);
+    next.remove(replaced);
+    if !CauseChoice::new(problem, weighted).is_whole(&next) {
+        return None;
+    }
+    let place = viscous - usize::from(replaced < viscous);
+    refine_one(problem, weighted, &mut next, place);
     let square = |set: &[usize]| SweptColumns::base(&problem.all, weighted).with(set).square;
-    let is_better = square(&alone) <= square(set);
-    if is_better {
-        *set = alone;
-    }
-    is_better
+    (square(&next) <= square(set) + worth).then_some(next)
 }
 
 /// Replaces one form of a set.
