@@ -91,6 +91,8 @@ impl TorqueModel {
         if forms.iter().any(|form| form.place == Place::Base) {
             scene.tilt(&self.inertials);
         }
+        let coefficients = self.terms.iter().map(|term| &term.coefficients[..]);
+        scene.believe_friction(forms.iter().zip(coefficients));
         let courses = self.courses(&forms, &scene);
         let mut torque: Vec<Vec<f64>> = scene.rigid.clone();
         for one in &courses {

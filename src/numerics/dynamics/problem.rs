@@ -13,6 +13,7 @@ use super::scene::{DynamicScene, column};
 use super::types::{ContactEvent, TorqueQuestion};
 use super::weighted::{Weighing, WeightedColumns};
 use crate::effect::Place;
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// s around an event whose rows do not count either.
@@ -178,9 +179,19 @@ impl<'a> TorqueProblem<'a> {
         theta
     }
 
-    /// Makes columns of the rigid torque anew, from the inertial numbers of a fit with a set of forms.
-    pub fn believe(&mut self, theta: &[f64], set: &[usize]) {
+    /// Makes columns of the rigid torque and of friction anew, from the inertial numbers and the solution of a fit with a set of forms.
+    pub fn believe(&mut self, theta: &[f64], set: &[usize], solution: &[(usize, f64)]) {
         self.scene.believe(theta);
+        let values: BTreeMap<usize, f64> = solution.iter().copied().collect();
+        let of_form = |number: &usize| {
+            let value = |column| values.get(&column).copied().unwrap_or(0.0);
+            self.all.of(*number).map(value).collect::<Vec<f64>>()
+        };
+        let coefficients: Vec<Vec<f64>> = set.iter().map(of_form).collect();
+        let forms = set.iter().map(|number| &self.all.forms[*number]);
+        let forms = forms.zip(&coefficients);
+        self.scene
+            .believe_friction(forms.map(|(form, values)| (form, &values[..])));
         // A tilt times what is wrong of the masses looks like offsets.
         if set
             .iter()

@@ -1,6 +1,7 @@
 //! The recording as causes see it: motion, rigid torque and clock at the recording's own rate, joint after joint.
 
 use super::arm::DynamicArm;
+use super::cause::TorqueForm;
 use super::clock::RecordingClock;
 use super::derivatives::derivatives;
 use super::filter::ZeroPhase;
@@ -31,6 +32,8 @@ pub(super) struct DynamicScene<'a> {
     pub acceleration: Vec<Vec<f64>>,
     /// Nm, of the inertials as they are believed at present, payload included.
     pub rigid: Vec<Vec<f64>>,
+    /// Nm, of friction as it is believed at present.
+    pub friction: Vec<Vec<f64>>,
     /// Nm, under a gravity of 9.81 m/s^2 along x, then along y of the base: of the declared masses, once a tilt is known of those that are
     /// believed.
     pub sideways: [Vec<Vec<f64>>; 2],
@@ -69,6 +72,7 @@ impl<'a> DynamicScene<'a> {
             velocity: vec![vec![0.0; rows]; n],
             acceleration: vec![vec![0.0; rows]; n],
             rigid: vec![vec![0.0; rows]; n],
+            friction: vec![vec![0.0; rows]; n],
             sideways: [vec![vec![0.0; rows]; n], vec![vec![0.0; rows]; n]],
             sign_width: SIGN_WIDTHS[1],
             sign_shares: vec![1.0; n],
@@ -165,6 +169,25 @@ impl<'a> DynamicScene<'a> {
     /// Takes 10 n inertial numbers for the rigid torques.
     pub fn believe(&mut self, theta: &[f64]) {
         self.rigid = self.torques_of(theta);
+    }
+
+    /// Takes friction of some forms with their coefficients.
+    pub fn believe_friction<'f>(
+        &mut self,
+        forms: impl Iterator<Item = (&'f TorqueForm, &'f [f64])>,
+    ) {
+        let rows = self.rows();
+        let mut friction = vec![vec![0.0; rows]; self.joints()];
+        let mut course = vec![0.0; rows];
+        for (form, coefficients) in forms.filter(|(form, _)| form.is_friction()) {
+            for (column, coefficient) in coefficients.iter().enumerate() {
+                let joint = form.joint();
+                form.cause.write(form, self, joint, column, &mut course);
+                let sums = friction[joint].iter_mut().zip(&course);
+                sums.for_each(|(sum, value)| *sum += coefficient * value);
+            }
+        }
+        self.friction = friction;
     }
 
     /// Rigid torques of 10 n inertial numbers, `[joint][row]`.

@@ -168,11 +168,10 @@ fn again(
     weighted: &mut WeightedColumns,
     set: Vec<usize>,
 ) -> Vec<usize> {
-    let theta = {
-        let sweep = CauseChoice::new(problem, weighted).base.with(&set);
-        problem.inertials(&set, &sweep.solution())
-    };
-    problem.believe(&theta, &set);
+    let choice = CauseChoice::new(problem, weighted);
+    let solution = choice.base.with(&set).solution();
+    let theta = problem.inertials(&set, &solution);
+    problem.believe(&theta, &set, &solution);
     problem.refresh();
     learn(problem, &set);
     *weighted = problem.weighted(&set);

@@ -311,6 +311,12 @@ impl TorqueForm {
         self.cause.name() == UNKNOWN && self.cause.bends(self)
     }
 
+    /// Whether it is friction of one joint.
+    pub fn is_friction(&self) -> bool {
+        let about = self.cause.about();
+        matches!(self.place, Place::Joint(_)) && (about.of_sign || about.brakes)
+    }
+
     /// Whether a curve without a name and another curve of speed would be one sum at one joint.
     pub fn is_one_curve_with(&self, other: &Self) -> bool {
         let [one, two] = [self, other].map(|form| form.cause.bends(form));

@@ -86,8 +86,10 @@ impl TorqueCause for TorqueConstant {
         let joint = form.joint();
         match form.shape.first() {
             None => out.copy_from_slice(&scene.rigid[joint]),
+            // A drive makes the torque of friction too, which so depends on load.
             Some(half) => fill(out, |row| {
-                scene.rigid[joint][row] / (1.0 + scene.rigid[joint][row].abs() / half)
+                let torque = scene.rigid[joint][row] + scene.friction[joint][row];
+                torque / (1.0 + torque.abs() / half)
             }),
         }
     }
