@@ -3,7 +3,7 @@
 use super::{FittedNumber, PLAIN, TorqueCause, TorqueCauseDescription, TorqueForm, fill};
 use crate::dynamics::scene::DynamicScene;
 
-/// q and 1; of a cable that stiffens as it bends its square and cube, too. Shape of a cable: least and greatest angle, rad.
+/// q and 1; of what stiffens as it bends its square and cube, too. Shape, but of a straight balancing spring: least and greatest angle, rad.
 pub(super) struct SpringTorque {
     balances: bool,
 }
@@ -55,11 +55,14 @@ impl TorqueCause for SpringTorque {
             let ends = scene.position[joint]
                 .iter()
                 .fold([f64::MAX, f64::MIN], |[a, b], q| [a.min(*q), b.max(*q)]);
-            TorqueForm::at_joint(cause, joint, width).shaped(if self.balances {
-                &[]
+            // A straight balancing spring may work over its dead centre.
+            let is_straight = width == WIDTHS[0];
+            let ends = if self.balances && is_straight {
+                &[][..]
             } else {
                 &ends
-            })
+            };
+            TorqueForm::at_joint(cause, joint, width).shaped(ends)
         };
         joints
             .flat_map(|joint| WIDTHS.map(|width| form(joint, width)))
@@ -89,10 +92,10 @@ impl TorqueCause for SpringTorque {
     }
 
     fn has_shape(&self, shape: &[f64]) -> bool {
-        !self.balances || shape.is_empty()
+        shape.len() == 2 || (self.balances && shape.is_empty())
     }
 
-    /// A cable resists: its stiffness is positive wherever the joint moves.
+    /// What bends resists: its stiffness is positive wherever the joint moves.
     fn is_possible(&self, form: &TorqueForm, values: &[f64]) -> bool {
         let number = |power: usize| values.get(power).copied().unwrap_or(0.0);
         let stiffness = |q: f64| number(0) + 2.0 * number(2) * q + 3.0 * number(3) * q * q;
