@@ -42,7 +42,7 @@
 //! | [`proof`] | sets of concealed recordings, their seal, diagnoses held against the truth | estimate, raw, robot, table, twin |
 //! | [`poses`] | which poses to measure, for a robot file or for a finding of a run | audit, identified, numerics, pipeline, raw, store, table |
 //! | [`summary`] | what runs, tables and diagnoses say, as text and as JSON | audit, diagnose, diff, effect, pipeline, report, shell, stage, store, table |
-//! | [`api`] | calib from arrays: a robot and a recording, and what the stages make of them in memory | audit, compensate, identified, pipeline, raw, stage, store, summary, table, numerics |
+//! | [`api`] | calib from arrays: a robot and a recording, and what the stages make of them in memory | audit, compensate, identified, pipeline, poses, raw, stage, store, summary, table, numerics |
 //! | [`cli`], [`progress`] | the only places that print, and the only ones that know a terminal | all |
 //!
 //! # A measurement, from file to report
