@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 /// payload_kg, temp_c and id, which the answer repeats. Every line gets one line, in order: joints_rad, with which the real arm comes to where
 /// the nominal robot would be (null where that is not reached or refused), uncorrected_mm, how far it would be off without, u95_mm, the 95 %
 /// uncertainty of the point, and remark, what is wrong. With --predict the answer is point_mm, where the model puts the tool in the frame of
-/// the instrument. A line that cannot be used is answered with error. Answers are written as soon as no further line waits.
+/// the instrument, with a remark where nothing was measured. A line that cannot be used is answered with error. Answers are written as soon as no further line waits.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct ServeModelArguments {
@@ -211,6 +211,7 @@ fn corrected(
 }
 
 fn predicted(robot: &Robot, asked: &[Result<Asked, String>], model: &Model) -> Vec<Value> {
+    let coverage = model.identified.coverage();
     let placed = asked.par_iter().map_init(
         || model.placing(),
         |place, asked| match asked {
@@ -220,7 +221,16 @@ fn predicted(robot: &Robot, asked: &[Result<Asked, String>], model: &Model) -> V
                     temperature: asked.temp_c,
                     ..Circumstance::unknown(robot.joints())
                 };
-                json!({ "point_mm": place(&circumstance, &mut asked.joints_rad.clone()) })
+                let mut q = asked.joints_rad.clone();
+                let mut answer = json!({ "point_mm": place(&circumstance, &mut q) });
+                let beyond = coverage
+                    .iter()
+                    .flat_map(|all| all.beyond(&q, &circumstance));
+                let remarks: Vec<String> = beyond.map(|beyond| beyond.to_string()).collect();
+                if !remarks.is_empty() {
+                    answer["remark"] = json!(remarks.join("; "));
+                }
+                answer
             }
             Err(error) => json!({ "error": error }),
         },

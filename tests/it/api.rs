@@ -226,4 +226,8 @@ fn a_served_model_answers_every_line_with_what_the_library_computes() {
             assert!((value_mm - value).abs() < 1e-9, "{value_mm} {value}");
         }
     }
+    // No row was measured with joint 1 turned by 170 degrees.
+    let far = served(&["--predict"], "[2.97, 0.2, -0.4, 0.5, 0.8, -1.0]\n");
+    let remark = far[0]["remark"].as_str().expect("a remark");
+    assert!(remark.contains("joint 1"), "{remark}");
 }
