@@ -296,9 +296,7 @@ impl ExaminedFile {
                 || ["#", "n\u{b0}", "n\u{ba}"].contains(&name);
             let whole = self.sheet.texts(*column).count() == rows;
             let first = !self.sheet.header && *column == 0 && self.may_be_names(0);
-            (words::IDS.contains(&stem.as_str()) || ends || first)
-                && whole
-                && !self.is_taken(*column)
+            (words::lists(words::IDS, &stem) || ends || first) && whole && !self.is_taken(*column)
         };
         let mut columns: Vec<usize> = (0..self.said.len()).filter(named).collect();
         let rank = |column: usize| (self.distinct(column) < rows, self.sheet.is_numeric(column));

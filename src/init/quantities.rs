@@ -403,13 +403,13 @@ impl ExaminedFile {
 
     fn scalars(&mut self) {
         for (quantity, listed, unit, most) in [
-            ("payload", &words::PAYLOADS[..], "kg", 1e4),
-            ("temperature", &words::TEMPERATURES[..], "C", 200.0),
+            ("payload", words::PAYLOADS, "kg", 1e4),
+            ("temperature", words::TEMPERATURES, "C", 200.0),
         ] {
             let fits = |column: &usize| {
                 let name = &self.said[*column];
                 let named = if quantity == "payload" {
-                    listed.contains(&name.stem().as_str())
+                    words::lists(listed, &name.stem())
                 } else {
                     name.is(listed)
                 };
@@ -430,8 +430,7 @@ impl ExaminedFile {
     }
 
     fn time(&mut self) {
-        let named =
-            |column: &usize| self.said[*column].is(&words::TIMES) && !self.is_taken(*column);
+        let named = |column: &usize| self.said[*column].is(words::TIMES) && !self.is_taken(*column);
         let unit = |column: usize| match self.said[column].unit {
             // Beyond what ms of a date are, it is finer than any unit that is read.
             None => Some((
@@ -503,14 +502,13 @@ impl ExaminedFile {
                 && 3 * distinct <= self.sheet.rows.len()
                 && !self.sheet.is_numeric(column)
         };
-        let listed =
-            |listed: &[&str], column: usize| listed.contains(&self.said[column].stem().as_str());
+        let listed = |list, column: usize| words::lists(list, &self.said[column].stem());
         let usages: Vec<usize> = columns
             .clone()
-            .filter(|column| listed(&words::USAGES, *column) && few(*column))
+            .filter(|column| listed(words::USAGES, *column) && few(*column))
             .collect();
         let reflectors: Vec<usize> = columns
-            .filter(|column| listed(&words::REFLECTORS, *column) && few(*column))
+            .filter(|column| listed(words::REFLECTORS, *column) && few(*column))
             .collect();
         self.map("usage", &usages, None, None);
         self.map(

@@ -301,7 +301,7 @@ fn pairs_by(one: &ExaminedFile, two: &ExaminedFile, numbers: bool) -> Vec<Pair> 
             if shared >= LEAST_SHARED {
                 let text = names.iter().any(|name| number(name).is_none());
                 let listed = |file: &ExaminedFile, column: usize| {
-                    usize::from(words::IDS.contains(&file.said[column].stem().as_str()))
+                    usize::from(words::lists(words::IDS, &file.said[column].stem()))
                 };
                 let named = listed(one, *a) + listed(two, *b);
                 pairs.push(Pair {
@@ -339,7 +339,7 @@ fn may_name(file: &ExaminedFile, column: usize) -> bool {
     let whole = file.sheet.texts(column).all(|cell| {
         number(cell).is_none_or(|value| value.fract() == 0.0 && !cell.contains(['.', ',']))
     });
-    let listed = words::IDS.contains(&file.said[column].stem().as_str());
+    let listed = words::lists(words::IDS, &file.said[column].stem());
     !file.is_taken(column) && distinct >= 2 && 2 * distinct >= rows && (whole || listed)
 }
 

@@ -5,7 +5,6 @@
 //! a second reading. Per file, accepted + rejected = read.
 
 mod arm;
-mod axes;
 mod bind;
 mod channel;
 mod check;
@@ -32,15 +31,13 @@ mod scan;
 mod slots;
 mod stretch;
 mod torques;
-mod twice;
 mod verdict;
-mod wide;
 mod write;
 
 pub use clock::is_clock_time;
 pub use columns::Columns;
 pub use later::LaterFiles;
-pub use layout::{Axis, Decimal, Duplicates, FileLayout, Join, LimitPolicy};
+pub use layout::{Axis, Decimal, Duplicates, FileLayout, Join, LimitPolicy, WideTargets};
 pub use listing::ListedTable;
 pub use mapped::{
     ColumnRef, ConventionColumns, CountColumn, CoupledColumn, JointColumns, NameMatch,
@@ -49,7 +46,6 @@ pub use mapped::{
 pub use motion::VelocitySettings;
 pub use noise::{InstrumentSetting, instruments};
 pub use torques::{IngestTorques, IngestTorquesReads, IngestTorquesWrites, TorqueSide};
-pub use wide::WideTargets;
 
 use crate::error::{Error, Result, counted};
 use crate::robot::{CountedCoupling, JointConvention};

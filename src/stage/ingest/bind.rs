@@ -3,10 +3,9 @@
 use super::arm::RobotJoints;
 use super::clock::CLOCK;
 use super::columns::Columns;
-use super::layout::FileLayout;
+use super::layout::{FileLayout, WideTargets};
 use super::mapped::{ColumnRef, JointColumns, NameRule, ScalarColumn};
 use super::slots::KindSlots;
-use super::wide::WideTargets;
 use crate::error::{Error, Fault, Result, counted, nearest};
 use crate::observation::{Convention, DeclaredColumn};
 use crate::table::recording_columns;

@@ -92,34 +92,34 @@ impl Stage for IngestTorques {
 
     fn check(&self) -> Vec<Fault> {
         let mut faults = Vec::new();
+        let at = &mut check::Place::root(&mut faults);
         if self.files.is_empty() {
-            faults.push(Fault::new("files", "no file; name at least one"));
+            at.at("files").fault("no file; name at least one");
         }
         if !(0.0..=1.0).contains(&self.max_rejected_fraction) {
-            faults.push(Fault::new("max_rejected_fraction", "allowed: 0 to 1"));
+            at.at("max_rejected_fraction").fault("allowed: 0 to 1");
         }
         for (index, file) in self.files.iter().enumerate() {
-            let place = format!("files[{index}]");
-            check::file_faults(file, &place, &mut faults);
+            let at = &mut at.at(format!("files[{index}]"));
+            check::file(file, at);
+            let at = &mut at.at("columns");
             for name in file.names().into_iter().filter(|name| !USED.contains(name)) {
-                let message = format!(
+                at.at(name).fault(format!(
                     "is not used of a recording of torques; allowed: {}",
                     USED.join(", ")
-                );
-                faults.push(Fault::new(format!("{place}.columns.{name}"), message));
-            }
-            let mut missing: Vec<&str> = ["q", "time"]
-                .into_iter()
-                .filter(|name| !file.has(name))
-                .collect();
-            if !file.has("torque") && !file.has("current") {
-                missing.push("torque or current");
-            }
-            if !missing.is_empty() {
-                faults.push(Fault::new(
-                    format!("{place}.columns"),
-                    format!("not mapped: {}", missing.join(", ")),
                 ));
+            }
+            let has_drive = file.has("torque") || file.has("current");
+            let missing: Vec<&str> = [
+                ("q", file.has("q")),
+                ("time", file.has("time")),
+                ("torque or current", has_drive),
+            ]
+            .into_iter()
+            .filter_map(|(name, has)| (!has).then_some(name))
+            .collect();
+            if !missing.is_empty() {
+                at.fault(format!("not mapped: {}", missing.join(", ")));
             }
         }
         faults
