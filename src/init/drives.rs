@@ -1,6 +1,6 @@
 //! What drives say of joints while the arm moves: torques or motor currents, velocities; and whether recordings are of them.
 
-use super::columns::{Choice, ExaminedFile, Mapping};
+use super::columns::{Choice, ExaminedFile};
 use super::words::{CURRENTS, NAMED_JOINTS, TORQUES, TRAJECTORIES, VELOCITIES, WANTED, lists};
 use std::collections::BTreeMap;
 
@@ -144,12 +144,8 @@ impl ExaminedFile {
             "{quantity} ({} to {})",
             self.sheet.names[first], self.sheet.names[last]
         );
-        let check = (!check.is_empty()).then(|| check.join("; "));
-        self.mappings.push(Mapping {
-            quantity,
-            choices: rows.iter().map(choice).collect(),
-            check,
-            account,
-        });
+        let choices: Vec<Choice> = rows.iter().map(choice).collect();
+        let check = check.into_iter().map(String::from);
+        self.propose(quantity, choices, check, account);
     }
 }

@@ -38,16 +38,16 @@ pub use clock::is_clock_time;
 pub use columns::Columns;
 pub use later::LaterFiles;
 pub use layout::{Axis, Decimal, Duplicates, FileLayout, Join, LimitPolicy, WideTargets};
-pub use listing::ListedTable;
 pub use mapped::{
     ColumnRef, ConventionColumns, CountColumn, CoupledColumn, JointColumns, NameMatch,
     ScalarColumn, TextColumn, UncertaintyColumn, last_number,
 };
 pub use motion::VelocitySettings;
 pub use noise::{InstrumentSetting, instruments};
+pub use reading::{TableLayout, records};
 pub use torques::{IngestTorques, IngestTorquesReads, IngestTorquesWrites, TorqueSide};
 
-use crate::error::{Error, Result, counted};
+use crate::error::{Error, Result};
 use crate::robot::{CountedCoupling, JointConvention};
 use crate::stage::{Context, RawFile, Stage, StreamedTable, reads, writes};
 use crate::table::{Intake, IntakeRow, JointConventions, Recording, Rejected, Robot};
@@ -141,22 +141,9 @@ impl Stage for Ingest {
         first.chain(later).collect()
     }
     fn look(&self, reads: Option<IngestReads>, context: &Context) -> Result<Option<IngestWrites>> {
-        let arm = reads
-            .map(|reads| arm::RobotJoints::of(&reads.robot))
-            .transpose()?;
-        let mut faults = Vec::new();
-        for layout in self.measurements().iter().flat_map(|one| &one.files) {
-            match reading::header(layout, arm.as_ref(), self.limits, context) {
-                Ok(()) => {}
-                Err(Error::Data(more)) => faults.extend(more),
-                Err(other) => return Err(other),
-            }
-        }
-        if faults.is_empty() {
-            Ok(None)
-        } else {
-            Err(Error::Data(faults))
-        }
+        let (all, robot) = (self.measurements(), reads.map(|reads| reads.robot));
+        let layouts = all.iter().flat_map(|one| &one.files);
+        reading::headers(layouts, robot.as_ref(), self.limits, context).map(|()| None)
     }
     fn run(&self, reads: IngestReads, context: &Context) -> Result<IngestWrites> {
         self.run_holding(MOST_HELD, reads, context)
@@ -269,25 +256,14 @@ fn names<'a>(labels: impl Iterator<Item = &'a str>) -> Vec<String> {
 }
 
 fn intake(decided: &[joined::JoinDecisions], context: &Context) -> Intake {
-    let mut rows: Vec<IntakeRow> = Vec::new();
-    for ((scan, decision), name) in decided
+    let files = decided
         .iter()
-        .flat_map(|one| one.scans.iter().zip(one.decisions).zip(one.names))
-    {
+        .flat_map(|one| one.scans.iter().zip(one.decisions).zip(one.names));
+    let row = |((scan, decision), name): ((&scan::Scan, _), &String)| {
         let accepted = verdict::accepted(scan, decision);
-        let rejected = scan.read - accepted;
-        context.services.note(format!(
-            "{name}: {} read, {accepted} used, {rejected} rejected",
-            counted(scan.read, "row")
-        ));
-        rows.push(IntakeRow {
-            file: name.clone(),
-            lines: scan.lines as i64,
-            read: scan.read as i64,
-            accepted: accepted as i64,
-            rejected: rejected as i64,
-        });
-    }
+        reading::intake(name, scan.lines, [scan.read, accepted], context)
+    };
+    let mut rows: Vec<IntakeRow> = files.map(row).collect();
     rows.sort_by(|a, b| a.file.cmp(&b.file));
     Intake(rows)
 }

@@ -138,21 +138,8 @@ impl Stage for IngestTorques {
         reads: Option<IngestTorquesReads>,
         context: &Context,
     ) -> Result<Option<IngestTorquesWrites>> {
-        let arm = reads
-            .map(|reads| RobotJoints::of(&reads.robot))
-            .transpose()?;
-        let mut faults = Vec::new();
-        for layout in &self.files {
-            match reading::header(layout, arm.as_ref(), self.limits, context) {
-                Err(Error::Data(more)) => faults.extend(more),
-                other => other?,
-            }
-        }
-        if faults.is_empty() {
-            Ok(None)
-        } else {
-            Err(Error::Data(faults))
-        }
+        let robot = reads.map(|reads| reads.robot);
+        reading::headers(self.files.iter(), robot.as_ref(), self.limits, context).map(|()| None)
     }
 
     fn run(&self, reads: IngestTorquesReads, context: &Context) -> Result<IngestTorquesWrites> {
@@ -286,18 +273,8 @@ impl<'a> MotionRows<'a> {
             .into_iter()
             .for_each(|loss| context.services.warn(loss));
         self.few_rejected(&label, read, accepted, &refused)?;
-        context.services.note(format!(
-            "{name}: {} read, {accepted} used, {} rejected",
-            counted(read, "row"),
-            read - accepted
-        ));
-        Ok(IntakeRow {
-            file: name.into(),
-            lines: open.lines() as i64,
-            read: read as i64,
-            accepted: accepted as i64,
-            rejected: (read - accepted) as i64,
-        })
+        let counts = [read, accepted];
+        Ok(reading::intake(name, open.lines(), counts, context))
     }
 
     /// Which of currents and torques a file has: one of them, and the same in each file.
