@@ -10,10 +10,8 @@ mod channel;
 mod check;
 mod clock;
 mod columns;
-mod copies;
 mod external;
 mod held;
-mod ids;
 mod joined;
 mod later;
 mod layout;
@@ -23,12 +21,9 @@ mod motion;
 mod noise;
 mod pair;
 mod reading;
-mod recorded;
 mod refusal;
-mod rejections;
 mod row;
 mod scan;
-mod slots;
 mod stretch;
 mod torques;
 mod verdict;
@@ -171,7 +166,7 @@ impl Ingest {
             verdict::judge(one, &scans, &decisions, &arm, context)?;
             scanned.push((scans, decisions));
         }
-        copies::refuse(&scanned)?;
+        verdict::no_copies(&scanned)?;
         let names = names(
             scanned
                 .iter()

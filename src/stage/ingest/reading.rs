@@ -5,9 +5,8 @@ use super::bind::{Binding, FileHeader, bind};
 use super::external::ExternalAxes;
 use super::layout::{Decimal, FileLayout, LimitPolicy};
 use super::listing::ListedRows;
-use super::recorded::RecordedRow;
 use super::refusal::RowRefusal;
-use super::row::RowReader;
+use super::row::{RecordedRow, RowReader};
 use crate::error::{Error, Result, counted};
 use crate::program::listing as language;
 use crate::raw::{

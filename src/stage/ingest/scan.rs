@@ -5,13 +5,12 @@
 
 use super::Ingest;
 use super::arm::RobotJoints;
-use super::held::{HeldRows, RowSource};
-use super::ids::{FileIds, RowHasher, behind, narrow};
+use super::held::{FileIds, HeldRows, RowHasher, RowSource, behind, narrow};
 use super::layout::{Duplicates, FileLayout, Join};
 use super::motion::{JointSamples, Track};
 use super::reading::{FileProgress, OpenedFile};
-use super::recorded::RecordedRow;
 use super::refusal::{Reason, RowRefusal};
+use super::row::RecordedRow;
 use crate::error::{Error, Result};
 use crate::stage::Context;
 use rayon::prelude::*;
@@ -79,14 +78,9 @@ pub(super) struct Scan {
     samples: Option<JointSamples>,
     /// Hash of what all its usable rows say, of a file with what was measured.
     pub measured: Option<u64>,
-    /// Ids of the first usable rows with their data rows, for a join by id.
-    pub first_ids: Vec<(u32, String)>,
     /// What could not be read of the file.
     loss: Option<String>,
 }
-
-/// Ids that are kept for examples.
-const EXAMPLES: usize = 1000;
 
 impl Scan {
     fn new(open: &OpenedFile, held: HeldRows) -> Self {
@@ -108,7 +102,6 @@ impl Scan {
             track: None,
             samples: None,
             measured: open.binding().measures.then_some(0),
-            first_ids: Vec::new(),
             loss: None,
         }
     }
@@ -198,10 +191,7 @@ fn file(
     let mut scan = Scan::new(&open, held);
     scan.samples = is_track(settings, layout).then(JointSamples::default);
     let keyed = layout.columns.has("point_id") && settings.duplicates != Duplicates::Keep;
-    let (by_time, by_id) = (
-        matches!(settings.join, Some(Join::Time { .. })),
-        matches!(settings.join, Some(Join::Id {})),
-    );
+    let by_time = matches!(settings.join, Some(Join::Time { .. }));
     let (mut hasher, mut pace) = (RowHasher::default(), progress.counter());
     while let Some(judged) = open.next()? {
         let row = &open.row;
@@ -218,10 +208,6 @@ fn file(
                 };
                 if keyed && !row.id.is_empty() {
                     scan.ids.push(row, content, &scan.label)?;
-                }
-                if by_id && scan.first_ids.len() < EXAMPLES {
-                    scan.first_ids
-                        .push((narrow(row.number, &scan.label)?, row.id.clone()));
                 }
                 if let Some(before) = &mut scan.measured {
                     *before = behind(*before, row.number, content);
