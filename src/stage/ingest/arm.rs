@@ -60,12 +60,7 @@ impl RobotJoints {
             .get(joint)
             .copied()
             .unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
-        let prismatic = self.prismatic.get(joint) == Some(&true);
-        let (scale, unit) = if prismatic {
-            (1e3, "mm")
-        } else {
-            (1f64.to_degrees(), "deg")
-        };
+        let (scale, unit) = self.shown_in(joint);
         let (side, limit) = if value < lower {
             ("below its lower", lower)
         } else {
@@ -78,6 +73,14 @@ impl RobotJoints {
             .unwrap_or_default();
         let (number, value, limit) = (joint + 1, value * scale, limit * scale);
         format!("joint {number}{name} at {value:.4} {unit}, {side} limit of {limit:.4} {unit}")
+    }
+    /// What positions of a joint (from 0) are multiplied by for people, and their unit then.
+    pub(super) fn shown_in(&self, joint: usize) -> (f64, &'static str) {
+        if self.prismatic.get(joint) == Some(&true) {
+            (1e3, "mm")
+        } else {
+            (1f64.to_degrees(), "deg")
+        }
     }
     pub(super) fn joints(&self) -> usize {
         self.prismatic.len()

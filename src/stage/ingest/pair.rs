@@ -279,10 +279,9 @@ mod tests {
                 .map(|(number, twin)| (*number, twin.line))
                 .collect();
             let pairs = by_id((&ids, &decisions[0]), (&ids, &decisions[0]));
-            (
-                pairs.iter().map(|(number, _)| *number).collect::<Vec<_>>(),
-                twins,
-            )
+            let mut left: Vec<u32> = pairs.iter().map(|(number, _)| *number).collect();
+            left.sort();
+            (left, twins)
         };
         assert_eq!(
             stays(Duplicates::Reject),

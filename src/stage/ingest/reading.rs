@@ -17,10 +17,9 @@ use crate::stage::{Context, OpenedInput};
 use crate::table::{IntakeRow, RejectedRow, Robot};
 use std::io::{BufRead, BufReader, Cursor};
 use std::path::Path;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 /// How many rows pass between two signs of progress.
-const STRIDE: u64 = 4096;
+pub(super) const STRIDE: u64 = 4096;
 /// Bytes that are read at a time; what says of which kind a file is stands among the first of them.
 const BUFFER: usize = 1 << 16;
 
@@ -273,55 +272,5 @@ pub(super) fn intake(
         read,
         accepted,
         rejected,
-    }
-}
-
-/// What is done of a bar, by all who work on it.
-pub(super) struct FileProgress<'a> {
-    context: &'a Context<'a>,
-    done: AtomicU64,
-}
-
-impl<'a> FileProgress<'a> {
-    pub(super) fn begin(
-        context: &'a Context<'a>,
-        what: &str,
-        total: Option<u64>,
-        unit: &str,
-    ) -> Self {
-        context.services.begin(what, total, unit);
-        Self {
-            context,
-            done: AtomicU64::new(0),
-        }
-    }
-    /// Counts units of work of one of them up to the next sign of progress.
-    pub(super) fn counter(&self) -> ProgressCounter<'_> {
-        ProgressCounter {
-            progress: self,
-            rows: 0,
-            told: 0,
-        }
-    }
-}
-
-/// Counts units of work up to the next sign of progress.
-pub(super) struct ProgressCounter<'a> {
-    progress: &'a FileProgress<'a>,
-    rows: u64,
-    told: u64,
-}
-
-impl ProgressCounter<'_> {
-    pub(super) fn row(&mut self, done: u64) {
-        self.rows += 1;
-        if self.rows.is_multiple_of(STRIDE) {
-            self.tell(done);
-        }
-    }
-    pub(super) fn tell(&mut self, done: u64) {
-        let more = done.saturating_sub(std::mem::replace(&mut self.told, done));
-        let all = self.progress.done.fetch_add(more, Ordering::Relaxed) + more;
-        self.progress.context.services.advance(all, "");
     }
 }

@@ -384,11 +384,7 @@ impl<'a> RowReader<'a> {
             if *q < lower - SLACK || *q > upper + SLACK {
                 row.beyond = Some(joint);
                 if self.limits == LimitPolicy::Reject {
-                    let (scale, unit) = if self.arm.prismatic.get(joint) == Some(&true) {
-                        (1e3, "mm")
-                    } else {
-                        (1f64.to_degrees(), "deg")
-                    };
+                    let (scale, unit) = self.arm.shown_in(joint);
                     let detail = format!(
                         "joint {} at {:.4} {unit}; allowed: {:.4} to {:.4} {unit}",
                         joint + 1,

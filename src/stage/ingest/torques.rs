@@ -6,7 +6,7 @@ use super::arm::RobotJoints;
 use super::channel::TorqueChannel;
 use super::check;
 use super::layout::{FileLayout, LimitPolicy};
-use super::reading::{self, FileProgress, OpenedFile};
+use super::reading::{self, OpenedFile, STRIDE};
 use super::refusal::{Reason, Rejections, RowRefusal};
 use super::row::RecordedRow;
 use super::scan::{RefusalCounts, tally};
@@ -219,7 +219,7 @@ impl<'a> MotionRows<'a> {
             sink: context.services.sink(ArmMotion::KIND)?,
             chunk: ArmMotion::default(),
             written: 0,
-            stretches: Stretches::new(),
+            stretches: Stretches::default(),
             ratio: ratio.collect::<Result<_>>()?,
             signal: None,
             channels: vec![TorqueChannel::default(); arm.joints()],
@@ -242,15 +242,16 @@ impl<'a> MotionRows<'a> {
         open.remarks()
             .iter()
             .for_each(|remark| context.services.note(format!("{label}: {remark}")));
-        let progress = FileProgress::begin(context, &format!("reading {label}"), size, "bytes");
+        context
+            .services
+            .begin(&format!("reading {label}"), size, "bytes");
         self.signal_of(&open, &label)?;
         let given = open.binding().slots();
         let has = |setting: &str| given.contains(&self.arm.slots.of(setting).start);
         let optional = [has("velocity"), has("temperature")];
         self.agree(optional, &label)?;
         self.stretches.begin();
-        let (mut pace, mut refused) = (progress.counter(), RefusalCounts::new());
-        let mut accepted = 0u64;
+        let (mut refused, mut accepted) = (RefusalCounts::new(), 0);
         while let Some(judged) = open.next()? {
             match judged.and_then(|()| self.complete(&open.row)) {
                 Ok(()) => {
@@ -265,7 +266,9 @@ impl<'a> MotionRows<'a> {
                     })?;
                 }
             }
-            pace.row(open.bytes());
+            if open.row.number.is_multiple_of(STRIDE) {
+                context.services.advance(open.bytes(), "");
+            }
         }
         let read = open.row.number;
         open.loss()
