@@ -21,19 +21,21 @@ pub(super) struct Mapping {
 }
 
 /// Lines below `columns`, and the columns that they take.
+#[derive(Default)]
 pub(super) struct Choice {
     pub lines: Vec<String>,
-    /// A line beside `columns` instead.
+    /// A line next to `columns` instead.
     pub beside: Option<String>,
     pub columns: Vec<usize>,
 }
 
 impl Choice {
     pub fn of(lines: Vec<String>, columns: Vec<usize>) -> Self {
+        let beside = None;
         Self {
             lines,
             columns,
-            beside: None,
+            beside,
         }
     }
 }
@@ -105,30 +107,18 @@ impl ExaminedFile {
 
     /// Takes a quantity out and leaves it as a remark.
     pub fn drop(&mut self, quantity: &str, why: &str) {
-        if let Some(at) = self
-            .mappings
-            .iter()
-            .position(|mapping| mapping.quantity == quantity)
-        {
-            let dropped = self.mappings.remove(at);
-            let lines = dropped
-                .choices
-                .first()
-                .map(|choice| choice.beside.iter().chain(&choice.lines).cloned().collect());
-            let lines: Vec<String> = lines.unwrap_or_default();
-            self.remarks.extend(
-                lines
-                    .into_iter()
-                    .zip([why].into_iter().chain(std::iter::repeat("")))
-                    .map(|(line, why)| {
-                        if why.is_empty() {
-                            line
-                        } else {
-                            format!("{line}   # CHECK: {why}")
-                        }
-                    }),
-            );
-        }
+        let is_it = |mapping: &Mapping| mapping.quantity == quantity;
+        let Some(at) = self.mappings.iter().position(is_it) else {
+            return;
+        };
+        let dropped = self.mappings.remove(at);
+        let lines = |choice: &Choice| choice.beside.iter().chain(&choice.lines).cloned().collect();
+        let mut lines: Vec<String> = dropped.choices.first().map(lines).unwrap_or_default();
+        lines
+            .iter_mut()
+            .take(1)
+            .for_each(|line| line.push_str(&format!("   # CHECK: {why}")));
+        self.remarks.extend(lines);
     }
 
     /// What was found, for the terminal.
@@ -162,10 +152,22 @@ impl ExaminedFile {
     pub fn state(&mut self, quantity: &'static str, value: &str, check: &str) {
         let choice = Choice::of(vec![format!("{quantity}: {{value: {value}}}")], Vec::new());
         let account = format!("{quantity} {value}");
+        self.propose(quantity, [choice], [check.into()], account);
+    }
+
+    /// Adds what may stand for a quantity, best first, with what is to be looked at.
+    pub fn propose(
+        &mut self,
+        quantity: &'static str,
+        choices: impl IntoIterator<Item = Choice>,
+        checks: impl IntoIterator<Item = String>,
+        account: String,
+    ) {
+        let checks: Vec<String> = checks.into_iter().collect();
         self.mappings.push(Mapping {
             quantity,
-            choices: vec![choice],
-            check: Some(check.into()),
+            choices: choices.into_iter().collect(),
+            check: (!checks.is_empty()).then(|| checks.join("; ")),
             account,
         });
     }
@@ -232,6 +234,7 @@ impl ExaminedFile {
     ) {
         let choice =
             |column: &usize| Choice::of(vec![self.line(quantity, *column, unit)], vec![*column]);
+        let choices: Vec<Choice> = columns.iter().map(choice).collect();
         let Some(first) = columns.first() else { return };
         let word = if quantity == "point_id" {
             "names"
@@ -241,12 +244,7 @@ impl ExaminedFile {
         let account = format!("{word} ({})", self.sheet.names[*first]);
         let check =
             check.or_else(|| (columns.len() > 1).then(|| "several columns fit".to_string()));
-        self.mappings.push(Mapping {
-            quantity,
-            choices: columns.iter().map(choice).collect(),
-            check,
-            account,
-        });
+        self.propose(quantity, choices, check, account);
     }
 
     /// A pattern where the names follow one, else a list.
@@ -296,9 +294,7 @@ impl ExaminedFile {
                 || ["#", "n\u{b0}", "n\u{ba}"].contains(&name);
             let whole = self.sheet.texts(*column).count() == rows;
             let first = !self.sheet.header && *column == 0 && self.may_be_names(0);
-            (words::IDS.contains(&stem.as_str()) || ends || first)
-                && whole
-                && !self.is_taken(*column)
+            (words::lists(words::IDS, &stem) || ends || first) && whole && !self.is_taken(*column)
         };
         let mut columns: Vec<usize> = (0..self.said.len()).filter(named).collect();
         let rank = |column: usize| (self.distinct(column) < rows, self.sheet.is_numeric(column));

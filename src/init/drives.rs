@@ -1,7 +1,7 @@
 //! What drives say of joints while the arm moves: torques or motor currents, velocities; and whether recordings are of them.
 
-use super::columns::{Choice, ExaminedFile, Mapping};
-use super::words::{CURRENTS, NAMED_JOINTS, TORQUES, TRAJECTORIES, VELOCITIES, WANTED};
+use super::columns::{Choice, ExaminedFile};
+use super::words::{CURRENTS, NAMED_JOINTS, TORQUES, TRAJECTORIES, VELOCITIES, WANTED, lists};
 use std::collections::BTreeMap;
 
 /// What a recording of torques is read of, besides torques, currents and velocities.
@@ -13,7 +13,7 @@ const EFFORT: &str = "drivers of ROS state torques or motor currents as effort";
 /// Whether the recordings are of torques: each has times, joints, and what drives them, and none has points. Then they are mapped as such.
 pub(super) fn of_torques(found: &mut [ExaminedFile]) -> bool {
     let driven = |file: &ExaminedFile| {
-        !file.by_joint(&TORQUES).is_empty() || !file.by_joint(&CURRENTS).is_empty()
+        !file.by_joint(TORQUES).is_empty() || !file.by_joint(CURRENTS).is_empty()
     };
     let moves = |file: &ExaminedFile| {
         file.get("x").is_none() && file.get("q").is_some() && file.get("time").is_some()
@@ -27,14 +27,11 @@ pub(super) fn of_torques(found: &mut [ExaminedFile]) -> bool {
 
 impl ExaminedFile {
     /// Columns of so many numbers as there are joints, under a name with one of these words; those that were measured first.
-    fn by_joint(&self, listed: &[&str]) -> Vec<Vec<usize>> {
+    fn by_joint(&self, listed: &str) -> Vec<Vec<usize>> {
         let Some(count) = self.get("q").map(|joints| joints.choices[0].columns.len()) else {
             return Vec::new();
         };
-        let others = [&TORQUES[..], &CURRENTS, &VELOCITIES]
-            .into_iter()
-            .filter(|other| *other != listed);
-        let others: Vec<&str> = others.flatten().copied().collect();
+        let others = [TORQUES, CURRENTS, VELOCITIES];
         let mut runs: BTreeMap<String, BTreeMap<usize, usize>> = BTreeMap::new();
         for (column, name) in self
             .said
@@ -50,8 +47,8 @@ impl ExaminedFile {
             let Some((key, number)) = named().or_else(|| name.joint()) else {
                 continue;
             };
-            let has = |words: &[&str]| key.split(['_', '#']).any(|word| words.contains(&word));
-            if has(listed) && !has(&others) {
+            let has = |list| key.split(['_', '#']).any(|word| lists(list, word));
+            if has(listed) && !others.iter().any(|other| *other != listed && has(other)) {
                 runs.entry(key).or_default().entry(number).or_insert(column);
             }
         }
@@ -63,10 +60,7 @@ impl ExaminedFile {
                 .take(count)
                 .collect();
             if run.len() == count {
-                rows.push((
-                    key.split(['_', '#']).any(|word| WANTED.contains(&word)),
-                    run,
-                ));
+                rows.push((key.split(['_', '#']).any(|word| lists(WANTED, word)), run));
             }
         }
         rows.sort();
@@ -77,7 +71,7 @@ impl ExaminedFile {
         self.mappings
             .retain(|mapping| BESIDE.contains(&mapping.quantity));
         let [torques, currents, velocities] =
-            [&TORQUES[..], &CURRENTS, &VELOCITIES].map(|listed| self.by_joint(listed));
+            [TORQUES, CURRENTS, VELOCITIES].map(|listed| self.by_joint(listed));
         let degrees = self
             .get("q")
             .is_some_and(|joints| joints.choices[0].lines[0].contains("unit: deg"));
@@ -133,8 +127,7 @@ impl ExaminedFile {
                 (!named).then_some("the unit").into_iter().collect(),
             );
         }
-        let trajectories =
-            |column: &usize| TRAJECTORIES.contains(&self.said[*column].stem().as_str());
+        let trajectories = |column: &usize| lists(TRAJECTORIES, &self.said[*column].stem());
         let trajectories: Vec<usize> = (0..self.said.len()).filter(trajectories).collect();
         self.map("trajectory", &trajectories, None, None);
     }
@@ -151,12 +144,8 @@ impl ExaminedFile {
             "{quantity} ({} to {})",
             self.sheet.names[first], self.sheet.names[last]
         );
-        let check = (!check.is_empty()).then(|| check.join("; "));
-        self.mappings.push(Mapping {
-            quantity,
-            choices: rows.iter().map(choice).collect(),
-            check,
-            account,
-        });
+        let choices: Vec<Choice> = rows.iter().map(choice).collect();
+        let check = check.into_iter().map(String::from);
+        self.propose(quantity, choices, check, account);
     }
 }

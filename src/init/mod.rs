@@ -91,9 +91,7 @@ pub fn start(request: &InitRequest) -> Result<StarterFiles> {
         pipeline::of_torques(request, &found, &arm)
     } else {
         let mut joined = together::join(&mut found);
-        joined
-            .lines
-            .extend(pipeline::later(request.folder, &found, &more));
+        joined.extend(pipeline::later(request.folder, &found, &more));
         pipeline::text(request, &found, (&joined, &arm))
     };
     let unknown = ["columns of joints", "the measured point"]

@@ -41,8 +41,8 @@ impl Name {
     }
 
     /// Whether the name is one of these, or one of them begins or ends it as a word of its own.
-    pub fn is(&self, listed: &[&str]) -> bool {
-        let listed = |text: &str| listed.contains(&text);
+    pub fn is(&self, list: &str) -> bool {
+        let listed = |text: &str| words::lists(list, text);
         // A letter alone says little beside other words: `x_t` is no time.
         let mut ends = [self.words.first(), self.words.last()]
             .into_iter()
@@ -117,16 +117,16 @@ pub(super) const LENGTHS: [&str; 4] = ["mm", "m", "um", "in"];
 /// The axis that a word names, and what it says besides: `x`, `dx`, `xist`, `x2`.
 fn axis(word: &str) -> Option<(usize, &str)> {
     let known = |more: &str| {
-        let listed = [
-            &words::MEASURED[..],
-            &words::WANTED,
-            &words::DIFFERENCE,
-            &words::SIGMA,
-            &["pos", "p", "coord", "tcp", "t"],
+        let lists = [
+            words::MEASURED,
+            words::WANTED,
+            words::DIFFERENCE,
+            words::SIGMA,
+            "pos p coord tcp t",
         ];
         more.is_empty()
             || more.bytes().all(|byte| byte.is_ascii_digit())
-            || listed.iter().any(|list| list.contains(&more))
+            || lists.iter().any(|list| words::lists(list, more))
     };
     let named = ["x", "y", "z"]
         .iter()
@@ -144,13 +144,13 @@ fn axis(word: &str) -> Option<(usize, &str)> {
 /// Whether a word says that a numbered column is no joint position.
 fn is_other(word: &str) -> bool {
     [
-        &words::NO_JOINTS[..],
-        &words::TORQUES,
-        &words::CURRENTS,
-        &words::VELOCITIES,
+        words::NO_JOINTS,
+        words::TORQUES,
+        words::CURRENTS,
+        words::VELOCITIES,
     ]
     .iter()
-    .any(|listed| listed.contains(&word))
+    .any(|list| words::lists(list, word))
 }
 
 /// Rows of columns that may be the joints, best first: those of usual names, else those of an arm's `count` that `angle` takes for angles.
@@ -226,31 +226,19 @@ fn named(names: &[Name], listed: &[&str]) -> Option<Vec<usize>> {
 
 /// How plain a usual name of joints is: 0 for the name and number alone, 1 with `ist` or the like, 2 with `soll` or the like.
 fn usual_name(key: &str) -> Option<usize> {
-    const SAID: [&str; 11] = [
-        "pos",
-        "position",
-        "positions",
-        "angle",
-        "angles",
-        "ang",
-        "winkel",
-        "value",
-        "deg",
-        "rad",
-        "data",
-    ];
+    const OTHERS: &str = "pos position positions angle angles ang winkel value deg rad data";
     let mut pieces: Vec<&str> = key
         .split(['_', '#'])
-        .filter(|word| !word.is_empty() && !SAID.contains(word))
+        .filter(|word| !word.is_empty() && !words::lists(OTHERS, word))
         .collect();
     let before = pieces.len();
-    pieces.retain(|word| !words::MEASURED.contains(word));
+    pieces.retain(|word| !words::lists(words::MEASURED, word));
     let measured = pieces.len() < before;
     let before = pieces.len();
-    pieces.retain(|word| !words::WANTED.contains(word));
+    pieces.retain(|word| !words::lists(words::WANTED, word));
     let wanted = pieces.len() < before;
     let joined = pieces.join("_");
-    (words::JOINTS.contains(&joined.as_str()) && key.contains('#')).then_some(
+    (words::lists(words::JOINTS, &joined) && key.contains('#')).then_some(
         match (measured, wanted) {
             (_, true) => 2,
             (true, false) => 1,

@@ -3,7 +3,6 @@
 use super::InitRequest;
 use super::arm::StartingArm;
 use super::columns::{Choice, ExaminedFile, MOST_NAMED, Mapping};
-use super::together::Joined;
 use crate::error::one_line;
 use crate::stage::ingest::instruments;
 use crate::yaml::quoted;
@@ -65,7 +64,7 @@ pub(super) fn of_torques(
 pub(super) fn text(
     request: &InitRequest,
     found: &[ExaminedFile],
-    (joined, arm): (&Joined, &StartingArm),
+    (joined, arm): (&[String], &StartingArm),
 ) -> String {
     let mut out = head(request) + "  - uses: ingest\n    with:\n      files:\n";
     if found.is_empty() {
@@ -78,7 +77,6 @@ pub(super) fn text(
     }
     out.push_str(&files(request, found, arm, missing(found)));
     joined
-        .lines
         .iter()
         .for_each(|line| out.push_str(&format!("{line}\n")));
     out.push_str(&instrument());

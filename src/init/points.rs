@@ -70,12 +70,12 @@ pub(super) fn families(names: &[Name]) -> Vec<Family> {
 }
 
 fn role(rest: &[String]) -> PointRole {
-    let has = |listed: &[&str]| rest.iter().any(|word| listed.contains(&word.as_str()));
+    let has = |list| rest.iter().any(|word| words::lists(list, word));
     match (
-        has(&words::SIGMA),
-        has(&words::DIFFERENCE),
-        has(&words::MEASURED),
-        has(&words::WANTED),
+        has(words::SIGMA),
+        has(words::DIFFERENCE),
+        has(words::MEASURED),
+        has(words::WANTED),
     ) {
         (true, ..) => PointRole::Sigma,
         (_, true, ..) => PointRole::Difference,
@@ -120,7 +120,7 @@ pub(super) fn points(names: &[Name]) -> Points {
         let minus = difference
             .words
             .iter()
-            .any(|word| words::TARGET_LESS_MEASURED.contains(&word.as_str()));
+            .any(|word| words::lists(words::TARGET_LESS_MEASURED, word));
         PointColumns {
             columns: target.columns,
             difference: Some((difference.columns, minus)),

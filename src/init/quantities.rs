@@ -1,6 +1,6 @@
 //! What a recording's columns seem to hold, by their names and values: a proposal that a person checks.
 
-use super::columns::{Choice, ExaminedFile, Mapping};
+use super::columns::{Choice, ExaminedFile};
 use super::names::{LENGTHS, joints};
 use super::points::{PointColumns, Points, points};
 use super::reading::tables;
@@ -54,21 +54,14 @@ impl ExaminedFile {
             .iter()
             .map(|column| self.sheet.largest(*column))
             .fold(0.0, f64::max);
-        let check = "no header says so; is it right?";
-        let mapping = match columns[..] {
+        let (quantity, lines, what) = match columns[..] {
             [x, y, z] => {
                 let unit = self.length_unit(&[x, y, z]).0;
                 let lines = ["x", "y", "z"]
                     .iter()
                     .zip([x, y, z])
                     .map(|(name, column)| self.line(name, column, Some(unit)));
-                let account = format!("the point ({})", self.shown(&columns));
-                Mapping {
-                    quantity: "x",
-                    choices: vec![Choice::of(lines.collect(), columns.clone())],
-                    check: Some(check.into()),
-                    account,
-                }
+                ("x", lines.collect(), "the point".to_string())
             }
             // Seven numbers may be a point with a quaternion.
             [_, _, _, _, _, _] | [_, _, _, _, _, _, _]
@@ -76,18 +69,14 @@ impl ExaminedFile {
             {
                 let unit = if most > MOST_RADIANS { "deg" } else { "rad" };
                 let lines = vec![self.joints_line("q", &columns, Some(unit))];
-                let account = format!("{} joints ({})", columns.len(), self.shown(&columns));
-                Mapping {
-                    quantity: "q",
-                    choices: vec![Choice::of(lines, columns.clone())],
-                    check: Some(check.into()),
-                    account,
-                }
+                ("q", lines, format!("{} joints", columns.len()))
             }
             _ => return,
         };
         self.sheet.trouble = None;
-        self.mappings.push(mapping);
+        let account = format!("{what} ({})", self.shown(&columns));
+        let check = "no header says so; is it right?".to_string();
+        self.propose(quantity, [Choice::of(lines, columns)], [check], account);
     }
 
     fn joints(&mut self, count: usize) {
@@ -133,7 +122,7 @@ impl ExaminedFile {
         let several = (rows.len() > 1).then(|| "several columns of joints fit".to_string());
         let of_list = (numbers > count)
             .then(|| format!("of the {numbers} numbers of the list the first {count}"));
-        let check: Vec<String> = several.into_iter().chain(of_list).chain(why).collect();
+        let checks = several.into_iter().chain(of_list).chain(why);
         let account = format!(
             "{} joints ({} to {})",
             best.len(),
@@ -146,13 +135,8 @@ impl ExaminedFile {
                 columns.clone(),
             )
         };
-        let mapping = Mapping {
-            quantity: "q",
-            choices: rows.iter().map(choice).collect(),
-            check: (!check.is_empty()).then(|| check.join("; ")),
-            account,
-        };
-        self.mappings.push(mapping);
+        let choices: Vec<Choice> = rows.iter().map(choice).collect();
+        self.propose("q", choices, checks, account);
     }
 
     /// Whether four columns are a quaternion.
@@ -179,9 +163,8 @@ impl ExaminedFile {
             .iter()
             .flat_map(|(_, columns)| columns)
             .all(|column| self.sheet.holds_numbers(*column))
-            && let Some(mapping) = self.targets(&found)
+            && self.targets(&found)
         {
-            self.mappings.push(mapping);
             return;
         }
         let numeric = |way: &PointColumns| {
@@ -225,7 +208,7 @@ impl ExaminedFile {
             .length_unit(&best.columns)
             .1
             .then(|| "the unit, by the size of the numbers".to_string());
-        let check: Vec<String> = found.question.into_iter().chain(by_size).collect();
+        let checks = found.question.into_iter().chain(by_size);
         let said = if found.said {
             "the measured point"
         } else {
@@ -239,13 +222,9 @@ impl ExaminedFile {
             )
         });
         let less = less.unwrap_or_default();
-        let mapping = Mapping {
-            quantity: "x",
-            choices: ways.iter().map(|way| self.way(way)).collect(),
-            check: (!check.is_empty()).then(|| check.join("; ")),
-            account: format!("{said} ({}{less})", self.shown(&best.columns)),
-        };
-        self.mappings.push(mapping);
+        let choices: Vec<Choice> = ways.iter().map(|way| self.way(way)).collect();
+        let account = format!("{said} ({}{less})", self.shown(&best.columns));
+        self.propose("x", choices, checks, account);
     }
 
     /// A quaternion beside the point, as lines to take in: with a standard deviation, which only the instrument's owner knows, rows are full
@@ -281,9 +260,12 @@ impl ExaminedFile {
             .push("sigma_orientation: {value: 30, unit: arcsec}".into());
     }
 
-    /// Several targets side by side, or one of them alone.
-    fn targets(&self, found: &Points) -> Option<Mapping> {
-        let unit = self.length_unit(&found.targets.first()?.1).0;
+    /// Several targets side by side, or one of them alone; whether there are such.
+    fn targets(&mut self, found: &Points) -> bool {
+        let Some((_, first)) = found.targets.first() else {
+            return false;
+        };
+        let unit = self.length_unit(first).0;
         let one = |(name, columns): &(String, [usize; 3])| {
             format!(
                 "{name}: [{}]",
@@ -303,31 +285,27 @@ impl ExaminedFile {
             "targets: {{unit: {unit}, columns: {{{}}}}}",
             all.join(", ")
         ));
-        let choices = [Choice {
-            lines: Vec::new(),
+        let all = Choice {
             columns,
             beside,
-        }]
-        .into_iter()
-        .chain(found.ways.iter().map(|way| self.way(way)));
+            ..Choice::default()
+        };
+        let ways = found.ways.iter().map(|way| self.way(way));
+        let choices: Vec<Choice> = std::iter::once(all).chain(ways).collect();
         let names: Vec<&str> = found
             .targets
             .iter()
             .map(|(name, _)| name.as_str())
             .collect();
-        Some(Mapping {
-            quantity: "x",
-            choices: choices.collect(),
-            check: Some(
-                "are these several reflectors, each measured in every pose, and is the unit right?"
-                    .into(),
-            ),
-            account: format!(
-                "the points of {} targets ({})",
-                names.len(),
-                names.join(", ")
-            ),
-        })
+        let account = format!(
+            "the points of {} targets ({})",
+            names.len(),
+            names.join(", ")
+        );
+        let check =
+            "are these several reflectors, each measured in every pose, and is the unit right?";
+        self.propose("x", choices, [check.to_string()], account);
+        true
     }
 
     fn way(&self, way: &PointColumns) -> Choice {
@@ -391,25 +369,20 @@ impl ExaminedFile {
             if columns.len() == count {
                 let lines = vec![self.joints_line(quantity, &columns, unit)];
                 let account = format!("{quantity} ({pattern})");
-                self.mappings.push(Mapping {
-                    quantity,
-                    choices: vec![Choice::of(lines, columns)],
-                    check: None,
-                    account,
-                });
+                self.propose(quantity, [Choice::of(lines, columns)], None, account);
             }
         }
     }
 
     fn scalars(&mut self) {
         for (quantity, listed, unit, most) in [
-            ("payload", &words::PAYLOADS[..], "kg", 1e4),
-            ("temperature", &words::TEMPERATURES[..], "C", 200.0),
+            ("payload", words::PAYLOADS, "kg", 1e4),
+            ("temperature", words::TEMPERATURES, "C", 200.0),
         ] {
             let fits = |column: &usize| {
                 let name = &self.said[*column];
                 let named = if quantity == "payload" {
-                    listed.contains(&name.stem().as_str())
+                    words::lists(listed, &name.stem())
                 } else {
                     name.is(listed)
                 };
@@ -430,8 +403,7 @@ impl ExaminedFile {
     }
 
     fn time(&mut self) {
-        let named =
-            |column: &usize| self.said[*column].is(&words::TIMES) && !self.is_taken(*column);
+        let named = |column: &usize| self.said[*column].is(words::TIMES) && !self.is_taken(*column);
         let unit = |column: usize| match self.said[column].unit {
             // Beyond what ms of a date are, it is finer than any unit that is read.
             None => Some((
@@ -503,14 +475,13 @@ impl ExaminedFile {
                 && 3 * distinct <= self.sheet.rows.len()
                 && !self.sheet.is_numeric(column)
         };
-        let listed =
-            |listed: &[&str], column: usize| listed.contains(&self.said[column].stem().as_str());
+        let listed = |list, column: usize| words::lists(list, &self.said[column].stem());
         let usages: Vec<usize> = columns
             .clone()
-            .filter(|column| listed(&words::USAGES, *column) && few(*column))
+            .filter(|column| listed(words::USAGES, *column) && few(*column))
             .collect();
         let reflectors: Vec<usize> = columns
-            .filter(|column| listed(&words::REFLECTORS, *column) && few(*column))
+            .filter(|column| listed(words::REFLECTORS, *column) && few(*column))
             .collect();
         self.map("usage", &usages, None, None);
         self.map(

@@ -4,11 +4,11 @@ use super::sheet::Sheet;
 use crate::error::{Error, Result};
 use crate::program::listing;
 use crate::raw::{
-    self, BagRows, BagTopic, ColumnRows, Record, RecordReader, Workbook, bag_content, failed,
-    has_columns, is_bag, is_utf16, is_workbook, not_read, shown,
+    self, BagTopic, InputSource, Record, Workbook, bag_content, failed, has_columns, is_bag,
+    is_utf16, is_workbook, not_read, shown,
 };
-use crate::stage::ingest::ListedTable;
-use std::io::{BufRead, BufReader, Read};
+use crate::stage::ingest::{TableLayout, records};
+use std::io::{BufRead, BufReader, Read, Seek};
 use std::path::Path;
 
 /// Bytes and lines that are looked at.
@@ -23,34 +23,38 @@ pub(super) fn tables(path: &Path, places: usize) -> Result<Vec<Sheet>> {
     let failed = |error: std::io::Error| Error::store(&place, format!("cannot be read: {error}"));
     let mut reader = BufReader::new(file);
     let head = reader.fill_buf().map_err(failed)?;
-    let one = |sheet: std::result::Result<Sheet, String>| {
-        vec![sheet.unwrap_or_else(Sheet::not_understood)]
+    let understood = |sheets: Result<Vec<Sheet>, String>| {
+        Ok(sheets.unwrap_or_else(|trouble| vec![Sheet::not_understood(trouble)]))
     };
+    let language = listing(&raw::ending(path), head);
     if is_workbook(head) {
-        return Ok(
-            sheets(reader, places).unwrap_or_else(|trouble| vec![Sheet::not_understood(trouble)])
-        );
+        return understood(sheets(reader, places));
     }
     if is_bag(head) {
-        return Ok(topics(path, &place)
-            .unwrap_or_else(|error| vec![Sheet::not_understood(error.to_string())]));
+        return understood(topics(path, &place).map_err(|error| error.to_string()));
     }
-    if let Some(language) = listing(&raw::ending(path), head) {
-        let table = ListedTable::read(reader, &place, language);
-        return Ok(one(table
-            .map(Sheet::of_program)
-            .map_err(|error| error.to_string())));
+    if language.is_some() || has_columns(head) {
+        let mut file = reader.into_inner();
+        file.rewind().map_err(failed)?;
+        let sheet = first_rows(file, &place, None).map(|(names, rows)| {
+            // A name, then six joints.
+            let unit = |column| language.and((1..=6).contains(&column).then_some("deg"));
+            Sheet {
+                units: (0..names.len()).map(unit).collect(),
+                ..Sheet::of_columns(names, rows)
+            }
+        });
+        return understood(
+            sheet
+                .map(|one| vec![one])
+                .map_err(|error| error.to_string()),
+        );
     }
     if let Some(what) = not_read(head) {
-        return Ok(one(Err(what.into())));
-    }
-    if has_columns(head) {
-        return Ok(one(
-            columns(reader, &place).map_err(|error| error.to_string())
-        ));
+        return understood(Err(what.into()));
     }
     if !is_utf16(head) && head.contains(&0) {
-        return Ok(one(Err("no text".into())));
+        return understood(Err("no text".into()));
     }
     let mut lines: Vec<String> = Vec::new();
     let text = raw::without_utf16(reader).map_err(failed)?;
@@ -66,13 +70,17 @@ pub(super) fn tables(path: &Path, places: usize) -> Result<Vec<Sheet>> {
     Ok(vec![Sheet::of(&lines)])
 }
 
-/// The first rows of a file of columns.
-fn columns(source: impl Read, label: &str) -> Result<Sheet> {
-    let (names, rows) = first_rows(&mut ColumnRows::open(source, label)?)?;
-    Ok(Sheet::of_columns(names, rows))
-}
-
-fn first_rows(rows: &mut dyn RecordReader) -> Result<(Vec<String>, Vec<Vec<String>>)> {
+/// The names and the first rows of a table that says itself what its columns are.
+fn first_rows(
+    source: Box<dyn InputSource>,
+    label: &str,
+    topic: Option<&str>,
+) -> Result<(Vec<String>, Vec<Vec<String>>)> {
+    let layout = TableLayout {
+        topic,
+        ..TableLayout::default()
+    };
+    let mut rows = records(source, label, layout)?;
     let (mut record, mut found) = (Record::default(), Vec::new());
     while found.len() <= LINES && rows.next(&mut record)? {
         if record.fault.is_none() {
@@ -107,7 +115,7 @@ fn topics(path: &Path, place: &str) -> Result<Vec<Sheet>> {
     ];
     let mut sheets = Vec::new();
     for topic in chosen.into_iter().flatten() {
-        let (names, rows) = first_rows(&mut BagRows::open(opened()?, place, Some(&topic.name))?)?;
+        let (names, rows) = first_rows(opened()?, place, Some(&topic.name))?;
         sheets.push(Sheet::of_topic(topic, names, rows));
     }
     if sheets.is_empty() {

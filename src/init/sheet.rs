@@ -1,7 +1,6 @@
 //! A delimited text as a table of cells, as far as it can be understood without being told.
 
 use crate::raw::{BagTopic, Delimiter, fields, unquoted_text};
-use crate::stage::ingest::ListedTable;
 use crate::units::{Unit, written};
 
 pub(super) use crate::raw::number_of_any_mark as number;
@@ -104,19 +103,6 @@ impl Sheet {
             of_book: Some(name.into()),
             delimiter: ',',
             ..Self::delimited(lines, Some('\t'))
-        }
-    }
-
-    /// Joints that a program lists, in deg.
-    pub fn of_program(table: ListedTable) -> Self {
-        let units = (0..table.names.len()).map(|column| (1..=6).contains(&column).then_some("deg"));
-        Self {
-            delimiter: ',',
-            header: true,
-            units: units.collect(),
-            names: table.names.into_iter().map(String::from).collect(),
-            rows: table.rows.into_iter().map(|(_, cells)| cells).collect(),
-            ..Self::default()
         }
     }
 

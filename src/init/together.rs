@@ -13,12 +13,6 @@ const LEAST_SHARED: f64 = 0.5;
 /// Fewer shared names than this are asked about.
 const PLENTY: f64 = 0.95;
 
-/// Lines of the pipeline below `files`.
-#[derive(Debug, Default)]
-pub(super) struct Joined {
-    pub lines: Vec<String>,
-}
-
 /// Columns of both files that name points alike.
 #[derive(Debug, Clone, PartialEq)]
 struct Pair {
@@ -32,8 +26,8 @@ struct Pair {
     named: usize,
 }
 
-/// Decides, and leaves every quantity in one of the files.
-pub(super) fn join(found: &mut [ExaminedFile]) -> Joined {
+/// Decides, and leaves every quantity in one of the files; the lines of the pipeline below `files`.
+pub(super) fn join(found: &mut [ExaminedFile]) -> Vec<String> {
     if found.len() > 1 && found.iter().all(is_whole) {
         return one_after_the_other(found);
     }
@@ -41,7 +35,7 @@ pub(super) fn join(found: &mut [ExaminedFile]) -> Joined {
         if let [only] = found {
             return alone(only);
         }
-        return Joined::default();
+        return Vec::new();
     };
     // A file that was not understood says nothing; ids and points are written as lines to replace.
     let blind = [&*one, &*two]
@@ -86,9 +80,7 @@ pub(super) fn join(found: &mut [ExaminedFile]) -> Joined {
         (_, true) => format!("CHECK: row by row, since neither names nor times were found in both; {a} rows each"),
         _ => format!("REPLACE: neither names nor times were found in both, and {a} and {b} rows cannot be joined by order"),
     };
-    Joined {
-        lines: vec![format!("      join: {{by: order}}       # {why}")],
-    }
+    vec![format!("      join: {{by: order}}       # {why}")]
 }
 
 /// Whether a file is a recording of its own: it has joints and points.
@@ -182,7 +174,7 @@ fn reflectors(stems: &[String]) -> Vec<String> {
 
 /// Several recordings, e.g. a grid and a check set: rows of the first are fitted to, those of the others judge, unless the files say so
 /// themselves. Points keep their names where no two files have the same.
-fn one_after_the_other(found: &mut [ExaminedFile]) -> Joined {
+fn one_after_the_other(found: &mut [ExaminedFile]) -> Vec<String> {
     let ids: Vec<Option<usize>> = found
         .iter()
         .map(|file| file.ids().first().copied())
@@ -208,32 +200,21 @@ fn one_after_the_other(found: &mut [ExaminedFile]) -> Joined {
             );
         }
     }
-    Joined {
-        lines: vec![
-            "      join: {by: append}      # CHECK: separate recordings, one after the other"
-                .into(),
-        ],
-    }
+    vec!["      join: {by: append}      # CHECK: separate recordings, one after the other".into()]
 }
 
 /// Names and repeats of a file that stands alone.
-fn alone(found: &mut ExaminedFile) -> Joined {
+fn alone(found: &mut ExaminedFile) -> Vec<String> {
     let ids = found.ids();
     let Some(first) = ids.first().copied() else {
-        return Joined::default();
+        return Vec::new();
     };
     found.map("point_id", &ids, None, None);
     let (rows, distinct) = (found.sheet.rows.len(), found.distinct(first));
     let line = format!(
         "      duplicates: keep       # CHECK: {distinct} names for {rows} rows; each row counts as a measurement"
     );
-    Joined {
-        lines: if distinct < rows {
-            vec![line]
-        } else {
-            Vec::new()
-        },
-    }
+    (distinct < rows).then_some(line).into_iter().collect()
 }
 
 /// Every quantity once: joints and what belongs to them from the first file that has them, the point from the file without joints.
@@ -301,7 +282,7 @@ fn pairs_by(one: &ExaminedFile, two: &ExaminedFile, numbers: bool) -> Vec<Pair> 
             if shared >= LEAST_SHARED {
                 let text = names.iter().any(|name| number(name).is_none());
                 let listed = |file: &ExaminedFile, column: usize| {
-                    usize::from(words::IDS.contains(&file.said[column].stem().as_str()))
+                    usize::from(words::lists(words::IDS, &file.said[column].stem()))
                 };
                 let named = listed(one, *a) + listed(two, *b);
                 pairs.push(Pair {
@@ -339,7 +320,7 @@ fn may_name(file: &ExaminedFile, column: usize) -> bool {
     let whole = file.sheet.texts(column).all(|cell| {
         number(cell).is_none_or(|value| value.fract() == 0.0 && !cell.contains(['.', ',']))
     });
-    let listed = words::IDS.contains(&file.said[column].stem().as_str());
+    let listed = words::lists(words::IDS, &file.said[column].stem());
     !file.is_taken(column) && distinct >= 2 && 2 * distinct >= rows && (whole || listed)
 }
 
@@ -355,7 +336,7 @@ fn by_id(
     best: &Pair,
     pairs: &[Pair],
     running: bool,
-) -> Joined {
+) -> Vec<String> {
     let alike =
         |pair: &&Pair| (pair.text, pair.shared, pair.named) == (best.text, best.shared, best.named);
     let columns = |file: usize| {
@@ -376,7 +357,7 @@ fn by_id(
         let line = format!(
             "      join: {{by: id}}          # CHECK: by the numbers in the names, of which {shared} % stand in both files"
         );
-        return Joined { lines: vec![line] };
+        return vec![line];
     }
     let [a, b] = [&*one, &*two].map(|file| file.sheet.rows.len());
     let repeated = [&*one, &*two]
@@ -394,9 +375,7 @@ fn by_id(
     } else {
         "by the point's name".into()
     };
-    Joined {
-        lines: vec![format!("      join: {{by: id}}          # {question}")],
-    }
+    vec![format!("      join: {{by: id}}          # {question}")]
 }
 
 /// Where files are not joined by id, the names of one of them may stand.
@@ -465,7 +444,7 @@ fn timing(one: &ExaminedFile, two: &ExaminedFile) -> Option<Timing> {
     })
 }
 
-fn by_time(timing: &Timing, files: [&ExaminedFile; 2]) -> Joined {
+fn by_time(timing: &Timing, files: [&ExaminedFile; 2]) -> Vec<String> {
     // Three times the usual distance, rounded up, but never as far as the next row.
     let wide = if timing.overlap {
         (3.0 * timing.near).max(1e-3)
@@ -498,7 +477,7 @@ fn by_time(timing: &Timing, files: [&ExaminedFile; 2]) -> Joined {
             "      max_rejected_fraction: {fraction}   # CHECK: {name} has {many} rows for the {few} of the other file"
         ));
     }
-    Joined { lines }
+    lines
 }
 
 /// Up to the next 1, 2 or 5 times a power of ten.

@@ -15,6 +15,7 @@ pub use content::{BagContent, BagTopic, bag_content};
 use content::{no_topic, only_topic};
 use message::{FieldValue, KINDS, MessageCells, MessageKind};
 use std::collections::VecDeque;
+use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::sync::Arc;
 
 /// Messages that say which columns there are, and bytes of them at most.
@@ -50,11 +51,18 @@ struct Message {
     data: Vec<u8>,
 }
 
-/// A file of messages.
+/// The bytes of a bag: of all its parts, one behind the other.
+type BagSource = BufReader<Box<dyn InputSource>>;
+
+/// Bytes that are read at a time.
+const BLOCK: usize = 1 << 18;
+
+/// A part of a bag.
 trait Container: Send {
     /// The next message of a topic of which a name is wanted; false at the end. Fails with what is lost, once.
     fn next(
         &mut self,
+        source: &mut BagSource,
         wanted: &dyn Fn(&str) -> bool,
         message: &mut Message,
     ) -> std::result::Result<bool, String>;
@@ -66,8 +74,6 @@ trait Container: Send {
     fn topics(&self) -> Vec<Arc<Topic>>;
     /// Place in the source.
     fn position(&self) -> u64;
-    /// Gives the source back.
-    fn into_source(self: Box<Self>) -> Box<dyn InputSource>;
 }
 
 /// Whether a file that begins so is a bag.
@@ -77,7 +83,7 @@ pub fn is_bag(head: &[u8]) -> bool {
 
 /// The messages of all parts of a bag.
 struct Messages {
-    source: Option<Box<dyn InputSource>>,
+    source: BagSource,
     container: Option<Box<dyn Container>>,
     bounds: Vec<u64>,
     /// The next part.
@@ -90,7 +96,7 @@ impl Messages {
     fn open(mut source: Box<dyn InputSource>) -> std::io::Result<Self> {
         let bounds = source.bounds()?;
         Ok(Self {
-            source: Some(source),
+            source: BufReader::with_capacity(BLOCK, source),
             container: None,
             bounds,
             part: 0,
@@ -114,7 +120,7 @@ impl Messages {
             let Some(container) = &mut self.container else {
                 continue;
             };
-            let next = container.next(wanted, message);
+            let next = container.next(&mut self.source, wanted, message);
             if let Ok(true) = next {
                 return true;
             }
@@ -123,7 +129,7 @@ impl Messages {
                     self.topics.push(topic);
                 }
             }
-            self.source = self.container.take().map(Container::into_source);
+            self.container = None;
             if let Err(lost) = next {
                 self.lose(&lost);
             }
@@ -138,35 +144,31 @@ impl Messages {
         else {
             return false;
         };
-        let Some(mut source) = self.source.take() else {
-            return false;
-        };
         self.part += 1;
-        let mut head = [0; 16];
-        let most = (bounds[1] - bounds[0]).min(16) as usize;
-        let begins = source
-            .seek(std::io::SeekFrom::Start(bounds[0]))
-            .and_then(|_| source.read_exact(&mut head[..most]));
-        let back = source.seek(std::io::SeekFrom::Start(bounds[0]));
-        let opened: std::result::Result<Box<dyn Container>, _> = match begins.and(back) {
-            Ok(_) if head.starts_with(mcap::MAGIC) => {
-                Ok(Box::new(mcap::McapMessages::open(source, bounds)))
-            }
-            Ok(_) if head.starts_with(sqlite::MAGIC) => {
-                sqlite::SqliteMessages::open(source, bounds)
-                    .map(|bag| Box::new(bag) as Box<dyn Container>)
-            }
-            Ok(_) => Err((source, "it is no bag".to_string())),
-            Err(error) => Err((source, error.to_string())),
-        };
-        match opened {
+        match self.opened(bounds) {
             Ok(container) => self.container = Some(container),
-            Err((source, lost)) => {
-                self.source = Some(source);
-                self.lose(&lost);
-            }
+            Err(lost) => self.lose(&lost),
         }
         true
+    }
+    fn opened(&mut self, bounds: [u64; 2]) -> std::result::Result<Box<dyn Container>, String> {
+        let mut head = [0; 16];
+        let most = (bounds[1] - bounds[0]).min(16) as usize;
+        let start = SeekFrom::Start(bounds[0]);
+        let mut begin = || {
+            self.source.seek(start)?;
+            self.source.read_exact(&mut head[..most])?;
+            self.source.seek(start)
+        };
+        begin().map_err(|error| error.to_string())?;
+        if head.starts_with(mcap::MAGIC) {
+            Ok(Box::new(mcap::McapMessages::new(bounds)))
+        } else if head.starts_with(sqlite::MAGIC) {
+            let source = self.source.get_mut();
+            sqlite::SqliteMessages::open(source, bounds).map(|bag| Box::new(bag) as _)
+        } else {
+            Err("it is no bag".into())
+        }
     }
     fn position(&self) -> u64 {
         let before = self
@@ -240,10 +242,7 @@ impl BagRows {
             }
         }
         let Some(kind) = kind.filter(|_| !head.is_empty()) else {
-            let source = messages
-                .source
-                .or_else(|| messages.container.map(Container::into_source));
-            let source = source.ok_or_else(|| Error::Bug("a bag without its bytes".into()))?;
+            let source = messages.source.into_inner();
             return Err(Error::data(
                 label,
                 no_topic(&topic, &bag_content(source, label)?),

@@ -70,60 +70,48 @@ impl ColumnRows {
         let size = content.len() as u64;
         let mut remark = None;
         let (what, opened) = if content.starts_with(PARQUET) {
-            let file = parquet(bytes::Bytes::from(content), HELD);
-            (
-                "a Parquet file",
-                file.map(|file| {
-                    (
-                        file.schema.clone(),
-                        Some(file.rows),
-                        Box::new(file) as Batches,
-                    )
-                }),
-            )
+            let opened = parquet(bytes::Bytes::from(content), HELD).map(|file| {
+                let (schema, rows) = (file.schema.clone(), file.rows);
+                (schema, Some(rows), Box::new(file) as Batches)
+            });
+            ("a Parquet file", opened)
         } else if content.starts_with(FEATHER[0]) {
             let message = "is a Feather file of version 1; allowed: version 2, which every writer of today makes, Parquet or text";
             return Err(Error::data(label, message));
         } else if is_arrays(&content) {
             let table = arrays(content).map(|(table, left)| {
                 remark = left;
+                let (schema, rows) = (table.schema(), table.num_rows() as u64);
                 (
-                    table.schema(),
-                    Some(table.num_rows() as u64),
+                    schema,
+                    Some(rows),
                     Box::new(std::iter::once(Ok(table))) as Batches,
                 )
             });
             ("an archive of NumPy arrays", table)
         } else if content.starts_with(STREAM) {
-            (
-                "a stream of Arrow",
-                decoded(|| StreamReader::try_new(Cursor::new(content), None)).and_then(batches_of),
-            )
+            let file = decoded(|| StreamReader::try_new(Cursor::new(content), None));
+            ("a stream of Arrow", file.and_then(batches_of))
         } else {
-            (
-                "a Feather file",
-                decoded(|| FileReader::try_new(Cursor::new(content), None)).and_then(batches_of),
-            )
+            let file = decoded(|| FileReader::try_new(Cursor::new(content), None));
+            ("a Feather file", file.and_then(batches_of))
         };
         let (schema, all, batches) = opened.map_err(|error| broken(label, what, error))?;
         let (schema, batches) = unfolded(schema, batches);
-        let label = label.into();
-        let (text, cells) = (String::new(), Vec::new());
-        let (is_named, batch, held, next, rows) = (false, None, 0, 0, 0);
         Ok(Self {
-            label,
+            label: label.into(),
             what,
             schema,
             batches,
             size,
             all,
-            is_named,
-            batch,
-            text,
-            cells,
-            held,
-            next,
-            rows,
+            is_named: false,
+            batch: None,
+            text: String::new(),
+            cells: Vec::new(),
+            held: 0,
+            next: 0,
+            rows: 0,
             remark,
         })
     }

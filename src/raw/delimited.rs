@@ -161,7 +161,7 @@ fn unquoted(field: &[u8]) -> Cow<'_, [u8]> {
     Cow::Owned(text)
 }
 
-/// How a delimited text is written.
+/// How a delimited text is written; without more, commas between fields and a header on the first line.
 #[derive(Debug, Clone)]
 pub struct TextLayout {
     /// What separates fields.
@@ -172,6 +172,17 @@ pub struct TextLayout {
     pub header_in_comment: bool,
     /// Lines above the first row.
     pub skip: u64,
+}
+
+impl Default for TextLayout {
+    fn default() -> Self {
+        Self {
+            delimiter: Delimiter::Byte(b','),
+            comment: None,
+            header_in_comment: false,
+            skip: 0,
+        }
+    }
 }
 
 /// Reads one text from its first line to its last.
@@ -362,8 +373,7 @@ mod tests {
         let layout = TextLayout {
             delimiter,
             comment: comment.map(Into::into),
-            header_in_comment: false,
-            skip: 0,
+            ..TextLayout::default()
         };
         TextRows::open(Cursor::new(text.to_vec()), "a.csv", layout).unwrap()
     }

@@ -29,22 +29,12 @@ pub enum NumberFault {
 /// A finite number, or why the cell is none. Blanks around it were removed.
 #[inline]
 pub fn number(cell: &[u8], mark: DecimalMark) -> Result<f64, NumberFault> {
-    let is_pointed = mark == DecimalMark::Comma && cell.contains(&b'.');
-    let mut room = [0; 32];
-    let plain = match room
-        .get_mut(..cell.len())
-        .filter(|_| mark == DecimalMark::Comma)
-    {
-        Some(copy) => {
-            copy.copy_from_slice(cell);
-            copy.iter_mut()
-                .find(|byte| **byte == b',')
-                .into_iter()
-                .for_each(|comma| *comma = b'.');
-            copy
-        }
-        None => cell,
+    let comma = cell.iter().position(|byte| *byte == b',');
+    let plain = match comma.filter(|_| mark == DecimalMark::Comma) {
+        Some(at) => Cow::Owned([&cell[..at], b".", &cell[at + 1..]].concat()),
+        None => Cow::Borrowed(cell),
     };
+    let is_pointed = mark == DecimalMark::Comma && cell.contains(&b'.');
     match fast_float2::parse::<f64, _>(plain) {
         Ok(value) if value.is_finite() && !is_pointed => Ok(value),
         _ => unusual(cell, mark),

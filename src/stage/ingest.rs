@@ -5,16 +5,13 @@
 //! a second reading. Per file, accepted + rejected = read.
 
 mod arm;
-mod axes;
 mod bind;
 mod channel;
 mod check;
 mod clock;
 mod columns;
-mod copies;
 mod external;
 mod held;
-mod ids;
 mod joined;
 mod later;
 mod layout;
@@ -24,34 +21,28 @@ mod motion;
 mod noise;
 mod pair;
 mod reading;
-mod recorded;
 mod refusal;
-mod rejections;
 mod row;
 mod scan;
-mod slots;
 mod stretch;
 mod torques;
-mod twice;
 mod verdict;
-mod wide;
 mod write;
 
 pub use clock::is_clock_time;
 pub use columns::Columns;
 pub use later::LaterFiles;
-pub use layout::{Axis, Decimal, Duplicates, FileLayout, Join, LimitPolicy};
-pub use listing::ListedTable;
+pub use layout::{Axis, Decimal, Duplicates, FileLayout, Join, LimitPolicy, WideTargets};
 pub use mapped::{
     ColumnRef, ConventionColumns, CountColumn, CoupledColumn, JointColumns, NameMatch,
     ScalarColumn, TextColumn, UncertaintyColumn, last_number,
 };
 pub use motion::VelocitySettings;
 pub use noise::{InstrumentSetting, instruments};
+pub use reading::{TableLayout, records};
 pub use torques::{IngestTorques, IngestTorquesReads, IngestTorquesWrites, TorqueSide};
-pub use wide::WideTargets;
 
-use crate::error::{Error, Result, counted};
+use crate::error::{Error, Result};
 use crate::robot::{CountedCoupling, JointConvention};
 use crate::stage::{Context, RawFile, Stage, StreamedTable, reads, writes};
 use crate::table::{Intake, IntakeRow, JointConventions, Recording, Rejected, Robot};
@@ -145,22 +136,9 @@ impl Stage for Ingest {
         first.chain(later).collect()
     }
     fn look(&self, reads: Option<IngestReads>, context: &Context) -> Result<Option<IngestWrites>> {
-        let arm = reads
-            .map(|reads| arm::RobotJoints::of(&reads.robot))
-            .transpose()?;
-        let mut faults = Vec::new();
-        for layout in self.measurements().iter().flat_map(|one| &one.files) {
-            match reading::header(layout, arm.as_ref(), self.limits, context) {
-                Ok(()) => {}
-                Err(Error::Data(more)) => faults.extend(more),
-                Err(other) => return Err(other),
-            }
-        }
-        if faults.is_empty() {
-            Ok(None)
-        } else {
-            Err(Error::Data(faults))
-        }
+        let (all, robot) = (self.measurements(), reads.map(|reads| reads.robot));
+        let layouts = all.iter().flat_map(|one| &one.files);
+        reading::headers(layouts, robot.as_ref(), self.limits, context).map(|()| None)
     }
     fn run(&self, reads: IngestReads, context: &Context) -> Result<IngestWrites> {
         self.run_holding(MOST_HELD, reads, context)
@@ -188,7 +166,7 @@ impl Ingest {
             verdict::judge(one, &scans, &decisions, &arm, context)?;
             scanned.push((scans, decisions));
         }
-        copies::refuse(&scanned)?;
+        verdict::no_copies(&scanned)?;
         let names = names(
             scanned
                 .iter()
@@ -273,25 +251,14 @@ fn names<'a>(labels: impl Iterator<Item = &'a str>) -> Vec<String> {
 }
 
 fn intake(decided: &[joined::JoinDecisions], context: &Context) -> Intake {
-    let mut rows: Vec<IntakeRow> = Vec::new();
-    for ((scan, decision), name) in decided
+    let files = decided
         .iter()
-        .flat_map(|one| one.scans.iter().zip(one.decisions).zip(one.names))
-    {
+        .flat_map(|one| one.scans.iter().zip(one.decisions).zip(one.names));
+    let row = |((scan, decision), name): ((&scan::Scan, _), &String)| {
         let accepted = verdict::accepted(scan, decision);
-        let rejected = scan.read - accepted;
-        context.services.note(format!(
-            "{name}: {} read, {accepted} used, {rejected} rejected",
-            counted(scan.read, "row")
-        ));
-        rows.push(IntakeRow {
-            file: name.clone(),
-            lines: scan.lines as i64,
-            read: scan.read as i64,
-            accepted: accepted as i64,
-            rejected: rejected as i64,
-        });
-    }
+        reading::intake(name, scan.lines, [scan.read, accepted], context)
+    };
+    let mut rows: Vec<IntakeRow> = files.map(row).collect();
     rows.sort_by(|a, b| a.file.cmp(&b.file));
     Intake(rows)
 }

@@ -22,6 +22,13 @@ pub(super) enum ColumnRole {
 }
 
 impl ColumnRole {
+    /// Whether a target without it is none.
+    pub fn is_needed(self) -> bool {
+        matches!(
+            self,
+            Self::Joint(..) | Self::Axis(..) | Self::Quaternion(_) | Self::Turn(..)
+        )
+    }
     /// What is wrong with a number of the column by itself.
     pub fn fault(self, value: f64) -> Option<String> {
         match self {

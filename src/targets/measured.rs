@@ -2,10 +2,8 @@
 //! each row in x, y, z.
 
 use super::Layout;
-use super::columns::{ColumnRole, TargetColumns};
-use super::fields::fields;
-use super::row::TargetRow;
-use super::text::{delimiter, parse};
+use super::columns::TargetColumns;
+use super::text::{fields, row, table};
 use crate::compensate::CommandTarget;
 use crate::error::{Error, Fault, Result};
 use nalgebra::Vector3;
@@ -21,21 +19,10 @@ pub struct MeasuredTarget {
 
 /// Reads a whole table. Fails with the faults of its header, or of its rows with their lines.
 pub fn measured(text: &str, layout: &Layout) -> Result<Vec<MeasuredTarget>> {
-    let mut lines = (1..)
-        .zip(text.trim_start_matches('\u{feff}').lines())
-        .filter(|(_, line)| !line.trim().is_empty());
-    let Some((number, header)) = lines.next() else {
-        return Err(Error::data(
-            layout.place,
-            "is empty; expected a header line and targets with their measured points",
-        ));
-    };
-    let delimiter = delimiter(header);
-    let broken =
-        |number: usize, message: String| Fault::new(format!("{}:{number}", layout.place), message);
-    let names =
-        fields(header, delimiter).map_err(|message| Error::Data(vec![broken(number, message)]))?;
-    let names: Vec<String> = names
+    let expected = "a header line and targets with their measured points";
+    let table = table(text, layout.place, expected)?;
+    let names: Vec<String> = table
+        .names
         .into_iter()
         .map(|field| field.1.into_owned())
         .collect();
@@ -44,12 +31,22 @@ pub fn measured(text: &str, layout: &Layout) -> Result<Vec<MeasuredTarget>> {
         let message = "has no columns of joints (the targets before correction), or no x_mm, y_mm, z_mm (the measured points)";
         return Err(Error::spec(layout.place, message));
     }
-    let mut rows = Vec::new();
-    let mut faults = Vec::new();
-    for (number, line) in lines {
-        match row(line, delimiter, &columns, layout) {
+    let read = |line: &str| {
+        let row = row(
+            &fields(line, table.delimiter)?,
+            table.delimiter,
+            &columns,
+            layout,
+        )?;
+        let point = row.point.into();
+        row.target(&columns, layout)
+            .map(|target| MeasuredTarget { target, point })
+    };
+    let (mut rows, mut faults) = (Vec::new(), Vec::new());
+    for (number, line) in table.rows {
+        match read(line) {
             Ok(read) => rows.push(read),
-            Err(message) => faults.push(broken(number, message)),
+            Err(message) => faults.push(Fault::new(format!("{}:{number}", layout.place), message)),
         }
     }
     if faults.is_empty() {
@@ -57,38 +54,4 @@ pub fn measured(text: &str, layout: &Layout) -> Result<Vec<MeasuredTarget>> {
     } else {
         Err(Error::Data(faults))
     }
-}
-
-fn row(
-    line: &str,
-    delimiter: char,
-    columns: &TargetColumns,
-    layout: &Layout,
-) -> Result<MeasuredTarget, String> {
-    let cells = fields(line, delimiter)?;
-    if cells.len() != columns.count {
-        return Err(format!(
-            "has {} fields, the header {}",
-            cells.len(),
-            columns.count
-        ));
-    }
-    let (mut row, mut point) = (TargetRow::default(), Vector3::zeros());
-    for (index, role) in &columns.roles {
-        let text = &cells[*index].1;
-        let value = parse(text, delimiter)
-            .map_err(|()| format!("field {} is `{text}`, no number", index + 1))?;
-        match (role, value) {
-            (ColumnRole::Axis(axis, unit), Some(value)) => point[*axis] = unit.to_si(value),
-            (role, Some(value)) => row.take(*role, value, layout.robot.joints.len()),
-            (ColumnRole::Axis(..) | ColumnRole::Joint(..), None) => {
-                return Err(format!("field {} is empty", index + 1));
-            }
-            _ => {}
-        }
-    }
-    Ok(MeasuredTarget {
-        target: row.target(columns, layout)?,
-        point,
-    })
 }

@@ -3,7 +3,6 @@
 
 mod columns;
 mod decimal;
-mod fields;
 mod measured;
 pub mod parquet;
 mod row;

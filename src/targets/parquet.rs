@@ -1,6 +1,6 @@
 //! Targets in Parquet: batch by batch, columns of joints replaced, all others passed on, what is known of each target appended.
 
-use super::columns::{ColumnRole, TargetColumns};
+use super::columns::TargetColumns;
 use super::row::{FarTurned, TargetRow};
 use super::{Layout, Unreached};
 use crate::compensate::{CommandTarget, CorrectedCommand, Corrector};
@@ -161,20 +161,13 @@ fn targets(
             let mut taken = TargetRow::default();
             for (role, name, column) in &numbers {
                 let values = column.as_primitive::<Float64Type>();
-                let needed = matches!(
-                    role,
-                    ColumnRole::Joint(..)
-                        | ColumnRole::Axis(..)
-                        | ColumnRole::Quaternion(_)
-                        | ColumnRole::Turn(..)
-                );
                 if !values.is_null(row) && values.value(row).is_finite() {
                     if let Some(message) = role.fault(values.value(row)) {
                         let place = format!("row {}: column `{name}`", before + row + 1);
                         return Err(Error::data(layout.place, format!("{place}: {message}")));
                     }
                     taken.take(*role, values.value(row), layout.robot.joints.len());
-                } else if needed {
+                } else if role.is_needed() {
                     return Err(Error::data(
                         layout.place,
                         format!("row {}: column `{name}` is empty", before + row + 1),

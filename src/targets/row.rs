@@ -14,7 +14,7 @@ use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 #[derive(Default)]
 pub(super) struct TargetRow {
     target: CommandTarget,
-    point: [f64; 3],
+    pub point: [f64; 3],
     quaternion: [f64; 4],
     turns: [f64; 3],
 }

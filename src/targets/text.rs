@@ -1,14 +1,15 @@
 //! Targets in delimited text: read in batches, every byte kept but the numbers of joints; what is known of each is appended.
 
-use super::columns::{ColumnRole, TargetColumns};
-use super::fields::fields;
+use super::columns::TargetColumns;
 use super::row::{FarTurned, TargetRow};
 use super::{Layout, Unreached, decimal};
 use crate::compensate::{CommandTarget, CorrectedCommand, Corrector};
 use crate::description::JointKind;
 use crate::error::{Error, Fault, Result};
+use crate::raw::{self, Delimiter, unquoted_text};
 use crate::units::Unit;
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::io::{BufRead, Read, Write};
 use std::ops::Range;
 
@@ -51,13 +52,8 @@ pub fn stream(
     };
     let delimiter = delimiter(&header);
     let (body, ending) = split_ending(&header);
-    let cells = fields(body.trim_start_matches('\u{feff}'), delimiter).map_err(|message| {
-        Error::Data(vec![Fault::new(
-            format!("{}:{number}", layout.place),
-            message,
-        )])
-    })?;
-    let names: Vec<String> = cells
+    let body_names = body.trim_start_matches('\u{feff}');
+    let names: Vec<String> = names(body_names, delimiter, layout.place, number)?
         .into_iter()
         .map(|field| field.1.into_owned())
         .collect();
@@ -240,6 +236,57 @@ fn next(input: &mut dyn BufRead, place: &str) -> Result<Option<String>> {
         .map_err(|_| Error::data(place, "is no text in UTF-8"))
 }
 
+/// Where a field stands in its line, and its text without quotes.
+pub(super) type TextField<'t> = (Range<usize>, Cow<'t, str>);
+
+/// The fields of a line. Fails where a quote is not closed.
+pub(super) fn fields(line: &str, delimiter: char) -> Result<Vec<TextField<'_>>, String> {
+    let (places, open) = raw::fields(line, Delimiter::Byte(delimiter as u8));
+    match open {
+        Some(at) => Err(format!("column {}: `\"` is not closed on its line", at + 1)),
+        None => Ok(places
+            .into_iter()
+            .map(|place| (place.clone(), unquoted_text(&line[place])))
+            .collect()),
+    }
+}
+
+/// A table in memory.
+pub(super) struct TableText<'t> {
+    pub delimiter: char,
+    pub header: &'t str,
+    pub names: Vec<TextField<'t>>,
+    /// With their numbers, from 1.
+    pub rows: Vec<(usize, &'t str)>,
+}
+
+/// Takes a table apart; fails where it has no header, and then `expected` something.
+pub(super) fn table<'t>(text: &'t str, place: &str, expected: &str) -> Result<TableText<'t>> {
+    let mut lines = (1..)
+        .zip(text.trim_start_matches('\u{feff}').lines())
+        .filter(|(_, line)| !line.trim().is_empty());
+    let Some((number, header)) = lines.next() else {
+        return Err(Error::data(place, format!("is empty; expected {expected}")));
+    };
+    let delimiter = delimiter(header);
+    Ok(TableText {
+        delimiter,
+        header,
+        names: names(header, delimiter, place, number)?,
+        rows: lines.collect(),
+    })
+}
+
+/// The fields of a header.
+fn names<'t>(
+    header: &'t str,
+    delimiter: char,
+    place: &str,
+    number: usize,
+) -> Result<Vec<TextField<'t>>> {
+    fields(header, delimiter).map_err(|message| Error::data(format!("{place}:{number}"), message))
+}
+
 /// A line and its line ending.
 fn split_ending(line: &str) -> (&str, &str) {
     let body = line.trim_end_matches(['\n', '\r']);
@@ -303,44 +350,7 @@ impl TextTable<'_> {
     fn target(&self, line: &str) -> Result<(CommandTarget, Spans), String> {
         let (body, _) = split_ending(line);
         let cells = fields(body, self.delimiter)?;
-        if cells.len() != self.columns.count {
-            return Err(format!(
-                "has {} fields, the header {}",
-                cells.len(),
-                self.columns.count
-            ));
-        }
-        let number = |index: usize| -> Result<Option<f64>, String> {
-            let (range, text) = &cells[index];
-            parse(text, self.delimiter).map_err(|()| {
-                format!(
-                    "column {}: field {} is `{text}`, no number",
-                    range.start + 1,
-                    index + 1
-                )
-            })
-        };
-        let mut row = TargetRow::default();
-        for (index, role) in &self.columns.roles {
-            if let Some(value) = number(*index)? {
-                if let Some(message) = role.fault(value) {
-                    return Err(format!(
-                        "column {}: field {}: {message}",
-                        cells[*index].0.start + 1,
-                        index + 1
-                    ));
-                }
-                row.take(*role, value, self.layout.robot.joints.len());
-            } else if matches!(
-                role,
-                ColumnRole::Joint(..)
-                    | ColumnRole::Axis(..)
-                    | ColumnRole::Quaternion(_)
-                    | ColumnRole::Turn(..)
-            ) {
-                return Err(format!("column {} is empty", cells[*index].0.start + 1));
-            }
-        }
+        let row = row(&cells, self.delimiter, self.columns, self.layout)?;
         let comma = self.delimiter != ','
             && body.contains(',')
             && cells.iter().any(|(_, text)| is_comma_number(text));
@@ -432,6 +442,38 @@ fn decimals(unit: Unit) -> usize {
 
 fn is_comma_number(text: &str) -> bool {
     text.contains(',') && !text.contains('.') && text.replacen(',', ".", 1).parse::<f64>().is_ok()
+}
+
+/// The numbers of a row by its fields.
+pub(super) fn row(
+    cells: &[TextField],
+    delimiter: char,
+    columns: &TargetColumns,
+    layout: &Layout,
+) -> Result<TargetRow, String> {
+    if cells.len() != columns.count {
+        return Err(format!(
+            "has {} fields, the header {}",
+            cells.len(),
+            columns.count
+        ));
+    }
+    let mut row = TargetRow::default();
+    for (index, role) in &columns.roles {
+        let (range, text) = &cells[*index];
+        let (column, field) = (range.start + 1, index + 1);
+        let value = parse(text, delimiter)
+            .map_err(|()| format!("column {column}: field {field} is `{text}`, no number"))?;
+        if let Some(value) = value {
+            if let Some(message) = role.fault(value) {
+                return Err(format!("column {column}: field {field}: {message}"));
+            }
+            row.take(*role, value, layout.robot.joints.len());
+        } else if role.is_needed() {
+            return Err(format!("column {column} is empty"));
+        }
+    }
+    Ok(row)
 }
 
 /// A number, or none where the field is empty.

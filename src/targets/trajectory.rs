@@ -1,7 +1,6 @@
 //! A planned motion as delimited text: times and joints in even steps; what it needs of torque is appended, all else stays.
 
-use super::fields::{TextField, fields};
-use super::text::{delimiter, parse};
+use super::text::{TableText, TextField, fields, parse, table};
 use super::{MOST, decimal};
 use crate::description::RobotDescription;
 use crate::dynamics::{JudgedRow, NeededTorques, PlannedMotion};
@@ -39,16 +38,13 @@ impl<'a> Trajectory<'a> {
     /// be read, times that do not grow in even steps, and where calib wrote the torques of the text already; `force`: its columns are
     /// written anew.
     pub fn read(place: &str, text: &'a str, robot: &RobotDescription, force: bool) -> Result<Self> {
-        let text = text.trim_start_matches('\u{feff}');
-        let mut lines = (1..)
-            .zip(text.lines())
-            .filter(|(_, line)| !line.trim().is_empty());
-        let empty = || Error::data(place, "is empty; expected a header line and a motion");
-        let (number, header) = lines.next().ok_or_else(empty)?;
-        let delimiter = delimiter(header);
-        let at = |line: usize, message: String| Fault::new(format!("{place}:{line}"), message);
-        let names =
-            fields(header, delimiter).map_err(|message| Error::Data(vec![at(number, message)]))?;
+        let table = table(text, place, "a header line and a motion")?;
+        let TableText {
+            delimiter,
+            header,
+            names,
+            rows: lines,
+        } = table;
         let everything = names.len();
         let kept = kept(place, &names, robot.joints.len(), force)?;
         let header = kept
@@ -63,7 +59,7 @@ impl<'a> Trajectory<'a> {
         let mut trajectory = Self {
             motion: empty_motion(robot.joints.len(), &columns),
             header,
-            lines: lines.collect(),
+            lines,
             delimiter,
             point: '.',
         };

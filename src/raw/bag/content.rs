@@ -116,13 +116,10 @@ pub fn bag_content(source: Box<dyn InputSource>, label: &str) -> Result<BagConte
         }
     }
     let loss = (!messages.losses.is_empty()).then(|| messages.losses.join("; "));
-    let source = messages
-        .source
-        .ok_or_else(|| Error::Bug("a bag without its bytes".into()))?;
     Ok(BagContent {
         topics: found.into_values().collect(),
         loss,
-        source,
+        source: messages.source.into_inner(),
     })
 }
 

@@ -1,24 +1,22 @@
 //! Messages of an MCAP file from its first byte to its last whole record: what the index at its end says is not needed.
 
-use super::{Container, Message, Topic};
-use crate::raw::{InputSource, decoded};
+use super::{BagSource, Container, Message, Topic};
+use crate::raw::decoded;
 use mcap::records::{Record, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{McapError, parse_record};
 use std::collections::BTreeMap;
-use std::io::{BufReader, Read};
+use std::io::Read;
 use std::sync::Arc;
 
 /// How a file begins.
 pub(super) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
-/// Bytes that are read at a time, and of a record at most.
-const BLOCK: usize = 1 << 18;
+/// Bytes of a record at most.
 const LONGEST: usize = 1 << 30;
 /// Bytes of a message before its content: channel, sequence, time of the record and of the publisher.
 const HEADER: usize = 22;
 
 pub(super) struct McapMessages {
-    source: BufReader<Box<dyn InputSource>>,
     reader: LinearReader,
     /// Place in the source, where the file ends, and where it begins.
     at: u64,
@@ -38,15 +36,12 @@ enum ReadStep {
 
 impl McapMessages {
     /// The file between two places of the source.
-    pub(super) fn open(source: Box<dyn InputSource>, [start, end]: [u64; 2]) -> Self {
+    pub(super) fn new([start, end]: [u64; 2]) -> Self {
         let options = LinearReaderOptions::default()
             .with_validate_chunk_crcs(true)
             .with_record_length_limit(LONGEST);
-        let reader = LinearReader::new_with_options(options);
-        let source = BufReader::with_capacity(BLOCK, source);
         Self {
-            source,
-            reader,
+            reader: LinearReader::new_with_options(options),
             at: start,
             end,
             start,
@@ -116,14 +111,13 @@ impl McapMessages {
     }
 
     /// Hands bytes to the decoder, of which it asked for so many; false where the file has fewer.
-    fn feed(&mut self, asked: usize) -> Result<bool, String> {
+    fn feed(&mut self, source: &mut BagSource, asked: usize) -> Result<bool, String> {
         let left = self.end - self.at;
         if asked as u64 > left {
             return Ok(false);
         }
         // No more than it asked for: it keeps what it does not need yet.
-        let read = self
-            .source
+        let read = source
             .read(self.reader.insert(asked))
             .map_err(|error| error.to_string())?;
         self.reader.notify_read(read);
@@ -142,6 +136,7 @@ impl McapMessages {
 impl Container for McapMessages {
     fn next(
         &mut self,
+        source: &mut BagSource,
         wanted: &dyn Fn(&str) -> bool,
         message: &mut Message,
     ) -> Result<bool, String> {
@@ -155,7 +150,7 @@ impl Container for McapMessages {
                 ReadStep::End => return Ok(false),
                 ReadStep::Other => {}
                 ReadStep::Read(bytes) => {
-                    if !self.feed(bytes).map_err(|why| self.lost(&why))? {
+                    if !self.feed(source, bytes).map_err(|why| self.lost(&why))? {
                         return Err(self.lost(
                             "it has no end: a recorder that was stopped, or a copy that was cut",
                         ));
@@ -169,8 +164,5 @@ impl Container for McapMessages {
     }
     fn position(&self) -> u64 {
         self.at
-    }
-    fn into_source(self: Box<Self>) -> Box<dyn InputSource> {
-        self.source.into_inner()
     }
 }

@@ -2,11 +2,13 @@
 //! `messages`, row by row, in bounded memory. No library of SQLite is used: it takes a path and reads files next to it, which no key of a
 //! table would know of, and it refuses a file that was cut, of which all pages that are there are read here.
 
-use super::{Container, Message, Topic};
+use super::{BagSource, Container, Message, Topic};
 use crate::raw::InputSource;
 use std::collections::BTreeMap;
 use std::io::SeekFrom;
 use std::sync::Arc;
+
+type Source = Box<dyn InputSource>;
 
 /// How a file begins.
 pub(super) const MAGIC: &[u8] = b"SQLite format 3\0";
@@ -17,7 +19,6 @@ const LONGEST: u64 = 1 << 30;
 
 /// The pages of a file.
 struct DatabasePages {
-    source: Box<dyn InputSource>,
     start: u64,
     size: u64,
     /// Bytes of a page that hold content.
@@ -69,10 +70,7 @@ fn varint(bytes: &[u8]) -> Option<(u64, usize)> {
 }
 
 impl DatabasePages {
-    fn open(
-        mut source: Box<dyn InputSource>,
-        [start, end]: [u64; 2],
-    ) -> Result<Self, (Box<dyn InputSource>, String)> {
+    fn open(source: &mut Source, [start, end]: [u64; 2]) -> Result<Self, String> {
         let mut head = [0; 100];
         let read = source
             .seek(SeekFrom::Start(start))
@@ -87,11 +85,10 @@ impl DatabasePages {
             || !size.is_power_of_two()
             || u64::from(head[20]) > size - 480
         {
-            return Err((source, "its first page is damaged".into()));
+            return Err("its first page is damaged".into());
         }
         let usable = (size - u64::from(head[20])) as usize;
         Ok(Self {
-            source,
             start,
             size,
             usable,
@@ -102,28 +99,28 @@ impl DatabasePages {
         })
     }
 
-    fn page(&mut self, number: u64) -> Result<Option<Vec<u8>>, String> {
+    fn page(&mut self, source: &mut Source, number: u64) -> Result<Option<Vec<u8>>, String> {
         if number == 0 || number > self.there {
             self.missing += 1;
             return Ok(None);
         }
         let mut page = vec![0; self.size as usize];
         let place = SeekFrom::Start(self.start + (number - 1) * self.size);
-        self.source
+        source
             .seek(place)
-            .and_then(|_| self.source.read_exact(&mut page))
+            .and_then(|_| source.read_exact(&mut page))
             .map_err(|error| error.to_string())?;
         Ok(Some(page))
     }
 
     /// All bytes of a row; none where a page of it is missing, or its length is more than the file's.
-    fn whole(&mut self, cell: &PageCell) -> Result<Option<Vec<u8>>, String> {
+    fn whole(&mut self, source: &mut Source, cell: &PageCell) -> Result<Option<Vec<u8>>, String> {
         if cell.length as u64 > self.there * self.size {
             return Ok(None);
         }
         let (mut bytes, mut next) = (cell.local.clone(), cell.overflow);
         while bytes.len() < cell.length {
-            let Some(page) = self.page(u64::from(next))? else {
+            let Some(page) = self.page(source, u64::from(next))? else {
                 return Ok(None);
             };
             let more = (cell.length - bytes.len()).min(self.usable - 4);
@@ -153,14 +150,18 @@ impl TableRows {
         }
     }
 
-    fn next(&mut self, pages: &mut DatabasePages) -> Result<Option<PageCell>, String> {
+    fn next(
+        &mut self,
+        source: &mut Source,
+        pages: &mut DatabasePages,
+    ) -> Result<Option<PageCell>, String> {
         loop {
             if let Some(number) = self.down.take() {
                 self.visited += 1;
                 if self.path.len() >= DEEPEST || self.visited > pages.there.max(pages.stated) {
                     return Err("a table goes in circles".into());
                 }
-                if let Some(page) = pages.page(number)? {
+                if let Some(page) = pages.page(source, number)? {
                     self.path.push((page, if number == 1 { 100 } else { 0 }, 0));
                 }
             }
@@ -281,9 +282,6 @@ fn columns(statement: &str) -> Vec<String> {
     inside.split(',').map(name).collect()
 }
 
-/// Topics by their numbers, the rows of messages, and places of topic, time and content among their columns.
-type BagTables = (BTreeMap<i64, Arc<Topic>>, TableRows, [usize; 3]);
-
 pub(super) struct SqliteMessages {
     pages: DatabasePages,
     topics: BTreeMap<i64, Arc<Topic>>,
@@ -296,28 +294,12 @@ pub(super) struct SqliteMessages {
 
 impl SqliteMessages {
     /// The file between two places of the source.
-    pub(super) fn open(
-        source: Box<dyn InputSource>,
-        bounds: [u64; 2],
-    ) -> Result<Self, (Box<dyn InputSource>, String)> {
+    pub(super) fn open(source: &mut Source, bounds: [u64; 2]) -> Result<Self, String> {
         let mut pages = DatabasePages::open(source, bounds)?;
-        match Self::tables(&mut pages) {
-            Ok((topics, messages, places)) => Ok(Self {
-                pages,
-                topics,
-                messages,
-                places,
-                cut: 0,
-            }),
-            Err(message) => Err((pages.source, message)),
-        }
-    }
-
-    fn tables(pages: &mut DatabasePages) -> Result<BagTables, String> {
         let mut tables: BTreeMap<String, (u64, Vec<String>)> = BTreeMap::new();
         let mut rows = TableRows::new(1);
-        while let Some(cell) = rows.next(pages)? {
-            let Some(row) = pages.whole(&cell)? else {
+        while let Some(cell) = rows.next(source, &mut pages)? {
+            let Some(row) = pages.whole(source, &cell)? else {
                 continue;
             };
             if let (Some(name), Some(Value::Integer(root)), Some(statement)) =
@@ -341,8 +323,8 @@ impl SqliteMessages {
         };
         let (root, places) = table("topics", &["name", "type", "serialization_format"])?;
         let (mut topics, mut rows) = (BTreeMap::new(), TableRows::new(root));
-        while let Some(cell) = rows.next(pages)? {
-            let Some(row) = pages.whole(&cell)? else {
+        while let Some(cell) = rows.next(source, &mut pages)? {
+            let Some(row) = pages.whole(source, &cell)? else {
                 continue;
             };
             if let [Some(name), Some(kind), Some(encoding)] =
@@ -359,23 +341,28 @@ impl SqliteMessages {
             }
         }
         let (root, places) = table("messages", &["topic_id", "timestamp", "data"])?;
-        Ok((
+        Ok(Self {
+            pages,
             topics,
-            TableRows::new(root),
-            [places[0], places[1], places[2]],
-        ))
+            messages: TableRows::new(root),
+            places: [places[0], places[1], places[2]],
+            cut: 0,
+        })
     }
 }
 
 impl Container for SqliteMessages {
     fn next(
         &mut self,
+        source: &mut BagSource,
         wanted: &dyn Fn(&str) -> bool,
         message: &mut Message,
     ) -> Result<bool, String> {
+        // Pages stand anywhere: nothing is read ahead.
+        let source = source.get_mut();
         let lost =
             |why: String| format!("it is damaged ({why}): what was recorded after that is lost");
-        while let Some(cell) = self.messages.next(&mut self.pages).map_err(lost)? {
+        while let Some(cell) = self.messages.next(source, &mut self.pages).map_err(lost)? {
             let Some(Value::Integer(topic)) = value(&cell.local, self.places[0]) else {
                 self.cut += 1;
                 continue;
@@ -388,7 +375,7 @@ impl Container for SqliteMessages {
             else {
                 continue;
             };
-            let row = self.pages.whole(&cell).map_err(lost)?;
+            let row = self.pages.whole(source, &cell).map_err(lost)?;
             let found = row
                 .as_ref()
                 .map(|row| (value(row, self.places[1]), value(row, self.places[2])));
@@ -425,8 +412,5 @@ impl Container for SqliteMessages {
     fn position(&self) -> u64 {
         self.pages.start
             + (self.messages.visited * self.pages.size).min(self.pages.there * self.pages.size)
-    }
-    fn into_source(self: Box<Self>) -> Box<dyn InputSource> {
-        self.pages.source
     }
 }

@@ -1,8 +1,10 @@
-//! What ingest needs to know of the robot: number and kinds of joints, and their limits.
+//! What ingest needs to know of the robot (number and kinds of joints, their limits), and where the quantities of a row live in its list of
+//! numbers and of texts: one after another, as the recording declares them.
 
-use super::slots::Slots;
 use crate::error::{Error, Result};
-use crate::table::Robot;
+use crate::observation::{DeclaredColumn, KINDS, MeasurementKind, Part};
+use crate::table::{Robot, recording_columns};
+use std::ops::Range;
 
 /// The joints of the robot table.
 pub(super) struct RobotJoints {
@@ -58,12 +60,7 @@ impl RobotJoints {
             .get(joint)
             .copied()
             .unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
-        let prismatic = self.prismatic.get(joint) == Some(&true);
-        let (scale, unit) = if prismatic {
-            (1e3, "mm")
-        } else {
-            (1f64.to_degrees(), "deg")
-        };
+        let (scale, unit) = self.shown_in(joint);
         let (side, limit) = if value < lower {
             ("below its lower", lower)
         } else {
@@ -77,7 +74,106 @@ impl RobotJoints {
         let (number, value, limit) = (joint + 1, value * scale, limit * scale);
         format!("joint {number}{name} at {value:.4} {unit}, {side} limit of {limit:.4} {unit}")
     }
+    /// What positions of a joint (from 0) are multiplied by for people, and their unit then.
+    pub(super) fn shown_in(&self, joint: usize) -> (f64, &'static str) {
+        if self.prismatic.get(joint) == Some(&true) {
+            (1e3, "mm")
+        } else {
+            (1f64.to_degrees(), "deg")
+        }
+    }
     pub(super) fn joints(&self) -> usize {
         self.prismatic.len()
+    }
+}
+
+/// The layout of a row, of a robot with so many joints.
+pub(super) struct Slots {
+    columns: Vec<(&'static DeclaredColumn, Range<usize>)>,
+    texts: Vec<&'static str>,
+    /// Numbers in a row.
+    pub count: usize,
+    pub time: usize,
+    pub q: Range<usize>,
+    pub velocity: Range<usize>,
+    /// The places of a measured point.
+    pub point: Range<usize>,
+    /// What each kind of measurement takes.
+    pub kinds: Vec<KindSlots>,
+}
+
+/// Where a kind's numbers are.
+pub(super) struct KindSlots {
+    pub kind: &'static dyn MeasurementKind,
+    pub values: Vec<usize>,
+    pub sigma: Vec<usize>,
+    /// Whether each reading needs its standard deviation.
+    pub own_sigma: bool,
+    /// Among the row's texts: what the target was brought to, of a kind that reads nothing.
+    pub name: Option<usize>,
+}
+
+impl Slots {
+    pub(super) fn new(joints: usize) -> Self {
+        let mut count = 0;
+        let place = |column: &'static DeclaredColumn| {
+            let first = count;
+            count += column.numbers(joints);
+            (column, first..count)
+        };
+        let columns: Vec<(&'static DeclaredColumn, Range<usize>)> =
+            recording_columns().map(place).collect();
+        let texts =
+            recording_columns().filter(|column| column.is_text() && column.setting != "point_id");
+        let mut slots = Self {
+            texts: texts.map(|column| column.setting).collect(),
+            columns,
+            count,
+            time: 0,
+            q: 0..0,
+            velocity: 0..0,
+            point: 0..0,
+            kinds: Vec::new(),
+        };
+        (slots.time, slots.q, slots.velocity) =
+            (slots.of("time").start, slots.of("q"), slots.of("velocity"));
+        slots.point = slots.of("x").start..slots.of("z").end;
+        let part = |kind: &dyn MeasurementKind, part: Part| -> Vec<usize> {
+            kind.columns(part)
+                .flat_map(|column| slots.of(column.setting).take(column.stored.len()))
+                .collect()
+        };
+        let name = |kind: &dyn MeasurementKind| {
+            let own = kind.telling().next().filter(|_| kind.is_brought())?;
+            slots
+                .texts
+                .iter()
+                .position(|setting| *setting == own.setting)
+        };
+        let kinds = KINDS.iter().map(|kind| KindSlots {
+            kind: *kind,
+            values: part(*kind, Part::Value),
+            sigma: part(*kind, Part::Sigma),
+            own_sigma: kind.about().own_sigma,
+            name: name(*kind),
+        });
+        slots.kinds = kinds.collect();
+        slots
+    }
+    /// The places of a setting's numbers.
+    pub(super) fn of(&self, setting: &str) -> Range<usize> {
+        let found = self
+            .columns
+            .iter()
+            .find(|(column, _)| column.setting == setting);
+        found.map_or(0..0, |(_, places)| places.clone())
+    }
+    /// All columns with numbers, and their places.
+    pub(super) fn numbers(&self) -> impl Iterator<Item = &(&'static DeclaredColumn, Range<usize>)> {
+        self.columns.iter().filter(|(_, places)| !places.is_empty())
+    }
+    /// Settings of the texts of a row beside its id.
+    pub(super) fn texts(&self) -> &[&'static str] {
+        &self.texts
     }
 }

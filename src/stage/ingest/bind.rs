@@ -1,12 +1,10 @@
 //! From the columns that the settings name to the columns that a file has.
 
-use super::arm::RobotJoints;
+use super::arm::{KindSlots, RobotJoints};
 use super::clock::CLOCK;
 use super::columns::Columns;
-use super::layout::FileLayout;
+use super::layout::{FileLayout, WideTargets};
 use super::mapped::{ColumnRef, JointColumns, NameRule, ScalarColumn};
-use super::slots::KindSlots;
-use super::wide::WideTargets;
 use crate::error::{Error, Fault, Result, counted, nearest};
 use crate::observation::{Convention, DeclaredColumn};
 use crate::table::recording_columns;
@@ -18,6 +16,7 @@ use std::ops::Range;
 const SHOWN: usize = 60;
 
 /// Where a file's quantities stand, resolved against its header.
+#[derive(Default)]
 pub(super) struct Binding {
     /// Fields of a row.
     pub width: usize,
@@ -91,17 +90,10 @@ pub(super) struct Difference {
 impl Binding {
     /// What follows from the columns that were found.
     fn settle(&mut self, arm: &RobotJoints, is_wide: bool) {
-        let kept = self
-            .conventions
-            .iter()
-            .flat_map(|(places, ..)| places.clone());
-        self.filled = self
-            .slots()
-            .into_iter()
-            .chain(kept)
-            .collect::<BTreeSet<usize>>()
-            .into_iter()
-            .collect();
+        let kept = self.conventions.iter();
+        let kept = kept.flat_map(|(places, ..)| places.clone());
+        let filled: BTreeSet<usize> = self.slots().into_iter().chain(kept).collect();
+        self.filled = filled.into_iter().collect();
         self.worded = (0..self.texts.len())
             .filter(|place| self.texts[*place].is_some())
             .collect();
@@ -136,18 +128,13 @@ impl Binding {
                 } => Some((*column, !optional)),
                 TextBinding::Value(_) => None,
             });
-        let cells = self
-            .cells
-            .iter()
-            .chain(self.points.iter().flat_map(|(_, cells)| cells));
-        let numbers = cells.flat_map(|cell| {
-            [
-                Some(cell.column),
-                cell.difference.as_ref().map(|other| other.column),
-            ]
-            .into_iter()
-            .flatten()
-            .map(|column| (column, !cell.optional))
+        let points = self.points.iter().flat_map(|(_, cells)| cells);
+        let numbers = self.cells.iter().chain(points).flat_map(|cell| {
+            let other = cell.difference.as_ref().map(|other| other.column);
+            [Some(cell.column), other]
+                .into_iter()
+                .flatten()
+                .map(|column| (column, !cell.optional))
         });
         texts
             .chain(numbers)
@@ -183,19 +170,8 @@ struct Binder<'a> {
 pub(super) fn bind(layout: &FileLayout, head: &FileHeader, arm: &RobotJoints) -> Result<Binding> {
     let binding = Binding {
         width: head.width,
-        id: None,
         texts: arm.slots.texts().iter().map(|_| None).collect(),
-        worded: Vec::new(),
-        conventions: Vec::new(),
-        measures: false,
-        kinds: Vec::new(),
-        sequence: None,
-        cells: Vec::new(),
-        points: Vec::new(),
-        constants: Vec::new(),
-        coupled: Vec::new(),
-        filled: Vec::new(),
-        missing: Vec::new(),
+        ..Binding::default()
     };
     let mut binder = Binder {
         head,
@@ -204,21 +180,17 @@ pub(super) fn bind(layout: &FileLayout, head: &FileHeader, arm: &RobotJoints) ->
     };
     let columns = &layout.columns;
     for (declared, text) in columns.texts() {
+        let setting = declared.setting;
         let value = text.value.clone().map(TextBinding::Value);
         let bound = value.or_else(|| {
-            let column = binder.column(text.column.as_ref()?, declared.setting, text.optional)?;
             Some(TextBinding::Column {
-                column,
+                column: binder.column(text.column.as_ref()?, setting, text.optional)?,
                 optional: text.optional,
                 rule: text.rule(),
             })
         });
-        match arm
-            .slots
-            .texts()
-            .iter()
-            .position(|name| *name == declared.setting)
-        {
+        let texts = arm.slots.texts();
+        match texts.iter().position(|name| *name == setting) {
             Some(at) => binder.binding.texts[at] = bound,
             None => binder.binding.id = bound,
         }
@@ -405,16 +377,12 @@ impl Binder<'_> {
     fn uncertainties(&mut self, columns: &Columns, arm: &RobotJoints) -> Result<()> {
         for (declared, mapped, of, divisor) in columns.uncertainties() {
             let unit = unit(mapped.unit.as_deref())?;
-            let places: Vec<usize> = of
-                .iter()
-                .map(|setting| arm.slots.of(setting).start)
-                .collect();
+            let places = of.iter().map(|setting| arm.slots.of(setting).start);
             if let Some(value) = mapped.value {
-                self.binding.constants.extend(
-                    places
-                        .into_iter()
-                        .map(|index| (index, unit.to_si(value) / divisor)),
-                );
+                let value = unit.to_si(value) / divisor;
+                self.binding
+                    .constants
+                    .extend(places.map(|index| (index, value)));
             } else if let Some(reference) = &mapped.column
                 && let Some(column) = self.column(reference, declared.setting, mapped.optional)
             {
@@ -459,23 +427,19 @@ impl Binder<'_> {
         column: usize,
         unit: Unit,
     ) -> NumberBinding {
-        let (_, range) = declared.of_joint(is_prismatic);
-        let (is_direction, name) = (declared.setting == "direction", self.name(column));
-        let (optional, divisor, zero, sign, difference, is_clock) =
-            (false, 1.0, 0.0, 1.0, None, false);
         NumberBinding {
             index,
             column,
             unit,
-            range,
-            is_direction,
-            optional,
-            divisor,
-            zero,
-            sign,
-            name,
-            difference,
-            is_clock,
+            range: declared.of_joint(is_prismatic).1,
+            is_direction: declared.setting == "direction",
+            optional: false,
+            divisor: 1.0,
+            zero: 0.0,
+            sign: 1.0,
+            name: self.name(column),
+            difference: None,
+            is_clock: false,
         }
     }
     fn joints(

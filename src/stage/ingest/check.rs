@@ -1,475 +1,428 @@
 //! Faults of the settings that types cannot express, each with its place below `with`.
 
-use super::axes::{self, needed};
+use super::Ingest;
 use super::clock::CLOCK;
 use super::columns::Columns;
 use super::later;
-use super::layout::{Duplicates, FileLayout, Join};
+use super::layout::{Duplicates, FileLayout, HELD, Join, SIMULATED, WideTargets};
 use super::mapped::{ColumnRef, ConventionColumns, JointColumns, ScalarColumn, TextColumn};
 use super::noise;
-use super::{Ingest, twice};
 use crate::error::{Fault, counted, nearest};
 use crate::observation::{Conventions, DeclaredColumn, KINDS, MeasurementKind, Part};
 use crate::raw::Delimiter;
 use crate::table::recording_columns;
 use crate::units::{Quantity, Unit};
+use std::collections::BTreeMap;
+use std::fmt::Display;
+
+/// A place in the settings, and the faults that were found so far.
+pub(super) struct Place<'f> {
+    faults: &'f mut Vec<Fault>,
+    path: String,
+}
+
+impl<'f> Place<'f> {
+    /// All settings.
+    pub(super) fn root(faults: &'f mut Vec<Fault>) -> Self {
+        let path = String::new();
+        Self { faults, path }
+    }
+    /// A key, or a path of keys, below this place.
+    pub(super) fn at(&mut self, key: impl Display) -> Place<'_> {
+        let path = match self.path.as_str() {
+            "" => key.to_string(),
+            path => format!("{path}.{key}"),
+        };
+        Place {
+            faults: self.faults,
+            path,
+        }
+    }
+    /// An item of the list at this place.
+    fn item(&mut self, index: usize) -> Place<'_> {
+        let path = format!("{}[{index}]", self.path);
+        Place {
+            faults: self.faults,
+            path,
+        }
+    }
+    pub(super) fn fault(&mut self, message: impl Into<String>) {
+        self.faults.push(Fault::new(&self.path, message));
+    }
+}
 
 /// All faults at once.
 pub(super) fn faults(settings: &Ingest) -> Vec<Fault> {
     let mut faults = Vec::new();
+    let at = &mut Place::root(&mut faults);
     if settings.files.is_empty() {
-        faults.push(Fault::new("files", "no file; name at least one"));
+        at.at("files").fault("no file; name at least one");
         return faults;
     }
     if !(settings.max_rejected_fraction > 0.0 && settings.max_rejected_fraction <= 1.0) {
-        faults.push(Fault::new(
-            "max_rejected_fraction",
-            "allowed: above 0 and up to 1",
-        ));
+        at.at("max_rejected_fraction")
+            .fault("allowed: above 0 and up to 1");
     }
-    for (index, file) in settings.files.iter().enumerate() {
-        file_faults(file, &format!("files[{index}]"), &mut faults);
+    for (index, layout) in settings.files.iter().enumerate() {
+        file(layout, &mut at.at("files").item(index));
     }
-    faults.extend(later::faults(settings));
-    axes::faults(settings, &mut faults);
-    together(settings, &mut faults);
-    motion_faults(settings, &mut faults);
+    at.faults.extend(later::faults(settings));
+    axes(settings, at);
+    together(settings, at);
+    motion(settings, at);
     faults.extend(noise::faults(settings));
     faults
 }
 
-pub(super) fn file_faults(file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
+/// Faults of one file's settings.
+pub(super) fn file(file: &FileLayout, at: &mut Place) {
     if Delimiter::parse(&file.delimiter).is_none() {
-        let message = format!(
+        at.at("delimiter").fault(format!(
             "delimiter `{}`; allowed: one ASCII character, `tab` or `whitespace`",
             file.delimiter
-        );
-        faults.push(Fault::new(format!("{place}.delimiter"), message));
+        ));
     }
     if file.comment.as_deref() == Some("") {
-        faults.push(Fault::new(
-            format!("{place}.comment"),
-            "an empty text; every line would be a comment",
-        ));
+        at.at("comment")
+            .fault("an empty text; every line would be a comment");
     }
     if file.header_in_comment && (file.comment.is_none() || !file.header) {
-        let message = match file.header {
+        at.at("header_in_comment").fault(match file.header {
             true => "say how a comment begins, e.g. `comment: \"//\"`",
             false => "there is no header",
-        };
-        faults.push(Fault::new(format!("{place}.header_in_comment"), message));
+        });
     }
     if !file.header && file.skip_below_header > 0 {
-        faults.push(Fault::new(
-            format!("{place}.skip_below_header"),
-            "there is no header; use `skip`",
-        ));
+        at.at("skip_below_header")
+            .fault("there is no header; use `skip`");
     }
-    let columns = &file.columns;
     if let Some(targets) = &file.targets {
-        faults.extend(targets.faults(&columns.names(), file.header, place));
+        wide(targets, file, at);
     }
     if file.names().is_empty() {
-        faults.push(Fault::new(
-            format!("{place}.columns"),
-            "no quantity is mapped",
-        ));
+        at.at("columns").fault("no quantity is mapped");
     }
-    for (declared, text) in columns.texts() {
-        text_faults(
-            declared,
-            text,
-            file,
-            &format!("{place}.columns.{}", declared.setting),
-            faults,
+    mapped(file, &mut at.at("columns"));
+    twice(file, at);
+    let (columns, at) = (&file.columns, &mut at.at("columns"));
+    if columns
+        .number("distance")
+        .is_some_and(|distance| distance.value == Some(0.0))
+    {
+        at.at("distance").fault(
+            "a distance of 0 to an anchor has no direction; a ball that lies in a socket is `socket: {column: ...}` with \
+             `sigma_socket`",
         );
     }
-    for (declared, counted) in columns.counts() {
-        column(
-            Some(&counted.column),
-            file,
-            &format!("{place}.columns.{}", declared.setting),
-            faults,
-        );
-    }
-    for (declared, scalar) in columns.numbers() {
-        scalar_faults(
-            scalar,
-            declared.quantity,
-            file,
-            &format!("{place}.columns.{}", declared.setting),
-            faults,
-        );
-    }
-    for (declared, mapped, _, coverage) in columns.uncertainties() {
-        let place = format!("{place}.columns.{}", declared.setting);
-        one_of(
-            mapped.column.is_some(),
-            mapped.value.is_some(),
-            "`column` or `value`",
-            &place,
-            faults,
-        );
-        column(mapped.column.as_ref(), file, &place, faults);
-        unit(
-            mapped.unit.as_deref(),
-            declared.quantity,
-            &format!("{place}.unit"),
-            faults,
-        );
-        if !(coverage > 0.0 && coverage.is_finite()) {
-            faults.push(Fault::new(
-                format!("{place}.coverage_factor"),
-                "allowed: above 0, e.g. 2 for 95 %",
-            ));
-        }
-        if mapped
-            .value
-            .is_some_and(|value| !(value > 0.0 && value.is_finite()))
-        {
-            faults.push(Fault::new(format!("{place}.value"), "allowed: above 0"));
-        }
-    }
-    for (declared, mapped) in columns.joints() {
-        joint_faults(
-            declared,
-            mapped,
-            file,
-            &format!("{place}.columns.{}", declared.setting),
-            faults,
-        );
-    }
-    for (declared, conventions, mapped) in columns.conventions() {
-        let place = format!("{place}.columns.{}", declared.setting);
-        convention_faults(declared, conventions, mapped, file, &place, faults);
-    }
-    twice::faults(file, place, faults);
-    no_distance(columns, &format!("{place}.columns"), faults);
     for kind in KINDS {
-        kind_faults(*kind, columns, &format!("{place}.columns"), faults);
+        measured(*kind, columns, at);
     }
     // Each group at its first column.
     for group in
         recording_columns().filter(|column| column.together.first() == Some(&column.setting))
     {
-        let mapped = group
-            .together
-            .iter()
-            .filter(|setting| columns.has(setting))
-            .count();
-        if mapped > 0 && mapped < group.together.len() {
-            let message = format!("map all of {}, or none", group.together.join(", "));
-            faults.push(Fault::new(format!("{place}.columns"), message));
+        let all = group.together;
+        let mapped = all.iter().filter(|setting| columns.has(setting)).count();
+        if mapped > 0 && mapped < all.len() {
+            at.fault(format!("map all of {}, or none", all.join(", ")));
         }
     }
 }
-
-fn text_faults(
-    declared: &DeclaredColumn,
-    text: &TextColumn,
-    file: &FileLayout,
-    place: &str,
-    faults: &mut Vec<Fault>,
-) {
-    if text.path.is_some() {
-        faults.push(Fault::new(
-            format!("{place}.path"),
-            "is filled in where a pipeline's file is read; here say `value`",
-        ));
-    } else {
-        one_of(
-            text.column.is_some(),
-            text.value.is_some(),
-            "`column`, `value` or `path`",
-            place,
-            faults,
+/// Each mapped quantity by itself.
+fn mapped(file: &FileLayout, at: &mut Place) {
+    let columns = &file.columns;
+    for (declared, mapped) in columns.texts() {
+        text(declared, mapped, file, &mut at.at(declared.setting));
+    }
+    for (declared, counted) in columns.counts() {
+        column(Some(&counted.column), file, &mut at.at(declared.setting));
+    }
+    for (declared, mapped) in columns.numbers() {
+        scalar(
+            mapped,
+            declared.quantity,
+            file,
+            &mut at.at(declared.setting),
         );
     }
-    if declared.setting == "point_id" && text.value.is_some() {
-        faults.push(Fault::new(
-            format!("{place}.value"),
-            "points cannot all have the same id; name a `column`",
+    for (declared, mapped, _, coverage) in columns.uncertainties() {
+        let at = &mut at.at(declared.setting);
+        let given = [mapped.column.is_some(), mapped.value.is_some()];
+        one_of(given, "`column` or `value`", at);
+        column(mapped.column.as_ref(), file, at);
+        unit(
+            mapped.unit.as_deref(),
+            declared.quantity,
+            &mut at.at("unit"),
+        );
+        if !(coverage > 0.0 && coverage.is_finite()) {
+            at.at("coverage_factor")
+                .fault("allowed: above 0, e.g. 2 for 95 %");
+        }
+        let is_allowed = |value: f64| value > 0.0 && value.is_finite();
+        if !mapped.value.is_none_or(is_allowed) {
+            at.at("value").fault("allowed: above 0");
+        }
+    }
+    for (declared, mapped) in columns.joints() {
+        joints(declared, mapped, file, &mut at.at(declared.setting));
+    }
+    for (declared, all, mapped) in columns.conventions() {
+        conventions(declared, all, mapped, file, &mut at.at(declared.setting));
+    }
+}
+
+/// Columns of several targets in a row.
+fn wide(targets: &WideTargets, file: &FileLayout, at: &mut Place) {
+    let others = file.columns.names();
+    for name in others.iter().filter(|name| HELD.contains(name)) {
+        at.at("columns")
+            .at(name)
+            .fault("also in `targets`; map it in one of them");
+    }
+    for name in others.iter().filter(|name| SIMULATED.contains(name)) {
+        at.at("columns")
+            .at(name)
+            .fault("one simulated point and several targets; put each target in a separate file");
+    }
+    let at = &mut at.at("targets");
+    if targets.columns.len() < 2 {
+        at.at("columns")
+            .fault("expected two targets or more; one is mapped as x, y and z");
+    }
+    for (target, references) in &targets.columns {
+        let mut columns = at.at("columns");
+        let at = &mut columns.at(target);
+        if target.trim().is_empty() {
+            at.fault("a target without a name");
+        }
+        for reference in references {
+            match reference {
+                ColumnRef::Number(0) => at.fault("columns count from 1"),
+                ColumnRef::Name(name) if !file.header => at.fault(format!(
+                    "there is no header with `{name}` in it; give numbers from 1"
+                )),
+                _ => {}
+            }
+        }
+    }
+    if Unit::parse(&targets.unit).is_none_or(|unit| unit.quantity() != Quantity::Length) {
+        let allowed = Unit::symbols(Quantity::Length).join(", ");
+        at.at("unit").fault(format!(
+            "`{}` is no unit of length; allowed: {allowed}",
+            targets.unit
         ));
+    }
+}
+
+fn text(declared: &DeclaredColumn, text: &TextColumn, file: &FileLayout, at: &mut Place) {
+    if text.path.is_some() {
+        at.at("path")
+            .fault("is filled in where a pipeline's file is read; here say `value`");
+    } else {
+        let given = [text.column.is_some(), text.value.is_some()];
+        one_of(given, "`column`, `value` or `path`", at);
+    }
+    let is_id = declared.setting == "point_id";
+    if is_id && text.value.is_some() {
+        at.at("value")
+            .fault("points cannot all have the same id; name a `column`");
     }
     for (key, given) in [
         ("match", text.matching.is_some()),
         ("strip", text.strip.is_some()),
     ] {
-        if given && declared.setting != "point_id" {
-            faults.push(Fault::new(
-                format!("{place}.{key}"),
-                "a rule for names of points; allowed for `point_id` alone",
-            ));
+        if given && !is_id {
+            at.at(key)
+                .fault("a rule for names of points; allowed for `point_id` alone");
         }
     }
-    column(text.column.as_ref(), file, place, faults);
-}
-
-/// A distance of nought has no direction.
-fn no_distance(columns: &Columns, place: &str, faults: &mut Vec<Fault>) {
-    if columns
-        .number("distance")
-        .is_some_and(|distance| distance.value == Some(0.0))
-    {
-        let message = "a distance of 0 to an anchor has no direction; a ball that lies in a socket is `socket: {column: ...}` with \
-                       `sigma_socket`";
-        faults.push(Fault::new(format!("{place}.distance"), message));
-    }
+    column(text.column.as_ref(), file, at);
 }
 
 /// What was measured comes with its standard deviation, and names of what it was measured from with it.
-fn kind_faults(
-    kind: &dyn MeasurementKind,
-    columns: &Columns,
-    place: &str,
-    faults: &mut Vec<Fault>,
-) {
+fn measured(kind: &dyn MeasurementKind, columns: &Columns, at: &mut Place) {
     let settings = |part: Part| kind.columns(part).map(|column| column.setting);
     let mapped = |part: Part| settings(part).any(|setting| columns.has(setting));
     let values: Vec<&str> = kind.telling().map(|column| column.setting).collect();
-    let told = values.iter().any(|setting| columns.has(setting));
+    let has_value = values.iter().any(|setting| columns.has(setting));
     let values = values.join("`, `");
-    if kind.about().own_sigma && told != mapped(Part::Sigma) {
+    if kind.about().own_sigma && has_value != mapped(Part::Sigma) {
         for sigma in settings(Part::Sigma) {
-            let message = format!(
+            at.fault(format!(
                 "map `{values}` and `{sigma}` together: a reading is weighted by its noise, e.g. {sigma}: {{value: 0.02, unit: ...}}"
-            );
-            faults.push(Fault::new(place, message));
+            ));
         }
     }
-    for anchor in settings(Part::Anchor).filter(|setting| columns.has(setting) && !told) {
-        let message = format!("an {anchor} is the end of a `{values}`; map that too");
-        faults.push(Fault::new(format!("{place}.{anchor}"), message));
+    for anchor in settings(Part::Anchor).filter(|setting| columns.has(setting) && !has_value) {
+        at.at(anchor).fault(format!(
+            "an {anchor} is the end of a `{values}`; map that too"
+        ));
     }
 }
 
-fn convention_faults(
+fn conventions(
     declared: &DeclaredColumn,
     conventions: &'static Conventions,
     mapped: &ConventionColumns,
     file: &FileLayout,
-    place: &str,
-    faults: &mut Vec<Fault>,
+    at: &mut Place,
 ) {
     let Some((convention, references)) = mapped.chosen(conventions) else {
-        faults.push(Fault::new(place, conventions.allowed));
-        return;
+        return at.fault(conventions.allowed);
     };
     if references.len() != convention.numbers {
-        faults.push(Fault::new(
-            place,
-            format!(
-                "{}; allowed: {}",
-                counted(references.len(), "column"),
-                convention.numbers
-            ),
+        at.fault(format!(
+            "{}; allowed: {}",
+            counted(references.len(), "column"),
+            convention.numbers
         ));
     }
     for reference in references {
-        column(Some(reference), file, place, faults);
+        column(Some(reference), file, at);
     }
+    let given = mapped.unit.as_deref();
     if !convention.unitless {
-        unit(
-            mapped.unit.as_deref(),
-            declared.quantity,
-            &format!("{place}.unit"),
-            faults,
-        );
-    } else if mapped.unit.is_some() {
-        faults.push(Fault::new(
-            format!("{place}.unit"),
-            format!("a {} has no unit", convention.name),
-        ));
+        unit(given, declared.quantity, &mut at.at("unit"));
+    } else if given.is_some() {
+        at.at("unit")
+            .fault(format!("a {} has no unit", convention.name));
     }
 }
 
-fn scalar_faults(
-    scalar: &ScalarColumn,
-    quantity: Quantity,
-    file: &FileLayout,
-    place: &str,
-    faults: &mut Vec<Fault>,
-) {
-    one_of(
-        scalar.column.is_some(),
-        scalar.value.is_some(),
-        "`column` or `value`",
-        place,
-        faults,
-    );
-    column(scalar.column.as_ref(), file, place, faults);
-    let is_clock = quantity == Quantity::Time
-        && scalar.column.is_some()
-        && scalar.unit.as_deref() == Some(CLOCK);
+fn scalar(scalar: &ScalarColumn, quantity: Quantity, file: &FileLayout, at: &mut Place) {
+    let given = [scalar.column.is_some(), scalar.value.is_some()];
+    one_of(given, "`column` or `value`", at);
+    column(scalar.column.as_ref(), file, at);
+    let symbol = scalar.unit.as_deref();
+    let is_clock = quantity == Quantity::Time && scalar.column.is_some() && symbol == Some(CLOCK);
     if !is_clock {
-        unit(
-            scalar.unit.as_deref(),
-            quantity,
-            &format!("{place}.unit"),
-            faults,
-        );
+        unit(symbol, quantity, &mut at.at("unit"));
     }
     if scalar.value.is_some_and(|value| !value.is_finite()) {
-        faults.push(Fault::new(format!("{place}.value"), "not a finite number"));
+        at.at("value").fault("not a finite number");
     }
-    difference_faults(scalar, quantity, file, place, faults);
-}
-
-fn difference_faults(
-    scalar: &ScalarColumn,
-    quantity: Quantity,
-    file: &FileLayout,
-    place: &str,
-    faults: &mut Vec<Fault>,
-) {
     let Some((other, sign)) = scalar.difference() else {
         if scalar.difference_unit.is_some() {
-            faults.push(Fault::new(
-                format!("{place}.difference_unit"),
-                "there is no `minus` or `plus`",
-            ));
+            at.at("difference_unit")
+                .fault("there is no `minus` or `plus`");
         }
         return;
     };
     let name = if sign < 0.0 { "minus" } else { "plus" };
     if quantity != Quantity::Length {
-        faults.push(Fault::new(
-            place,
-            "`minus` and `plus` are for lengths, e.g. x, y, z",
-        ));
-        return;
+        return at.fault("`minus` and `plus` are for lengths, e.g. x, y, z");
     }
     if scalar.minus.is_some() && scalar.plus.is_some() {
-        faults.push(Fault::new(
-            place,
-            "`minus` and `plus` at once; say one of them",
-        ));
+        at.fault("`minus` and `plus` at once; say one of them");
     }
     if scalar.column.is_none() {
-        faults.push(Fault::new(
-            place,
-            format!("`{name}` needs `column`: the target that the difference is taken from"),
+        at.fault(format!(
+            "`{name}` needs `column`: the target that the difference is taken from"
         ));
     }
-    column(Some(other), file, &format!("{place}.{name}"), faults);
+    column(Some(other), file, &mut at.at(name));
     if let Some(symbol) = &scalar.difference_unit {
-        unit(
-            Some(symbol),
-            quantity,
-            &format!("{place}.difference_unit"),
-            faults,
-        );
+        unit(Some(symbol), quantity, &mut at.at("difference_unit"));
     }
 }
 
-fn joint_faults(
-    declared: &DeclaredColumn,
-    joints: &JointColumns,
-    file: &FileLayout,
-    place: &str,
-    faults: &mut Vec<Fault>,
-) {
+fn joints(declared: &DeclaredColumn, joints: &JointColumns, file: &FileLayout, at: &mut Place) {
     let quantity = declared.quantity;
+    let given = [joints.column.is_some(), joints.columns.is_some()];
     one_of(
-        joints.column.is_some(),
-        joints.columns.is_some(),
+        given,
         "`column` (a pattern with {j}) or `columns` (a list)",
-        place,
-        faults,
+        at,
     );
     match &joints.column {
         Some(pattern) if !["{j}", "{name}"].iter().any(|mark| pattern.contains(mark)) => {
-            let message = format!(
+            at.at("column").fault(format!(
                 "`{pattern}` has neither {{j}} for the joint's number nor {{name}}; e.g. `q{{j}}_deg`, or list them in `columns`"
-            );
-            faults.push(Fault::new(format!("{place}.column"), message));
-        }
-        Some(_) if !file.header => {
-            faults.push(Fault::new(
-                format!("{place}.column"),
-                "there is no header with names; list numbers in `columns`",
             ));
         }
+        Some(_) if !file.header => at
+            .at("column")
+            .fault("there is no header with names; list numbers in `columns`"),
         _ => {}
     }
     for (index, entry) in joints.columns.iter().flatten().enumerate() {
-        column(
-            Some(entry),
-            file,
-            &format!("{place}.columns[{index}]"),
-            faults,
-        );
+        column(Some(entry), file, &mut at.at("columns").item(index));
     }
-    faults.extend(joints.counting_faults(declared.setting == "q", place));
+    counting(joints, declared.setting == "q", at);
     if quantity == Quantity::Angle && joints.optional {
-        faults.push(Fault::new(
-            format!("{place}.optional"),
-            "no recording without joint positions",
-        ));
+        at.at("optional")
+            .fault("no recording without joint positions");
     }
+    let [turning, sliding] = [joints.unit.as_deref(), joints.linear_unit.as_deref()];
     let linear = declared.of_joint(true).0;
     if linear != quantity {
-        if joints.unit.is_some() || joints.linear_unit.is_none() {
-            unit(
-                joints.unit.as_deref(),
-                quantity,
-                &format!("{place}.unit"),
-                faults,
-            );
+        if turning.is_some() || sliding.is_none() {
+            unit(turning, quantity, &mut at.at("unit"));
         }
-        if joints.linear_unit.is_some() {
-            unit(
-                joints.linear_unit.as_deref(),
-                linear,
-                &format!("{place}.linear_unit"),
-                faults,
-            );
+        if sliding.is_some() {
+            unit(sliding, linear, &mut at.at("linear_unit"));
         }
         return;
     }
-    match quantity {
-        Quantity::Number if joints.unit.is_some() => {
-            faults.push(Fault::new(
-                format!("{place}.unit"),
-                "a direction (1, -1, 0) has no unit",
-            ));
-        }
-        Quantity::Number => (),
-        other => unit(
-            joints.unit.as_deref(),
-            other,
-            &format!("{place}.unit"),
-            faults,
-        ),
+    if quantity != Quantity::Number {
+        unit(turning, quantity, &mut at.at("unit"));
+    } else if turning.is_some() {
+        at.at("unit").fault("a direction (1, -1, 0) has no unit");
     }
-    if joints.linear_unit.is_some() {
-        faults.push(Fault::new(
-            format!("{place}.linear_unit"),
-            "for the positions and velocities of prismatic joints only",
-        ));
+    if sliding.is_some() {
+        at.at("linear_unit")
+            .fault("for the positions and velocities of prismatic joints only");
     }
 }
 
-fn one_of(first: bool, second: bool, names: &str, place: &str, faults: &mut Vec<Fault>) {
+/// How the file is said to count its joints.
+fn counting(joints: &JointColumns, are_positions: bool, at: &mut Place) {
+    for (index, sign) in joints.sign.iter().enumerate() {
+        if sign.abs() != 1.0 {
+            at.at("sign").item(index).fault("allowed: 1 and -1");
+        }
+    }
+    for (index, zero) in joints.zero.iter().enumerate() {
+        if !zero.is_finite() {
+            at.at("zero").item(index).fault("not a finite number");
+        }
+    }
+    for (index, one) in joints.coupled.iter().enumerate() {
+        let mut list = at.at("coupled");
+        let mut at = list.item(index);
+        if one.joint == 0 || one.by == 0 {
+            at.fault("joints count from 1");
+        } else if one.joint == one.by {
+            at.fault("a joint cannot hold itself; expected two different joints");
+        }
+        if !one.ratio.is_finite() {
+            at.at("ratio").fault("not a finite number, e.g. 1 or -1");
+        }
+    }
+    let is_plain = joints.zero.is_empty() && joints.coupled.is_empty();
+    if !are_positions && !is_plain {
+        at.fault("`zero` and `coupled` are for positions; say them at `q`");
+    }
+}
+
+fn one_of([first, second]: [bool; 2], names: &str, at: &mut Place) {
     if first == second {
-        faults.push(Fault::new(place, format!("say {names}, one of them")));
+        at.fault(format!("say {names}, one of them"));
     }
 }
 
-fn column(column: Option<&ColumnRef>, file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
+fn column(column: Option<&ColumnRef>, file: &FileLayout, at: &mut Place) {
     match column {
-        Some(ColumnRef::Number(0)) => faults.push(Fault::new(place, "columns count from 1")),
-        Some(ColumnRef::Name(name)) if !file.header => {
-            faults.push(Fault::new(
-                place,
-                format!("there is no header with `{name}` in it; give the column's number from 1"),
-            ));
-        }
+        Some(ColumnRef::Number(0)) => at.fault("columns count from 1"),
+        Some(ColumnRef::Name(name)) if !file.header => at.fault(format!(
+            "there is no header with `{name}` in it; give the column's number from 1"
+        )),
         _ => {}
     }
 }
 
-fn unit(symbol: Option<&str>, quantity: Quantity, place: &str, faults: &mut Vec<Fault>) {
+fn unit(symbol: Option<&str>, quantity: Quantity, at: &mut Place) {
     let allowed = Unit::symbols(quantity);
     let clock = if quantity == Quantity::Time {
         ", or clock for times such as 08:15:03 and 2026-11-22T08:15:03"
@@ -479,156 +432,303 @@ fn unit(symbol: Option<&str>, quantity: Quantity, place: &str, faults: &mut Vec<
     let list = allowed.join(", ") + clock;
     match symbol {
         None if quantity == Quantity::Number => {}
-        None => faults.push(Fault::new(place, format!("no unit; allowed: {list}"))),
+        None => at.fault(format!("no unit; allowed: {list}")),
         Some(symbol) => match Unit::parse(symbol) {
             Some(unit) if unit.quantity() == quantity => {}
-            Some(_) => faults.push(Fault::new(
-                place,
-                format!("`{symbol}` is the unit of another quantity; allowed: {list}"),
+            Some(_) => at.fault(format!(
+                "`{symbol}` is the unit of another quantity; allowed: {list}"
             )),
             None => {
                 let hint = nearest(symbol, allowed)
                     .map(|name| format!("; did you mean `{name}`?"))
                     .unwrap_or_default();
-                faults.push(Fault::new(
-                    place,
-                    format!("unknown unit `{symbol}`; allowed: {list}{hint}"),
-                ));
+                at.fault(format!("unknown unit `{symbol}`; allowed: {list}{hint}"));
             }
         },
     }
 }
 
+/// A mapped column.
+struct Use {
+    /// As people call it, e.g. `x`.
+    name: String,
+    /// Quantities of one group never share a column; those of two may where one is the sum of two columns, as a target is next to the
+    /// point that is written as its difference from it.
+    group: &'static str,
+    /// Whether the quantity is this column alone.
+    alone: bool,
+}
+
+/// Columns that are mapped to two quantities: joints and what was measured need a column each. Circumstances and uncertainties may share
+/// columns, also with each other.
+fn twice(file: &FileLayout, at: &mut Place) {
+    let mut uses: BTreeMap<String, Vec<Use>> = BTreeMap::new();
+    let mut take = |reference: &ColumnRef, used: Use, at: &mut Place| {
+        // Where names are the same, so are the columns: `A{j}` stands for a name of each joint.
+        let written = match reference {
+            ColumnRef::Number(_) => reference.to_string(),
+            ColumnRef::Name(name) => format!("`{}", name.trim()),
+        };
+        let earlier = uses.entry(written).or_default();
+        if let Some(other) = earlier
+            .iter()
+            .find(|other| other.group == used.group || (other.alone && used.alone))
+        {
+            let both = if other.name == used.name {
+                format!("{} twice", used.name)
+            } else {
+                format!("{} and {}", other.name, used.name)
+            };
+            at.fault(format!(
+                "{reference} is mapped to {both}; allowed: a column for each"
+            ));
+        }
+        earlier.push(used);
+    };
+    let single = |name: String, group: &'static str| Use {
+        name,
+        group,
+        alone: true,
+    };
+    let columns = &file.columns;
+    for (declared, joints) in columns
+        .joints()
+        .filter(|(declared, _)| declared.quantity != Quantity::Number)
+    {
+        let setting = declared.setting;
+        let mut list = at.at("columns");
+        let at = &mut list.at(setting);
+        if let Some(pattern) = &joints.column {
+            let reference = ColumnRef::Name(pattern.clone());
+            let used = single(format!("`{setting}`"), setting);
+            take(&reference, used, &mut at.at("column"));
+        }
+        for (k, reference) in joints.columns.iter().flatten().enumerate() {
+            let used = single(format!("joint {} of `{setting}`", k + 1), setting);
+            take(reference, used, &mut at.at("columns").item(k));
+        }
+    }
+    let measured = |setting: &str| {
+        let has = |kind: &&&dyn MeasurementKind| {
+            kind.columns(Part::Value)
+                .any(|column| column.setting == setting)
+        };
+        KINDS.iter().find(has).map(|kind| kind.about().name)
+    };
+    for (declared, scalar) in columns.numbers() {
+        let setting = declared.setting;
+        // A point next to `targets` is a fault of its kind.
+        let is_wide = file.targets.is_some() && HELD.contains(&setting);
+        let simulated = SIMULATED.contains(&setting).then_some("simulated");
+        let Some(group) = measured(setting).or(simulated).filter(|_| !is_wide) else {
+            continue;
+        };
+        let key = if scalar.minus.is_some() {
+            "minus"
+        } else {
+            "plus"
+        };
+        let difference = scalar.difference().map(|(reference, _)| reference);
+        for (key, reference) in [("column", scalar.column.as_ref()), (key, difference)] {
+            let Some(reference) = reference else { continue };
+            let used = Use {
+                alone: difference.is_none(),
+                ..single(format!("`{setting}`"), group)
+            };
+            take(reference, used, &mut at.at("columns").at(setting).at(key));
+        }
+    }
+    for (declared, conventions, mapped) in columns.conventions() {
+        let setting = declared.setting;
+        let chosen = mapped.chosen(conventions);
+        if let (Some(group), Some((convention, references))) = (measured(setting), chosen) {
+            for (k, reference) in references.iter().enumerate() {
+                let used = single(format!("`{setting}`"), group);
+                let mut list = at.at("columns");
+                let mut at = list.at(setting);
+                take(reference, used, &mut at.at(convention.name).item(k));
+            }
+        }
+    }
+    for (target, references) in file.targets.iter().flat_map(|targets| &targets.columns) {
+        for (k, reference) in references.iter().enumerate() {
+            let used = single(format!("target `{target}`"), "targets");
+            let mut at = at.at("targets.columns");
+            take(reference, used, &mut at.at(target).item(k));
+        }
+    }
+}
+
+/// What a recording cannot be without: joints, and points unless another kind of measurement is mapped.
+fn needed(settings: &Ingest) -> Vec<&'static str> {
+    let [first, others @ ..] = KINDS else {
+        return Vec::new();
+    };
+    let is_mapped = |kind: &&dyn MeasurementKind, columns: &Columns| {
+        kind.telling().any(|column| columns.has(column.setting))
+    };
+    let other = |file: &FileLayout| others.iter().any(|kind| is_mapped(kind, &file.columns));
+    let axes = match &settings.axes {
+        Some(axes) => axes.iter().map(|axis| axis.name()).collect(),
+        None if settings.files.iter().any(other) => Vec::new(),
+        None => first
+            .columns(Part::Value)
+            .map(|column| column.setting)
+            .collect(),
+    };
+    std::iter::once("q").chain(axes).collect()
+}
+
+/// The axes that were measured, and columns of others.
+fn axes(settings: &Ingest, at: &mut Place) {
+    let Some(axes) = &settings.axes else { return };
+    if axes.is_empty() {
+        return at
+            .at("axes")
+            .fault("no axis; name those that were measured, e.g. [z], or leave `axes` out");
+    }
+    for (k, axis) in axes.iter().enumerate() {
+        if axes[..k].contains(axis) {
+            at.at("axes")
+                .item(k)
+                .fault(format!("`{}` is named twice", axis.name()));
+        }
+    }
+    let names: Vec<&str> = axes.iter().map(|axis| axis.name()).collect();
+    let all = KINDS[..1].iter().flat_map(|kind| kind.columns(Part::Value));
+    let left: Vec<&str> = all
+        .map(|column| column.setting)
+        .filter(|name| !names.contains(name))
+        .collect();
+    for (index, file) in settings.files.iter().enumerate() {
+        let mut files = at.at("files");
+        let at = &mut files.item(index);
+        for name in left.iter().filter(|name| file.columns.has(name)) {
+            at.at("columns").at(name).fault(format!(
+                "`axes: [{}]` says that {name} was not measured; take `{name}` out of `columns`, or add it to `axes`",
+                names.join(", ")
+            ));
+        }
+        if file.targets.is_some() && !left.is_empty() {
+            at.at("targets")
+                .fault("the points of targets have all axes; leave `axes` out");
+        }
+    }
+}
+
 /// Faults of the files taken together.
-fn together(settings: &Ingest, faults: &mut Vec<Fault>) {
+fn together(settings: &Ingest, at: &mut Place) {
     let files = &settings.files;
     let needed = needed(settings);
     let Some(join) = &settings.join else {
         if files.len() > 1 {
-            let message = "several files; say how they belong together: {by: id}, {by: time, tolerance_s: 0.5}, {by: order} or {by: append}";
-            faults.push(Fault::new("join", message));
+            at.at("join").fault(
+                "several files; say how they belong together: {by: id}, {by: time, tolerance_s: 0.5}, {by: order} or {by: append}",
+            );
         } else {
-            complete(files, &needed, "files[0].columns", faults);
+            complete(files, &needed, &mut at.at("files[0].columns"));
         }
         return;
     };
     if let Join::Append {} = join {
         for (index, file) in files.iter().enumerate() {
-            complete(
-                std::slice::from_ref(file),
-                &needed,
-                &format!("files[{index}].columns"),
-                faults,
-            );
+            let mut list = at.at("files");
+            let mut at = list.item(index);
+            complete(std::slice::from_ref(file), &needed, &mut at.at("columns"));
         }
         return;
     }
     if files.len() < 2 {
-        faults.push(Fault::new(
-            "join",
-            format!("joins two files or more, not {}", files.len()),
-        ));
-        return;
+        let message = format!("joins two files or more, not {}", files.len());
+        return at.at("join").fault(message);
     }
-    complete(files, &needed, "files", faults);
+    complete(files, &needed, &mut at.at("files"));
     let key = match join {
         Join::Id {} => Some("point_id"),
         Join::Time { .. } => Some("time"),
         _ => None,
     };
     for (index, file) in files.iter().enumerate().skip(1) {
+        let at = &mut at.at(format!("files[{index}].columns"));
         for name in file.names() {
             if files[..index].iter().any(|other| other.has(name)) && Some(name) != key {
-                faults.push(Fault::new(
-                    format!("files[{index}].columns.{name}"),
-                    "mapped in two files; map it in one",
-                ));
+                at.at(name).fault("mapped in two files; map it in one");
             }
         }
         if file.columns.has("sequence") {
-            let message = "rows keep the order of the first file; map it there";
-            faults.push(Fault::new(
-                format!("files[{index}].columns.sequence"),
-                message,
-            ));
+            at.at("sequence")
+                .fault("rows keep the order of the first file; map it there");
         }
     }
     for (index, file) in files.iter().enumerate() {
         let Some(key) = key else { continue };
-        let place = format!("files[{index}].columns.{key}");
-        if !file.columns.names().contains(&key) {
-            faults.push(Fault::new(
-                place,
-                format!("not mapped; the files are joined by {key}"),
-            ));
-        } else if optional_key(file, key) {
-            faults.push(Fault::new(
-                place,
-                "the files are joined by it: a column that is not optional",
-            ));
+        let mut at = at.at(format!("files[{index}].columns.{key}"));
+        if !file.columns.has(key) {
+            at.fault(format!("not mapped; the files are joined by {key}"));
+        } else if is_optional(file, key) {
+            at.fault("the files are joined by it: a column that is not optional");
         }
     }
     match join {
-        Join::Id {} if settings.duplicates == Duplicates::Keep => {
-            faults.push(Fault::new(
-                "duplicates",
-                "`keep` cannot be combined with a join by id; allowed: reject, first, last",
-            ));
-        }
+        Join::Id {} if settings.duplicates == Duplicates::Keep => at
+            .at("duplicates")
+            .fault("`keep` cannot be combined with a join by id; allowed: reject, first, last"),
         Join::Time {
             tolerance_s,
             offset_s,
         } => {
             if !(tolerance_s.is_finite() && *tolerance_s >= 0.0) {
-                faults.push(Fault::new("join.tolerance_s", "allowed: 0 and above"));
+                at.at("join.tolerance_s").fault("allowed: 0 and above");
             }
             if !offset_s.is_finite() {
-                faults.push(Fault::new("join.offset_s", "not a finite number"));
+                at.at("join.offset_s").fault("not a finite number");
             }
         }
         _ => {}
     }
 }
 
-fn optional_key(file: &FileLayout, key: &str) -> bool {
-    let id = file.columns.text("point_id").is_some_and(|id| id.optional);
-    let time = file
-        .columns
-        .number("time")
-        .is_some_and(|time| time.optional || time.column.is_none());
-    if key == "time" { time } else { id }
-}
-
-/// Velocities by the joints over time need both in one file.
-fn motion_faults(settings: &Ingest, faults: &mut Vec<Fault>) {
-    let Some(motion) = &settings.motion else {
-        return;
-    };
-    faults.extend(motion.faults());
-    let columns = || settings.files.iter().map(|file| &file.columns);
-    let given = columns().any(|columns| columns.has("velocity"));
-    let timed = |columns: &Columns| {
-        columns
-            .number("time")
-            .is_some_and(|time| time.column.is_some())
-    };
-    if !given && columns().any(|columns| columns.has("q") && !timed(columns)) {
-        let message = "joint velocities follow from the joints over time: map `time` in the file that has `q`, or map `velocity`";
-        faults.push(Fault::new("motion", message));
+fn is_optional(file: &FileLayout, key: &str) -> bool {
+    let (id, time) = (file.columns.text("point_id"), file.columns.number("time"));
+    if key == "time" {
+        time.is_some_and(|time| time.optional || time.column.is_none())
+    } else {
+        id.is_some_and(|id| id.optional)
     }
 }
 
-fn complete(files: &[FileLayout], needed: &[&str], place: &str, faults: &mut Vec<Fault>) {
-    let mapped: Vec<&str> = files.iter().flat_map(FileLayout::names).collect();
-    let missing: Vec<&str> = needed
-        .iter()
-        .copied()
-        .filter(|name| !mapped.contains(name))
-        .collect();
+/// Velocities by the joints over time need both in one file.
+fn motion(settings: &Ingest, at: &mut Place) {
+    let Some(motion) = &settings.motion else {
+        return;
+    };
+    if !motion.gap_s.is_none_or(|gap| gap > 0.0 && gap.is_finite()) {
+        at.at("motion.gap_s").fault("allowed: above 0, e.g. 0.1");
+    }
+    if !(motion.over_s >= 0.0 && motion.over_s.is_finite()) {
+        at.at("motion.over_s")
+            .fault("allowed: 0 and above, e.g. 0.02");
+    }
+    if !motion.later_s.is_finite() {
+        at.at("motion.later_s").fault("not a finite number");
+    }
+    let columns = || settings.files.iter().map(|file| &file.columns);
+    let given = columns().any(|columns| columns.has("velocity"));
+    let timed = |columns: &Columns| {
+        let time = columns.number("time");
+        time.is_some_and(|time| time.column.is_some())
+    };
+    if !given && columns().any(|columns| columns.has("q") && !timed(columns)) {
+        at.at("motion").fault(
+            "joint velocities follow from the joints over time: map `time` in the file that has `q`, or map `velocity`",
+        );
+    }
+}
+
+fn complete(files: &[FileLayout], needed: &[&str], at: &mut Place) {
+    let is_missing = |name: &&&str| !files.iter().any(|file| file.has(name));
+    let missing: Vec<&str> = needed.iter().filter(is_missing).copied().collect();
     if !missing.is_empty() {
-        faults.push(Fault::new(
-            place,
-            format!("not mapped: {}", missing.join(", ")),
-        ));
+        at.fault(format!("not mapped: {}", missing.join(", ")));
     }
 }

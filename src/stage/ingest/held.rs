@@ -1,11 +1,14 @@
 //! Rows of a file as they were judged, in columns: handed out again to be written, and found by number as partners of other rows.
 //!
-//! A file that takes more memory than it may is read again instead; what partners need of it is held all the same.
+//! Of each row its point id is remembered with a hash of what the row says. A file that takes more memory than it may is read again instead; what partners need of it is held all the same.
 
 use super::bind::Binding;
 use super::reading::OpenedFile;
-use super::recorded::RecordedRow;
 use super::refusal::RowRefusal;
+use super::row::RecordedRow;
+use crate::error::{Error, Result};
+use std::collections::BTreeMap;
+use twox_hash::XxHash3_128;
 
 /// Texts one behind the other.
 #[derive(Default)]
@@ -18,9 +21,6 @@ impl Texts {
     pub(super) fn push(&mut self, text: &[u8]) {
         self.text.extend_from_slice(text);
         self.ends.push(self.text.len());
-    }
-    pub(super) fn len(&self) -> usize {
-        self.ends.len()
     }
     pub(super) fn bytes(&self, at: usize) -> Option<&[u8]> {
         let end = *self.ends.get(at)?;
@@ -66,7 +66,7 @@ struct OwnRows {
     /// As they stand in the file.
     records: Texts,
     /// By index.
-    refused: Vec<(usize, RowRefusal)>,
+    refused: BTreeMap<usize, RowRefusal>,
 }
 
 impl HeldRows {
@@ -106,12 +106,9 @@ impl HeldRows {
             own.sequence.push(row.sequence.unwrap_or(i64::MIN));
         }
         own.records.push(open.text());
-        own.refused.extend(
-            judged
-                .as_ref()
-                .err()
-                .map(|refusal| (own.lines.len() - 1, refusal.clone())),
-        );
+        if let Err(refusal) = judged {
+            own.refused.insert(own.lines.len() - 1, refusal.clone());
+        }
         let texts: usize = self.texts.iter().map(|(_, texts)| texts.size()).sum();
         let refused = own.refused.len() * 128 + own.records.size() + 16 * own.lines.len();
         if 8 * self.values.len() + 24 * self.points.len() + self.ids.size() + texts + refused
@@ -134,7 +131,6 @@ impl HeldRows {
         Some(HeldReading {
             held: self,
             own: self.own.as_ref()?,
-            refused: 0,
             row,
         })
     }
@@ -144,8 +140,6 @@ impl HeldRows {
 pub(super) struct HeldReading<'a> {
     held: &'a HeldRows,
     own: &'a OwnRows,
-    /// Refusals handed out.
-    refused: usize,
     row: RecordedRow,
 }
 
@@ -174,7 +168,7 @@ impl RowSource<'_> {
         }
     }
     /// Goes on to the next row: used or refused; `None` at the end.
-    pub(super) fn next(&mut self) -> crate::error::Result<Option<Result<(), RowRefusal>>> {
+    pub(super) fn next(&mut self) -> Result<Option<Result<(), RowRefusal>>> {
         match self {
             Self::Held(held) => Ok(held.next()),
             Self::File(open) => open.next(),
@@ -209,12 +203,95 @@ impl HeldReading<'_> {
             .get(at)
             .copied()
             .filter(|number| *number != i64::MIN);
-        let refusal = self
-            .own
-            .refused
-            .get(self.refused)
-            .filter(|(index, _)| *index == at);
-        self.refused += usize::from(refusal.is_some());
-        Some(refusal.map_or(Ok(()), |(_, refusal)| Err(refusal.clone())))
+        let refusal = self.own.refused.get(&at).cloned();
+        Some(refusal.map_or(Ok(()), Err))
     }
+}
+
+/// The point ids of the usable rows of a file, in its order.
+#[derive(Default)]
+pub(super) struct FileIds {
+    pub ids: Texts,
+    pub rows: Vec<NamedRow>,
+}
+
+/// A row that has a point id.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct NamedRow {
+    /// Data row in its file, from 1.
+    pub number: u32,
+    pub line: u32,
+    /// Hash of what the row says, but for its place in the recording.
+    pub content: u64,
+}
+
+impl FileIds {
+    /// Adds a usable row, whose content has this hash.
+    pub fn push(&mut self, row: &RecordedRow, content: u64, label: &str) -> Result<()> {
+        self.ids.push(row.id.as_bytes());
+        self.rows.push(NamedRow {
+            number: narrow(row.number, label)?,
+            line: narrow(row.line, label)?,
+            content,
+        });
+        Ok(())
+    }
+    pub fn rows(&self) -> impl Iterator<Item = (&[u8], NamedRow)> {
+        self.rows
+            .iter()
+            .enumerate()
+            .filter_map(|(at, row)| Some((self.ids.bytes(at)?, *row)))
+    }
+}
+
+/// The number of a row, as it is kept of every one.
+pub(super) fn narrow(number: u64, label: &str) -> Result<u32> {
+    u32::try_from(number).map_err(|_| Error::data(label, "more than 4294967295 rows"))
+}
+
+/// Makes hashes of rows; its room is used again.
+#[derive(Default)]
+pub(super) struct RowHasher {
+    bytes: Vec<u8>,
+}
+
+impl RowHasher {
+    /// Hash of the numbers, points and texts of a row; numbers stand in these places.
+    pub(super) fn of(&mut self, row: &RecordedRow, places: &[usize]) -> u64 {
+        self.bytes.clear();
+        // What a row lacks says nothing: a circumstance more that may be declared costs a row nothing.
+        for place in places.iter().filter(|place| !row.values[**place].is_nan()) {
+            self.bytes.extend_from_slice(
+                [*place as u64, row.values[*place].to_bits()]
+                    .map(u64::to_le_bytes)
+                    .as_flattened(),
+            );
+        }
+        for value in row.points.iter().flatten() {
+            self.bytes.extend_from_slice(&value.to_bits().to_le_bytes());
+        }
+        for (place, text) in row
+            .texts
+            .iter()
+            .enumerate()
+            .filter(|(_, text)| !text.is_empty())
+        {
+            self.bytes.extend_from_slice(
+                [place, text.len()]
+                    .map(|number| (number as u64).to_le_bytes())
+                    .as_flattened(),
+            );
+            self.bytes.extend_from_slice(text.as_bytes());
+        }
+        XxHash3_128::oneshot(&self.bytes) as u64
+    }
+}
+
+/// Hash of rows and of one more.
+pub(super) fn behind(before: u64, number: u64, content: u64) -> u64 {
+    XxHash3_128::oneshot(
+        [before, number, content]
+            .map(u64::to_le_bytes)
+            .as_flattened(),
+    ) as u64
 }

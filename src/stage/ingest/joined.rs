@@ -5,8 +5,8 @@ use super::arm::RobotJoints;
 use super::held::HeldRows;
 use super::layout::Join;
 use super::pair::{FileDecision, NONE};
-use super::recorded::RecordedRow;
 use super::refusal::{Reason, RowRefusal};
+use super::row::RecordedRow;
 use super::scan::Scan;
 use crate::observation::{KINDS, Part};
 

@@ -3,11 +3,12 @@
 //! Nothing is guessed: an unmapped column is ignored, a mapped one that is not there is an error unless it is `optional`.
 
 use super::columns::Columns;
-use super::wide::{HELD, WideTargets};
+use super::mapped::ColumnRef;
 use crate::raw::DecimalMark;
 use crate::stage::RawFile;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// One raw file: delimited text, a workbook, a file of columns, or a topic of a recording.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -52,6 +53,23 @@ pub struct FileLayout {
     pub targets: Option<WideTargets>,
     /// Which column holds which quantity.
     pub columns: Columns,
+}
+
+/// What a wide row holds of a recording.
+pub(super) const HELD: [&str; 4] = ["x", "y", "z", "target"];
+
+/// What is of one point alone.
+pub(super) const SIMULATED: [&str; 3] = ["sim_x", "sim_y", "sim_z"];
+
+/// Columns of the points of several targets; a row of the file becomes one of the recording for each target that was seen in it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct WideTargets {
+    /// Unit of the file's numbers, e.g. `mm`.
+    pub unit: String,
+    /// The columns of x, y and z by the target's name, e.g. `{smr1: [X1, Y1, Z1], smr2: [X2, Y2, Z2]}`; blank cells, or a point at 0, 0, 0,
+    /// are a target that was not seen.
+    pub columns: BTreeMap<String, [ColumnRef; 3]>,
 }
 
 impl FileLayout {

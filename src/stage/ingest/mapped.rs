@@ -1,6 +1,5 @@
 //! Where a quantity stands in a file: a column or several of them, or one value for every row.
 
-use crate::error::Fault;
 use schemars::JsonSchema;
 use serde::de::{self, Deserializer, Unexpected, Visitor};
 use serde::{Deserialize, Serialize};
@@ -244,60 +243,6 @@ pub struct ConventionColumns {
     pub unit: Option<String>,
     /// The cells may be blank: the row has none.
     pub optional: bool,
-}
-
-impl JointColumns {
-    /// Faults of how the file is said to count its joints.
-    pub(super) fn counting_faults(&self, are_positions: bool, place: &str) -> Vec<Fault> {
-        let mut faults = Vec::new();
-        for (index, _) in self
-            .sign
-            .iter()
-            .enumerate()
-            .filter(|(_, sign)| sign.abs() != 1.0)
-        {
-            faults.push(Fault::new(
-                format!("{place}.sign[{index}]"),
-                "allowed: 1 and -1",
-            ));
-        }
-        for (index, _) in self
-            .zero
-            .iter()
-            .enumerate()
-            .filter(|(_, zero)| !zero.is_finite())
-        {
-            faults.push(Fault::new(
-                format!("{place}.zero[{index}]"),
-                "not a finite number",
-            ));
-        }
-        for (index, one) in self.coupled.iter().enumerate() {
-            let place = format!("{place}.coupled[{index}]");
-            if one.joint == 0 || one.by == 0 {
-                faults.push(Fault::new(&place, "joints count from 1"));
-            } else if one.joint == one.by {
-                faults.push(Fault::new(
-                    &place,
-                    "a joint cannot hold itself; expected two different joints",
-                ));
-            }
-            if !one.ratio.is_finite() {
-                faults.push(Fault::new(
-                    format!("{place}.ratio"),
-                    "not a finite number, e.g. 1 or -1",
-                ));
-            }
-        }
-        let is_plain = self.zero.is_empty() && self.coupled.is_empty();
-        if !are_positions && !is_plain {
-            faults.push(Fault::new(
-                place,
-                "`zero` and `coupled` are for positions; say them at `q`",
-            ));
-        }
-        faults
-    }
 }
 
 impl ScalarColumn {

@@ -4,7 +4,7 @@
 //! that is worth is seen from the same with neighbours twice as far (Richardson: the difference is three times the error).
 
 use super::arm::RobotJoints;
-use crate::error::{Error, Fault, Result, counted};
+use crate::error::{Error, Result, counted};
 use crate::stage::Context;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -23,28 +23,6 @@ pub struct VelocitySettings {
     /// How much later the points were measured than the joints beside them, s, as `diagnose` says it: joints are carried there.
     #[serde(default)]
     pub later_s: f64,
-}
-
-impl VelocitySettings {
-    pub(super) fn faults(&self) -> Vec<Fault> {
-        let mut faults = Vec::new();
-        if self
-            .gap_s
-            .is_some_and(|gap| !(gap > 0.0 && gap.is_finite()))
-        {
-            faults.push(Fault::new("motion.gap_s", "allowed: above 0, e.g. 0.1"));
-        }
-        if !(self.over_s >= 0.0 && self.over_s.is_finite()) {
-            faults.push(Fault::new(
-                "motion.over_s",
-                "allowed: 0 and above, e.g. 0.02",
-            ));
-        }
-        if !self.later_s.is_finite() {
-            faults.push(Fault::new("motion.later_s", "not a finite number"));
-        }
-        faults
-    }
 }
 
 /// Steps beyond so many usual ones are gaps.

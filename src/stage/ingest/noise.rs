@@ -1,8 +1,8 @@
 //! The noise of the recording: standard deviations as they were recorded, else by the instrument, else a weight to start from.
 
 use super::Ingest;
+use super::arm::Slots;
 use super::layout::Join;
-use super::slots::Slots;
 use crate::error::Fault;
 use crate::observation::Part;
 use crate::robot::{INSTRUMENTS, Instrument, START, SigmaSource};

@@ -1,10 +1,9 @@
 //! Duplicates within a file, and partners across several: every other file is joined to the first.
 
-use super::ids::{FileIds, NamedRow};
+use super::held::{FileIds, NamedRow};
 use super::layout::{Duplicates, Join};
 use super::scan::Scan;
-use std::collections::hash_map::Entry;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 
 /// No partner.
 pub(super) const NONE: u32 = u32::MAX;
@@ -110,45 +109,48 @@ pub(super) fn decide(
     decisions
 }
 
+/// A row with its id, and the index of its file.
+type IdentifiedRow<'i> = (&'i [u8], usize, NamedRow);
+
+/// The rows that are left of a file, by id; of equal ids in the order of the file. Ids that count upwards are in this order already.
+fn by_name<'i>(
+    files: &[(usize, &'i FileIds)],
+    is_left: impl Fn(&NamedRow) -> bool,
+) -> Vec<IdentifiedRow<'i>> {
+    let all = files.iter();
+    let mut rows: Vec<IdentifiedRow> = all
+        .flat_map(|(file, ids)| ids.rows().map(move |(id, row)| (id, *file, row)))
+        .filter(|(.., row)| is_left(row))
+        .collect();
+    rows.sort_by_key(|(id, ..)| (id.len(), *id));
+    rows
+}
+
 /// Leaves one row of each id, or none, of files by their index. Copies of one row are one row: they do not contradict each other.
 fn single(files: &[(usize, &FileIds)], duplicates: Duplicates, decisions: &mut [FileDecision]) {
-    if duplicates == Duplicates::Keep || (files.len() == 1 && !files[0].1.is_mixed) {
+    if duplicates == Duplicates::Keep {
         return;
     }
-    let mut first: HashMap<&[u8], (usize, NamedRow)> = HashMap::new();
-    let mut repeated: HashMap<&[u8], Vec<(usize, NamedRow)>> = HashMap::new();
-    for (file, (id, row)) in files
-        .iter()
-        .flat_map(|(file, ids)| ids.rows().map(move |named| (*file, named)))
-    {
-        match first.entry(id) {
-            Entry::Vacant(entry) => drop(entry.insert((file, row))),
-            Entry::Occupied(entry) => repeated
-                .entry(id)
-                .or_insert_with(|| vec![*entry.get()])
-                .push((file, row)),
-        }
-    }
-    for same in repeated.values() {
-        let [first, .., last] = same.as_slice() else {
+    for same in by_name(files, |_| true).chunk_by(|a, b| a.0 == b.0) {
+        let [(.., first), _, ..] = same else {
             continue;
         };
-        let copies = same.iter().all(|(_, row)| row.content == first.1.content);
+        let copies = same.iter().all(|(.., row)| row.content == first.content);
         let stays = match duplicates {
             Duplicates::Reject if !copies => None,
             Duplicates::Last => Some(same.len() - 1),
             _ => Some(0),
         };
-        for (k, (file, row)) in same.iter().enumerate().filter(|(k, _)| Some(*k) != stays) {
-            let twin = stays.map_or(if k == 0 { last } else { first }, |stays| &same[stays]);
-            let copied = stays.is_some() && twin.1.content == row.content;
+        for (k, (_, file, row)) in same.iter().enumerate().filter(|(k, _)| Some(*k) != stays) {
+            let other = stays.unwrap_or(if k == 0 { same.len() - 1 } else { 0 });
+            let (_, file_of_other, twin) = &same[other];
             if let Some(decision) = decisions.get_mut(*file) {
                 decision.twins.insert(
                     row.number,
                     Twin {
-                        file: twin.0 as u32,
-                        line: twin.1.line,
-                        copied,
+                        file: *file_of_other as u32,
+                        line: twin.line,
+                        copied: stays.is_some() && twin.content == row.content,
                     },
                 );
             }
@@ -158,37 +160,18 @@ fn single(files: &[(usize, &FileIds)], duplicates: Duplicates, decisions: &mut [
 
 /// Pairs of rows with one id; every id once.
 fn by_id(first: (&FileIds, &FileDecision), second: (&FileIds, &FileDecision)) -> Vec<(u32, u32)> {
-    let used = |(ids, decision): (&'_ FileIds, &'_ FileDecision)| -> Vec<(usize, u32)> {
-        let rows = ids.rows.iter().map(|row| row.number).enumerate();
-        rows.filter(|(_, number)| !decision.twins.contains_key(number))
-            .collect()
-    };
-    let (mine, theirs) = (used(first), used(second));
-    let is = |place: usize, id: &[u8]| second.0.ids.bytes(place) == Some(id);
-    let mut known: Option<HashMap<&[u8], usize>> = None;
-    let (mut pairs, mut next) = (Vec::with_capacity(mine.len().min(theirs.len())), 0);
-    for (place, number) in mine {
-        let Some(id) = first.0.ids.bytes(place) else {
-            continue;
-        };
-        // As nearly every pair of files has it, ids stand in one order.
-        let found = Some(next)
-            .filter(|at| theirs.get(*at).is_some_and(|(place, _)| is(*place, id)))
-            .or_else(|| {
-                let ids = || {
-                    theirs
-                        .iter()
-                        .enumerate()
-                        .filter_map(|(at, (place, _))| Some((second.0.ids.bytes(*place)?, at)))
-                };
-                known
-                    .get_or_insert_with(|| ids().collect())
-                    .get(id)
-                    .copied()
-            });
-        if let Some(at) = found {
-            pairs.push((number, theirs[at].1));
-            next = at + 1;
+    let [mine, theirs] = [first, second].map(|(ids, decision)| {
+        by_name(&[(0, ids)], |row| !decision.twins.contains_key(&row.number))
+    });
+    let (mut pairs, mut others) = (Vec::new(), theirs.iter().peekable());
+    for (id, _, row) in &mine {
+        let key = (id.len(), *id);
+        while others
+            .next_if(|(other, ..)| (other.len(), *other) < key)
+            .is_some()
+        {}
+        if let Some((.., partner)) = others.next_if(|(other, ..)| other == id) {
+            pairs.push((row.number, partner.number));
         }
     }
     pairs
@@ -250,7 +233,7 @@ fn nearest(from: &[(f64, u32)], to: &[(f64, u32)]) -> Vec<Option<usize>> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::recorded::RecordedRow;
+    use super::super::row::RecordedRow;
     use super::*;
 
     fn times(times: &[f64]) -> Vec<(f64, u32)> {
@@ -296,10 +279,9 @@ mod tests {
                 .map(|(number, twin)| (*number, twin.line))
                 .collect();
             let pairs = by_id((&ids, &decisions[0]), (&ids, &decisions[0]));
-            (
-                pairs.iter().map(|(number, _)| *number).collect::<Vec<_>>(),
-                twins,
-            )
+            let mut left: Vec<u32> = pairs.iter().map(|(number, _)| *number).collect();
+            left.sort();
+            (left, twins)
         };
         assert_eq!(
             stays(Duplicates::Reject),

@@ -4,102 +4,85 @@ use super::arm::RobotJoints;
 use super::bind::{Binding, FileHeader, bind};
 use super::external::ExternalAxes;
 use super::layout::{Decimal, FileLayout, LimitPolicy};
-use super::listing;
-use super::recorded::RecordedRow;
+use super::listing::ListedRows;
 use super::refusal::RowRefusal;
-use super::row::RowReader;
+use super::row::{RecordedRow, RowReader};
 use crate::error::{Error, Result, counted};
 use crate::program::listing as language;
 use crate::raw::{
-    self, BagRows, ColumnRows, Delimiter, Record, RecordReader, TextLayout, TextRows, Workbook,
-    failed, has_columns, is_bag, is_workbook, not_read,
+    self, BagRows, ColumnRows, Delimiter, InputSource, Record, RecordReader, TextLayout, TextRows,
+    Workbook, failed, has_columns, is_bag, is_workbook, not_read,
 };
 use crate::stage::{Context, OpenedInput};
-use crate::table::RejectedRow;
+use crate::table::{IntakeRow, RejectedRow, Robot};
 use std::io::{BufRead, BufReader, Cursor};
 use std::path::Path;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 /// How many rows pass between two signs of progress.
-const STRIDE: u64 = 4096;
+pub(super) const STRIDE: u64 = 4096;
 /// Bytes that are read at a time; what says of which kind a file is stands among the first of them.
 const BUFFER: usize = 1 << 16;
 
-/// Opens a file of any kind: the first that a file is, text at last.
-fn records(source: OpenedInput, layout: &FileLayout) -> Result<Box<dyn RecordReader>> {
-    let label = &source.label;
-    let mut reader = BufReader::with_capacity(BUFFER, source.reader);
+/// What is said of a table beforehand.
+#[derive(Default)]
+pub struct TableLayout<'l> {
+    /// The sheet, of a workbook.
+    pub sheet: Option<&'l str>,
+    /// The topic, of a recording of ROS 2.
+    pub topic: Option<&'l str>,
+    /// How its rows are written, of text.
+    pub text: TextLayout,
+    /// The decimal mark of its numbers, of text and workbooks.
+    pub decimal: Decimal,
+}
+
+/// Opens a table of any kind: the first that a file is, text at last.
+pub fn records(
+    source: Box<dyn InputSource>,
+    label: &str,
+    layout: TableLayout,
+) -> Result<Box<dyn RecordReader>> {
+    let mut reader = BufReader::with_capacity(BUFFER, source);
     let head = reader.fill_buf().map_err(|error| failed(label, &error))?;
-    let is_book = is_workbook(head);
-    if let Some(sheet) = layout.sheet.as_ref().filter(|_| !is_book) {
-        let message = format!(
+    let (is_book, is_bag) = (is_workbook(head), is_bag(head));
+    let data = |message: String| Error::data(label, message);
+    if let Some(sheet) = layout.sheet.filter(|_| !is_book) {
+        return Err(data(format!(
             "is no workbook, and has no sheet `{sheet}`; allowed: a file .xlsx or .xlsm, or no `sheet`"
-        );
-        return Err(Error::data(label, message));
+        )));
     }
-    let is_bag = is_bag(head);
-    if let Some(topic) = layout.topic.as_ref().filter(|_| !is_bag) {
-        let message = format!(
+    if let Some(topic) = layout.topic.filter(|_| !is_bag) {
+        return Err(data(format!(
             "is no recording of ROS 2, and has no topic `{topic}`; allowed: a file .mcap or .db3, or no `topic`"
-        );
-        return Err(Error::data(label, message));
+        )));
     }
-    let delimiter = Delimiter::parse(&layout.delimiter)
-        .ok_or_else(|| Error::Bug("an unchecked delimiter".into()))?;
-    let FileLayout {
-        comment,
-        header_in_comment,
-        skip,
-        ..
-    } = layout.clone();
-    let text = TextLayout {
-        delimiter,
-        comment,
-        header_in_comment,
-        skip,
-    };
     Ok(if is_book {
-        let data = |message: String| Error::data(label, message);
         let mut book = Workbook::read(reader).map_err(data)?;
-        let name = book.sheet(layout.sheet.as_deref()).map_err(data)?;
-        let lines = book
-            .lines(
-                &name,
-                if layout.decimal == Decimal::Comma {
-                    ','
-                } else {
-                    '.'
-                },
-            )
-            .map_err(data)?;
+        let name = book.sheet(layout.sheet).map_err(data)?;
+        let mark = if layout.decimal == Decimal::Comma {
+            ','
+        } else {
+            '.'
+        };
+        let lines = book.lines(&name, mark).map_err(data)?;
         let text = TextLayout {
             delimiter: Delimiter::Byte(b'\t'),
-            ..text
+            ..layout.text
         };
-        Box::new(TextRows::open(
-            Cursor::new(lines),
-            &format!("{label} sheet `{name}`"),
-            text,
-        )?)
+        let label = format!("{label} sheet `{name}`");
+        Box::new(TextRows::open(Cursor::new(lines), &label, text)?)
     } else if is_bag {
-        Box::new(BagRows::open(
-            reader.into_inner(),
-            label,
-            layout.topic.as_deref(),
-        )?)
+        Box::new(BagRows::open(reader.into_inner(), label, layout.topic)?)
     } else if let Some(language) = language(&raw::ending(Path::new(label)), head) {
-        listing::open(reader, label, language)?
+        Box::new(ListedRows::open(reader, label, language)?)
     } else if has_columns(head) {
         Box::new(ColumnRows::open(reader, label)?)
     } else if let Some(what) = not_read(head) {
         return Err(Error::data(label, what));
     } else {
         let reader = raw::without_utf16(reader).map_err(|error| failed(label, &error))?;
-        Box::new(TextRows::open(
-            BufReader::with_capacity(BUFFER, reader),
-            label,
-            text,
-        )?)
+        let reader = BufReader::with_capacity(BUFFER, reader);
+        Box::new(TextRows::open(reader, label, layout.text)?)
     })
 }
 
@@ -127,7 +110,19 @@ impl<'a> OpenedFile<'a> {
         arm: &'a RobotJoints,
         limits: LimitPolicy,
     ) -> Result<Self> {
-        let mut reader = records(source, layout)?;
+        let table = TableLayout {
+            sheet: layout.sheet.as_deref(),
+            topic: layout.topic.as_deref(),
+            text: TextLayout {
+                delimiter: Delimiter::parse(&layout.delimiter)
+                    .ok_or_else(|| Error::Bug("an unchecked delimiter".into()))?,
+                comment: layout.comment.clone(),
+                header_in_comment: layout.header_in_comment,
+                skip: layout.skip,
+            },
+            decimal: layout.decimal,
+        };
+        let mut reader = records(source.reader, &source.label, table)?;
         let label = reader.label().to_string();
         let (header, decimal) = if reader.is_text() {
             (layout.header, layout.decimal)
@@ -226,71 +221,56 @@ impl<'a> OpenedFile<'a> {
     }
 }
 
-/// Whether a file has the columns that are mapped; without a robot, those that do not depend on its joints.
-pub(super) fn header(
-    layout: &FileLayout,
-    arm: Option<&RobotJoints>,
+/// Fails where files lack columns that are mapped; without a robot, of those that do not depend on its joints.
+pub(super) fn headers<'l>(
+    layouts: impl Iterator<Item = &'l FileLayout>,
+    robot: Option<&Robot>,
     limits: LimitPolicy,
     context: &Context,
 ) -> Result<()> {
-    let source = context.services.open(&layout.file)?;
-    if let Some(arm) = arm {
-        return OpenedFile::open(source, layout, arm, limits).map(drop);
-    }
-    let layout = FileLayout {
-        columns: layout.columns.without_joints(),
-        ..layout.clone()
+    let arm = match robot {
+        Some(robot) => RobotJoints::of(robot)?,
+        None => RobotJoints::new(vec![false], vec![[f64::NEG_INFINITY, f64::INFINITY]]),
     };
-    let arm = RobotJoints::new(vec![false], vec![[f64::NEG_INFINITY, f64::INFINITY]]);
-    OpenedFile::open(source, &layout, &arm, limits).map(drop)
-}
-
-/// What is done of a bar, by all who work on it.
-pub(super) struct FileProgress<'a> {
-    context: &'a Context<'a>,
-    done: AtomicU64,
-}
-
-impl<'a> FileProgress<'a> {
-    pub(super) fn begin(
-        context: &'a Context<'a>,
-        what: &str,
-        total: Option<u64>,
-        unit: &str,
-    ) -> Self {
-        context.services.begin(what, total, unit);
-        Self {
-            context,
-            done: AtomicU64::new(0),
+    let mut faults = Vec::new();
+    for layout in layouts {
+        let mut layout = layout.clone();
+        if robot.is_none() {
+            layout.columns = layout.columns.without_joints();
+        }
+        let source = context.services.open(&layout.file)?;
+        match OpenedFile::open(source, &layout, &arm, limits) {
+            Ok(_) => {}
+            Err(Error::Data(more)) => faults.extend(more),
+            Err(other) => return Err(other),
         }
     }
-    /// Counts units of work of one of them up to the next sign of progress.
-    pub(super) fn counter(&self) -> ProgressCounter<'_> {
-        ProgressCounter {
-            progress: self,
-            rows: 0,
-            told: 0,
-        }
+    if faults.is_empty() {
+        Ok(())
+    } else {
+        Err(Error::Data(faults))
     }
 }
 
-/// Counts units of work up to the next sign of progress.
-pub(super) struct ProgressCounter<'a> {
-    progress: &'a FileProgress<'a>,
-    rows: u64,
-    told: u64,
-}
-
-impl ProgressCounter<'_> {
-    pub(super) fn row(&mut self, done: u64) {
-        self.rows += 1;
-        if self.rows.is_multiple_of(STRIDE) {
-            self.tell(done);
-        }
-    }
-    pub(super) fn tell(&mut self, done: u64) {
-        let more = done.saturating_sub(std::mem::replace(&mut self.told, done));
-        let all = self.progress.done.fetch_add(more, Ordering::Relaxed) + more;
-        self.progress.context.services.advance(all, "");
+/// What became of the rows of a file, for the table and for the person.
+pub(super) fn intake(
+    file: &str,
+    lines: u64,
+    [read, accepted]: [u64; 2],
+    context: &Context,
+) -> IntakeRow {
+    let rejected = read - accepted;
+    context.services.note(format!(
+        "{file}: {} read, {accepted} used, {rejected} rejected",
+        counted(read, "row")
+    ));
+    let [lines, read, accepted, rejected] =
+        [lines, read, accepted, rejected].map(|count| count as i64);
+    IntakeRow {
+        file: file.into(),
+        lines,
+        read,
+        accepted,
+        rejected,
     }
 }

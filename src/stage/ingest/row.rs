@@ -1,19 +1,69 @@
-//! One row read as quantities, or the reason why not.
+//! The quantities of one row, read from its record, or the reason why not.
 
-use super::arm::RobotJoints;
+use super::arm::{KindSlots, RobotJoints};
 use super::bind::{Binding, NumberBinding, TextBinding};
 use super::clock::{ALLOWED, CLOCK, ClockColumn, ClockTime};
 use super::layout::{Decimal, LimitPolicy};
-use super::recorded::RecordedRow;
 use super::refusal::{Reason, RowRefusal, refuse};
-use super::slots::KindSlots;
 use crate::raw::{DecimalMark, NumberFault, Record, decoded_text, number};
 use crate::robot::ONE_AND_A_HALF_TURNS;
+use crate::table::RejectedRow;
 
 /// A joint at its limit is not beyond it: what rounding in the file's unit may add, rad or m.
 const SLACK: f64 = 1e-6;
 /// Numbers of rows go up to here: the targets of wide rows have room beyond.
 const LARGEST_SEQUENCE: i64 = 1 << 52;
+
+/// Letters that are shown of a row that is not used.
+const SHOWN: usize = 200;
+
+/// The quantities of one row; reused from row to row.
+#[derive(Default)]
+pub(super) struct RecordedRow {
+    /// Number of the data row in its file, from 1.
+    pub number: u64,
+    pub line: u64,
+    /// Empty where there is none.
+    pub id: String,
+    /// By [`Slots::texts`]; empty where there is none.
+    ///
+    /// [`Slots::texts`]: super::arm::Slots::texts
+    pub texts: Vec<String>,
+    pub sequence: Option<i64>,
+    /// SI, by the places of the arm's slots; NaN where missing.
+    pub values: Vec<f64>,
+    /// The point of each target of a wide row, SI; NaN where it was not seen.
+    pub points: Vec<[f64; 3]>,
+    /// The first joint beyond its limits, from 0.
+    pub beyond: Option<usize>,
+    /// The first revolute joint beyond one and a half turns, from 0, and its angle, rad; also where the row is refused.
+    pub turned: Option<(usize, f64)>,
+    /// Nothing stands in any of its fields.
+    pub is_blank: bool,
+}
+
+impl RecordedRow {
+    /// An empty one.
+    pub(super) fn empty(arm: &RobotJoints) -> Self {
+        let texts = vec![String::new(); arm.slots.texts().len()];
+        Self {
+            texts,
+            values: vec![f64::NAN; arm.slots.count],
+            ..Self::default()
+        }
+    }
+    /// The row as one that is not used, of the file that tables call `name`; `text` is what stands there.
+    pub(super) fn rejected(&self, name: &str, text: &[u8], refusal: RowRefusal) -> RejectedRow {
+        RejectedRow {
+            file: name.into(),
+            line: self.line as i64,
+            point_id: (!self.id.is_empty()).then(|| self.id.clone()),
+            reason: refusal.reason.word().into(),
+            detail: refusal.detail,
+            text: crate::raw::shown(text).chars().take(SHOWN).collect(),
+        }
+    }
+}
 
 /// Reads rows of one file.
 pub(super) struct RowReader<'a> {
@@ -334,11 +384,7 @@ impl<'a> RowReader<'a> {
             if *q < lower - SLACK || *q > upper + SLACK {
                 row.beyond = Some(joint);
                 if self.limits == LimitPolicy::Reject {
-                    let (scale, unit) = if self.arm.prismatic.get(joint) == Some(&true) {
-                        (1e3, "mm")
-                    } else {
-                        (1f64.to_degrees(), "deg")
-                    };
+                    let (scale, unit) = self.arm.shown_in(joint);
                     let detail = format!(
                         "joint {} at {:.4} {unit}; allowed: {:.4} to {:.4} {unit}",
                         joint + 1,

@@ -5,18 +5,18 @@
 
 use super::Ingest;
 use super::arm::RobotJoints;
-use super::held::{HeldRows, RowSource};
-use super::ids::{FileIds, RowHasher, behind, narrow};
+use super::held::{FileIds, HeldRows, RowHasher, RowSource, behind, narrow};
 use super::layout::{Duplicates, FileLayout, Join};
 use super::motion::{JointSamples, Track};
-use super::reading::{FileProgress, OpenedFile};
-use super::recorded::RecordedRow;
+use super::reading::{OpenedFile, STRIDE};
 use super::refusal::{Reason, RowRefusal};
+use super::row::RecordedRow;
 use crate::error::{Error, Result};
 use crate::stage::Context;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::ops::Range;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// How many rows were refused for a reason, and the first of them.
 #[derive(Debug, Clone)]
@@ -53,6 +53,7 @@ impl FileOddities {
 }
 
 /// What the reading of a file found.
+#[derive(Default)]
 pub(super) struct Scan {
     pub label: String,
     pub lines: u64,
@@ -79,37 +80,18 @@ pub(super) struct Scan {
     samples: Option<JointSamples>,
     /// Hash of what all its usable rows say, of a file with what was measured.
     pub measured: Option<u64>,
-    /// Ids of the first usable rows with their data rows, for a join by id.
-    pub first_ids: Vec<(u32, String)>,
     /// What could not be read of the file.
     loss: Option<String>,
 }
-
-/// Ids that are kept for examples.
-const EXAMPLES: usize = 1000;
 
 impl Scan {
     fn new(open: &OpenedFile, held: HeldRows) -> Self {
         Self {
             label: open.label.clone(),
-            lines: 0,
-            read: 0,
-            last: 0,
-            tally: RefusalCounts::new(),
-            ids: FileIds::default(),
-            times: Vec::new(),
-            usable: Vec::new(),
             held,
             slots: open.binding().slots(),
-            turns: FileOddities::default(),
-            beyond: FileOddities::default(),
-            largest: 0.0,
-            ranges: Vec::new(),
-            track: None,
-            samples: None,
             measured: open.binding().measures.then_some(0),
-            first_ids: Vec::new(),
-            loss: None,
+            ..Self::default()
         }
     }
     /// How far a joint turns over the rows at most, rad or m.
@@ -145,16 +127,19 @@ pub(super) fn files(
         opened.push(open);
     }
     let labels: Vec<&str> = opened.iter().map(|open| open.label.as_str()).collect();
-    let progress = FileProgress::begin(
-        context,
-        &format!("reading {}", labels.join(", ")),
-        sizes.into_iter().sum(),
-        "bytes",
-    );
+    let what = format!("reading {}", labels.join(", "));
+    context
+        .services
+        .begin(&what, sizes.into_iter().sum(), "bytes");
+    let done = AtomicU64::new(0);
+    let advance = |more: u64| {
+        let all = done.fetch_add(more, Ordering::Relaxed) + more;
+        context.services.advance(all, "");
+    };
     let scans: Vec<Result<Scan>> = opened
         .into_par_iter()
         .enumerate()
-        .map(|(index, open)| file(settings, index, open, (arm, most), &progress))
+        .map(|(index, open)| file(settings, index, open, (arm, most), &advance))
         .collect();
     // Of several faults that of the first file.
     let mut scans = scans.into_iter().collect::<Result<Vec<_>>>()?;
@@ -183,7 +168,7 @@ fn file(
     index: usize,
     mut open: OpenedFile,
     (arm, most): (&RobotJoints, usize),
-    progress: &FileProgress,
+    advance: &dyn Fn(u64),
 ) -> Result<Scan> {
     let layout = &settings.files[index];
     let joined = matches!(
@@ -198,11 +183,9 @@ fn file(
     let mut scan = Scan::new(&open, held);
     scan.samples = is_track(settings, layout).then(JointSamples::default);
     let keyed = layout.columns.has("point_id") && settings.duplicates != Duplicates::Keep;
-    let (by_time, by_id) = (
-        matches!(settings.join, Some(Join::Time { .. })),
-        matches!(settings.join, Some(Join::Id {})),
-    );
-    let (mut hasher, mut pace) = (RowHasher::default(), progress.counter());
+    let by_time = matches!(settings.join, Some(Join::Time { .. }));
+    let (mut hasher, mut told) = (RowHasher::default(), 0);
+    let mut tell = |bytes: u64| advance(bytes.saturating_sub(std::mem::replace(&mut told, bytes)));
     while let Some(judged) = open.next()? {
         let row = &open.row;
         if let Some((joint, angle)) = row.turned {
@@ -218,10 +201,6 @@ fn file(
                 };
                 if keyed && !row.id.is_empty() {
                     scan.ids.push(row, content, &scan.label)?;
-                }
-                if by_id && scan.first_ids.len() < EXAMPLES {
-                    scan.first_ids
-                        .push((narrow(row.number, &scan.label)?, row.id.clone()));
                 }
                 if let Some(before) = &mut scan.measured {
                     *before = behind(*before, row.number, content);
@@ -244,9 +223,11 @@ fn file(
             scan.last = row.number;
         }
         scan.held.push(&open, &judged);
-        pace.row(open.bytes());
+        if open.row.number.is_multiple_of(STRIDE) {
+            tell(open.bytes());
+        }
     }
-    pace.tell(open.bytes());
+    tell(open.bytes());
     open.external.must_stand(&open.label, arm.joints())?;
     (scan.lines, scan.read, scan.loss) = (open.lines(), open.row.number, open.loss());
     if scan.read == 0 {

@@ -10,6 +10,7 @@ const NEAR: f64 = 0.4;
 const MOVES: f64 = 2e-4;
 
 /// Stretches of rows, numbered from 1.
+#[derive(Default)]
 pub(super) struct Stretches {
     number: i64,
     name: Option<String>,
@@ -26,18 +27,6 @@ pub(super) struct Stretches {
 const TOLD: u64 = 5;
 
 impl Stretches {
-    pub(super) fn new() -> Self {
-        Self {
-            number: 0,
-            name: None,
-            last: None,
-            step: None,
-            usual: Vec::new(),
-            gap: None,
-            warned: 0,
-        }
-    }
-
     /// Rows of another file follow: another stretch.
     pub(super) fn begin(&mut self) {
         (self.name, self.last, self.step) = (None, None, None);
@@ -153,7 +142,7 @@ mod tests {
 
     #[test]
     fn a_pause_begins_a_stretch_and_a_clock_that_jumps_is_refused() {
-        let mut paused = Stretches::new();
+        let mut paused = Stretches::default();
         assert_eq!(rows(&mut paused, 0..50, 0.0, 0.0), Ok(1));
         assert_eq!(rows(&mut paused, 50..90, 3.0, 0.9), Ok(2));
         assert!(
@@ -162,14 +151,14 @@ mod tests {
                 .expect("a gap")
                 .starts_with("a.csv:7: no rows for 3.010 s")
         );
-        let mut jumps = Stretches::new();
+        let mut jumps = Stretches::default();
         assert_eq!(rows(&mut jumps, 0..50, 0.0, 0.0), Ok(1));
         assert!(
             rows(&mut jumps, 50..90, 3.0, 0.0)
                 .unwrap_err()
                 .starts_with("the clock jumps by 3.010 s")
         );
-        let mut back = Stretches::new();
+        let mut back = Stretches::default();
         assert_eq!(rows(&mut back, 0..50, 0.0, 0.0), Ok(1));
         assert!(
             rows(&mut back, 20..21, 0.0, 0.0)

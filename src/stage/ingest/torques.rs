@@ -6,10 +6,9 @@ use super::arm::RobotJoints;
 use super::channel::TorqueChannel;
 use super::check;
 use super::layout::{FileLayout, LimitPolicy};
-use super::reading::{self, FileProgress, OpenedFile};
-use super::recorded::RecordedRow;
-use super::refusal::{Reason, RowRefusal};
-use super::rejections::Rejections;
+use super::reading::{self, OpenedFile, STRIDE};
+use super::refusal::{Reason, Rejections, RowRefusal};
+use super::row::RecordedRow;
 use super::scan::{RefusalCounts, tally};
 use super::stretch::Stretches;
 use crate::error::{Error, Fault, Result, counted};
@@ -92,34 +91,34 @@ impl Stage for IngestTorques {
 
     fn check(&self) -> Vec<Fault> {
         let mut faults = Vec::new();
+        let at = &mut check::Place::root(&mut faults);
         if self.files.is_empty() {
-            faults.push(Fault::new("files", "no file; name at least one"));
+            at.at("files").fault("no file; name at least one");
         }
         if !(0.0..=1.0).contains(&self.max_rejected_fraction) {
-            faults.push(Fault::new("max_rejected_fraction", "allowed: 0 to 1"));
+            at.at("max_rejected_fraction").fault("allowed: 0 to 1");
         }
         for (index, file) in self.files.iter().enumerate() {
-            let place = format!("files[{index}]");
-            check::file_faults(file, &place, &mut faults);
+            let at = &mut at.at(format!("files[{index}]"));
+            check::file(file, at);
+            let at = &mut at.at("columns");
             for name in file.names().into_iter().filter(|name| !USED.contains(name)) {
-                let message = format!(
+                at.at(name).fault(format!(
                     "is not used of a recording of torques; allowed: {}",
                     USED.join(", ")
-                );
-                faults.push(Fault::new(format!("{place}.columns.{name}"), message));
-            }
-            let mut missing: Vec<&str> = ["q", "time"]
-                .into_iter()
-                .filter(|name| !file.has(name))
-                .collect();
-            if !file.has("torque") && !file.has("current") {
-                missing.push("torque or current");
-            }
-            if !missing.is_empty() {
-                faults.push(Fault::new(
-                    format!("{place}.columns"),
-                    format!("not mapped: {}", missing.join(", ")),
                 ));
+            }
+            let has_drive = file.has("torque") || file.has("current");
+            let missing: Vec<&str> = [
+                ("q", file.has("q")),
+                ("time", file.has("time")),
+                ("torque or current", has_drive),
+            ]
+            .into_iter()
+            .filter_map(|(name, has)| (!has).then_some(name))
+            .collect();
+            if !missing.is_empty() {
+                at.fault(format!("not mapped: {}", missing.join(", ")));
             }
         }
         faults
@@ -138,21 +137,8 @@ impl Stage for IngestTorques {
         reads: Option<IngestTorquesReads>,
         context: &Context,
     ) -> Result<Option<IngestTorquesWrites>> {
-        let arm = reads
-            .map(|reads| RobotJoints::of(&reads.robot))
-            .transpose()?;
-        let mut faults = Vec::new();
-        for layout in &self.files {
-            match reading::header(layout, arm.as_ref(), self.limits, context) {
-                Err(Error::Data(more)) => faults.extend(more),
-                other => other?,
-            }
-        }
-        if faults.is_empty() {
-            Ok(None)
-        } else {
-            Err(Error::Data(faults))
-        }
+        let robot = reads.map(|reads| reads.robot);
+        reading::headers(self.files.iter(), robot.as_ref(), self.limits, context).map(|()| None)
     }
 
     fn run(&self, reads: IngestTorquesReads, context: &Context) -> Result<IngestTorquesWrites> {
@@ -233,7 +219,7 @@ impl<'a> MotionRows<'a> {
             sink: context.services.sink(ArmMotion::KIND)?,
             chunk: ArmMotion::default(),
             written: 0,
-            stretches: Stretches::new(),
+            stretches: Stretches::default(),
             ratio: ratio.collect::<Result<_>>()?,
             signal: None,
             channels: vec![TorqueChannel::default(); arm.joints()],
@@ -256,15 +242,16 @@ impl<'a> MotionRows<'a> {
         open.remarks()
             .iter()
             .for_each(|remark| context.services.note(format!("{label}: {remark}")));
-        let progress = FileProgress::begin(context, &format!("reading {label}"), size, "bytes");
+        context
+            .services
+            .begin(&format!("reading {label}"), size, "bytes");
         self.signal_of(&open, &label)?;
         let given = open.binding().slots();
         let has = |setting: &str| given.contains(&self.arm.slots.of(setting).start);
         let optional = [has("velocity"), has("temperature")];
         self.agree(optional, &label)?;
         self.stretches.begin();
-        let (mut pace, mut refused) = (progress.counter(), RefusalCounts::new());
-        let mut accepted = 0u64;
+        let (mut refused, mut accepted) = (RefusalCounts::new(), 0);
         while let Some(judged) = open.next()? {
             match judged.and_then(|()| self.complete(&open.row)) {
                 Ok(()) => {
@@ -279,25 +266,17 @@ impl<'a> MotionRows<'a> {
                     })?;
                 }
             }
-            pace.row(open.bytes());
+            if open.row.number.is_multiple_of(STRIDE) {
+                context.services.advance(open.bytes(), "");
+            }
         }
         let read = open.row.number;
         open.loss()
             .into_iter()
             .for_each(|loss| context.services.warn(loss));
         self.few_rejected(&label, read, accepted, &refused)?;
-        context.services.note(format!(
-            "{name}: {} read, {accepted} used, {} rejected",
-            counted(read, "row"),
-            read - accepted
-        ));
-        Ok(IntakeRow {
-            file: name.into(),
-            lines: open.lines() as i64,
-            read: read as i64,
-            accepted: accepted as i64,
-            rejected: (read - accepted) as i64,
-        })
+        let counts = [read, accepted];
+        Ok(reading::intake(name, open.lines(), counts, context))
     }
 
     /// Which of currents and torques a file has: one of them, and the same in each file.

@@ -1,4 +1,4 @@
-//! What is wrong with a file as a whole: errors for the owner of the measurements, before any table is written.
+//! What is wrong with a file as a whole, or with several files as copies of each other: errors for the owner of the measurements, before any table is written.
 
 use super::Ingest;
 use super::arm::RobotJoints;
@@ -18,6 +18,8 @@ const SMALL_IN_DEGREES: f64 = 6.5;
 /// What most rows beyond the limits are a sign of.
 const COUNTED: &str = ": the controller may count its joints otherwise than the robot file (`sign`, `zero`, `coupled` of `q`), or the columns stand in \
                        another order";
+/// Ids that are looked at for examples.
+const EXAMPLES: usize = 1000;
 /// Joints that are recorded for calibration turn by more, rad.
 const FAR: f64 = 2.0;
 
@@ -169,7 +171,10 @@ fn too_many_rejected(
             format!(
                 "no partner in {}{}",
                 scans[other].label,
-                unlike(scans, decisions, [index, other]).unwrap_or_default()
+                Some(&settings.join)
+                    .filter(|join| matches!(join, Some(Join::Id {})))
+                    .and_then(|_| unlike(scans, decisions, [index, other]))
+                    .unwrap_or_default()
             )
         },
     );
@@ -268,10 +273,10 @@ fn smaller(scan: &Scan, columns: &Columns) -> &'static str {
 fn unlike(scans: &[Scan], decisions: &[FileDecision], files: [usize; 2]) -> Option<String> {
     let without_partner = |file: usize| -> Option<Vec<&str>> {
         let (scan, decision) = (scans.get(file)?, decisions.get(file)?);
-        let rows = scan.first_ids.iter().filter(|(number, _)| {
-            !decision.is_whole(*number as usize) && !decision.twins.contains_key(number)
+        let rows = scan.ids.rows().take(EXAMPLES).filter(|(_, row)| {
+            !decision.is_whole(row.number as usize) && !decision.twins.contains_key(&row.number)
         });
-        Some(rows.map(|(_, id)| id.as_str()).collect())
+        rows.map(|(id, _)| std::str::from_utf8(id).ok()).collect()
     };
     let [here, there] = [without_partner(files[0])?, without_partner(files[1])?];
     // Of three files a row may lack its partner in the third.
@@ -324,4 +329,63 @@ fn warn(scan: &Scan, columns: &Columns, limits: LimitPolicy, arm: &RobotJoints, 
             scan.largest.to_degrees()
         ));
     }
+}
+
+/// A file that was read, and its place below `with`.
+struct ReadFile<'a> {
+    place: String,
+    scan: &'a Scan,
+    decision: &'a FileDecision,
+}
+
+/// Fails where the same measured rows would be used twice. One log of several days beside a file of joints for each day is none: of its
+/// rows each is used once.
+pub(super) fn no_copies(scanned: &[(Vec<Scan>, Vec<FileDecision>)]) -> Result<()> {
+    let mut read: Vec<ReadFile> = Vec::new();
+    let mut faults = Vec::new();
+    for (set, (scans, decisions)) in scanned.iter().enumerate() {
+        for (index, (scan, decision)) in scans.iter().zip(decisions).enumerate() {
+            let place = match set.checked_sub(1) {
+                None => format!("files[{index}].file"),
+                Some(later) => format!("later[{later}].files[{index}]"),
+            };
+            let own = ReadFile {
+                place,
+                scan,
+                decision,
+            };
+            let found = read
+                .iter()
+                .find_map(|other| Some((other, shared(other, &own).filter(|rows| *rows > 0)?)));
+            if let Some((other, rows)) = found {
+                let message = format!(
+                    "`{}` measured what `{}` of `{}` did, and {} would be used twice: copies look like perfect repeatability; name the \
+                     file of another measurement, or take this one out",
+                    scan.label,
+                    other.scan.label,
+                    other.place,
+                    counted(rows, "row")
+                );
+                faults.push(Fault::new(format!("with.{}", own.place), message));
+            }
+            read.push(own);
+        }
+    }
+    if faults.is_empty() {
+        Ok(())
+    } else {
+        Err(Error::Data(faults))
+    }
+}
+
+/// Rows that are used of both files; none where what they measured differs.
+fn shared(one: &ReadFile, other: &ReadFile) -> Option<u64> {
+    if one.scan.measured? != other.scan.measured? {
+        return None;
+    }
+    if one.decision.partners.is_empty() || other.decision.partners.is_empty() {
+        return Some(accepted(one.scan, one.decision).min(accepted(other.scan, other.decision)));
+    }
+    let both = |number: &usize| one.decision.is_whole(*number) && other.decision.is_whole(*number);
+    Some((1..=one.scan.read as usize).filter(both).count() as u64)
 }

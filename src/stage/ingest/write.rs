@@ -5,9 +5,9 @@ use super::later::Continuation;
 use super::layout::FileLayout;
 use super::noise::NoiseSlots;
 use super::pair::FileDecision;
-use super::reading::FileProgress;
-use super::recorded::RecordedRow;
-use super::rejections::Rejections;
+use super::reading::STRIDE;
+use super::refusal::Rejections;
+use super::row::RecordedRow;
 use super::{scan, verdict};
 use crate::error::{Error, Result, counted};
 use crate::observation::{KINDS, Part};
@@ -33,7 +33,9 @@ pub(super) fn write(
     let rows = rows
         .map(|(scan, decision)| verdict::accepted(scan, decision))
         .sum();
-    let progress = FileProgress::begin(context, "writing the recording", Some(rows), "rows");
+    context
+        .services
+        .begin("writing the recording", Some(rows), "rows");
     let mut recording = RecordingChunks::new(decided, context)?;
     let mut rejected = Rejections::new(names, context)?;
     for (one, gap) in decided
@@ -46,7 +48,7 @@ pub(super) fn write(
                 one,
                 index,
                 layout,
-                (index < one.leading()).then_some((&mut recording, &progress)),
+                (index < one.leading()).then_some(&mut recording),
                 &mut rejected,
                 context,
             )?;
@@ -60,7 +62,7 @@ fn file(
     decided: &JoinDecisions,
     index: usize,
     layout: &FileLayout,
-    mut recording: Option<(&mut RecordingChunks, &FileProgress)>,
+    mut recording: Option<&mut RecordingChunks>,
     rejected: &mut Rejections,
     context: &Context,
 ) -> Result<()> {
@@ -76,22 +78,23 @@ fn file(
         return Ok(());
     }
     let mut rows = scan::rows(scan, (decided.settings, layout), decided.arm, context)?;
-    let mut pace = recording.as_ref().map(|(_, progress)| progress.counter());
-    let mut accepted = 0;
+    let mut accepted = 0u64;
     while let Some(judged) = rows.next()? {
         match judged.and_then(|()| decided.outcome(index, decision, rows.row())) {
             Ok(()) => {
                 accepted += 1;
-                if let (Some((chunks, _)), Some(pace)) = (&mut recording, &mut pace) {
+                if let Some(chunks) = &mut recording {
                     chunks.push(rows.row(), index, decision, decided)?;
-                    pace.row(chunks.written);
+                    if accepted.is_multiple_of(STRIDE) {
+                        context.services.advance(chunks.written, "");
+                    }
                 }
             }
             Err(refusal) => rejected.push(rows.row().rejected(name, rows.text(), refusal))?,
         }
     }
     let read = rows.row().number;
-    if let Some((chunks, _)) = recording {
+    if let Some(chunks) = recording {
         chunks.before += read;
     }
     if (read, accepted) != (scan.read, used) {
