@@ -5,6 +5,7 @@ use super::draw::TorqueCase;
 use super::law::{Fall, Law, Moment};
 use super::record::{AR1_COEFFICIENT, TorqueRows};
 use super::rigid::Machine;
+use std::f64::consts::FRAC_PI_2;
 
 /// Rows that are averaged into one: as a low-pass does.
 const AVERAGED: usize = 4;
@@ -282,76 +283,27 @@ impl<'a> Columns<'a> {
 }
 
 /// Effects of a joint that are linear in their size, in usual forms.
-fn per_joint(joint: usize) -> Vec<Law> {
-    let width = 0.008;
-    vec![
-        Law::Viscous {
-            joint,
-            size: 1.0,
-            exponent: 1.0,
-        },
-        Law::Coulomb {
-            joint,
-            size: 1.0,
-            width,
-        },
-        Law::Asymmetric {
-            joint,
-            size: 1.0,
-            width,
-            by_speed: 0.0,
-        },
-        Law::Stribeck {
-            joint,
-            size: 1.0,
-            speed: 0.05,
-            fall: Fall::Exponential(1.0),
-        },
-        Law::Stribeck {
-            joint,
-            size: 1.0,
-            speed: 0.1,
-            fall: Fall::Exponential(1.0),
-        },
-        Law::Load {
-            joint,
-            share: 1.0,
-            exponent: 1.0,
-            width,
-        },
-        Law::Rotor {
-            joint,
-            inertia: 1.0,
-        },
-        Law::Offset {
-            joint,
-            size: 1.0,
-            drift: 0.0,
-        },
-        Law::Cable {
-            joint,
-            stiffness: 1.0,
-            zero: 0.0,
-            hardening: 0.0,
-        },
-        Law::Spring {
-            joint,
-            size: 1.0,
-            zero: 0.0,
-            gas: 0.0,
-        },
-        Law::Spring {
-            joint,
-            size: 1.0,
-            zero: std::f64::consts::FRAC_PI_2,
-            gas: 0.0,
-        },
+#[rustfmt::skip]
+fn per_joint(joint: usize) -> [Law; 11] {
+    let (size, width, fall) = (1.0, 0.008, Fall::Exponential(1.0));
+    [
+        Law::Viscous { joint, size, exponent: 1.0 },
+        Law::Coulomb { joint, size, width },
+        Law::Asymmetric { joint, size, width, by_speed: 0.0 },
+        Law::Stribeck { joint, size, speed: 0.05, fall },
+        Law::Stribeck { joint, size, speed: 0.1, fall },
+        Law::Load { joint, share: 1.0, exponent: 1.0, width },
+        Law::Rotor { joint, inertia: 1.0 },
+        Law::Offset { joint, size, drift: 0.0 },
+        Law::Cable { joint, stiffness: 1.0, zero: 0.0, hardening: 0.0 },
+        Law::Spring { joint, size, zero: 0.0, gas: 0.0 },
+        Law::Spring { joint, size, zero: FRAC_PI_2, gas: 0.0 },
     ]
 }
 
 /// Torques by a joint's angle whose phase is free: a balancer, which is a wave a turn, and ripples.
 fn waves(joint: usize) -> Vec<Vec<Law>> {
-    let phases = [0.0, std::f64::consts::FRAC_PI_2];
+    let phases = [0.0, FRAC_PI_2];
     let ripple = |order: usize| {
         let law = |phase| Law::Ripple {
             joint,
