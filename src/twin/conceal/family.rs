@@ -75,6 +75,15 @@ impl Draft {
             hides: Vec::new(),
         }
     }
+    /// A draft of one cause whose size may be changed.
+    fn one(
+        form: &'static str,
+        effect: &'static str,
+        place: impl Into<String>,
+        physical: Vec<Physical>,
+    ) -> Draft {
+        Draft::new(form, vec![sized(effect, place.into(), physical)])
+    }
     fn accepting(mut self, effect: &'static str, place: String) -> Draft {
         self.accepted.push((effect, place));
         self
@@ -103,11 +112,8 @@ fn sized(effect: &'static str, place: String, physical: Vec<Physical>) -> Cause 
 /// A cause of the size that it was drawn with.
 fn fixed(effect: &'static str, place: String, physical: Vec<Physical>) -> Cause {
     Cause {
-        effect,
-        place,
-        physical,
         sized: false,
-        wanted: true,
+        ..sized(effect, place, physical)
     }
 }
 
@@ -263,222 +269,80 @@ impl<'a> Bench<'a> {
     }
 }
 
+/// Draws an effect; none where this robot cannot have it.
+type Draw = fn(&Bench, Form, &mut Noise) -> Option<Draft>;
+
 /// A family of effects.
 pub struct Family {
     /// The canonical name of the effect; `unknown` for what is in no list.
     pub name: &'static str,
-    /// Draws an effect; none where this robot cannot have it.
-    pub draw: fn(&Bench, Form, &mut Noise) -> Option<Draft>,
+    /// Draws one.
+    pub draw: Draw,
     /// May stand beside another one.
     pub paired: bool,
 }
 
+const fn alone(name: &'static str, draw: Draw) -> Family {
+    Family {
+        name,
+        draw,
+        paired: false,
+    }
+}
+
+const fn paired(name: &'static str, draw: Draw) -> Family {
+    Family {
+        paired: true,
+        ..alone(name, draw)
+    }
+}
+
 /// Families in canonical names; several rows of one name are different causes.
 pub const FAMILIES: &[Family] = &[
-    Family {
-        name: "joint_compliance",
-        draw: gears::joint_compliance,
-        paired: true,
-    },
-    Family {
-        name: "joint_hardening",
-        draw: gears::joint_hardening,
-        paired: false,
-    },
-    Family {
-        name: "gear_cyclic",
-        draw: gears::gear_cyclic,
-        paired: true,
-    },
-    Family {
-        name: "gear_motor_cyclic",
-        draw: gears::gear_motor_cyclic,
-        paired: true,
-    },
-    Family {
-        name: "backlash",
-        draw: gears::backlash,
-        paired: true,
-    },
-    Family {
-        name: "axis_wobble",
-        draw: gears::axis_wobble,
-        paired: true,
-    },
-    Family {
-        name: "zero_shift",
-        draw: gears::zero_shift,
-        paired: true,
-    },
-    Family {
-        name: "cable_drag",
-        draw: gears::cable_drag,
-        paired: false,
-    },
-    Family {
-        name: "link_compliance",
-        draw: loads::link_compliance,
-        paired: true,
-    },
-    Family {
-        name: "base_compliance",
-        draw: loads::base_compliance,
-        paired: true,
-    },
-    Family {
-        name: "counterbalance",
-        draw: loads::counterbalance,
-        paired: false,
-    },
-    Family {
-        name: "link_mass",
-        draw: loads::link_mass,
-        paired: false,
-    },
-    Family {
-        name: "payload_error",
-        draw: loads::payload_error,
-        paired: false,
-    },
-    Family {
-        name: "thermal_growth",
-        draw: mounts::thermal_growth,
-        paired: true,
-    },
-    Family {
-        name: "tool_shift",
-        draw: mounts::tool_shift,
-        paired: true,
-    },
-    Family {
-        name: "base_shift",
-        draw: mounts::base_shift,
-        paired: true,
-    },
-    Family {
-        name: "tracker_drift",
-        draw: mounts::tracker_drift,
-        paired: true,
-    },
-    Family {
-        name: "joint_log_lag",
-        draw: mounts::joint_log_lag,
-        paired: false,
-    },
-    Family {
-        name: "tracker_scale",
-        draw: mounts::tracker_scale,
-        paired: false,
-    },
-    Family {
-        name: "unknown",
-        draw: unlisted::bump,
-        paired: false,
-    },
-    Family {
-        name: "unknown",
-        draw: unlisted::hinge,
-        paired: false,
-    },
-    Family {
-        name: "unknown",
-        draw: unlisted::product,
-        paired: false,
-    },
-    Family {
-        name: "unknown",
-        draw: unlisted::sway,
-        paired: false,
-    },
+    paired("joint_compliance", gears::joint_compliance),
+    alone("joint_hardening", gears::joint_hardening),
+    paired("gear_cyclic", gears::gear_cyclic),
+    paired("gear_motor_cyclic", gears::gear_motor_cyclic),
+    paired("backlash", gears::backlash),
+    paired("axis_wobble", gears::axis_wobble),
+    paired("zero_shift", gears::zero_shift),
+    alone("cable_drag", gears::cable_drag),
+    paired("link_compliance", loads::link_compliance),
+    paired("base_compliance", loads::base_compliance),
+    alone("counterbalance", loads::counterbalance),
+    alone("link_mass", loads::link_mass),
+    alone("payload_error", loads::payload_error),
+    paired("thermal_growth", mounts::thermal_growth),
+    paired("tool_shift", mounts::tool_shift),
+    paired("base_shift", mounts::base_shift),
+    paired("tracker_drift", mounts::tracker_drift),
+    alone("joint_log_lag", mounts::joint_log_lag),
+    alone("tracker_scale", mounts::tracker_scale),
+    alone("unknown", unlisted::bump),
+    alone("unknown", unlisted::hinge),
+    alone("unknown", unlisted::product),
+    alone("unknown", unlisted::sway),
 ];
 
 /// Families of physics that no list of effects holds yet: instruments, memory, interactions.
 pub const BEYOND: &[Family] = &[
-    Family {
-        name: "tracker_circle",
-        draw: instruments::circle,
-        paired: false,
-    },
-    Family {
-        name: "tracker_elevation",
-        draw: instruments::elevation,
-        paired: false,
-    },
-    Family {
-        name: "tracker_offset",
-        draw: instruments::offset,
-        paired: false,
-    },
-    Family {
-        name: "tracker_refraction",
-        draw: instruments::refraction,
-        paired: false,
-    },
-    Family {
-        name: "unknown",
-        draw: instruments::swing,
-        paired: false,
-    },
-    Family {
-        name: "base_shift",
-        draw: instruments::knock,
-        paired: false,
-    },
-    Family {
-        name: "presliding",
-        draw: memories::presliding,
-        paired: false,
-    },
-    Family {
-        name: "joint_warming",
-        draw: memories::own_heat,
-        paired: false,
-    },
-    Family {
-        name: "joint_warming",
-        draw: memories::late_heat,
-        paired: false,
-    },
-    Family {
-        name: "thermal_growth",
-        draw: memories::lagging_link,
-        paired: false,
-    },
-    Family {
-        name: "gear_load",
-        draw: interactions::gear_load,
-        paired: false,
-    },
-    Family {
-        name: "gear_flank",
-        draw: interactions::gear_flank,
-        paired: false,
-    },
-    Family {
-        name: "joint_warming",
-        draw: interactions::warm_ratio,
-        paired: false,
-    },
-    Family {
-        name: "joint_warming",
-        draw: interactions::warm_spring,
-        paired: false,
-    },
-    Family {
-        name: "backlash",
-        draw: interactions::spring_by_direction,
-        paired: false,
-    },
-    Family {
-        name: "backlash",
-        draw: interactions::growing_gap,
-        paired: false,
-    },
-    Family {
-        name: "unknown",
-        draw: interactions::bent_link,
-        paired: false,
-    },
+    alone("tracker_circle", instruments::circle),
+    alone("tracker_elevation", instruments::elevation),
+    alone("tracker_offset", instruments::offset),
+    alone("tracker_refraction", instruments::refraction),
+    alone("unknown", instruments::swing),
+    alone("base_shift", instruments::knock),
+    alone("presliding", memories::presliding),
+    alone("joint_warming", memories::own_heat),
+    alone("joint_warming", memories::late_heat),
+    alone("thermal_growth", memories::lagging_link),
+    alone("gear_load", interactions::gear_load),
+    alone("gear_flank", interactions::gear_flank),
+    alone("joint_warming", interactions::warm_ratio),
+    alone("joint_warming", interactions::warm_spring),
+    alone("backlash", interactions::spring_by_direction),
+    alone("backlash", interactions::growing_gap),
+    alone("unknown", interactions::bent_link),
 ];
 
 /// What a set of recordings is drawn from.

@@ -172,6 +172,13 @@ macro_rules! effect {
         $(#[$meta])*
         #[serde(deny_unknown_fields)]
         pub struct $name { $( #[doc = $doc] $(#[$attribute])* pub $field: $type, )* }
+        impl $name {
+            /// The effect of these numbers, in the order of its fields.
+            #[allow(clippy::too_many_arguments, reason = "as many as it has numbers")]
+            pub fn effect($($field: $type),*) -> $crate::effect::Physical {
+                $crate::effect::Physical::$name(Self { $($field),* })
+            }
+        }
     };
     (@act $name:ident turns |$me:ident, $at:ident| $turn:expr; $($more:tt)*) => {
         impl $crate::effect::Act for $name {
@@ -225,11 +232,6 @@ macro_rules! physical {
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
         #[serde(rename_all = "snake_case")]
         pub enum Physical { $( #[doc = $doc] $name($name), )+ }
-        $( impl From<$name> for Physical {
-            fn from(effect: $name) -> Self {
-                Physical::$name(effect)
-            }
-        } )+
         impl Physical {
             fn inner(&self) -> &dyn Act {
                 match self { $( Physical::$name(effect) => effect, )+ }
