@@ -5,7 +5,6 @@
 //! Adding an effect: a row in `effect/` and a line in [`effect::Physical`].
 
 #![forbid(unsafe_code)]
-#![warn(missing_docs)]
 
 pub mod arm;
 pub mod conceal;

@@ -16,9 +16,9 @@ use super::robots::{ALL_KINDS, KINDS, Kind};
 use crate::arm::Arm;
 use crate::effect::Physical;
 use crate::equilibrium::settle;
+use crate::matrix::{self, Vector};
 use crate::noise::Noise;
 use crate::plan::Point;
-use crate::statics::Row;
 use crate::truth::ARCSEC;
 use calib_foundation::description::RobotDescription;
 
@@ -38,9 +38,7 @@ pub enum Column {
 /// One concealed cause: what a diagnosis should name, and what the twin does for it.
 #[derive(Debug, Clone)]
 pub struct Cause {
-    /// Canonical name.
     pub effect: &'static str,
-    /// In the words of the interface.
     pub place: String,
     /// What makes it.
     pub physical: Vec<Physical>,
@@ -171,16 +169,7 @@ impl<'a> Bench<'a> {
                 .map_or(0.0, |point| point.time_s),
         };
         for point in points {
-            let row = Row {
-                command: point.q.clone(),
-                drive: point.q.clone(),
-                direction: point.direction.clone(),
-                time_s: point.time_s,
-                temperature_c: point.temperature_c,
-                payload_kg: point.payload_kg,
-                velocity: Vec::new(),
-                memory: Vec::new(),
-            };
+            let row = point.row(point.q.clone(), Vec::new());
             let rest = settle(&arm, &row, &[]);
             for (peak, torque) in bench.peak.iter_mut().zip(&rest.torque) {
                 *peak = peak.max(torque.abs());
@@ -226,23 +215,24 @@ impl<'a> Bench<'a> {
         list.get(draw.index(list.len())).copied()
     }
 
+    /// From the axis of a joint (from 0) to the next one, or to the tool, m.
+    fn line(&self, index: usize) -> Vector {
+        let next = self.robot.joints.get(index + 1);
+        let end = next.map_or(self.robot.tool, |next| next.point);
+        matrix::minus(end, self.robot.joints[index].point)
+    }
+
     /// Links (from 1) with a length worth the name.
     fn long_links(&self) -> Vec<usize> {
-        let end = |index: usize| {
-            self.robot
-                .joints
-                .get(index + 1)
-                .map_or(self.robot.tool, |next| next.point)
-        };
-        let span = |index: usize| {
-            crate::matrix::norm(crate::matrix::minus(
-                end(index),
-                self.robot.joints[index].point,
-            ))
-        };
         (1..self.joints())
-            .filter(|number| span(number - 1) > 0.15)
+            .filter(|number| matrix::norm(self.line(number - 1)) > 0.15)
             .collect()
+    }
+
+    /// One of them; none where there is none.
+    fn long_link(&self, draw: &mut Noise) -> Option<usize> {
+        let long = self.long_links();
+        long.get(draw.index(long.len())).copied()
     }
 
     /// Wind-up per torque (rad/Nm) that turns a joint by so much under its largest torque.

@@ -37,6 +37,13 @@ pub enum ForeignMotion {
     Elevation,
 }
 
+impl ForeignMotion {
+    /// Whether it acts in what the instrument reads, and not on the arm.
+    pub fn is_sighted(self) -> bool {
+        matches!(self, Self::Range | Self::Azimuth | Self::Elevation)
+    }
+}
+
 /// `size * shape(variable)`, or the product of two shapes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -118,14 +125,6 @@ impl Foreign {
         }
     }
 
-    /// Whether it acts in what the instrument reads, and not on the arm.
-    pub fn is_sighted(&self) -> bool {
-        matches!(
-            self.motion,
-            ForeignMotion::Range | ForeignMotion::Azimuth | ForeignMotion::Elevation
-        )
-    }
-
     /// Product of the shapes in what is seen.
     fn share(&self, seen: &Seen) -> f64 {
         self.courses
@@ -182,7 +181,7 @@ impl Act for Foreign {
             .unwrap_or_default()
     }
     fn sight(&self, row: &Row, memory: f64, point: Vector) -> Vector {
-        if !self.is_sighted() {
+        if !self.motion.is_sighted() {
             return point;
         }
         let seen = Seen {

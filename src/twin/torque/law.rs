@@ -22,11 +22,11 @@ pub enum Bristles {
     Slipping,
 }
 
-/// Declares what rigid bodies leave out, a row each: its canonical name, where it sits (the joint or link that a number names, from 0, or a
+/// Declares what rigid bodies leave out, a row each: the function that makes it, its canonical name, where it sits (the joint or link that a number names, from 0, or a
 /// place), its numbers, whether they make another form than the usual formula, and what it adds to the torque of its joint, Nm. Rows that
 /// add nothing change the bodies or the recording.
 macro_rules! laws {
-    (|$now:ident, $past:ident| $( $(#[$meta:meta])* $name:ident $effect:literal at $seat:tt { $($field:ident: $type:ty),* }
+    (|$now:ident, $past:ident| $( $(#[$meta:meta])* $name:ident $make:ident $effect:literal at $seat:tt { $($field:ident: $type:ty),* }
       other $other:expr $(=> $adds:expr)?; )+) => {
         /// An effect with its numbers.
         #[derive(Debug, Clone, PartialEq)]
@@ -34,6 +34,10 @@ macro_rules! laws {
 
         #[allow(unused_variables, reason = "a row uses some of its numbers here, some there")]
         impl Law {
+            $( pub(super) fn $make($($field: $type),*) -> Law {
+                Law::$name { $($field),* }
+            } )+
+
             /// Its canonical name.
             pub fn name(&self) -> &'static str {
                 match self { $( Self::$name { .. } => $effect, )+ }
@@ -66,92 +70,92 @@ macro_rules! laws {
 
 laws! { |now, past|
     /// Nm s/rad; the exponent of velocity is 1 but in another form.
-    Viscous "viscous_friction" at joint { joint: usize, size: f64, exponent: f64 } other exponent != 1.0
+    Viscous viscous "viscous_friction" at joint { joint: usize, size: f64, exponent: f64 } other exponent != 1.0
         => viscous(now.v(joint), size, exponent);
     /// Nm; rises from zero within `width`, rad/s.
-    Coulomb "coulomb_friction" at joint { joint: usize, size: f64, width: f64 } other false
+    Coulomb coulomb "coulomb_friction" at joint { joint: usize, size: f64, width: f64 } other false
         => size * sign(now.v(joint), width);
     /// Nm more in the positive direction; in another form it is a share of speed, too.
-    Asymmetric "asymmetric_friction" at joint { joint: usize, size: f64, width: f64, by_speed: f64 } other by_speed != 0.0
+    Asymmetric asymmetric "asymmetric_friction" at joint { joint: usize, size: f64, width: f64, by_speed: f64 } other by_speed != 0.0
         => size * ((1.0 - by_speed) * sign(now.v(joint), width).max(0.0) + by_speed * now.v(joint).max(0.0));
     /// Nm more at creeping speed, gone beyond `speed`, rad/s.
-    Stribeck "stribeck_friction" at joint { joint: usize, size: f64, speed: f64, fall: Fall } other fall != Fall::Exponential(1.0)
+    Stribeck stribeck "stribeck_friction" at joint { joint: usize, size: f64, speed: f64, fall: Fall } other fall != Fall::Exponential(1.0)
         => size * sign(now.v(joint), 0.15 * speed) * fall.at(now.v(joint).abs() / speed);
     /// Change of Coulomb friction by bristles that bend over a travel (rad); Nm.
-    Presliding "presliding_friction" at joint { joint: usize, size: f64, travel: f64, width: f64, bristles: Bristles }
+    Presliding presliding "presliding_friction" at joint { joint: usize, size: f64, travel: f64, width: f64, bristles: Bristles }
         other bristles != Bristles::One
         => size * (past.bend(bristles, now.v(joint) * now.step, travel) - sign(now.v(joint), width));
     /// Friction as a share of what the gear transmits.
-    Load "load_friction" at joint { joint: usize, share: f64, exponent: f64, width: f64 } other exponent != 1.0
+    Load load "load_friction" at joint { joint: usize, share: f64, exponent: f64, width: f64 } other exponent != 1.0
         => share * now.rigid[joint].abs().powf(exponent) * sign(now.v(joint), width);
     /// Friction that falls as the gear warms up: share at the begin, and time, s; exponential, in another form as 1 / (1 + t / time).
-    Warmup "warmup_friction" at joint { joint: usize, share: f64, time: f64, slow: bool } other slow => {
+    Warmup warmup "warmup_friction" at joint { joint: usize, share: f64, time: f64, slow: bool } other slow => {
         let cold = if slow { 1.0 / (1.0 + now.time / time) } else { (-now.time / time).exp() };
         share * cold * now.friction[joint]
     };
     /// Friction of a coupled pair by v_joint + ratio v_by, on both; the exponent of that velocity is 1 but in another form.
-    WristCoupling "wrist_coupling" at joint {
+    WristCoupling wrist_coupling "wrist_coupling" at joint {
         joint: usize, by: usize, ratio: f64, viscous: f64, coulomb: f64, width: f64, exponent: f64
     } other exponent != 1.0 => {
         let x = now.v(joint) + ratio * now.v(by);
         viscous * x.abs().powf(exponent) * x.signum() + coulomb * sign(x, width)
     };
     /// kg m2 at the joint.
-    Rotor "rotor_inertia" at joint { joint: usize, inertia: f64 } other false => inertia * now.state.a[joint];
+    Rotor rotor "rotor_inertia" at joint { joint: usize, inertia: f64 } other false => inertia * now.state.a[joint];
     /// True torque per stated torque, less 1; in another form it falls with torque, to half at so many Nm.
-    TorqueConstant "torque_constant" at joint { joint: usize, share: f64, half: f64 } other half.is_finite();
+    TorqueConstant torque_constant "torque_constant" at joint { joint: usize, share: f64, half: f64 } other half.is_finite();
     /// Nm; in another form a share of it comes only as the sensor warms up, within a quarter of a minute.
-    Offset "current_offset" at joint { joint: usize, size: f64, drift: f64 } other drift != 0.0
+    Offset offset "current_offset" at joint { joint: usize, size: f64, drift: f64 } other drift != 0.0
         => size * (1.0 - drift * (-now.time / SENSOR_WARM).exp());
     /// Nm, so many per turn of the joint; in another form with an overtone, as a share.
-    Ripple "torque_ripple" at joint { joint: usize, size: f64, order: f64, phase: f64, overtone: f64 } other overtone != 0.0 => {
+    Ripple ripple "torque_ripple" at joint { joint: usize, size: f64, order: f64, phase: f64, overtone: f64 } other overtone != 0.0 => {
         let turn = order * now.q(joint) + phase;
         size * (turn.sin() + overtone * (2.0 * turn + phase).sin())
     };
     /// A balancer: -size sin(q - zero), Nm; in another form a gas spring that is stiffer the more it is bent, by a share.
-    Spring "spring_balance" at joint { joint: usize, size: f64, zero: f64, gas: f64 } other gas != 0.0 => {
+    Spring spring "spring_balance" at joint { joint: usize, size: f64, zero: f64, gas: f64 } other gas != 0.0 => {
         let bend = (now.q(joint) - zero).sin();
         -(size * bend * (1.0 + gas * bend))
     };
     /// A hose: -stiffness (q - zero), Nm/rad; hardening in another form.
-    Cable "cable_stiffness" at joint { joint: usize, stiffness: f64, zero: f64, hardening: f64 } other hardening != 0.0 => {
+    Cable cable "cable_stiffness" at joint { joint: usize, stiffness: f64, zero: f64, hardening: f64 } other hardening != 0.0 => {
         let bend = now.q(joint) - zero;
         stiffness * bend * (1.0 + hardening * bend * bend)
     };
     /// s that torques are logged late; in another form behind a filter of that time.
-    Latency "current_latency" at "recording" { time: f64, filter: bool } other filter;
+    Latency latency "current_latency" at "recording" { time: f64, filter: bool } other filter;
     /// The gear swings: rad/s and damping ratio.
-    Elasticity "joint_elasticity" at joint { joint: usize, frequency: f64, damping: f64 } other false
+    Elasticity elasticity "joint_elasticity" at joint { joint: usize, frequency: f64, damping: f64 } other false
         => past.swing(now.rigid[joint], frequency, damping, now.step);
     /// Nm after each reversal, and its time, s; in another form half a wave.
-    Backlash "backlash_spikes" at joint { joint: usize, size: f64, time: f64, wave: bool } other wave
+    Backlash backlash "backlash_spikes" at joint { joint: usize, size: f64, time: f64, wave: bool } other wave
         => size * past.knock(now.v(joint), time, wave, now.step);
     /// N at the tool between two times, s: half a wave, in another form a push that is held.
-    Contact "contact" at "arm" { start: f64, end: f64, force: [f64; 3], held: bool } other held;
+    Contact contact "contact" at "arm" { start: f64, end: f64, force: [f64; 3], held: bool } other held;
     /// kg more on the tool, centre off by m.
-    Payload "payload_error" at "tool" { mass: f64, centre: [f64; 3] } other centre != [0.0; 3];
+    Payload payload "payload_error" at "tool" { mass: f64, centre: [f64; 3] } other centre != [0.0; 3];
     /// Share of a link's mass; in another form bolted on so far (m) from its centre.
-    LinkMass "link_mass" at link { link: usize, share: f64, away: [f64; 3] } other away != [0.0; 3];
+    LinkMass link_mass "link_mass" at link { link: usize, share: f64, away: [f64; 3] } other away != [0.0; 3];
     /// m.
-    LinkCentre "link_com" at link { link: usize, shift: [f64; 3] } other false;
+    LinkCentre link_centre "link_com" at link { link: usize, shift: [f64; 3] } other false;
     /// Share of a link's inertia.
-    LinkInertia "link_inertia" at link { link: usize, share: f64 } other false;
+    LinkInertia link_inertia "link_inertia" at link { link: usize, share: f64 } other false;
     /// rad about x and y that the base is tilted by.
-    Tilt "gravity_direction" at "base" { by: [f64; 2] } other false;
+    Tilt tilt "gravity_direction" at "base" { by: [f64; 2] } other false;
     /// No entry of a library: friction of a joint by another one's position, Nm.
-    Meshing "unknown" at joint { joint: usize, by: usize, size: f64, order: f64 } other true
+    Meshing meshing "unknown" at joint { joint: usize, by: usize, size: f64, order: f64 } other true
         => size * (order * now.q(by)).sin() * (2.0 * now.q(joint)).cos();
     /// No entry of a library: friction (Nm) by a random smooth curve of speed, waves (rad s, phase, share) of it.
-    SpeedCurve "unknown" at joint { joint: usize, size: f64, width: f64, waves: [[f64; 3]; 3] } other true
+    SpeedCurve speed_curve "unknown" at joint { joint: usize, size: f64, width: f64, waves: [[f64; 3]; 3] } other true
         => size * sign(now.v(joint), width) * curve(&waves, now.v(joint).abs());
     /// No entry of a library: torque (Nm) by a random smooth curve of the joint's angle that no turn repeats.
-    AngleCurve "unknown" at joint { joint: usize, size: f64, waves: [[f64; 3]; 3] } other true
+    AngleCurve angle_curve "unknown" at joint { joint: usize, size: f64, waves: [[f64; 3]; 3] } other true
         => size * curve(&waves, now.q(joint));
     /// No entry of a library: friction (Nm) that is greater at some angles of the joint, so many a turn.
-    AngleDrag "unknown" at joint { joint: usize, size: f64, width: f64, order: f64, phase: f64 } other true
+    AngleDrag angle_drag "unknown" at joint { joint: usize, size: f64, width: f64, order: f64, phase: f64 } other true
         => size * sign(now.v(joint), width) * (1.0 + (order * now.q(joint) + phase).sin());
     /// No entry of a library: a hose that drags (Nm) and turns over only after a travel of a good part of a radian.
-    HoseDrag "unknown" at joint { joint: usize, size: f64, travel: f64 } other true
+    HoseDrag hose_drag "unknown" at joint { joint: usize, size: f64, travel: f64 } other true
         => size * past.bend(Bristles::One, now.v(joint) * now.step, travel);
 }
 

@@ -116,7 +116,7 @@ impl<'a> Columns<'a> {
                 .sqrt()
                 .recip()
         });
-        let fit = rows.validate.iter().filter(|validate| !**validate).count();
+        let fit = rows.to_fit();
         let stated = rows.state[..fit]
             .iter()
             .flat_map(|state| case.stated.torque(state))
@@ -133,12 +133,7 @@ impl<'a> Columns<'a> {
     fn of(&self, torque: impl Iterator<Item = f64>) -> Vec<f64> {
         let n = self.weight.len();
         let torque: Vec<f64> = torque.collect();
-        let fit = self
-            .rows
-            .validate
-            .iter()
-            .filter(|validate| !**validate)
-            .count();
+        let fit = self.rows.to_fit();
         let mut out = Vec::with_capacity(fit / AVERAGED * n);
         for block in torque[..fit * n].chunks_exact(AVERAGED * n) {
             for (joint, weight) in self.weight.iter().enumerate() {
@@ -197,11 +192,7 @@ impl<'a> Columns<'a> {
             for laws in waves(joint) {
                 add(&laws[0], laws.iter().map(|law| self.of_law(law)).collect());
             }
-            let law = Law::TorqueConstant {
-                joint,
-                share: 0.0,
-                half: f64::INFINITY,
-            };
+            let law = Law::torque_constant(joint, 0.0, f64::INFINITY);
             let own = self
                 .rows
                 .torque
@@ -212,31 +203,15 @@ impl<'a> Columns<'a> {
                 add(&law, vec![self.of(own)]);
             }
             add(
-                &Law::LinkMass {
-                    link: joint,
-                    share: 0.0,
-                    away: [0.0; 3],
-                },
+                &Law::link_mass(joint, 0.0, [0.0; 3]),
                 vec![self.of_machine(|machine| machine.links[joint].mass += 1.0)],
             );
             let centre =
                 (0..3).map(|k| self.of_machine(|machine| machine.links[joint].centre[k] += 0.01));
-            add(
-                &Law::LinkCentre {
-                    link: joint,
-                    shift: [0.0; 3],
-                },
-                centre.collect(),
-            );
+            add(&Law::link_centre(joint, [0.0; 3]), centre.collect());
             let inertia =
                 (0..6).map(|k| self.of_machine(|machine| machine.links[joint].inertia[k] += 0.1));
-            add(
-                &Law::LinkInertia {
-                    link: joint,
-                    share: 0.0,
-                },
-                inertia.collect(),
-            );
+            add(&Law::link_inertia(joint, 0.0), inertia.collect());
         }
         let payload = |change: fn(&mut super::rigid::Body)| {
             self.of_machine(|machine| machine.payload.iter_mut().for_each(change))
@@ -247,15 +222,9 @@ impl<'a> Columns<'a> {
             payload(|body| body.centre[1] += 0.01),
             payload(|body| body.centre[2] += 0.01),
         ];
-        add(
-            &Law::Payload {
-                mass: 0.0,
-                centre: [0.0; 3],
-            },
-            payload,
-        );
+        add(&Law::payload(0.0, [0.0; 3]), payload);
         let tilt = [0, 1].map(|k| self.of_machine(|machine| machine.gravity[k] += 0.1));
-        add(&Law::Tilt { by: [0.0; 2] }, tilt.into());
+        add(&Law::tilt([0.0; 2]), tilt.into());
         rivals
     }
 
@@ -283,21 +252,20 @@ impl<'a> Columns<'a> {
 }
 
 /// Effects of a joint that are linear in their size, in usual forms.
-#[rustfmt::skip]
 fn per_joint(joint: usize) -> [Law; 11] {
     let (size, width, fall) = (1.0, 0.008, Fall::Exponential(1.0));
     [
-        Law::Viscous { joint, size, exponent: 1.0 },
-        Law::Coulomb { joint, size, width },
-        Law::Asymmetric { joint, size, width, by_speed: 0.0 },
-        Law::Stribeck { joint, size, speed: 0.05, fall },
-        Law::Stribeck { joint, size, speed: 0.1, fall },
-        Law::Load { joint, share: 1.0, exponent: 1.0, width },
-        Law::Rotor { joint, inertia: 1.0 },
-        Law::Offset { joint, size, drift: 0.0 },
-        Law::Cable { joint, stiffness: 1.0, zero: 0.0, hardening: 0.0 },
-        Law::Spring { joint, size, zero: 0.0, gas: 0.0 },
-        Law::Spring { joint, size, zero: FRAC_PI_2, gas: 0.0 },
+        Law::viscous(joint, size, 1.0),
+        Law::coulomb(joint, size, width),
+        Law::asymmetric(joint, size, width, 0.0),
+        Law::stribeck(joint, size, 0.05, fall),
+        Law::stribeck(joint, size, 0.1, fall),
+        Law::load(joint, 1.0, 1.0, width),
+        Law::rotor(joint, 1.0),
+        Law::offset(joint, size, 0.0),
+        Law::cable(joint, 1.0, 0.0, 0.0),
+        Law::spring(joint, size, 0.0, 0.0),
+        Law::spring(joint, size, FRAC_PI_2, 0.0),
     ]
 }
 
@@ -305,22 +273,11 @@ fn per_joint(joint: usize) -> [Law; 11] {
 fn waves(joint: usize) -> Vec<Vec<Law>> {
     let phases = [0.0, FRAC_PI_2];
     let ripple = |order: usize| {
-        let law = |phase| Law::Ripple {
-            joint,
-            size: 1.0,
-            order: order as f64,
-            phase,
-            overtone: 0.0,
-        };
+        let law = |phase| Law::ripple(joint, 1.0, order as f64, phase, 0.0);
         phases.map(law).to_vec()
     };
     let balancer = phases
-        .map(|zero| Law::Spring {
-            joint,
-            size: 1.0,
-            zero,
-            gas: 0.0,
-        })
+        .map(|zero| Law::spring(joint, 1.0, zero, 0.0))
         .to_vec();
     std::iter::once(balancer)
         .chain((1..=LARGEST_ORDER).map(ripple))

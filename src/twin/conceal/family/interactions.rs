@@ -168,8 +168,7 @@ pub(super) fn growing_gap(bench: &Bench, form: Form, draw: &mut Noise) -> Option
 }
 
 pub(super) fn bent_link(bench: &Bench, form: Form, draw: &mut Noise) -> Option<Draft> {
-    let long = bench.long_links();
-    let number = *long.get(draw.index(long.len()))?;
+    let number = bench.long_link(draw)?;
     let (power, name) = match form {
         Form::Obvious => (1, "by the cosine of the next joint"),
         Form::Other => (2, "by the squared cosine of the next joint"),

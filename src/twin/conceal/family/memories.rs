@@ -105,8 +105,7 @@ pub(super) fn late_heat(bench: &Bench, form: Form, draw: &mut Noise) -> Option<D
 }
 
 pub(super) fn lagging_link(bench: &Bench, form: Form, draw: &mut Noise) -> Option<Draft> {
-    let long = bench.long_links();
-    let number = *long.get(draw.index(long.len()))?;
+    let number = bench.long_link(draw)?;
     let (core_s, name) = match form {
         Form::Obvious => (0.0, "behind the temperature"),
         Form::Other => (draw.uniform(0.2, 0.5) * bench.end_s, "skin and core"),
