@@ -45,12 +45,14 @@ pub struct Log {
     pub position: Vec<Vector>,
 }
 
+/// A column of every joint: its title, its values if they are known, and how they are written.
+type OfJoints<'a> = (&'a str, Option<&'a Vec<f64>>, &'a dyn Fn(f64) -> String);
+
 impl Log {
     /// controller.csv.
     pub fn controller(&self, decimals: Decimals) -> String {
-        // Columns of every joint: title, values if they are known, and how they are written.
         let angle = |value: f64| fixed(value.to_degrees(), decimals.angle);
-        let of_joints: [(&str, Option<&Vec<f64>>, &dyn Fn(f64) -> String); 4] = [
+        let of_joints: [OfJoints; 4] = [
             ("q{}_deg", Some(&self.q), &angle),
             ("i{}_a", self.current.as_ref(), &|value| fixed(value, 4)),
             ("dir{}", self.direction.as_ref(), &|value| fixed(value, 0)),

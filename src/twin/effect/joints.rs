@@ -532,7 +532,8 @@ impl Stated for JointLogLag {
         self.clock_ms *= by;
     }
     fn truth(&self) -> Vec<TrueValue> {
-        let share = (self.share != 0.0 || self.clock_ms == 0.0).then(|| ("share", "1", self.share));
+        let share =
+            (self.share != 0.0 || self.clock_ms == 0.0).then_some(("share", "1", self.share));
         let time = (self.clock_ms != 0.0).then(|| ("time", "s", self.later()));
         let numbers = share.into_iter().chain(time);
         true_values("joint_log_lag", "recording", "recording", numbers)
