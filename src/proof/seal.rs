@@ -1,11 +1,11 @@
 //! The seal of a set of concealed recordings: `seal.json` holds the SHA-256 of every file of it, as `sha256sum` prints them.
 
-use super::concealed_set::ConcealedSet;
 use crate::error::{Error, Fault, Result};
 use crate::raw;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
+use std::fmt::Debug;
 use std::fs;
 use std::io::ErrorKind;
 use std::path::{Component, Path, PathBuf};
@@ -33,7 +33,7 @@ pub struct Seal {
 }
 
 impl Seal {
-    pub(super) fn new(design: &ConcealedSet) -> Seal {
+    pub(super) fn new(design: &impl Debug) -> Seal {
         Seal {
             calib_seal: FORMAT,
             hash: HASH.into(),
@@ -43,7 +43,7 @@ impl Seal {
     }
 
     /// Whether the set was drawn from this design.
-    pub fn is_of(&self, design: &ConcealedSet) -> bool {
+    pub fn is_of(&self, design: &impl Debug) -> bool {
         self.design == Seal::new(design).design
     }
 

@@ -1,6 +1,5 @@
 //! A set of concealed recordings as a folder: what a user has, and the truth of each apart.
 
-use super::concealed_set::ConcealedSet;
 use super::seal::{RECORDINGS, SEALED, Seal};
 use crate::error::{Error, Result};
 use crate::estimate::threads::in_order;
@@ -8,6 +7,25 @@ use crate::twin::conceal::case::Case;
 use crate::twin::conceal::design::{Content, Design};
 use crate::twin::torque::{TorqueCase, TorqueDesign};
 use std::path::Path;
+
+/// What a set is drawn from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ConcealedSet {
+    /// Points that were measured.
+    Positions(Box<Design>),
+    /// Torques of an arm that moves.
+    Torques(TorqueDesign),
+}
+
+impl ConcealedSet {
+    /// Recordings in it.
+    pub fn cases(&self) -> usize {
+        match self {
+            Self::Positions(design) => design.cases,
+            Self::Torques(design) => design.cases,
+        }
+    }
+}
 
 /// Writes the recordings, their truths and the seal; gives the number of rows. No byte depends on the number of threads.
 pub fn conceal(folder: &Path, set: &ConcealedSet, threads: usize) -> Result<usize> {

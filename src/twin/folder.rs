@@ -11,11 +11,8 @@ const TRACKER_LATER_S: f64 = 1.5;
 /// Decimals of what is written: joint angles in deg and deg/s, coordinates in mm, times in s.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Decimals {
-    /// Decimals of angles.
     pub angle: usize,
-    /// Decimals of coordinates.
     pub length: usize,
-    /// Decimals of times.
     pub time: usize,
 }
 
@@ -48,66 +45,43 @@ pub struct Log {
     pub position: Vec<Vector>,
 }
 
+/// A column of every joint: its title, its values if they are known, and how they are written.
+type OfJoints<'a> = (&'a str, Option<&'a Vec<f64>>, &'a dyn Fn(f64) -> String);
+
 impl Log {
     /// controller.csv.
     pub fn controller(&self, decimals: Decimals) -> String {
-        let numbered =
-            |name: &dyn Fn(usize) -> String| (1..=self.joints).map(name).collect::<Vec<_>>();
+        let angle = |value: f64| fixed(value.to_degrees(), decimals.angle);
+        let of_joints: [OfJoints; 4] = [
+            ("q{}_deg", Some(&self.q), &angle),
+            ("i{}_a", self.current.as_ref(), &|value| fixed(value, 4)),
+            ("dir{}", self.direction.as_ref(), &|value| fixed(value, 0)),
+            ("dq{}_deg_s", self.velocity.as_ref(), &angle),
+        ];
+        let known = || {
+            let known = |(title, values, text)| Some((title, values?, text));
+            of_joints.into_iter().filter_map(known)
+        };
         let mut titles = vec!["point_id".to_string()];
         titles.extend(self.time_s.is_some().then(|| "time_s".into()));
         titles.extend(["use".into(), "payload_kg".into()]);
-        titles.extend(numbered(&|joint| format!("q{joint}_deg")));
-        titles.extend(
-            self.current
-                .iter()
-                .flat_map(|_| numbered(&|joint| format!("i{joint}_a"))),
-        );
-        titles.extend(
-            self.direction
-                .iter()
-                .flat_map(|_| numbered(&|joint| format!("dir{joint}"))),
-        );
-        titles.extend(
-            self.velocity
-                .iter()
-                .flat_map(|_| numbered(&|joint| format!("dq{joint}_deg_s"))),
-        );
+        for (title, ..) in known() {
+            titles.extend((1..=self.joints).map(|joint| title.replace("{}", &joint.to_string())));
+        }
         titles.extend(self.temperature_c.is_some().then(|| "temp_c".into()));
         let mut text = titles.join(",") + "\n";
         for (row, id) in self.id.iter().enumerate() {
-            let joints = row * self.joints..(row + 1) * self.joints;
             let mut cells = vec![word(id)];
-            cells.extend(
-                self.time_s
-                    .iter()
-                    .map(|time| fixed(time[row], decimals.time)),
-            );
+            let time = self.time_s.iter();
+            cells.extend(time.map(|time| fixed(time[row], decimals.time)));
             cells.push(word(&self.usage[row]));
             cells.push(fixed(self.payload_kg[row], 1));
-            cells.extend(
-                self.q[joints.clone()]
-                    .iter()
-                    .map(|angle| fixed(angle.to_degrees(), decimals.angle)),
-            );
-            cells.extend(
-                self.current
-                    .iter()
-                    .flat_map(|all| &all[joints.clone()])
-                    .map(|current| fixed(*current, 4)),
-            );
-            cells.extend(
-                self.direction
-                    .iter()
-                    .flat_map(|all| &all[joints.clone()])
-                    .map(|side| fixed(*side, 0)),
-            );
-            let rates = self.velocity.iter().flat_map(|all| &all[joints.clone()]);
-            cells.extend(rates.map(|rate| fixed(rate.to_degrees(), decimals.angle)));
-            cells.extend(
-                self.temperature_c
-                    .iter()
-                    .map(|celsius| fixed(celsius[row], 2)),
-            );
+            for (_, values, write) in known() {
+                let values = &values[row * self.joints..(row + 1) * self.joints];
+                cells.extend(values.iter().map(|value| write(*value)));
+            }
+            let celsius = self.temperature_c.iter();
+            cells.extend(celsius.map(|celsius| fixed(celsius[row], 2)));
             let _ = writeln!(text, "{}", cells.join(","));
         }
         text

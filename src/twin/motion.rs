@@ -45,6 +45,25 @@ impl Motion {
         }
     }
 
+    /// Moves the base about a point of it, m.
+    pub fn move_base(&mut self, pivot: Vector, by: &Matrix) {
+        let about = matrix::times(by, &matrix::shift(matrix::scale(pivot, -1.0)));
+        self.base = matrix::times(&self.base, &matrix::times(&matrix::shift(pivot), &about));
+    }
+
+    /// Moves the far end of a link (from 0), in its frame.
+    pub fn move_end(&mut self, link: usize, by: &Matrix) {
+        self.link_end[link] = matrix::times(&self.link_end[link], by);
+    }
+
+    /// Moves the axis of a joint (from 0), seen from the body that carries it; the first stands on the base, at its foot.
+    pub fn move_axis(&mut self, foot: Vector, joint: usize, by: &Matrix) {
+        match joint.checked_sub(1) {
+            Some(link) => self.move_end(link, by),
+            None => self.move_base(foot, by),
+        }
+    }
+
     /// The largest difference of any number, rad, m or Nm; the motors' torque does not move the arm.
     pub fn distance(&self, other: &Motion) -> f64 {
         let apart = |a: &Matrix, b: &Matrix| {

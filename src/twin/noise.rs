@@ -54,6 +54,13 @@ impl Noise {
         self.uniform(0.0, 1.0) < probability
     }
 
+    /// Fisher and Yates.
+    pub fn shuffle<T>(&mut self, all: &mut [T]) {
+        for last in (1..all.len()).rev() {
+            all.swap(last, self.index(last + 1));
+        }
+    }
+
     /// +1 or -1.
     pub fn sign(&mut self) -> f64 {
         if self.chance(0.5) { 1.0 } else { -1.0 }

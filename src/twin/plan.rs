@@ -8,6 +8,7 @@ use super::given::GivenPose;
 use super::matrix::{self, Vector};
 use super::motion::Motion;
 use super::noise::{Noise, Purpose};
+use super::statics::Row;
 use calib_foundation::description::RobotDescription;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -170,6 +171,22 @@ pub struct Point {
     pub temperature_c: f64,
     /// Declared mass at the flange, kg.
     pub payload_kg: f64,
+}
+
+impl Point {
+    /// The row of this point, with joints at the gears' outputs and what effects make of the rows before.
+    pub fn row(&self, drive: Vec<f64>, memory: Vec<f64>) -> Row {
+        Row {
+            command: self.q.clone(),
+            drive,
+            direction: self.direction.clone(),
+            time_s: self.time_s,
+            temperature_c: self.temperature_c,
+            payload_kg: self.payload_kg,
+            velocity: Vec::new(),
+            memory,
+        }
+    }
 }
 
 /// Random poses that may be rejected before the plan gives up on a point.

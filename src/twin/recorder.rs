@@ -3,8 +3,8 @@
 
 use super::arm::Arm;
 use super::effect::{self, JointCompliance, Physical};
-use super::equilibrium::{settle, sighted};
-use super::matrix::Vector;
+use super::equilibrium::{Equilibrium, settle, sighted};
+use super::matrix::{Matrix, Vector};
 use super::memory;
 use super::motion::Motion;
 use super::noise::{Noise, Purpose};
@@ -34,7 +34,6 @@ pub struct Experiment<'a> {
     pub robot: &'a RobotDescription,
     /// As it is.
     pub truth: &'a TrueRobot,
-    /// What acts on it besides.
     pub effects: &'a [Physical],
     /// Where it stands and how well it measures.
     pub tracker: &'a Tracker,
@@ -42,7 +41,6 @@ pub struct Experiment<'a> {
     pub motors: &'a Motors,
     /// Standard deviation of each joint from move to move, arcsec (um for a prismatic joint); empty: none.
     pub repeatability_arcsec: &'a [f64],
-    /// Which poses may be measured.
     pub poses: &'a Poses,
     /// In the order of measurement.
     pub blocks: &'a [Block],
@@ -75,6 +73,44 @@ pub struct Shot {
     pub sigma: f64,
     /// Velocities as the controller logs them, rad/s or m/s; empty where the arm stood.
     pub velocity: Vec<f64>,
+}
+
+/// What is measured, and by what.
+struct Scene<'a> {
+    arm: &'a Arm,
+    effects: &'a [Physical],
+    tracker: &'a Tracker,
+    base: Matrix,
+}
+
+impl Scene<'_> {
+    /// A row of a block as the tracker sees it, with joints logged at `q` after a move from `before`; currents and velocities apart.
+    fn shot(
+        &self,
+        (block, row): (usize, Row),
+        mut q: Vec<f64>,
+        before: &[f64],
+        beam: &mut Beam,
+    ) -> (Shot, Equilibrium) {
+        let rest = settle(self.arm, &row, self.effects);
+        let seen = sighted(&rest, &self.base, &row, self.effects);
+        for effect in self.effects {
+            effect.log(&mut q, before);
+        }
+        let shot = Shot {
+            block,
+            q,
+            direction: row.direction,
+            time_s: row.time_s,
+            temperature_c: row.temperature_c,
+            payload_kg: row.payload_kg,
+            current: Vec::new(),
+            position: self.tracker.measure(seen, beam),
+            sigma: self.tracker.sigma(seen),
+            velocity: Vec::new(),
+        };
+        (shot, rest)
+    }
 }
 
 impl Experiment<'_> {
@@ -125,7 +161,12 @@ impl Experiment<'_> {
             )
         });
         let mut memories = effect::recall(&effects, &memory::along(course));
-        let base = self.tracker.base();
+        let scene = Scene {
+            arm: &arm,
+            effects: &effects,
+            tracker: self.tracker,
+            base: self.tracker.base(),
+        };
         let mut beam = Beam::new(self.seed);
         let mut play = Noise::new(self.seed, Purpose::Repeatability);
         let lasts = if way.wander_s > 0.0 {
@@ -147,7 +188,7 @@ impl Experiment<'_> {
         let mut shots = Vec::with_capacity(rows);
         for (row, (block, load)) in blocks.enumerate() {
             let since_s = row as f64 / way.rate_hz;
-            let (mut q, logged) = path.at(since_s);
+            let (q, logged) = path.at(since_s);
             let (command, velocity) = path.at(since_s + later);
             let mut drive = self.truth.drive(self.robot, &command);
             for (((position, astray), sigma), link) in drive
@@ -180,24 +221,10 @@ impl Experiment<'_> {
                 velocity,
                 memory,
             };
-            let rest = settle(&arm, &row, &effects);
-            let seen = sighted(&rest, &base, &row, &effects);
             let before = q.clone();
-            for effect in &effects {
-                effect.log(&mut q, &before);
-            }
-            shots.push(Shot {
-                block,
-                q,
-                direction: row.direction,
-                time_s,
-                temperature_c,
-                payload_kg,
-                current: Vec::new(),
-                position: self.tracker.measure(seen, &mut beam),
-                sigma: self.tracker.sigma(seen),
-                velocity: if way.log_velocity { logged } else { Vec::new() },
-            });
+            let (shot, _) = scene.shot((block, row), q, &before, &mut beam);
+            let velocity = if way.log_velocity { logged } else { Vec::new() };
+            shots.push(Shot { velocity, ..shot });
             tick();
         }
         Ok(shots)
@@ -210,7 +237,12 @@ impl Experiment<'_> {
         for effect in &effects {
             effect.shape(&mut arm);
         }
-        let base = self.tracker.base();
+        let scene = Scene {
+            arm: &arm,
+            effects: &effects,
+            tracker: self.tracker,
+            base: self.tracker.base(),
+        };
         let mut beam = Beam::new(self.seed);
         let mut meter = Noise::new(self.seed, Purpose::Current);
         let mut play = Noise::new(self.seed, Purpose::Repeatability);
@@ -225,44 +257,10 @@ impl Experiment<'_> {
             {
                 *position += sigma * if link.revolute { ARCSEC } else { 1e-6 } * play.normal();
             }
-            let Point {
-                block,
-                before,
-                time_s,
-                temperature_c,
-                payload_kg,
-                ..
-            } = point;
-            let direction = point.direction;
-            let velocity = Vec::new();
-            let row = Row {
-                command: point.q,
-                drive,
-                direction,
-                time_s,
-                temperature_c,
-                payload_kg,
-                velocity,
-                memory,
-            };
-            let rest = settle(&arm, &row, &effects);
-            let seen = sighted(&rest, &base, &row, &effects);
-            let mut q = row.command;
-            for effect in &effects {
-                effect.log(&mut q, &before);
-            }
-            shots.push(Shot {
-                block,
-                current: self.currents(&arm, &rest.torque, &rest.motion, &mut meter),
-                position: self.tracker.measure(seen, &mut beam),
-                sigma: self.tracker.sigma(seen),
-                q,
-                direction: row.direction,
-                time_s,
-                temperature_c,
-                payload_kg,
-                velocity: Vec::new(),
-            });
+            let row = point.row(drive, memory);
+            let (shot, rest) = scene.shot((point.block, row), point.q, &point.before, &mut beam);
+            let current = self.currents(&arm, &rest.torque, &rest.motion, &mut meter);
+            shots.push(Shot { current, ..shot });
             tick();
         }
         shots

@@ -3,15 +3,10 @@
 /// A true number under its canonical name.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrueValue {
-    /// Name of the number.
     pub name: String,
-    /// Canonical name.
     pub effect: &'static str,
-    /// In the words of the interface.
     pub place: String,
-    /// Symbol.
     pub unit: &'static str,
-    /// In `unit`.
     pub value: f64,
 }
 

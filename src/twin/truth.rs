@@ -4,7 +4,7 @@
 //! motion of joint i caused by joint j, which the controller takes out) and e_ij its error.
 
 use super::matrix::Vector;
-use super::true_value::{TrueValue, true_value};
+use super::true_value::{TrueValue, true_value, true_values};
 use calib_foundation::description::{JointKind, RobotDescription};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -151,36 +151,22 @@ impl TrueRobot {
                 "rad/Nm",
                 self.compliance(joint, per_ampere),
             );
-            let (error, link) = (self.link_error(joint), format!("l{}", joint + 1));
+            let error = self.link_error(joint);
             for (axis, letter) in ["x", "y", "z"].into_iter().enumerate() {
+                let (shift, tilt) = (1e3 * error.shift[axis], error.tilt[axis]);
                 if joint + 1 == robot.joints.len() {
-                    out.push(true_value(
+                    out.extend(true_values(
                         "tool_offset",
                         letter,
-                        "tool".into(),
-                        "",
-                        "mm",
-                        1e3 * error.shift[axis],
+                        "tool",
+                        [("", "mm", shift)],
                     ));
                     continue;
                 }
-                let place = format!("link {}", joint + 1);
-                out.push(true_value(
-                    "link_geometry",
-                    &link,
-                    place.clone(),
-                    letter,
-                    "mm",
-                    1e3 * error.shift[axis],
-                ));
-                out.push(true_value(
-                    "link_geometry",
-                    &link,
-                    place,
-                    &format!("r{letter}"),
-                    "rad",
-                    error.tilt[axis],
-                ));
+                let (tag, place) = (format!("l{}", joint + 1), format!("link {}", joint + 1));
+                let turned = format!("r{letter}");
+                let numbers = [(letter, "mm", shift), (turned.as_str(), "rad", tilt)];
+                out.extend(true_values("link_geometry", &tag, &place, numbers));
             }
         }
         for wrong in &self.couplings {

@@ -6,10 +6,10 @@ use crate::error::{Error, Fault, Result, counted, nearest};
 use crate::proof::{ConcealedSet, RECORDINGS, SEAL, conceal, vacant};
 use crate::twin::conceal::design::Design;
 use crate::twin::conceal::family::Collection;
-use crate::twin::conceal::layout::{LAYOUTS, Layout};
+use crate::twin::conceal::layout::LAYOUTS;
 use crate::twin::conceal::robots::ALL_KINDS;
 use crate::twin::torque::TorqueDesign;
-use crate::twin::tracker::{SCATTERS, Scatter};
+use crate::twin::tracker::SCATTERS;
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use std::path::PathBuf;
@@ -242,30 +242,24 @@ fn points(arguments: &ConcealArguments) -> Result<ConcealedSet> {
             allowed.push(family.name);
         }
     }
-    for name in arguments
-        .family
-        .iter()
-        .filter(|name| !allowed.contains(&name.as_str()))
-    {
-        faults.push(unknown("--family", name, &allowed));
-    }
     let kinds: Vec<&str> = ALL_KINDS.iter().map(|kind| kind.name()).collect();
-    for name in arguments
-        .robot
-        .iter()
-        .filter(|name| !kinds.contains(&name.as_str()))
-    {
-        faults.push(unknown("--robot", name, &kinds));
+    for (option, names, allowed) in [
+        ("--family", &arguments.family, &allowed),
+        ("--robot", &arguments.robot, &kinds),
+    ] {
+        let wrong = names
+            .iter()
+            .filter(|name| !allowed.contains(&name.as_str()));
+        faults.extend(wrong.map(|name| unknown(option, name, allowed)));
     }
-    let scatter = arguments.scatter.as_deref().map(|name| {
-        SCATTERS
-            .into_iter()
-            .find(|scatter| scatter.name() == name)
-            .ok_or_else(|| unknown("--scatter", name, &SCATTERS.map(Scatter::name)))
-    });
-    let scatter = scatter.transpose().unwrap_or_else(|fault| {
-        faults.push(fault);
-        None
+    let scatter = arguments.scatter.as_deref();
+    let scatter = scatter.and_then(|name| {
+        named(
+            "--scatter",
+            name,
+            SCATTERS.map(|one| (one.name(), one)),
+            &mut faults,
+        )
     });
     if !(0.0..=500.0).contains(&arguments.tool_mass) {
         faults.push(Fault::new(
@@ -276,17 +270,12 @@ fn points(arguments: &ConcealArguments) -> Result<ConcealedSet> {
             ),
         ));
     }
-    let layout = LAYOUTS
-        .into_iter()
-        .find(|layout| layout.name() == arguments.layout)
-        .unwrap_or_else(|| {
-            faults.push(unknown(
-                "--layout",
-                &arguments.layout,
-                &LAYOUTS.map(Layout::name),
-            ));
-            Layout::default()
-        });
+    let layout = named(
+        "--layout",
+        &arguments.layout,
+        LAYOUTS.map(|one| (one.name(), one)),
+        &mut faults,
+    );
     if !(0.0..=1.0).contains(&arguments.log_step) {
         faults.push(Fault::new(
             "--log-step",
@@ -319,9 +308,23 @@ fn points(arguments: &ConcealArguments) -> Result<ConcealedSet> {
         scatter,
         bare: arguments.bare,
         log_step_deg: arguments.log_step,
-        layout,
+        layout: layout.unwrap_or_default(),
         tool_mass_kg: arguments.tool_mass,
     })))
+}
+
+/// The one of this name; a fault where there is none.
+fn named<T: Copy, const N: usize>(
+    option: &str,
+    name: &str,
+    all: [(&str, T); N],
+    faults: &mut Vec<Fault>,
+) -> Option<T> {
+    let found = all.iter().find(|(known, _)| *known == name);
+    if found.is_none() {
+        faults.push(unknown(option, name, &all.map(|(known, _)| known)));
+    }
+    found.map(|(_, one)| *one)
 }
 
 fn unknown(option: &str, name: &str, allowed: &[&str]) -> Fault {

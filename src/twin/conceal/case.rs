@@ -33,9 +33,7 @@ pub struct Case {
     pub content: Content,
     /// The list that its effects are drawn from.
     pub collection: Collection,
-    /// The seed of this case.
     pub seed: u64,
-    /// Kind of the robot.
     pub kind: Kind,
     /// As its owner believes it to be.
     pub robot: RobotDescription,

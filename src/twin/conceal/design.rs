@@ -11,7 +11,6 @@ use crate::tracker::Scatter;
 pub struct Design {
     /// The same seed gives the same cases.
     pub seed: u64,
-    /// How many.
     pub cases: usize,
     /// The list that effects are drawn from.
     pub collection: Collection,
@@ -23,7 +22,6 @@ pub struct Design {
     pub points: Option<usize>,
     /// Shares of cases without an effect, with two, with one outside every list; the rest has one.
     pub nulls: f64,
-    /// With two effects.
     pub pairs: f64,
     /// With an effect outside every list.
     pub open: f64,
@@ -144,10 +142,7 @@ impl Design {
                 None => Content::Null,
             });
         }
-        // Fisher and Yates.
-        for last in (1..out.len()).rev() {
-            out.swap(last, draw.index(last + 1));
-        }
+        draw.shuffle(&mut out);
         out
     }
 

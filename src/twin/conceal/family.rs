@@ -16,9 +16,9 @@ use super::robots::{ALL_KINDS, KINDS, Kind};
 use crate::arm::Arm;
 use crate::effect::Physical;
 use crate::equilibrium::settle;
+use crate::matrix::{self, Vector};
 use crate::noise::Noise;
 use crate::plan::Point;
-use crate::statics::Row;
 use crate::truth::ARCSEC;
 use calib_foundation::description::RobotDescription;
 
@@ -38,9 +38,7 @@ pub enum Column {
 /// One concealed cause: what a diagnosis should name, and what the twin does for it.
 #[derive(Debug, Clone)]
 pub struct Cause {
-    /// Canonical name.
     pub effect: &'static str,
-    /// In the words of the interface.
     pub place: String,
     /// What makes it.
     pub physical: Vec<Physical>,
@@ -75,6 +73,15 @@ impl Draft {
             hides: Vec::new(),
         }
     }
+    /// A draft of one cause whose size may be changed.
+    fn one(
+        form: &'static str,
+        effect: &'static str,
+        place: impl Into<String>,
+        physical: Vec<Physical>,
+    ) -> Draft {
+        Draft::new(form, vec![sized(effect, place.into(), physical)])
+    }
     fn accepting(mut self, effect: &'static str, place: String) -> Draft {
         self.accepted.push((effect, place));
         self
@@ -103,11 +110,8 @@ fn sized(effect: &'static str, place: String, physical: Vec<Physical>) -> Cause 
 /// A cause of the size that it was drawn with.
 fn fixed(effect: &'static str, place: String, physical: Vec<Physical>) -> Cause {
     Cause {
-        effect,
-        place,
-        physical,
         sized: false,
-        wanted: true,
+        ..sized(effect, place, physical)
     }
 }
 
@@ -165,16 +169,7 @@ impl<'a> Bench<'a> {
                 .map_or(0.0, |point| point.time_s),
         };
         for point in points {
-            let row = Row {
-                command: point.q.clone(),
-                drive: point.q.clone(),
-                direction: point.direction.clone(),
-                time_s: point.time_s,
-                temperature_c: point.temperature_c,
-                payload_kg: point.payload_kg,
-                velocity: Vec::new(),
-                memory: Vec::new(),
-            };
+            let row = point.row(point.q.clone(), Vec::new());
             let rest = settle(&arm, &row, &[]);
             for (peak, torque) in bench.peak.iter_mut().zip(&rest.torque) {
                 *peak = peak.max(torque.abs());
@@ -220,23 +215,24 @@ impl<'a> Bench<'a> {
         list.get(draw.index(list.len())).copied()
     }
 
+    /// From the axis of a joint (from 0) to the next one, or to the tool, m.
+    fn line(&self, index: usize) -> Vector {
+        let next = self.robot.joints.get(index + 1);
+        let end = next.map_or(self.robot.tool, |next| next.point);
+        matrix::minus(end, self.robot.joints[index].point)
+    }
+
     /// Links (from 1) with a length worth the name.
     fn long_links(&self) -> Vec<usize> {
-        let end = |index: usize| {
-            self.robot
-                .joints
-                .get(index + 1)
-                .map_or(self.robot.tool, |next| next.point)
-        };
-        let span = |index: usize| {
-            crate::matrix::norm(crate::matrix::minus(
-                end(index),
-                self.robot.joints[index].point,
-            ))
-        };
         (1..self.joints())
-            .filter(|number| span(number - 1) > 0.15)
+            .filter(|number| matrix::norm(self.line(number - 1)) > 0.15)
             .collect()
+    }
+
+    /// One of them; none where there is none.
+    fn long_link(&self, draw: &mut Noise) -> Option<usize> {
+        let long = self.long_links();
+        long.get(draw.index(long.len())).copied()
     }
 
     /// Wind-up per torque (rad/Nm) that turns a joint by so much under its largest torque.
@@ -263,222 +259,80 @@ impl<'a> Bench<'a> {
     }
 }
 
+/// Draws an effect; none where this robot cannot have it.
+type Draw = fn(&Bench, Form, &mut Noise) -> Option<Draft>;
+
 /// A family of effects.
 pub struct Family {
     /// The canonical name of the effect; `unknown` for what is in no list.
     pub name: &'static str,
-    /// Draws an effect; none where this robot cannot have it.
-    pub draw: fn(&Bench, Form, &mut Noise) -> Option<Draft>,
+    /// Draws one.
+    pub draw: Draw,
     /// May stand beside another one.
     pub paired: bool,
 }
 
+const fn alone(name: &'static str, draw: Draw) -> Family {
+    Family {
+        name,
+        draw,
+        paired: false,
+    }
+}
+
+const fn paired(name: &'static str, draw: Draw) -> Family {
+    Family {
+        paired: true,
+        ..alone(name, draw)
+    }
+}
+
 /// Families in canonical names; several rows of one name are different causes.
 pub const FAMILIES: &[Family] = &[
-    Family {
-        name: "joint_compliance",
-        draw: gears::joint_compliance,
-        paired: true,
-    },
-    Family {
-        name: "joint_hardening",
-        draw: gears::joint_hardening,
-        paired: false,
-    },
-    Family {
-        name: "gear_cyclic",
-        draw: gears::gear_cyclic,
-        paired: true,
-    },
-    Family {
-        name: "gear_motor_cyclic",
-        draw: gears::gear_motor_cyclic,
-        paired: true,
-    },
-    Family {
-        name: "backlash",
-        draw: gears::backlash,
-        paired: true,
-    },
-    Family {
-        name: "axis_wobble",
-        draw: gears::axis_wobble,
-        paired: true,
-    },
-    Family {
-        name: "zero_shift",
-        draw: gears::zero_shift,
-        paired: true,
-    },
-    Family {
-        name: "cable_drag",
-        draw: gears::cable_drag,
-        paired: false,
-    },
-    Family {
-        name: "link_compliance",
-        draw: loads::link_compliance,
-        paired: true,
-    },
-    Family {
-        name: "base_compliance",
-        draw: loads::base_compliance,
-        paired: true,
-    },
-    Family {
-        name: "counterbalance",
-        draw: loads::counterbalance,
-        paired: false,
-    },
-    Family {
-        name: "link_mass",
-        draw: loads::link_mass,
-        paired: false,
-    },
-    Family {
-        name: "payload_error",
-        draw: loads::payload_error,
-        paired: false,
-    },
-    Family {
-        name: "thermal_growth",
-        draw: mounts::thermal_growth,
-        paired: true,
-    },
-    Family {
-        name: "tool_shift",
-        draw: mounts::tool_shift,
-        paired: true,
-    },
-    Family {
-        name: "base_shift",
-        draw: mounts::base_shift,
-        paired: true,
-    },
-    Family {
-        name: "tracker_drift",
-        draw: mounts::tracker_drift,
-        paired: true,
-    },
-    Family {
-        name: "joint_log_lag",
-        draw: mounts::joint_log_lag,
-        paired: false,
-    },
-    Family {
-        name: "tracker_scale",
-        draw: mounts::tracker_scale,
-        paired: false,
-    },
-    Family {
-        name: "unknown",
-        draw: unlisted::bump,
-        paired: false,
-    },
-    Family {
-        name: "unknown",
-        draw: unlisted::hinge,
-        paired: false,
-    },
-    Family {
-        name: "unknown",
-        draw: unlisted::product,
-        paired: false,
-    },
-    Family {
-        name: "unknown",
-        draw: unlisted::sway,
-        paired: false,
-    },
+    paired("joint_compliance", gears::joint_compliance),
+    alone("joint_hardening", gears::joint_hardening),
+    paired("gear_cyclic", gears::gear_cyclic),
+    paired("gear_motor_cyclic", gears::gear_motor_cyclic),
+    paired("backlash", gears::backlash),
+    paired("axis_wobble", gears::axis_wobble),
+    paired("zero_shift", gears::zero_shift),
+    alone("cable_drag", gears::cable_drag),
+    paired("link_compliance", loads::link_compliance),
+    paired("base_compliance", loads::base_compliance),
+    alone("counterbalance", loads::counterbalance),
+    alone("link_mass", loads::link_mass),
+    alone("payload_error", loads::payload_error),
+    paired("thermal_growth", mounts::thermal_growth),
+    paired("tool_shift", mounts::tool_shift),
+    paired("base_shift", mounts::base_shift),
+    paired("tracker_drift", mounts::tracker_drift),
+    alone("joint_log_lag", mounts::joint_log_lag),
+    alone("tracker_scale", mounts::tracker_scale),
+    alone("unknown", unlisted::bump),
+    alone("unknown", unlisted::hinge),
+    alone("unknown", unlisted::product),
+    alone("unknown", unlisted::sway),
 ];
 
 /// Families of physics that no list of effects holds yet: instruments, memory, interactions.
 pub const BEYOND: &[Family] = &[
-    Family {
-        name: "tracker_circle",
-        draw: instruments::circle,
-        paired: false,
-    },
-    Family {
-        name: "tracker_elevation",
-        draw: instruments::elevation,
-        paired: false,
-    },
-    Family {
-        name: "tracker_offset",
-        draw: instruments::offset,
-        paired: false,
-    },
-    Family {
-        name: "tracker_refraction",
-        draw: instruments::refraction,
-        paired: false,
-    },
-    Family {
-        name: "unknown",
-        draw: instruments::swing,
-        paired: false,
-    },
-    Family {
-        name: "base_shift",
-        draw: instruments::knock,
-        paired: false,
-    },
-    Family {
-        name: "presliding",
-        draw: memories::presliding,
-        paired: false,
-    },
-    Family {
-        name: "joint_warming",
-        draw: memories::own_heat,
-        paired: false,
-    },
-    Family {
-        name: "joint_warming",
-        draw: memories::late_heat,
-        paired: false,
-    },
-    Family {
-        name: "thermal_growth",
-        draw: memories::lagging_link,
-        paired: false,
-    },
-    Family {
-        name: "gear_load",
-        draw: interactions::gear_load,
-        paired: false,
-    },
-    Family {
-        name: "gear_flank",
-        draw: interactions::gear_flank,
-        paired: false,
-    },
-    Family {
-        name: "joint_warming",
-        draw: interactions::warm_ratio,
-        paired: false,
-    },
-    Family {
-        name: "joint_warming",
-        draw: interactions::warm_spring,
-        paired: false,
-    },
-    Family {
-        name: "backlash",
-        draw: interactions::spring_by_direction,
-        paired: false,
-    },
-    Family {
-        name: "backlash",
-        draw: interactions::growing_gap,
-        paired: false,
-    },
-    Family {
-        name: "unknown",
-        draw: interactions::bent_link,
-        paired: false,
-    },
+    alone("tracker_circle", instruments::circle),
+    alone("tracker_elevation", instruments::elevation),
+    alone("tracker_offset", instruments::offset),
+    alone("tracker_refraction", instruments::refraction),
+    alone("unknown", instruments::swing),
+    alone("base_shift", instruments::knock),
+    alone("presliding", memories::presliding),
+    alone("joint_warming", memories::own_heat),
+    alone("joint_warming", memories::late_heat),
+    alone("thermal_growth", memories::lagging_link),
+    alone("gear_load", interactions::gear_load),
+    alone("gear_flank", interactions::gear_flank),
+    alone("joint_warming", interactions::warm_ratio),
+    alone("joint_warming", interactions::warm_spring),
+    alone("backlash", interactions::spring_by_direction),
+    alone("backlash", interactions::growing_gap),
+    alone("unknown", interactions::bent_link),
 ];
 
 /// What a set of recordings is drawn from.

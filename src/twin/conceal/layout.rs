@@ -65,7 +65,7 @@ impl Layout {
         if self == Self::Shuffled {
             blocks
                 .iter()
-                .for_each(|block| shuffle(&mut out[block.clone()], draw));
+                .for_each(|block| draw.shuffle(&mut out[block.clone()]));
         }
         Ok(out)
     }
@@ -77,11 +77,4 @@ fn curve(from: &[f64], bend: &[f64], to: &[f64], u: f64) -> Vec<f64> {
     joints
         .map(|((a, b), c)| (1.0 - u).powi(2) * a + 2.0 * u * (1.0 - u) * b + u * u * c)
         .collect()
-}
-
-/// Fisher and Yates.
-fn shuffle(poses: &mut [Vec<f64>], draw: &mut Noise) {
-    for last in (1..poses.len()).rev() {
-        poses.swap(last, draw.index(last + 1));
-    }
 }

@@ -15,9 +15,7 @@ pub const VALIDATE: usize = 1;
 /// How many points, and which of them twice.
 #[derive(Debug, Clone, Copy)]
 pub struct Amount {
-    /// To fit.
     pub fit: usize,
-    /// To judge by.
     pub validate: usize,
     /// Share of points that repeat the one before.
     pub repeated: f64,

@@ -11,7 +11,6 @@ use crate::noise::Noise;
 pub struct Concealed {
     /// What acts.
     pub cause: Cause,
-    /// The word for its form.
     pub form: &'static str,
     /// Made by a formula that a library is not expected to hold; stated of what lies beyond the library.
     pub strange: bool,
@@ -39,6 +38,14 @@ impl Sight<'_> {
     /// Visibility of a displacement that nothing absorbs.
     fn strength(&self, column: &[f64]) -> f64 {
         (norm(column) / self.noise).powi(2)
+    }
+}
+
+impl Cause {
+    fn scale(&mut self, by: f64) {
+        for effect in &mut self.physical {
+            *effect = effect.scaled(by);
+        }
     }
 }
 
@@ -123,12 +130,7 @@ pub(super) fn size(
         // What is of natural size stays so, but where it would be too plain to test anything.
         let wanted = if natural { found.min(PLAINEST) } else { wanted };
         let factor = (wanted / found).sqrt().clamp(SMALLEST, LARGEST);
-        let cause = &mut causes[index].0;
-        cause.physical = cause
-            .physical
-            .iter()
-            .map(|effect| effect.scaled(factor))
-            .collect();
+        causes[index].0.scale(factor);
     }
     seen(causes, sight)
 }
@@ -217,12 +219,7 @@ pub(super) fn beyond(
             // The others absorb what they can, as geometry does.
             let found = seen(causes.clone(), sight)[index].strength.max(1e-9);
             let factor = (wanted / found).sqrt().clamp(SMALLEST, largest);
-            let cause = &mut causes[index].0;
-            cause.physical = cause
-                .physical
-                .iter()
-                .map(|effect| effect.scaled(factor))
-                .collect();
+            causes[index].0.scale(factor);
         }
         let mut concealed = seen(causes, sight);
         concealed
@@ -259,12 +256,7 @@ pub(super) fn drawn(
         for _ in 0..2 {
             let whole = alone(&causes, 0, sight.site);
             let found = norm(&whole) / (whole.len().max(1) as f64).sqrt() / sight.noise;
-            let cause = &mut causes[0].0;
-            cause.physical = cause
-                .physical
-                .iter()
-                .map(|effect| effect.scaled(ratio / found.max(1e-6)))
-                .collect();
+            causes[0].0.scale(ratio / found.max(1e-6));
         }
         let mut concealed = seen(causes, sight);
         concealed.iter_mut().for_each(|one| one.strange = true);

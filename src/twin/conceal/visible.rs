@@ -56,16 +56,7 @@ impl Site<'_> {
             .iter()
             .zip(memories)
             .map(move |(point, memory)| {
-                let row = Row {
-                    command: point.q.clone(),
-                    drive: self.truth.drive(self.robot, &point.q),
-                    direction: point.direction.clone(),
-                    time_s: point.time_s,
-                    temperature_c: point.temperature_c,
-                    payload_kg: point.payload_kg,
-                    velocity: Vec::new(),
-                    memory,
-                };
+                let row = point.row(self.truth.drive(self.robot, &point.q), memory);
                 let rest = settle(&arm, &row, effects);
                 (row, rest)
             })
@@ -98,7 +89,7 @@ impl Site<'_> {
             for (index, effect) in effects.iter().enumerate() {
                 if let Physical::Foreign(foreign) = effect {
                     let memory = row.memory.get(index).copied().unwrap_or(0.0);
-                    let point = if foreign.is_sighted() {
+                    let point = if foreign.motion.is_sighted() {
                         there
                     } else {
                         rest.posture.tool

@@ -1,11 +1,5 @@
 //! An effect that nobody listed: a drawn shape of one variable, or a product of two, in one direction of motion anywhere on the chain.
 
-mod shape;
-mod variable;
-
-pub use shape::ForeignShape;
-pub use variable::ForeignVariable;
-
 use super::{Act, Motion, State, Stated, TrueValue, true_value};
 use crate::matrix::{self, Matrix, Vector};
 use crate::memory::Moment;
@@ -14,7 +8,6 @@ use crate::statics::Row;
 use crate::truth::ARCSEC;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use variable::Seen;
 
 /// What it moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -42,6 +35,13 @@ pub enum ForeignMotion {
     Azimuth,
     /// Elevation.
     Elevation,
+}
+
+impl ForeignMotion {
+    /// Whether it acts in what the instrument reads, and not on the arm.
+    pub fn is_sighted(self) -> bool {
+        matches!(self, Self::Range | Self::Azimuth | Self::Elevation)
+    }
 }
 
 /// `size * shape(variable)`, or the product of two shapes.
@@ -125,14 +125,6 @@ impl Foreign {
         }
     }
 
-    /// Whether it acts in what the instrument reads, and not on the arm.
-    pub fn is_sighted(&self) -> bool {
-        matches!(
-            self.motion,
-            ForeignMotion::Range | ForeignMotion::Azimuth | ForeignMotion::Elevation
-        )
-    }
-
     /// Product of the shapes in what is seen.
     fn share(&self, seen: &Seen) -> f64 {
         self.courses
@@ -166,21 +158,14 @@ impl Act for Foreign {
         };
         let share = self.share(&seen);
         let index = self.seat - 1;
-        let end = |motion: &mut Motion, link: usize| {
-            motion.link_end[link] = matrix::times(&motion.link_end[link], &self.step(share));
-        };
         match self.motion {
             ForeignMotion::JointTurn => motion.joint[index] += ARCSEC * self.size * share,
-            ForeignMotion::JointShift | ForeignMotion::JointTilt if index == 0 => {
-                // The first axis stands on the base: about its own foot.
-                let foot = state.arm.foot;
-                let about =
-                    matrix::times(&self.step(share), &matrix::shift(matrix::scale(foot, -1.0)));
-                motion.base =
-                    matrix::times(&motion.base, &matrix::times(&matrix::shift(foot), &about));
+            ForeignMotion::JointShift | ForeignMotion::JointTilt => {
+                motion.move_axis(state.arm.foot, index, &self.step(share));
             }
-            ForeignMotion::JointShift | ForeignMotion::JointTilt => end(motion, index - 1),
-            ForeignMotion::LinkShift | ForeignMotion::LinkBend => end(motion, index),
+            ForeignMotion::LinkShift | ForeignMotion::LinkBend => {
+                motion.move_end(index, &self.step(share));
+            }
             ForeignMotion::BaseShift | ForeignMotion::BaseTurn => {
                 motion.base = matrix::times(&self.step(share), &motion.base);
             }
@@ -196,34 +181,23 @@ impl Act for Foreign {
             .unwrap_or_default()
     }
     fn sight(&self, row: &Row, memory: f64, point: Vector) -> Vector {
-        let by = || {
-            self.size
-                * self.share(&Seen {
-                    row,
-                    memory,
-                    torque: &[],
-                    point,
-                })
-        };
-        let polar = Polar::of(point);
-        match self.motion {
-            ForeignMotion::Range => Polar {
-                range: polar.range + 1e-6 * by(),
-                ..polar
-            }
-            .point(),
-            ForeignMotion::Azimuth => Polar {
-                azimuth: polar.azimuth + ARCSEC * by(),
-                ..polar
-            }
-            .point(),
-            ForeignMotion::Elevation => Polar {
-                elevation: polar.elevation + ARCSEC * by(),
-                ..polar
-            }
-            .point(),
-            _ => point,
+        if !self.motion.is_sighted() {
+            return point;
         }
+        let seen = Seen {
+            row,
+            memory,
+            torque: &[],
+            point,
+        };
+        let by = self.size * self.share(&seen);
+        let mut polar = Polar::of(point);
+        match self.motion {
+            ForeignMotion::Range => polar.range += 1e-6 * by,
+            ForeignMotion::Azimuth => polar.azimuth += ARCSEC * by,
+            _ => polar.elevation += ARCSEC * by,
+        }
+        polar.point()
     }
 }
 
@@ -250,6 +224,145 @@ impl Stated for Foreign {
         vec![true_value(
             "unknown", "foreign", place, "size", unit, self.size,
         )]
+    }
+}
+
+/// A variable of a recording; joints count from 1.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ForeignVariable {
+    /// Angle of a joint, rad.
+    Angle(usize),
+    /// Side of approach of a joint, +1 or -1.
+    Approach(usize),
+    /// Travel of a joint in the last move, rad.
+    LastMove(usize),
+    /// Torque on a joint, Nm; the instrument knows none.
+    Load(usize),
+    /// kg.
+    Payload,
+    /// s.
+    Time,
+    /// C.
+    Temperature,
+    /// Where the measured point is along a direction, m: from the base, of the instrument from the instrument.
+    Space(Vector),
+    /// Travel of a joint, of which each move's share fades with a time (s): rad.
+    Relaxing(usize, f64),
+    /// Travel of a joint that sticks and slips beyond a limit (rad): rad.
+    Slipping(usize, f64),
+}
+
+/// What is seen of a row.
+struct Seen<'a> {
+    row: &'a Row,
+    memory: f64,
+    torque: &'a [f64],
+    /// m.
+    point: Vector,
+}
+
+impl ForeignVariable {
+    /// Its value; 0 for a joint that there is not.
+    fn value(&self, seen: &Seen) -> f64 {
+        let of = |all: &[f64], joint: usize| all.get(joint.wrapping_sub(1)).copied().unwrap_or(0.0);
+        match self {
+            Self::Angle(joint) => of(&seen.row.command, *joint),
+            Self::Approach(joint) => of(&seen.row.direction, *joint),
+            Self::Load(joint) => of(seen.torque, *joint),
+            Self::Payload => seen.row.payload_kg,
+            Self::Time => seen.row.time_s,
+            Self::Temperature => seen.row.temperature_c,
+            Self::Space(direction) => matrix::dot(*direction, seen.point),
+            Self::LastMove(_) | Self::Relaxing(..) | Self::Slipping(..) => seen.memory,
+        }
+    }
+
+    /// Its value row by row where it depends on the rows before; else nothing.
+    fn remember(&self, past: &[Moment]) -> Vec<f64> {
+        match *self {
+            Self::LastMove(joint) => past
+                .iter()
+                .map(|moment| moment.travels(joint).last().unwrap_or(0.0))
+                .collect(),
+            Self::Relaxing(joint, time_s) => {
+                let (mut then, mut left) = (0.0, 0.0);
+                let live = |moment: &Moment| {
+                    left = left * (-(moment.time_s - then) / time_s).exp()
+                        + moment.travels(joint).sum::<f64>();
+                    then = moment.time_s;
+                    left
+                };
+                past.iter().map(live).collect()
+            }
+            Self::Slipping(joint, limit) => {
+                let mut stretch: f64 = 0.0;
+                let live = |moment: &Moment| {
+                    moment
+                        .travels(joint)
+                        .for_each(|way| stretch = (stretch + way).max(-limit).min(limit));
+                    stretch
+                };
+                past.iter().map(live).collect()
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    /// Whether it depends on the rows before.
+    pub fn is_remembered(&self) -> bool {
+        matches!(
+            self,
+            Self::LastMove(_) | Self::Relaxing(..) | Self::Slipping(..)
+        )
+    }
+}
+
+/// A function of 0 to 1.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ForeignShape {
+    /// From -1 to 1: for what has two values only.
+    Straight,
+    /// Sum of `amplitude cos(rate x + phase)`, rows of amplitude, rate (rad) and phase (rad).
+    Smooth(Vec<[f64; 3]>),
+    /// Straight pieces between points (x, value) with rising x; outside of them the nearest value.
+    Corners(Vec<[f64; 2]>),
+    /// Steps: pairs (x, value) with rising x, the value from that x on; 0 before the first.
+    Jumps(Vec<[f64; 2]>),
+}
+
+impl ForeignShape {
+    /// At `x`.
+    fn value(&self, x: f64) -> f64 {
+        match self {
+            Self::Straight => 2.0 * x - 1.0,
+            Self::Smooth(waves) => waves
+                .iter()
+                .map(|[amplitude, rate, phase]| amplitude * (rate * x + phase).cos())
+                .sum(),
+            Self::Corners(points) => {
+                let after = points
+                    .iter()
+                    .position(|[at, _]| *at > x)
+                    .unwrap_or(points.len());
+                match (
+                    after.checked_sub(1).and_then(|before| points.get(before)),
+                    points.get(after),
+                ) {
+                    (Some([from, low]), Some([to, high])) => {
+                        low + (high - low) * (x - from) / (to - from)
+                    }
+                    (Some([_, value]), None) | (None, Some([_, value])) => *value,
+                    (None, None) => 0.0,
+                }
+            }
+            Self::Jumps(steps) => steps
+                .iter()
+                .rev()
+                .find(|[at, _]| *at <= x)
+                .map_or(0.0, |[_, value]| *value),
+        }
     }
 }
 

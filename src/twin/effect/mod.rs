@@ -1,57 +1,17 @@
-//! Physical effects of the twin, each by its definition in mechanics. One file each, one line each in [`Physical`].
+//! Physical effects of the twin, each by its definition in mechanics: a row of a table with its numbers, its truth and its law, and a line
+//! in [`Physical`].
 //!
 //! Joints and links count from 1 here, because people write these settings.
 
-mod axis_wobble;
-mod backlash;
-mod backlash_growth;
-mod base_compliance;
-mod base_shift;
-mod base_sway;
-mod cable_drag;
-mod counterbalance;
+mod bodies;
 mod foreign;
-mod gear_cyclic;
-mod gear_eccentricity;
-mod gear_flank;
-mod gear_load;
-mod holding_friction;
-mod joint_bump;
-mod joint_compliance;
-mod joint_hardening;
-mod joint_hinge;
-mod joint_hysteresis;
-mod joint_log_lag;
-mod joint_product;
-mod joint_warming;
-mod link_compliance;
-mod link_hinge;
-mod link_mass;
-mod payload_error;
-mod presliding;
-mod thermal_bow;
-mod thermal_growth;
-mod thermal_lag;
-mod thermal_warm_up;
-mod tool_shift;
-mod tracker_circle;
-mod tracker_drift;
-mod tracker_elevation;
-mod tracker_knock;
-mod tracker_offset;
-mod tracker_refraction;
-mod tracker_scale;
-mod tracker_sway;
-mod viscous_windup;
-mod zero_shift;
+mod joints;
+mod tracker;
 
-pub use cable_drag::Pull;
-pub use counterbalance::Balancer;
-pub use foreign::{ForeignCourse, ForeignMotion, ForeignShape, ForeignVariable};
-pub use joint_hardening::Curve;
-pub use joint_warming::Heat;
-pub use tracker_circle::Circle;
-pub use tracker_drift::Course;
+pub use bodies::*;
+pub use foreign::*;
+pub use joints::*;
+pub use tracker::*;
 
 use super::arm::{Arm, Posture};
 use super::matrix::Vector;
@@ -78,10 +38,42 @@ pub struct State<'a> {
     pub memory: f64,
 }
 
+/// A joint as it is at present.
+struct AtJoint<'a> {
+    /// From 0.
+    joint: usize,
+    state: &'a State<'a>,
+}
+
+impl AtJoint<'_> {
+    /// rad.
+    fn angle(&self) -> f64 {
+        self.state.row.command[self.joint]
+    }
+    /// Nm.
+    fn torque(&self) -> f64 {
+        self.state.torque[self.joint]
+    }
+    /// +1, -1 or 0: its last move.
+    fn side(&self) -> f64 {
+        self.state.row.direction[self.joint]
+    }
+    /// A wave of so many periods per turn of the joint.
+    fn wave(&self, order: f64, phase_deg: f64) -> f64 {
+        (order * self.angle() + phase_deg.to_radians()).sin()
+    }
+}
+
+/// The angle of a joint (from 1), rad; 0 of one that there is not.
+fn angle_of(state: &State, joint: usize) -> f64 {
+    let angle = state.row.command.get(joint.saturating_sub(1));
+    angle.copied().unwrap_or(0.0)
+}
+
 /// An effect of the twin.
 trait Act: Stated {
     /// Adds what the effect does in `state` to `motion`.
-    fn act(&self, state: &State, motion: &mut Motion);
+    fn act(&self, _state: &State, _motion: &mut Motion) {}
     /// Changes what the arm is for the whole recording: masses and centres.
     fn shape(&self, _arm: &mut Arm) {}
     /// What it makes of the rows before at each of them, the row itself included; empty: it has no memory.
@@ -133,48 +125,72 @@ impl<const N: usize> Size for [f64; N] {
     }
 }
 
-/// Declares an effect as it is written in YAML: its numbers; its canonical name; its place, which is the joint or link that a number of
-/// it names (with the end of its tag), or a tag and a place; the numbers that its size is in proportion to; its true numbers as name,
-/// unit and value.
+/// Declares effects as they are written in YAML, a row each: its canonical name; its place, which is the joint or link that a number of it
+/// names (with the end of its tag), or a tag and a place; its numbers; those that its size is in proportion to; its true numbers as name,
+/// unit and value; and its law: what it adds to the turn of its joint, or the functions of [`Act`].
 macro_rules! effect {
-    (@type $(#[$meta:meta])* pub struct $name:ident { $($fields:tt)* } $by:ident $($size:ident)+) => {
-        #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
-        $(#[$meta])*
-        #[serde(deny_unknown_fields)]
-        pub struct $name { $($fields)* }
-        impl $name {
-            fn scale_by(&mut self, $by: f64) {
-                $( $crate::effect::Size::scale(&mut self.$size, $by); )+
-            }
+    ($(#[$meta:meta])* $name:ident $effect:literal at joint $($end:literal)? { $($fields:tt)* } $($more:tt)+) => {
+        $crate::effect::effect! { @seat $(#[$meta])* $name $effect joint $($end)? { joint: usize = "From 1.", $($fields)* } $($more)+ }
+    };
+    ($(#[$meta:meta])* $name:ident $effect:literal at link $($end:literal)? { $($fields:tt)* } $($more:tt)+) => {
+        $crate::effect::effect! {
+            @seat $(#[$meta])* $name $effect link $($end)? { link: usize = "From 1: the body moved by joint N.", $($fields)* } $($more)+
         }
     };
-    ($(#[$meta:meta])* pub struct $name:ident { $($fields:tt)* }
-     $effect:literal at $seat:ident $($end:literal)?, scaled by $($size:ident)+, |$me:ident| $numbers:expr) => {
-        $crate::effect::effect! { @type $(#[$meta])* pub struct $name { $($fields)* } by $($size)+ }
+    (@seat $(#[$meta:meta])* $name:ident $effect:literal $seat:ident $($end:literal)? { $($fields:tt)* }
+     scaled by $($size:ident)+; truth |$me:ident| $numbers:expr; $($law:tt)*) => {
+        $crate::effect::effect! { @type $(#[$meta])* $name { $($fields)* } }
         impl $crate::effect::Stated for $name {
             fn seat(&self) -> Option<usize> {
                 Some(self.$seat)
             }
             fn scale(&mut self, by: f64) {
-                self.scale_by(by);
+                $( $crate::effect::Size::scale(&mut self.$size, by); )+
             }
             fn truth(&$me) -> Vec<$crate::true_value::TrueValue> {
                 let tag = format!(concat!("{}{}", $($end)?), &stringify!($seat)[..1], $me.$seat);
                 $crate::true_value::true_values($effect, &tag, &format!("{} {}", stringify!($seat), $me.$seat), $numbers)
             }
         }
+        $crate::effect::effect! { @act $name $($law)* }
     };
-    ($(#[$meta:meta])* pub struct $name:ident { $($fields:tt)* }
-     $effect:literal of $tag:literal $place:literal, scaled by $($size:ident)+, |$me:ident| $numbers:expr) => {
-        $crate::effect::effect! { @type $(#[$meta])* pub struct $name { $($fields)* } by $($size)+ }
+    ($(#[$meta:meta])* $name:ident $effect:literal of $tag:literal $place:literal { $($fields:tt)* }
+     scaled by $($size:ident)+; truth |$me:ident| $numbers:expr; $($law:tt)*) => {
+        $crate::effect::effect! { @type $(#[$meta])* $name { $($fields)* } }
         impl $crate::effect::Stated for $name {
             fn scale(&mut self, by: f64) {
-                self.scale_by(by);
+                $( $crate::effect::Size::scale(&mut self.$size, by); )+
             }
             fn truth(&$me) -> Vec<$crate::true_value::TrueValue> {
                 $crate::true_value::true_values($effect, $tag, $place, $numbers)
             }
         }
+        $crate::effect::effect! { @act $name $($law)* }
+    };
+    (@type $(#[$meta:meta])* $name:ident { $($(#[$attribute:meta])* $field:ident: $type:ty = $doc:literal,)* }) => {
+        #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
+        $(#[$meta])*
+        #[serde(deny_unknown_fields)]
+        pub struct $name { $( #[doc = $doc] $(#[$attribute])* pub $field: $type, )* }
+        impl $name {
+            /// The effect of these numbers, in the order of its fields.
+            #[allow(clippy::too_many_arguments, reason = "as many as it has numbers")]
+            pub fn effect($($field: $type),*) -> $crate::effect::Physical {
+                $crate::effect::Physical::$name(Self { $($field),* })
+            }
+        }
+    };
+    (@act $name:ident turns |$me:ident, $at:ident| $turn:expr; $($more:tt)*) => {
+        impl $crate::effect::Act for $name {
+            fn act(&$me, state: &$crate::effect::State, motion: &mut $crate::motion::Motion) {
+                let $at = $crate::effect::AtJoint { joint: $me.joint - 1, state };
+                motion.joint[$at.joint] += $turn;
+            }
+            $($more)*
+        }
+    };
+    (@act $name:ident $($functions:tt)*) => {
+        impl $crate::effect::Act for $name { $($functions)* }
     };
 }
 use effect;
@@ -211,12 +227,11 @@ fn by_axis(
 
 /// Declares the list of effects: the name in the YAML is the type's name in snake case.
 macro_rules! physical {
-    ($( $(#[$doc:meta])* $file:ident::$name:ident, )+) => {
-        $( pub use $file::$name; )+
+    ($( $name:ident: $doc:literal, )+) => {
         /// One effect with its numbers, written `- gear_cyclic: {joint: 2, ...}`.
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
         #[serde(rename_all = "snake_case")]
-        pub enum Physical { $( $(#[$doc])* $name($name), )+ }
+        pub enum Physical { $( #[doc = $doc] $name($name), )+ }
         impl Physical {
             fn inner(&self) -> &dyn Act {
                 match self { $( Physical::$name(effect) => effect, )+ }
@@ -229,92 +244,49 @@ macro_rules! physical {
 }
 
 physical! {
-    /// Wind-up proportional to torque.
-    joint_compliance::JointCompliance,
-    /// Wind-up not proportional to torque.
-    joint_hardening::JointHardening,
-    /// Elastic beam between two joints.
-    link_compliance::LinkCompliance,
-    /// The foundation tilts.
-    base_compliance::BaseCompliance,
-    /// Error periodic in the joint angle.
-    gear_cyclic::GearCyclic,
-    /// Error periodic in the motor angle.
-    gear_cyclic::GearMotorCyclic,
-    /// Lost motion by direction of approach.
-    backlash::Backlash,
-    /// Friction that the current shows at rest.
-    holding_friction::HoldingFriction,
-    /// A link grows with temperature.
-    thermal_growth::ThermalGrowth,
-    /// The tracker's frame creeps.
-    tracker_drift::TrackerDrift,
-    /// The tracker's metre is wrong.
-    tracker_scale::TrackerScale,
-    /// A joint's zero steps at some time.
-    zero_shift::ZeroShift,
-    /// The axis tilts as the joint turns.
-    axis_wobble::AxisWobble,
-    /// The base steps at some time.
-    base_shift::BaseShift,
-    /// The base swings slowly.
-    base_sway::BaseSway,
-    /// A hose package pulls on a joint.
-    cable_drag::CableDrag,
-    /// A balancer carries part of a joint's load.
-    counterbalance::Counterbalance,
-    /// Run-out of an eccentric wheel, not a pure sine.
-    gear_eccentricity::GearEccentricity,
-    /// The two flanks of the teeth err differently.
-    gear_flank::GearFlank,
-    /// A joint is wrong near one angle.
-    joint_bump::JointBump,
-    /// A joint's error starts at some angle.
-    joint_hinge::JointHinge,
-    /// The log of the joints is behind.
-    joint_log_lag::JointLogLag,
-    /// A joint's error is a product of two angles.
-    joint_product::JointProduct,
-    /// A link gives way at its middle.
-    link_hinge::LinkHinge,
-    /// A link weighs otherwise than described.
-    link_mass::LinkMass,
-    /// The payload is otherwise than declared.
-    payload_error::PayloadError,
-    /// A link grows with its own warm-up.
-    thermal_warm_up::ThermalWarmUp,
-    /// The reflector steps at some time.
-    tool_shift::ToolShift,
-    /// A joint trails behind while it turns.
-    viscous_windup::ViscousWindup,
-    /// Lost motion that grows with time.
-    backlash_growth::BacklashGrowth,
-    /// Run-out that grows with the load.
-    gear_load::GearLoad,
-    /// Wind-up that depends on the direction of approach.
-    joint_hysteresis::JointHysteresis,
-    /// A joint that is warm by its own work or with the arm.
-    joint_warming::JointWarming,
-    /// Lost motion that builds up over a travel.
-    presliding::Presliding,
-    /// A bent link grows with temperature.
-    thermal_bow::ThermalBow,
-    /// A link grows with a temperature that lags.
-    thermal_lag::ThermalLag,
-    /// The tracker's horizontal circle is off.
-    tracker_circle::TrackerCircle,
-    /// The tracker's head is off in elevation.
-    tracker_elevation::TrackerElevation,
-    /// The tracker's stand is knocked.
-    tracker_knock::TrackerKnock,
-    /// The tracker's ranges are off.
-    tracker_offset::TrackerOffset,
-    /// The tracker's ranges grow with the air's temperature.
-    tracker_refraction::TrackerRefraction,
-    /// The tracker's stand swings slowly.
-    tracker_sway::TrackerSway,
-    /// A drawn shape in one direction of motion.
-    foreign::Foreign,
+    JointCompliance: "Wind-up proportional to torque.",
+    JointHardening: "Wind-up not proportional to torque.",
+    LinkCompliance: "Elastic beam between two joints.",
+    BaseCompliance: "The foundation tilts.",
+    GearCyclic: "Error periodic in the joint angle.",
+    GearMotorCyclic: "Error periodic in the motor angle.",
+    Backlash: "Lost motion by direction of approach.",
+    HoldingFriction: "Friction that the current shows at rest.",
+    ThermalGrowth: "A link grows with temperature.",
+    TrackerDrift: "The tracker's frame creeps.",
+    TrackerScale: "The tracker's metre is wrong.",
+    ZeroShift: "A joint's zero steps at some time.",
+    AxisWobble: "The axis tilts as the joint turns.",
+    BaseShift: "The base steps at some time.",
+    BaseSway: "The base swings slowly.",
+    CableDrag: "A hose package pulls on a joint.",
+    Counterbalance: "A balancer carries part of a joint's load.",
+    GearEccentricity: "Run-out of an eccentric wheel, not a pure sine.",
+    GearFlank: "The two flanks of the teeth err differently.",
+    JointBump: "A joint is wrong near one angle.",
+    JointHinge: "A joint's error starts at some angle.",
+    JointLogLag: "The log of the joints is behind.",
+    JointProduct: "A joint's error is a product of two angles.",
+    LinkHinge: "A link gives way at its middle.",
+    LinkMass: "A link weighs otherwise than described.",
+    PayloadError: "The payload is otherwise than declared.",
+    ThermalWarmUp: "A link grows with its own warm-up.",
+    ToolShift: "The reflector steps at some time.",
+    ViscousWindup: "A joint trails behind while it turns.",
+    BacklashGrowth: "Lost motion that grows with time.",
+    GearLoad: "Run-out that grows with the load.",
+    JointHysteresis: "Wind-up that depends on the direction of approach.",
+    JointWarming: "A joint that is warm by its own work or with the arm.",
+    Presliding: "Lost motion that builds up over a travel.",
+    ThermalBow: "A bent link grows with temperature.",
+    ThermalLag: "A link grows with a temperature that lags.",
+    TrackerCircle: "The tracker's horizontal circle is off.",
+    TrackerElevation: "The tracker's head is off in elevation.",
+    TrackerKnock: "The tracker's stand is knocked.",
+    TrackerOffset: "The tracker's ranges are off.",
+    TrackerRefraction: "The tracker's ranges grow with the air's temperature.",
+    TrackerSway: "The tracker's stand swings slowly.",
+    Foreign: "A drawn shape in one direction of motion.",
 }
 
 impl Physical {

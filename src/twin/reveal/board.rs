@@ -5,6 +5,8 @@ use super::mark::{Case, DUE, HeldOut, Marked, Outcome};
 use super::place::Places;
 use super::reliability::{Reliability, Subject, reliability};
 use super::share::Share;
+use serde::{Serialize, Serializer};
+use serde_json::json;
 use std::collections::BTreeMap;
 
 /// Lower ends of the bins of visibility L.
@@ -51,10 +53,17 @@ impl Counts {
     }
 }
 
+impl Serialize for Counts {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        json!({ "n": self.all(), "exact": self.exact, "in_set": self.in_set, "wrong": self.wrong,
+            "silent": self.silent, "exact_wilson_95": self.exactly().limits() })
+        .serialize(to)
+    }
+}
+
 /// All marked cases.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Board {
-    /// One a recording.
     pub cases: Vec<Case>,
     /// Cases without a verdict, or with one that cannot be read, and why.
     pub missing: Vec<(String, String)>,
@@ -105,46 +114,35 @@ impl Board {
             .collect()
     }
 
+    /// Causes that should be named.
+    fn due(&self) -> impl Iterator<Item = &Marked> {
+        let causes = self.causes().map(|(_, cause)| cause);
+        causes.filter(|cause| cause.strength >= DUE)
+    }
+
+    fn due_by_effect(&self) -> BTreeMap<&str, Vec<&Marked>> {
+        let mut out: BTreeMap<&str, Vec<&Marked>> = BTreeMap::new();
+        for cause in self.due() {
+            out.entry(&cause.effect).or_default().push(cause);
+        }
+        out
+    }
+
     /// Outcomes of due causes by effect.
     pub fn by_effect(&self) -> BTreeMap<&str, Counts> {
-        let mut names: Vec<&str> = self
-            .causes()
-            .map(|(_, cause)| cause.effect.as_str())
-            .collect();
-        names.sort_unstable();
-        names.dedup();
-        let due = |name: &str| {
-            Counts::of(
-                self.causes()
-                    .map(|(_, cause)| cause)
-                    .filter(|cause| cause.effect == name && cause.strength >= DUE),
-            )
-        };
-        names
-            .into_iter()
-            .map(|name| (name, due(name)))
-            .filter(|(_, counts)| counts.all() > 0)
+        let due = self.due_by_effect().into_iter();
+        due.map(|(name, causes)| (name, Counts::of(causes.into_iter())))
             .collect()
     }
 
     /// Places and names of due causes: of all, and by effect.
     pub fn places(&self) -> (Places, BTreeMap<&str, Places>) {
-        let due = || {
-            self.causes()
-                .map(|(_, cause)| cause)
-                .filter(|cause| cause.strength >= DUE)
-        };
-        let of = |name: &str| {
-            Places::of(
-                due()
-                    .filter(|cause| cause.effect == name)
-                    .map(|cause| cause.placed),
-            )
-        };
-        let by_effect = due()
-            .map(|cause| (cause.effect.as_str(), of(&cause.effect)))
-            .collect();
-        (Places::of(due().map(|cause| cause.placed)), by_effect)
+        let by_effect = self.due_by_effect().into_iter().map(|(name, causes)| {
+            let placed = causes.into_iter().map(|cause| cause.placed);
+            (name, Places::of(placed))
+        });
+        let all = Places::of(self.due().map(|cause| cause.placed));
+        (all, by_effect.collect())
     }
 
     /// Recordings with a due effect whose held-out error is near its bound.
@@ -155,12 +153,8 @@ impl Board {
 
     /// Due causes whose formula the library has, or has not: outcomes, and the mean probability that the true name was given.
     pub fn by_formula(&self, shared: bool) -> (Counts, Option<f64>) {
-        let due = || {
-            self.causes()
-                .map(|(_, cause)| cause)
-                .filter(|cause| cause.strength >= DUE)
-        };
-        let own: Vec<&Marked> = due()
+        let own: Vec<&Marked> = self
+            .due()
             .filter(|cause| (cause.strange || OWN_FORMS.contains(&cause.form.as_str())) != shared)
             .collect();
         let stated: Vec<f64> = own.iter().filter_map(|cause| cause.probability).collect();
@@ -171,7 +165,7 @@ impl Board {
     /// Due causes: effect -> what it was called (`=`: rightly; `-`: nothing) -> how often.
     pub fn confusion(&self) -> BTreeMap<&str, BTreeMap<String, usize>> {
         let mut out: BTreeMap<&str, BTreeMap<String, usize>> = BTreeMap::new();
-        for (_, cause) in self.causes().filter(|(_, cause)| cause.strength >= DUE) {
+        for cause in self.due() {
             let called = match (cause.outcome, &cause.said) {
                 (Outcome::Exact, _) => "=".to_string(),
                 (Outcome::InSet, _) => "in the set".to_string(),
@@ -192,22 +186,18 @@ impl Board {
 
     /// Recordings without an effect in which one was declared.
     pub fn alarms(&self) -> Share {
-        Share::of(
-            self.cases
-                .iter()
-                .filter(|case| case.causes.is_empty())
-                .map(|case| !case.strays.is_empty()),
-        )
+        self.named_besides(true)
     }
 
     /// Recordings with effects in which something was named that is not there.
     pub fn strays(&self) -> Share {
-        Share::of(
-            self.cases
-                .iter()
-                .filter(|case| !case.causes.is_empty())
-                .map(|case| !case.strays.is_empty()),
-        )
+        self.named_besides(false)
+    }
+
+    fn named_besides(&self, null: bool) -> Share {
+        let cases = self.cases.iter();
+        let cases = cases.filter(|case| case.causes.is_empty() == null);
+        Share::of(cases.map(|case| !case.strays.is_empty()))
     }
 
     /// Recordings whose causes are all due: all named and nothing else; and the strongest named.
@@ -230,13 +220,8 @@ impl Board {
 
     /// Faults of the recording by kind: how many were named.
     pub fn tampered(&self) -> BTreeMap<&str, Share> {
-        let mut out: BTreeMap<&str, Vec<bool>> = BTreeMap::new();
-        for (kind, named) in self.cases.iter().flat_map(|case| &case.tampered) {
-            out.entry(kind).or_default().push(*named);
-        }
-        out.into_iter()
-            .map(|(kind, named)| (kind, Share::of(named)))
-            .collect()
+        let faults = self.cases.iter().flat_map(|case| &case.tampered);
+        Share::by_kind(faults.map(|(kind, named)| (kind.as_str(), *named)))
     }
 
     /// Held-out errors of recordings with a due effect.
@@ -295,20 +280,9 @@ impl Board {
     /// Stated 95 % intervals that hold the true number, by effect; of recordings in which all due causes were named and nothing
     /// else: the numbers of a wrong model are not those of the truth.
     pub fn intervals(&self) -> BTreeMap<&str, Share> {
-        let mut out: BTreeMap<&str, Vec<bool>> = BTreeMap::new();
-        for interval in self
-            .cases
-            .iter()
-            .filter(|case| case.right(DUE))
-            .flat_map(|case| &case.intervals)
-        {
-            out.entry(&interval.effect)
-                .or_default()
-                .push(interval.holds);
-        }
-        out.into_iter()
-            .map(|(effect, holds)| (effect, Share::of(holds)))
-            .collect()
+        let right = self.cases.iter().filter(|case| case.right(DUE));
+        let all = right.flat_map(|case| &case.intervals);
+        Share::by_kind(all.map(|interval| (interval.effect.as_str(), interval.holds)))
     }
 
     /// Stated probabilities against what was true.

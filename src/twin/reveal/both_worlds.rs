@@ -4,23 +4,22 @@
 use super::board::Board;
 use super::mark::DUE;
 use super::reliability::{Statement, Subject, ends, within};
+use serde::Serialize;
 
 /// Shares of recordings whose cause nobody listed.
 pub const UNLISTED: [f64; 2] = [0.3, 0.5];
 
 /// Statements of both kinds whose probability lies in a range.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MixedBin {
-    /// Lower end.
     pub from: f64,
-    /// Upper end.
     pub to: f64,
-    /// Mean of the stated probabilities.
     pub stated: f64,
     /// The share of statements that held.
     pub right: f64,
     /// How many statements there are with the whole list, and without the cause.
-    pub statements: [usize; 2],
+    pub statements_whole_list: usize,
+    pub statements_left_out: usize,
 }
 
 impl Board {
@@ -60,7 +59,8 @@ fn mixed(statements: [Vec<&Statement>; 2], unlisted: f64) -> Vec<MixedBin> {
             to,
             stated: sum(&|one| one.probability) / all,
             right: sum(&|one| f64::from(u8::from(one.right))) / all,
-            statements: [own[0].len(), own[1].len()],
+            statements_whole_list: own[0].len(),
+            statements_left_out: own[1].len(),
         })
     };
     ends().filter_map(bin).collect()
@@ -87,13 +87,11 @@ mod tests {
         let without = [name(1.0, false), name(1.0, true)];
         let bins = mixed([listed.iter().collect(), without.iter().collect()], 0.25);
         let [second, first] = [bins[1], bins[0]];
-        assert_eq!(
-            (bins.len(), first.statements, first.right),
-            (2, [1, 0], 1.0)
-        );
+        let counts = |bin: MixedBin| [bin.statements_whole_list, bin.statements_left_out];
+        assert_eq!((bins.len(), counts(first), first.right), (2, [1, 0], 1.0));
         // 0.75 x 2 + 0.25 x 1 of 0.75 x 2 + 0.25 x 2.
         assert_eq!(
-            (second.from, second.to, second.statements),
+            (second.from, second.to, counts(second)),
             (0.95, 1.0, [2, 2])
         );
         assert!(

@@ -8,9 +8,7 @@ use calib_foundation::units::Unit;
 /// Whether a stated 95 % interval holds the true number.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Interval {
-    /// Canonical name of the effect.
     pub effect: String,
-    /// Name of the number.
     pub name: String,
     /// Whether it holds the truth.
     pub holds: bool,

@@ -1,7 +1,7 @@
 //! Recordings whose own causes were taken out of the list that a diagnosis may name: what was said in their stead.
 
 use super::mark::DUE;
-use super::paper::{Answer, Atoms, Truth, atoms};
+use super::paper::{Answer, Atoms, Cause, Name, Truth, all_atoms, atoms};
 use super::place::{GIVEN, NAMELESS};
 use super::reliability::{Statement, statements};
 use super::share::Share;
@@ -15,7 +15,6 @@ const CONTENT: [&str; 2] = ["explained", "nothing_missing"];
 /// A recording that was diagnosed without its causes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LeftOut {
-    /// Name of the recording.
     pub name: String,
     /// What was left out.
     pub effect: String,
@@ -25,11 +24,9 @@ pub struct LeftOut {
     pub tells: bool,
     /// The wrong name with the highest probability, `effect at place`.
     pub wrong: Option<(String, f64)>,
-    /// As it was given.
     pub verdict: String,
     /// A finding has the name that was left out.
     pub came_back: bool,
-    /// With a probability.
     pub statements: Vec<Statement>,
 }
 
@@ -44,28 +41,16 @@ pub fn left_out(truth: &Truth, whole: &Answer, without: &Answer) -> Option<LeftO
         .iter()
         .chain(&cause.same)
         .filter(|name| name.effect != cause.effect);
-    let mut known: BTreeSet<(String, String)> = accepted
-        .flat_map(|name| atoms(&name.effect, &name.place))
-        .collect();
-    let places = truth
-        .accepted
-        .iter()
-        .chain(&cause.same)
-        .map(|name| name.place.as_str())
-        .chain([cause.place.as_str()]);
+    let mut known: Atoms = accepted.flat_map(Name::atoms).collect();
+    let places = truth.accepted.iter().chain(&cause.same);
+    let places = places.map(|name| name.place.as_str());
+    let places = places.chain([cause.place.as_str()]);
     known.extend(places.flat_map(|place| atoms(NAMELESS, place)));
-    known.extend(
-        truth
-            .tampered
-            .iter()
-            .flat_map(|fault| atoms(&fault.effect, &fault.place)),
-    );
+    known.extend(all_atoms(&truth.tampered));
     // What else is concealed is no wrong name, wanted or not.
-    let others = truth
-        .effects
-        .iter()
-        .filter(|other| other.effect != cause.effect);
-    known.extend(others.flat_map(|other| atoms(&other.effect, &other.place)));
+    let others = truth.effects.iter();
+    let others = others.filter(|other| other.effect != cause.effect);
+    known.extend(others.flat_map(Cause::atoms));
     let right: Vec<Atoms> = known
         .iter()
         .map(|name| BTreeSet::from([name.clone()]))
@@ -74,7 +59,7 @@ pub fn left_out(truth: &Truth, whole: &Answer, without: &Answer) -> Option<LeftO
         .findings
         .iter()
         .filter(|finding| finding.effect != NAMELESS);
-    let wrong = said.filter(|finding| atoms(&finding.effect, &finding.place).is_disjoint(&known));
+    let wrong = said.filter(|finding| finding.atoms().is_disjoint(&known));
     let strongest = wrong.map(|finding| {
         let name = format!("{} at {}", finding.effect, finding.place);
         (

@@ -1,10 +1,9 @@
 //! One case: what was found of every concealed cause, and what was said that is not there.
 
 use super::interval::{Interval, intervals};
-use super::paper::{Answer, Atoms, Finding, Truth, atoms};
-use super::place::{Placed, placed};
+use super::paper::{Answer, Atoms, Cause, Finding, Name, Rival, Truth, all_atoms, atoms};
+use super::place::{POINT_FAULTS, Placed, placed};
 use super::reliability::{Statement, statements};
-use std::collections::BTreeSet;
 
 /// From this visibility on an effect should be named.
 pub const DUE: f64 = 50.0;
@@ -37,17 +36,13 @@ impl Outcome {
 /// A cause and how it was named.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Marked {
-    /// Canonical name.
     pub effect: String,
-    /// In the words of the interface.
     pub place: String,
-    /// The word for its form.
     pub form: String,
     /// Made by a formula that the library is not expected to hold.
     pub strange: bool,
     /// L, squared visible displacement over the variance of the noise.
     pub strength: f64,
-    /// How it was named.
     pub outcome: Outcome,
     /// Whether its place was found.
     pub placed: Placed,
@@ -60,9 +55,7 @@ pub struct Marked {
 /// Held-out errors against what noise and the parameters' uncertainty leave, rms mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeldOut {
-    /// Error of the base model.
     pub before: f64,
-    /// With the findings.
     pub after: f64,
     /// `floor sqrt(1 + p / (n - p - 1))` with the true noise, p of geometry and of the findings, n coordinates to fit; with it what foreign
     /// effects do beyond what the points to fit show of them, which no model can know.
@@ -85,19 +78,13 @@ impl HeldOut {
 /// A marked case.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Case {
-    /// Name of the recording.
     pub name: String,
     /// What it conceals: null, single, pair or open.
     pub content: String,
-    /// Family of its effect.
     pub family: String,
-    /// Its kind.
     pub robot: String,
-    /// How many were measured.
     pub points: usize,
-    /// As it was given.
     pub verdict: String,
-    /// What was concealed.
     pub causes: Vec<Marked>,
     /// Faults of the recording, and whether each was named.
     pub tampered: Vec<(String, bool)>,
@@ -107,7 +94,6 @@ pub struct Case {
     pub held_out: Option<HeldOut>,
     /// Intervals of the numbers that were stated.
     pub intervals: Vec<Interval>,
-    /// With a probability.
     pub statements: Vec<Statement>,
 }
 
@@ -133,60 +119,27 @@ fn said(finding: &Finding) -> String {
 }
 
 /// Everything that a finding may mean: itself and its rivals.
-fn reach(finding: &Finding) -> BTreeSet<(String, String)> {
-    let rivals = finding
-        .rivals
-        .iter()
-        .flat_map(|rival| atoms(&rival.effect, &rival.place));
-    atoms(&finding.effect, &finding.place)
-        .into_iter()
-        .chain(rivals)
-        .collect()
+fn reach(finding: &Finding) -> Atoms {
+    let rivals = finding.rivals.iter().flat_map(Rival::atoms);
+    finding.atoms().into_iter().chain(rivals).collect()
 }
 
 /// Marks a diagnosis of a case.
 pub fn mark(truth: &Truth, answer: &Answer) -> Case {
-    let found: BTreeSet<_> = answer
-        .findings
-        .iter()
-        .flat_map(|finding| atoms(&finding.effect, &finding.place))
-        .collect();
-    let reached: BTreeSet<_> = answer.findings.iter().flat_map(reach).collect();
-    let accepted: BTreeSet<_> = truth
-        .accepted
-        .iter()
-        .flat_map(|name| atoms(&name.effect, &name.place))
-        .collect();
+    let found: Atoms = answer.findings.iter().flat_map(Finding::atoms).collect();
+    let reached: Atoms = answer.findings.iter().flat_map(reach).collect();
+    let accepted = all_atoms(&truth.accepted);
     let mut known = accepted.clone();
-    known.extend(
-        truth
-            .effects
-            .iter()
-            .flat_map(|cause| atoms(&cause.effect, &cause.place)),
-    );
+    known.extend(truth.effects.iter().flat_map(Cause::atoms));
     // Both kinds of tampering count as known where one is: a swapped pair is two outliers, too.
     if !truth.tampered.is_empty() {
-        known.extend(
-            ["outlier", "mislabelled_point"]
-                .into_iter()
-                .flat_map(|effect| atoms(effect, "recording")),
-        );
+        let faults = POINT_FAULTS.iter();
+        known.extend(faults.flat_map(|effect| atoms(effect, "recording")));
     }
-    let tampered = truth
-        .tampered
-        .iter()
-        .map(|fault| atoms(&fault.effect, &fault.place));
-    let true_names: Vec<Atoms> = truth
-        .effects
-        .iter()
-        .map(|cause| atoms(&cause.effect, &cause.place))
-        .chain(tampered)
-        .collect();
-    let accepted_names: Vec<Atoms> = truth
-        .accepted
-        .iter()
-        .map(|name| atoms(&name.effect, &name.place))
-        .collect();
+    let tampered = truth.tampered.iter().map(Name::atoms);
+    let causes = truth.effects.iter().map(Cause::atoms);
+    let true_names: Vec<Atoms> = causes.chain(tampered).collect();
+    let accepted_names: Vec<Atoms> = truth.accepted.iter().map(Name::atoms).collect();
     let stray = |finding: &&Finding| reach(finding).is_disjoint(&known);
     let strays: Vec<String> = answer.findings.iter().filter(stray).map(said).collect();
     let causes = truth
@@ -194,12 +147,8 @@ pub fn mark(truth: &Truth, answer: &Answer) -> Case {
         .iter()
         .filter(|cause| cause.wanted)
         .map(|cause| {
-            let own = atoms(&cause.effect, &cause.place);
-            let same: Atoms = cause
-                .same
-                .iter()
-                .flat_map(|name| atoms(&name.effect, &name.place))
-                .collect();
+            let own = cause.atoms();
+            let same = all_atoms(&cause.same);
             let outcome = if own.is_subset(&found) || !same.is_disjoint(&found) {
                 Outcome::Exact
             } else if own.is_subset(&reached) || !accepted.is_disjoint(&found) {

@@ -6,9 +6,7 @@ use std::collections::BTreeSet;
 /// An effect and its place.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
 pub struct Name {
-    /// Canonical name.
     pub effect: String,
-    /// In the words of the interface.
     #[serde(rename = "where")]
     pub place: String,
 }
@@ -16,11 +14,8 @@ pub struct Name {
 /// A true number.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Number {
-    /// Name of the parameter.
     pub name: String,
-    /// In `unit`.
     pub value: f64,
-    /// Symbol.
     #[serde(default)]
     pub unit: String,
     /// One standard deviation, if stated.
@@ -31,12 +26,9 @@ pub struct Number {
 /// A concealed cause.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Cause {
-    /// Canonical name.
     pub effect: String,
-    /// In the words of the interface.
     #[serde(rename = "where")]
     pub place: String,
-    /// The word for its form.
     pub form: String,
     /// Made by a formula that the library is not expected to hold.
     #[serde(default)]
@@ -50,7 +42,6 @@ pub struct Cause {
     /// What data cannot separate from it: as good as its own name and place.
     #[serde(default)]
     pub same: Vec<Name>,
-    /// Its true numbers.
     pub parameters: Vec<Number>,
 }
 
@@ -61,9 +52,7 @@ fn yes() -> bool {
 /// How many points.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Points {
-    /// To fit.
     pub fit: usize,
-    /// To judge by.
     pub validate: usize,
 }
 
@@ -82,21 +71,15 @@ pub struct NoiseSize {
 /// The truth of a case; what it holds besides is not needed here.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Truth {
-    /// Name of the recording.
     pub case: String,
     /// `null`, `single`, `pair`, `open`.
     pub content: String,
-    /// Family of its effect.
     pub family: String,
-    /// Its kind.
     pub robot: String,
     /// Names that are right too.
     pub accepted: Vec<Name>,
-    /// What was concealed.
     pub effects: Vec<Cause>,
-    /// Faults of the recording itself.
     pub tampered: Vec<Name>,
-    /// How many points.
     pub points: Points,
     /// Numbers that geometry amounts to.
     #[serde(default)]
@@ -117,12 +100,9 @@ pub struct Errors {
 /// A finding as the diagnosis states it.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Finding {
-    /// Canonical name.
     pub effect: String,
-    /// In the words of the interface.
     #[serde(rename = "where")]
     pub place: String,
-    /// Fitted numbers.
     #[serde(default)]
     pub parameters: Vec<Number>,
     /// Explanations that were not excluded.
@@ -131,7 +111,6 @@ pub struct Finding {
     /// That it is this effect at this place, and that it acts at this place.
     #[serde(default)]
     pub probability: Option<f64>,
-    /// Probability of the place.
     #[serde(default)]
     pub place_probability: Option<f64>,
 }
@@ -139,12 +118,9 @@ pub struct Finding {
 /// Another explanation of a finding.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Rival {
-    /// Canonical name.
     pub effect: String,
-    /// In the words of the interface.
     #[serde(rename = "where")]
     pub place: String,
-    /// Probability of this rival.
     #[serde(default)]
     pub probability: Option<f64>,
 }
@@ -152,12 +128,9 @@ pub struct Rival {
 /// What a diagnosis said.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Answer {
-    /// As it was given.
     pub verdict: String,
-    /// Errors of the base model.
     #[serde(default)]
     pub before: Option<Errors>,
-    /// With the findings.
     #[serde(default)]
     pub after: Option<Errors>,
     /// The strongest first.
@@ -179,4 +152,21 @@ pub(super) fn atoms(effect: &str, place: &str) -> Atoms {
             .collect(),
         None => BTreeSet::from([(effect.to_string(), place.to_string())]),
     }
+}
+
+/// What states an effect and its place.
+macro_rules! named {
+    ($($name:ident)+) => {
+        $( impl $name {
+            pub(super) fn atoms(&self) -> Atoms {
+                atoms(&self.effect, &self.place)
+            }
+        } )+
+    };
+}
+named! { Name Cause Finding Rival }
+
+/// Those of several.
+pub(super) fn all_atoms<'a>(names: impl IntoIterator<Item = &'a Name>) -> Atoms {
+    names.into_iter().flat_map(Name::atoms).collect()
 }

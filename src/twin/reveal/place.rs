@@ -1,11 +1,12 @@
 //! Whether a diagnosis looked in the right place, gave no wrong name, and said `unknown` where it knew no name.
 
-use super::paper::{Atoms, Cause, Finding, Truth, atoms};
+use super::paper::{Atoms, Cause, Finding, Truth, all_atoms};
 use super::share::Share;
+use serde::Serialize;
 use std::collections::BTreeSet;
 
 /// Faults of single points: they say nothing about where a cause sits.
-const POINT_FAULTS: [&str; 2] = ["outlier", "mislabelled_point"];
+pub(super) const POINT_FAULTS: [&str; 2] = ["outlier", "mislabelled_point"];
 /// A name that is stated with this probability or more is given.
 pub const GIVEN: f64 = 0.5;
 /// What has a place and no name.
@@ -37,23 +38,15 @@ pub(super) fn placed(
     known: &Atoms,
     reach: impl Fn(&Finding) -> Atoms,
 ) -> Placed {
-    let own = atoms(&cause.effect, &cause.place);
-    let accepted: Atoms = truth
-        .accepted
-        .iter()
-        .flat_map(|name| atoms(&name.effect, &name.place))
-        .collect();
+    let own = cause.atoms();
+    let accepted = all_atoms(&truth.accepted);
     let right: BTreeSet<&str> = places(&own).union(&places(&accepted)).copied().collect();
-    let others: Atoms = truth
-        .effects
-        .iter()
-        .flat_map(|other| atoms(&other.effect, &other.place))
-        .collect();
+    let others: Atoms = truth.effects.iter().flat_map(Cause::atoms).collect();
     let elsewhere: BTreeSet<&str> = places(&others).difference(&right).copied().collect();
 
     let said: Vec<(&Finding, Atoms)> = findings
         .iter()
-        .map(|finding| (finding, atoms(&finding.effect, &finding.place)))
+        .map(|finding| (finding, finding.atoms()))
         .collect();
     let physical = || {
         said.iter()
@@ -83,19 +76,30 @@ pub(super) fn placed(
 }
 
 /// Shares of causes.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Places {
-    /// Right places.
     pub place: Share,
     /// Right names, or `unknown` at the right place.
     pub name_or_unknown: Share,
-    /// Wrong names.
     pub wrong_name: Share,
     /// Wrong names with a probability of [`GIVEN`] or more.
+    #[serde(rename = "wrong_name_0.5")]
     pub wrong_given: Share,
 }
 
 impl Places {
+    /// Each with a title.
+    pub(super) fn titled(&self) -> [(&'static str, Share); 4] {
+        [
+            ("place right", self.place),
+            (
+                "name right, or unknown at the right place",
+                self.name_or_unknown,
+            ),
+            ("a wrong name at all", self.wrong_name),
+            ("a wrong name with 0.5 or more", self.wrong_given),
+        ]
+    }
     pub(super) fn of(causes: impl Iterator<Item = Placed>) -> Places {
         let all: Vec<Placed> = causes.collect();
         let share = |holds: fn(&Placed) -> bool| Share::of(all.iter().map(holds));

@@ -1,7 +1,8 @@
 //! Stated probabilities against what was true: how often what is said with a probability is right, and the mean squared error of it.
 
-use super::paper::{Atoms, Finding, atoms};
+use super::paper::{Atoms, Finding};
 use super::share::Share;
+use serde::Serialize;
 use std::collections::BTreeSet;
 
 /// What a probability is of.
@@ -28,20 +29,16 @@ impl Subject {
 pub struct Statement {
     /// What it is about.
     pub subject: Subject,
-    /// As it was stated.
     pub probability: f64,
     /// Whether it held.
     pub right: bool,
 }
 
 /// Statements whose probability lies in a range, and how many of them are right.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Bin {
-    /// Lower end.
     pub from: f64,
-    /// Upper end.
     pub to: f64,
-    /// Mean of the stated probabilities.
     pub stated: f64,
     /// Statements that held.
     pub right: Share,
@@ -77,12 +74,12 @@ pub(super) fn statements(
         .collect();
     let mut out = Vec::new();
     for finding in findings {
-        let own = atoms(&finding.effect, &finding.place);
+        let own = finding.atoms();
         let there = own.iter().any(|(_, place)| places.contains(place.as_str()));
         let rivals = finding
             .rivals
             .iter()
-            .map(|rival| (rival.probability, atoms(&rival.effect, &rival.place)));
+            .map(|rival| (rival.probability, rival.atoms()));
         let names: Vec<(Option<f64>, Atoms)> = std::iter::once((finding.probability, own))
             .chain(rivals)
             .collect();

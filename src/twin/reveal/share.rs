@@ -1,11 +1,13 @@
 //! Counts as shares with their uncertainty.
 
+use serde::{Serialize, Serializer};
+use serde_json::json;
+use std::collections::BTreeMap;
+
 /// How many of how many, with Wilson's 95 % limits.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Share {
-    /// So many.
     pub count: usize,
-    /// How many there are in all.
     pub of: usize,
 }
 
@@ -17,6 +19,18 @@ impl Share {
                 count: share.count + usize::from(holds),
                 of: share.of + 1,
             })
+    }
+    /// What holds by kind.
+    pub(super) fn by_kind<'a>(
+        all: impl Iterator<Item = (&'a str, bool)>,
+    ) -> BTreeMap<&'a str, Share> {
+        let mut out: BTreeMap<&str, Share> = BTreeMap::new();
+        for (kind, holds) in all {
+            let share = out.entry(kind).or_default();
+            share.count += usize::from(holds);
+            share.of += 1;
+        }
+        out
     }
     /// The fraction; none of nothing.
     pub fn value(&self) -> Option<f64> {
@@ -37,5 +51,12 @@ impl Share {
             (middle - wide) / (1.0 + z * z / n),
             (middle + wide) / (1.0 + z * z / n),
         ]
+    }
+}
+
+impl Serialize for Share {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        let limits = self.limits();
+        json!({ "count": self.count, "of": self.of, "wilson_95": limits }).serialize(to)
     }
 }

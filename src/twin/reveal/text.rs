@@ -4,8 +4,8 @@ use super::board::{BINS, Board, Company, Counts, NEAR_BOUND};
 use super::both_worlds::{MixedBin, UNLISTED};
 use super::left_out::LeftOutShares;
 use super::mark::{Case, DUE};
-use super::place::{GIVEN, Places};
-use super::reliability::{Bin, Reliability, Subject};
+use super::place::GIVEN;
+use super::reliability::{Reliability, Subject};
 use super::share::Share;
 use calib_foundation::statistics::quantile;
 use serde_json::{Value, json};
@@ -22,6 +22,9 @@ const TOLD: [(&str, bool); 2] = [
     ("where the data can tell", true),
     ("where it cannot", false),
 ];
+
+const SUBJECTS: [Subject; 2] = [Subject::Name, Subject::Place];
+const UNTOLD: &str = "names where the data cannot tell";
 
 impl Board {
     /// The scoreboard as text, mm and percent.
@@ -101,7 +104,7 @@ impl Board {
                 "explained share of the held-out error: median {median:.4}"
             );
         }
-        for subject in [Subject::Name, Subject::Place] {
+        for subject in SUBJECTS {
             tell_reliability(&mut out, subject.name(), &self.reliability(subject));
         }
         self.tell_left_out(&mut out);
@@ -153,23 +156,13 @@ impl Board {
             out,
             "\nplaces and names of effects with L of {DUE} or more\n  effect                     n  place  name or unknown  wrong name"
         );
-        for (
-            effect,
-            Places {
-                place,
-                name_or_unknown,
-                wrong_name,
-                ..
-            },
-        ) in by_effect
-        {
-            let _ = writeln!(
-                out,
-                "  {effect:<22}{:>6}{:>7}{:>17}{:>12}",
-                place.of, place.count, name_or_unknown.count, wrong_name.count
-            );
+        for (effect, of) in by_effect {
+            let counts = [of.place, of.name_or_unknown, of.wrong_name].map(|share| share.count);
+            let [place, name, wrong] = counts;
+            let n = of.place.of;
+            let _ = writeln!(out, "  {effect:<22}{n:>6}{place:>7}{name:>17}{wrong:>12}");
         }
-        for (title, share) in titled(&all) {
+        for (title, share) in all.titled() {
             let _ = writeln!(out, "{title}: {}", percent(&share));
         }
         let near = self.near_bound();
@@ -223,11 +216,7 @@ impl Board {
             }
         }
         if !self.left_out.is_empty() {
-            tell_reliability(
-                out,
-                "names where the data cannot tell",
-                &self.untold_reliability(),
-            );
+            tell_reliability(out, UNTOLD, &self.untold_reliability());
             for unlisted in UNLISTED {
                 let _ = writeln!(
                     out,
@@ -237,14 +226,15 @@ impl Board {
                     out,
                     "  from  to    stated  right   statements with the whole list, and without the cause"
                 );
-                for MixedBin {
-                    from,
-                    to,
-                    stated,
-                    right,
-                    statements: [listed, without],
-                } in self.mixed_reliability(unlisted)
-                {
+                for bin in self.mixed_reliability(unlisted) {
+                    let (listed, without) = (bin.statements_whole_list, bin.statements_left_out);
+                    let MixedBin {
+                        from,
+                        to,
+                        stated,
+                        right,
+                        ..
+                    } = bin;
                     let _ = writeln!(
                         out,
                         "  {from:<4}  {to:<4}  {stated:.3}   {right:.3}   {listed:>4}  {without:>4}"
@@ -281,81 +271,52 @@ impl Board {
 
     /// The scoreboard as JSON.
     pub fn document(&self) -> Value {
-        let share = |share: &Share| json!({ "count": share.count, "of": share.of, "wilson_95": share.limits() });
-        let counts = |counts: &Counts| {
-            json!({ "n": counts.all(), "exact": counts.exact, "in_set": counts.in_set, "wrong": counts.wrong,
-                "silent": counts.silent, "exact_wilson_95": counts.exactly().limits() })
-        };
         let bins = |company| {
-            let by_strength = self.by_strength(company);
-            by_strength
-                .iter()
-                .enumerate()
-                .map(|(bin, of)| json!({ "L": range(bin), "outcomes": counts(of) }))
+            let bins = self.by_strength(company).into_iter().enumerate();
+            bins.map(|(bin, of)| json!({ "L": range(bin), "outcomes": of }))
                 .collect::<Vec<_>>()
         };
         let by_formula = FORMULAS.map(|(_, shared)| {
             let (of, mean) = self.by_formula(shared);
-            json!({ "shared": shared, "outcomes": counts(&of), "mean_probability": mean })
+            json!({ "shared": shared, "outcomes": of, "mean_probability": mean })
         });
-        let reliable = |of: &str, Reliability { bins, brier, auc }: Reliability| {
-            let bin = |bin: &Bin| json!({ "from": bin.from, "to": bin.to, "stated": bin.stated, "right": share(&bin.right) });
-            json!({ "of": of, "brier": brier, "auc": auc, "bins": bins.iter().map(bin).collect::<Vec<_>>() })
+        let reliable = |of: &str, Reliability { bins, brier, auc }| json!({ "of": of, "brier": brier, "auc": auc, "bins": bins });
+        let listed = |shares: &[(String, Share)]| {
+            let shares = shares.iter();
+            let shares = shares.map(|(what, of)| json!({ "what": what.trim(), "share": of }));
+            shares.collect::<Vec<_>>()
         };
-        let reliability = [Subject::Name, Subject::Place]
-            .map(|subject| reliable(subject.name(), self.reliability(subject)));
         let left_out = TOLD.map(|(title, tells)| {
             let shares = LeftOutShares::of(&self.left_out, tells).titled();
-            json!({ "which": title, "shares": shares.iter().map(|(what, of)| json!({ "what": what, "share": share(of) })).collect::<Vec<_>>() })
+            json!({ "which": title, "shares": listed(&shares) })
         });
-        let places = |of: &Places| {
-            let each = [
-                ("place", of.place),
-                ("name_or_unknown", of.name_or_unknown),
-                ("wrong_name", of.wrong_name),
-                ("wrong_name_0.5", of.wrong_given),
-            ];
-            each.iter()
-                .map(|(name, of)| (name.to_string(), share(of)))
-                .collect::<serde_json::Map<_, _>>()
-        };
+        let mixed = UNLISTED.map(
+            |unlisted| json!({ "unlisted": unlisted, "bins": self.mixed_reliability(unlisted) }),
+        );
         let (placed, placed_by_effect) = self.places();
-        let placed_by_effect: serde_json::Map<_, _> = placed_by_effect
-            .iter()
-            .map(|(name, of)| (name.to_string(), json!(places(of))))
-            .collect();
         let [due, null] = self.ratios();
         let spread = |sorted: &[f64]| json!({ "n": sorted.len(), "median": quantile(sorted, 0.5), "p90": quantile(sorted, 0.9) });
+        let missing = self.missing.iter();
         json!({
             "recordings": self.cases.len(),
-            "without_verdict": self.missing.iter().map(|(case, why)| json!({ "case": case, "why": why })).collect::<Vec<_>>(),
+            "without_verdict": missing.map(|(case, why)| json!({ "case": case, "why": why })).collect::<Vec<_>>(),
             "alone": bins(Company::Alone),
             "beside": bins(Company::Beside),
-            "by_effect": self.by_effect().iter().map(|(name, of)| (name.to_string(), counts(of))).collect::<serde_json::Map<_, _>>(),
+            "by_effect": self.by_effect(),
             "by_formula": by_formula,
-            "places": { "all": places(&placed), "by_effect": placed_by_effect },
+            "places": { "all": placed, "by_effect": placed_by_effect },
             "confusion": self.confusion(),
-            "reliability": reliability,
-            "shares": self.shares().iter().map(|(title, of)| json!({ "what": title.trim(), "share": share(of) })).collect::<Vec<_>>(),
-            "intervals": self.intervals().iter().map(|(name, of)| (name.to_string(), share(of))).collect::<serde_json::Map<_, _>>(),
-            "held_out_over_bound": { "due": spread(&due), "null": spread(&null), "due_within_1.15": share(&self.near_bound()), "due_worse": share(&self.worse()), "due_worse_than_bound": share(&self.worse_than_bound()) },
-            "left_out": { "recordings": self.left_out.len(), "worlds": left_out, "reliability": reliable("names where the data cannot tell", self.untold_reliability()),
-                "both_worlds": UNLISTED.map(|unlisted| json!({ "unlisted": unlisted, "bins": self.mixed_reliability(unlisted).iter().map(mixed_bin).collect::<Vec<_>>() })) },
+            "reliability": SUBJECTS.map(|subject| reliable(subject.name(), self.reliability(subject))),
+            "shares": listed(&self.shares()),
+            "intervals": self.intervals(),
+            "held_out_over_bound": { "due": spread(&due), "null": spread(&null), "due_within_1.15": self.near_bound(),
+                "due_worse": self.worse(), "due_worse_than_bound": self.worse_than_bound() },
+            "left_out": { "recordings": self.left_out.len(), "worlds": left_out,
+                "reliability": reliable(UNTOLD, self.untold_reliability()), "both_worlds": mixed },
             "explained_share": spread(&self.explained()),
             "failures": self.failures().map(failure).collect::<Vec<_>>(),
         })
     }
-}
-
-fn mixed_bin(bin: &MixedBin) -> Value {
-    let MixedBin {
-        from,
-        to,
-        stated,
-        right,
-        statements: [listed, without],
-    } = bin;
-    json!({ "from": from, "to": to, "stated": stated, "right": right, "statements_whole_list": listed, "statements_left_out": without })
 }
 
 /// Stated probabilities against what was true.
@@ -370,31 +331,11 @@ fn tell_reliability(out: &mut String, of: &str, Reliability { bins, brier, auc }
         );
         let _ = writeln!(out, "  from  to    stated  right");
     }
-    for Bin {
-        from,
-        to,
-        stated,
-        right,
-    } in bins
-    {
-        let _ = writeln!(
-            out,
-            "  {from:<4}  {to:<4}  {stated:.3}   {}",
-            percent(right)
-        );
+    for bin in bins {
+        let (from, to, stated) = (bin.from, bin.to, bin.stated);
+        let right = percent(&bin.right);
+        let _ = writeln!(out, "  {from:<4}  {to:<4}  {stated:.3}   {right}");
     }
-}
-
-fn titled(all: &Places) -> [(&'static str, Share); 4] {
-    [
-        ("place right", all.place),
-        (
-            "name right, or unknown at the right place",
-            all.name_or_unknown,
-        ),
-        ("a wrong name at all", all.wrong_name),
-        ("a wrong name with 0.5 or more", all.wrong_given),
-    ]
 }
 
 /// E.g. `15-50`.

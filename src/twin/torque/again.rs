@@ -10,26 +10,17 @@ use crate::noise::{Noise, Purpose};
 impl TorqueCase {
     /// The same arm with so much more on the tool (kg), the payload's centre off by so much (m).
     pub fn carrying(self, mass: f64, centre: [f64; 3]) -> Self {
-        self.with(Law::Payload { mass, centre })
+        self.with(Law::payload(mass, centre))
     }
 
     /// The same arm with friction of a joint (from 0) that is greater at low speed (Nm), until so fast (rad/s).
     pub fn with_stribeck(self, joint: usize, size: f64, speed: f64) -> Self {
-        self.with(Law::Stribeck {
-            joint,
-            size,
-            speed,
-            fall: Fall::Exponential(1.0),
-        })
+        self.with(Law::stribeck(joint, size, speed, Fall::Exponential(1.0)))
     }
 
     /// The same arm with so much more Coulomb friction at a joint (from 0), Nm.
     pub fn with_drag(self, joint: usize, size: f64) -> Self {
-        self.with(Law::Coulomb {
-            joint,
-            size,
-            width: 0.008,
-        })
+        self.with(Law::coulomb(joint, size, 0.008))
     }
 
     fn with(mut self, law: Law) -> Self {

@@ -16,12 +16,10 @@ use calib_foundation::description::{
 pub struct TorqueDesign {
     /// The same seed gives the same recordings.
     pub seed: u64,
-    /// How many.
     pub cases: usize,
     /// Shares of recordings without any effect but, in half of them, friction of all joints; with two effects beside that friction; with
     /// one that is in no list. The rest has one.
     pub nulls: f64,
-    /// With two effects.
     pub pairs: f64,
     /// With an effect that is in no list.
     pub open: f64,
@@ -82,9 +80,7 @@ impl TorqueDesign {
     fn family(&self, number: usize) -> usize {
         let mut draw = Noise::new(self.seed, Purpose::Faults);
         let mut order: Vec<usize> = (0..FAMILIES).collect();
-        for last in (1..FAMILIES).rev() {
-            order.swap(last, draw.index(last + 1));
-        }
+        draw.shuffle(&mut order);
         order[number % FAMILIES]
     }
 }
@@ -94,7 +90,6 @@ impl TorqueDesign {
 pub struct TorqueCase {
     /// `torque_017`.
     pub name: String,
-    /// The seed of this recording.
     pub seed: u64,
     /// The arm as its user believes it to be.
     pub robot: RobotDescription,
@@ -206,16 +201,16 @@ impl TorqueCase {
             for (joint, scale) in scale.iter().enumerate() {
                 let other = noise.chance(design.other_forms * 0.3);
                 let exponent = if other { noise.uniform(0.6, 0.8) } else { 1.0 };
-                self.laws.push(Law::Viscous {
+                self.laws.push(Law::viscous(
                     joint,
-                    size: scale * noise.uniform(0.04, 0.12),
+                    scale * noise.uniform(0.04, 0.12),
                     exponent,
-                });
-                self.laws.push(Law::Coulomb {
+                ));
+                self.laws.push(Law::coulomb(
                     joint,
-                    size: scale * noise.uniform(0.05, 0.15),
+                    scale * noise.uniform(0.05, 0.15),
                     width,
-                });
+                ));
             }
         }
         self.common = self.laws.len();

@@ -46,12 +46,7 @@ impl Pool<'_> {
         match family {
             0 => {
                 let by_speed = if other { noise.uniform(0.3, 0.7) } else { 0.0 };
-                Law::Asymmetric {
-                    joint,
-                    size: scale * noise.uniform(0.04, 0.1),
-                    width,
-                    by_speed,
-                }
+                Law::asymmetric(joint, scale * noise.uniform(0.04, 0.1), width, by_speed)
             }
             1 => {
                 let falls = [
@@ -64,12 +59,12 @@ impl Pool<'_> {
                 } else {
                     Fall::Exponential(1.0)
                 };
-                Law::Stribeck {
+                Law::stribeck(
                     joint,
-                    size: scale * noise.uniform(0.08, 0.2),
-                    speed: noise.uniform(0.04, 0.12),
+                    scale * noise.uniform(0.08, 0.2),
+                    noise.uniform(0.04, 0.12),
                     fall,
-                }
+                )
             }
             2 => {
                 let (size, travel) = (scale * noise.uniform(0.08, 0.2), noise.size(0.004, 0.03));
@@ -79,29 +74,23 @@ impl Pool<'_> {
                 } else {
                     Bristles::One
                 };
-                Law::Presliding {
-                    joint,
-                    size,
-                    travel,
-                    width,
-                    bristles,
-                }
+                Law::presliding(joint, size, travel, width, bristles)
             }
             3 => {
                 let exponent: f64 = if other { noise.uniform(0.7, 0.9) } else { 1.0 };
-                Law::Load {
+                Law::load(
                     joint,
-                    share: noise.uniform(0.06, 0.2) * scale.powf(1.0 - exponent),
+                    noise.uniform(0.06, 0.2) * scale.powf(1.0 - exponent),
                     exponent,
                     width,
-                }
+                )
             }
-            _ => Law::Warmup {
+            _ => Law::warmup(
                 joint,
-                share: noise.uniform(0.4, 1.0),
-                time: noise.uniform(6.0, 14.0),
-                slow: other,
-            },
+                noise.uniform(0.4, 1.0),
+                noise.uniform(6.0, 14.0),
+                other,
+            ),
         }
     }
 
@@ -119,21 +108,18 @@ impl Pool<'_> {
                 );
                 let exponent = if other { noise.uniform(0.6, 0.85) } else { 1.0 };
                 let by = last - 1;
-                Law::WristCoupling {
-                    joint: last,
+                Law::wrist_coupling(
+                    last,
                     by,
-                    ratio: noise.sign(),
+                    noise.sign(),
                     viscous,
                     coulomb,
-                    width: self.width,
+                    self.width,
                     exponent,
-                }
+                )
             }
             6 | 7 if self.sensors => return None,
-            6 => Law::Rotor {
-                joint,
-                inertia: scale * noise.uniform(0.03, 0.08),
-            },
+            6 => Law::rotor(joint, scale * noise.uniform(0.03, 0.08)),
             7 => {
                 let share = noise.sign() * noise.uniform(0.06, 0.15);
                 let (times, half) = if other {
@@ -141,30 +127,26 @@ impl Pool<'_> {
                 } else {
                     (1.0, f64::INFINITY)
                 };
-                Law::TorqueConstant {
-                    joint,
-                    share: times * share,
-                    half,
-                }
+                Law::torque_constant(joint, times * share, half)
             }
             8 => {
                 let drift = if other { noise.uniform(0.2, 0.5) } else { 0.0 };
-                Law::Offset {
+                Law::offset(
                     joint,
-                    size: noise.sign() * scale * noise.uniform(0.03, 0.1),
+                    noise.sign() * scale * noise.uniform(0.03, 0.1),
                     drift,
-                }
+                )
             }
             9 => {
                 let order = (1 + noise.index(6)) as f64;
                 let overtone = if other { noise.uniform(0.3, 0.6) } else { 0.0 };
-                Law::Ripple {
+                Law::ripple(
                     joint,
-                    size: scale * noise.uniform(0.02, 0.06),
+                    scale * noise.uniform(0.02, 0.06),
                     order,
-                    phase: noise.uniform(0.0, 6.2),
+                    noise.uniform(0.0, 6.2),
                     overtone,
-                }
+                )
             }
             10 => {
                 let gas = if other {
@@ -173,39 +155,22 @@ impl Pool<'_> {
                     0.0
                 };
                 let size = self.scale[BALANCED] * noise.uniform(0.1, 0.25);
-                Law::Spring {
-                    joint: BALANCED,
-                    size,
-                    zero: angle(noise),
-                    gas,
-                }
+                Law::spring(BALANCED, size, angle(noise), gas)
             }
             11 => {
                 let hardening = if other { noise.uniform(0.2, 0.5) } else { 0.0 };
-                Law::Cable {
+                Law::cable(
                     joint,
-                    stiffness: scale * noise.uniform(0.04, 0.12),
-                    zero: angle(noise),
+                    scale * noise.uniform(0.04, 0.12),
+                    angle(noise),
                     hardening,
-                }
+                )
             }
-            12 => Law::Latency {
-                time: noise.uniform(0.006, 0.02),
-                filter: other,
-            },
-            13 => Law::Elasticity {
-                joint,
-                frequency: noise.uniform(18.0, 35.0),
-                damping: noise.uniform(0.05, 0.2),
-            },
+            12 => Law::latency(noise.uniform(0.006, 0.02), other),
+            13 => Law::elasticity(joint, noise.uniform(18.0, 35.0), noise.uniform(0.05, 0.2)),
             _ => {
                 let time = noise.uniform(0.03, 0.08);
-                Law::Backlash {
-                    joint,
-                    size: scale * noise.uniform(0.06, 0.15),
-                    time,
-                    wave: other,
-                }
+                Law::backlash(joint, scale * noise.uniform(0.06, 0.15), time, other)
             }
         })
     }
@@ -220,12 +185,7 @@ impl Pool<'_> {
                     matrix::norm(matrix::minus(self.machine.tool, self.machine.points[0])).max(0.3);
                 let size = 0.1 * self.scale.iter().copied().fold(0.0, f64::max) / reach;
                 let end = start + noise.uniform(0.8, 1.6);
-                Law::Contact {
-                    start,
-                    end,
-                    force: noise.vector(size, 3.0 * size),
-                    held: other,
-                }
+                Law::contact(start, end, noise.vector(size, 3.0 * size), other)
             }
             16 => {
                 let payload = self
@@ -238,52 +198,43 @@ impl Pool<'_> {
                 } else {
                     [0.0; 3]
                 };
-                Law::Payload {
-                    mass: noise.sign() * payload * noise.uniform(0.1, 0.3),
-                    centre,
-                }
+                Law::payload(noise.sign() * payload * noise.uniform(0.1, 0.3), centre)
             }
             17 => {
                 let (link, share) = (
                     1 + noise.index(n - 2),
                     noise.sign() * noise.uniform(0.06, 0.15),
                 );
-                Law::LinkMass {
+                Law::link_mass(
                     link,
                     share,
-                    away: if other {
+                    if other {
                         noise.vector(0.03, 0.1)
                     } else {
                         [0.0; 3]
                     },
-                }
+                )
             }
-            18 => Law::LinkCentre {
-                link: 1 + noise.index(n - 2),
-                shift: noise.vector(0.02, 0.05),
-            },
-            19 => Law::LinkInertia {
-                link: noise.index(n - 1),
-                share: noise.uniform(0.4, 1.0),
-            },
+            18 => Law::link_centre(1 + noise.index(n - 2), noise.vector(0.02, 0.05)),
+            19 => Law::link_inertia(noise.index(n - 1), noise.uniform(0.4, 1.0)),
             20 => {
                 let [x, y, _] = noise.vector(0.02, 0.05);
-                Law::Tilt { by: [x, y] }
+                Law::tilt([x, y])
             }
             _ if self.common => return None,
             21 => {
                 let exponent = if other { noise.uniform(0.6, 0.8) } else { 1.0 };
-                Law::Viscous {
+                Law::viscous(
                     joint,
-                    size: self.scale[joint] * noise.uniform(0.04, 0.12),
+                    self.scale[joint] * noise.uniform(0.04, 0.12),
                     exponent,
-                }
+                )
             }
-            _ => Law::Coulomb {
+            _ => Law::coulomb(
                 joint,
-                size: self.scale[joint] * noise.uniform(0.05, 0.15),
-                width: self.width,
-            },
+                self.scale[joint] * noise.uniform(0.05, 0.15),
+                self.width,
+            ),
         })
     }
 
@@ -302,45 +253,34 @@ impl Pool<'_> {
         match which {
             0 => {
                 let by = (joint + 1 + noise.index(n - 1)) % n;
-                Law::Meshing {
+                Law::meshing(
                     joint,
                     by,
-                    size: scale * noise.uniform(0.06, 0.15),
-                    order: (2 + noise.index(2)) as f64,
-                }
+                    scale * noise.uniform(0.06, 0.15),
+                    (2 + noise.index(2)) as f64,
+                )
             }
             1 => {
                 let size = scale * noise.uniform(0.05, 0.12);
-                Law::SpeedCurve {
-                    joint,
-                    size,
-                    width: self.width,
-                    waves: waves(noise, [3.0, 9.0]),
-                }
+                Law::speed_curve(joint, size, self.width, waves(noise, [3.0, 9.0]))
             }
             3 => {
                 let (size, order) = (
                     scale * noise.uniform(0.05, 0.12),
                     (1 + noise.index(3)) as f64,
                 );
-                Law::AngleDrag {
-                    joint,
-                    size,
-                    width: self.width,
-                    order,
-                    phase: noise.uniform(0.0, 6.2),
-                }
+                Law::angle_drag(joint, size, self.width, order, noise.uniform(0.0, 6.2))
             }
-            4 => Law::HoseDrag {
+            4 => Law::hose_drag(
                 joint,
-                size: scale * noise.uniform(0.05, 0.15),
-                travel: noise.uniform(0.1, 0.4),
-            },
-            _ => Law::AngleCurve {
+                scale * noise.uniform(0.05, 0.15),
+                noise.uniform(0.1, 0.4),
+            ),
+            _ => Law::angle_curve(
                 joint,
-                size: scale * noise.uniform(0.03, 0.08),
-                waves: waves(noise, [1.3, 5.0]),
-            },
+                scale * noise.uniform(0.03, 0.08),
+                waves(noise, [1.3, 5.0]),
+            ),
         }
     }
 }

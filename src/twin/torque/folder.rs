@@ -13,7 +13,7 @@ pub type TorqueFile = (&'static str, String);
 impl TorqueCase {
     /// robot.json and recording.csv.
     pub fn recording(&self) -> [TorqueFile; 2] {
-        let rows = self.all();
+        let rows = self.true_rows();
         [
             ("robot.json", pretty(&self.robot_json())),
             ("recording.csv", self.csv(&rows)),
@@ -22,7 +22,7 @@ impl TorqueCase {
 
     /// The truth: what is concealed, with its numbers and how visible each effect is.
     pub fn sealed(&self) -> String {
-        let rows = self.all();
+        let rows = self.true_rows();
         let pair = |effect: &str, place: &str| json!({ "effect": effect, "where": place });
         let seen = self.visible(&rows);
         let mut accepted = Vec::new();
@@ -44,17 +44,13 @@ impl TorqueCase {
             }));
         }
         let names: Vec<&str> = self.laws[self.common..].iter().map(Law::name).collect();
-        let to_fit = rows.validate.iter().filter(|validate| !**validate).count();
+        let to_fit = rows.to_fit();
         pretty(&json!({
             "case": self.name, "content": self.content.name(), "family": names.join("+"), "robot": self.robot.name,
             "seed": self.seed, "accepted": accepted, "effects": effects, "tampered": [],
             "points": { "fit": to_fit, "validate": rows.validate.len() - to_fit },
             "noise_nm": { "white": self.white, "lasting": self.lasting },
         }))
-    }
-
-    fn all(&self) -> TorqueRows {
-        self.rows(&(0..self.laws.len()).collect::<Vec<_>>())
     }
 
     fn csv(&self, rows: &TorqueRows) -> String {

@@ -1,4 +1,4 @@
-//! What rigid bodies leave out, by its physical definition: one line of [`Law`] each. Numbers are SI; joints count from 0.
+//! What rigid bodies leave out, by its physical definition: a row of [`laws`] each. Numbers are SI; joints count from 0.
 
 use super::rigid::JointState;
 
@@ -22,161 +22,141 @@ pub enum Bristles {
     Slipping,
 }
 
-/// An effect with its numbers.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Law {
+/// Declares what rigid bodies leave out, a row each: the function that makes it, its canonical name, where it sits (the joint or link that a number names, from 0, or a
+/// place), its numbers, whether they make another form than the usual formula, and what it adds to the torque of its joint, Nm. Rows that
+/// add nothing change the bodies or the recording.
+macro_rules! laws {
+    (|$now:ident, $past:ident| $( $(#[$meta:meta])* $name:ident $make:ident $effect:literal at $seat:tt { $($field:ident: $type:ty),* }
+      other $other:expr $(=> $adds:expr)?; )+) => {
+        /// An effect with its numbers.
+        #[derive(Debug, Clone, PartialEq)]
+        pub enum Law { $( $(#[$meta])* $name { $($field: $type),* }, )+ }
+
+        #[allow(unused_variables, reason = "a row uses some of its numbers here, some there")]
+        impl Law {
+            $( pub(super) fn $make($($field: $type),*) -> Law {
+                Law::$name { $($field),* }
+            } )+
+
+            /// Its canonical name.
+            pub fn name(&self) -> &'static str {
+                match self { $( Self::$name { .. } => $effect, )+ }
+            }
+
+            /// What it sits on, and the number of it, from 0.
+            fn seat(&self) -> (&'static str, Option<usize>) {
+                match *self { $( Self::$name { $($field),* } => laws!(@seat $seat), )+ }
+            }
+
+            /// Whether it has another form than the usual formula.
+            pub(super) fn is_of_another_form(&self) -> bool {
+                match *self { $( Self::$name { $($field),* } => $other, )+ }
+            }
+
+            /// What it adds to the torque of its joint, Nm.
+            fn adds(&self, $now: &Moment, $past: &mut Past) -> Option<f64> {
+                match *self {
+                    $( Self::$name { $($field),* } => {
+                        let all: &[f64] = &[$($adds)?];
+                        all.first().copied()
+                    } )+
+                }
+            }
+        }
+    };
+    (@seat $seat:ident) => { (stringify!($seat), Some($seat)) };
+    (@seat $place:literal) => { ($place, None) };
+}
+
+laws! { |now, past|
     /// Nm s/rad; the exponent of velocity is 1 but in another form.
-    Viscous {
-        joint: usize,
-        size: f64,
-        exponent: f64,
-    },
+    Viscous viscous "viscous_friction" at joint { joint: usize, size: f64, exponent: f64 } other exponent != 1.0
+        => viscous(now.v(joint), size, exponent);
     /// Nm; rises from zero within `width`, rad/s.
-    Coulomb { joint: usize, size: f64, width: f64 },
+    Coulomb coulomb "coulomb_friction" at joint { joint: usize, size: f64, width: f64 } other false
+        => size * sign(now.v(joint), width);
     /// Nm more in the positive direction; in another form it is a share of speed, too.
-    Asymmetric {
-        joint: usize,
-        size: f64,
-        width: f64,
-        by_speed: f64,
-    },
+    Asymmetric asymmetric "asymmetric_friction" at joint { joint: usize, size: f64, width: f64, by_speed: f64 } other by_speed != 0.0
+        => size * ((1.0 - by_speed) * sign(now.v(joint), width).max(0.0) + by_speed * now.v(joint).max(0.0));
     /// Nm more at creeping speed, gone beyond `speed`, rad/s.
-    Stribeck {
-        joint: usize,
-        size: f64,
-        speed: f64,
-        fall: Fall,
-    },
+    Stribeck stribeck "stribeck_friction" at joint { joint: usize, size: f64, speed: f64, fall: Fall } other fall != Fall::Exponential(1.0)
+        => size * sign(now.v(joint), 0.15 * speed) * fall.at(now.v(joint).abs() / speed);
     /// Change of Coulomb friction by bristles that bend over a travel (rad); Nm.
-    Presliding {
-        joint: usize,
-        size: f64,
-        travel: f64,
-        width: f64,
-        bristles: Bristles,
-    },
+    Presliding presliding "presliding_friction" at joint { joint: usize, size: f64, travel: f64, width: f64, bristles: Bristles }
+        other bristles != Bristles::One
+        => size * (past.bend(bristles, now.v(joint) * now.step, travel) - sign(now.v(joint), width));
     /// Friction as a share of what the gear transmits.
-    Load {
-        joint: usize,
-        share: f64,
-        exponent: f64,
-        width: f64,
-    },
+    Load load "load_friction" at joint { joint: usize, share: f64, exponent: f64, width: f64 } other exponent != 1.0
+        => share * now.rigid[joint].abs().powf(exponent) * sign(now.v(joint), width);
     /// Friction that falls as the gear warms up: share at the begin, and time, s; exponential, in another form as 1 / (1 + t / time).
-    Warmup {
-        joint: usize,
-        share: f64,
-        time: f64,
-        slow: bool,
-    },
+    Warmup warmup "warmup_friction" at joint { joint: usize, share: f64, time: f64, slow: bool } other slow => {
+        let cold = if slow { 1.0 / (1.0 + now.time / time) } else { (-now.time / time).exp() };
+        share * cold * now.friction[joint]
+    };
     /// Friction of a coupled pair by v_joint + ratio v_by, on both; the exponent of that velocity is 1 but in another form.
-    WristCoupling {
-        joint: usize,
-        by: usize,
-        ratio: f64,
-        viscous: f64,
-        coulomb: f64,
-        width: f64,
-        exponent: f64,
-    },
+    WristCoupling wrist_coupling "wrist_coupling" at joint {
+        joint: usize, by: usize, ratio: f64, viscous: f64, coulomb: f64, width: f64, exponent: f64
+    } other exponent != 1.0 => {
+        let x = now.v(joint) + ratio * now.v(by);
+        viscous * x.abs().powf(exponent) * x.signum() + coulomb * sign(x, width)
+    };
     /// kg m2 at the joint.
-    Rotor { joint: usize, inertia: f64 },
+    Rotor rotor "rotor_inertia" at joint { joint: usize, inertia: f64 } other false => inertia * now.state.a[joint];
     /// True torque per stated torque, less 1; in another form it falls with torque, to half at so many Nm.
-    TorqueConstant { joint: usize, share: f64, half: f64 },
+    TorqueConstant torque_constant "torque_constant" at joint { joint: usize, share: f64, half: f64 } other half.is_finite();
     /// Nm; in another form a share of it comes only as the sensor warms up, within a quarter of a minute.
-    Offset { joint: usize, size: f64, drift: f64 },
+    Offset offset "current_offset" at joint { joint: usize, size: f64, drift: f64 } other drift != 0.0
+        => size * (1.0 - drift * (-now.time / SENSOR_WARM).exp());
     /// Nm, so many per turn of the joint; in another form with an overtone, as a share.
-    Ripple {
-        joint: usize,
-        size: f64,
-        order: f64,
-        phase: f64,
-        overtone: f64,
-    },
+    Ripple ripple "torque_ripple" at joint { joint: usize, size: f64, order: f64, phase: f64, overtone: f64 } other overtone != 0.0 => {
+        let turn = order * now.q(joint) + phase;
+        size * (turn.sin() + overtone * (2.0 * turn + phase).sin())
+    };
     /// A balancer: -size sin(q - zero), Nm; in another form a gas spring that is stiffer the more it is bent, by a share.
-    Spring {
-        joint: usize,
-        size: f64,
-        zero: f64,
-        gas: f64,
-    },
+    Spring spring "spring_balance" at joint { joint: usize, size: f64, zero: f64, gas: f64 } other gas != 0.0 => {
+        let bend = (now.q(joint) - zero).sin();
+        -(size * bend * (1.0 + gas * bend))
+    };
     /// A hose: -stiffness (q - zero), Nm/rad; hardening in another form.
-    Cable {
-        joint: usize,
-        stiffness: f64,
-        zero: f64,
-        hardening: f64,
-    },
+    Cable cable "cable_stiffness" at joint { joint: usize, stiffness: f64, zero: f64, hardening: f64 } other hardening != 0.0 => {
+        let bend = now.q(joint) - zero;
+        stiffness * bend * (1.0 + hardening * bend * bend)
+    };
     /// s that torques are logged late; in another form behind a filter of that time.
-    Latency { time: f64, filter: bool },
+    Latency latency "current_latency" at "recording" { time: f64, filter: bool } other filter;
     /// The gear swings: rad/s and damping ratio.
-    Elasticity {
-        joint: usize,
-        frequency: f64,
-        damping: f64,
-    },
+    Elasticity elasticity "joint_elasticity" at joint { joint: usize, frequency: f64, damping: f64 } other false
+        => past.swing(now.rigid[joint], frequency, damping, now.step);
     /// Nm after each reversal, and its time, s; in another form half a wave.
-    Backlash {
-        joint: usize,
-        size: f64,
-        time: f64,
-        wave: bool,
-    },
+    Backlash backlash "backlash_spikes" at joint { joint: usize, size: f64, time: f64, wave: bool } other wave
+        => size * past.knock(now.v(joint), time, wave, now.step);
     /// N at the tool between two times, s: half a wave, in another form a push that is held.
-    Contact {
-        start: f64,
-        end: f64,
-        force: [f64; 3],
-        held: bool,
-    },
+    Contact contact "contact" at "arm" { start: f64, end: f64, force: [f64; 3], held: bool } other held;
     /// kg more on the tool, centre off by m.
-    Payload { mass: f64, centre: [f64; 3] },
+    Payload payload "payload_error" at "tool" { mass: f64, centre: [f64; 3] } other centre != [0.0; 3];
     /// Share of a link's mass; in another form bolted on so far (m) from its centre.
-    LinkMass {
-        link: usize,
-        share: f64,
-        away: [f64; 3],
-    },
+    LinkMass link_mass "link_mass" at link { link: usize, share: f64, away: [f64; 3] } other away != [0.0; 3];
     /// m.
-    LinkCentre { link: usize, shift: [f64; 3] },
+    LinkCentre link_centre "link_com" at link { link: usize, shift: [f64; 3] } other false;
     /// Share of a link's inertia.
-    LinkInertia { link: usize, share: f64 },
+    LinkInertia link_inertia "link_inertia" at link { link: usize, share: f64 } other false;
     /// rad about x and y that the base is tilted by.
-    Tilt { by: [f64; 2] },
+    Tilt tilt "gravity_direction" at "base" { by: [f64; 2] } other false;
     /// No entry of a library: friction of a joint by another one's position, Nm.
-    Meshing {
-        joint: usize,
-        by: usize,
-        size: f64,
-        order: f64,
-    },
+    Meshing meshing "unknown" at joint { joint: usize, by: usize, size: f64, order: f64 } other true
+        => size * (order * now.q(by)).sin() * (2.0 * now.q(joint)).cos();
     /// No entry of a library: friction (Nm) by a random smooth curve of speed, waves (rad s, phase, share) of it.
-    SpeedCurve {
-        joint: usize,
-        size: f64,
-        width: f64,
-        waves: [[f64; 3]; 3],
-    },
+    SpeedCurve speed_curve "unknown" at joint { joint: usize, size: f64, width: f64, waves: [[f64; 3]; 3] } other true
+        => size * sign(now.v(joint), width) * curve(&waves, now.v(joint).abs());
     /// No entry of a library: torque (Nm) by a random smooth curve of the joint's angle that no turn repeats.
-    AngleCurve {
-        joint: usize,
-        size: f64,
-        waves: [[f64; 3]; 3],
-    },
+    AngleCurve angle_curve "unknown" at joint { joint: usize, size: f64, waves: [[f64; 3]; 3] } other true
+        => size * curve(&waves, now.q(joint));
     /// No entry of a library: friction (Nm) that is greater at some angles of the joint, so many a turn.
-    AngleDrag {
-        joint: usize,
-        size: f64,
-        width: f64,
-        order: f64,
-        phase: f64,
-    },
+    AngleDrag angle_drag "unknown" at joint { joint: usize, size: f64, width: f64, order: f64, phase: f64 } other true
+        => size * sign(now.v(joint), width) * (1.0 + (order * now.q(joint) + phase).sin());
     /// No entry of a library: a hose that drags (Nm) and turns over only after a travel of a good part of a radian.
-    HoseDrag {
-        joint: usize,
-        size: f64,
-        travel: f64,
-    },
+    HoseDrag hose_drag "unknown" at joint { joint: usize, size: f64, travel: f64 } other true
+        => size * past.bend(Bristles::One, now.v(joint) * now.step, travel);
 }
 
 /// s in which the zero of a sensor warms up.
@@ -203,7 +183,38 @@ pub(super) struct Moment<'a> {
     pub friction: &'a [f64],
 }
 
+impl Moment<'_> {
+    fn q(&self, joint: usize) -> f64 {
+        self.state.q[joint]
+    }
+    fn v(&self, joint: usize) -> f64 {
+        self.state.v[joint]
+    }
+}
+
 impl Past {
+    /// How far bristles are bent after a move, in their travels.
+    fn bend(&mut self, bristles: Bristles, way: f64, travel: f64) -> f64 {
+        let mut kept = 0.0;
+        for (z, (share, part)) in self.bristle.iter_mut().zip(bristles.parts()) {
+            let moved = way / (part * travel);
+            if moved != 0.0 {
+                *z = bristles.bent(*z, moved);
+            }
+            kept += share * *z;
+        }
+        kept
+    }
+
+    /// What a swinging gear adds to what drives it, Nm.
+    fn swing(&mut self, drive: f64, frequency: f64, damping: f64, step: f64) -> f64 {
+        let [x, dx] = self.swing;
+        let ddx = frequency * frequency * (drive - x) - 2.0 * damping * frequency * dx;
+        let dx = dx + step * ddx;
+        self.swing = [x + step * dx, dx];
+        self.swing[0] - drive
+    }
+
     /// What a knock of unit height after each reversal is at present.
     fn knock(&mut self, v: f64, time: f64, wave: bool, step: f64) -> f64 {
         if v.abs() > 0.01 && v.signum() != self.direction {
@@ -226,6 +237,10 @@ impl Past {
                 since * (1.0 - since).exp()
             }
     }
+}
+
+fn viscous(v: f64, size: f64, exponent: f64) -> f64 {
+    size * v.abs().powf(exponent) * v.signum()
 }
 
 fn sign(v: f64, width: f64) -> f64 {
@@ -277,10 +292,7 @@ impl Law {
                 joint,
                 size,
                 exponent,
-            } => {
-                let v = state.v[joint];
-                Some((joint, size * v.abs().powf(exponent) * v.signum()))
-            }
+            } => Some((joint, viscous(state.v[joint], size, exponent))),
             Self::Coulomb { joint, size, width } => {
                 Some((joint, size * sign(state.v[joint], width)))
             }
@@ -288,192 +300,42 @@ impl Law {
         }
     }
 
-    /// Joint and torque (Nm) of what no library has.
-    fn curve(&self, now: &Moment, past: &mut Past) -> Option<(usize, f64)> {
-        let (q, v) = (&now.state.q, &now.state.v);
-        Some(match *self {
-            Self::Meshing {
-                joint,
-                by,
-                size,
-                order,
-            } => (joint, size * (order * q[by]).sin() * (2.0 * q[joint]).cos()),
-            Self::SpeedCurve {
-                joint,
-                size,
-                width,
-                ref waves,
-            } => (
-                joint,
-                size * sign(v[joint], width) * curve(waves, v[joint].abs()),
-            ),
-            Self::AngleCurve {
-                joint,
-                size,
-                ref waves,
-            } => (joint, size * curve(waves, q[joint])),
-            Self::AngleDrag {
-                joint,
-                size,
-                width,
-                order,
-                phase,
-            } => (
-                joint,
-                size * sign(v[joint], width) * (1.0 + (order * q[joint] + phase).sin()),
-            ),
-            Self::HoseDrag {
-                joint,
-                size,
-                travel,
-            } => {
-                let moved = v[joint] * now.step / travel;
-                if moved != 0.0 {
-                    past.bristle[0] = Bristles::One.bent(past.bristle[0], moved);
-                }
-                (joint, size * past.bristle[0])
-            }
-            _ => return None,
-        })
-    }
-
     /// Adds its torque at each joint, Nm.
     pub(super) fn add(&self, now: &Moment, past: &mut Past, torque: &mut [f64]) {
-        let v = |joint: usize| now.state.v[joint];
-        let q = |joint: usize| now.state.q[joint];
-        if let Some((joint, size)) = self
-            .plain_friction(now.state)
-            .or_else(|| self.curve(now, past))
-        {
-            torque[joint] += size;
+        if let (Some(joint), Some(adds)) = (self.joint(), self.adds(now, past)) {
+            torque[joint] += adds;
+            if let Self::WristCoupling { by, ratio, .. } = *self {
+                torque[by] += ratio * adds;
+            }
         }
-        match *self {
-            Self::Asymmetric {
-                joint,
-                size,
-                width,
-                by_speed,
-            } => {
-                let there = v(joint).max(0.0);
-                torque[joint] +=
-                    size * ((1.0 - by_speed) * sign(v(joint), width).max(0.0) + by_speed * there);
-            }
-            Self::Stribeck {
-                joint,
-                size,
-                speed,
-                fall,
-            } => {
-                torque[joint] +=
-                    size * sign(v(joint), 0.15 * speed) * fall.at(v(joint).abs() / speed);
-            }
-            Self::Presliding {
-                joint,
-                size,
-                travel,
-                width,
-                bristles,
-            } => {
-                let mut kept = 0.0;
-                for (z, (share, part)) in past.bristle.iter_mut().zip(bristles.parts()) {
-                    let moved = v(joint) * now.step / (part * travel);
-                    if moved != 0.0 {
-                        *z = bristles.bent(*z, moved);
-                    }
-                    kept += share * *z;
-                }
-                torque[joint] += size * (kept - sign(v(joint), width));
-            }
-            Self::Load {
-                joint,
-                share,
-                exponent,
-                width,
-            } => {
-                let load = now.rigid[joint].abs().powf(exponent);
-                torque[joint] += share * load * sign(v(joint), width);
-            }
-            Self::Warmup {
-                joint,
-                share,
-                time,
-                slow,
-            } => {
-                let cold = if slow {
-                    1.0 / (1.0 + now.time / time)
-                } else {
-                    (-now.time / time).exp()
-                };
-                torque[joint] += share * cold * now.friction[joint];
-            }
-            Self::WristCoupling {
-                joint,
-                by,
-                ratio,
-                viscous,
-                coulomb,
-                width,
-                exponent,
-            } => {
-                let x = v(joint) + ratio * v(by);
-                let drag = viscous * x.abs().powf(exponent) * x.signum() + coulomb * sign(x, width);
-                torque[joint] += drag;
-                torque[by] += ratio * drag;
-            }
-            Self::Rotor { joint, inertia } => torque[joint] += inertia * now.state.a[joint],
-            Self::Offset { joint, size, drift } => {
-                torque[joint] += size * (1.0 - drift * (-now.time / SENSOR_WARM).exp())
-            }
-            Self::Ripple {
-                joint,
-                size,
-                order,
-                phase,
-                overtone,
-            } => {
-                let turn = order * q(joint) + phase;
-                torque[joint] += size * (turn.sin() + overtone * (2.0 * turn + phase).sin());
-            }
-            Self::Spring {
-                joint,
-                size,
-                zero,
-                gas,
-            } => {
-                let bend = (q(joint) - zero).sin();
-                torque[joint] -= size * bend * (1.0 + gas * bend);
-            }
-            Self::Cable {
-                joint,
-                stiffness,
-                zero,
-                hardening,
-            } => {
-                let bend = q(joint) - zero;
-                torque[joint] += stiffness * bend * (1.0 + hardening * bend * bend);
-            }
-            Self::Elasticity {
-                joint,
-                frequency,
-                damping,
-            } => {
-                let [x, dx] = past.swing;
-                let drive = now.rigid[joint];
-                let ddx = frequency * frequency * (drive - x) - 2.0 * damping * frequency * dx;
-                let dx = dx + now.step * ddx;
-                past.swing = [x + now.step * dx, dx];
-                torque[joint] += past.swing[0] - drive;
-            }
-            Self::Backlash {
-                joint,
-                size,
-                time,
-                wave,
-            } => {
-                torque[joint] += size * past.knock(v(joint), time, wave, now.step);
-            }
-            // Rigid ones are in the bodies; the recording shifts and scales; friction and curves were added above.
-            _ => {}
+    }
+
+    /// The joint that it acts on, from 0.
+    pub fn joint(&self) -> Option<usize> {
+        let (word, number) = self.seat();
+        number.filter(|_| word == "joint")
+    }
+
+    /// Where it sits, as people write it.
+    pub fn place(&self) -> String {
+        match self.seat() {
+            (word, Some(number)) => format!("{word} {}", number + 1),
+            (place, None) => place.into(),
+        }
+    }
+
+    /// What it may be called besides, at its place: a curve that no library has is also one of its kind.
+    pub(super) fn kin(&self) -> &'static [&'static str] {
+        match self {
+            Self::Viscous { exponent, .. } if *exponent != 1.0 => &["unknown", "stribeck_friction"],
+            Self::SpeedCurve { .. } => &["stribeck_friction"],
+            Self::AngleCurve { .. } => &["torque_ripple"],
+            Self::HoseDrag { .. } => &["presliding_friction"],
+            // A hose at the joint that arms balance is a spring there.
+            Self::Cable { joint: 1, .. } => &["spring_balance"],
+            // What is bolted on moves the centre, too.
+            Self::LinkMass { away, .. } if *away != [0.0; 3] => &["link_com"],
+            _ => &[],
         }
     }
 

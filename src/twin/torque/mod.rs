@@ -9,7 +9,6 @@ mod draw;
 mod family;
 mod folder;
 mod law;
-mod names;
 mod path;
 mod record;
 pub mod rigid;

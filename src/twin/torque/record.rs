@@ -29,6 +29,14 @@ pub struct TorqueRows {
     pub torque: Vec<f64>,
 }
 
+impl TorqueRows {
+    /// Rows to fit; the others, which judge, follow them.
+    pub(super) fn to_fit(&self) -> usize {
+        let fit = self.validate.iter().filter(|validate| !**validate);
+        fit.count()
+    }
+}
+
 impl TorqueCase {
     /// The bodies as they are: off within the tolerance, and by those laws that change bodies.
     pub(super) fn true_machine<'a>(&self, laws: impl Iterator<Item = &'a Law>) -> Machine {

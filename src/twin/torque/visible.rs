@@ -5,6 +5,7 @@ use super::draw::TorqueCase;
 use super::law::{Fall, Law, Moment};
 use super::record::{AR1_COEFFICIENT, TorqueRows};
 use super::rigid::Machine;
+use std::f64::consts::FRAC_PI_2;
 
 /// Rows that are averaged into one: as a low-pass does.
 const AVERAGED: usize = 4;
@@ -115,7 +116,7 @@ impl<'a> Columns<'a> {
                 .sqrt()
                 .recip()
         });
-        let fit = rows.validate.iter().filter(|validate| !**validate).count();
+        let fit = rows.to_fit();
         let stated = rows.state[..fit]
             .iter()
             .flat_map(|state| case.stated.torque(state))
@@ -132,12 +133,7 @@ impl<'a> Columns<'a> {
     fn of(&self, torque: impl Iterator<Item = f64>) -> Vec<f64> {
         let n = self.weight.len();
         let torque: Vec<f64> = torque.collect();
-        let fit = self
-            .rows
-            .validate
-            .iter()
-            .filter(|validate| !**validate)
-            .count();
+        let fit = self.rows.to_fit();
         let mut out = Vec::with_capacity(fit / AVERAGED * n);
         for block in torque[..fit * n].chunks_exact(AVERAGED * n) {
             for (joint, weight) in self.weight.iter().enumerate() {
@@ -196,11 +192,7 @@ impl<'a> Columns<'a> {
             for laws in waves(joint) {
                 add(&laws[0], laws.iter().map(|law| self.of_law(law)).collect());
             }
-            let law = Law::TorqueConstant {
-                joint,
-                share: 0.0,
-                half: f64::INFINITY,
-            };
+            let law = Law::torque_constant(joint, 0.0, f64::INFINITY);
             let own = self
                 .rows
                 .torque
@@ -211,31 +203,15 @@ impl<'a> Columns<'a> {
                 add(&law, vec![self.of(own)]);
             }
             add(
-                &Law::LinkMass {
-                    link: joint,
-                    share: 0.0,
-                    away: [0.0; 3],
-                },
+                &Law::link_mass(joint, 0.0, [0.0; 3]),
                 vec![self.of_machine(|machine| machine.links[joint].mass += 1.0)],
             );
             let centre =
                 (0..3).map(|k| self.of_machine(|machine| machine.links[joint].centre[k] += 0.01));
-            add(
-                &Law::LinkCentre {
-                    link: joint,
-                    shift: [0.0; 3],
-                },
-                centre.collect(),
-            );
+            add(&Law::link_centre(joint, [0.0; 3]), centre.collect());
             let inertia =
                 (0..6).map(|k| self.of_machine(|machine| machine.links[joint].inertia[k] += 0.1));
-            add(
-                &Law::LinkInertia {
-                    link: joint,
-                    share: 0.0,
-                },
-                inertia.collect(),
-            );
+            add(&Law::link_inertia(joint, 0.0), inertia.collect());
         }
         let payload = |change: fn(&mut super::rigid::Body)| {
             self.of_machine(|machine| machine.payload.iter_mut().for_each(change))
@@ -246,15 +222,9 @@ impl<'a> Columns<'a> {
             payload(|body| body.centre[1] += 0.01),
             payload(|body| body.centre[2] += 0.01),
         ];
-        add(
-            &Law::Payload {
-                mass: 0.0,
-                centre: [0.0; 3],
-            },
-            payload,
-        );
+        add(&Law::payload(0.0, [0.0; 3]), payload);
         let tilt = [0, 1].map(|k| self.of_machine(|machine| machine.gravity[k] += 0.1));
-        add(&Law::Tilt { by: [0.0; 2] }, tilt.into());
+        add(&Law::tilt([0.0; 2]), tilt.into());
         rivals
     }
 
@@ -282,93 +252,32 @@ impl<'a> Columns<'a> {
 }
 
 /// Effects of a joint that are linear in their size, in usual forms.
-fn per_joint(joint: usize) -> Vec<Law> {
-    let width = 0.008;
-    vec![
-        Law::Viscous {
-            joint,
-            size: 1.0,
-            exponent: 1.0,
-        },
-        Law::Coulomb {
-            joint,
-            size: 1.0,
-            width,
-        },
-        Law::Asymmetric {
-            joint,
-            size: 1.0,
-            width,
-            by_speed: 0.0,
-        },
-        Law::Stribeck {
-            joint,
-            size: 1.0,
-            speed: 0.05,
-            fall: Fall::Exponential(1.0),
-        },
-        Law::Stribeck {
-            joint,
-            size: 1.0,
-            speed: 0.1,
-            fall: Fall::Exponential(1.0),
-        },
-        Law::Load {
-            joint,
-            share: 1.0,
-            exponent: 1.0,
-            width,
-        },
-        Law::Rotor {
-            joint,
-            inertia: 1.0,
-        },
-        Law::Offset {
-            joint,
-            size: 1.0,
-            drift: 0.0,
-        },
-        Law::Cable {
-            joint,
-            stiffness: 1.0,
-            zero: 0.0,
-            hardening: 0.0,
-        },
-        Law::Spring {
-            joint,
-            size: 1.0,
-            zero: 0.0,
-            gas: 0.0,
-        },
-        Law::Spring {
-            joint,
-            size: 1.0,
-            zero: std::f64::consts::FRAC_PI_2,
-            gas: 0.0,
-        },
+fn per_joint(joint: usize) -> [Law; 11] {
+    let (size, width, fall) = (1.0, 0.008, Fall::Exponential(1.0));
+    [
+        Law::viscous(joint, size, 1.0),
+        Law::coulomb(joint, size, width),
+        Law::asymmetric(joint, size, width, 0.0),
+        Law::stribeck(joint, size, 0.05, fall),
+        Law::stribeck(joint, size, 0.1, fall),
+        Law::load(joint, 1.0, 1.0, width),
+        Law::rotor(joint, 1.0),
+        Law::offset(joint, size, 0.0),
+        Law::cable(joint, 1.0, 0.0, 0.0),
+        Law::spring(joint, size, 0.0, 0.0),
+        Law::spring(joint, size, FRAC_PI_2, 0.0),
     ]
 }
 
 /// Torques by a joint's angle whose phase is free: a balancer, which is a wave a turn, and ripples.
 fn waves(joint: usize) -> Vec<Vec<Law>> {
-    let phases = [0.0, std::f64::consts::FRAC_PI_2];
+    let phases = [0.0, FRAC_PI_2];
     let ripple = |order: usize| {
-        let law = |phase| Law::Ripple {
-            joint,
-            size: 1.0,
-            order: order as f64,
-            phase,
-            overtone: 0.0,
-        };
+        let law = |phase| Law::ripple(joint, 1.0, order as f64, phase, 0.0);
         phases.map(law).to_vec()
     };
     let balancer = phases
-        .map(|zero| Law::Spring {
-            joint,
-            size: 1.0,
-            zero,
-            gas: 0.0,
-        })
+        .map(|zero| Law::spring(joint, 1.0, zero, 0.0))
         .to_vec();
     std::iter::once(balancer)
         .chain((1..=LARGEST_ORDER).map(ripple))

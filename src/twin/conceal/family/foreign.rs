@@ -104,10 +104,7 @@ fn seat(bench: &Bench, motion: ForeignMotion, draw: &mut Noise) -> usize {
         ForeignMotion::JointTurn | ForeignMotion::JointShift | ForeignMotion::JointTilt => {
             bench.turning(draw)
         }
-        ForeignMotion::LinkShift | ForeignMotion::LinkBend => {
-            let long = bench.long_links();
-            long.get(draw.index(long.len())).copied().unwrap_or(1)
-        }
+        ForeignMotion::LinkShift | ForeignMotion::LinkBend => bench.long_link(draw).unwrap_or(1),
         _ => 1,
     }
 }
@@ -117,16 +114,11 @@ fn direction(bench: &Bench, motion: ForeignMotion, seat: usize, draw: &mut Noise
     let arrow = draw.vector(1.0, 1.0);
     let along = draw.chance(0.5);
     let own = &bench.robot.joints[seat - 1];
-    let end = bench
-        .robot
-        .joints
-        .get(seat)
-        .map_or(bench.robot.tool, |next| next.point);
     let (line, along) = match motion {
         ForeignMotion::JointShift => (own.axis, along),
         ForeignMotion::JointTilt => (own.axis, false),
-        ForeignMotion::LinkShift => (matrix::minus(end, own.point), along),
-        ForeignMotion::LinkBend => (matrix::minus(end, own.point), false),
+        ForeignMotion::LinkShift => (bench.line(seat - 1), along),
+        ForeignMotion::LinkBend => (bench.line(seat - 1), false),
         _ => return arrow,
     };
     let line = matrix::scale(line, 1.0 / matrix::norm(line).max(1e-9));
@@ -180,10 +172,7 @@ fn variable(
     seat: usize,
     draw: &mut Noise,
 ) -> (ForeignVariable, [f64; 2]) {
-    let instrument = matches!(
-        motion,
-        ForeignMotion::Range | ForeignMotion::Azimuth | ForeignMotion::Elevation
-    );
+    let instrument = motion.is_sighted();
     let anywhere = instrument
         || matches!(
             motion,
@@ -198,22 +187,8 @@ fn variable(
     };
     let range = bench.ranges_deg[number - 1].map(f64::to_radians);
     let width = range[1] - range[0];
-    let reach: f64 = {
-        let ends = bench
-            .robot
-            .joints
-            .iter()
-            .skip(1)
-            .map(|joint| joint.point)
-            .chain([bench.robot.tool]);
-        let spans = bench
-            .robot
-            .joints
-            .iter()
-            .zip(ends)
-            .map(|(joint, end)| matrix::norm(matrix::minus(end, joint.point)));
-        spans.sum()
-    };
+    let spans = (0..bench.joints()).map(|index| matrix::norm(bench.line(index)));
+    let reach: f64 = spans.sum();
     match draw.index(11) {
         0..=2 => (ForeignVariable::Angle(number), range),
         3 => (ForeignVariable::Approach(number), [-1.0, 1.0]),

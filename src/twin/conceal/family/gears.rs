@@ -9,10 +9,7 @@ use crate::noise::Noise;
 
 /// The linear spring of a joint that turns by so many arcsec under its largest torque.
 pub(super) fn spring(bench: &Bench, number: usize, arcsec: f64) -> Physical {
-    Physical::JointCompliance(JointCompliance {
-        joint: number,
-        rad_per_nm: bench.softness(number, arcsec),
-    })
+    JointCompliance::effect(number, bench.softness(number, arcsec))
 }
 
 /// The springs of all loaded joints, of their natural size.
@@ -65,12 +62,7 @@ pub(super) fn joint_hardening(bench: &Bench, form: Form, draw: &mut Noise) -> Op
             "progressive, quadratic",
         ),
     };
-    let curve = Physical::JointHardening(JointHardening {
-        joint: number,
-        curve,
-        amplitude_arcsec,
-        scale_nm,
-    });
+    let curve = JointHardening::effect(number, curve, amplitude_arcsec, scale_nm);
     let linear = fixed(
         "joint_compliance",
         joint(number),
@@ -89,13 +81,7 @@ pub(super) fn joint_hardening(bench: &Bench, form: Form, draw: &mut Noise) -> Op
 
 fn ripple(number: usize, order: f64, amplitude_arcsec: f64, draw: &mut Noise) -> Physical {
     let phase_deg = draw.uniform(-180.0, 180.0).round();
-    Physical::GearCyclic(GearCyclic {
-        joint: number,
-        order,
-        amplitude_arcsec,
-        arcsec_per_nm: 0.0,
-        phase_deg,
-    })
+    GearCyclic::effect(number, order, amplitude_arcsec, 0.0, phase_deg)
 }
 
 pub(super) fn gear_cyclic(bench: &Bench, form: Form, draw: &mut Noise) -> Option<Draft> {
@@ -130,32 +116,18 @@ pub(super) fn gear_cyclic(bench: &Bench, form: Form, draw: &mut Noise) -> Option
         (Form::Other, _) => {
             let (order, skew) = (2.0 + draw.index(3) as f64, draw.uniform(0.3, 0.6));
             let phase_deg = draw.uniform(-180.0, 180.0).round();
-            let wheel = GearEccentricity {
-                joint: number,
-                order,
-                amplitude_arcsec: amplitude,
-                skew,
-                phase_deg,
-            };
-            (vec![Physical::GearEccentricity(wheel)], "eccentric wheel")
+            let wheel = GearEccentricity::effect(number, order, amplitude, skew, phase_deg);
+            (vec![wheel], "eccentric wheel")
         }
     };
-    Some(Draft::new(
-        name,
-        vec![sized("gear_cyclic", joint(number), effects)],
-    ))
+    Some(Draft::one(name, "gear_cyclic", joint(number), effects))
 }
 
 pub(super) fn gear_motor_cyclic(bench: &Bench, form: Form, draw: &mut Noise) -> Option<Draft> {
     let number = bench.turning(draw);
     let amplitude = draw.size(8.0, 40.0);
     let ripple = |order: f64, amplitude_arcsec: f64, phase_deg: f64| {
-        Physical::GearMotorCyclic(GearMotorCyclic {
-            joint: number,
-            order,
-            amplitude_arcsec,
-            phase_deg,
-        })
+        GearMotorCyclic::effect(number, order, amplitude_arcsec, phase_deg)
     };
     let (first, second) = (
         draw.uniform(-180.0, 180.0).round(),
@@ -174,9 +146,11 @@ pub(super) fn gear_motor_cyclic(bench: &Bench, form: Form, draw: &mut Noise) -> 
             "two orders",
         ),
     };
-    Some(Draft::new(
+    Some(Draft::one(
         name,
-        vec![sized("gear_motor_cyclic", joint(number), effects)],
+        "gear_motor_cyclic",
+        joint(number),
+        effects,
     ))
 }
 
@@ -184,21 +158,8 @@ pub(super) fn backlash(bench: &Bench, form: Form, draw: &mut Noise) -> Option<Dr
     let gap_arcsec = draw.size(20.0, 80.0);
     if form == Form::Obvious {
         let number = bench.turning(draw);
-        let gap = Backlash {
-            joint: number,
-            gap_arcsec,
-            arcsec_per_nm: 0.0,
-            closing_nm: 0.0,
-            soft_nm: 0.0,
-        };
-        let draft = Draft::new(
-            "by direction",
-            vec![sized(
-                "backlash",
-                joint(number),
-                vec![Physical::Backlash(gap)],
-            )],
-        );
+        let gap = Backlash::effect(number, gap_arcsec, 0.0, 0.0, 0.0);
+        let draft = Draft::one("by direction", "backlash", joint(number), vec![gap]);
         return Some(draft.needing(&[Column::Direction]));
     }
     let number = bench.bearing(draw)?;
@@ -220,22 +181,8 @@ pub(super) fn backlash(bench: &Bench, form: Form, draw: &mut Noise) -> Option<Dr
                 &[],
             ),
         };
-    let gap = Backlash {
-        joint: number,
-        gap_arcsec,
-        arcsec_per_nm: 0.0,
-        closing_nm,
-        soft_nm,
-    };
-    let draft = Draft::new(
-        name,
-        vec![sized(
-            "backlash",
-            joint(number),
-            vec![Physical::Backlash(gap)],
-        )],
-    )
-    .needing(needs);
+    let gap = Backlash::effect(number, gap_arcsec, 0.0, closing_nm, soft_nm);
+    let draft = Draft::one(name, "backlash", joint(number), vec![gap]).needing(needs);
     // What saturates at little load is the same thing by two names.
     Some(if needs.is_empty() {
         draft.accepting("joint_hardening", joint(number))
@@ -251,29 +198,16 @@ pub(super) fn axis_wobble(bench: &Bench, form: Form, draw: &mut Noise) -> Option
         Form::Other => (2.0, draw.uniform(0.4, 0.9), "elliptic"),
     };
     let (amplitude_arcsec, phase_deg) = (draw.size(8.0, 40.0), draw.uniform(-180.0, 180.0).round());
-    let wobble = Physical::AxisWobble(AxisWobble {
-        joint: number,
-        order,
-        amplitude_arcsec,
-        ellipse,
-        phase_deg,
-    });
-    Some(Draft::new(
-        name,
-        vec![sized("axis_wobble", joint(number), vec![wobble])],
-    ))
+    let wobble = AxisWobble::effect(number, order, amplitude_arcsec, ellipse, phase_deg);
+    Some(Draft::one(name, "axis_wobble", joint(number), vec![wobble]))
 }
 
 pub(super) fn zero_shift(bench: &Bench, _form: Form, draw: &mut Noise) -> Option<Draft> {
     let number = bench.turning(draw);
     let step_arcsec = draw.sign() * draw.size(10.0, 80.0);
-    let step = Physical::ZeroShift(ZeroShift {
-        joint: number,
-        step_arcsec,
-        at_s: bench.moment(draw),
-    });
-    let draft = Draft::new("step", vec![sized("zero_shift", joint(number), vec![step])])
-        .needing(&[Column::Time]);
+    let step = ZeroShift::effect(number, step_arcsec, bench.moment(draw));
+    let draft =
+        Draft::one("step", "zero_shift", joint(number), vec![step]).needing(&[Column::Time]);
     // A step of the first zero is a step of the whole arm about the same axis.
     Some(if number == 1 {
         draft.accepting("base_shift", "base".into())
@@ -301,22 +235,15 @@ pub(super) fn cable_drag(bench: &Bench, form: Form, draw: &mut Noise) -> Option<
         draw.sign() * draw.uniform(0.5, 1.0),
         draw.uniform(-60.0, 60.0).round(),
     );
-    let hose = CableDrag {
-        joint: number,
+    let hose = CableDrag::effect(
+        number,
         by,
         lead,
         pull,
-        amplitude_arcsec: draw.size(15.0, 80.0),
-        torque_nm: 0.0,
+        draw.size(15.0, 80.0),
+        0.0,
         phase_deg,
-    };
-    let draft = Draft::new(
-        name,
-        vec![sized(
-            "cable_drag",
-            joint(number),
-            vec![Physical::CableDrag(hose)],
-        )],
     );
+    let draft = Draft::one(name, "cable_drag", joint(number), vec![hose]);
     Some(draft.accepting("unknown", joint(number)))
 }

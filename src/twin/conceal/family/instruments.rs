@@ -21,81 +21,51 @@ pub(super) fn circle(_bench: &Bench, form: Form, draw: &mut Noise) -> Option<Dra
         (Form::Other, true) => (Circle::Elliptic, "elliptic"),
         (Form::Other, false) => (Circle::OffCentre, "centre off the axis"),
     };
-    let circle = TrackerCircle {
-        circle,
-        amplitude_arcsec: draw.size(4.0, 40.0),
-        phase_deg: phase(draw),
-    };
-    Some(tracker(
-        "tracker_circle",
-        name,
-        Physical::TrackerCircle(circle),
-    ))
+    let circle = TrackerCircle::effect(circle, draw.size(4.0, 40.0), phase(draw));
+    Some(tracker("tracker_circle", name, circle))
 }
 
 pub(super) fn elevation(_bench: &Bench, form: Form, draw: &mut Noise) -> Option<Draft> {
     let (size, second) = (draw.sign() * draw.size(5.0, 40.0), draw.uniform(-1.0, 1.0));
+    let head = TrackerElevation::effect;
     let (head, name) = match (form, draw.chance(0.5)) {
-        (Form::Obvious, _) => (
-            TrackerElevation {
-                index_arcsec: size * second,
-                sag_arcsec: size,
-                ..TrackerElevation::default()
-            },
-            "index and sag",
-        ),
+        (Form::Obvious, _) => (head(size * second, size, 0.0, 0.0, 0.0), "index and sag"),
         (Form::Other, true) => {
-            let head = TrackerElevation {
-                circle_arcsec: size,
-                phase_deg: phase(draw),
-                ..TrackerElevation::default()
-            };
-            (head, "eccentric vertical circle")
+            let circle = head(0.0, 0.0, size, phase(draw), 0.0);
+            (circle, "eccentric vertical circle")
         }
-        (Form::Other, false) => (
-            TrackerElevation {
-                transit_arcsec: size,
-                ..TrackerElevation::default()
-            },
-            "tilted transit axis",
-        ),
+        (Form::Other, false) => (head(0.0, 0.0, 0.0, 0.0, size), "tilted transit axis"),
     };
-    Some(tracker(
-        "tracker_elevation",
-        name,
-        Physical::TrackerElevation(head),
-    ))
+    Some(tracker("tracker_elevation", name, head))
 }
 
 pub(super) fn offset(_bench: &Bench, form: Form, draw: &mut Noise) -> Option<Draft> {
     let size = draw.sign() * draw.size(30.0, 300.0);
     let (ranges, name) = match (form, draw.chance(0.5)) {
-        (Form::Obvious, _) => (
-            TrackerOffset {
+        (Form::Obvious, _) => {
+            let path = TrackerOffset {
                 constant_um: size,
                 ..TrackerOffset::default()
-            },
-            "dead path",
-        ),
+            };
+            (path, "dead path")
+        }
         (Form::Other, true) => {
             let (wave_mm, phase_deg) = (draw.size(300.0, 1500.0).round(), phase(draw));
-            (
-                TrackerOffset {
-                    cyclic_um: 0.3 * size,
-                    wave_mm,
-                    phase_deg,
-                    ..TrackerOffset::default()
-                },
-                "cyclic",
-            )
+            let cycle = TrackerOffset {
+                cyclic_um: 0.3 * size,
+                wave_mm,
+                phase_deg,
+                ..TrackerOffset::default()
+            };
+            (cycle, "cyclic")
         }
-        (Form::Other, false) => (
-            TrackerOffset {
+        (Form::Other, false) => {
+            let square = TrackerOffset {
                 um_per_m2: 0.2 * size,
                 ..TrackerOffset::default()
-            },
-            "square of the range",
-        ),
+            };
+            (square, "square of the range")
+        }
     };
     Some(tracker(
         "tracker_offset",
@@ -105,41 +75,31 @@ pub(super) fn offset(_bench: &Bench, form: Form, draw: &mut Noise) -> Option<Dra
 }
 
 pub(super) fn refraction(bench: &Bench, form: Form, draw: &mut Noise) -> Option<Draft> {
-    let as_logged = TrackerRefraction {
-        um_per_m_k: draw.sign() * draw.uniform(0.8, 1.2),
-        reference_c: 20.0,
-        lag_s: 0.0,
-        own_rise_k: 0.0,
-        warm_up_h: 1.0,
+    let um_per_m_k = draw.sign() * draw.uniform(0.8, 1.2);
+    let air = |lag_s, own_rise_k, warm_up_h| {
+        TrackerRefraction::effect(um_per_m_k, 20.0, lag_s, own_rise_k, warm_up_h)
     };
     let (air, name, needs): (_, _, &[Column]) = match (form, draw.chance(0.5)) {
-        (Form::Obvious, _) => (
-            as_logged,
-            "with the logged temperature",
-            &[Column::Temperature],
-        ),
+        (Form::Obvious, _) => {
+            let name = "with the logged temperature";
+            (air(0.0, 0.0, 1.0), name, &[Column::Temperature])
+        }
         (Form::Other, true) => {
             let lag_s = (bench.end_s * draw.uniform(0.05, 0.2)).round();
+            let name = "behind the logged temperature";
             (
-                TrackerRefraction { lag_s, ..as_logged },
-                "behind the logged temperature",
+                air(lag_s, 0.0, 1.0),
+                name,
                 &[Column::Temperature, Column::Time],
             )
         }
         (Form::Other, false) => {
             let warm_up_h = draw.uniform(0.15, 0.6) * bench.end_s / 3600.0;
-            (
-                TrackerRefraction {
-                    own_rise_k: 12.0,
-                    warm_up_h,
-                    ..as_logged
-                },
-                "air that warms by its own",
-                &[Column::Time],
-            )
+            let name = "air that warms by its own";
+            (air(0.0, 12.0, warm_up_h), name, &[Column::Time])
         }
     };
-    Some(tracker("tracker_refraction", name, Physical::TrackerRefraction(air)).needing(needs))
+    Some(tracker("tracker_refraction", name, air).needing(needs))
 }
 
 /// A direction of motion of the stand: along, or about the tracker's origin.
@@ -161,13 +121,7 @@ pub(super) fn swing(bench: &Bench, form: Form, draw: &mut Noise) -> Option<Draft
             "fading swing",
         ),
     };
-    let sway = Physical::TrackerSway(TrackerSway {
-        shift_um,
-        turn_arcsec,
-        period_s,
-        phase_deg,
-        fading_s,
-    });
+    let sway = TrackerSway::effect(shift_um, turn_arcsec, period_s, phase_deg, fading_s);
     // The base may swing as well as the stand.
     Some(
         tracker("unknown", name, sway)
@@ -186,18 +140,14 @@ pub(super) fn knock(bench: &Bench, form: Form, draw: &mut Noise) -> Option<Draft
         Form::Other => (draw.uniform(0.3, 0.7), "knock, settling back in part"),
     };
     let back_s = (draw.uniform(0.05, 0.15) * bench.end_s).round().max(1.0);
-    let knock = TrackerKnock {
+    let knock = TrackerKnock::effect(
         shift_um,
         turn_arcsec,
-        at_s: bench.moment(draw),
+        bench.moment(draw),
         back_share,
         back_s,
-    };
-    let cause = sized(
-        "base_shift",
-        "base".into(),
-        vec![Physical::TrackerKnock(knock)],
     );
+    let cause = sized("base_shift", "base".into(), vec![knock]);
     Some(
         Draft::new(name, vec![cause])
             .needing(&[Column::Time])

@@ -20,33 +20,21 @@ pub(super) fn gear_load(bench: &Bench, form: Form, draw: &mut Noise) -> Option<D
         Form::Obvious => (0.0, "with the load"),
         Form::Other => (peak * draw.uniform(0.2, 0.5), "with the load, saturating"),
     };
-    let gear = GearLoad {
-        joint: number,
+    let gear = GearLoad::effect(
+        number,
         order,
-        arcsec_per_nm: draw.size(15.0, 60.0) / peak,
+        draw.size(15.0, 60.0) / peak,
         phase_deg,
         full_nm,
-    };
-    Some(Draft::new(
-        name,
-        vec![sized(
-            "gear_load",
-            joint(number),
-            vec![Physical::GearLoad(gear)],
-        )],
-    ))
+    );
+    Some(Draft::one(name, "gear_load", joint(number), vec![gear]))
 }
 
 pub(super) fn gear_flank(bench: &Bench, form: Form, draw: &mut Noise) -> Option<Draft> {
     let number = bench.turning(draw);
     let flank = |order: f64, amplitude_arcsec: f64, draw: &mut Noise| {
         let phase_deg = draw.uniform(-180.0, 180.0).round();
-        Physical::GearFlank(GearFlank {
-            joint: number,
-            order,
-            amplitude_arcsec,
-            phase_deg,
-        })
+        GearFlank::effect(number, order, amplitude_arcsec, phase_deg)
     };
     let (first, size) = (1.0 + draw.index(4) as f64, draw.size(10.0, 50.0));
     let mut waves = vec![flank(first, size, draw)];
@@ -57,10 +45,7 @@ pub(super) fn gear_flank(bench: &Bench, form: Form, draw: &mut Noise) -> Option<
     } else {
         "one order"
     };
-    Some(
-        Draft::new(name, vec![sized("gear_flank", joint(number), waves)])
-            .needing(&[Column::Direction]),
-    )
+    Some(Draft::one(name, "gear_flank", joint(number), waves).needing(&[Column::Direction]))
 }
 
 /// The spring that a change of the spring belongs to: it may be named, or counted to the change.
@@ -93,13 +78,11 @@ pub(super) fn warm_ratio(bench: &Bench, form: Form, draw: &mut Noise) -> Option<
             "ratio with temperature, saturating",
         ),
     };
-    let draft = Draft::new(
+    let draft = Draft::one(
         name,
-        vec![sized(
-            "joint_warming",
-            joint(number),
-            vec![Physical::JointWarming(warm)],
-        )],
+        "joint_warming",
+        joint(number),
+        vec![Physical::JointWarming(warm)],
     );
     Some(draft.needing(&[Column::Temperature]))
 }
@@ -143,23 +126,14 @@ pub(super) fn spring_by_direction(bench: &Bench, form: Form, draw: &mut Noise) -
         Form::Obvious => {
             let rad_per_nm = -2.0 * bench.softness(number, size);
             (
-                Physical::JointHysteresis(JointHysteresis {
-                    joint: number,
-                    rad_per_nm,
-                }),
+                JointHysteresis::effect(number, rad_per_nm),
                 "spring by direction",
             )
         }
         Form::Other => {
             let arcsec_per_nm = 2.0 * size / bench.peak[number - 1].max(1e-9);
-            let gap = Backlash {
-                joint: number,
-                gap_arcsec: 0.0,
-                arcsec_per_nm,
-                closing_nm: 0.0,
-                soft_nm: 0.0,
-            };
-            (Physical::Backlash(gap), "loop that opens with the load")
+            let gap = Backlash::effect(number, 0.0, arcsec_per_nm, 0.0, 0.0);
+            (gap, "loop that opens with the load")
         }
     };
     let causes = vec![
@@ -184,21 +158,8 @@ pub(super) fn growing_gap(bench: &Bench, form: Form, draw: &mut Noise) -> Option
         ),
     };
     let (gap_arcsec, start) = (draw.size(20.0, 80.0), draw.uniform(0.1, 0.4));
-    let gap = BacklashGrowth {
-        joint: number,
-        gap_arcsec,
-        start,
-        time_s: time_s.round(),
-        settling,
-    };
-    let draft = Draft::new(
-        name,
-        vec![sized(
-            "backlash",
-            joint(number),
-            vec![Physical::BacklashGrowth(gap)],
-        )],
-    );
+    let gap = BacklashGrowth::effect(number, gap_arcsec, start, time_s.round(), settling);
+    let draft = Draft::one(name, "backlash", joint(number), vec![gap]);
     Some(
         draft
             .needing(&[Column::Direction, Column::Time])
@@ -207,26 +168,13 @@ pub(super) fn growing_gap(bench: &Bench, form: Form, draw: &mut Noise) -> Option
 }
 
 pub(super) fn bent_link(bench: &Bench, form: Form, draw: &mut Noise) -> Option<Draft> {
-    let long = bench.long_links();
-    let number = *long.get(draw.index(long.len()))?;
+    let number = bench.long_link(draw)?;
     let (power, name) = match form {
         Form::Obvious => (1, "by the cosine of the next joint"),
         Form::Other => (2, "by the squared cosine of the next joint"),
     };
-    let bow = ThermalBow {
-        link: number,
-        um_per_m_k: draw.uniform(8.0, 16.0),
-        reference_c: 20.0,
-        power,
-    };
-    let draft = Draft::new(
-        name,
-        vec![sized(
-            "unknown",
-            link(number),
-            vec![Physical::ThermalBow(bow)],
-        )],
-    );
+    let bow = ThermalBow::effect(number, draw.uniform(8.0, 16.0), 20.0, power);
+    let draft = Draft::one(name, "unknown", link(number), vec![bow]);
     Some(
         draft
             .needing(&[Column::Temperature])

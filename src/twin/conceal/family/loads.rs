@@ -1,10 +1,9 @@
 //! What loads do, and what is wrong about them: soft links, a soft base, balancers, masses.
 
 use super::gears::springs;
-use super::{Bench, Draft, Form, fixed, joint, link, sized};
+use super::{Bench, Draft, Form, fixed, joint, link};
 use crate::effect::{
     Balancer, BaseCompliance, Counterbalance, LinkCompliance, LinkHinge, LinkMass, PayloadError,
-    Physical,
 };
 use crate::noise::Noise;
 use crate::truth::ARCSEC;
@@ -24,26 +23,18 @@ pub(super) fn link_compliance(bench: &Bench, form: Form, draw: &mut Noise) -> Op
         .max(1e-9);
     let rad_per_nm = draw.size(10.0, 60.0) * ARCSEC / heavy;
     let (beam, name) = match form {
-        Form::Obvious => (
-            Physical::LinkHinge(LinkHinge {
-                link: number,
-                rad_per_nm,
-            }),
-            "at the middle",
-        ),
+        Form::Obvious => (LinkHinge::effect(number, rad_per_nm), "at the middle"),
         Form::Other => {
             let torsion_rad_per_nm = if draw.chance(0.3) { rad_per_nm } else { 0.0 };
-            let beam = LinkCompliance {
-                link: number,
-                bending_rad_per_nm: rad_per_nm,
-                torsion_rad_per_nm,
-            };
-            (Physical::LinkCompliance(beam), "cantilever")
+            let beam = LinkCompliance::effect(number, rad_per_nm, torsion_rad_per_nm);
+            (beam, "cantilever")
         }
     };
-    Some(Draft::new(
+    Some(Draft::one(
         name,
-        vec![sized("link_compliance", link(number), vec![beam])],
+        "link_compliance",
+        link(number),
+        vec![beam],
     ))
 }
 
@@ -62,14 +53,8 @@ pub(super) fn base_compliance(bench: &Bench, form: Form, draw: &mut Noise) -> Op
             "about a point below",
         ),
     };
-    let base = Physical::BaseCompliance(BaseCompliance {
-        rad_per_nm,
-        pivot_mm,
-    });
-    Some(Draft::new(
-        name,
-        vec![sized("base_compliance", "base".into(), vec![base])],
-    ))
+    let base = BaseCompliance::effect(rad_per_nm, pivot_mm);
+    Some(Draft::one(name, "base_compliance", "base", vec![base]))
 }
 
 /// The joint that carries most.
@@ -88,12 +73,7 @@ pub(super) fn counterbalance(bench: &Bench, form: Form, draw: &mut Noise) -> Opt
     };
     let torque_nm = draw.sign() * draw.uniform(0.15, 0.5) * bench.peak[number - 1];
     let phase_deg = draw.uniform(-40.0, 40.0).round();
-    let spring = Physical::Counterbalance(Counterbalance {
-        joint: number,
-        balancer,
-        torque_nm,
-        phase_deg,
-    });
+    let spring = Counterbalance::effect(number, balancer, torque_nm, phase_deg);
     let mut causes = vec![fixed("counterbalance", joint(number), vec![spring])];
     causes.extend(springs(bench, draw));
     Some(Draft::new(name, causes).accepting("gear_cyclic", joint(number)))
@@ -107,11 +87,7 @@ pub(super) fn link_mass(bench: &Bench, form: Form, draw: &mut Noise) -> Option<D
         (Form::Obvious, false) => (draw.sign() * 0.1, [0.0; 3], "mass by 10 %"),
         (Form::Other, _) => (0.0, draw.vector(20.0, 60.0).map(f64::round), "centre"),
     };
-    let heavy = Physical::LinkMass(LinkMass {
-        link: number,
-        mass_share,
-        centre_mm,
-    });
+    let heavy = LinkMass::effect(number, mass_share, centre_mm);
     let mut causes = vec![fixed("link_mass", link(number), vec![heavy])];
     causes.extend(springs(bench, draw));
     // Of neighbouring links only sums of moments show.
@@ -129,10 +105,7 @@ pub(super) fn payload_error(bench: &Bench, form: Form, draw: &mut Noise) -> Opti
         Form::Obvious => (draw.sign() * draw.uniform(0.04, 0.15), [0.0; 3], "mass"),
         Form::Other => (0.0, draw.vector(20.0, 60.0).map(f64::round), "centre"),
     };
-    let wrong = Physical::PayloadError(PayloadError {
-        mass_share,
-        centre_mm,
-    });
+    let wrong = PayloadError::effect(mass_share, centre_mm);
     let mut causes = vec![fixed("payload_error", "tool".into(), vec![wrong])];
     causes.extend(springs(bench, draw));
     Some(Draft::new(name, causes))

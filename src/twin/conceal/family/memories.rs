@@ -1,6 +1,6 @@
 //! What follows from the rows before: friction before it slides, heat that cools off, metal that lags.
 
-use super::{Bench, Column, Draft, Form, joint, link, sized};
+use super::{Bench, Column, Draft, Form, joint, link};
 use crate::effect::{Heat, JointWarming, Physical, Presliding, ThermalLag};
 use crate::noise::Noise;
 
@@ -20,20 +20,8 @@ pub(super) fn presliding(bench: &Bench, form: Form, draw: &mut Noise) -> Option<
             )
         }
     };
-    let friction = Presliding {
-        joint: number,
-        amplitude_arcsec,
-        dahl_deg,
-        slip_deg,
-    };
-    let draft = Draft::new(
-        name,
-        vec![sized(
-            "presliding",
-            joint(number),
-            vec![Physical::Presliding(friction)],
-        )],
-    );
+    let friction = Presliding::effect(number, amplitude_arcsec, dahl_deg, slip_deg);
+    let draft = Draft::one(name, "presliding", joint(number), vec![friction]);
     Some(draft.needing(&[Column::Direction]))
 }
 
@@ -91,13 +79,7 @@ pub(super) fn own_heat(bench: &Bench, form: Form, draw: &mut Noise) -> Option<Dr
         }
     };
     let warm = Physical::JointWarming(off(heat, usual, draw));
-    Some(
-        Draft::new(
-            name,
-            vec![sized("joint_warming", joint(number), vec![warm])],
-        )
-        .needing(&[Column::Time]),
-    )
+    Some(Draft::one(name, "joint_warming", joint(number), vec![warm]).needing(&[Column::Time]))
 }
 
 /// Usual rise of the arm's temperature, K.
@@ -118,13 +100,12 @@ pub(super) fn late_heat(bench: &Bench, form: Form, draw: &mut Noise) -> Option<D
         }
     };
     let parts = parts.into_iter().map(Physical::JointWarming).collect();
-    let draft = Draft::new(name, vec![sized("joint_warming", joint(number), parts)]);
+    let draft = Draft::one(name, "joint_warming", joint(number), parts);
     Some(draft.needing(&[Column::Temperature, Column::Time]))
 }
 
 pub(super) fn lagging_link(bench: &Bench, form: Form, draw: &mut Noise) -> Option<Draft> {
-    let long = bench.long_links();
-    let number = *long.get(draw.index(long.len()))?;
+    let number = bench.long_link(draw)?;
     let (core_s, name) = match form {
         Form::Obvious => (0.0, "behind the temperature"),
         Form::Other => (draw.uniform(0.2, 0.5) * bench.end_s, "skin and core"),
@@ -133,20 +114,7 @@ pub(super) fn lagging_link(bench: &Bench, form: Form, draw: &mut Noise) -> Optio
         draw.uniform(8.0, 16.0),
         draw.uniform(0.05, 0.2) * bench.end_s,
     );
-    let growth = ThermalLag {
-        link: number,
-        um_per_m_k,
-        reference_c: 20.0,
-        lag_s: lag_s.round(),
-        core_s: core_s.round(),
-    };
-    let draft = Draft::new(
-        name,
-        vec![sized(
-            "thermal_growth",
-            link(number),
-            vec![Physical::ThermalLag(growth)],
-        )],
-    );
+    let growth = ThermalLag::effect(number, um_per_m_k, 20.0, lag_s.round(), core_s.round());
+    let draft = Draft::one(name, "thermal_growth", link(number), vec![growth]);
     Some(draft.needing(&[Column::Temperature, Column::Time]))
 }

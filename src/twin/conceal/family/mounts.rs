@@ -2,8 +2,8 @@
 
 use super::{Bench, Column, Draft, Form, fixed, link, sized};
 use crate::effect::{
-    BaseShift, Course, JointLogLag, Physical, ThermalGrowth, ThermalWarmUp, ToolShift,
-    TrackerDrift, TrackerScale,
+    BaseShift, Course, JointLogLag, ThermalGrowth, ThermalWarmUp, ToolShift, TrackerDrift,
+    TrackerScale,
 };
 use crate::noise::Noise;
 
@@ -23,27 +23,12 @@ pub(super) fn thermal_growth(bench: &Bench, form: Form, draw: &mut Noise) -> Opt
     let links = start..=end;
     let strain = draw.uniform(8.0, 16.0);
     if form == Form::Obvious {
-        let grown = links.map(|link| {
-            Physical::ThermalGrowth(ThermalGrowth {
-                link,
-                um_per_m_k: strain,
-                reference_c: 20.0,
-            })
-        });
-        let draft = Draft::new(
-            "with temperature",
-            vec![sized("thermal_growth", place, grown.collect())],
-        );
+        let grown = links.map(|link| ThermalGrowth::effect(link, strain, 20.0));
+        let draft = Draft::one("with temperature", "thermal_growth", place, grown.collect());
         return Some(draft.needing(&[Column::Temperature]));
     }
     let warm_up_h = draw.uniform(0.15, 0.6) * bench.end_s / 3600.0;
-    let grown = links.map(|link| {
-        Physical::ThermalWarmUp(ThermalWarmUp {
-            link,
-            um_per_m: 15.0 * strain,
-            warm_up_h,
-        })
-    });
+    let grown = links.map(|link| ThermalWarmUp::effect(link, 15.0 * strain, warm_up_h));
     let causes = vec![sized("thermal_growth", place, grown.collect())];
     Some(if draw.chance(0.5) {
         Draft::new("by its own warm-up, no temperature", causes)
@@ -56,14 +41,8 @@ pub(super) fn thermal_growth(bench: &Bench, form: Form, draw: &mut Noise) -> Opt
 
 pub(super) fn tool_shift(bench: &Bench, _form: Form, draw: &mut Noise) -> Option<Draft> {
     let shift_um = draw.vector(30.0, 250.0).map(f64::round);
-    let step = Physical::ToolShift(ToolShift {
-        shift_um,
-        at_s: bench.moment(draw),
-    });
-    Some(
-        Draft::new("step", vec![sized("tool_shift", "tool".into(), vec![step])])
-            .needing(&[Column::Time]),
-    )
+    let step = ToolShift::effect(shift_um, bench.moment(draw));
+    Some(Draft::one("step", "tool_shift", "tool", vec![step]).needing(&[Column::Time]))
 }
 
 pub(super) fn base_shift(bench: &Bench, _form: Form, draw: &mut Noise) -> Option<Draft> {
@@ -71,12 +50,8 @@ pub(super) fn base_shift(bench: &Bench, _form: Form, draw: &mut Noise) -> Option
         draw.vector(30.0, 200.0).map(f64::round),
         draw.vector(2.0, 20.0),
     );
-    let step = Physical::BaseShift(BaseShift {
-        shift_um,
-        turn_arcsec,
-        at_s: bench.moment(draw),
-    });
-    let draft = Draft::new("step", vec![sized("base_shift", "base".into(), vec![step])]);
+    let step = BaseShift::effect(shift_um, turn_arcsec, bench.moment(draw));
+    let draft = Draft::one("step", "base_shift", "base", vec![step]);
     Some(draft.needing(&[Column::Time]))
 }
 
@@ -96,19 +71,8 @@ pub(super) fn tracker_drift(bench: &Bench, form: Form, draw: &mut Noise) -> Opti
     } else {
         [0.0; 3]
     };
-    let drift = Physical::TrackerDrift(TrackerDrift {
-        shift_um,
-        turn_arcsec,
-        settling_h,
-        course,
-    });
-    Some(
-        Draft::new(
-            name,
-            vec![sized("tracker_drift", "tracker".into(), vec![drift])],
-        )
-        .needing(&[Column::Time]),
-    )
+    let drift = TrackerDrift::effect(shift_um, turn_arcsec, settling_h, course);
+    Some(Draft::one(name, "tracker_drift", "tracker", vec![drift]).needing(&[Column::Time]))
 }
 
 pub(super) fn joint_log_lag(bench: &Bench, form: Form, draw: &mut Noise) -> Option<Draft> {
@@ -116,22 +80,13 @@ pub(super) fn joint_log_lag(bench: &Bench, form: Form, draw: &mut Noise) -> Opti
         Form::Obvious => (None, "all joints"),
         Form::Other => (Some(bench.turning(draw)), "one joint"),
     };
-    let lag = Physical::JointLogLag(JointLogLag {
-        share: draw.size(1e-4, 1e-3),
-        clock_ms: 0.0,
-        joint: only,
-    });
-    Some(Draft::new(
-        name,
-        vec![sized("joint_log_lag", "recording".into(), vec![lag])],
-    ))
+    let lag = JointLogLag::effect(draw.size(1e-4, 1e-3), 0.0, only);
+    Some(Draft::one(name, "joint_log_lag", "recording", vec![lag]))
 }
 
 /// Position data cannot tell a wrong metre from a larger robot: the one right answer is silence.
 pub(super) fn tracker_scale(_bench: &Bench, _form: Form, draw: &mut Noise) -> Option<Draft> {
-    let scale = Physical::TrackerScale(TrackerScale {
-        um_per_m: draw.sign() * draw.size(1.0, 10.0),
-    });
+    let scale = TrackerScale::effect(draw.sign() * draw.size(1.0, 10.0));
     Some(Draft::new(
         "scale",
         vec![fixed("tracker_scale", "tracker".into(), vec![scale])],

@@ -19,27 +19,21 @@ pub(super) fn bump(bench: &Bench, _form: Form, draw: &mut Noise) -> Option<Draft
         draw.uniform(0.06, 0.16) * (upper - lower),
     );
     let amplitude_arcsec = draw.sign() * draw.size(40.0, 200.0);
-    let bump = JointBump {
-        joint: number,
+    let bump = JointBump::effect(
+        number,
         amplitude_arcsec,
-        centre_deg: centre_deg.round(),
-        width_deg: width_deg.round(),
-    };
+        centre_deg.round(),
+        width_deg.round(),
+    );
     // A bump is a table of no formula, too.
-    unknown("bump", number, Physical::JointBump(bump))
-        .map(|draft| draft.accepting("joint_table", joint(number)))
+    unknown("bump", number, bump).map(|draft| draft.accepting("joint_table", joint(number)))
 }
 
 pub(super) fn hinge(bench: &Bench, _form: Form, draw: &mut Noise) -> Option<Draft> {
     let number = bench.turning(draw);
     let from_deg = bench.angle(number, draw).round();
-    let hinge = JointHinge {
-        joint: number,
-        from_deg,
-        arcsec_per_rad: draw.sign() * draw.size(30.0, 150.0),
-    };
-    unknown("hinge", number, Physical::JointHinge(hinge))
-        .map(|draft| draft.accepting("joint_table", joint(number)))
+    let hinge = JointHinge::effect(number, from_deg, draw.sign() * draw.size(30.0, 150.0));
+    unknown("hinge", number, hinge).map(|draft| draft.accepting("joint_table", joint(number)))
 }
 
 pub(super) fn product(bench: &Bench, _form: Form, draw: &mut Noise) -> Option<Draft> {
@@ -48,17 +42,10 @@ pub(super) fn product(bench: &Bench, _form: Form, draw: &mut Noise) -> Option<Dr
     if other == number {
         return None;
     }
-    let product = JointProduct {
-        joint: number,
-        of: [number, other],
-        arcsec_per_rad2: draw.sign() * draw.size(10.0, 60.0),
-    };
-    unknown(
-        "product of two angles",
-        number,
-        Physical::JointProduct(product),
-    )
-    .map(|draft| draft.accepting("cable_drag", joint(number)))
+    let product =
+        JointProduct::effect(number, [number, other], draw.sign() * draw.size(10.0, 60.0));
+    unknown("product of two angles", number, product)
+        .map(|draft| draft.accepting("cable_drag", joint(number)))
 }
 
 pub(super) fn sway(bench: &Bench, _form: Form, draw: &mut Noise) -> Option<Draft> {
@@ -67,13 +54,13 @@ pub(super) fn sway(bench: &Bench, _form: Form, draw: &mut Noise) -> Option<Draft
         true => (draw.vector(30.0, 150.0).map(f64::round), [0.0; 3]),
         false => ([0.0; 3], draw.vector(3.0, 20.0)),
     };
-    let sway = BaseSway {
+    let sway = BaseSway::effect(
         shift_um,
         turn_arcsec,
         period_s,
-        phase_deg: draw.uniform(-180.0, 180.0).round(),
-    };
-    let cause = sized("unknown", "base".into(), vec![Physical::BaseSway(sway)]);
+        draw.uniform(-180.0, 180.0).round(),
+    );
+    let cause = sized("unknown", "base".into(), vec![sway]);
     // The tracker's stand may swing as well as the base.
     Some(
         Draft::new("slow swing", vec![cause])
