@@ -2,7 +2,7 @@
 
 use super::estimate::length;
 use super::statistics::rows;
-use super::{Diagnosed, labelled, screen, tables};
+use super::{DiagnosisSummary, labelled, screen, tables};
 use crate::error::{Result, counted};
 use crate::pipeline::CompletedRun;
 use crate::stage::{DIAGNOSES, Stage, Transfer};
@@ -39,7 +39,7 @@ pub fn in_short(
     };
     let diagnosed = DIAGNOSES.iter().find_map(|name| ran(name));
     let diagnosed = diagnosed
-        .map(|stage| Diagnosed::read(&outcome.manifest.run_id, stage, store))
+        .map(|stage| DiagnosisSummary::read(&outcome.manifest.run_id, stage, store))
         .transpose()?;
     if let Some(wrong) = wrong {
         let verdict = diagnosed.map_or_else(|| "wrong set-up".into(), |told| told.verdict());
@@ -98,13 +98,13 @@ pub fn in_short(
         least,
     ));
     if let Some(told) = &diagnosed {
-        text.push_str(&screen::found(told.found(), width));
+        text.push_str(&screen::found(told.in_few_words(), width));
     }
     text.push_str(&labelled(
         "verdict",
         &diagnosed
             .as_ref()
-            .map_or_else(|| verdict(after), Diagnosed::verdict),
+            .map_or_else(|| verdict(after), DiagnosisSummary::verdict),
     ));
     if let Some(doubtful) = after.remarked.filter(|doubtful| *doubtful > 0) {
         let of = counted(after.points as usize, "point");
@@ -122,7 +122,7 @@ pub fn in_short(
         text.push_str(&screen::sentence("warning", &warning, width));
     }
     let next = diagnosed
-        .and_then(|told| told.next_step(on.store))
+        .and_then(|told| told.next_step("HEAD", on.store))
         .or_else(|| unknown_noise(after));
     let compensate = || NextStep::correct("HEAD", on.store);
     Ok(Some(text + &next.unwrap_or_else(compensate).text(width)))

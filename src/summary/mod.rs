@@ -2,7 +2,6 @@
 
 mod columns;
 mod corrections;
-mod diagnosed;
 mod diagnosis;
 mod effects;
 mod estimate;
@@ -24,11 +23,9 @@ mod screen;
 mod searches;
 mod short_finding;
 mod statistics;
-mod torques;
 
 pub use columns::{columns, columns_json};
 pub use corrections::{corrections, corrections_json};
-pub use diagnosed::Diagnosed;
 pub use diagnosis::DiagnosisSummary;
 pub use effects::effects_json;
 pub use explanation::explanation;
@@ -46,7 +43,6 @@ pub use run::{run, stage, status};
 pub use run_diff::run_diff;
 pub use searches::{searches, searches_json};
 pub use statistics::{rejected, rejected_rows, statistics, statistics_json};
-pub use torques::TorqueSummary;
 
 use crate::error::Result;
 use crate::pipeline::{CompletedRun, StageReport};
