@@ -1,7 +1,7 @@
 //! A run in ten lines: what was measured, the error before and after, what was found, the verdict, what is in doubt, one next step.
 
 use super::estimate::length;
-use super::statistics::rows;
+use super::statistics::statistics_rows;
 use super::{DiagnosisSummary, labelled, screen, tables};
 use crate::error::{Result, counted};
 use crate::pipeline::CompletedRun;
@@ -29,7 +29,7 @@ pub fn in_short(
     on: ResultScreen,
 ) -> Result<Option<String>> {
     let width = screen::width(on.columns);
-    let rows = rows(outcome, store)?;
+    let rows = statistics_rows(outcome, store)?;
     let ran = |name: &str| {
         outcome
             .manifest
@@ -65,7 +65,7 @@ pub fn in_short(
         .iter()
         .filter(|row| carried.is_none() && row.set == after.set && row.order < after.order);
     let before = earlier.min_by_key(|row| (row.order, row.held_out != after.held_out));
-    let robot = tables::<Robot>(outcome, store)?
+    let robot = tables::<Robot>(&outcome.manifest, store)?
         .into_iter()
         .next()
         .and_then(|robot| robot.0.into_iter().next());
