@@ -82,6 +82,8 @@
 //! | stage | `src/stage/<name>.rs` | one line in [`stage::STAGES`] |
 //! | table | `schemas/<kind>.json`, of which its rows are made; `src/table/<kind>.rs` for what fills them | one line in [`table::TABLES`] |
 //! | export format | `src/export/<name>.rs`, which declares an [`export::Format`] | its `mod`, and one line in [`export::FORMATS`] |
+//! | figure of a page | - | the template in `src/report`: it has the rows of tables with all their columns, and the filters `mm`, `count`, `fixed`, `significant` |
+//! | figure of `--json` | - | the columns that [`table::picked`] is asked for where the document is made |
 //! | pipeline | `pipelines/<name>/pipeline.yaml` | - |
 //!
 //! An effect step by step, with a row of the table that a test compiles and fits: `src/numerics/effect/README.md`.

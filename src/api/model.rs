@@ -92,7 +92,7 @@ pub fn diagnose(robot: &Robot, recording: &Recording, options: &Options) -> Resu
     let Identified { mut model, given } = options.run("diagnose", robot, recording)?;
     let tables = |kind: &str| Ok(given.kind(kind).cloned());
     // Commands that are proposed speak of a run: the last one of whoever types them.
-    let summary = DiagnosisSummary::of_tables("HEAD", "diagnose", &tables)?;
+    let summary = DiagnosisSummary::of_tables("HEAD", &tables)?;
     let rows = recording.points_mm.len() as u64;
     let summary = summary.with_subject(&robot.description.name, rows);
     if summary.is_wrong_setup() {

@@ -11,7 +11,7 @@ use crate::pipeline::{
 use crate::stage::DIAGNOSES;
 use crate::store::Store;
 use crate::store::frame::Frame;
-use crate::summary::{Diagnosed, LimitsSummary};
+use crate::summary::{DiagnosisSummary, LimitsSummary};
 use std::path::Path;
 
 /// What is to be run, and how.
@@ -102,9 +102,10 @@ impl CalibRun {
     }
 
     /// The stage that diagnosed, `step` where there are several, and what it said.
-    pub fn diagnosis(&self, step: Option<&str>) -> Result<(String, Diagnosed)> {
+    pub fn diagnosis(&self, step: Option<&str>) -> Result<(String, DiagnosisSummary)> {
         let run = &self.manifest.run_id;
         let (_, stage) = diagnosis(&self.store, run, step, &DIAGNOSES)?;
-        Ok((stage.id.clone(), Diagnosed::read(run, &stage, &self.store)?))
+        let summary = DiagnosisSummary::read(run, &stage, &self.store)?;
+        Ok((stage.id.clone(), summary))
     }
 }

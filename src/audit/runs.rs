@@ -182,57 +182,34 @@ fn outputs(manifest: &Manifest, place: &RunAddress) -> Vec<(String, OutputRecord
 }
 
 fn causes(a: &Manifest, b: &Manifest) -> Vec<SettingChange> {
+    let cause = |stage: &str, what, before: &str, now: &str| SettingChange {
+        stage: stage.into(),
+        change: KeyChange {
+            what,
+            name: stage.into(),
+            before: before.into(),
+            now: now.into(),
+        },
+    };
     let mut causes = Vec::new();
     if a.tool.version != b.tool.version {
-        let change = KeyChange {
-            what: "calib",
-            name: String::new(),
-            before: a.tool.version.clone(),
-            now: b.tool.version.clone(),
-        };
-        causes.push(SettingChange {
-            stage: String::new(),
-            change,
-        });
+        causes.push(cause("", "calib", &a.tool.version, &b.tool.version));
     }
     for stage in &b.stages {
-        let before = a.stage(&stage.id);
-        if before.is_none() {
-            let change = KeyChange {
-                what: "stage",
-                name: stage.id.clone(),
-                before: "-".into(),
-                now: stage.uses.clone(),
-            };
-            causes.push(SettingChange {
-                stage: stage.id.clone(),
-                change,
-            });
-        }
-        let (Some(old), Some(new)) = (before.and_then(|stage| stage.key.as_ref()), &stage.key)
-        else {
+        let Some(before) = a.stage(&stage.id) else {
+            causes.push(cause(&stage.id, "stage", "-", &stage.uses));
             continue;
         };
-        let own = changes_of(old, new)
-            .into_iter()
-            .filter(|change| change.what != "input");
+        let keys = before.key.as_ref().zip(stage.key.as_ref());
+        let changes = keys.map_or_else(Vec::new, |(old, new)| changes_of(old, new));
+        let own = changes.into_iter().filter(|change| change.what != "input");
         causes.extend(own.map(|change| SettingChange {
             stage: stage.id.clone(),
             change,
         }));
     }
-    for stage in a.stages.iter().filter(|stage| b.stage(&stage.id).is_none()) {
-        let change = KeyChange {
-            what: "stage",
-            name: stage.id.clone(),
-            before: stage.uses.clone(),
-            now: "-".into(),
-        };
-        causes.push(SettingChange {
-            stage: stage.id.clone(),
-            change,
-        });
-    }
+    let gone = a.stages.iter().filter(|stage| b.stage(&stage.id).is_none());
+    causes.extend(gone.map(|stage| cause(&stage.id, "stage", &stage.uses, "-")));
     causes
 }
 

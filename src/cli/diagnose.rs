@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::pipeline::{Purpose, Selection};
 use crate::raw::ending;
 use crate::stage::DIAGNOSES;
-use crate::summary::{Diagnosed, rejected};
+use crate::summary::{DiagnosisSummary, rejected};
 use clap::Args;
 use std::ffi::OsString;
 use std::io::Write;
@@ -114,7 +114,7 @@ fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<u
         };
         diagnosis(&store, run, step, &DIAGNOSES)?
     };
-    let told = Diagnosed::read(&manifest.run_id, &stage, &store)?;
+    let told = DiagnosisSummary::read(&manifest.run_id, &stage, &store)?;
     if let Some(file) = &arguments.export_effect {
         write_new(file, &told.effect_file(arguments.finding)?)?;
     }

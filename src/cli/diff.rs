@@ -11,6 +11,7 @@ use crate::store::{Store, TableRef};
 use crate::summary::{rival_changes, run_diff};
 use crate::table::{Recording, Table};
 use clap::Args;
+use serde_json::json;
 use std::path::{Path, PathBuf};
 
 /// Compare two tables or two runs: which rows changed, by how much, in the column's unit and in sigmas.
@@ -131,12 +132,10 @@ fn execute(arguments: &DiffArguments) -> Result<u8> {
     let diff = compare_runs(&store, &a, &b, &options)?;
     let rivals = rival_changes(&store, &diff, [&a, &b])?;
     if arguments.json {
-        let mut value =
-            serde_json::to_value(&diff).map_err(|error| Error::Bug(error.to_string()))?;
+        let mut value = json!(diff);
         value["same"] = diff.is_same().into();
         value["counting"] = counting.into();
-        value["rivals"] =
-            serde_json::to_value(&rivals).map_err(|error| Error::Bug(error.to_string()))?;
+        value["rivals"] = json!(rivals);
         emit_json(&value)?;
     } else {
         emit(&(run_diff(&diff, &rivals, arguments.stat) + &line(counting.as_deref())))?;
@@ -204,7 +203,8 @@ fn tables(
 ) -> Result<u8> {
     let diff = diff::compare(a, b, options)?;
     if arguments.json {
-        let mut value = json(&diff)?;
+        let mut value = json!(diff);
+        value["same"] = diff.is_same().into();
         value["counting"] = counting.into();
         emit_json(&value)?;
     } else {
@@ -324,10 +324,4 @@ fn options(arguments: &DiffArguments) -> Result<DiffOptions> {
         options.quaternions.push(names);
     }
     Ok(options)
-}
-
-fn json(diff: &TableDiff) -> Result<serde_json::Value> {
-    let mut value = serde_json::to_value(diff).map_err(|error| Error::Bug(error.to_string()))?;
-    value["same"] = diff.is_same().into();
-    Ok(value)
 }

@@ -3,7 +3,7 @@
 use super::surroundings::open_store;
 use super::{emit, emit_json};
 use crate::audit::explain;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::pipeline::find_run;
 use crate::summary;
 use clap::Args;
@@ -34,9 +34,7 @@ pub(super) fn main(arguments: &ExplainArguments) -> Result<()> {
     let store = open_store(arguments.store.as_deref())?;
     let explanation = explain(&store, &find_run(&store, &arguments.run)?, &arguments.stage)?;
     if arguments.json {
-        return emit_json(
-            &serde_json::to_value(&explanation).map_err(|error| Error::Bug(error.to_string()))?,
-        );
+        return emit_json(&explanation);
     }
     emit(&summary::explanation(&explanation))
 }

@@ -3,7 +3,7 @@
 use super::surroundings::{now, open_store};
 use super::{emit, emit_json};
 use crate::audit::kept_actions;
-use crate::error::{Error, Result, counted};
+use crate::error::{Result, counted};
 use clap::Args;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -43,9 +43,7 @@ pub(super) fn main(arguments: &GcArguments) -> Result<()> {
     let before = now().checked_sub(grace).unwrap_or(std::time::UNIX_EPOCH);
     let sweep = store.sweep(&keep, before, arguments.dry_run)?;
     if arguments.json {
-        return emit_json(
-            &serde_json::to_value(&sweep).map_err(|error| Error::Bug(error.to_string()))?,
-        );
+        return emit_json(&sweep);
     }
     let verb = if arguments.dry_run {
         "would remove"

@@ -32,9 +32,7 @@ pub(super) fn main(arguments: &LineageArguments) -> Result<()> {
     let store = open_store(arguments.store.as_deref())?;
     let node = lineage(&store, &hash(&store, &arguments.table)?)?;
     if arguments.json {
-        return emit_json(
-            &serde_json::to_value(&node).map_err(|error| Error::Bug(error.to_string()))?,
-        );
+        return emit_json(&node);
     }
     let mut text = String::new();
     lines(&node, "", 0, &mut text);

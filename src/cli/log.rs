@@ -83,7 +83,7 @@ pub(super) fn main(arguments: &LogArguments) -> Result<()> {
         shown += 1;
     }
     if arguments.json {
-        return emit_json(&rows.into());
+        return emit_json(&rows);
     }
     emit(if shown == 0 { "no runs\n" } else { &text })
 }

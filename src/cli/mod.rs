@@ -218,8 +218,8 @@ fn emit_lines(text: &str) -> Result<()> {
     })
 }
 
-fn emit_json(value: &serde_json::Value) -> Result<()> {
-    let text =
-        serde_json::to_string_pretty(value).map_err(|error| Error::Bug(error.to_string()))?;
-    emit(&format!("{text}\n"))
+/// Prints one JSON document, keys in their order.
+fn emit_json(result: &impl serde::Serialize) -> Result<()> {
+    let value = serde_json::to_value(result).map_err(|error| Error::Bug(error.to_string()))?;
+    emit(&format!("{value:#}\n"))
 }

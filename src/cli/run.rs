@@ -10,7 +10,7 @@ use crate::raw::ending;
 use crate::report::PageLanguage;
 use crate::store::Store;
 use crate::summary::{self, LimitsSummary, ResultScreen, labelled};
-use crate::table::Withdrawn;
+use crate::table::picked;
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use serde_json::json;
@@ -204,45 +204,30 @@ fn document(
         .iter()
         .map(|path| path.display().to_string())
         .collect();
-    let standing = standing_of(&outcome.manifest, store)?.map(|stands| {
-        let compared = |gone: &Withdrawn| {
-            json!({ "step": gone.step, "rms_mm": gone.rms_mm, "than": gone.than, "than_rms_mm": gone.than_rms_mm, "points": gone.points })
-        };
-        json!({
-            "step": stands.step, "model": stands.model, "withdrawn": stands.withdrawn.iter().map(compared).collect::<Vec<_>>(),
-            "contradicted": stands.contradicted.as_ref().map(|contradicted| compared(&contradicted.0)),
-        })
-    });
-    let stages: Vec<serde_json::Value> = manifest
-        .stages
-        .iter()
-        .map(|stage| {
-            let outputs = stage.outputs.iter().map(|output| {
-                json!({
-                    "port": output.port, "kind": output.kind, "rows": output.table.rows,
-                    "table_hash": output.table.table_hash, "path": output.path,
-                })
-            });
+    let stages = manifest.stages.iter().map(|stage| {
+        let mut told = picked(stage, "id uses status reason notes warnings wall_seconds");
+        let outputs = stage.outputs.iter().map(|output| {
             json!({
-                "id": stage.id, "uses": stage.uses, "status": stage.status, "reason": stage.reason,
-                "outputs": outputs.collect::<Vec<_>>(), "notes": stage.notes, "warnings": stage.warnings,
-                "wall_seconds": stage.wall_seconds,
+                "port": output.port, "kind": output.kind, "rows": output.table.rows,
+                "table_hash": output.table.table_hash, "path": output.path,
             })
-        })
-        .collect();
+        });
+        told["outputs"] = outputs.collect();
+        told
+    });
     Ok(json!({
         "status": "done",
         "run_id": manifest.run_id,
         "pipeline": manifest.pipeline.name,
         "seed": manifest.seed,
-        "stages": stages,
-        "standing": standing,
+        "stages": stages.collect::<Vec<_>>(),
+        "standing": standing_of(manifest, store)?,
         "wrong_setup": wrong_setup_of(manifest, store)?,
         "accepted": limits.accepted(),
-        "limits": limits.document()?,
-        "statistics": summary::statistics_json(outcome, store)?,
-        "corrections": summary::corrections_json(outcome, store)?,
-        "searches": summary::searches_json(outcome, store)?,
+        "limits": limits,
+        "statistics": summary::statistics_rows(outcome, store)?,
+        "corrections": summary::corrections_rows(outcome, store)?,
+        "searches": summary::searches_rows(outcome, store)?,
         "rejected_rows": summary::rejected_rows(&outcome.manifest),
         "report": documents.first(),
         "documents": documents,

@@ -60,9 +60,7 @@ pub(super) fn main(arguments: &ShowArguments) -> Result<()> {
         ));
     };
     if arguments.json {
-        return emit_json(
-            &serde_json::to_value(stage).map_err(|error| Error::Bug(error.to_string()))?,
-        );
+        return emit_json(stage);
     }
     emit(&summary::stage(stage))
 }

@@ -43,7 +43,7 @@ fn execute(arguments: &VerifyArguments) -> Result<u8> {
         Err(other) => return Err(other),
     };
     if arguments.json {
-        emit_json(&serde_json::to_value(&found).map_err(|error| Error::Bug(error.to_string()))?)?;
+        emit_json(&found)?;
     } else {
         emit(&text(&found))?;
     }

@@ -59,9 +59,6 @@ pub fn achieved_page(tables: &AchievedTables) -> Result<String> {
         });
     let page = json!({
         "title": tables.title,
-        "policy": "",
-        "style": include_str!("report.css"),
-        "version": env!("CARGO_PKG_VERSION"),
         "model": tables.model,
         "points": count(tables.errors[1].len() as i64),
         "rows": tables.rows.iter().map(row).collect::<Vec<_>>(),
@@ -69,5 +66,5 @@ pub fn achieved_page(tables: &AchievedTables) -> Result<String> {
         "picture": histogram(&errors, "Histogram of the position error before and after correction"),
         "poses": poses.collect::<Vec<_>>(),
     });
-    render("achieved.html", include_str!("achieved.html"), &page)
+    render("achieved.html", include_str!("achieved.html"), page)
 }

@@ -12,6 +12,18 @@ pub(super) struct Area {
     pub bottom: f64,
 }
 
+impl Area {
+    /// Left, top, right, bottom.
+    pub fn new([left, top, right, bottom]: [f64; 4]) -> Self {
+        Self {
+            left,
+            top,
+            right,
+            bottom,
+        }
+    }
+}
+
 /// Data to user units along one axis, linear or logarithmic.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Scale {

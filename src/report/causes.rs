@@ -91,9 +91,6 @@ pub fn diagnosed_page(tables: &DiagnosedTables) -> Result<String> {
     });
     let page = json!({
         "title": tables.title,
-        "policy": "",
-        "style": include_str!("report.css"),
-        "version": env!("CARGO_PKG_VERSION"),
         "run": tables.origin[0],
         "step_id": tables.origin[1],
         "kind": if tables.verdict.0 { "better" } else { "open" },
@@ -103,5 +100,5 @@ pub fn diagnosed_page(tables: &DiagnosedTables) -> Result<String> {
         "findings": findings.collect::<Vec<_>>(),
         "next": tables.next,
     });
-    render("diagnosed.html", include_str!("diagnosed.html"), &page)
+    render("diagnosed.html", include_str!("diagnosed.html"), page)
 }

@@ -92,12 +92,7 @@ fn closings(tables: &Tables) -> Option<Vec<FixtureFigures>> {
 }
 
 fn picture(all: &[FixtureFigures]) -> String {
-    let area = Area {
-        left: LEFT,
-        top: 8.0,
-        right: WIDTH - 12.0,
-        bottom: 8.0 + ROW * all.len() as f64,
-    };
+    let area = Area::new([LEFT, 8.0, WIDTH - 12.0, 8.0 + ROW * all.len() as f64]);
     let means = || {
         all.iter()
             .flat_map(|own| [own.before[0], own.after[0]])

@@ -1,7 +1,7 @@
 //! How the rivals of a learned correction did, and why one was kept or none.
 
 use super::Tables;
-use super::number::{count, mm, signed};
+use super::number::{mm, signed};
 use crate::table::CorrectionsRow;
 use serde_json::{Value, json};
 
@@ -28,23 +28,18 @@ fn comparison(rows: &[CorrectionsRow]) -> Option<Value> {
         )
     };
     let view = |row: &CorrectionsRow| {
-        json!({
-            "name": words(&row.rival),
-            "chosen": row.chosen,
-            // Mean, rms, largest error, mm.
-            "errors": Vec::from([row.mean_mm, row.rms_mm, row.max_mm].map(error)),
-            "gain": row
-                .gain_mm
-                .zip(row.gain_sigma_mm)
-                .filter(|_| row.rival != "none")
-                .map_or_else(String::new, |(gain, sigma)| format!("{} \u{b1} {}", signed(gain, 3), mm(sigma))),
-            "numbers": if row.numbers > 0 { count(row.numbers) } else { String::new() },
-            "settings": row
-                .hidden
-                .zip(row.decay)
-                .map_or_else(String::new, |(hidden, decay)| format!("{hidden} neurons, decay {decay}")),
-            "reason": row.reason,
-        })
+        let gain = row
+            .gain_mm
+            .zip(row.gain_sigma_mm)
+            .filter(|_| row.rival != "none");
+        let gain = gain.map(|(gain, sigma)| format!("{} \u{b1} {}", signed(gain, 3), mm(sigma)));
+        let settings = row.hidden.zip(row.decay);
+        let settings = settings.map(|(hidden, decay)| format!("{hidden} neurons, decay {decay}"));
+        let mut told = json!(row);
+        told["name"] = words(&row.rival).into();
+        told["gain"] = gain.unwrap_or_default().into();
+        told["settings"] = settings.into();
+        told
     };
     Some(
         json!({ "step": first.step, "sentence": sentence, "rows": rows.iter().map(view).collect::<Vec<_>>() }),

@@ -16,12 +16,7 @@ const DRAWN: usize = 300;
 
 /// Positive values over a count (iterations, generations).
 pub(super) fn course(lines: &[Line], x_name: &str, y_name: &str, title: &str) -> String {
-    let area = Area {
-        left: 52.0,
-        top: 26.0,
-        right: WIDTH - 14.0,
-        bottom: 220.0,
-    };
+    let area = Area::new([52.0, 26.0, WIDTH - 14.0, 220.0]);
     let all = || lines.iter().flat_map(|line| &line.points);
     let last = all().map(|p| p[0]).fold(1.0, f64::max);
     let upper = all().map(|p| p[1]).fold(0.0, f64::max);
@@ -55,12 +50,7 @@ pub(super) fn course(lines: &[Line], x_name: &str, y_name: &str, title: &str) ->
 
 /// Singular values as (number, value), on a logarithmic axis.
 pub(super) fn spectrum(values: &[(i64, f64)], title: &str) -> String {
-    let area = Area {
-        left: 52.0,
-        top: 26.0,
-        right: WIDTH - 14.0,
-        bottom: 220.0,
-    };
+    let area = Area::new([52.0, 26.0, WIDTH - 14.0, 220.0]);
     let upper = values.iter().map(|v| v.1).fold(0.0, f64::max);
     let lower = values
         .iter()

@@ -2,7 +2,7 @@
 
 use super::Tables;
 use super::number::{count, fixed};
-use crate::table::{IntakeRow, RejectedRow, Robot};
+use crate::table::{RejectedRow, Robot, RobotRow};
 use crate::units::Unit;
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
@@ -43,9 +43,9 @@ pub(super) fn section(tables: &Tables) -> Value {
         "quantities": quantities.into_iter().filter_map(|(there, name)| there.then_some(name)).collect::<Vec<_>>(),
         // Set and its rows.
         "sets": sets.into_iter().map(|(name, rows)| (name, count(rows))).collect::<Vec<_>>(),
-        "files": tables.intake.iter().flat_map(|table| &table.0).map(file).collect::<Vec<_>>(),
+        "files": tables.intake.iter().flat_map(|table| &table.0).collect::<Vec<_>>(),
         "reasons": reasons.into_iter().cloned().collect::<Vec<_>>(),
-        "rejected": rejected.iter().take(LISTED).map(|row| reject(row)).collect::<Vec<_>>(),
+        "rejected": rejected.iter().take(LISTED).collect::<Vec<_>>(),
         "rejected_count": count(rejected.len() as i64),
         "unlisted": rejected.len() > LISTED,
         // Table kind and its rows, as read by the report; a sum where several stages wrote one.
@@ -54,35 +54,22 @@ pub(super) fn section(tables: &Tables) -> Value {
 }
 
 fn joints(robot: &Robot) -> Vec<Value> {
-    let triple = |values: [Option<f64>; 3], decimals| {
-        let texts: Option<Vec<String>> = values
-            .into_iter()
-            .map(|v| Some(fixed(v?, decimals)))
-            .collect();
-        texts.map_or_else(String::new, |texts| texts.join(", "))
+    let is_joint = |body: &&RobotRow| body.kind == "revolute" || body.kind == "prismatic";
+    let with_travel = |body: &RobotRow| {
+        let mut joint = json!(body);
+        let degrees = |v| fixed(Unit::Degree.from_si(v), 1);
+        let travel = match (
+            body.lower_rad.zip(body.upper_rad),
+            body.lower_mm.zip(body.upper_mm),
+        ) {
+            (Some((from, to)), _) => format!("{} to {} deg", degrees(from), degrees(to)),
+            (None, Some((from, to))) => format!("{} to {} mm", fixed(from, 1), fixed(to, 1)),
+            (None, None) => String::new(),
+        };
+        joint["travel"] = travel.into();
+        joint
     };
-    let bodies = robot
-        .0
-        .iter()
-        .filter(|body| body.kind == "revolute" || body.kind == "prismatic");
-    bodies
-        .map(|body| {
-            json!({
-                "name": format!("{} {}", body.body, body.name),
-                "kind": body.kind,
-                "axis": triple([body.axis_x, body.axis_y, body.axis_z], 4),
-                "point": triple([body.point_x_mm, body.point_y_mm, body.point_z_mm], 1),
-                "limits": match (body.lower_rad.zip(body.upper_rad), body.lower_mm.zip(body.upper_mm)) {
-                    (Some((lower, upper)), _) => {
-                        let degrees = |v| fixed(Unit::Degree.from_si(v), 1);
-                        format!("{} to {} deg", degrees(lower), degrees(upper))
-                    }
-                    (None, Some((lower, upper))) => format!("{} to {} mm", fixed(lower, 1), fixed(upper, 1)),
-                    (None, None) => String::new(),
-                },
-            })
-        })
-        .collect()
+    robot.0.iter().filter(is_joint).map(with_travel).collect()
 }
 
 fn tool(robot: &Robot) -> Option<String> {
@@ -99,30 +86,47 @@ fn tool(robot: &Robot) -> Option<String> {
     Some(format!("{point} mm{mass}"))
 }
 
-fn file(row: &IntakeRow) -> Value {
-    json!({
-        "name": row.file,
-        "lines": count(row.lines),
-        "read": count(row.read),
-        "accepted": count(row.accepted),
-        "rejected": count(row.rejected),
-        "balanced": row.accepted + row.rejected == row.read,
-    })
-}
-
-fn reject(row: &RejectedRow) -> Value {
-    json!({
-        "file": row.file,
-        "line": row.line.to_string(),
-        "point": row.point_id.clone().unwrap_or_default(),
-        "reason": row.reason,
-        "detail": row.detail,
-        "text": row.text,
-    })
-}
-
 fn kinds(tables: &Tables) -> Vec<(&'static str, String)> {
-    let of = |lengths: Vec<usize>| -> String {
+    let one = |rows: usize| vec![rows];
+    let kinds: [(&str, Vec<usize>); 15] = [
+        ("robot", one(tables.robot.0.len())),
+        ("recording", one(tables.recording.rows())),
+        ("intake", tables.intake.iter().map(|t| t.0.len()).collect()),
+        (
+            "rejected",
+            tables.rejected.iter().map(|t| t.0.len()).collect(),
+        ),
+        ("split", one(tables.split.0.len())),
+        ("parameters", one(tables.parameters.0.len())),
+        ("fit", tables.fit.iter().map(|t| t.0.len()).collect()),
+        (
+            "observability",
+            tables.observability.iter().map(|t| t.0.len()).collect(),
+        ),
+        (
+            "training",
+            tables.training.iter().map(|t| t.0.len()).collect(),
+        ),
+        (
+            "corrections",
+            tables.corrections.iter().map(|t| t.0.len()).collect(),
+        ),
+        (
+            "prediction",
+            tables.prediction.iter().map(|t| t.0.len()).collect(),
+        ),
+        ("statistics", one(tables.statistics.0.len())),
+        (
+            "suspects",
+            tables.suspects.iter().map(|t| t.0.len()).collect(),
+        ),
+        (
+            "findings",
+            tables.findings.iter().map(|t| t.0.len()).collect(),
+        ),
+        ("curves", one(tables.curves.0.len())),
+    ];
+    let of = |lengths: Vec<usize>| {
         let texts: Vec<String> = lengths.into_iter().map(|n| count(n as i64)).collect();
         if texts.is_empty() {
             "not written".into()
@@ -130,45 +134,5 @@ fn kinds(tables: &Tables) -> Vec<(&'static str, String)> {
             format!("{} rows", texts.join(" + "))
         }
     };
-    vec![
-        ("robot", of(vec![tables.robot.0.len()])),
-        ("recording", of(vec![tables.recording.rows()])),
-        (
-            "intake",
-            of(tables.intake.iter().map(|t| t.0.len()).collect()),
-        ),
-        (
-            "rejected",
-            of(tables.rejected.iter().map(|t| t.0.len()).collect()),
-        ),
-        ("split", of(vec![tables.split.0.len()])),
-        ("parameters", of(vec![tables.parameters.0.len()])),
-        ("fit", of(tables.fit.iter().map(|t| t.0.len()).collect())),
-        (
-            "observability",
-            of(tables.observability.iter().map(|t| t.0.len()).collect()),
-        ),
-        (
-            "training",
-            of(tables.training.iter().map(|t| t.0.len()).collect()),
-        ),
-        (
-            "corrections",
-            of(tables.corrections.iter().map(|t| t.0.len()).collect()),
-        ),
-        (
-            "prediction",
-            of(tables.prediction.iter().map(|t| t.0.len()).collect()),
-        ),
-        ("statistics", of(vec![tables.statistics.0.len()])),
-        (
-            "suspects",
-            of(tables.suspects.iter().map(|t| t.0.len()).collect()),
-        ),
-        (
-            "findings",
-            of(tables.findings.iter().map(|t| t.0.len()).collect()),
-        ),
-        ("curves", of(vec![tables.curves.0.len()])),
-    ]
+    kinds.map(|(kind, lengths)| (kind, of(lengths))).into()
 }

@@ -41,12 +41,7 @@ fn scale(all: &[StepErrors]) -> Scale {
 
 /// Points per equal bin (equal on the axis as drawn), a row per step, one height scale for all.
 pub(super) fn histogram(all: &[StepErrors], title: &str) -> String {
-    let area = Area {
-        left: 16.0,
-        top: TOP,
-        right: WIDTH - 12.0,
-        bottom: TOP + ROW * all.len() as f64,
-    };
+    let area = Area::new([16.0, TOP, WIDTH - 12.0, TOP + ROW * all.len() as f64]);
     let scale = scale(all).over(area.left, area.right);
     let counts: Vec<[usize; BINS]> = all
         .iter()
@@ -104,12 +99,12 @@ fn bins(errors: &[f64], scale: Scale, area: Area) -> [usize; BINS] {
 
 /// Share of the points whose error is at most so large, a curve per step.
 pub(super) fn cumulative(all: &[StepErrors], title: &str) -> String {
-    let area = Area {
-        left: 44.0,
-        top: 26.0,
-        right: WIDTH - 12.0,
-        bottom: (TOP + ROW * all.len() as f64).clamp(190.0, 330.0),
-    };
+    let area = Area::new([
+        44.0,
+        26.0,
+        WIDTH - 12.0,
+        (TOP + ROW * all.len() as f64).clamp(190.0, 330.0),
+    ]);
     let scale = scale(all).over(area.left, area.right);
     let share = Scale::linear(0.0, 100.0).over(area.bottom, area.top);
     let mut svg = Svg::new(WIDTH, area.bottom + 38.0);

@@ -137,12 +137,12 @@ pub(super) fn errors_section(
         // Sets still held out after the step that stands, the verdict's first; then those that a later step was fitted to.
         "held_out": held_out.chain(used).collect::<Vec<_>>(),
         "training": sets(rows, false).into_iter().map(|set| block(set, false, None)).collect::<Vec<_>>(),
-        "folds": rows.iter().filter_map(|row| fold(row, steps)).collect::<Vec<_>>(),
+        "folds": rows.iter().filter(|row| row.fold_rms_mm.is_some()).map(|r| row(r, steps)).collect::<Vec<_>>(),
         // What the second kind of folds is.
         "blocks": blocks(rows),
         // Steps whose cross-validation was dropped, and the number of poses.
         "unfolded": unfolded(tables),
-        "references": rows.iter().filter_map(beside).collect::<Vec<_>>(),
+        "references": rows.iter().filter(|row| row.reference.is_some()).collect::<Vec<_>>(),
         "pictures": last.iter().map(|row| picture(tables, row, steps)).collect::<Vec<_>>(),
         "legend": steps.names.iter().map(|(order, step)| (steps.colour(*order), steps.called(step))).collect::<Vec<_>>(),
     }))
@@ -169,64 +169,13 @@ fn sets(rows: &[StatisticsRow], held_out: bool) -> Vec<&str> {
     names
 }
 
+/// A row with what its step is called, its colour, and whether it is the step that stands.
 fn row(row: &StatisticsRow, steps: &Steps) -> Value {
-    let values = [
-        row.mean_mm,
-        row.std_mm,
-        row.p95_mm,
-        row.max_mm,
-        row.rms_mm,
-        row.median_mm,
-        row.rms_x_mm,
-        row.rms_y_mm,
-        row.rms_z_mm,
-        row.noise_rms_mm,
-    ];
-    json!({
-        "step": steps.called(&row.step),
-        "colour": steps.colour(row.order),
-        "points": count(row.points),
-        // Whether it is the step that stands.
-        "last": Some(row.order) == steps.standing(),
-        // mean, std, p95, max, rms, median, rms x, y, z, noise.
-        "values": values.into_iter().map(mm).collect::<Vec<_>>(),
-    })
-}
-
-fn fold(row: &StatisticsRow, steps: &Steps) -> Option<Value> {
-    row.fold_rms_mm?;
-    let values = [
-        row.fold_mean_mm,
-        row.fold_max_mm,
-        row.fold_rms_mm,
-        row.fold_expected_mm,
-        row.block_mean_mm,
-        row.block_max_mm,
-        row.block_rms_mm,
-    ];
-    Some(json!({
-        "step": steps.called(&row.step),
-        "colour": steps.colour(row.order),
-        "set": row.set,
-        // Parts drawn at random: mean, max, rms, expected rms; contiguous parts: mean, max, rms.
-        "values": values.map(|value| value.map_or_else(String::new, mm)),
-    }))
-}
-
-fn beside(row: &StatisticsRow) -> Option<Value> {
-    let figure = |ours, theirs: Option<f64>| (mm(ours), theirs.map_or_else(String::new, mm));
-    Some(json!({
-        "label": row.reference.clone()?,
-        "step": row.step,
-        "set": row.set,
-        "points": if row.held_out { "held out" } else { "training" },
-        // Ours and theirs: mean, std, max.
-        "figures": [
-            figure(row.mean_mm, row.reference_mean_mm),
-            figure(row.std_mm, row.reference_std_mm),
-            figure(row.max_mm, row.reference_max_mm),
-        ],
-    }))
+    let mut told = json!(row);
+    told["called"] = steps.called(&row.step).into();
+    told["colour"] = steps.colour(row.order).into();
+    told["last"] = (Some(row.order) == steps.standing()).into();
+    told
 }
 
 /// The first step with held-out rows of the same set as `after`.

@@ -350,12 +350,7 @@ fn pictures(finding: &FindingRow, curve: &[&CurveRow]) -> Vec<(String, String)> 
             .map(|value| value * y_scale),
     );
     let margin = 0.06 * (y1 - y0).max(1e-9);
-    let area = Area {
-        left: 52.0,
-        top: 26.0,
-        right: 406.0,
-        bottom: 230.0,
-    };
+    let area = Area::new([52.0, 26.0, 406.0, 230.0]);
     let x = Scale::linear(x0, x1).over(area.left, area.right);
     let y = Scale::linear(y0 - margin, y1 + margin).over(area.bottom, area.top);
     let draw = |title: &str, before: bool| {

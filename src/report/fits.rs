@@ -38,7 +38,7 @@ pub(super) fn section(tables: &Tables, steps: &Steps) -> Value {
         "courses": (!lines.is_empty())
             .then(|| course(&lines, "iteration", "rms over the rows of the fit, mm", "Convergence of the fits")),
         "legend": fits.iter().map(|(step, _)| (steps.colour_of(step), step.clone())).collect::<Vec<_>>(),
-        "fits": fits.iter().filter_map(|(step, rows)| Some(fit(step, rows.last()?))).collect::<Vec<_>>(),
+        "fits": fits.iter().filter_map(|(_, rows)| rows.last()).collect::<Vec<_>>(),
         "seen": seen.into_iter().map(|(step, rows)| see(step, &rows)).collect::<Vec<_>>(),
         "trainings": trainings.into_iter().filter_map(|((step, phase), rows)| training(step, phase, &rows)).collect::<Vec<_>>(),
     })
@@ -58,18 +58,6 @@ fn groups<'a, R, K: PartialEq>(
         }
     }
     groups
-}
-
-fn fit(step: &str, last: &FitRow) -> Value {
-    json!({
-        "step": step,
-        "iterations": count(last.iteration),
-        "rms": mm(last.rms_mm),
-        "cost": significant(last.cost, 6),
-        "gradient": significant(last.gradient, 2),
-        "step_norm": significant(last.step_norm, 2),
-        "stop": last.stop.clone().unwrap_or_else(|| "not stated".into()),
-    })
 }
 
 fn see(step: String, rows: &[&ObservabilityRow]) -> Value {

@@ -34,7 +34,6 @@ pub fn html(
         "name": name,
         "title": format!("Fleet {name}"),
         "policy": "; script-src 'unsafe-inline'; img-src data:",
-        "version": env!("CARGO_PKG_VERSION"),
         "style": include_str!("fleet.css"),
         "script": include_str!("fleet.js"),
         "counts": counts.into_iter().map(|(status, count)| (status.to_string(), count)).collect::<Vec<_>>(),
@@ -45,7 +44,7 @@ pub fn html(
         "compared": fleet.0.iter().any(|row| row.changes.is_some()),
         "grouped": fleet.0.iter().any(|row| row.model.is_some() || row.plant.is_some() || row.campaign.is_some()),
     });
-    render("fleet.html", include_str!("fleet.html"), &page)
+    render("fleet.html", include_str!("fleet.html"), page)
 }
 
 /// Robots that are named above the table, at most.
@@ -87,30 +86,18 @@ fn needs(row: &FleetRow) -> Option<(u8, String)> {
     })
 }
 
-fn row<'a>(row: &'a FleetRow, links: &'a BTreeMap<String, String>) -> Value {
-    let figure = |value: Option<f64>| {
-        value.map(|value| json!({ "shown": format!("{value:.3}"), "value": value }))
-    };
+fn row(row: &FleetRow, links: &BTreeMap<String, String>) -> Value {
     let group: Vec<&str> = [&row.model, &row.plant, &row.campaign]
         .into_iter()
         .filter_map(|group| group.as_deref())
         .collect();
-    json!({
-        "name": visible(&row.robot),
-        "link": links.get(&row.robot).map(String::as_str),
-        "group": group.join(", "),
-        "status": &row.status,
-        "reason": row.reason.as_deref(),
-        "before": figure(row.before_rms_mm),
-        "after": figure(row.after_rms_mm),
-        "largest": figure(row.after_max_mm),
-        "floor": figure(row.floor_mm),
-        "held_out": row.held_out.unwrap_or(true),
-        "spark": row.course.as_deref().and_then(|course| spark(course, row.floor_mm)),
-        "verdict": row.verdict.as_ref().map(|verdict| verdict.replace('_', " ")),
-        "causes": row.causes.as_deref(),
-        "flags": row.flags.as_deref(),
-    })
+    let course = row.course.as_deref();
+    let mut told = json!(row);
+    told["name"] = visible(&row.robot).into();
+    told["link"] = json!(links.get(&row.robot));
+    told["group"] = group.join(", ").into();
+    told["spark"] = json!(course.and_then(|course| spark(course, row.floor_mm)));
+    told
 }
 
 fn change(row: &crate::table::FleetChangeRow) -> Value {

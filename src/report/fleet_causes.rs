@@ -54,7 +54,6 @@ pub fn html(
         "name": name,
         "title": format!("Fleet {name}: causes"),
         "policy": "; script-src 'unsafe-inline'; img-src data:",
-        "version": env!("CARGO_PKG_VERSION"),
         "style": concat!(include_str!("fleet.css"), include_str!("fleet_causes.css")),
         "script": include_str!("fleet.js"),
         "lead": format!(
@@ -67,11 +66,7 @@ pub fn html(
         "heads": shared.iter().map(|row| words(&row.effect, &row.place)).collect::<Vec<_>>(),
         "robots": robots(&shared, cells),
     });
-    render(
-        "fleet_causes.html",
-        include_str!("fleet_causes.html"),
-        &page,
-    )
+    render("fleet_causes.html", include_str!("fleet_causes.html"), page)
 }
 
 fn words(effect: &str, place: &str) -> String {

@@ -142,13 +142,10 @@ pub fn pages(tables: &Tables, options: &ReportOptions) -> Result<Pages> {
     let choices = [("title", options.title), ("set", options.set)];
     let page = json!({
         "title": title,
-        "policy": "",
         "certificate": certificate::certificate(tables, &robot, options.identity, judgement.as_ref(), options.set),
         "has_identity": !options.identity.is_empty(),
         "hashes": &options.hashes,
         "diagnosis": findings::section(tables),
-        "style": include_str!("report.css"),
-        "version": env!("CARGO_PKG_VERSION"),
         "errors": errors::errors_section(tables, &steps, options.set)?,
         "closure": closure::section(tables),
         "workspace": errors::workspace_section(&tables.prediction, tables.standing.as_deref()),
@@ -159,7 +156,7 @@ pub fn pages(tables: &Tables, options: &ReportOptions) -> Result<Pages> {
         "choices": choices.into_iter().filter(|(_, value)| value.is_some()).collect::<Vec<_>>(),
         "robot": robot,
     });
-    let html = page::render("report.html", include_str!("report.html"), &page)?;
+    let html = page::render("report.html", include_str!("report.html"), page)?;
     let acceptance = Acceptance(
         judgement
             .map(|judgement| judgement.limits)

@@ -52,9 +52,6 @@ pub fn torque_page(tables: &TorqueTables, title: Option<&str>) -> Result<String>
     let said = |topic| tables.sentences.about(&verdict.step, topic);
     let page = json!({
         "title": title.map_or_else(|| format!("Torques of {robot}"), str::to_owned),
-        "policy": "",
-        "style": include_str!("report.css"),
-        "version": env!("CARGO_PKG_VERSION"),
         "robot": robot,
         "joints": tables.course.joints,
         "rows": count(verdict.rows),
@@ -72,7 +69,7 @@ pub fn torque_page(tables: &TorqueTables, title: Option<&str>) -> Result<String>
         "remarks": said(VerdictTopic::Remark),
         "hashes": &tables.hashes,
     });
-    page::render("torques.html", include_str!("torques.html"), &page)
+    page::render("torques.html", include_str!("torques.html"), page)
 }
 
 fn facts(verdict: &TorqueVerdictRow) -> Vec<String> {
@@ -274,12 +271,7 @@ const GAP: f64 = 8.0;
 
 /// Lines over time; what is held out is shaded.
 fn over_time(course: &TorqueCourse, lines: &[(&str, &[f64])], title: &str) -> String {
-    let area = Area {
-        left: 52.0,
-        top: 26.0,
-        right: WIDTH - 14.0,
-        bottom: 200.0,
-    };
+    let area = Area::new([52.0, 26.0, WIDTH - 14.0, 200.0]);
     let (first, last) = (
         course.time.first().copied().unwrap_or(0.0),
         course.time.last().copied().unwrap_or(1.0),
@@ -350,12 +342,7 @@ fn stretches(time: &[f64]) -> Vec<std::ops::Range<usize>> {
 
 /// Friction over velocity with a band of two standard deviations.
 fn friction(curve: &[&FrictionCurveRow], title: &str) -> String {
-    let area = Area {
-        left: 52.0,
-        top: 26.0,
-        right: 406.0,
-        bottom: 200.0,
-    };
+    let area = Area::new([52.0, 26.0, 406.0, 200.0]);
     let ends = |sign: f64| {
         curve
             .iter()

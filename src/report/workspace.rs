@@ -107,12 +107,7 @@ pub(super) fn scatter(
     title: &str,
 ) -> (String, String) {
     const WIDTH: f64 = 420.0;
-    let area = Area {
-        left: 52.0,
-        top: 26.0,
-        right: WIDTH - 14.0,
-        bottom: 300.0,
-    };
+    let area = Area::new([52.0, 26.0, WIDTH - 14.0, 300.0]);
     let extent = |axis: ViewAxis| {
         let values = frame.iter().flat_map(|table| &table.0).map(axis.1);
         let (lower, upper) = values.fold((f64::MAX, f64::MIN), |(low, high), v| {

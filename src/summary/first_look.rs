@@ -1,11 +1,11 @@
 //! What a fit of base and geometry says of a recording before anything is run in earnest: rows that are used and not, ranges, what is warned
 //! of, what will be observable.
 
-use super::labelled;
+use super::{labelled, tables};
 use crate::error::{Result, counted};
 use crate::pipeline::Manifest;
 use crate::store::Store;
-use crate::table::{Parameters, Prediction, Recording, Rejected, Robot, Table};
+use crate::table::{Parameters, Prediction, Recording, Rejected, Robot};
 use std::collections::BTreeMap;
 
 /// Rejected rows that are shown of one reason.
@@ -50,17 +50,6 @@ pub fn first_look(manifest: &Manifest, store: &Store) -> Result<String> {
         }
     }
     Ok(out)
-}
-
-fn tables<T: Table>(manifest: &Manifest, store: &Store) -> Result<Vec<T>> {
-    let outputs = manifest
-        .stages
-        .iter()
-        .flat_map(|stage| &stage.outputs)
-        .filter(|output| output.kind == T::KIND);
-    outputs
-        .map(|output| T::from_frame(&store.load(&output.table)?))
-        .collect()
 }
 
 fn distinct(recording: &Recording) -> usize {

@@ -1,8 +1,8 @@
 //! A run in ten lines: what was measured, the error before and after, what was found, the verdict, what is in doubt, one next step.
 
 use super::estimate::length;
-use super::statistics::rows;
-use super::{Diagnosed, labelled, screen, tables};
+use super::statistics::statistics_rows;
+use super::{DiagnosisSummary, labelled, screen, tables};
 use crate::error::{Result, counted};
 use crate::pipeline::CompletedRun;
 use crate::stage::{DIAGNOSES, Stage, Transfer};
@@ -29,7 +29,7 @@ pub fn in_short(
     on: ResultScreen,
 ) -> Result<Option<String>> {
     let width = screen::width(on.columns);
-    let rows = rows(outcome, store)?;
+    let rows = statistics_rows(outcome, store)?;
     let ran = |name: &str| {
         outcome
             .manifest
@@ -39,7 +39,7 @@ pub fn in_short(
     };
     let diagnosed = DIAGNOSES.iter().find_map(|name| ran(name));
     let diagnosed = diagnosed
-        .map(|stage| Diagnosed::read(&outcome.manifest.run_id, stage, store))
+        .map(|stage| DiagnosisSummary::read(&outcome.manifest.run_id, stage, store))
         .transpose()?;
     if let Some(wrong) = wrong {
         let verdict = diagnosed.map_or_else(|| "wrong set-up".into(), |told| told.verdict());
@@ -65,7 +65,7 @@ pub fn in_short(
         .iter()
         .filter(|row| carried.is_none() && row.set == after.set && row.order < after.order);
     let before = earlier.min_by_key(|row| (row.order, row.held_out != after.held_out));
-    let robot = tables::<Robot>(outcome, store)?
+    let robot = tables::<Robot>(&outcome.manifest, store)?
         .into_iter()
         .next()
         .and_then(|robot| robot.0.into_iter().next());
@@ -98,13 +98,13 @@ pub fn in_short(
         least,
     ));
     if let Some(told) = &diagnosed {
-        text.push_str(&screen::found(told.found(), width));
+        text.push_str(&screen::found(told.in_few_words(), width));
     }
     text.push_str(&labelled(
         "verdict",
         &diagnosed
             .as_ref()
-            .map_or_else(|| verdict(after), Diagnosed::verdict),
+            .map_or_else(|| verdict(after), DiagnosisSummary::verdict),
     ));
     if let Some(doubtful) = after.remarked.filter(|doubtful| *doubtful > 0) {
         let of = counted(after.points as usize, "point");
@@ -122,7 +122,7 @@ pub fn in_short(
         text.push_str(&screen::sentence("warning", &warning, width));
     }
     let next = diagnosed
-        .and_then(|told| told.next_step(on.store))
+        .and_then(|told| told.next_step("HEAD", on.store))
         .or_else(|| unknown_noise(after));
     let compensate = || NextStep::correct("HEAD", on.store);
     Ok(Some(text + &next.unwrap_or_else(compensate).text(width)))

@@ -7,9 +7,9 @@ use crate::stage::{Report, Stage};
 use crate::store::Store;
 use crate::table::{Acceptance, AcceptanceRow, Table};
 use serde::Serialize;
-use serde_json::Value;
 
 /// The judgements of a run's reports, those alone that have limits.
+#[derive(Serialize)]
 pub struct LimitsSummary(Vec<Judged>);
 
 /// A judgement and the report's stage.
@@ -79,11 +79,6 @@ impl LimitsSummary {
             .iter()
             .map(|judged| labelled("limits", &judged.words()))
             .collect()
-    }
-
-    /// The same for other programs.
-    pub fn document(&self) -> Result<Value> {
-        serde_json::to_value(&self.0).map_err(|error| Error::Bug(error.to_string()))
     }
 }
 

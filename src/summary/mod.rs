@@ -1,8 +1,6 @@
 //! What a run, its tables, its diagnosis and the difference of two runs say, as text and as JSON; nothing is printed here.
 
 mod columns;
-mod corrections;
-mod diagnosed;
 mod diagnosis;
 mod effects;
 mod estimate;
@@ -21,14 +19,10 @@ mod rival_changes;
 mod run;
 mod run_diff;
 mod screen;
-mod searches;
 mod short_finding;
 mod statistics;
-mod torques;
 
 pub use columns::{columns, columns_json};
-pub use corrections::{corrections, corrections_json};
-pub use diagnosed::Diagnosed;
 pub use diagnosis::DiagnosisSummary;
 pub use effects::effects_json;
 pub use explanation::explanation;
@@ -44,19 +38,19 @@ pub use plan::graph;
 pub use rival_changes::{RivalChange, rival_changes};
 pub use run::{run, stage, status};
 pub use run_diff::run_diff;
-pub use searches::{searches, searches_json};
-pub use statistics::{rejected, rejected_rows, statistics, statistics_json};
-pub use torques::TorqueSummary;
+pub use statistics::{
+    corrections, corrections_rows, rejected, rejected_rows, searches, searches_rows, statistics,
+    statistics_rows,
+};
 
 use crate::error::Result;
-use crate::pipeline::{CompletedRun, StageReport};
+use crate::pipeline::{Manifest, StageReport};
 use crate::store::Store;
 use crate::table::{Robot, Table};
 
 /// All tables of a kind that a run wrote. Fails where one has left the store.
-fn tables<T: Table>(outcome: &CompletedRun, store: &Store) -> Result<Vec<T>> {
-    outcome
-        .manifest
+fn tables<T: Table>(manifest: &Manifest, store: &Store) -> Result<Vec<T>> {
+    manifest
         .tables(T::KIND)
         .map(|output| T::from_frame(&store.load(&output.table)?))
         .collect()

@@ -2,6 +2,7 @@
 
 use super::estimate::estimate;
 use crate::effect::{figure, names};
+use crate::table::{FindingNumberRow, RivalRow, picked_of};
 use serde_json::Value;
 
 /// From this probability on a name stands without its rivals.
@@ -12,36 +13,62 @@ const UNLISTED: f64 = 0.2;
 /// Rivals that are named; of more the name is not determined.
 const NAMED: usize = 2;
 
-/// A number of a finding, in its unit.
-pub(super) struct FindingNumber<'a> {
-    pub name: &'a str,
-    pub value: f64,
-    pub unit: &'a str,
-    pub sigma: Option<f64>,
-}
-
-/// Another explanation, with its probability.
-pub(super) struct NamedRival<'a> {
-    pub effect: &'a str,
-    pub place: &'a str,
-    pub probability: f64,
-}
-
-/// A finding as its tables have it.
-pub(super) struct FoundCause<'a> {
-    pub effect: &'a str,
-    pub place: &'a str,
-    pub statement: &'a str,
-    /// Its forms as JSON, an array of objects of one cause each; empty where it has none.
-    pub forms: &'a str,
-    pub numbers: Vec<FindingNumber<'a>>,
-    /// Of its name; none of what has none.
-    pub probability: Option<f64>,
-    /// Rivals that the data do not exclude, and the probability of none of the names.
-    pub rivals: Vec<NamedRival<'a>>,
-    pub none: f64,
+/// A finding of positions or torques with its numbers and rivals.
+pub(super) struct Found {
+    pub rank: i64,
+    pub effect: String,
+    pub place: String,
+    pub statement: String,
+    /// Its forms, objects of one cause each; null where it has none.
+    pub forms: Value,
+    pub numbers: Vec<FindingNumberRow>,
+    /// Of its name, of its place, and of none of the names.
+    pub probabilities: [Option<f64>; 3],
+    /// Whether it was compared with others.
+    pub is_compared: bool,
+    pub rivals: Vec<RivalRow>,
     /// Its size in a unit that all findings of a diagnosis share, and as it is printed.
     pub size: Option<(f64, String)>,
+    /// What `--json` has of it but numbers and rivals.
+    pub document: Value,
+}
+
+impl Found {
+    /// All of it for other programs.
+    pub fn document(&self) -> Value {
+        let mut document = self.document.clone();
+        document["parameters"] = picked_of(&self.numbers, "name value unit sigma");
+        document["rivals"] = picked_of(&self.rivals, "effect where=place delta_bic probability");
+        document
+    }
+
+    /// All of it for a person; `more` stands before the rivals that are shown.
+    pub fn details(&self, more: &str, is_shown: fn(&RivalRow) -> bool) -> String {
+        let (effect, at) = (&self.effect, &self.place);
+        let mut text = format!("{}. {}\n", self.rank, self.statement);
+        if let [Some(name), Some(place), Some(none)] = self.probabilities {
+            text.push_str(&format!("   probability: {effect} {name:.2}, at {at} {place:.2}, none of the names {none:.2}\n"));
+        }
+        text.push_str(more);
+        let rival = |rival: &RivalRow| {
+            let probability = rival.probability.map(|value| format!(" {value:.2}"));
+            format!(
+                "{} at {}{}",
+                rival.effect,
+                rival.place,
+                probability.unwrap_or_default()
+            )
+        };
+        let shown = self.rivals.iter().filter(|rival| is_shown(rival));
+        let shown: Vec<String> = shown.map(rival).collect();
+        if !shown.is_empty() {
+            let rivals = shown.join(", ");
+            text.push_str(&format!(
+                "   these data cannot separate it from: {rivals}\n"
+            ));
+        }
+        text
+    }
 }
 
 /// A finding in a few words.
@@ -197,13 +224,12 @@ pub(super) fn words(effect: &str, place: &str) -> String {
 
 impl ShortFinding {
     /// The same of a finding as its tables have it; `rows` says that time counts rows.
-    pub fn of(found: FoundCause, rows: bool) -> Self {
-        let forms = serde_json::from_str::<Value>(found.forms).unwrap_or_default();
+    pub fn of(found: &Found, rows: bool) -> Self {
         // A cause of the list which fits best, but not well enough to bear its name.
         let nearest = (found.effect == names::UNKNOWN)
-            .then(|| nearest(&found, &forms))
+            .then(|| nearest(found))
             .flatten();
-        let effect = nearest.unwrap_or(found.effect);
+        let effect = nearest.unwrap_or(&found.effect);
         let told = phrase(effect).map_or(
             if effect == names::UNKNOWN {
                 No
@@ -217,9 +243,9 @@ impl ShortFinding {
         let mut what = if of_rows {
             found.statement.trim_end_matches('.').to_string()
         } else {
-            words(effect, found.place)
+            words(effect, &found.place)
         };
-        if let Some(at) = changed_at(&forms).filter(|_| !of_rows) {
+        if let Some(at) = changed_at(&found.forms).filter(|_| !of_rows) {
             what += &if rows {
                 format!(" at row {:.0}", at.floor() + 2.0)
             } else {
@@ -229,9 +255,9 @@ impl ShortFinding {
         if nearest.is_some() {
             what += ", roughly";
         }
-        let instead = instead(&found, nearest);
+        let instead = instead(found, nearest);
         Self {
-            size: found.size,
+            size: found.size.clone(),
             what,
             number,
             instead,
@@ -240,10 +266,11 @@ impl ShortFinding {
 }
 
 /// The cause by whose form something unknown is modelled, where that is its closest rival.
-fn nearest<'a>(found: &FoundCause<'a>, forms: &Value) -> Option<&'a str> {
-    let own = |rival: &&NamedRival| rival.place == found.place && rival.effect != names::UNKNOWN;
+fn nearest(found: &Found) -> Option<&str> {
+    let own = |rival: &&RivalRow| rival.place == found.place && rival.effect != names::UNKNOWN;
     let modelled = |effect: &str| {
-        forms
+        found
+            .forms
             .as_array()
             .is_some_and(|all| all.iter().any(|form| form.get(effect).is_some()))
     };
@@ -251,8 +278,8 @@ fn nearest<'a>(found: &FoundCause<'a>, forms: &Value) -> Option<&'a str> {
         .rivals
         .iter()
         .filter(own)
-        .find(|rival| modelled(rival.effect))
-        .map(|rival| rival.effect)
+        .find(|rival| modelled(&rival.effect))
+        .map(|rival| rival.effect.as_str())
 }
 
 /// When a form steps, on the clock of the recording.
@@ -271,21 +298,19 @@ fn changed_at(forms: &Value) -> Option<f64> {
 }
 
 /// What else it might be, where its name is not certain.
-fn instead(found: &FoundCause, nearest: Option<&str>) -> Option<String> {
-    let certain = nearest.is_some()
-        || found
-            .probability
-            .is_none_or(|probability| probability > CERTAIN);
-    let mut rivals: Vec<(f64, String)> = found
-        .rivals
-        .iter()
-        .filter(|rival| rival.probability >= NOTABLE)
-        .map(|rival| (rival.probability, words(rival.effect, rival.place)))
-        .collect();
+fn instead(found: &Found, nearest: Option<&str>) -> Option<String> {
+    let [name, _, none] = found.probabilities;
+    let name = name.filter(|_| found.is_compared);
+    let certain = nearest.is_some() || name.is_none_or(|probability| probability > CERTAIN);
+    let notable = |rival: &RivalRow| {
+        let probability = rival.probability.filter(|value| *value >= NOTABLE)?;
+        Some((probability, words(&rival.effect, &rival.place)))
+    };
+    let mut rivals: Vec<(f64, String)> = found.rivals.iter().filter_map(notable).collect();
     rivals.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| a.1.cmp(&b.1)));
     let others = rivals.len();
-    if found.none >= UNLISTED && found.effect != names::UNKNOWN {
-        rivals.push((found.none, "another cause".into()));
+    if let Some(none) = none.filter(|none| *none >= UNLISTED && found.effect != names::UNKNOWN) {
+        rivals.push((none, "another cause".into()));
     }
     if certain || rivals.is_empty() {
         return None;
@@ -303,14 +328,14 @@ fn instead(found: &FoundCause, nearest: Option<&str>) -> Option<String> {
 }
 
 impl Told {
-    fn number(self, all: &[FindingNumber]) -> Option<String> {
-        let written = |one: &FindingNumber| {
+    fn number(self, all: &[FindingNumberRow]) -> Option<String> {
+        let written = |one: &FindingNumberRow| {
             let per = if one.name.ends_with("per_kelvin") {
                 "/K"
             } else {
                 ""
             };
-            estimate(one.value, one.sigma, one.unit) + per
+            estimate(one.value, one.sigma, &one.unit) + per
         };
         let largest = || {
             all.iter()
@@ -319,19 +344,19 @@ impl Told {
         match self {
             No => None,
             Largest => largest().map(written),
-            Size => largest().map(|one| estimate(one.value.abs(), one.sigma, one.unit)),
+            Size => largest().map(|one| estimate(one.value.abs(), one.sigma, &one.unit)),
             Twice => largest().map(|one| {
                 estimate(
                     2.0 * one.value.abs(),
                     one.sigma.map(|sigma| 2.0 * sigma),
-                    one.unit,
+                    &one.unit,
                 )
             }),
             Called(name) => {
                 let called = all.iter().find(|one| {
                     one.name.rsplit(['.', '_']).next() == Some(name) || one.name == name
                 });
-                let more = |one: &&FindingNumber| {
+                let more = |one: &&FindingNumberRow| {
                     ["mass", "relative", "offset"].contains(&name) && one.value > 0.0
                 };
                 called.map(|one| format!("{}{}", if more(&one) { "+" } else { "" }, written(one)))
@@ -342,7 +367,7 @@ impl Told {
 }
 
 /// The amplitude of the largest sine and cosine, and how many periods a turn has.
-fn amplitude(all: &[FindingNumber]) -> Option<String> {
+fn amplitude(all: &[FindingNumberRow]) -> Option<String> {
     let pairs = all.iter().filter_map(|sine| {
         let start = sine.name.strip_suffix("sin")?;
         let cosine = all
@@ -367,39 +392,53 @@ fn amplitude(all: &[FindingNumber]) -> Option<String> {
         .map(|(_, rest)| digits(rest))
         .filter(|order| !order.is_empty());
     let order = order.map_or_else(String::new, |order| format!(", {order} per turn"));
-    Some(estimate(size, sigma.filter(|sigma| sigma.is_finite()), sine.unit) + &order)
+    Some(estimate(size, sigma.filter(|sigma| sigma.is_finite()), &sine.unit) + &order)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::effect::CAUSES;
+    use serde_json::json;
 
-    fn number<'a>(name: &'a str, value: f64, unit: &'a str, sigma: f64) -> FindingNumber<'a> {
-        FindingNumber {
-            name,
+    fn rival(effect: &str, probability: f64) -> RivalRow {
+        RivalRow {
+            rank: 1,
+            effect: effect.into(),
+            place: "joint 3".into(),
+            delta_bic: 0.0,
+            probability: Some(probability),
+        }
+    }
+
+    fn number(name: &str, value: f64, unit: &str, sigma: f64) -> FindingNumberRow {
+        FindingNumberRow {
+            rank: 1,
+            name: name.into(),
             value,
-            unit,
+            unit: unit.into(),
             sigma: Some(sigma),
         }
     }
 
-    fn found<'a>(effect: &'a str, numbers: Vec<FindingNumber<'a>>) -> FoundCause<'a> {
-        FoundCause {
-            effect,
-            place: "joint 3",
-            statement: "",
-            forms: "[]",
+    fn found(effect: &str, numbers: Vec<FindingNumberRow>) -> Found {
+        Found {
+            rank: 1,
+            effect: effect.into(),
+            place: "joint 3".into(),
+            statement: String::new(),
+            forms: Value::Null,
             numbers,
-            probability: Some(0.95),
+            probabilities: [Some(0.95), None, Some(0.0)],
+            is_compared: true,
             rivals: Vec::new(),
-            none: 0.0,
+            document: Value::Null,
             size: Some((3.546, "3.55 mm".into())),
         }
     }
 
-    fn said(found: FoundCause) -> [String; 3] {
-        let short = ShortFinding::of(found, false);
+    fn said(found: Found) -> [String; 3] {
+        let short = ShortFinding::of(&found, false);
         [
             short.what,
             short.number.unwrap_or_default(),
@@ -434,10 +473,9 @@ mod tests {
                 ""
             ]
         );
-        let forms =
-            r#"[{"zero_shift": {"law": {"of": "time", "basis": {"after": {"at": 447.2}}}}}]"#;
-        let step = FoundCause {
-            forms,
+        let law = json!({ "of": "time", "basis": { "after": { "at": 447.2 } } });
+        let step = Found {
+            forms: json!([{ "zero_shift": { "law": law } }]),
             ..found("zero_shift", vec![number("j3.step", -14.8, "arcsec", 0.4)])
         };
         assert_eq!(
@@ -458,16 +496,11 @@ mod tests {
 
     #[test]
     fn rivals_are_named_only_where_the_name_is_not_certain() {
-        let backlash = || NamedRival {
-            effect: "backlash",
-            place: "joint 3",
-            probability: 0.3,
-        };
+        let backlash = || rival("backlash", 0.3);
         let doubtful = |probability, rivals, none| {
-            said(FoundCause {
-                probability: Some(probability),
+            said(Found {
+                probabilities: [Some(probability), None, Some(none)],
                 rivals,
-                none,
                 ..found("gear_cyclic", Vec::new())
             })[2]
                 .clone()
@@ -478,12 +511,7 @@ mod tests {
         );
         assert_eq!(doubtful(0.89, Vec::new(), 0.11), "");
         assert_eq!(doubtful(0.95, vec![backlash()], 0.1), "");
-        let twelve = (0..12)
-            .map(|_| NamedRival {
-                probability: 0.07,
-                ..backlash()
-            })
-            .collect();
+        let twelve = (0..12).map(|_| rival("backlash", 0.07)).collect();
         assert_eq!(
             doubtful(0.07, twelve, 0.07),
             "not determined: 12 other causes fit as well (--details)"
@@ -492,16 +520,10 @@ mod tests {
 
     #[test]
     fn what_is_in_no_list_is_called_as_the_nearest_that_models_it_roughly() {
-        let rivals = || {
-            vec![NamedRival {
-                effect: "joint_compliance",
-                place: "joint 3",
-                probability: 0.02,
-            }]
-        };
+        let rivals = || vec![rival("joint_compliance", 0.02)];
         let numbers = || vec![number("j3", 4.17e-7, "rad/Nm", 2e-9)];
-        let near = FoundCause {
-            forms: r#"[{"joint_compliance": {}}]"#,
+        let near = Found {
+            forms: json!([{ "joint_compliance": {} }]),
             rivals: rivals(),
             ..found("unknown", numbers())
         };
@@ -513,8 +535,8 @@ mod tests {
                 ""
             ]
         );
-        let far = FoundCause {
-            forms: r#"[{"unknown": {}}]"#,
+        let far = Found {
+            forms: json!([{ "unknown": {} }]),
             rivals: rivals(),
             ..found("unknown", numbers())
         };

@@ -28,6 +28,22 @@ impl RivalRow {
     }
 }
 
+impl FindingNumbers {
+    /// Those of a finding.
+    pub fn of_finding(&self, rank: i64) -> Vec<FindingNumberRow> {
+        let own = self.0.iter().filter(|row| row.rank == rank);
+        own.cloned().collect()
+    }
+}
+
+impl Rivals {
+    /// Those of a finding.
+    pub fn of_finding(&self, rank: i64) -> Vec<RivalRow> {
+        let own = self.0.iter().filter(|row| row.rank == rank);
+        own.cloned().collect()
+    }
+}
+
 /// Less probable than this, a name is excluded.
 const EXCLUDED: f64 = 0.005;
 

@@ -1,7 +1,8 @@
 //! Formulas for findings without a name, with their numbers.
 
-use super::{FormRow, Forms};
+use super::{FormRow, Forms, picked, picked_of};
 use crate::diagnose::Diagnosis;
+use serde_json::Value;
 
 impl Forms {
     /// The formulas of a diagnosis.
@@ -42,6 +43,19 @@ impl Forms {
         self.0
             .chunk_by(|a, b| (a.rank, a.form) == (b.rank, b.form))
             .filter(own)
+    }
+}
+
+impl Forms {
+    /// The formulas of a finding as JSON.
+    pub fn document(&self, rank: i64) -> Vec<Value> {
+        let one = |rows: &[FormRow]| {
+            let columns = "formula price proposed folds_rms_mm curve_rms_mm without_rms_mm";
+            let mut form = picked(&rows[0], columns);
+            form["numbers"] = picked_of(rows, "name=number value unit sigma");
+            form
+        };
+        self.of_finding(rank).map(one).collect()
     }
 }
 

@@ -46,6 +46,25 @@ pub fn of_kind<T: Table>(tables: &TablesByKind) -> Result<Option<T>> {
         .transpose()
 }
 
+/// A row as JSON with these of its columns, separated by blanks; `where=place` is the column `place` under the name `where`.
+pub fn picked(row: &impl serde::Serialize, columns: &str) -> serde_json::Value {
+    let mut row = serde_json::json!(row);
+    let column = |column: &str| {
+        let (name, column) = column.split_once('=').unwrap_or((column, column));
+        let value = row.get_mut(column).expect("a column of the row").take();
+        (name.to_string(), value)
+    };
+    columns.split(' ').map(column).collect()
+}
+
+/// Rows as JSON, each as [`picked`] has it.
+pub fn picked_of<'a, R: serde::Serialize + 'a>(
+    rows: impl IntoIterator<Item = &'a R>,
+    columns: &str,
+) -> serde_json::Value {
+    rows.into_iter().map(|row| picked(row, columns)).collect()
+}
+
 /// Declares a table as a list of rows. It is handed the columns of `schemas/<kind>.json` by a macro of the kind's name (schemas/build.rs).
 macro_rules! rows {
     ($kind:literal, $(#[$doc:meta])* pub struct $table:ident of $row:ident { $( $(#[$fdoc:meta])* $field:ident: $ty:ty, )+ }) => {

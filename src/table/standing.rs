@@ -8,6 +8,7 @@ use super::{Frame, Prediction};
 use crate::error::Result;
 use crate::estimate::autocorrelation_time;
 use crate::estimate::fisher::tail;
+use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
@@ -44,7 +45,7 @@ pub struct Step {
 }
 
 /// The step that stands.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Standing {
     /// Id of the stage that stands for the run.
     pub step: String,
@@ -57,7 +58,7 @@ pub struct Standing {
 }
 
 /// A step that was worse than one before it, rms of the same points.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Withdrawn {
     /// Id of the stage that is withdrawn.
     pub step: String,
@@ -72,7 +73,7 @@ pub struct Withdrawn {
 }
 
 /// The same of the step that stands, at points that choose nothing.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Contradicted(pub Withdrawn);
 
 impl fmt::Display for Withdrawn {

@@ -135,23 +135,9 @@ pub(super) fn main(arguments: &FleetDiagnoseArguments, command_line: &[OsString]
             .iter()
             .flatten()
             .filter(|record| record.ending != Ending::Done);
-        let findings = made.answers.findings.0.iter().map(|row| {
-            json!({
-                "group": row.group, "robot": row.robot, "effect": row.effect, "place": row.place, "follows": row.follows, "cell": row.cell,
-                "shape": row.shape, "robots": row.robots, "of_robots": row.of_robots, "log_odds": row.log_odds,
-                "probability": row.probability, "rival": row.rival, "size_mm": row.size_mm, "spread_mm": row.spread_mm, "trend": row.trend,
-                "statement": row.statement,
-            })
-        });
-        let outliers = made.answers.outliers.0.iter().map(|row| {
-            json!({
-                "robot": row.robot, "kind": row.kind, "cell": row.cell, "group": row.group, "size_mm": row.size_mm,
-                "usual_mm": row.usual_mm, "probability": row.probability, "statement": row.statement,
-            })
-        });
         return emit_json(&json!({
             "fleet": fleet.name(), "robots": last.len(), "not_asked": rejected.count(), "rounds": search.rounds, "computed": computed,
-            "wall_seconds": seconds, "findings": findings.collect::<Vec<_>>(), "outliers": outliers.collect::<Vec<_>>(),
+            "wall_seconds": seconds, "findings": made.answers.findings.0, "outliers": made.answers.outliers.0,
             "tables": made.tables.iter().map(|path| path.to_string_lossy()).collect::<Vec<_>>(), "page": made.page.to_string_lossy(),
         }));
     }

@@ -9,6 +9,7 @@ use crate::fleet::ledger::{Member, RunNote};
 use crate::fleet::{Ending, Fleet, Ledger, RobotRecord, Workshop, local, tables};
 use crate::progress::{FleetProgress, Verbosity};
 use crate::store::Store;
+use crate::table::picked;
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use std::ffi::OsString;
@@ -296,11 +297,12 @@ fn document(
     told: &tables::FleetSummary,
 ) -> serde_json::Value {
     let robots = fleet.roster.0.iter().zip(records).zip(&told.fleet.0).map(|((robot, record), row)| {
-        json!({
-            "robot": robot.name, "status": row.status, "reason": row.reason, "exit_code": record.as_ref().map(|r| r.exit_code),
-            "before_rms_mm": row.before_rms_mm, "after_rms_mm": row.after_rms_mm, "floor_mm": row.floor_mm, "noise_basis": row.noise_basis,
-            "verdict": row.verdict, "causes": row.causes, "flags": row.flags, "run": record.as_ref().and_then(|r| r.run.clone()),
-        })
+        let columns = "status reason before_rms_mm after_rms_mm floor_mm noise_basis verdict causes flags";
+        let mut told = picked(row, columns);
+        told["robot"] = json!(robot.name);
+        told["exit_code"] = json!(record.as_ref().map(|record| record.exit_code));
+        told["run"] = json!(record.as_ref().and_then(|record| record.run.as_ref()));
+        told
     });
     let tables: Vec<_> = told
         .tables

@@ -1,0 +1,311 @@
+//! A diagnosis of positions: its verdict, errors and where they are, rows set aside.
+
+use crate::diagnose::VerdictKind;
+use crate::effect::names;
+use crate::error::{Error, Result, counted};
+use crate::summary::estimate::{angle, length};
+use crate::summary::short_finding::Found;
+use crate::summary::{labelled, screen};
+use crate::table::{
+    CauseGrid, Cells, FindingNumbers, FindingRow, Findings, FormRow, Forms, Rivals, ShareRow,
+    Shares, Suspects, SuspectsRow, TablesByKind, Verdict, VerdictRow, formula_in_words, of_kind,
+    picked, picked_of,
+};
+use crate::units::Unit;
+use serde_json::{Value, json};
+
+/// Rows set aside that are named.
+const ASIDE: usize = 4;
+
+/// Places and variables that are shown.
+const SHOWN: usize = 5;
+
+/// Tables of a diagnosis of positions beside findings and sentences.
+pub(super) struct Positions {
+    pub verdict: VerdictRow,
+    pub findings: Findings,
+    pub cells: Cells,
+    pub forms: Forms,
+    shares: Shares,
+    suspects: Suspects,
+}
+
+impl Positions {
+    pub fn read(tables: &TablesByKind) -> Result<Self> {
+        let verdict: Option<Verdict> = of_kind(tables)?;
+        let verdict = verdict.and_then(|verdict| verdict.0.into_iter().next());
+        Ok(Self {
+            verdict: verdict.ok_or_else(|| Error::Bug("a diagnosis without a verdict".into()))?,
+            findings: of_kind(tables)?.unwrap_or_default(),
+            cells: of_kind(tables)?.unwrap_or_default(),
+            forms: of_kind(tables)?.unwrap_or_default(),
+            shares: of_kind(tables)?.unwrap_or_default(),
+            suspects: of_kind(tables)?.unwrap_or_default(),
+        })
+    }
+
+    pub fn found(&self, numbers: &FindingNumbers, rivals: &Rivals) -> Vec<Found> {
+        let one = |row: &FindingRow| {
+            let columns =
+                "effect where=place statement probability place_probability none_probability";
+            let mut document = picked(row, columns);
+            let columns = "f_statistic p_value delta_bic heldout_gain_mm effect_rms_mm";
+            document["evidence"] = picked(row, columns);
+            document["forms"] = json!(self.forms.document(row.rank));
+            document["valid_range"] = match row.valid_range() {
+                Some((joint, range, unit)) => json!({ format!("q{joint}_{unit}"): range }),
+                None => json!({}),
+            };
+            let by_length = row.effect_rms_mm.map(|mm| (mm, length(mm)));
+            Found {
+                rank: row.rank,
+                effect: row.effect.clone(),
+                place: row.place.clone(),
+                statement: row.statement.clone(),
+                forms: serde_json::from_str(&row.forms).unwrap_or_default(),
+                numbers: numbers.of_finding(row.rank),
+                probabilities: [row.probability, row.place_probability, row.none_probability],
+                is_compared: row.delta_bic.is_some(),
+                rivals: rivals.of_finding(row.rank),
+                size: by_length.or_else(|| row.effect_rms_rad.map(|rad| (rad, angle(rad)))),
+                document,
+            }
+        };
+        self.findings.0.iter().map(one).collect()
+    }
+
+    /// The verdict in at most twelve words.
+    pub fn verdict(&self) -> String {
+        let v = &self.verdict;
+        let size = |mm: Option<f64>, rad: Option<f64>| {
+            mm.map(length)
+                .or_else(|| rad.map(angle))
+                .unwrap_or_default()
+        };
+        let left = size(v.leftover_rms_mm, v.leftover_rms_rad);
+        let noise = size(v.noise_floor_mm, v.noise_floor_rad);
+        let noise = match v.noise_basis.as_deref() {
+            Some("repeats") => format!("repeats show {noise}"),
+            Some("instrument") => format!("the noise is {noise}"),
+            _ => "the noise is not known".into(),
+        };
+        let is = |kind: VerdictKind| v.verdict == kind.name();
+        let nameless = self
+            .findings
+            .0
+            .iter()
+            .filter(|finding| finding.effect == names::UNKNOWN)
+            .count();
+        match v.after_rms_mm.filter(|_| v.held_out) {
+            _ if is(VerdictKind::WrongSetup) => {
+                "wrong set-up: correct it first; nothing was calibrated".into()
+            }
+            _ if is(VerdictKind::NotAsked) => "not asked: too few points were fitted".into(),
+            _ if is(VerdictKind::NothingMissing) => {
+                format!("nothing missing: {left} rms remain, {noise}")
+            }
+            _ if is(VerdictKind::Explained) => format!("explained: {left} rms remain, {noise}"),
+            _ if nameless > 0 => {
+                format!(
+                    "unexplained in part: {left} rms remain, {nameless} of {} causes unnamed",
+                    self.findings.0.len()
+                )
+            }
+            Some(held_out) => format!(
+                "unexplained: {left} rms remain at fitted points, {} at held-out ones",
+                length(held_out)
+            ),
+            None => format!("unexplained: {left} rms remain, {noise}"),
+        }
+    }
+
+    /// What was measured, and the errors before and after.
+    pub fn head(&self, robot: Option<&str>, rows: u64) -> String {
+        let v = &self.verdict;
+        let mut text = screen::measured(
+            robot,
+            &format!("{rows} points, {} fitted", v.points),
+            v.noise_floor_mm
+                .map(length)
+                .or_else(|| v.noise_floor_rad.map(angle))
+                .map(|size| screen::noise(&size, v.noise_basis.as_deref()))
+                .as_deref(),
+        );
+        let rows = if v.held_out {
+            "held out"
+        } else {
+            "fitted points: flattered"
+        };
+        let [before, after] = [
+            format!("geometry identified, {rows}"),
+            screen::with_findings(self.findings.0.len()).to_string(),
+        ];
+        let pair = |mean: Option<f64>, max: Option<f64>| Some([mean?, max?]);
+        if let (Some(first), Some(last)) = (
+            pair(v.before_mean_mm, v.before_max_mm),
+            pair(v.after_mean_mm, v.after_max_mm),
+        ) {
+            let least = first[0].min(last[0]);
+            text.push_str(&screen::errors("before", first, least, &before));
+            text.push_str(&screen::errors("after", last, least, &after));
+        }
+        if let (Some(first), Some(last)) = (v.before_rms_rad, v.after_rms_rad) {
+            for (label, rad, of) in [("before", first, &before), ("after", last, &after)] {
+                text.push_str(&labelled(
+                    label,
+                    &format!("{:>7.1} arcsec rms  {of}", Unit::Arcsecond.from_si(rad)),
+                ));
+            }
+        }
+        text
+    }
+
+    /// What could explain the most of the residual before the findings, more than chance, largest first.
+    fn located(&self, by: &str) -> Vec<&ShareRow> {
+        let all = self
+            .shares
+            .0
+            .iter()
+            .filter(|row| row.moment == "before" && row.by == by && row.delta_bic > 0.0);
+        let mut all: Vec<&ShareRow> = all.collect();
+        all.sort_by(|a, b| b.share.total_cmp(&a.share));
+        all.truncate(SHOWN);
+        all
+    }
+
+    /// What `--json` has of it.
+    pub fn document(&self) -> Value {
+        let v = &self.verdict;
+        let columns = "verdict statement noise_floor_mm noise_basis held_out clock";
+        let mut document = picked(v, columns);
+        let columns = "validate_mean_mm=before_mean_mm validate_rms_mm=before_rms_mm validate_max_mm=before_max_mm";
+        document["before"] = picked(v, columns);
+        document["after"] = picked(v, &columns.replace("before", "after"));
+        let located = |by: &str| picked_of(self.located(by), "name share delta_bic");
+        document["located"] =
+            json!({ "places": located("place"), "variables": located("variable") });
+        let columns = "rms_mm=leftover_rms_mm chi_square p_value=p_after signature";
+        document["leftover"] = picked(v, columns);
+        document["set_aside"] = picked_of(self.aside(), "point_id set kind size_mm");
+        document["noise"] = picked(v, "repeatability_rad repeats");
+        document
+    }
+
+    /// Rows that are not fitted.
+    fn aside(&self) -> impl Iterator<Item = &SuspectsRow> {
+        self.suspects.0.iter().filter(|row| !row.used)
+    }
+
+    /// The same, the worst first.
+    pub fn worst_aside(&self) -> Vec<&SuspectsRow> {
+        let mut all: Vec<&SuspectsRow> = self.aside().collect();
+        all.sort_by(|a, b| b.size_mm.total_cmp(&a.size_mm));
+        all
+    }
+
+    /// How many rows are not fitted, and the worst of them by name.
+    pub fn set_aside(&self) -> Option<String> {
+        let all = self.worst_aside();
+        let named: Vec<String> = all
+            .iter()
+            .take(ASIDE)
+            .map(|row| {
+                format!(
+                    "{} of set {} {:.3} mm off",
+                    row.point_id, row.set, row.size_mm
+                )
+            })
+            .collect();
+        let more = if all.len() > ASIDE {
+            ", the worst of them"
+        } else {
+            ""
+        };
+        let which = counted(all.len(), "row");
+        (!all.is_empty()).then(|| {
+            format!(
+                "{which} (not fitted; figures include those that are held out){more}: {}",
+                named.join(", ")
+            )
+        })
+    }
+
+    /// Verdict, errors and where they are, as `calib diagnose --details` prints them before the findings.
+    pub fn text(&self) -> String {
+        let v = &self.verdict;
+        let mm =
+            |value: Option<f64>| value.map_or_else(|| "-".into(), |value| format!("{value:.3}"));
+        let rows = if v.held_out {
+            "held-out points"
+        } else {
+            "fitted points (none are held out: flattered)"
+        };
+        let basis = v
+            .noise_basis
+            .as_ref()
+            .map(|basis| format!(" (noise basis: {basis})"))
+            .unwrap_or_default();
+        let mut text = format!("{}{basis}\n", v.verdict.replace('_', " "));
+        v.statement
+            .iter()
+            .for_each(|statement| text.push_str(&format!("{statement}\n")));
+        text.push('\n');
+        text.push_str(&format!("error in mm, {rows}: mean / rms / max\n"));
+        for (name, mean, rms, max) in [
+            ("before", v.before_mean_mm, v.before_rms_mm, v.before_max_mm),
+            ("after", v.after_mean_mm, v.after_rms_mm, v.after_max_mm),
+        ] {
+            text.push_str(&format!(
+                "  {name:6}  {:>8}  {:>8}  {:>8}\n",
+                mm(mean),
+                mm(rms),
+                mm(max)
+            ));
+        }
+        let assumed = if v.is_noise_assumed() {
+            "  assumed: none is recorded, and no `instrument` is stated"
+        } else {
+            ""
+        };
+        text.push_str(&format!(
+            "  noise   {:>8}  {:>8}{assumed}\n\n",
+            "",
+            mm(v.noise_floor_mm)
+        ));
+        for (by, what) in [("place", "where"), ("variable", "depends on")] {
+            let all = self.located(by);
+            let all: Vec<String> = all
+                .iter()
+                .map(|row| format!("{} {:.0} %", row.name, row.share * 100.0))
+                .collect();
+            if !all.is_empty() {
+                text.push_str(&format!("{what:10}  {}\n", all.join(", ")));
+            }
+        }
+        if !self.shares.0.is_empty() {
+            text.push_str("            (of the squared residual, what one cause there could explain at most)\n\n");
+        }
+        let grid = CauseGrid::of(&self.cells, &self.findings).text();
+        if !grid.is_empty() {
+            text.push_str(&format!("{grid}            (rms at the tool of the findings, by place and kind of variable)\n\n"));
+        }
+        text
+    }
+
+    /// The formulas of a finding, a line each.
+    pub fn formulas(&self, rank: i64) -> String {
+        let line = |rows: &[FormRow]| {
+            let proposed = if rows.iter().any(|row| row.proposed) {
+                ", proposed"
+            } else {
+                ""
+            };
+            let words = formula_in_words(rows);
+            let (price, folds) = (rows[0].price, rows[0].folds_rms_mm);
+            format!(
+                "   formula: {words} ({price} parts, {folds:.4} mm cross-validated{proposed})\n"
+            )
+        };
+        self.forms.of_finding(rank).map(line).collect()
+    }
+}
