@@ -32,46 +32,55 @@ pub(super) fn refine(
     before != set
 }
 
-/// Describes friction of a joint by one power of speed where that explains as much: in place of a curve without a name, and in place of viscous
-/// and Coulomb friction, which with a sign that turns slowly are nearly such a power. Tells whether it did.
+/// Replaces viscous and Coulomb friction of a joint by friction that grows with a power of speed where it leaves no more than the two: with a
+/// sign that turns slowly they are nearly this power. Tells whether it did.
 pub(super) fn one_power_of_speed(
     problem: &mut TorqueProblem,
     weighted: &mut WeightedColumns,
     set: &mut Vec<usize>,
     joint: usize,
 ) -> bool {
-    let is_at = |form: &TorqueForm| form.place == Place::Joint(joint);
-    let viscous = |form: &TorqueForm| is_at(form) && form.cause.name() == VISCOUS;
-    let coulomb = |form: &TorqueForm| is_at(form) && form.cause.name() == COULOMB;
-    let curve = |form: &TorqueForm| is_at(form) && form.is_nameless_curve();
-    // The curve has three numbers more than the power that takes its place.
-    let worth = 3.0 * (weighted.rows as f64).ln();
-    let mut replace = |is_replaced: IsForm, worth: f64| {
-        let at = |is: IsForm| {
-            let mut forms = set.iter().map(|number| &problem.all.forms[*number]);
-            forms.position(is)
-        };
-        let both = at(&viscous).zip(at(is_replaced));
-        let next = both.and_then(|both| powered(problem, weighted, set, both, worth));
-        let is_better = next.is_some();
-        *set = next.unwrap_or_else(|| set.clone());
-        is_better
-    };
-    replace(&curve, worth) | replace(&coulomb, 0.0)
+    let is_coulomb = |form: &TorqueForm| form.cause.name() == COULOMB;
+    powered(problem, weighted, set, (joint, &is_coulomb), 0.0)
 }
 
-type IsForm<'a> = &'a dyn Fn(&TorqueForm) -> bool;
+/// Replaces a curve of speed without a name by a power of speed of the viscous friction where that explains nearly as much. Tells whether it
+/// did.
+pub(super) fn power_for_curve(
+    problem: &mut TorqueProblem,
+    weighted: &mut WeightedColumns,
+    set: &mut Vec<usize>,
+    joint: usize,
+) -> bool {
+    // The curve has three numbers more.
+    let worth = 3.0 * (weighted.rows as f64).ln();
+    powered(
+        problem,
+        weighted,
+        set,
+        (joint, &TorqueForm::is_nameless_curve),
+        worth,
+    )
+}
 
-/// A set without its form `replaced`, whose viscous friction grows with a power of speed, where the sum of squares so rises by no more than
-/// `worth`.
+/// Takes a form of a joint out of a set and lets its viscous friction grow with a power of speed, where the sum of squares so rises by no more
+/// than `worth`. Tells whether it did.
 fn powered(
     problem: &mut TorqueProblem,
     weighted: &mut WeightedColumns,
-    set: &[usize],
-    (viscous, replaced): (usize, usize),
+    set: &mut Vec<usize>,
+    (joint, is_replaced): (usize, &dyn Fn(&TorqueForm) -> bool),
     worth: f64,
-) -> Option<Vec<usize>> {
-    let mut next = set.to_vec();
+) -> bool {
+    let at = |is: &dyn Fn(&TorqueForm) -> bool| {
+        let mut forms = set.iter().map(|number| &problem.all.forms[*number]);
+        forms.position(|form| form.place == Place::Joint(joint) && is(form))
+    };
+    let viscous = at(&|form| form.cause.name() == VISCOUS);
+    let (Some(viscous), Some(replaced)) = (viscous, at(is_replaced)) else {
+        return false;
+    };
+    let mut next = set.clone();
     let form = &problem.all.forms[set[viscous]];
     if form.shape.first() == Some(&1.0) {
         let form = form.with_shape(0, START_POWER);
@@ -79,12 +88,16 @@ fn powered(
     }
     next.remove(replaced);
     if !CauseChoice::new(problem, weighted).is_whole(&next) {
-        return None;
+        return false;
     }
     let place = viscous - usize::from(replaced < viscous);
     refine_one(problem, weighted, &mut next, place);
     let square = |set: &[usize]| SweptColumns::base(&problem.all, weighted).with(set).square;
-    (square(&next) <= square(set) + worth).then_some(next)
+    let is_better = square(&next) <= square(set) + worth;
+    if is_better {
+        *set = next;
+    }
+    is_better
 }
 
 /// Replaces one form of a set.

@@ -12,7 +12,7 @@ use super::naming::{JudgedSet, settle_names, take_out_ends};
 use super::polish::polish;
 use super::problem::TorqueProblem;
 use super::recording::TorqueRecording;
-use super::refine::{one_power_of_speed, refine};
+use super::refine::{one_power_of_speed, power_for_curve, refine};
 use super::rich::{noise_beside, rich_forms};
 use super::shape_slopes::ShapeSlopes;
 use super::sign_width::sign_width;
@@ -92,6 +92,11 @@ pub(super) fn solve<'a>(
         }
         set = again(&mut problem, &mut weighted, set);
         polish(&mut problem, &mut weighted, &mut set);
+    }
+    for joint in 0..problem.scene.joints() {
+        if power_for_curve(&mut problem, &mut weighted, &mut set, joint) {
+            polish(&mut problem, &mut weighted, &mut set);
+        }
     }
     weighted = problem.weighted(&set);
     let mut judged = {
