@@ -1,7 +1,7 @@
 //! Torques that a planned motion needs, by the identified model: differentiated and composed as the recording was.
 
 use super::arm::DynamicArm;
-use super::cause::TorqueForm;
+use super::cause::{TorqueForm, friction_of};
 use super::clock::RecordingClock;
 use super::model::TorqueModel;
 use super::recording::TorqueRecording;
@@ -92,7 +92,7 @@ impl TorqueModel {
             scene.tilt(&self.inertials);
         }
         let coefficients = self.terms.iter().map(|term| &term.coefficients[..]);
-        scene.believe_friction(forms.iter().zip(coefficients));
+        scene.friction = friction_of(forms.iter().zip(coefficients), &scene);
         let courses = self.courses(&forms, &scene);
         let mut torque: Vec<Vec<f64>> = scene.rigid.clone();
         for one in &courses {

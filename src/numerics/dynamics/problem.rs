@@ -1,7 +1,7 @@
 //! A recording prepared for least squares: measured and rigid torque, base and forms in judged rows, and which of these count.
 
 use super::arm::DynamicArm;
-use super::cause::TorqueForm;
+use super::cause::{TorqueForm, friction_of};
 use super::clock::RecordingClock;
 use super::columns::{TorqueColumns, columns_of};
 use super::newton_euler::INERTIAL_NUMBERS;
@@ -189,9 +189,8 @@ impl<'a> TorqueProblem<'a> {
         };
         let coefficients: Vec<Vec<f64>> = set.iter().map(of_form).collect();
         let forms = set.iter().map(|number| &self.all.forms[*number]);
-        let forms = forms.zip(&coefficients);
-        self.scene
-            .believe_friction(forms.map(|(form, values)| (form, &values[..])));
+        let forms = forms.zip(coefficients.iter().map(Vec::as_slice));
+        self.scene.friction = friction_of(forms, &self.scene);
         // A tilt times what is wrong of the masses looks like offsets.
         if set
             .iter()

@@ -1,7 +1,6 @@
 //! The recording as causes see it: motion, rigid torque and clock at the recording's own rate, joint after joint.
 
 use super::arm::DynamicArm;
-use super::cause::TorqueForm;
 use super::clock::RecordingClock;
 use super::derivatives::derivatives;
 use super::filter::ZeroPhase;
@@ -169,25 +168,6 @@ impl<'a> DynamicScene<'a> {
     /// Takes 10 n inertial numbers for the rigid torques.
     pub fn believe(&mut self, theta: &[f64]) {
         self.rigid = self.torques_of(theta);
-    }
-
-    /// Takes friction of some forms with their coefficients.
-    pub fn believe_friction<'f>(
-        &mut self,
-        forms: impl Iterator<Item = (&'f TorqueForm, &'f [f64])>,
-    ) {
-        let rows = self.rows();
-        let mut friction = vec![vec![0.0; rows]; self.joints()];
-        let mut course = vec![0.0; rows];
-        for (form, coefficients) in forms.filter(|(form, _)| form.is_friction()) {
-            for (column, coefficient) in coefficients.iter().enumerate() {
-                let joint = form.joint();
-                form.cause.write(form, self, joint, column, &mut course);
-                let sums = friction[joint].iter_mut().zip(&course);
-                sums.for_each(|(sum, value)| *sum += coefficient * value);
-            }
-        }
-        self.friction = friction;
     }
 
     /// Rigid torques of 10 n inertial numbers, `[joint][row]`.

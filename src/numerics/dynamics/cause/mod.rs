@@ -311,12 +311,6 @@ impl TorqueForm {
         self.cause.name() == UNKNOWN && self.cause.bends(self)
     }
 
-    /// Whether it is friction of one joint.
-    pub fn is_friction(&self) -> bool {
-        let about = self.cause.about();
-        matches!(self.place, Place::Joint(_)) && (about.of_sign || about.brakes)
-    }
-
     /// Whether a curve without a name and another curve of speed would be one sum at one joint.
     pub fn is_one_curve_with(&self, other: &Self) -> bool {
         let [one, two] = [self, other].map(|form| form.cause.bends(form));
@@ -378,6 +372,30 @@ impl TorqueForm {
         };
         (0..self.width).map(name).collect()
     }
+}
+
+/// Friction of the joints (Nm, `[joint][row]`) by those of some forms that are friction of one joint, with their coefficients.
+pub(super) fn friction_of<'f>(
+    forms: impl Iterator<Item = (&'f TorqueForm, &'f [f64])>,
+    scene: &DynamicScene,
+) -> Vec<Vec<f64>> {
+    let mut friction = vec![vec![0.0; scene.rows()]; scene.joints()];
+    let mut course = vec![0.0; scene.rows()];
+    for (form, coefficients) in forms {
+        let about = form.cause.about();
+        let Place::Joint(joint) = form.place else {
+            continue;
+        };
+        if !(about.of_sign || about.brakes) {
+            continue;
+        }
+        for (column, coefficient) in coefficients.iter().enumerate() {
+            form.cause.write(form, scene, joint, column, &mut course);
+            let sums = friction[joint].iter_mut().zip(&course);
+            sums.for_each(|(sum, value)| *sum += coefficient * value);
+        }
+    }
+    friction
 }
 
 /// A parameter that is one coefficient.
