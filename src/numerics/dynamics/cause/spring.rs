@@ -3,7 +3,8 @@
 use super::{FittedNumber, PLAIN, TorqueCause, TorqueCauseDescription, TorqueForm, fill};
 use crate::dynamics::scene::DynamicScene;
 
-/// q and 1; of what stiffens as it bends its square and cube, too. Shape, but of a straight balancing spring: least and greatest angle, rad.
+/// q and 1; of what stiffens as it bends its square and cube, too. Shape: least and greatest angle, rad,
+/// and of a balancing spring the highest power; none of a straight balancing spring.
 pub(super) struct SpringTorque {
     balances: bool,
 }
@@ -55,14 +56,14 @@ impl TorqueCause for SpringTorque {
             let ends = scene.position[joint]
                 .iter()
                 .fold([f64::MAX, f64::MIN], |[a, b], q| [a.min(*q), b.max(*q)]);
-            // A straight balancing spring may work over its dead centre.
-            let is_straight = width == WIDTHS[0];
-            let ends = if self.balances && is_straight {
-                &[][..]
-            } else {
-                &ends
+            let with_power = [ends[0], ends[1], (width - 1) as f64];
+            let shape = match (self.balances, width) {
+                // A straight balancing spring may work over its dead centre.
+                (true, 2) => &[],
+                (true, _) => &with_power[..],
+                (false, _) => &ends,
             };
-            TorqueForm::at_joint(cause, joint, width).shaped(ends)
+            TorqueForm::at_joint(cause, joint, width).shaped(shape)
         };
         joints
             .flat_map(|joint| WIDTHS.map(|width| form(joint, width)))
@@ -92,14 +93,15 @@ impl TorqueCause for SpringTorque {
     }
 
     fn has_shape(&self, shape: &[f64]) -> bool {
-        shape.len() == 2 || (self.balances && shape.is_empty())
+        let counts: &[usize] = if self.balances { &[0, 3] } else { &[2] };
+        counts.contains(&shape.len())
     }
 
     /// What bends resists: its stiffness is positive wherever the joint moves.
     fn is_possible(&self, form: &TorqueForm, values: &[f64]) -> bool {
         let number = |power: usize| values.get(power).copied().unwrap_or(0.0);
         let stiffness = |q: f64| number(0) + 2.0 * number(2) * q + 3.0 * number(3) * q * q;
-        let &[least, most] = &form.shape[..] else {
+        let &[least, most, ..] = &form.shape[..] else {
             return true;
         };
         (0..=CHECKED).all(|k| stiffness(least + (most - least) * k as f64 / CHECKED as f64) > 0.0)
