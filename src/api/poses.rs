@@ -1,7 +1,7 @@
-//! Which poses to measure, by what `calib poses` does.
+//! Which poses to measure, as `calib poses` proposes them.
 
 use super::{Poses, Robot};
-use crate::error::{Error, Result};
+use crate::error::{Error, Fault, Result};
 use crate::poses::{PoseAnswer, PoseRequest, proposal};
 use serde_json::Value;
 
@@ -25,7 +25,12 @@ pub fn propose_poses(
 ) -> Result<ProposedPoses> {
     let faults = request.faults(pair);
     if !faults.is_empty() {
-        return Err(Error::Spec(faults));
+        // Settings have the names of the options.
+        let named = faults.into_iter().map(|fault| Fault {
+            place: fault.place.trim_start_matches('-').into(),
+            ..fault
+        });
+        return Err(Error::Spec(named.collect()));
     }
     let description = robot.description.clone();
     let answer = proposal(request, description, &robot.description.name, pair, None)?;

@@ -114,25 +114,25 @@ fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<u
         };
         diagnosis(&store, run, step, &DIAGNOSES)?
     };
-    let told = DiagnosisSummary::read(&manifest.run_id, &stage, &store)?;
+    let diagnosis = DiagnosisSummary::read(&manifest.run_id, &stage, &store)?;
     if let Some(file) = &arguments.export_effect {
-        write_new(file, &told.effect_file(arguments.finding)?)?;
+        write_new(file, &diagnosis.effect_file(arguments.finding)?)?;
     }
     let store = arguments.means.store_again();
     if let Some(file) = &arguments.html {
-        write_new(file, &told.page(&store)?)?;
+        write_new(file, &diagnosis.page(&store)?)?;
     }
     if arguments.json {
-        emit_json(&told.document(&store))?;
+        emit_json(&diagnosis.document(&store))?;
     } else {
         let text = if arguments.details {
-            told.text(&store)
+            diagnosis.text(&store)
         } else {
-            told.short(&store, columns())
+            diagnosis.short(&store, columns())
         };
         emit_lines(&(text + &rejected(&manifest)))?;
     }
-    Ok(if told.is_wrong_setup() {
+    Ok(if diagnosis.is_wrong_setup() {
         WRONG_SETUP
     } else {
         0

@@ -210,7 +210,7 @@ pub(super) fn ranges(text: &str) -> Result<Ranges, String> {
 fn check(arguments: &PosesArguments, request: &PoseRequest, pair: &[String]) -> Result<()> {
     let of_robot = arguments.run.is_none();
     let mut faults = request.faults(if of_robot { pair } else { &[] });
-    if of_robot && arguments.separate.is_some() && pair.len() != 2 {
+    if of_robot && arguments.separate.is_some() && pair.is_empty() {
         faults.push(Fault::new(
             "--separate",
             "expected two effects, or a run whose findings have rivals (--run)",

@@ -24,18 +24,18 @@ pub(super) struct Mapping {
 #[derive(Default)]
 pub(super) struct Choice {
     pub lines: Vec<String>,
-    /// A line next to `columns` instead.
-    pub beside: Option<String>,
+    /// The line `targets:` of the file, instead.
+    pub targets: Option<String>,
     pub columns: Vec<usize>,
 }
 
 impl Choice {
     pub fn of(lines: Vec<String>, columns: Vec<usize>) -> Self {
-        let beside = None;
+        let targets = None;
         Self {
             lines,
             columns,
-            beside,
+            targets,
         }
     }
 }
@@ -112,7 +112,14 @@ impl ExaminedFile {
             return;
         };
         let dropped = self.mappings.remove(at);
-        let lines = |choice: &Choice| choice.beside.iter().chain(&choice.lines).cloned().collect();
+        let lines = |choice: &Choice| {
+            choice
+                .targets
+                .iter()
+                .chain(&choice.lines)
+                .cloned()
+                .collect()
+        };
         let mut lines: Vec<String> = dropped.choices.first().map(lines).unwrap_or_default();
         lines
             .iter_mut()

@@ -250,7 +250,7 @@ fn file_text(file: &ExaminedFile, lacks: &Lacks) -> String {
         if let Some(line) = mapping
             .choices
             .first()
-            .and_then(|choice| choice.beside.as_ref())
+            .and_then(|choice| choice.targets.as_ref())
         {
             put(&format!(
                 "{line}   # CHECK: {}",

@@ -281,13 +281,13 @@ impl ExaminedFile {
             .iter()
             .flat_map(|(_, columns)| *columns)
             .collect();
-        let beside = Some(format!(
+        let targets = Some(format!(
             "targets: {{unit: {unit}, columns: {{{}}}}}",
             all.join(", ")
         ));
         let all = Choice {
             columns,
-            beside,
+            targets,
             ..Choice::default()
         };
         let ways = found.ways.iter().map(|way| self.way(way));

@@ -18,6 +18,7 @@ use crate::effect::identified;
 use crate::error::{Fault, instead};
 use crate::estimate::choose::{Aim, DesignRequest};
 use serde::Deserialize;
+use std::cmp::Ordering::Less;
 use std::path::PathBuf;
 
 /// What is asked for, in the units of the command line.
@@ -37,10 +38,12 @@ pub struct PoseRequest {
     /// Part of each joint's travel left free at either end, percent.
     pub margin: f64,
     /// Where the measured point may be, mm: x, y, z.
+    #[serde(rename = "box")]
     pub bounds: Option<Vec<[f64; 2]>>,
     /// mm.
     pub floor: Option<f64>,
     /// kg; none: 0, or those of the run.
+    #[serde(rename = "payload")]
     pub payloads: Vec<f64>,
     /// Standard deviation per axis of a measured point, mm.
     pub sigma: Option<f64>,
@@ -69,7 +72,7 @@ impl Default for PoseRequest {
 }
 
 impl PoseRequest {
-    /// What can be said against it without a robot, and against two effects to separate; places are options of `calib poses`.
+    /// Faults that need no robot; `pair` are two effects to separate, or none. Places are options of `calib poses`.
     pub fn faults(&self, pair: &[String]) -> Vec<Fault> {
         let known: Vec<&str> = identified().map(|cause| cause.name()).collect();
         let mut faults = Vec::new();
@@ -78,6 +81,25 @@ impl PoseRequest {
             for name in names.iter().filter(|name| !proposal::is_known(name)) {
                 let other = instead(name, &known);
                 fault(option, format!("unknown effect `{name}`{other}"));
+            }
+        }
+        if !matches!(pair.len(), 0 | 2) {
+            let message = "expected two effects, or a run whose findings have rivals (--run)";
+            fault("--separate", message.into());
+        }
+        for (option, count, most) in [
+            ("--count", self.count, 2000),
+            ("--candidates", self.candidates, 1_000_000),
+        ] {
+            if !(1..=most).contains(&count) {
+                fault(option, format!("expected 1 to {most}, found {count}"));
+            }
+        }
+        for (option, ranges) in [("--limits", &self.limits), ("--box", &self.bounds)] {
+            let mut ranges = ranges.iter().flatten();
+            if let Some([from, to]) = ranges.find(|[from, to]| from.partial_cmp(to) != Some(Less)) {
+                let message = format!("{from}:{to} is empty; expected MIN:MAX with MIN below MAX");
+                fault(option, message);
             }
         }
         if let [a, b] = pair {

@@ -35,11 +35,11 @@ fn comparison(rows: &[CorrectionsRow]) -> Option<Value> {
         let gain = gain.map(|(gain, sigma)| format!("{} \u{b1} {}", signed(gain, 3), mm(sigma)));
         let settings = row.hidden.zip(row.decay);
         let settings = settings.map(|(hidden, decay)| format!("{hidden} neurons, decay {decay}"));
-        let mut told = json!(row);
-        told["name"] = words(&row.rival).into();
-        told["gain"] = gain.unwrap_or_default().into();
-        told["settings"] = settings.into();
-        told
+        let mut shown = json!(row);
+        shown["name"] = words(&row.rival).into();
+        shown["gain"] = gain.unwrap_or_default().into();
+        shown["settings"] = settings.into();
+        shown
     };
     Some(
         json!({ "step": first.step, "sentence": sentence, "rows": rows.iter().map(view).collect::<Vec<_>>() }),

@@ -78,8 +78,8 @@ impl Steps {
 fn blocks(rows: &[StatisticsRow]) -> &'static str {
     let folded = || rows.iter().filter(|row| row.fold_rms_mm.is_some());
     match (
-        folded().any(StatisticsRow::is_brought),
-        folded().all(StatisticsRow::is_brought),
+        folded().any(StatisticsRow::is_contact),
+        folded().all(StatisticsRow::is_contact),
     ) {
         (true, true) => "whole places",
         (true, false) => "contiguous parts of the recording; whole places",
@@ -171,11 +171,11 @@ fn sets(rows: &[StatisticsRow], held_out: bool) -> Vec<&str> {
 
 /// A row with what its step is called, its colour, and whether it is the step that stands.
 fn row(row: &StatisticsRow, steps: &Steps) -> Value {
-    let mut told = json!(row);
-    told["called"] = steps.called(&row.step).into();
-    told["colour"] = steps.colour(row.order).into();
-    told["last"] = (Some(row.order) == steps.standing()).into();
-    told
+    let mut shown = json!(row);
+    shown["called"] = steps.called(&row.step).into();
+    shown["colour"] = steps.colour(row.order).into();
+    shown["last"] = (Some(row.order) == steps.standing()).into();
+    shown
 }
 
 /// The first step with held-out rows of the same set as `after`.

@@ -92,12 +92,12 @@ fn row(row: &FleetRow, links: &BTreeMap<String, String>) -> Value {
         .filter_map(|group| group.as_deref())
         .collect();
     let course = row.course.as_deref();
-    let mut told = json!(row);
-    told["name"] = visible(&row.robot).into();
-    told["link"] = json!(links.get(&row.robot));
-    told["group"] = group.join(", ").into();
-    told["spark"] = json!(course.and_then(|course| spark(course, row.floor_mm)));
-    told
+    let mut shown = json!(row);
+    shown["name"] = visible(&row.robot).into();
+    shown["link"] = json!(links.get(&row.robot));
+    shown["group"] = group.join(", ").into();
+    shown["spark"] = json!(course.and_then(|course| spark(course, row.floor_mm)));
+    shown
 }
 
 fn change(row: &crate::table::FleetChangeRow) -> Value {

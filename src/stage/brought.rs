@@ -36,7 +36,7 @@ pub(super) fn note(
 ) {
     let brought: Vec<&dyn MeasurementKind> = kinds(data)
         .into_iter()
-        .filter(|kind| kind.is_brought())
+        .filter(|kind| kind.is_contact())
         .collect();
     let own: Vec<usize> = rows
         .iter()
@@ -129,7 +129,7 @@ pub(super) fn events(
 ) -> Vec<String> {
     let brought: Vec<&dyn MeasurementKind> = kinds(data)
         .into_iter()
-        .filter(|kind| kind.is_brought())
+        .filter(|kind| kind.is_contact())
         .collect();
     let own: Vec<usize> = rows
         .iter()

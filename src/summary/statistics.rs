@@ -99,7 +99,7 @@ fn errors(title: &str, rows: &[&StatisticsRow]) -> String {
 fn folds(rows: &[StatisticsRow]) -> String {
     let rows = rows.iter().filter(|row| row.fold_rms_mm.is_some());
     let rows: Vec<&StatisticsRow> = rows.collect();
-    let brought = rows.iter().filter(|row| row.is_brought()).count();
+    let brought = rows.iter().filter(|row| row.is_contact()).count();
     let blocks = match brought {
         _ if rows.is_empty() => return String::new(),
         0 => "contiguous folds",
@@ -158,7 +158,7 @@ fn references(rows: &[StatisticsRow]) -> String {
     }
     let heads = ["<reference", "<step", "<set", ">17mean", ">17std", ">17max"];
     format!(
-        "beside reference figures, error in mm: ours | theirs\n{}\n",
+        "reference figures, error in mm: ours | theirs\n{}\n",
         aligned(&heads, cells)
     )
 }

@@ -135,7 +135,7 @@ impl Recording {
     pub fn brought(&self, row: usize) -> Option<&str> {
         let settings = KINDS
             .iter()
-            .filter(|kind| kind.is_brought())
+            .filter(|kind| kind.is_contact())
             .flat_map(|kind| kind.telling());
         settings
             .filter_map(|column| self.names.get(column.setting)?.get(row)?.as_deref())

@@ -18,11 +18,11 @@ impl StatisticsRow {
     }
 
     /// Whether it is of rows in which the target was brought to places: blocks that are left out are places then.
-    pub fn is_brought(&self) -> bool {
+    pub fn is_contact(&self) -> bool {
         let own = |word: &str| self.set.ends_with(&format!("({word})"));
         KINDS
             .iter()
-            .any(|kind| kind.is_brought() && own(kind.about().word))
+            .any(|kind| kind.is_contact() && own(kind.about().word))
     }
 
     /// Whether its figures of noise rest on nothing that was stated or measured again.

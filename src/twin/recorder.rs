@@ -75,7 +75,7 @@ pub struct Shot {
     pub velocity: Vec<f64>,
 }
 
-/// What is measured, and by what.
+/// What is measured, and with which instrument.
 struct Scene<'a> {
     arm: &'a Arm,
     effects: &'a [Physical],

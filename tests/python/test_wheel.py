@@ -208,7 +208,7 @@ def test_robots_come_from_tables_files_and_the_library(tmp_path):
 
 def test_poses_are_those_of_the_command_line(tmp_path):
     arm = calib.Robot.library("ur10e")
-    asked = {"payloads": [0.0, 5.0], "floor": 200.0, "candidates": 200, "seed": 3}
+    asked = {"payload": [0.0, 5.0], "floor": 200.0, "candidates": 200, "seed": 3}
     limits = np.tile(np.radians([-170.0, 170.0]), (6, 1))
     found = arm.poses(20, limits=limits, settings=asked)
     (tmp_path / "arm.yaml").write_text(command("robots", "ur10e"))
@@ -219,6 +219,12 @@ def test_poses_are_those_of_the_command_line(tmp_path):
     assert np.allclose(np.degrees(found.joints[:, 0]), [pose["q1_deg"] for pose in answer["poses"]], atol=6e-5)
     with pytest.raises(calib.SpecError, match="did you mean `joint_compliance`"):
         arm.poses(separate=("reduction_ratio", "joint_complience"))
+    with pytest.raises(calib.SpecError, match="separate: expected two effects"):
+        arm.poses(separate=("reduction_ratio",))
+    with pytest.raises(calib.SpecError, match="count: expected 1 to 2000, found 0"):
+        arm.poses(0)
+    with pytest.raises(calib.SpecError, match="limits: .* is empty"):
+        arm.poses(limits=-limits)
     with pytest.raises(ValueError, match="unknown field `flor`"):
         arm.poses(settings={"flor": 200.0})
     with pytest.raises(calib.SpecError, match="has no limits"):

@@ -177,12 +177,12 @@ fn run(
         member.key = record.as_ref().map(|record| record.key.clone());
     }
     workshop.ledger.close(&note)?;
-    let told = tables::publish(fleet, &workshop.ledger, &all)?;
+    let shown = tables::publish(fleet, &workshop.ledger, &all)?;
     let seconds = begun.elapsed().as_secs_f64();
     if how.json {
-        emit_json(&document(fleet, &note.run, &all, computed, seconds, &told))?;
+        emit_json(&document(fleet, &note.run, &all, computed, seconds, &shown))?;
     } else {
-        emit(&text(&all, computed, seconds, &told))?;
+        emit(&text(&all, computed, seconds, &shown))?;
     }
     let asked: Vec<Option<RobotRecord>> = chosen.iter().map(|index| all[*index].clone()).collect();
     verdict(fleet, &asked)
@@ -260,20 +260,20 @@ fn text(
     records: &[Option<RobotRecord>],
     computed: usize,
     seconds: f64,
-    told: &tables::FleetSummary,
+    shown: &tables::FleetSummary,
 ) -> String {
     let mut text = String::new();
-    for row in told.fleet.0.iter().filter(|row| row.flags.is_some()) {
+    for row in shown.fleet.0.iter().filter(|row| row.flags.is_some()) {
         text.push_str(&format!(
             "{}: {}\n",
             visible(&row.robot),
             visible(row.flags.as_deref().unwrap_or_default())
         ));
     }
-    for path in &told.tables {
+    for path in &shown.tables {
         text.push_str(&format!("table: {}\n", path.display()));
     }
-    text.push_str(&format!("page: {}\n", told.page.display()));
+    text.push_str(&format!("page: {}\n", shown.page.display()));
     let rate = if computed > 0 {
         format!(", {:.0} a minute", computed as f64 / seconds * 60.0)
     } else {
@@ -294,17 +294,17 @@ fn document(
     records: &[Option<RobotRecord>],
     computed: usize,
     seconds: f64,
-    told: &tables::FleetSummary,
+    shown: &tables::FleetSummary,
 ) -> serde_json::Value {
-    let robots = fleet.roster.0.iter().zip(records).zip(&told.fleet.0).map(|((robot, record), row)| {
+    let robots = fleet.roster.0.iter().zip(records).zip(&shown.fleet.0).map(|((robot, record), row)| {
         let columns = "status reason before_rms_mm after_rms_mm floor_mm noise_basis verdict causes flags";
-        let mut told = picked(row, columns);
-        told["robot"] = json!(robot.name);
-        told["exit_code"] = json!(record.as_ref().map(|record| record.exit_code));
-        told["run"] = json!(record.as_ref().and_then(|record| record.run.as_ref()));
-        told
+        let mut shown = picked(row, columns);
+        shown["robot"] = json!(robot.name);
+        shown["exit_code"] = json!(record.as_ref().map(|record| record.exit_code));
+        shown["run"] = json!(record.as_ref().and_then(|record| record.run.as_ref()));
+        shown
     });
-    let tables: Vec<_> = told
+    let tables: Vec<_> = shown
         .tables
         .iter()
         .map(|path| path.to_string_lossy())
@@ -312,7 +312,7 @@ fn document(
     json!({
         "fleet": fleet.name(), "run": run, "robots": robots.collect::<Vec<_>>(), "computed": computed, "wall_seconds": seconds,
         "done": count(records, Ending::Done), "rejected": count(records, Ending::Rejected), "failed": count(records, Ending::Failed),
-        "missing": records.iter().filter(|record| record.is_none()).count(), "tables": tables, "page": told.page.to_string_lossy(),
+        "missing": records.iter().filter(|record| record.is_none()).count(), "tables": tables, "page": shown.page.to_string_lossy(),
     })
 }
 

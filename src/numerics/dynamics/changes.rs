@@ -178,6 +178,7 @@ fn prepared<'a>(
     problem.scene.friction_lead = about.friction_lead;
     problem.events = one.events.to_vec();
     problem.scene.believe(&about.inertials);
+    problem.scene.friction = about.friction(&about.forms()?, &problem.scene);
     let all: Vec<String> = TORQUE_CAUSES
         .iter()
         .map(|cause| cause.name().to_string())

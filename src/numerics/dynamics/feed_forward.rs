@@ -77,11 +77,7 @@ impl TorqueModel {
                 format!("has {rows} rows; at least {LEAST} are needed"),
             ));
         }
-        let forms = self
-            .terms
-            .iter()
-            .map(|term| term.form())
-            .collect::<Result<Vec<TorqueForm>>>()?;
+        let forms = self.forms()?;
         let mut scene = self.scene(arm, motion);
         let declared = match &scene.declared {
             Some(declared) => scene.torques_of(&declared.theta),
@@ -91,8 +87,7 @@ impl TorqueModel {
         if forms.iter().any(|form| form.place == Place::Base) {
             scene.tilt(&self.inertials);
         }
-        let coefficients = self.terms.iter().map(|term| &term.coefficients[..]);
-        scene.friction = friction_of(forms.iter().zip(coefficients), &scene);
+        scene.friction = self.friction(&forms, &scene);
         let courses = self.courses(&forms, &scene);
         let mut torque: Vec<Vec<f64>> = scene.rigid.clone();
         for one in &courses {
@@ -120,6 +115,17 @@ impl TorqueModel {
             velocity: by_row(&scene.velocity),
             acceleration: by_row(&scene.acceleration),
         })
+    }
+
+    /// Of its terms. Fails where no cause has a term's name.
+    pub(super) fn forms(&self) -> Result<Vec<TorqueForm>> {
+        self.terms.iter().map(|term| term.form()).collect()
+    }
+
+    /// Nm, `[joint][row]`; `forms` are those of the terms.
+    pub(super) fn friction(&self, forms: &[TorqueForm], scene: &DynamicScene) -> Vec<Vec<f64>> {
+        let coefficients = self.terms.iter().map(|term| &term.coefficients[..]);
+        friction_of(forms.iter().zip(coefficients), scene)
     }
 
     /// What each coefficient adds, term after term.

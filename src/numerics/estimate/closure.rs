@@ -33,7 +33,7 @@ impl Problem<'_> {
 pub(super) fn closed(model: &Model, data: &Measurements, rows: &[usize]) -> Option<Measurements> {
     let brought: Vec<&dyn MeasurementKind> = kinds(data)
         .into_iter()
-        .filter(|kind| kind.is_brought())
+        .filter(|kind| kind.is_contact())
         .collect();
     if brought.is_empty() {
         return None;

@@ -159,7 +159,7 @@ fn blocks(
 ) -> Vec<Vec<usize>> {
     let brought: Vec<_> = kinds(data)
         .into_iter()
-        .filter(|kind| kind.is_brought())
+        .filter(|kind| kind.is_contact())
         .collect();
     let place = |row: usize| {
         let name = brought

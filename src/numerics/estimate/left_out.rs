@@ -22,7 +22,7 @@ fn unseen(
     let setup = model.robot.setup();
     let brought: Vec<_> = kinds(data)
         .into_iter()
-        .filter(|kind| kind.is_brought())
+        .filter(|kind| kind.is_contact())
         .collect();
     let anchor = |row: &usize| {
         let mut readings = brought.iter().filter_map(|kind| kind.reading(data, *row));
@@ -82,7 +82,7 @@ fn placed_by(
         let axes = |row: &usize| {
             kinds(data)
                 .iter()
-                .filter(|kind| kind.is_brought())
+                .filter(|kind| kind.is_contact())
                 .map(|kind| kind.axes(data, *row))
                 .sum::<usize>()
         };

@@ -27,7 +27,7 @@ const CUT: f64 = 4.0;
 pub fn reseated(model: &Model, data: &Measurements, rows: &[usize], sigma: f64) -> Option<Reseat> {
     let socket = kinds(data)
         .into_iter()
-        .find(|kind| kind.is_brought() && kind.about().axes == 3)?;
+        .find(|kind| kind.is_contact() && kind.about().axes == 3)?;
     let mut scratch = model.stack.scratch(&model.robot);
     let mut seen: Vec<(usize, Vector3<f64>)> = Vec::new();
     for row in rows {

@@ -320,7 +320,7 @@ impl dyn MeasurementKind + '_ {
 
     /// Columns that say that a row measured it: its values or, of a kind that reads none, the name of what the target was brought to.
     pub fn telling(&self) -> impl Iterator<Item = &'static DeclaredColumn> {
-        let part = if self.is_brought() {
+        let part = if self.is_contact() {
             Part::Anchor
         } else {
             Part::Value
@@ -332,7 +332,7 @@ impl dyn MeasurementKind + '_ {
     }
 
     /// Whether the target is brought to something, and nothing is read but the joints.
-    pub fn is_brought(&self) -> bool {
+    pub fn is_contact(&self) -> bool {
         self.columns(Part::Value).next().is_none()
     }
 
@@ -359,7 +359,7 @@ impl dyn MeasurementKind + '_ {
             .columns(Part::Anchor)
             .next()
             .map(|column| named(column.setting));
-        if self.is_brought() && anchor.as_ref().is_none_or(Option::is_none) {
+        if self.is_contact() && anchor.as_ref().is_none_or(Option::is_none) {
             return None;
         }
         let anchor = anchor.map(Option::unwrap_or_default);
@@ -388,9 +388,9 @@ pub fn only_brought(data: &Measurements, rows: &[usize]) -> bool {
     let brought = |row: &usize| {
         kinds
             .iter()
-            .all(|kind| kind.is_brought() || kind.axes(data, *row) == 0)
+            .all(|kind| kind.is_contact() || kind.axes(data, *row) == 0)
     };
-    kinds.iter().any(|kind| kind.is_brought()) && rows.iter().all(brought)
+    kinds.iter().any(|kind| kind.is_contact()) && rows.iter().all(brought)
 }
 
 /// Numbers that a row measured, of all kinds.

@@ -326,7 +326,7 @@ class Robot:
 
         separate: names of two effects, e.g. ("reduction_ratio", "joint_compliance").
         limits: float64, shape (joints, 2), rad (mm of a joint that slides), instead of the robot's.
-        settings: effects (names), bounds ([[x, x], [y, y], [z, z]], mm), floor (mm), payloads (kg), sigma (mm), margin (percent of the travel
+        settings: effects (names), box ([[x, x], [y, y], [z, z]], mm), floor (mm), payload (kg), sigma (mm), margin (percent of the travel
             left free at either end), candidates, seed.
 
         Raises SpecError where a setting is wrong, a joint has no limits, or the arm cannot go there; ValueError for unknown settings.

@@ -109,7 +109,7 @@ pub(super) struct KindSlots {
     pub sigma: Vec<usize>,
     /// Whether each reading needs its standard deviation.
     pub own_sigma: bool,
-    /// Among the row's texts: what the target was brought to, of a kind that reads nothing.
+    /// Among the row's texts: the name of the place that holds the target, of a contact constraint.
     pub name: Option<usize>,
 }
 
@@ -144,11 +144,11 @@ impl Slots {
                 .collect()
         };
         let name = |kind: &dyn MeasurementKind| {
-            let own = kind.telling().next().filter(|_| kind.is_brought())?;
+            let column = kind.telling().next().filter(|_| kind.is_contact())?;
             slots
                 .texts
                 .iter()
-                .position(|setting| *setting == own.setting)
+                .position(|setting| *setting == column.setting)
         };
         let kinds = KINDS.iter().map(|kind| KindSlots {
             kind: *kind,
@@ -172,7 +172,7 @@ impl Slots {
     pub(super) fn numbers(&self) -> impl Iterator<Item = &(&'static DeclaredColumn, Range<usize>)> {
         self.columns.iter().filter(|(_, places)| !places.is_empty())
     }
-    /// Settings of the texts of a row beside its id.
+    /// Settings of the texts of a row but its id.
     pub(super) fn texts(&self) -> &[&'static str] {
         &self.texts
     }

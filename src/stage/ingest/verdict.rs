@@ -338,7 +338,7 @@ struct ReadFile<'a> {
     decision: &'a FileDecision,
 }
 
-/// Fails where the same measured rows would be used twice. One log of several days beside a file of joints for each day is none: of its
+/// Fails where the same measured rows would be used twice. One log of several days with a file of joints for each day is none: of its
 /// rows each is used once.
 pub(super) fn no_copies(scanned: &[(Vec<Scan>, Vec<FileDecision>)]) -> Result<()> {
     let mut read: Vec<ReadFile> = Vec::new();

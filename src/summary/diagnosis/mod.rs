@@ -54,7 +54,7 @@ impl DiagnosisSummary {
             own.map(|output| store.load(&output.table)).transpose()
         };
         let recording = stage.inputs.iter().find(|input| input.port == "recording");
-        let told = if stage.uses == DiagnoseTorques::NAME {
+        let diagnosis = if stage.uses == DiagnoseTorques::NAME {
             let (torques, numbers, rivals) = (
                 Torques::read(&load)?,
                 // The same columns as those of positions.
@@ -78,7 +78,7 @@ impl DiagnosisSummary {
         Ok(Self {
             robot: robot_of(stage, store)?,
             rows: recording.map_or(0, |input| input.table.rows),
-            ..told
+            ..diagnosis
         })
     }
 
@@ -109,8 +109,10 @@ impl DiagnosisSummary {
     /// Whether the files do not belong together as they are read.
     pub fn is_wrong_setup(&self) -> bool {
         match &self.kind {
-            Kind::Positions(told) => told.verdict.verdict == VerdictKind::WrongSetup.name(),
-            Kind::Torques(told) => told.verdict.is_wrong_setup(),
+            Kind::Positions(diagnosis) => {
+                diagnosis.verdict.verdict == VerdictKind::WrongSetup.name()
+            }
+            Kind::Torques(diagnosis) => diagnosis.verdict.is_wrong_setup(),
         }
     }
 
@@ -140,11 +142,11 @@ impl DiagnosisSummary {
         })?;
         let found = self.found.iter().find(|found| found.rank == row.rank);
         let (effect, place) = found.map_or(("-", "-"), |found| (&found.effect, &found.place));
-        let told = format!(
+        let diagnosis = format!(
             "a formula for {effect} at {place}, found in run {}",
             self.run
         );
-        declared_in_yaml(&row.declaration, &told)
+        declared_in_yaml(&row.declaration, &diagnosis)
     }
 
     fn said(&self, topic: VerdictTopic) -> Vec<&str> {
@@ -195,13 +197,13 @@ impl DiagnosisSummary {
     /// The diagnosis as one document; `store` is where the run is, as one types it.
     pub fn document(&self, store: &str) -> Value {
         let mut document = match &self.kind {
-            Kind::Positions(told) => {
-                let mut document = told.document();
+            Kind::Positions(diagnosis) => {
+                let mut document = diagnosis.document();
                 document["next_measurements"] = json!(self.next(store));
                 document
             }
-            Kind::Torques(told) => {
-                let mut document = told.document();
+            Kind::Torques(diagnosis) => {
+                let mut document = diagnosis.document();
                 document["withdrawn"] = json!(self.said(VerdictTopic::Withdrawn));
                 document["remarks"] = json!(self.said(VerdictTopic::Remark));
                 document
@@ -256,12 +258,12 @@ impl DiagnosisSummary {
     /// All of the diagnosis, as `calib diagnose --details` prints it; `store` is the `--store` of the commands that it proposes.
     pub fn text(&self, store: &str) -> String {
         let mut text = match &self.kind {
-            Kind::Positions(told) => told.text(),
-            Kind::Torques(told) => told.text(),
+            Kind::Positions(diagnosis) => diagnosis.text(),
+            Kind::Torques(diagnosis) => diagnosis.text(),
         };
         text.extend(self.found.iter().map(|found| match &self.kind {
-            Kind::Positions(told) => {
-                found.details(&told.formulas(found.rank), RivalRow::is_inseparable)
+            Kind::Positions(diagnosis) => {
+                found.details(&diagnosis.formulas(found.rank), RivalRow::is_inseparable)
             }
             Kind::Torques(_) => found.details(&torques::numbers(found), |_| true),
         }));
@@ -274,17 +276,20 @@ impl DiagnosisSummary {
         text += &lines("withdrawn: ", &self.said(VerdictTopic::Withdrawn));
         text += &lines("not observable: ", &self.said(VerdictTopic::NotObservable));
         match &self.kind {
-            Kind::Positions(told) => {
+            Kind::Positions(diagnosis) => {
                 text += &lines(
-                    "what is left: ",
-                    &Vec::from_iter(told.verdict.signature.as_deref()),
+                    "residual: ",
+                    &Vec::from_iter(diagnosis.verdict.signature.as_deref()),
                 );
-                text += &lines("set aside: ", &Vec::from_iter(told.set_aside().as_deref()));
+                text += &lines(
+                    "set aside: ",
+                    &Vec::from_iter(diagnosis.set_aside().as_deref()),
+                );
                 for line in self.next(store).into_iter().flatten() {
                     text.push_str(&format!("measure next: {line}\n"));
                 }
             }
-            Kind::Torques(told) => text += &told.left(),
+            Kind::Torques(diagnosis) => text += &diagnosis.left(),
         }
         text + &lines("", &self.said(VerdictTopic::Remark))
     }
@@ -293,23 +298,23 @@ impl DiagnosisSummary {
     fn head(&self) -> String {
         let robot = self.robot.as_deref();
         match &self.kind {
-            Kind::Positions(told) => told.head(robot, self.rows),
-            Kind::Torques(told) => told.head(robot, self.found.len()),
+            Kind::Positions(diagnosis) => diagnosis.head(robot, self.rows),
+            Kind::Torques(diagnosis) => diagnosis.head(robot, self.found.len()),
         }
     }
 
     /// The verdict in at most twelve words.
     pub fn verdict(&self) -> String {
         match &self.kind {
-            Kind::Positions(told) => told.verdict(),
-            Kind::Torques(told) => told.verdict(),
+            Kind::Positions(diagnosis) => diagnosis.verdict(),
+            Kind::Torques(diagnosis) => diagnosis.verdict(),
         }
     }
 
     /// The findings in a few words each, as the table has them.
     pub(super) fn in_few_words(&self) -> Vec<ShortFinding> {
         let rows = match &self.kind {
-            Kind::Positions(told) => told.verdict.clock.as_deref() == Some("row"),
+            Kind::Positions(diagnosis) => diagnosis.verdict.clock.as_deref() == Some("row"),
             Kind::Torques(_) => false,
         };
         self.found
@@ -332,11 +337,11 @@ impl DiagnosisSummary {
         let width = screen::width(columns);
         let mut text = self.head() + &labelled("verdict", &self.verdict());
         let (positions, wrong) = match &self.kind {
-            Kind::Positions(told) => (Some(told), self.is_wrong_setup()),
+            Kind::Positions(diagnosis) => (Some(diagnosis), self.is_wrong_setup()),
             Kind::Torques(_) => (None, false),
         };
         let at = match positions {
-            Some(told) if told.verdict.leftover_rms_mm.is_some() => " at the tool",
+            Some(diagnosis) if diagnosis.verdict.leftover_rms_mm.is_some() => " at the tool",
             _ => " rms",
         };
         for (short, found) in self.in_few_words().iter().zip(&self.found) {
@@ -346,13 +351,13 @@ impl DiagnosisSummary {
                 false => screen::ranked(found.rank, short, at, width),
             });
         }
-        if let Some(told) = positions {
-            if let Some(statement) = told.verdict.statement.as_ref().filter(|_| wrong)
+        if let Some(diagnosis) = positions {
+            if let Some(statement) = diagnosis.verdict.statement.as_ref().filter(|_| wrong)
                 && self.found.is_empty()
             {
                 text.push_str(&screen::sentence("", statement, width));
             }
-            let aside = told.worst_aside();
+            let aside = diagnosis.worst_aside();
             let aside = aside
                 .iter()
                 .map(|row| format!("{} ({})", row.point_id, length(row.size_mm)));
@@ -375,7 +380,7 @@ impl DiagnosisSummary {
     /// What to do next, where the diagnosis says so.
     pub(super) fn next_step(&self, run: &str, store: &str) -> Option<NextStep> {
         match &self.kind {
-            Kind::Positions(told) => self.next_of_positions(&told.verdict, store),
+            Kind::Positions(diagnosis) => self.next_of_positions(&diagnosis.verdict, store),
             Kind::Torques(_) => Some(NextStep {
                 what: "feed torques forward".into(),
                 command: Some(format!("calib compensate {run} motion.csv --torque{store}")),

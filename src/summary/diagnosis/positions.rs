@@ -20,7 +20,7 @@ const ASIDE: usize = 4;
 /// Places and variables that are shown.
 const SHOWN: usize = 5;
 
-/// Tables of a diagnosis of positions beside findings and sentences.
+/// Tables of a diagnosis of positions but findings and sentences.
 pub(super) struct Positions {
     pub verdict: VerdictRow,
     pub findings: Findings,

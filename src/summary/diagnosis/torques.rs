@@ -13,7 +13,7 @@ use crate::table::{
 use serde_json::{Value, json};
 use std::cmp::Ordering;
 
-/// Tables of a diagnosis of torques beside findings and sentences.
+/// Tables of a diagnosis of torques but findings and sentences.
 pub(super) struct Torques {
     pub verdict: TorqueVerdictRow,
     findings: TorqueFindings,
@@ -189,7 +189,7 @@ impl Torques {
     pub fn left(&self) -> String {
         let line = |row: &JointTorqueRow| {
             let left = row.signature.as_ref()?;
-            Some(format!("what is left at joint {}: {left}\n", row.joint))
+            Some(format!("residual at joint {}: {left}\n", row.joint))
         };
         self.joints.iter().filter_map(line).collect()
     }

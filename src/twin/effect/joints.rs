@@ -18,7 +18,7 @@ effect! {
     turns |self, at| self.rad_per_nm * at.torque();
 }
 
-/// The form of the wind-up beside the linear one, of amplitude 1.
+/// The form of the nonlinear wind-up, of amplitude 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Curve {
@@ -34,7 +34,7 @@ pub enum Curve {
 
 // A gear that is softer under little torque than under much: teeth and rollers that first have to come into full contact.
 effect! {
-    /// Wind-up beside the linear one.
+    /// Wind-up that is added to the linear one.
     JointHardening "joint_hardening" at joint {
         curve: Curve = "Over the torque.",
         amplitude_arcsec: f64 = "arcsec.",
@@ -338,7 +338,7 @@ pub enum Balancer {
     Gas,
 }
 
-// A balancer beside a joint's gear takes torque off the gear: who leaves it out overrates the wind-up.
+// A balancer parallel to a joint's gear takes torque off the gear: who leaves it out overrates the wind-up.
 effect! {
     /// Torque of a balancer.
     Counterbalance "counterbalance" at joint {

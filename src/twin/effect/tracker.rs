@@ -71,7 +71,7 @@ fn minute() -> f64 {
     60.0
 }
 
-// As a tripod does in the sun or beside a machine: an effect that no list expects.
+// As a tripod does in the sun or near a machine: an effect that no list expects.
 effect! {
     /// A sine of time in one direction of motion of what is measured.
     TrackerSway "unknown" of "tracker_sway" "tracker" {

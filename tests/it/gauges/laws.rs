@@ -179,7 +179,7 @@ const ASKEW: [f64; 3] = [0.9, -1.2, 0.4];
 
 /// Kinds that read something; what is only brought to a place has a file of its own.
 fn read() -> impl Iterator<Item = &'static dyn MeasurementKind> {
-    KINDS.iter().copied().filter(|kind| !kind.is_brought())
+    KINDS.iter().copied().filter(|kind| !kind.is_contact())
 }
 
 /// Residual of a kind under the model with parameters `x`.

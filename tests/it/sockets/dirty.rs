@@ -183,7 +183,7 @@ fn derivatives_of_sockets_planes_and_spheres_are_central_differences() {
         let mut checked = 0;
         for (kind, row) in KINDS
             .iter()
-            .filter(|kind| kind.is_brought())
+            .filter(|kind| kind.is_contact())
             .flat_map(|kind| (0..data.rows()).map(move |row| (*kind, row)))
         {
             let mut scratch = model.stack.scratch(&model.robot);
