@@ -1,9 +1,7 @@
 //! What a search has found, as findings: which components make one up, how probable its name and its place are, what else it may be; and where
 //! the residual sits before and after.
 
-use super::cell::CauseCell;
 use super::evidence::log_sum;
-use super::listed::cell_of;
 use super::scan::{CauseTable, CellScan};
 use super::search::without;
 use super::state::{CellColumns, Component, KnownState};
@@ -48,17 +46,17 @@ pub(crate) struct Answer {
     pub hidden: Vec<(Form, f64)>,
 }
 
-/// The name of a component.
-fn told(own: &Component, cell: &CauseCell) -> &'static str {
-    let bends = cell.name == names::JOINT_COMPLIANCE && own.shape.is_bent;
-    if bends {
-        names::JOINT_HARDENING
-    } else {
-        cell.name
-    }
-}
-
 impl CauseTable<'_, '_> {
+    /// The name of a component.
+    fn name_of(&self, component: &Component) -> &'static str {
+        let cell = &self.cells[component.cell];
+        if cell.name == names::JOINT_COMPLIANCE && component.shape.is_bent {
+            self.bent
+        } else {
+            cell.name
+        }
+    }
+
     /// The findings that components are; `first` is where the residual sat before any of them.
     pub(super) fn answer(&mut self, components: &[Component], first: (Located, f64)) -> Answer {
         self.know(components);
@@ -74,10 +72,7 @@ impl CauseTable<'_, '_> {
         let mut groups: BTreeMap<(&'static str, Place), Vec<usize>> = BTreeMap::new();
         for (i, own) in components.iter().enumerate() {
             let cell = &self.cells[own.cell];
-            groups
-                .entry((cell_of(cell.name), cell.place))
-                .or_default()
-                .push(i);
+            groups.entry((cell.name, cell.place)).or_default().push(i);
         }
         let found = groups.into_values().map(|members| {
             let mut found = self.found(components, &members, state.kappa);
@@ -132,10 +127,7 @@ impl CauseTable<'_, '_> {
         let mut scan = self.scan_alike(&components[main], &state, &rest, 8, &[cell]);
         // Others are asked what the strongest does: further ones of its cell add to any of them.
         scan.log_odds[cell] = self.cells[cell].log_prior + own;
-        let (effect, place) = (
-            told(&components[main], &self.cells[cell]),
-            self.cells[cell].place,
-        );
+        let (effect, place) = (self.name_of(&components[main]), self.cells[cell].place);
         let (probabilities, rivals) = self.weigh((effect, place), cell, &components[main], &scan);
         let mut bounds = Vec::new();
         for i in members {
@@ -199,9 +191,7 @@ impl CauseTable<'_, '_> {
                 bent
             };
             if cell.name == names::JOINT_COMPLIANCE {
-                *shares
-                    .entry((names::JOINT_HARDENING, cell.place))
-                    .or_default() += bent * probability;
+                *shares.entry((self.bent, cell.place)).or_default() += bent * probability;
                 *shares.entry((cell.name, cell.place)).or_default() += (1.0 - bent) * probability;
             } else {
                 *shares.entry((cell.name, cell.place)).or_default() += probability;

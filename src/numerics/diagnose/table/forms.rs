@@ -62,7 +62,7 @@ fn unnamed(place: Place, survey: &Survey) -> Vec<CauseCell> {
             .into_iter()
             .flatten()
         {
-            if generated::listed_as(motion, of, over, survey).is_none() {
+            if !generated::is_listed(motion, of, over, survey) {
                 let shapes = Shapes::Free(FreeShape { motion, of, over });
                 out.push(CauseCell {
                     name: names::UNKNOWN,

@@ -3,7 +3,7 @@
 
 use super::cell::{CauseCell, FreeShape, Over, Shapes};
 use super::frame::SearchRows;
-use crate::criteria::cells::{FADING, LIMITS, PAIR, PRODUCT, UNNAMED, USUAL};
+use crate::criteria::cells::{FADING, LIMITS, PAIR, PRODUCT};
 use crate::diagnose::types::Question;
 use crate::effect::{Axes, AxisPoint, Motion, Place, Polar, Survey, Variable, names};
 use crate::observation::only_brought;
@@ -54,9 +54,7 @@ pub(super) fn cells(
     question: &Question,
     is_open: bool,
 ) -> Vec<CauseCell> {
-    let odds = |probability: f64| probability / (1.0 - probability);
-    let unnamed = *UNNAMED * odds(question.open_world) / odds(*USUAL);
-    let left_out = |name: &str| question.without.iter().any(|out| out == name);
+    let unnamed = super::listed::unnamed(question);
     let mut out = Vec::new();
     let varies = |frame: &SearchRows, of: Variable| {
         frame
@@ -77,9 +75,7 @@ pub(super) fn cells(
                 let kind = kind.into_iter().filter(|(of, _)| varies(frame, *of));
                 let all: Vec<_> = kind
                     .flat_map(|(of, over)| motions.iter().map(move |motion| (*motion, of, over)))
-                    .filter(|(motion, of, over)| {
-                        listed_as(*motion, *of, *over, survey).is_none_or(left_out)
-                    })
+                    .filter(|(motion, of, over)| !is_listed(*motion, *of, *over, survey))
                     .collect();
                 if !all.is_empty() {
                     groups.push(all);
@@ -396,28 +392,22 @@ pub(super) fn kinds(place: Place, motion: Motion, survey: &Survey) -> Vec<Kind> 
     out
 }
 
-/// The cause whose cell is this motion over this variable in all shapes, if there is one.
-pub(super) fn listed_as(
-    motion: Motion,
-    of: Variable,
-    over: Over,
-    survey: &Survey,
-) -> Option<&'static str> {
+/// Whether this motion over this variable, in all shapes, is the cell of a cause.
+pub(super) fn is_listed(motion: Motion, of: Variable, over: Over, survey: &Survey) -> bool {
     let last = survey.joints().saturating_sub(1);
     match (motion, of, over) {
         // What the last joint carries is the tool.
-        (Motion::Slide { joint, .. }, Variable::Time, Over::Step) if joint == last => {
-            Some(names::TOOL_SHIFT)
-        }
-        (Motion::Joint { joint }, Variable::Approach { joint: by }, _) if joint == by => {
-            Some(names::BACKLASH)
-        }
-        (Motion::Joint { joint }, Variable::Load { joint: by }, _) if joint == by => {
-            Some(names::JOINT_COMPLIANCE)
-        }
-        (Motion::Joint { .. }, Variable::Time, Over::Step) => Some(names::ZERO_SHIFT),
-        (Motion::Base { .. }, Variable::Time, Over::Step) => Some(names::BASE_SHIFT),
-        (Motion::Tool { .. }, Variable::Time, Over::Step) => Some(names::TOOL_SHIFT),
-        _ => None,
+        (Motion::Slide { joint, .. }, Variable::Time, Over::Step) => joint == last,
+        (
+            Motion::Joint { joint },
+            Variable::Approach { joint: by } | Variable::Load { joint: by },
+            _,
+        ) => joint == by,
+        (
+            Motion::Joint { .. } | Motion::Base { .. } | Motion::Tool { .. },
+            Variable::Time,
+            Over::Step,
+        ) => true,
+        _ => false,
     }
 }

@@ -2,7 +2,7 @@
 //! physics.
 
 use super::cell::{CauseCell, CellShape, FreeShape, Over, ShapeGroup, Shapes, not_quite_straight};
-use crate::criteria::cells::{BENT, COMMON, RARE, RARER};
+use crate::criteria::cells::{BENT, COMMON, RARE, RARER, UNNAMED, USUAL};
 use crate::criteria::effect;
 use crate::diagnose::types::Question;
 use crate::effect::{
@@ -48,7 +48,8 @@ pub(super) fn cell_of(cause: &'static str) -> &'static str {
     }
 }
 
-/// All cells with a name, but of those that are to be left out: cells without a name take their place.
+/// All cells of causes. Those of a name that is not to be given stay, as rare as a cell without a name, and are `unknown`: what they explain
+/// would take the name of a neighbour.
 pub(super) fn cells(
     survey: &Survey,
     values: &dyn Fn(Variable) -> Option<Vec<f64>>,
@@ -75,12 +76,11 @@ pub(super) fn cells(
             .iter()
             .flat_map(|cause| DeclaredForm::hypotheses(cause, survey)),
     );
-    let left_out = |name: &str| without.iter().any(|out| out == name);
-    for hypothesis in proposed.filter(|hypothesis| !left_out(hypothesis.form.name())) {
+    for hypothesis in proposed {
         let key = (cell_of(hypothesis.form.name()), hypothesis.form.place());
         all.entry(key).or_default().push(hypothesis);
     }
-    for joint in survey.revolute().filter(|_| !left_out(names::CABLE_DRAG)) {
+    for joint in survey.revolute() {
         let pulled = hoses(survey, joint);
         if !pulled.is_empty() {
             all.entry((names::CABLE_DRAG, Place::Joint(joint)))
@@ -91,20 +91,28 @@ pub(super) fn cells(
     let cell = |((name, place), hypotheses): ((&'static str, Place), Vec<Hypothesis>)| {
         let unusual = unusual(&hypotheses);
         let mut groups = weighed(hypotheses, survey.robot);
-        let straight = name == names::JOINT_COMPLIANCE && left_out(names::JOINT_HARDENING);
-        if !straight {
-            groups.extend(curves(name, place, &groups, values, survey.joints()));
-        }
+        groups.extend(curves(name, place, &groups, values, survey.joints()));
+        let is_named = !without.iter().any(|out| out == name);
         CauseCell {
-            name,
+            name: if is_named { name } else { names::UNKNOWN },
             place,
             key: format!("{name}@{place}"),
-            log_prior: log_prior(name, place, prior_weight) - prior_weight * unusual,
+            log_prior: if is_named {
+                log_prior(name, place, prior_weight) - prior_weight * unusual
+            } else {
+                unnamed(question).ln()
+            },
             shapes: Shapes::Listed(groups),
             between: None,
         }
     };
     all.into_iter().map(cell).collect()
+}
+
+/// Prior odds of all cells without a name at a place together.
+pub(super) fn unnamed(question: &Question) -> f64 {
+    let odds = |probability: f64| probability / (1.0 - probability);
+    *UNNAMED * odds(question.open_world) / odds(*USUAL)
 }
 
 /// By how much, in ln of odds, the commonest form of a cell is rarer than what is rare.

@@ -9,7 +9,7 @@ use crate::criteria::cells::{
     ALIKE, BENDS, COMPONENTS, FAR_BELOW, JOINS, PAIR, PAIRS, UNLIKELY, USUAL_MOST,
 };
 use crate::diagnose::types::{KnownCell, Question};
-use crate::effect::{Form, Place, Survey, Variable, cause};
+use crate::effect::{Form, Place, Survey, Variable, cause, names};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -38,6 +38,8 @@ pub(super) struct CauseTable<'f, 'a> {
     pub declared: Vec<usize>,
     /// Motions and variables whose products with others are cells.
     pub multiplied: Vec<FreeShape>,
+    /// What a joint that yields out of proportion to its load is called.
+    pub bent: &'static str,
 }
 
 /// What a cell says given a state, with its likeliest shape.
@@ -165,6 +167,15 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             declared,
             from_before: Vec::new(),
             multiplied: shown.to_vec(),
+            bent: if question
+                .without
+                .iter()
+                .any(|out| out == names::JOINT_HARDENING)
+            {
+                names::UNKNOWN
+            } else {
+                names::JOINT_HARDENING
+            },
         }
     }
 

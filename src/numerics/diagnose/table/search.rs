@@ -219,7 +219,7 @@ impl CauseTable<'_, '_> {
             return Vec::new();
         }
         let yields: Vec<usize> = (0..self.cells.len())
-            .filter(|cell| self.cells[*cell].name == names::JOINT_COMPLIANCE)
+            .filter(|cell| self.cells[*cell].key.starts_with(names::JOINT_COMPLIANCE))
             .collect();
         let mut components = Vec::new();
         for cell in yields {
