@@ -1,19 +1,19 @@
 //! Whether what changes slowly is a cause that follows time, or noise that is correlated from point to point.
 //!
 //! Two explanations of the same points are compared: all causes with noise as it is believed, and the causes that do not follow time with noise
-//! that is correlated. Searched causes take a part of such noise with them, so that what they leave alone would show too little of it; likelihoods
-//! are restricted ones (Patterson and Thompson, 1971), as the base model takes its part, too.
+//! that is correlated. Searched causes take a part of such noise with them, so that what they leave alone would show too little of it: in both
+//! the coefficients of causes are random with the variances at which they were found, and the likelihood is the marginal one of the rows,
+//! restricted to what the base model cannot do (Patterson and Thompson, 1971).
 
 use super::along_path::CorrelationChange;
 use super::fit_state::{FitState, Fitter};
-use super::stretches::thinned;
-use crate::criteria::cells::SETTLED;
+use super::stretches::{first_of_pose, thinned};
+use crate::criteria::cells::{COMMON, SETTLED};
 use crate::criteria::noise::{AS_GOOD, CLEARER, PLAIN};
 use crate::diagnose::linear::{orthonormal, project};
 use crate::diagnose::table::{Answer, FoundCell};
 use crate::diagnose::whitened::{AutocorrelatedNoise, WhitenedProblem};
 use crate::effect::{Form, Variable};
-use crate::robot::Measurements;
 use faer::linalg::matmul::triangular::{BlockStructure, matmul};
 use faer::{Accum, Mat, MatRef, Par, Side};
 use rayon::prelude::*;
@@ -43,17 +43,17 @@ pub(crate) fn correlation_left_by(
         .iter()
         .map(|cause| follows_time(&cause.form))
         .collect();
-    let price = price_of(&answer.found, &|i| slow[i]);
     let with_all = Regression::of((&problem, width), settled, fitter, &vec![true; slow.len()]);
+    let price = price_of(&answer.found, &|i| slow[i]);
     let believed = with_all.cost(fitter.correlated) + price;
     let (best, noise) = with_all.likeliest();
     if fitter.causes_of_the_arm_first() {
         // What noise alone explains as well has no other name.
-        let price = price_of(&answer.found, &|_| true);
+        let best = best + price_of(&answer.found, &|_| true);
         let (alone, of_noise) =
             Regression::of((&problem, width), settled, fitter, &vec![false; slow.len()])
                 .likeliest();
-        let keeps_causes = best + price < alone - *PLAIN;
+        let keeps_causes = best < alone - *PLAIN;
         return Some(CorrelationChange {
             noise: if keeps_causes { noise } else { of_noise },
             keeps_causes,
@@ -65,7 +65,7 @@ pub(crate) fn correlation_left_by(
         let (cost, other) = Regression::of((&problem, width), settled, fitter, &kept).likeliest();
         // Causes that were not found yet look like such noise, too.
         let clearer = if answer.nothing_last > *SETTLED {
-            *CLEARER
+            0.0
         } else {
             10.0 * *CLEARER
         };
@@ -76,29 +76,16 @@ pub(crate) fn correlation_left_by(
     (best < believed - *PLAIN && noise != fitter.correlated).then(|| change(noise))
 }
 
-/// Rows without those that measured a target again before the arm left the pose: what the model leaves there they share, whatever the noise does.
-fn first_of_pose(data: &Measurements, rows: &[usize]) -> Vec<usize> {
-    let again = |row: usize| {
-        let before = (0..data.rank_in_time(row))
-            .rev()
-            .map(|place| data.at_place(place));
-        before
-            .take_while(|other| data.near_pose(*other, row))
-            .any(|other| data.target(other) == data.target(row))
-    };
-    rows.iter().copied().filter(|row| !again(*row)).collect()
-}
-
 fn follows_time(form: &Form) -> bool {
     form.variables().contains(&Variable::Time)
 }
 
-/// What the freedom of some findings costs them, -2 ln of evidence.
+/// -2 ln of the prior odds of some findings.
 fn price_of(found: &[FoundCell], of: &dyn Fn(usize) -> bool) -> f64 {
     let of = found
         .iter()
         .filter(|found| found.members.iter().any(|i| of(*i)));
-    of.map(|found| found.price).sum()
+    -2.0 * of.map(|found| found.log_prior).sum::<f64>()
 }
 
 /// Points by the base model and some causes, in a linear picture.
@@ -106,11 +93,13 @@ struct Regression<'a> {
     rows: &'a [usize],
     /// Numbers of a row.
     width: usize,
-    /// An orthonormal basis of what they can do, columns one after another, and then what they leave of the points. Of any other basis the
-    /// determinants would differ by the same factor under all noises.
+    /// An orthonormal basis of what the base model can do, columns one after another (of any other basis the determinants would differ by the
+    /// same factor under all noises); columns of causes, of unit prior variance; and the points.
     columns: Vec<f64>,
-    /// Columns of the basis.
-    count: usize,
+    /// Columns of the base model, and of causes.
+    counts: [usize; 2],
+    /// Causes that are in the model.
+    causes: usize,
 }
 
 impl<'a> Regression<'a> {
@@ -122,51 +111,53 @@ impl<'a> Regression<'a> {
         kept: &[bool],
     ) -> Self {
         let rows = problem.residual_rows();
-        let mut left = problem.of_readings().to_vec();
-        let base = problem.jacobian(fitter.free());
+        let mut points = problem.of_readings().to_vec();
+        let mut random = Vec::new();
+        for (cause, kept) in settled.causes.iter().zip(kept) {
+            let columns = problem.columns(&cause.form);
+            let numbers = cause.coefficients.iter().zip(&cause.priors);
+            for (column, (coefficient, prior)) in columns.chunks(rows).zip(numbers) {
+                let known = if *kept { prior.mean } else { 0.0 };
+                points
+                    .iter_mut()
+                    .zip(column)
+                    .for_each(|(value, c)| *value += c * (coefficient - known));
+                if *kept {
+                    random.extend(column.iter().map(|c| c * prior.sigma));
+                }
+            }
+        }
+        let base = orthonormal(&problem.jacobian(fitter.free()));
+        project(base.as_ref(), &mut points);
+        AutocorrelatedNoise::without_gross(&mut points);
         let mut columns: Vec<f64> = (0..base.ncols())
             .flat_map(|j| base.col_as_slice(j).to_vec())
             .collect();
-        for (cause, kept) in settled.causes.iter().zip(kept) {
-            let own = problem.columns(&cause.form);
-            if *kept {
-                columns.extend(own);
-                continue;
-            }
-            for (column, coefficient) in own.chunks(rows).zip(&cause.coefficients) {
-                left.iter_mut()
-                    .zip(column)
-                    .for_each(|(value, c)| *value += c * coefficient);
-            }
-        }
-        let design = orthonormal(&Mat::from_fn(rows, columns.len() / rows, |i, j| {
-            columns[j * rows + i]
-        }));
-        project(design.as_ref(), &mut left);
-        AutocorrelatedNoise::without_gross(&mut left);
-        let mut columns: Vec<f64> = (0..design.ncols())
-            .flat_map(|j| design.col_as_slice(j).to_vec())
-            .collect();
-        columns.extend(left);
+        let counts = [base.ncols(), random.len() / rows];
+        columns.extend(random);
+        columns.extend(points);
         Self {
             rows: &problem.rows,
             width,
             columns,
-            count: design.ncols(),
+            counts,
+            causes: kept.iter().filter(|kept| **kept).count(),
         }
     }
 
-    /// -2 ln of the restricted likelihood, its scale estimated, up to a constant of the points; infinite where they leave nothing.
+    /// -2 ln of the restricted marginal likelihood, its scale estimated, up to a constant of the points; infinite where nothing is left.
     fn cost(&self, noise: Option<AutocorrelatedNoise>) -> f64 {
         let believed = noise.unwrap_or(AutocorrelatedNoise::NONE);
-        let rows = self.columns.len() / (self.count + 1);
+        let [base, random] = self.counts;
+        let count = base + random + 1;
+        let rows = self.columns.len() / count;
         let innovations = believed.filter(self.rows, self.width);
         let mut columns = self.columns.clone();
         columns
             .chunks_mut(rows)
             .for_each(|column| innovations.apply(column));
-        let columns = MatRef::from_column_major_slice(&columns, rows, self.count + 1);
-        let mut gram = Mat::zeros(self.count + 1, self.count + 1);
+        let columns = MatRef::from_column_major_slice(&columns, rows, count);
+        let mut gram = Mat::zeros(count, count);
         let (lower, whole) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
         matmul(
             gram.as_mut(),
@@ -179,19 +170,19 @@ impl<'a> Regression<'a> {
             1.0,
             Par::Seq,
         );
+        (base..base + random).for_each(|k| gram[(k, k)] += 1.0);
         let Ok(factor) = gram.llt(Side::Lower) else {
             return f64::INFINITY;
         };
         let pivot = |k: usize| factor.L()[(k, k)];
-        let freedom = (rows.saturating_sub(self.count)).max(1) as f64;
-        // The last pivot is the length of what the design leaves of the points.
-        let square = pivot(self.count).powi(2);
-        let shapes = if noise.is_some() {
-            2.0 * freedom.ln()
-        } else {
-            0.0
-        };
-        let design: f64 = (0..self.count).map(|k| pivot(k).ln()).sum();
+        let freedom = rows.saturating_sub(base).max(1) as f64;
+        // The last pivot is the length of the points in standard deviations of all that is random.
+        let square = pivot(count - 1).powi(2);
+        // Share and length of the noise, size and shape of each cause; such noise is as usual as a common cause.
+        let lasts = usize::from(noise.is_some());
+        let shapes =
+            2.0 * (lasts + self.causes) as f64 * freedom.ln() - 2.0 * lasts as f64 * COMMON.ln();
+        let design: f64 = (0..count - 1).map(|k| pivot(k).ln()).sum();
         freedom * (square / freedom).ln() + innovations.determinant() + 2.0 * design + shapes
     }
 

@@ -3,6 +3,7 @@
 use super::along_path::{CorrelationChange, PathCorrelation, follow_a_path};
 use super::base_model::base_model;
 use super::noise::{JointSpread, RepeatPairs, by_residual};
+use super::stretches::lasts;
 use crate::criteria::noise::{ESTIMATES, REPEATS, SETTLED};
 use crate::diagnose::types::{JointRepeatability, Question};
 use crate::diagnose::whitened::AutocorrelatedNoise;
@@ -120,8 +121,13 @@ impl<'a> Fitter<'a> {
         fitter.follow(&now);
         fitter.spread = JointSpread::of(&now.model, &fitter.data);
         let kept = &now.screening.kept;
-        let shown =
-            RepeatPairs::of(&fitter.data, kept).noise(&now.model, &fitter.data, &fitter.spread);
+        let lasts = lasts(&now.model, &fitter.data, kept);
+        let shown = RepeatPairs::of(&fitter.data, kept).noise(
+            &now.model,
+            &fitter.data,
+            &fitter.spread,
+            lasts,
+        );
         fitter.repeatability = shown.joints;
         fitter.scaled = shown.scale != 1.0;
         if fitter.scaled {

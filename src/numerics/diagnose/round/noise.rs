@@ -198,8 +198,15 @@ impl RepeatPairs {
     }
 
     /// What the pairs show of the instrument's noise, with the joints' repeatability at that: where they follow each other at once, are enough,
-    /// and speak clearly for another noise than the stated one.
-    pub fn noise(&self, model: &Model, data: &Measurements, spread: &JointSpread) -> RepeatedNoise {
+    /// and speak clearly for another noise than the stated one. Where noise `lasts` from pose to pose, shots of a standing arm agree better than
+    /// it is small.
+    pub fn noise(
+        &self,
+        model: &Model,
+        data: &Measurements,
+        spread: &JointSpread,
+        lasts: bool,
+    ) -> RepeatedNoise {
         let joints = self.repeatability(model, data, spread);
         let stated = RepeatedNoise { scale: 1.0, joints };
         let samples = self.of_points(model, data, spread);
@@ -233,7 +240,7 @@ impl RepeatPairs {
         let Some((cost, scale)) = best else {
             return stated;
         };
-        let differs = (scale - 1.0).abs() > *SETTLED * scale.max(1.0);
+        let differs = (scale - 1.0).abs() > *SETTLED * scale.max(1.0) && !(lasts && scale < 1.0);
         if !differs || cost > best_joints(1.0).0 - *CLEARER {
             return stated;
         }

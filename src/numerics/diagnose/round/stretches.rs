@@ -2,7 +2,7 @@
 
 use crate::criteria::noise::{ALONE, SEARCHED, STRETCHES};
 use crate::diagnose::whitened::WhitenedProblem;
-use crate::estimate::autocorrelation_time;
+use crate::estimate::{Model, autocorrelation_time};
 use crate::robot::Measurements;
 
 /// Rows that the search looks at: all but those of the recording's first stop, to which nobody knows the way, or [`SEARCHED`] of them by a sequence
@@ -34,4 +34,26 @@ pub(super) fn bounded_autocorrelation_time(problem: &WhitenedProblem) -> f64 {
     } else {
         time.min(rows.len() as f64 / *STRETCHES as f64).max(1.0)
     }
+}
+
+/// Rows without those that measured a target again before the arm left the pose: what the model leaves there they share, whatever the noise does.
+pub(super) fn first_of_pose(data: &Measurements, rows: &[usize]) -> Vec<usize> {
+    let again = |row: usize| {
+        let before = (0..data.rank_in_time(row))
+            .rev()
+            .map(|place| data.at_place(place));
+        before
+            .take_while(|other| data.near_pose(*other, row))
+            .any(|other| data.target(other) == data.target(row))
+    };
+    rows.iter().copied().filter(|row| !again(*row)).collect()
+}
+
+/// Whether what a model leaves of standing points lasts from pose to pose.
+pub(super) fn lasts(model: &Model, data: &Measurements, rows: &[usize]) -> bool {
+    let rows = first_of_pose(data, rows);
+    let problem = WhitenedProblem::new(model, data, rows);
+    problem
+        .width()
+        .is_some_and(|width| autocorrelation_time(problem.of_readings(), width) > *ALONE)
 }

@@ -5,7 +5,7 @@ use super::evidence::log_sum;
 use super::scan::{CauseTable, CellScan};
 use super::search::without;
 use super::state::{CellColumns, Component, KnownState};
-use crate::criteria::cells::{BENDS, MISLED, NU, RIVAL};
+use crate::criteria::cells::{BENDS, MISLED, RIVAL};
 use crate::diagnose::types::{
     ExplainedCell, ExplainedShare, Located, Probabilities, RivalCause, SpectrumLine,
 };
@@ -21,8 +21,8 @@ pub(crate) struct FoundCell {
     pub members: Vec<usize>,
     /// ln of the evidence for it given all others.
     pub log: f64,
-    /// What its freedom costs: by how much -2 ln of its evidence is more than that of its best fit.
-    pub price: f64,
+    /// ln of the prior odds of its cells.
+    pub log_prior: f64,
     /// Fall of the squared residual in standard deviations, and by how many numbers.
     pub gain: f64,
     pub numbers: usize,
@@ -139,14 +139,15 @@ impl CauseTable<'_, '_> {
             );
         }
         let gain = (state.rows.square - with.rows.square).max(0.0);
-        let whole = *NU + state.rows.square;
-        let best = -(state.rows.freedom + *NU) * (1.0 - gain / whole).max(f64::MIN_POSITIVE).ln();
         FoundCell {
             effect,
             place,
             members: Vec::new(),
             log,
-            price: (best - 2.0 * log).max(0.0),
+            log_prior: members
+                .iter()
+                .map(|i| self.cells[components[*i].cell].log_prior)
+                .sum(),
             gain,
             numbers: members.iter().map(|i| components[*i].part.ncols()).sum(),
             probabilities,
