@@ -147,10 +147,11 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
+pub use calib_diagnose as diagnose;
+pub use calib_dynamics as dynamics;
 pub use calib_foundation::{description, statistics, units};
 pub use calib_numerics::{
-    compensate, criteria, diagnose, dynamics, effect, error, estimate, observation, robot, spatial,
-    yaml,
+    compensate, criteria, effect, error, estimate, observation, robot, spatial, yaml,
 };
 pub use calib_twin as twin;
 

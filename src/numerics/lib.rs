@@ -20,7 +20,3 @@ pub mod observation;
 pub mod estimate;
 
 pub mod compensate;
-
-pub mod diagnose;
-
-pub mod dynamics;
