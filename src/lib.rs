@@ -2,9 +2,9 @@
 //!
 //! # The map
 //! Two towers that do not know each other, and one bridge. **Numerics** (`spatial -> robot -> effect -> observation -> estimate -> diagnose`)
-//! has no files and no frames: a package of its own, `calib-numerics` in `src/numerics`. The **twin** is another, `calib-twin` in `src/twin`,
-//! which does not depend on it. What both use is the package `calib-foundation` in `src/foundation`. All three are handed on here, and the
-//! compiler keeps their walls. **Columns** (`store`) has no robots. [`table`] is the only bridge between a Parquet row and a Rust value;
+//! has no files and no frames: the package `calib-numerics` in `src/numerics`, and above it `calib-diagnose` and `calib-dynamics` in folders
+//! of that. The **twin** is another package, `calib-twin` in `src/twin`, which does not depend on them. What both use is the package
+//! `calib-foundation` in `src/foundation`. All five are handed on here, and the compiler keeps their walls. **Columns** (`store`) has no robots. [`table`] is the only bridge between a Parquet row and a Rust value;
 //! [`stage`] is the only place where both towers are used; [`pipeline`] is the only caller of stages. Data goes one way:
 //! YAML -> draft -> `Plan` -> stage -> tables -> report. Nothing is updated in place, no layer calls back up.
 //!
@@ -147,10 +147,11 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
+pub use calib_diagnose as diagnose;
+pub use calib_dynamics as dynamics;
 pub use calib_foundation::{description, statistics, units};
 pub use calib_numerics::{
-    compensate, criteria, diagnose, dynamics, effect, error, estimate, observation, robot, spatial,
-    yaml,
+    compensate, criteria, effect, error, estimate, observation, robot, spatial, yaml,
 };
 pub use calib_twin as twin;
 

@@ -1,4 +1,5 @@
-//! The numerics of calib: no files, no frames, no terminal. The crate `calib` hands its modules on and has the map.
+//! The numerics of calib, up to estimation: no files, no frames, no terminal. The crate `calib` hands its modules on and has the map;
+//! `calib-diagnose` and `calib-dynamics` are made of them.
 
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
@@ -20,7 +21,3 @@ pub mod observation;
 pub mod estimate;
 
 pub mod compensate;
-
-pub mod diagnose;
-
-pub mod dynamics;

@@ -69,7 +69,7 @@ fn every_layer_is_a_row_of_the_map_and_every_row_a_layer() {
                 .strip_suffix(';')
                 .map(String::from)
         })
-        .chain(["twin".into()])
+        .chain(["diagnose", "dynamics", "twin"].map(String::from))
         .collect();
     assert_eq!(declared, table().into_keys().collect::<BTreeSet<_>>());
 }

@@ -186,8 +186,8 @@ fn absolute(path: &[String], module: &[String], modules: &[Vec<String>]) -> Opti
             base.clear();
             rest = &rest[1..];
         }
-        "calib_twin" => {
-            base = vec!["twin".into()];
+        package @ ("calib_diagnose" | "calib_dynamics" | "calib_twin") => {
+            base = vec![package.trim_start_matches("calib_").into()];
             rest = &rest[1..];
         }
         "self" => rest = &rest[1..],

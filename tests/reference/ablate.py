@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What halving and doubling does of every number by which a diagnosis decides (src/numerics/criteria).
 
-    cargo build -p calib -p calib-numerics --example ablate --features calib-numerics/ablate
+    cargo build -p calib -p calib-diagnose --example ablate --features calib-diagnose/ablate
     python3 tests/reference/ablate.py --program target/debug/examples/ablate --seed 7 --recordings 24 --jobs 1 [--lines FILE] [--write]
 
 Recordings are concealed ones, by turns with a cause of the list, with that cause taken out of the list, and with physics of no list. A

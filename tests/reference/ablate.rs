@@ -7,8 +7,8 @@
 
 #![allow(clippy::print_stdout, reason = "a program of its own")]
 
+use calib_diagnose::{Diagnosis, Question, VerdictKind, diagnose, wrong_setup};
 use calib_numerics::criteria::{CriterionFactor, reached, scale};
-use calib_numerics::diagnose::{Diagnosis, Question, VerdictKind, diagnose, wrong_setup};
 use calib_numerics::estimate::gauge;
 use calib_numerics::robot::{Measurements, NoiseBasis, PointReadings, RobotModel, Sequence};
 use calib_twin::conceal::case::Case;

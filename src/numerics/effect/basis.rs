@@ -135,7 +135,7 @@ impl Basis {
     }
 
     /// The values of its functions at `u`, numbered.
-    pub(crate) fn at(&self, u: f64, each: &mut dyn FnMut(usize, f64)) {
+    pub fn at(&self, u: f64, each: &mut dyn FnMut(usize, f64)) {
         match *self {
             Self::Linear { zero, per } => each(0, (u - zero) / per),
             Self::Straight { zero, per } => {

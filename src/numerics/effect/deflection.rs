@@ -200,7 +200,7 @@ impl Deflection {
     }
 
     /// What each parameter loads each joint with, Nm per unit: (parameter, joint, rate).
-    pub(crate) fn loads(&self) -> impl Iterator<Item = (usize, usize, f64)> + '_ {
+    pub fn loads(&self) -> impl Iterator<Item = (usize, usize, f64)> + '_ {
         self.partials
             .iter()
             .filter_map(|(parameter, direction)| match direction {

@@ -132,7 +132,7 @@ impl Axes {
     }
 
     /// How many they are.
-    pub(crate) fn count(self) -> usize {
+    pub fn count(self) -> usize {
         self.range().len()
     }
 
@@ -169,7 +169,7 @@ impl Motion {
     }
 
     /// The joint that travels, where that is all of the motion.
-    pub(crate) fn travels(&self) -> Option<usize> {
+    pub fn travels(&self) -> Option<usize> {
         match *self {
             Self::Joint { joint } | Self::Coupled { moved: joint, .. } => Some(joint),
             _ => None,

@@ -383,7 +383,7 @@ pub struct PointMotion {
 
 impl PointMotion {
     /// A variable of one number in this row; none where the row does not tell.
-    pub(crate) fn value(
+    pub fn value(
         &self,
         robot: &RobotModel,
         data: &Measurements,
@@ -446,7 +446,7 @@ impl PointMotion {
     }
 
     /// The values of a law's functions in this row, numbered; none of those that the row does not tell.
-    pub(crate) fn law(
+    pub fn law(
         &self,
         robot: &RobotModel,
         data: &Measurements,

@@ -41,11 +41,13 @@ impl Term {
     }
 
     /// Where it enters the chain.
+    #[inline]
     pub fn motion(&self) -> Motion {
         self.motion
     }
 
     /// What it depends on, and how.
+    #[inline]
     pub fn law(&self) -> &Law {
         &self.law
     }
@@ -64,6 +66,7 @@ impl Term {
     }
 
     /// The basis of its first variable.
+    #[inline]
     pub fn basis(&self) -> Basis {
         self.law.first.basis
     }

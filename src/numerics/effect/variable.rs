@@ -169,7 +169,7 @@ impl Variable {
     }
 
     /// Whether it is one number of a row.
-    pub(crate) fn is_single(self) -> bool {
+    pub fn is_single(self) -> bool {
         self.components() == 1 && !matches!(self, Self::ArmLoad | Self::LastMove | Self::Speed)
     }
 

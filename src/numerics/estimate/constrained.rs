@@ -20,7 +20,8 @@ impl Model {
             .map_or(value, |bounds| value.clamp(bounds.low, bounds.high))
     }
 
-    pub(crate) fn known(&self, parameter: usize) -> Known {
+    /// Bounds and prior of a parameter.
+    pub fn known(&self, parameter: usize) -> Known {
         self.known.get(&parameter).copied().unwrap_or_default()
     }
 

@@ -100,7 +100,7 @@ impl ErrorScale {
 }
 
 /// Length of one sigma (m or rad) of the first kind of a dimension that a row measured.
-pub(crate) fn noise(data: &Measurements, row: usize, of: Dimension) -> Option<f64> {
+pub fn noise(data: &Measurements, row: usize, of: Dimension) -> Option<f64> {
     KINDS
         .iter()
         .filter(|kind| kind.about().dimension == of)

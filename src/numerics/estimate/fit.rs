@@ -77,7 +77,7 @@ pub struct Fitted {
 
 impl Fitted {
     /// Parameters that were estimated.
-    pub(crate) fn free(&self) -> Vec<usize> {
+    pub fn free(&self) -> Vec<usize> {
         (0..self.statuses.len())
             .filter(|k| matches!(self.statuses[*k], ParameterStatus::Free(_)))
             .collect()
@@ -100,7 +100,7 @@ const ROUGH: Effort = Effort {
 /// Effort of the first round, which only finds out how large the residual is and what it lets one see.
 const FIRST: Effort = Effort { limit: 4, ..ROUGH };
 /// A parameter that the nominal robot hid is taken up where the data know it this many times better than its prior sigma ...
-pub(crate) const CLEARLY: f64 = 10.0;
+pub const CLEARLY: f64 = 10.0;
 /// ... and where they lower the cost by this and so much for each further one: chi-square as rare as five sigmas, so that
 /// hundreds of robots of one kind keep one set of parameters.
 const WORTH: [f64; 2] = [12.5, 1.75];
@@ -144,7 +144,7 @@ pub fn fit(start: &Model, data: &Measurements, options: &FitOptions) -> (Model, 
 }
 
 /// Which of some further parameters the data can see around a fitted model next to those that were fitted, `times` better than their priors.
-pub(crate) fn seen(
+pub fn seen(
     model: &Model,
     data: &Measurements,
     fitted: &Fitted,

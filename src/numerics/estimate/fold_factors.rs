@@ -22,7 +22,7 @@ const LEFT: f64 = 0.02;
 const STRAIGHT: f64 = 0.01;
 
 /// A model around which others are fitted, and its rows in parts that are left out in turn.
-pub(crate) struct NearbyFits<'a> {
+pub struct NearbyFits<'a> {
     data: &'a Measurements,
     model: &'a Model,
     excess: ExcessSigma,

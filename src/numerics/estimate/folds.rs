@@ -80,7 +80,7 @@ pub fn fold_poses(data: &Measurements, rows: &[usize]) -> usize {
 
 /// How rows are dealt into folds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum FoldKind {
+pub enum FoldKind {
     /// As [`Folds::random`], drawn with a seed.
     Random(u64),
     /// As [`Folds::blocks`].
@@ -88,7 +88,7 @@ pub(crate) enum FoldKind {
 }
 
 /// Rows of one kind of [`Folds`], each sorted. `None` where the poses are too few.
-pub(crate) fn dealt(kind: FoldKind, whole: &Session, count: usize) -> Option<Vec<Vec<usize>>> {
+pub fn dealt(kind: FoldKind, whole: &Session, count: usize) -> Option<Vec<Vec<usize>>> {
     let Session { data, rows, .. } = *whole;
     let parts = parts(data, rows);
     let order = whole.divisible(&parts, count)?;
@@ -123,7 +123,7 @@ impl Session<'_> {
     }
 
     /// Errors of the rows of each fold under a fit to the others.
-    pub(crate) fn without_each(&self, folds: &[Vec<usize>], scale: ErrorScale) -> Vec<Vec<f64>> {
+    pub fn without_each(&self, folds: &[Vec<usize>], scale: ErrorScale) -> Vec<Vec<f64>> {
         let fitted = self.fitted;
         let candidates = self.candidates();
         let nearby = NearbyFits::of(self, folds, &fitted.free(), scale);
@@ -232,7 +232,8 @@ fn without(whole: &Session, candidates: &[usize], part: &[usize], scale: ErrorSc
         .collect()
 }
 
-pub(crate) fn gather(
+/// Errors of `rows`, in their order, by the errors of the `parts` they were dealt into.
+pub fn gather(
     data: &Measurements,
     rows: &[usize],
     parts: &[Vec<usize>],

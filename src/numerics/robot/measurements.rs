@@ -62,11 +62,13 @@ pub struct Measurements {
 
 impl Measurements {
     /// How many rows were measured, of whatever kinds.
+    #[inline]
     pub fn rows(&self) -> usize {
         self.q.len().checked_div(self.joints).unwrap_or(0)
     }
 
     /// Joint positions of a row, rad or m.
+    #[inline]
     pub fn q(&self, row: usize) -> &[f64] {
         &self.q[row * self.joints..(row + 1) * self.joints]
     }

@@ -40,7 +40,7 @@ pub use rows::{DhRow, DhTable};
 pub use sequence::Sequence;
 pub use setup::{Anchor, MeasurementSetup, Shape, Target};
 pub use travel::Travel;
-pub(crate) use visited::numbered;
+pub use visited::numbered;
 pub use visited::{Unmeasured, Visited};
 
 #[cfg(test)]

@@ -99,6 +99,7 @@ impl RobotModel {
     }
 
     /// Number of joints.
+    #[inline]
     pub fn joints(&self) -> usize {
         self.screws.len()
     }
@@ -124,6 +125,7 @@ impl RobotModel {
     }
 
     /// Whether a joint (from 0) turns; else it slides.
+    #[inline]
     pub fn is_revolute(&self, joint: usize) -> bool {
         self.description.joints[joint].kind == JointKind::Revolute
     }

@@ -131,7 +131,7 @@ impl fmt::Display for Unmeasured {
 }
 
 /// Joints, from 0, as people count them: `3, 5`.
-pub(crate) fn numbered(joints: &[usize]) -> String {
+pub fn numbered(joints: &[usize]) -> String {
     joints
         .iter()
         .map(|joint| (joint + 1).to_string())

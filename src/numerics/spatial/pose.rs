@@ -69,6 +69,7 @@ impl Pose {
     }
 
     /// The motion back: `pose * pose.inverse()` is the identity.
+    #[inline]
     pub fn inverse(&self) -> Self {
         let rotation = self.rotation.transpose();
         Self {
@@ -78,11 +79,13 @@ impl Pose {
     }
 
     /// The point (m) as it stands after this motion.
+    #[inline]
     pub fn point(&self, point: &Vector3<f64>) -> Vector3<f64> {
         self.rotation * point + self.translation
     }
 
     /// The point's coordinates in this frame.
+    #[inline]
     pub fn inverse_point(&self, point: &Vector3<f64>) -> Vector3<f64> {
         self.rotation.tr_mul(&(point - self.translation))
     }
@@ -104,6 +107,7 @@ fn coefficients(angle_squared: f64) -> (f64, f64, f64) {
 
 impl Mul for Pose {
     type Output = Pose;
+    #[inline]
     fn mul(self, right: Pose) -> Pose {
         Pose {
             rotation: self.rotation * right.rotation,

@@ -10,18 +10,20 @@ use crate::diagnose::linear::dot;
 use nalgebra::{DMatrix, DVector};
 
 /// Amplitudes of the grid.
-pub(crate) const AMPLITUDES: usize = 28;
+pub const AMPLITUDES: usize = 28;
 
 /// How much the rows say: degrees of freedom and the squared residual, in standard deviations of the noise.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct EvidenceRows {
+pub struct EvidenceRows {
+    /// Degrees of freedom.
     pub freedom: f64,
+    /// Squared residual.
     pub square: f64,
 }
 
 /// What a group of columns says.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct GroupEvidence {
+pub struct GroupEvidence {
     /// ln of the evidence over that of no such group.
     pub log: f64,
     /// The likeliest amplitude, rms motion at the tool, m.
@@ -41,7 +43,7 @@ impl GroupEvidence {
 
 /// The evidence of columns by their Gram matrix, their products with the residual (both in standard deviations of the noise), and the
 /// shares of the prior variance.
-pub(crate) fn evidence(
+pub fn evidence(
     gram: &DMatrix<f64>,
     gradient: &DVector<f64>,
     shares: &[f64],
@@ -183,7 +185,7 @@ fn amplitudes() -> impl Iterator<Item = f64> {
 }
 
 /// ln of a sum of exponentials; minus infinity of none.
-pub(crate) fn log_sum(logs: &[f64]) -> f64 {
+pub fn log_sum(logs: &[f64]) -> f64 {
     let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     if most == f64::NEG_INFINITY {
         most

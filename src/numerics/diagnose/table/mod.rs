@@ -18,12 +18,12 @@ mod search;
 mod state;
 
 pub(crate) use answer::{Answer, FoundCell};
-pub(crate) use evidence::{AMPLITUDES, EvidenceRows, evidence, log_sum};
+pub use evidence::{AMPLITUDES, EvidenceRows, GroupEvidence, evidence, log_sum};
 pub(crate) use forms::forms_of;
 pub use given::{CellAnswer, GivenCell};
 pub(crate) use given::{answers, given_causes};
-pub(crate) use search::ComponentSearch;
-pub(crate) use state::KnownState;
+pub use search::ComponentSearch;
+pub use state::KnownState;
 
 use super::round::{EstimatedCause, FitState, Fitter, RoundView};
 use super::types::Located;

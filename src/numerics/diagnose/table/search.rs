@@ -12,7 +12,7 @@ use crate::effect::{Form, Variable, names};
 use std::collections::BTreeSet;
 
 /// A search for what rows show, of components each with its evidence given all others.
-pub(crate) trait ComponentSearch {
+pub trait ComponentSearch {
     /// What is found.
     type Component: Clone;
 

@@ -406,7 +406,7 @@ impl PartProducts {
 }
 
 /// Some components in the covariance.
-pub(crate) struct KnownState {
+pub struct KnownState {
     /// Standard deviation of the noise over what is stated.
     pub kappa: f64,
     /// What is left, seen through the covariance.

@@ -7,7 +7,7 @@ use super::{
 use crate::dynamics::scene::DynamicScene;
 
 /// Its name.
-pub(in crate::dynamics) const OFFSET: &str = "current_offset";
+pub(crate) const OFFSET: &str = "current_offset";
 
 /// A constant torque that no mass explains: the zero of a current or torque sensor. With a shape (s, and the end of its search) a part of it
 /// comes only as the sensor warms up.

@@ -4,7 +4,7 @@ use super::{FittedNumber, TorqueCause, TorqueForm, about, at_each_joint};
 use crate::dynamics::scene::DynamicScene;
 
 /// Its name.
-pub(in crate::dynamics) const ROTOR: &str = "rotor_inertia";
+pub(crate) const ROTOR: &str = "rotor_inertia";
 
 /// Inertia of a motor and its gear, as the joint feels it.
 pub(super) struct Rotor;

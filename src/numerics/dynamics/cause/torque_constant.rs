@@ -4,7 +4,7 @@ use super::{FittedNumber, ShapeSpan, TorqueCause, TorqueForm, about, at_each_joi
 use crate::dynamics::scene::DynamicScene;
 
 /// Its name.
-pub(in crate::dynamics) const TORQUE_CONSTANT: &str = "torque_constant";
+pub(crate) const TORQUE_CONSTANT: &str = "torque_constant";
 
 /// A current that makes another torque than declared. With a shape (Nm, and the largest torque of the joint) the difference falls with
 /// torque, to half at so many Nm: iron saturates, and a table of a drive is right at its rated current.

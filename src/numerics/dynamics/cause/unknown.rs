@@ -4,7 +4,7 @@ use super::{FittedNumber, TorqueCause, TorqueForm, about, fill};
 use crate::dynamics::scene::DynamicScene;
 
 /// Its name.
-pub(in crate::dynamics) const UNKNOWN: &str = "unknown";
+pub(crate) const UNKNOWN: &str = "unknown";
 
 /// Products of sine and cosine of one angle and of twice another; `with` holds the two joints.
 pub(super) struct Unnamed;

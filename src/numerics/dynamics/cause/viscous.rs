@@ -4,7 +4,7 @@ use super::{FittedNumber, ShapeSpan, TorqueCause, TorqueForm, about, at_each_joi
 use crate::dynamics::scene::DynamicScene;
 
 /// Its name.
-pub(in crate::dynamics) const VISCOUS: &str = "viscous_friction";
+pub(crate) const VISCOUS: &str = "viscous_friction";
 
 /// Friction that grows with the velocity of a joint. Shape: its exponent, 1 but where the data show another: grease that thins with speed.
 pub(super) struct Viscous;

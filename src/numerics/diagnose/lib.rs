@@ -9,6 +9,14 @@
 //! A `round` looks at the recording around the present model as a `whitened` problem, in which the cells of the `table` of causes are
 //! compared; the `verdict` says what is explained, and `words` say it to people.
 
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+
+use calib_foundation::{statistics, units};
+use calib_numerics::{criteria, effect, error, estimate, observation, robot, spatial};
+// Paths are those of the crate `calib`.
+use crate as diagnose;
+
 mod closed_form;
 mod judge;
 mod linear;
@@ -18,7 +26,7 @@ mod regression;
 mod round;
 mod separate;
 mod setup;
-pub(crate) mod table;
+pub mod table;
 mod too_few;
 mod types;
 mod unasked;

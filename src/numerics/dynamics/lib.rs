@@ -1,5 +1,14 @@
 //! Torques of a moving arm: which physics a rigid inverse dynamics lacks.
 
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+
+use calib_diagnose as diagnose;
+use calib_foundation::statistics;
+use calib_numerics::{criteria, effect, error, estimate, spatial};
+// Paths are those of the crate `calib`.
+use crate as dynamics;
+
 mod arm;
 mod base_parameters;
 mod bodies;
