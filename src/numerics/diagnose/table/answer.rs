@@ -65,13 +65,13 @@ impl CauseTable<'_, '_> {
         let scan = self.scan(&state, &all, 4, &[]);
         let mut ranges = Vec::new();
         let mut at = 0;
-        for own in components {
-            ranges.push(at..at + own.forms.len());
-            at += own.forms.len();
+        for component in components {
+            ranges.push(at..at + component.forms.len());
+            at += component.forms.len();
         }
         let mut groups: BTreeMap<(&'static str, Place), Vec<usize>> = BTreeMap::new();
-        for (i, own) in components.iter().enumerate() {
-            let cell = &self.cells[own.cell];
+        for (i, component) in components.iter().enumerate() {
+            let cell = &self.cells[component.cell];
             groups.entry((cell.name, cell.place)).or_default().push(i);
         }
         let found = groups.into_values().map(|members| {
@@ -115,8 +115,8 @@ impl CauseTable<'_, '_> {
             .max_by(|a, b| log_of(*a, &state, &rest).total_cmp(&log_of(*b, &state, &rest)));
         let main = strongest.unwrap_or(members[0]);
         let cell = components[main].cell;
-        let own = log_of(main, &state, &rest);
-        let mut log = own;
+        let log_main = log_of(main, &state, &rest);
+        let mut log = log_main;
         let mut known = rest.clone();
         known.push(&components[main]);
         for i in members.iter().copied().filter(|i| *i != main) {
@@ -126,7 +126,7 @@ impl CauseTable<'_, '_> {
         }
         let mut scan = self.scan_alike(&components[main], &state, &rest, 8, &[cell]);
         // Others are asked what the strongest does: further ones of its cell add to any of them.
-        scan.log_odds[cell] = self.cells[cell].log_prior + own;
+        scan.log_odds[cell] = self.cells[cell].log_prior + log_main;
         let (effect, place) = (self.name_of(&components[main]), self.cells[cell].place);
         let (probabilities, rivals) = self.weigh((effect, place), cell, &components[main], &scan);
         let mut bounds = Vec::new();
@@ -160,7 +160,7 @@ impl CauseTable<'_, '_> {
     fn weigh(
         &self,
         (effect, place): (&'static str, Place),
-        own: usize,
+        found_in: usize,
         component: &Component,
         scan: &CellScan,
     ) -> (Probabilities, Vec<RivalCause>) {
@@ -186,7 +186,7 @@ impl CauseTable<'_, '_> {
             };
             let bent = scan.closely.get(&k).map_or(0.0, bends);
             // What was refined stands for its cell.
-            let bent = if k == own && component.shape.is_bent {
+            let bent = if k == found_in && component.shape.is_bent {
                 bent.max(0.9)
             } else {
                 bent
@@ -324,7 +324,9 @@ impl CauseTable<'_, '_> {
             for group in groups {
                 let [form] = &group.forms[..] else { continue };
                 if form.cause().hidden(form, self.survey.robot).is_none()
-                    || components.iter().any(|own| own.forms.contains(form))
+                    || components
+                        .iter()
+                        .any(|component| component.forms.contains(form))
                 {
                     continue;
                 }

@@ -387,7 +387,7 @@ pub(super) fn not_quite_straight(
             let all = 1.0 + share * share;
             let line = std::iter::repeat_n(1.0 / (fields as f64 * all), fields);
             let shares = line
-                .chain(curve.iter().map(|own| own * share * share / all))
+                .chain(curve.iter().map(|part| part * share * share / all))
                 .collect();
             shapes.push(CellShape {
                 shares,
@@ -422,9 +422,9 @@ fn line_and_curve(
         is_bent: false,
     }];
     let count = (lengths.len() as f64).ln();
-    for own in lengths {
+    for curve_shares in lengths {
         let alone = std::iter::repeat_n(0.0, line)
-            .chain(own.iter().copied())
+            .chain(curve_shares.iter().copied())
             .collect();
         out.push(CellShape {
             shares: alone,
@@ -435,7 +435,11 @@ fn line_and_curve(
             let all = 1.0 + share * share;
             let line = std::iter::repeat_n(1.0 / (line as f64 * all), line);
             let shares = line
-                .chain(own.iter().map(|own| own * share * share / all))
+                .chain(
+                    curve_shares
+                        .iter()
+                        .map(|curve_shares| curve_shares * share * share / all),
+                )
                 .collect();
             out.push(CellShape {
                 shares,

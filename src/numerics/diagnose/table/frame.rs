@@ -171,20 +171,20 @@ impl<'a> SearchRows<'a> {
             .collect();
         let rows = each
             .iter()
-            .map(|own| own.rows)
+            .map(|block| block.rows)
             .max()
             .unwrap_or(self.residual.len());
         let mut values =
-            Vec::with_capacity(rows * each.iter().map(|own| own.square.len()).sum::<usize>());
-        for own in &each {
-            for column in own.columns.chunks(own.rows.max(1)) {
+            Vec::with_capacity(rows * each.iter().map(|block| block.square.len()).sum::<usize>());
+        for block in &each {
+            for column in block.columns.chunks(block.rows.max(1)) {
                 values.extend_from_slice(column);
-                values.resize(values.len() + rows - own.rows, 0.0);
+                values.resize(values.len() + rows - block.rows, 0.0);
             }
         }
         project(self.base.as_ref().subrows(0, rows), &mut values);
-        let counts = each.iter().map(|own| own.square.len()).collect();
-        let square: Vec<f64> = each.into_iter().flat_map(|own| own.square).collect();
+        let counts = each.iter().map(|block| block.square.len()).collect();
+        let square: Vec<f64> = each.into_iter().flat_map(|block| block.square).collect();
         (
             UnitColumns {
                 values: Arc::new(DMatrix::from_vec(rows, square.len(), values)),
@@ -243,7 +243,9 @@ impl<'a> SearchRows<'a> {
                 let lines = self.view.problem.readings_of(i);
                 let sums =
                     lines.map(|line| [weighed[line] * left[line], weighed[line] * weighed[line]]);
-                sums.fold([0.0, 0.0], |sum, own| [sum[0] + own[0], sum[1] + own[1]])
+                sums.fold([0.0, 0.0], |sum, square| {
+                    [sum[0] + square[0], sum[1] + square[1]]
+                })
             };
             let rows: Vec<[f64; 2]> = (0..self.variance.len()).map(of_row).collect();
             for function in &functions {
@@ -251,8 +253,9 @@ impl<'a> SearchRows<'a> {
                     .iter()
                     .zip(&rows)
                     .map(|(value, [along, square])| [value * along, value * value * square]);
-                let [along, square] =
-                    sums.fold([0.0, 0.0], |sum, own| [sum[0] + own[0], sum[1] + own[1]]);
+                let [along, square] = sums.fold([0.0, 0.0], |sum, square| {
+                    [sum[0] + square[0], sum[1] + square[1]]
+                });
                 fit += along * along / square.max(f64::MIN_POSITIVE);
             }
         }
@@ -310,9 +313,9 @@ impl<'a> SearchRows<'a> {
         let (mut columns, mut square) = (vec![0.0; rows * count], Vec::with_capacity(count));
         for (k, column) in columns.chunks_mut(rows.max(1)).enumerate().take(count) {
             let (direction, function) = pair(k);
-            let own = dot(&squared[function], &directions[direction].square);
-            let scale = unit(own);
-            square.push(own);
+            let length = dot(&squared[function], &directions[direction].square);
+            let scale = unit(length);
+            square.push(length);
             for (i, value) in functions[function].iter().enumerate() {
                 let by = value * scale;
                 for line in problem.readings_of(i) {

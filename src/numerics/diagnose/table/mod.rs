@@ -97,9 +97,9 @@ impl Rounds {
         let before: Vec<String> = self.components.iter().map(|(key, _)| key.clone()).collect();
         table.from_before.clone_from(&before);
         let mut components = Vec::new();
-        for (key, own) in std::mem::take(&mut self.components) {
+        for (key, component) in std::mem::take(&mut self.components) {
             if let Some(cell) = table.cell(&key) {
-                components.push(table.component_of(&own, cell));
+                components.push(table.component_of(&component, cell));
             }
         }
         if self.first.is_none() {
@@ -126,7 +126,7 @@ impl Rounds {
         }
         let keys: Vec<String> = components
             .iter()
-            .map(|own| table.cells[own.cell].key.clone())
+            .map(|component| table.cells[component.cell].key.clone())
             .collect();
         let sorted = |keys: &[String]| {
             let mut keys = keys.to_vec();
@@ -191,14 +191,14 @@ fn estimated(table: &CauseTable, components: &[Component]) -> Vec<EstimatedCause
     let all: Vec<&Component> = components.iter().collect();
     let coefficients = table.state(&all, None).coefficients(&all, table.frame);
     let mut out = Vec::new();
-    for (own, coefficients) in components.iter().zip(coefficients) {
-        let sigmas = own.sigmas();
+    for (component, coefficients) in components.iter().zip(coefficients) {
+        let sigmas = component.sigmas();
         let seen = |k: usize| {
-            let root = own.amplitude * own.shape.shares[k].sqrt();
-            root * own.values.column(k).norm() > *IDLE
+            let root = component.amplitude * component.shape.shares[k].sqrt();
+            root * component.values.column(k).norm() > *IDLE
         };
         let mut first = 0;
-        for (form, count) in own.forms.iter().zip(&own.counts) {
+        for (form, count) in component.forms.iter().zip(&component.counts) {
             let range = first..first + count;
             first += count;
             let (form, kept) = without_idle_waves(form, *count, &|k| seen(range.start + k));
@@ -233,9 +233,9 @@ fn by_currents(causes: &mut [EstimatedCause], view: &RoundView) {
         .iter_mut()
         .filter(|cause| cause.form.is_of_torque_model())
     {
-        let own: Vec<Prior> = priors.by_ref().take(cause.coefficients.len()).collect();
-        if own.len() == cause.coefficients.len() {
-            cause.priors = own;
+        let by_current: Vec<Prior> = priors.by_ref().take(cause.coefficients.len()).collect();
+        if by_current.len() == cause.coefficients.len() {
+            cause.priors = by_current;
         }
     }
 }

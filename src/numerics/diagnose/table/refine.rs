@@ -45,15 +45,15 @@ impl CauseTable<'_, '_> {
                 ))
             })
             .collect();
-        for (cell, own) in refined {
+        for (cell, closer) in refined {
             let Some(found) = scan.closely.get_mut(&cell) else {
                 continue;
             };
-            if own.1 > found.log {
-                found.log = own.1;
-                scan.log_odds[cell] = prior(cell) + own.1;
+            if closer.1 > found.log {
+                found.log = closer.1;
+                scan.log_odds[cell] = prior(cell) + closer.1;
             }
-            found.refined = Some(own);
+            found.refined = Some(closer);
         }
     }
 
@@ -68,7 +68,7 @@ impl CauseTable<'_, '_> {
         let best = self.as_found(cell, found);
         let keys: BTreeSet<String> = others
             .iter()
-            .flat_map(|own| &own.forms)
+            .flat_map(|component| &component.forms)
             .map(Form::key)
             .collect();
         let value = |forms: &[Form]| {
@@ -138,9 +138,9 @@ impl CauseTable<'_, '_> {
             let count = form
                 .term()
                 .map_or(0, |term| fields(term.motion()) * term.law().count());
-            let own = shares.get(at..at + count).unwrap_or_default();
+            let shares_here = shares.get(at..at + count).unwrap_or_default();
             at += count;
-            if own.is_empty() || own.iter().any(|share| *share > 0.0) {
+            if shares_here.is_empty() || shares_here.iter().any(|share| *share > 0.0) {
                 out.push(form.clone());
             }
         }

@@ -200,10 +200,10 @@ impl<'f, 'a> CauseTable<'f, 'a> {
 
     /// Computes once what scans need of some components.
     pub fn know(&mut self, components: &[Component]) {
-        for own in components {
-            if !self.products.contains_key(&own.id) {
+        for component in components {
+            if !self.products.contains_key(&component.id) {
                 let with = |block: &CellColumns| {
-                    own.by_part(&self.known.of(&own.values, &block.columns.values))
+                    component.by_part(&self.known.of(&component.values, &block.columns.values))
                 };
                 let all: Vec<DMatrix<f64>> = self.coarse.par_iter().map(with).collect();
                 let values: Vec<f64> = all
@@ -211,12 +211,12 @@ impl<'f, 'a> CauseTable<'f, 'a> {
                     .flat_map(|products| products.iter().copied())
                     .collect();
                 self.products.insert(
-                    own.id,
-                    DMatrix::from_vec(own.part.ncols(), self.columns, values),
+                    component.id,
+                    DMatrix::from_vec(component.part.ncols(), self.columns, values),
                 );
             }
         }
-        let known: BTreeSet<u64> = components.iter().map(|own| own.id).collect();
+        let known: BTreeSet<u64> = components.iter().map(|component| component.id).collect();
         if self.products.len() > 3 * *COMPONENTS {
             self.products.retain(|id, _| known.contains(id));
         }
@@ -240,8 +240,8 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         let mut columns = Vec::new();
         for cell in cells {
             first.push(columns.len());
-            let own = self.coarse[*cell].columns.values.ncols();
-            columns.extend(self.first[*cell]..self.first[*cell] + own);
+            let count = self.coarse[*cell].columns.values.ncols();
+            columns.extend(self.first[*cell]..self.first[*cell] + count);
         }
         let solved: Vec<DMatrix<f64>> = columns
             .par_chunks(512)
@@ -266,16 +266,16 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     }
 
     /// Cells that do much of what a component does.
-    pub fn alike(&self, own: &Component, most: usize) -> Vec<usize> {
+    pub fn alike(&self, component: &Component, most: usize) -> Vec<usize> {
         // Its likeliest motion, of unit length, in the directions of its part.
-        self.parts.know(&[own], self.frame);
-        let state = KnownState::of(&[own], &self.parts, self.frame, None);
+        self.parts.know(&[component], self.frame);
+        let state = KnownState::of(&[component], &self.parts, self.frame, None);
         let Some(weights) = state.weights() else {
             return Vec::new();
         };
-        let motion = &*own.part * &weights;
+        let motion = &*component.part * &weights;
         let length = motion.norm().max(f64::MIN_POSITIVE);
-        let Some(products) = self.products.get(&own.id) else {
+        let Some(products) = self.products.get(&component.id) else {
             return Vec::new();
         };
         let along: Vec<f64> = products
@@ -299,7 +299,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
 
     /// Cells with a name at the place of a component, and of a curve those over its variable there or next to it: columns that are looked at
     /// coarsely do not show how alike fine curves are.
-    pub fn near(&self, own: &Component) -> Vec<usize> {
+    pub fn near(&self, component: &Component) -> Vec<usize> {
         let of = |cell: &CauseCell| match &cell.shapes {
             Shapes::Free(FreeShape {
                 of,
@@ -322,7 +322,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             Place::Tool => Some(2 * joints),
             _ => None,
         };
-        let cell = &self.cells[own.cell];
+        let cell = &self.cells[component.cell];
         let free = matches!(cell.shapes, Shapes::Free(_));
         let variable = of(cell).filter(|_| free);
         let near = |other: &CauseCell| match (along(cell.place), along(other.place)) {
@@ -346,7 +346,9 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     ) -> DMatrix<f64> {
         let parts: Vec<DMatrix<f64>> = components
             .iter()
-            .map(|own| own.by_part(&self.known.of(&own.values, &block.columns.values)))
+            .map(|component| {
+                component.by_part(&self.known.of(&component.values, &block.columns.values))
+            })
             .collect();
         let rows = parts.iter().map(DMatrix::nrows).sum();
         let columns = block.columns.values.ncols();
@@ -388,7 +390,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         // A model holds every number once, by its name.
         let keys: BTreeSet<String> = components
             .iter()
-            .flat_map(|own| &own.forms)
+            .flat_map(|component| &component.forms)
             .map(Form::key)
             .collect();
         let is_there = |group: usize| {
@@ -455,13 +457,13 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     /// The odds of cells that do much of what a component does, given a state without it.
     pub fn scan_alike(
         &self,
-        own: &Component,
+        component: &Component,
         state: &KnownState,
         others: &[&Component],
         most: usize,
         also: &[usize],
     ) -> CellScan {
-        self.scan_some(&self.alike(own, 60), state, others, most, also)
+        self.scan_some(&self.alike(component, 60), state, others, most, also)
     }
 
     /// The same of some cells.
@@ -474,7 +476,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         also: &[usize],
     ) -> CellScan {
         let prior = |cell: usize| {
-            if components.iter().any(|own| own.cell == cell) {
+            if components.iter().any(|component| component.cell == cell) {
                 0.0
             } else {
                 self.cells[cell].log_prior
@@ -574,17 +576,17 @@ impl<'f, 'a> CauseTable<'f, 'a> {
 
     /// The component that a cell is in a scan.
     pub fn component(&mut self, cell: usize, found: &CellEvidence) -> Component {
-        let own = self.as_found(cell, found);
+        let found_component = self.as_found(cell, found);
         let Some((forms, _, amplitude)) = found.refined.clone() else {
             self.next += 1;
-            return own.with_part(self.next);
+            return found_component.with_part(self.next);
         };
-        let own = Component {
+        let found_component = Component {
             forms,
             amplitude,
-            ..own
+            ..found_component
         };
-        self.component_of(&own, cell)
+        self.component_of(&found_component, cell)
     }
 
     /// The same with the numbers of its listed shape.
@@ -662,15 +664,15 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     /// ln of the evidence of one shape with its weight given a state, and its amplitude.
     pub fn of_component(
         &self,
-        own: &Component,
+        component: &Component,
         state: &KnownState,
         others: &[&Component],
     ) -> Option<(f64, f64)> {
-        let block = CellColumns::of_component(own, self.frame);
+        let block = CellColumns::of_component(component, self.frame);
         let across = self.across_block(&block, state, others);
         let mut found = None;
-        state.shapes(&block, &across, 0, |_, _, own| {
-            found = Some((own.log, own.amplitude))
+        state.shapes(&block, &across, 0, |_, _, evidence| {
+            found = Some((evidence.log, evidence.amplitude))
         });
         found
     }

@@ -85,7 +85,10 @@ impl ComponentSearch for CauseTable<'_, '_> {
     fn best(&mut self, components: &[Component]) -> Option<Component> {
         let now: Vec<&Component> = components.iter().collect();
         let state = self.state(&now, None);
-        let numbers: usize = components.iter().map(|own| own.part.ncols()).sum();
+        let numbers: usize = components
+            .iter()
+            .map(|component| component.part.ncols())
+            .sum();
         // So many numbers describe rows and explain nothing.
         if components.len() >= *COMPONENTS || 3.0 * numbers as f64 > state.rows.freedom {
             return None;
@@ -104,8 +107,8 @@ impl ComponentSearch for CauseTable<'_, '_> {
         let found = &scan.closely[&best];
         let new = components
             .iter()
-            .filter(|own| !self.from_before.contains(&self.cells[own.cell].key));
-        let moved: f64 = new.map(|own| own.amplitude.powi(2)).sum();
+            .filter(|component| !self.from_before.contains(&self.cells[component.cell].key));
+        let moved: f64 = new.map(|component| component.amplitude.powi(2)).sum();
         (found.amplitude >= *SECOND_ORDER * moved).then(|| self.component(best, found))
     }
 
@@ -148,10 +151,10 @@ impl CauseTable<'_, '_> {
                 let others: Vec<Component> = without(&components, &[i]);
                 let others: Vec<&Component> = others.iter().collect();
                 let state = self.state(&others, Some(kappa));
-                let own = self.of_component(&components[i], &state, &others);
-                let Some(own) = own else { continue };
+                let alone = self.of_component(&components[i], &state, &others);
+                let Some(alone) = alone else { continue };
                 let before = (components[i].amplitude, components[i].shape.shares.clone());
-                components[i].amplitude = own.1;
+                components[i].amplitude = alone.1;
                 let Some(mut grid) = self.closely(components[i].cell, &state, &others) else {
                     continue;
                 };
@@ -184,10 +187,10 @@ impl CauseTable<'_, '_> {
                     continue;
                 };
                 // A shape of further numbers stays on the terms on which it came.
-                let paid = |(log, _): (f64, f64), own: &Component| {
-                    log - if own.shape.is_bent { *BENDS } else { 0.0 }
+                let paid = |(log, _): (f64, f64), component: &Component| {
+                    log - if component.shape.is_bent { *BENDS } else { 0.0 }
                 };
-                if paid(other, &found) > paid(own, &components[i]) + *SWAPS {
+                if paid(other, &found) > paid(alone, &components[i]) + *SWAPS {
                     grid.refined = self.refined(components[i].cell, &grid, &state, &others);
                     components[i] = self.component(components[i].cell, &grid);
                     changed = true;
@@ -245,18 +248,23 @@ impl CauseTable<'_, '_> {
     }
 
     /// ln of the evidence of a component's cell, its refined shape among the others.
-    pub fn log_evidence(&self, own: &Component, state: &KnownState, others: &[&Component]) -> f64 {
+    pub fn log_evidence(
+        &self,
+        component: &Component,
+        state: &KnownState,
+        others: &[&Component],
+    ) -> f64 {
         let grid = self
-            .closely(own.cell, state, others)
+            .closely(component.cell, state, others)
             .map_or(f64::NEG_INFINITY, |found| found.log);
-        self.of_component(own, state, others)
+        self.of_component(component, state, others)
             .map_or(grid, |(log, _)| grid.max(log))
     }
 
     /// Exchanges components for cells that say more in their place.
     pub fn swap(&mut self, mut components: Vec<Component>) -> Vec<Component> {
         let key = |components: &[Component]| {
-            let mut cells: Vec<usize> = components.iter().map(|own| own.cell).collect();
+            let mut cells: Vec<usize> = components.iter().map(|component| component.cell).collect();
             cells.sort_unstable();
             cells
         };
@@ -273,24 +281,24 @@ impl CauseTable<'_, '_> {
                     .total_cmp(&components[*b].amplitude)
             });
             for i in order {
-                let own = components[i].cell;
+                let cell = components[i].cell;
                 let others = without(&components, &[i]);
                 let rest: Vec<&Component> = others.iter().collect();
                 let state = self.state(&rest, Some(kappa));
                 let alike = self.alike(&components[i], 24);
-                let near: Vec<usize> = std::iter::once(own)
+                let near: Vec<usize> = std::iter::once(cell)
                     .chain(self.near(&components[i]))
                     .collect();
                 let scan = self.scan_some(&alike, &state, &rest, 5, &near);
                 let Some(best) = scan.best() else { continue };
-                let again = rest.iter().any(|other| other.cell == own);
+                let again = rest.iter().any(|other| other.cell == cell);
                 let prior = if again {
                     0.0
                 } else {
-                    self.cells[own].log_prior
+                    self.cells[cell].log_prior
                 };
                 let stays = prior + self.log_evidence(&components[i], &state, &rest);
-                if best == own || scan.log_odds[best] <= stays + *SWAPS {
+                if best == cell || scan.log_odds[best] <= stays + *SWAPS {
                     continue;
                 }
                 let found = scan.closely[&best].clone();
@@ -312,14 +320,16 @@ impl CauseTable<'_, '_> {
     fn total(&self, components: &[Component], kappa: f64) -> f64 {
         let state = self.state(&components.iter().collect::<Vec<_>>(), Some(kappa));
         let mut prior = 0.0;
-        for (i, own) in components.iter().enumerate() {
-            let first = !components[..i].iter().any(|other| other.cell == own.cell);
+        for (i, component) in components.iter().enumerate() {
+            let first = !components[..i]
+                .iter()
+                .any(|other| other.cell == component.cell);
             prior += if first {
-                self.cells[own.cell].log_prior
+                self.cells[component.cell].log_prior
             } else {
                 0.0
             };
-            prior += own.shape.log_weight - (AMPLITUDES as f64).ln();
+            prior += component.shape.log_weight - (AMPLITUDES as f64).ln();
         }
         let half = 0.5 * (state.rows.freedom + *NU);
         prior - state.log_determinant() - half * (*NU + state.rows.square).ln()
@@ -329,11 +339,11 @@ impl CauseTable<'_, '_> {
     pub fn by_several(&mut self, mut components: Vec<Component>) -> Vec<Component> {
         let unnamed: Vec<u64> = components
             .iter()
-            .filter(|own| !self.cells[own.cell].is_named())
-            .map(|own| own.id)
+            .filter(|component| !self.cells[component.cell].is_named())
+            .map(|component| component.id)
             .collect();
         for id in unnamed {
-            let Some(at) = components.iter().position(|own| own.id == id) else {
+            let Some(at) = components.iter().position(|component| component.id == id) else {
                 continue;
             };
             self.know(&components);
@@ -374,14 +384,15 @@ impl CauseTable<'_, '_> {
     /// Motions over a variable that show, whose products are not cells yet.
     pub fn shown(&self, components: &[Component]) -> Vec<FreeShape> {
         // What has become a product still shows by its first variable.
-        let products = components
-            .iter()
-            .filter_map(|own| match &self.cells[own.cell].shapes {
-                Shapes::Free(free) if matches!(free.over, Over::Product(_)) => {
-                    Some((free.motion, free.of))
-                }
-                _ => None,
-            });
+        let products =
+            components
+                .iter()
+                .filter_map(|component| match &self.cells[component.cell].shapes {
+                    Shapes::Free(free) if matches!(free.over, Over::Product(_)) => {
+                        Some((free.motion, free.of))
+                    }
+                    _ => None,
+                });
         let products: Vec<_> = products.collect();
         let stays = |shown: &&FreeShape| {
             products
@@ -391,15 +402,15 @@ impl CauseTable<'_, '_> {
         let mut out: Vec<FreeShape> = self.multiplied.iter().filter(stays).copied().collect();
         let most = components
             .iter()
-            .map(|own| own.amplitude)
+            .map(|component| component.amplitude)
             .fold(0.0, f64::max);
-        for own in components
+        for component in components
             .iter()
-            .filter(|own| own.amplitude > 2.0 * *TRACE * most)
+            .filter(|component| component.amplitude > 2.0 * *TRACE * most)
         {
-            let free = match &self.cells[own.cell].shapes {
+            let free = match &self.cells[component.cell].shapes {
                 Shapes::Free(free) if !matches!(free.over, Over::Product(_)) => {
-                    let refined = own
+                    let refined = component
                         .forms
                         .first()
                         .and_then(|form| Some(form.term()?.law().first.of));
@@ -409,7 +420,7 @@ impl CauseTable<'_, '_> {
                     })
                 }
                 Shapes::Free(_) => None,
-                Shapes::Listed(_) => own.forms.first().and_then(|form| {
+                Shapes::Listed(_) => component.forms.first().and_then(|form| {
                     let term = form.term().filter(|term| term.law().times.is_none())?;
                     let of = term.law().first.of;
                     Some(FreeShape {

@@ -74,8 +74,8 @@ impl CellColumns {
             {
                 shape.shares = vec![1.0 / count.max(1) as f64; count];
             }
-            let own = columns.values.columns(range.start, count).into_owned();
-            let (gram, gradient) = (product(view(&own), view(&own)), frame.along(&own));
+            let values = columns.values.columns(range.start, count).into_owned();
+            let (gram, gradient) = (product(view(&values), view(&values)), frame.along(&values));
             SeenGroup {
                 group,
                 range,
@@ -94,14 +94,14 @@ impl CellColumns {
 
 impl CellColumns {
     /// The shape of a component alone.
-    pub fn of_component(own: &Component, frame: &SearchRows) -> Self {
-        let values = own.values.clone();
+    pub fn of_component(component: &Component, frame: &SearchRows) -> Self {
+        let values = component.values.clone();
         let (gram, gradient) = (product(view(&values), view(&values)), frame.along(&values));
         let range = 0..values.ncols();
         let group = SeenGroup {
-            group: (*own.group).clone(),
+            group: (*component.group).clone(),
             range,
-            counts: own.counts.clone(),
+            counts: component.counts.clone(),
             gram,
             gradient,
         };
@@ -109,7 +109,7 @@ impl CellColumns {
             groups: vec![group],
             columns: UnitColumns {
                 values,
-                square: (*own.square).clone(),
+                square: (*component.square).clone(),
             },
             between: [0.0, f64::INFINITY],
         }
@@ -203,16 +203,16 @@ impl Component {
                     .zip(&roots)
                     .for_each(|(entry, root)| *entry *= root * roots[j]);
             }
-            let own = gram.symmetric_eigen();
-            let seen: Vec<usize> = (0..own.eigenvalues.len())
-                .filter(|k| own.eigenvalues[*k] > UNSEEN)
+            let eigen = gram.symmetric_eigen();
+            let seen: Vec<usize> = (0..eigen.eigenvalues.len())
+                .filter(|k| eigen.eigenvalues[*k] > UNSEEN)
                 .collect();
             let kept = if seen.is_empty() {
-                vec![own.eigenvalues.imax()]
+                vec![eigen.eigenvalues.imax()]
             } else {
                 seen
             };
-            mix *= own.eigenvectors.select_columns(kept.iter());
+            mix *= eigen.eigenvectors.select_columns(kept.iter());
         }
         let mut part = DMatrix::zeros(self.values.nrows(), mix.ncols());
         let out = MatMut::from_column_major_slice_mut(
@@ -332,17 +332,17 @@ impl PartProducts {
         if cache.pairs.len() > 20_000 {
             *cache = PartCache::default();
         }
-        for (i, own) in components.iter().enumerate() {
+        for (i, component) in components.iter().enumerate() {
             cache
                 .along
-                .entry(own.id)
-                .or_insert_with(|| Arc::new(frame.along(&own.part)));
+                .entry(component.id)
+                .or_insert_with(|| Arc::new(frame.along(&component.part)));
             for other in &components[..=i] {
-                let key = (own.id.max(other.id), own.id.min(other.id));
-                let [later, earlier] = if own.id >= other.id {
-                    [own, other]
+                let key = (component.id.max(other.id), component.id.min(other.id));
+                let [later, earlier] = if component.id >= other.id {
+                    [component, other]
                 } else {
-                    [other, own]
+                    [other, component]
                 };
                 cache
                     .pairs
@@ -354,23 +354,26 @@ impl PartProducts {
 
     /// The Gram matrix of components, and their products with the residual.
     fn of(&self, components: &[&Component]) -> (DMatrix<f64>, DVector<f64>) {
-        let count: usize = components.iter().map(|own| own.part.ncols()).sum();
+        let count: usize = components
+            .iter()
+            .map(|component| component.part.ncols())
+            .sum();
         let (mut gram, mut along) = (DMatrix::zeros(count, count), DVector::zeros(count));
         let Ok(cache) = self.0.read() else {
             return (gram, along);
         };
         let mut down = 0;
-        for (i, own) in components.iter().enumerate() {
-            let rows = own.part.ncols();
-            if let Some(known) = cache.along.get(&own.id) {
+        for (i, component) in components.iter().enumerate() {
+            let rows = component.part.ncols();
+            if let Some(known) = cache.along.get(&component.id) {
                 along.rows_mut(down, rows).copy_from(known);
             }
             let mut across = 0;
             for other in &components[..=i] {
                 let columns = other.part.ncols();
-                let key = (own.id.max(other.id), own.id.min(other.id));
+                let key = (component.id.max(other.id), component.id.min(other.id));
                 if let Some(known) = cache.pairs.get(&key) {
-                    let block = if own.id >= other.id {
+                    let block = if component.id >= other.id {
                         (**known).clone()
                     } else {
                         known.transpose()
@@ -397,8 +400,8 @@ impl PartProducts {
                 .map(|known| known.norm_squared())
         };
         match (square(a.id, b.id), square(a.id, a.id), square(b.id, b.id)) {
-            (Some(both), Some(own), Some(other)) => {
-                both / (own * other).sqrt().max(f64::MIN_POSITIVE)
+            (Some(both), Some(first), Some(second)) => {
+                both / (first * second).sqrt().max(f64::MIN_POSITIVE)
             }
             _ => 1.0,
         }
@@ -430,7 +433,7 @@ impl KnownState {
         let (gram, along) = products.of(components);
         let known = Self::new(&gram, along, frame.rows(), frame.least_noise(), kappa);
         Self {
-            components: components.iter().map(|own| own.id).collect(),
+            components: components.iter().map(|component| component.id).collect(),
             ..known
         }
     }
@@ -491,10 +494,12 @@ impl KnownState {
         frame: &SearchRows,
     ) -> Vec<Vec<f64>> {
         let left = DVector::from_vec(self.left(components, frame));
-        let of = |own: &&Component| {
-            let along =
-                own.values.tr_mul(&left.rows(0, own.values.nrows())) / (self.kappa * self.kappa);
-            let scaled = own.roots().zip(own.sigmas()).zip(along.iter());
+        let of = |component: &&Component| {
+            let along = component
+                .values
+                .tr_mul(&left.rows(0, component.values.nrows()))
+                / (self.kappa * self.kappa);
+            let scaled = component.roots().zip(component.sigmas()).zip(along.iter());
             scaled
                 .map(|((root, sigma), along)| sigma * root * along)
                 .collect()
@@ -676,12 +681,18 @@ fn solve(lower: &Mat<f64>, columns: &mut [f64]) {
 
 /// The parts of components in the covariance as one matrix.
 fn side_by_side(components: &[&Component], rows: usize) -> DMatrix<f64> {
-    let mut out = DMatrix::zeros(rows, components.iter().map(|own| own.part.ncols()).sum());
+    let mut out = DMatrix::zeros(
+        rows,
+        components
+            .iter()
+            .map(|component| component.part.ncols())
+            .sum(),
+    );
     let mut first = 0;
-    for own in components {
-        out.view_mut((0, first), own.part.shape())
-            .copy_from(&*own.part);
-        first += own.part.ncols();
+    for component in components {
+        out.view_mut((0, first), component.part.shape())
+            .copy_from(&*component.part);
+        first += component.part.ncols();
     }
     out
 }
