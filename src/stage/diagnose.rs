@@ -137,7 +137,7 @@ crate::stage::writes! {
 impl Stage for Diagnose {
     const NAME: &'static str = "diagnose";
     const SUMMARY: &'static str = "locates where simulation and recording differ, and names the physics that the model leaves out";
-    const IMPLEMENTATION: u32 = 36;
+    const IMPLEMENTATION: u32 = 37;
     type Reads = DiagnoseReads;
     type Writes = DiagnoseWrites;
 

@@ -87,6 +87,9 @@ writes! {
     }
 }
 
+/// Points of a block, and candidates of a pose, at most: what fits into memory.
+const MOST: usize = 10_000_000;
+
 impl Stage for Simulate {
     const NAME: &'static str = "simulate";
     const SUMMARY: &'static str = "records an experiment on a twin whose truth is known";
@@ -123,6 +126,20 @@ impl Stage for Simulate {
             fault(
                 "blocks",
                 "expected at least one block with points, e.g. [{usage: fit, points: 50}]",
+            );
+        }
+        for (index, block) in self.blocks.iter().enumerate() {
+            if block.points > MOST {
+                fault(
+                    &format!("blocks[{index}].points"),
+                    &format!("expected {MOST} points at most"),
+                );
+            }
+        }
+        if self.poses.candidates > MOST {
+            fault(
+                "poses.candidates",
+                &format!("expected {MOST} candidates at most"),
             );
         }
         for (place, pose) in given(&self.blocks) {

@@ -156,10 +156,10 @@ fn blind(family: &str, seed: &str) -> (Value, Value) {
     let mut arguments = vec![
         "simulate", "conceal", "--out", "sealed", "--cases", "1", "--seed", seed, "--points", "120",
     ];
-    if family == "nothing" {
-        arguments.extend(["--nulls", "1"])
-    } else {
-        arguments.extend(["--family", family])
+    match family {
+        "nothing" => arguments.extend(["--nulls", "1"]),
+        "wandering" => arguments.extend(["--nulls", "1", "--scatter", "wandering"]),
+        family => arguments.extend(["--family", family]),
     }
     arguments.extend(["--robot", "compact6", "--faulty", "0"]);
     calib(&arguments, folder.path());
@@ -196,6 +196,12 @@ fn a_recording_without_a_missing_effect_has_no_findings() {
             .iter()
             .any(|line| line.as_str().unwrap().contains("tracker_scale"))
     );
+}
+
+#[test]
+fn a_tracker_that_wanders_is_no_cause() {
+    let (said, _) = blind("wandering", "2");
+    assert_eq!(said["findings"], serde_json::json!([]), "{said:#}");
 }
 
 #[test]

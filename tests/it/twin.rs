@@ -384,6 +384,15 @@ blocks: [{usage: fit, points: 12}, {usage: check, points: 8, payload_kg: 210}]
 }
 
 #[test]
+fn more_points_than_fit_into_memory_are_refused_with_their_place() {
+    let mut all = settings();
+    all.blocks[1].points = 1 << 32;
+    all.poses.candidates = 1 << 32;
+    let places: Vec<String> = all.check().into_iter().map(|fault| fault.place).collect();
+    assert_eq!(places, ["blocks[1].points", "poses.candidates"]);
+}
+
+#[test]
 fn a_seed_gives_one_recording_and_another_seed_another() {
     let (first, again, other) = (
         simulate(&settings(), 5),

@@ -36,6 +36,24 @@ fn an_excluded_cause_is_not_named_by_another_form_of_it() {
 }
 
 #[test]
+fn what_an_excluded_cause_explains_takes_no_neighbours_name() {
+    for (seed, place) in [("1", "link 2"), ("2", "link 4"), ("6", "link 2")] {
+        let folder = concealed("link_compliance", seed, "120");
+        let said = said("link_compliance", folder.path());
+        let found: Vec<(&str, &str)> = said["findings"]
+            .as_array()
+            .expect("a list")
+            .iter()
+            .map(|finding| {
+                let text = |key: &str| finding[key].as_str().expect("text");
+                (text("effect"), text("where"))
+            })
+            .collect();
+        assert_eq!(found, [("unknown", place)], "seed {seed}: {said:#}");
+    }
+}
+
+#[test]
 fn an_excluded_correction_of_geometry_leaves_the_robot_file_as_it_is() {
     let folder = concealed("zero_shift", "923", "120");
     let here = folder.path();

@@ -133,7 +133,7 @@ fn finding(last: &LastRound, found: &FoundCell, details: &[usize]) -> Finding {
         effect_rms,
         gain: found.gain,
     };
-    let parameters = parameters(state, effect, members);
+    let parameters = parameters(last, effect, members);
     let clock = Clock::of(last.survey.data);
     let summary = Summary {
         place,
@@ -232,34 +232,35 @@ fn impossible(last: &LastRound, found: &FoundCell) -> Option<String> {
         })
 }
 
-/// The fitted parameters of some causes, as people read them.
-fn parameters(state: &FitState, effect: &str, members: &[usize]) -> Vec<ParameterEstimate> {
-    let one = |(form, k): (usize, usize)| {
-        let spec = &state.model.stack.specs()[k];
-        let sigma = match state.fitted.statuses[k] {
-            ParameterStatus::Free(sigma) => Some(sigma),
-            _ => None,
-        };
-        let (unit, symbol) = people(spec.unit);
-        let name = spec
-            .name
-            .strip_prefix(effect)
-            .unwrap_or(&spec.name)
-            .trim_start_matches('.');
-        ParameterEstimate {
-            name: name.to_string(),
-            form,
-            value: unit.from_si(state.model.x[k]),
-            unit: symbol,
-            sigma: sigma.map(|sigma| unit.from_si(sigma)),
+/// The fitted parameters of some causes, as people read them: without the name of the finding, and of a cause that is not to be named.
+fn parameters(last: &LastRound, effect: &str, members: &[usize]) -> Vec<ParameterEstimate> {
+    let state = &last.state;
+    let mut out: Vec<ParameterEstimate> = Vec::new();
+    for (form, i) in members.iter().enumerate() {
+        let cause = state.causes[*i].form.name();
+        let hidden = if last.excludes(cause) { cause } else { effect };
+        for k in state.ranges[*i].clone() {
+            let spec = &state.model.stack.specs()[k];
+            let sigma = match state.fitted.statuses[k] {
+                ParameterStatus::Free(sigma) => Some(sigma),
+                _ => None,
+            };
+            let (unit, symbol) = people(spec.unit);
+            let name = spec.name.strip_prefix(hidden).unwrap_or(&spec.name);
+            let mut name = name.trim_start_matches('.').to_string();
+            while out.iter().any(|other| other.name == name) {
+                name.push('~');
+            }
+            out.push(ParameterEstimate {
+                name,
+                form,
+                value: unit.from_si(state.model.x[k]),
+                unit: symbol,
+                sigma: sigma.map(|sigma| unit.from_si(sigma)),
+            });
         }
-    };
-    members
-        .iter()
-        .enumerate()
-        .flat_map(|(form, i)| state.ranges[*i].clone().map(move |k| (form, k)))
-        .map(one)
-        .collect()
+    }
+    out
 }
 
 /// Joint and range over which the errors of a joint hold.
