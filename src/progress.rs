@@ -46,7 +46,7 @@ struct State {
     unit: String,
     total: Option<u64>,
     begun: Instant,
-    said: Instant,
+    printed: Instant,
     /// What was warned of: several stages say the same of one recording.
     warned: BTreeSet<String>,
 }
@@ -65,7 +65,7 @@ impl Progress {
             unit: String::new(),
             total: None,
             begun: now,
-            said: now,
+            printed: now,
             warned: BTreeSet::new(),
         };
         let columns = std::io::stderr()
@@ -193,7 +193,7 @@ impl Observer for Progress {
     fn begin(&self, id: &str, what: &str, total: Option<u64>, unit: &str) {
         let mut state = self.state();
         (state.what, state.unit, state.total) = (what.into(), unit.into(), total);
-        (state.begun, state.said) = (Instant::now(), Instant::now());
+        (state.begun, state.printed) = (Instant::now(), Instant::now());
         if let Some(bar) = &state.bar {
             bar.reset();
             bar.set_prefix(format!("{id:width$}", width = self.width));
@@ -223,10 +223,10 @@ impl Observer for Progress {
             });
             return;
         }
-        if state.said.elapsed() < PAUSE {
+        if state.printed.elapsed() < PAUSE {
             return;
         }
-        state.said = Instant::now();
+        state.printed = Instant::now();
         let line = match state.total {
             Some(total) if total > 0 && done > 0 => {
                 let spent = state.begun.elapsed().as_secs_f64();
@@ -245,7 +245,7 @@ impl Observer for Progress {
     fn note(&self, id: &str, line: &str) {
         if self.verbosity == Verbosity::Detailed {
             self.print(id, &format!("  {line}"));
-            self.state().said = Instant::now();
+            self.state().printed = Instant::now();
         }
     }
     fn warn(&self, id: &str, line: &str) {

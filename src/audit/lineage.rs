@@ -42,10 +42,10 @@ pub struct Provenance {
     pub seed: u64,
     /// Raw files: name and blake3.
     pub files: Vec<(String, String)>,
-    /// Input tables by port; empty where they were told already.
+    /// Input tables by port; empty where they were shown already.
     pub reads: Vec<(String, LineageNode)>,
     /// Whether its inputs stand above in the same answer.
-    pub told_before: bool,
+    pub shown_before: bool,
 }
 
 /// Traces the table whose content hash begins with `start`.
@@ -83,21 +83,21 @@ pub fn lineage(store: &Store, start: &str) -> Result<LineageNode> {
 fn trace(
     hash: &TableHash,
     makers: &BTreeMap<TableHash, (ActionRecord, String)>,
-    told: &mut BTreeSet<String>,
+    shown: &mut BTreeSet<String>,
 ) -> LineageNode {
     let made = makers.get(hash).map(|(record, port)| {
-        let told_before = !told.insert(record.id.to_string());
+        let shown_before = !shown.insert(record.id.to_string());
         let table = record.tables.get(port);
         let reads = record
             .key
             .reads
             .iter()
             .flat_map(|(port, tables)| tables.iter().map(move |table| (port, table)));
-        let reads = if told_before {
+        let reads = if shown_before {
             Vec::new()
         } else {
             reads
-                .map(|(port, read)| (port.clone(), trace(&read.table, makers, told)))
+                .map(|(port, read)| (port.clone(), trace(&read.table, makers, shown)))
                 .collect()
         };
         Provenance {
@@ -119,7 +119,7 @@ fn trace(
                 .map(|file| (file.name.clone(), file.content.to_string()))
                 .collect(),
             reads,
-            told_before,
+            shown_before,
         }
     });
     LineageNode {

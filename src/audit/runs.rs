@@ -111,8 +111,8 @@ pub fn compare_runs(
         tables.push(table(store, name, of(&outputs_a), of(&outputs_b), options)?);
     }
     Ok(RunDiff {
-        a: told(&left),
-        b: told(&right),
+        a: summary_of(&left),
+        b: summary_of(&right),
         causes: causes(&left, &right),
         tables,
     })
@@ -159,7 +159,7 @@ pub struct RunAddress {
     pub port: Option<String>,
 }
 
-fn told(manifest: &Manifest) -> RunSummary {
+fn summary_of(manifest: &Manifest) -> RunSummary {
     RunSummary {
         run: manifest.run_id.clone(),
         pipeline: manifest.pipeline.name.clone(),

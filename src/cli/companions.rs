@@ -47,7 +47,7 @@ impl Companions {
     }
 
     /// What was read beside the program, in a line; none where nothing was.
-    pub fn told(&self) -> Option<String> {
+    pub fn summary_line(&self) -> Option<String> {
         let names: Vec<&str> = self.0.iter().map(|(place, _)| place.as_str()).collect();
         (!names.is_empty()).then(|| format!("read with the program: {}\n", names.join(", ")))
     }

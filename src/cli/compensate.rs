@@ -510,7 +510,7 @@ fn rewritten(
         .as_deref()
         .and_then(|tool| RobotTool::parse(tool).ok());
     let told = companions
-        .told()
+        .summary_line()
         .filter(|_| !arguments.model.quiet)
         .unwrap_or_default();
     let _ = std::io::stderr().write_all(told.as_bytes());

@@ -1,7 +1,7 @@
 //! `calib diagnose`: where simulation and recording differ, what physics is missing, the fit before and after.
 
 use super::execution_arguments::{CommandTask, ExecutionArguments, shown};
-use super::pipeline_arguments::told_as;
+use super::pipeline_arguments::reported_as;
 use super::run::WRONG_SETUP;
 use super::surroundings::columns;
 use super::{complain, emit_json, emit_lines};
@@ -63,7 +63,7 @@ const EXAMPLES: &str = "Examples:
 
 /// Gives the exit code: 10 where the set-up is wrong, whatever else was asked for.
 pub(super) fn main(arguments: &DiagnoseArguments, command_line: &[OsString]) -> u8 {
-    match told_as(arguments.json, execute(arguments, command_line)) {
+    match reported_as(arguments.json, execute(arguments, command_line)) {
         Ok(code) => code,
         Err(error) => complain(&error),
     }

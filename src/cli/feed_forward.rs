@@ -69,7 +69,7 @@ pub(super) fn feed_forward(asked: &FeedForward, identified: &IdentifiedModel) ->
     let mut told = if asked.quiet {
         String::new()
     } else {
-        said(torques, &trajectory, judged.len())
+        remarks_on(torques, &trajectory, judged.len())
     };
     if asked.sigma && needed.u95.is_none() {
         told.push_str("warning: a table of parameters alone does not say how certain torques are: nothing is refused for it\n");
@@ -146,7 +146,7 @@ fn read(motion: &Path) -> Result<(String, String)> {
 }
 
 /// What the person must know, a line each.
-fn said(torques: &IdentifiedTorques, trajectory: &Trajectory, rows: usize) -> String {
+fn remarks_on(torques: &IdentifiedTorques, trajectory: &Trajectory, rows: usize) -> String {
     let derived = match (&trajectory.motion.velocity, &trajectory.motion.acceleration) {
         (Some(_), Some(_)) => "velocities and accelerations as given",
         (Some(_), None) => {

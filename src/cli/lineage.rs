@@ -85,7 +85,7 @@ fn lines(node: &LineageNode, port: &str, depth: usize, text: &mut String) {
         made.port,
         counted(made.rows, "row")
     ));
-    if made.told_before {
+    if made.shown_before {
         text.push_str("  (as above)\n");
         return;
     }

@@ -83,13 +83,13 @@ impl PipelineArguments {
     }
 
     /// The result, whose failure is also a document where one is asked for.
-    pub fn told<T>(&self, result: Result<T>) -> Result<T> {
-        told_as(self.json, result)
+    pub fn reported<T>(&self, result: Result<T>) -> Result<T> {
+        reported_as(self.json, result)
     }
 }
 
 /// A result, whose failure is also a document under `json`.
-pub(super) fn told_as<T>(json: bool, result: Result<T>) -> Result<T> {
+pub(super) fn reported_as<T>(json: bool, result: Result<T>) -> Result<T> {
     if let (true, Err(error)) = (json, &result) {
         emit_json(&failure(error))?;
     }

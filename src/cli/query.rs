@@ -1,6 +1,6 @@
 //! `calib query`: the tables of a run asked in SQL.
 
-use super::pipeline_arguments::told_as;
+use super::pipeline_arguments::reported_as;
 use super::surroundings::open_store;
 use super::{emit, emit_json};
 use crate::audit::{QueryTable, QueryTables};
@@ -48,7 +48,7 @@ pub(super) struct QueryArguments {
 }
 
 pub(super) fn main(arguments: &QueryArguments) -> Result<()> {
-    told_as(arguments.json, execute(arguments))
+    reported_as(arguments.json, execute(arguments))
 }
 
 fn execute(arguments: &QueryArguments) -> Result<()> {

@@ -59,7 +59,7 @@ const EXAMPLES: &str = "Examples:
   calib run pipeline.yaml --json --quiet > result.json";
 
 pub(super) fn main(arguments: &RunArguments, command_line: &[OsString]) -> u8 {
-    match arguments.shared.told(execute(arguments, command_line)) {
+    match arguments.shared.reported(execute(arguments, command_line)) {
         Ok(code) => code,
         Err(error) => complain(&error),
     }

@@ -99,7 +99,7 @@ pub(super) fn main(arguments: &VerifyRobotArguments, command_line: &[OsString]) 
     if arguments.json {
         return emit_json(&document(&identified.origin, &found));
     }
-    emit_lines(&told(&identified.origin, &found, arguments.new_base))
+    emit_lines(&report_text(&identified.origin, &found, arguments.new_base))
 }
 
 /// Mean, 95th percentile and largest, mm.
@@ -193,7 +193,7 @@ fn page(origin: &str, found: &Achieved, new_base: bool) -> Result<String> {
     })
 }
 
-fn told(origin: &str, found: &Achieved, new_base: bool) -> String {
+fn report_text(origin: &str, found: &Achieved, new_base: bool) -> String {
     let mut text = labelled("model", origin);
     for (label, [mean, p95, max], what) in rows(found, new_base) {
         text.push_str(&labelled(

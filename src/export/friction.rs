@@ -67,7 +67,7 @@ pub(super) fn coefficient(torques: &IdentifiedTorques, effect: &str, joint: usiz
     )
 }
 
-/// What formats of one number hold of a law that has a shape, and what must be said of it: of friction that grows with another power of speed
+/// What formats of one number hold of a law that has a shape, and what must be remark of it: of friction that grows with another power of speed
 /// its number of `line` over the recorded speeds, of a torque constant that falls with torque what is right at half of the greatest load.
 fn as_one_number(
     term: &TorqueTerm,
@@ -220,22 +220,22 @@ mod tests {
 
     #[test]
     fn a_law_with_a_shape_is_written_as_one_number_and_with_a_word() {
-        let (value, said) = held(DAMPING, &[0.8], 4.0).expect("a remark");
+        let (value, remark) = held(DAMPING, &[0.8], 4.0).expect("a remark");
         assert!((value - 3.3164).abs() < 1e-9, "{value}");
         assert!(
-            said.starts_with(
+            remark.starts_with(
                 "viscous_friction at joint 2 grows with the power 0.80 of speed: 3.31"
             ),
-            "{said}"
+            "{remark}"
         );
         assert!(
-            said.ends_with("Nm s/rad is written, the line up to 2.000 rad/s"),
-            "{said}"
+            remark.ends_with("Nm s/rad is written, the line up to 2.000 rad/s"),
+            "{remark}"
         );
-        let (value, said) = held(DRIVE, &[20.0, 40.0], 0.2).expect("a remark");
+        let (value, remark) = held(DRIVE, &[20.0, 40.0], 0.2).expect("a remark");
         assert!(
-            (value - 0.1).abs() < 1e-15 && said.ends_with("is right at 20.000 Nm"),
-            "{value} {said}"
+            (value - 0.1).abs() < 1e-15 && remark.ends_with("is right at 20.000 Nm"),
+            "{value} {remark}"
         );
         assert_eq!(held(DAMPING, &[1.0], 4.0), None);
         assert_eq!(held(DRIVE, &[], 0.2), None);

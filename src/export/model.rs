@@ -130,13 +130,13 @@ impl Export {
             ));
         }
         let names: Vec<&str> = targets.iter().map(|target| target.name.as_str()).collect();
-        let told = || {
+        let listed = || {
             format!(
                 "not carried: where targets sit ({}); the tool is that of the robot file",
                 names.join(", ")
             )
         };
-        (!names.is_empty()).then(told)
+        (!names.is_empty()).then(listed)
     }
 
     /// What was refused and is written all the same.

@@ -20,7 +20,7 @@ pub fn submit(ledger: &Ledger, note: &mut RunNote, options: &ClusterOptions) -> 
     std::fs::create_dir_all(&folder)
         .map_err(|error| Error::store(folder.display().to_string(), error.to_string()))?;
     for script in scripts {
-        let answer = said("sbatch", &["--parsable"], Some(&script.text))?;
+        let answer = output_of("sbatch", &["--parsable"], Some(&script.text))?;
         // `id` or `id;cluster`.
         note.jobs.push(
             answer
@@ -64,7 +64,7 @@ pub fn wait(
         looks += 1;
         if looks % LOOKS == 0 {
             // A job that is long over is unknown to squeue, which then complains.
-            let queued = said("squeue", &["--noheader", "--jobs", &jobs.join(",")], None)
+            let queued = output_of("squeue", &["--noheader", "--jobs", &jobs.join(",")], None)
                 .unwrap_or_default();
             empty = if queued.trim().is_empty() {
                 empty + 1
@@ -89,12 +89,12 @@ pub fn cancel(jobs: &[String]) -> Result<()> {
     if words.is_empty() {
         Ok(())
     } else {
-        said("scancel", &words, None).map(drop)
+        output_of("scancel", &words, None).map(drop)
     }
 }
 
 /// Runs a program of Slurm, without a shell, and gives what it printed.
-fn said(program: &str, words: &[&str], input: Option<&str>) -> Result<String> {
+fn output_of(program: &str, words: &[&str], input: Option<&str>) -> Result<String> {
     let fault = |message: String| Error::store(program, message);
     let mut child = Command::new(program)
         .args(words)

@@ -170,7 +170,7 @@ impl Read {
     }
 
     fn row(&self, robot: &super::FleetRobot, record: Option<&RobotRecord>) -> FleetRow {
-        let rows = self.statistics.as_ref().map(told_rows).unwrap_or_default();
+        let rows = self.statistics.as_ref().map(final_rows).unwrap_or_default();
         let (first, last) = (rows.first().copied(), rows.last().copied());
         let verdict = self.verdict.as_ref().and_then(|verdict| verdict.0.first());
         // A pipeline that does not predict with what it found still says how much better that is.
@@ -244,7 +244,7 @@ fn causes(findings: &Findings) -> String {
 }
 
 /// One row a step, in pipeline order: of held-out points where the last step has some, of the set with most of them.
-fn told_rows(statistics: &Statistics) -> Vec<&StatisticsRow> {
+fn final_rows(statistics: &Statistics) -> Vec<&StatisticsRow> {
     let Some(last) = statistics.0.iter().map(|row| row.order).max() else {
         return Vec::new();
     };

@@ -96,10 +96,10 @@ pub fn run_in_memory(
         Output::Streamed(_) => None,
     });
     let tables = frames.collect();
-    let said = services.lines();
+    let lines = services.lines();
     Ok(StageTables {
         tables,
-        notes: said.notes,
-        warnings: said.warnings,
+        notes: lines.notes,
+        warnings: lines.warnings,
     })
 }

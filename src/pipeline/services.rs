@@ -129,14 +129,14 @@ pub(super) fn open(
         .ok()
         .and_then(|bounds| bounds.last().copied());
     Ok(OpenedInput {
-        label: told(files, known),
+        label: label_of(files, known),
         reader,
         size,
     })
 }
 
 /// A file in messages: by its name, and where the stage has another file of that name, as the YAML names it.
-fn told(files: &[super::plan::InputFile], file: &super::plan::InputFile) -> String {
+fn label_of(files: &[super::plan::InputFile], file: &super::plan::InputFile) -> String {
     let name = label(&file.path);
     let shared = files
         .iter()

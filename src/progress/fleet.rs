@@ -29,7 +29,7 @@ struct State {
     over: usize,
     fresh: usize,
     bad: usize,
-    said: Instant,
+    printed: Instant,
 }
 
 impl FleetProgress {
@@ -66,7 +66,7 @@ impl FleetProgress {
             over: 0,
             fresh: 0,
             bad: 0,
-            said: now,
+            printed: now,
         };
         Self {
             verbosity,
@@ -130,8 +130,8 @@ impl FleetProgress {
         if let Some(bars) = &self.bars {
             bars.total.set_position(state.over as u64);
             bars.total.set_message(format!("{pace}{bad}"));
-        } else if state.said.elapsed() >= PAUSE || state.over == self.total {
-            state.said = Instant::now();
+        } else if state.printed.elapsed() >= PAUSE || state.over == self.total {
+            state.printed = Instant::now();
             let line = format!(
                 "{}/{}, {pace}{bad}",
                 state.over,

@@ -205,7 +205,7 @@ where
         };
         let batch = next.map_or_else(
             |message| Some(Err(message)),
-            |batch| batch.map(|batch| batch.map_err(|error| said(&error))),
+            |batch| batch.map(|batch| batch.map_err(|error| decoder_message(&error))),
         );
         whole = matches!(batch, Some(Ok(_)));
         batch
@@ -214,7 +214,7 @@ where
 }
 
 /// What the decoder says, and what to do where the file is compressed in a way that it does not know.
-fn said(error: &ArrowError) -> String {
+fn decoder_message(error: &ArrowError) -> String {
     let text = error.to_string();
     if text.contains("lz4") {
         return "its columns are compressed by LZ4; allowed: none or zstd, e.g. `to_feather(FILE, compression=\"zstd\")`".into();

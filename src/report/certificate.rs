@@ -49,7 +49,7 @@ pub(super) fn certificate(
         // Figure, found, allowed, whether it is kept.
         "limits": judgement.map(|judgement| judgement.found().map(limit).collect::<Vec<_>>()),
         "conditions": conditions(tables),
-        "not_observable": diagnosis.map(|row| tables.said(&row.step, VerdictTopic::NotObservable)).unwrap_or_default(),
+        "not_observable": diagnosis.map(|row| tables.statements(&row.step, VerdictTopic::NotObservable)).unwrap_or_default(),
     })
 }
 

@@ -120,7 +120,7 @@ pub(super) fn section(tables: &Tables) -> Option<Value> {
         "findings": findings,
         // What each figure of the evidence means.
         "meanings": meanings,
-        "next": tables.said(&verdict.step, VerdictTopic::NextMeasurement),
+        "next": tables.statements(&verdict.step, VerdictTopic::NextMeasurement),
         "signature": verdict.signature,
         "suspects": suspects
             .map(|row| [row.point_id.clone(), row.set.clone(), row.kind.clone(), mm(row.size_mm), row.remark.clone()])

@@ -41,7 +41,7 @@ pub(super) fn document(
     let diagnosis = tables.verdict.iter().flat_map(|table| &table.0).next_back().map(|row| {
         let columns = "step verdict statement noise_basis noise_floor_mm before_rms_mm after_rms_mm clock";
         let mut diagnosis = picked(row, columns);
-        diagnosis["not_observable"] = json!(tables.said(&row.step, VerdictTopic::NotObservable));
+        diagnosis["not_observable"] = json!(tables.statements(&row.step, VerdictTopic::NotObservable));
         diagnosis
     });
     let limits = judgement.map(|judgement| {

@@ -95,7 +95,7 @@ pub struct Tables {
 
 impl Tables {
     /// What the diagnosis of a step says of a topic.
-    fn said(&self, step: &str, topic: VerdictTopic) -> Vec<&str> {
+    fn statements(&self, step: &str, topic: VerdictTopic) -> Vec<&str> {
         self.sentences
             .iter()
             .flat_map(|table| table.about(step, topic))

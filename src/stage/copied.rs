@@ -38,7 +38,7 @@ pub(super) fn copied_rows(recording: &Recording) -> Vec<(usize, usize)> {
 }
 
 /// What is said of them; none where there are none.
-pub(super) fn said(copies: &[(usize, usize)], recording: &Recording) -> Option<String> {
+pub(super) fn remark(copies: &[(usize, usize)], recording: &Recording) -> Option<String> {
     let id = |row: usize| recording.point_id[row].as_str();
     let named: Vec<String> = copies
         .iter()

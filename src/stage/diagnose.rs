@@ -239,7 +239,7 @@ impl Stage for Diagnose {
             context.services.advance(steps, &line);
         };
         let diagnosis = wrong_setup(&question).unwrap_or_else(|| diagnose(&question, tell));
-        let mut diagnosis = said(diagnosis, &question, context)?;
+        let mut diagnosis = with_remarks(diagnosis, &question, context)?;
         blank_payload(&reads.recording)
             .into_iter()
             .for_each(|line| context.services.warn(line));
@@ -431,7 +431,11 @@ fn mismatch(
 }
 
 /// Tells a person at once what must not be read past: a wrong set-up, too few rows, and what cannot be known without masses.
-fn said(mut diagnosis: Diagnosis, question: &Question, context: &Context) -> Result<Diagnosis> {
+fn with_remarks(
+    mut diagnosis: Diagnosis,
+    question: &Question,
+    context: &Context,
+) -> Result<Diagnosis> {
     match diagnosis.verdict {
         Said::NotAsked => context.services.warn(diagnosis.not_observable.join("; ")),
         Said::WrongSetup => match diagnosis.findings.first() {

@@ -214,7 +214,7 @@ impl Identify {
         {
             return;
         }
-        unmoved::told(robot, data, rows)
+        unmoved::remark(robot, data, rows)
             .into_iter()
             .for_each(|line| context.services.warn(line));
         let fit: Vec<usize> = rows

@@ -53,7 +53,7 @@ impl Stage for Masses {
         for (index, (joint, link)) in robot.joints.iter_mut().zip(&links).enumerate() {
             context
                 .services
-                .note(told(index, joint.mass, joint.centre, link));
+                .note(change_text(index, joint.mass, joint.centre, link));
             joint.mass = Some(link.mass);
             joint.centre = Some(link.centre.into());
             if let Some(i) = &link.inertia {
@@ -68,7 +68,7 @@ impl Stage for Masses {
             }
         }
         let friction = reads.parameters.dry_friction(links.len());
-        context.services.note(told_of_friction(&friction));
+        context.services.note(friction_text(&friction));
         for (joint, friction) in robot.joints.iter_mut().zip(friction) {
             joint.coulomb = friction;
         }
@@ -86,7 +86,7 @@ impl Stage for Masses {
 }
 
 /// Friction of the joints.
-fn told_of_friction(friction: &[Option<f64>]) -> String {
+fn friction_text(friction: &[Option<f64>]) -> String {
     let of = |friction: &Option<f64>| {
         friction.map_or_else(
             || "none found".into(),
@@ -102,7 +102,7 @@ fn told_of_friction(friction: &[Option<f64>]) -> String {
 }
 
 /// What changes of a link.
-fn told(
+fn change_text(
     index: usize,
     mass: Option<f64>,
     centre: Option<[f64; 3]>,

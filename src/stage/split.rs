@@ -245,7 +245,7 @@ impl Stage for SplitBy {
         copies
             .iter()
             .for_each(|(row, copy)| sets[*copy] = sets[*row].clone());
-        copied::said(&copies, recording)
+        copied::remark(&copies, recording)
             .into_iter()
             .for_each(|line| context.services.warn(line));
         let mut counts: BTreeMap<&str, usize> = BTreeMap::new();

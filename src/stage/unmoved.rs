@@ -85,7 +85,7 @@ fn drift(data: &Measurements, rows: &[usize]) -> Option<[f64; 2]> {
 }
 
 /// A sentence on joints that stand in rows where others move.
-pub(super) fn told(robot: &RobotModel, data: &Measurements, rows: &[usize]) -> Option<String> {
+pub(super) fn remark(robot: &RobotModel, data: &Measurements, rows: &[usize]) -> Option<String> {
     let standing = standing(data, rows);
     if rows.len() < 2 || standing.is_empty() || standing.len() == data.joints {
         return None;

@@ -53,7 +53,7 @@ impl Decoded {
     }
 
     /// The file's own key-value metadata.
-    pub fn said(&self, key: &str) -> Option<&str> {
+    pub fn metadata_value(&self, key: &str) -> Option<&str> {
         self.said.get(key).map(String::as_str)
     }
 

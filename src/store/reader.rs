@@ -163,7 +163,7 @@ fn loose<R: ChunkReader + 'static>(
 ) -> Result<Loose<Frame>> {
     let decoded = Decoded::of(source)
         .map_err(|why| Error::data(place, format!("not a readable Parquet file: {why}")))?;
-    let id = decoded.said(SCHEMA).map(String::from);
+    let id = decoded.metadata_value(SCHEMA).map(String::from);
     let (kind, version) = match (kind, &id) {
         (Some(kind), Some(id)) if id.split_once('/').is_none_or(|(named, _)| named != kind) => {
             return Err(Error::data(
@@ -180,7 +180,7 @@ fn loose<R: ChunkReader + 'static>(
             ));
         }
     };
-    let carried = decoded.said(CONTENT_HASH);
+    let carried = decoded.metadata_value(CONTENT_HASH);
     if carried.is_some_and(|carried| {
         decoded
             .table_hash(kind, version)

@@ -42,11 +42,11 @@ pub fn first_look(manifest: &Manifest, store: &Store) -> Result<String> {
         .stages
         .iter()
         .flat_map(|stage| stage.warnings.iter().map(|line| (stage.id.as_str(), line)));
-    let mut said = Vec::new();
+    let mut lines = Vec::new();
     for (id, line) in warnings {
-        if !said.contains(&line) {
+        if !lines.contains(&line) {
             out.push_str(&labelled("warning", &format!("{id}: {line}")));
-            said.push(line);
+            lines.push(line);
         }
     }
     Ok(out)

@@ -42,7 +42,8 @@ pub fn in_short(
         .map(|stage| DiagnosisSummary::read(&outcome.manifest.run_id, stage, store))
         .transpose()?;
     if let Some(wrong) = wrong {
-        let verdict = diagnosed.map_or_else(|| "wrong set-up".into(), |told| told.verdict());
+        let verdict =
+            diagnosed.map_or_else(|| "wrong set-up".into(), |diagnosis| diagnosis.verdict());
         return Ok(Some(
             labelled("verdict", &verdict)
                 + &screen::sentence("", wrong.trim_start_matches("the set-up is wrong: "), width),
@@ -59,7 +60,7 @@ pub fn in_short(
     let step = carried.map(|stage| stage.id.as_str()).or_else(stands);
     let own = || rows.iter().filter(|row| Some(row.step.as_str()) == step);
     let Some(after) = own().max_by_key(|row| (row.held_out, row.points)) else {
-        return Ok(diagnosed.map(|told| told.in_short(width, on.store)));
+        return Ok(diagnosed.map(|diagnosis| diagnosis.in_short(width, on.store)));
     };
     let earlier = rows
         .iter()
@@ -97,8 +98,8 @@ pub fn in_short(
         after,
         least,
     ));
-    if let Some(told) = &diagnosed {
-        text.push_str(&screen::found(told.in_few_words(), width));
+    if let Some(diagnosis) = &diagnosed {
+        text.push_str(&screen::found(diagnosis.in_few_words(), width));
     }
     text.push_str(&labelled(
         "verdict",
@@ -122,7 +123,7 @@ pub fn in_short(
         text.push_str(&screen::sentence("warning", &warning, width));
     }
     let next = diagnosed
-        .and_then(|told| told.next_step("HEAD", on.store))
+        .and_then(|diagnosis| diagnosis.next_step("HEAD", on.store))
         .or_else(|| unknown_noise(after));
     let compensate = || NextStep::correct("HEAD", on.store);
     Ok(Some(text + &next.unwrap_or_else(compensate).text(width)))

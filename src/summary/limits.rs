@@ -111,27 +111,27 @@ fn judged(stage: &str, Acceptance(rows): Acceptance) -> Option<Judged> {
 impl Judged {
     /// The judgement, then the figures that are beyond, or all where none is.
     fn words(&self) -> String {
-        let told = self
+        let limits = self
             .figures
             .iter()
             .filter(|figure| figure.kept == self.kept);
-        let told = told.map(|one| {
+        let limits = limits.map(|one| {
             format!(
                 "{} {:.4} mm, at most {} mm allowed",
                 one.figure, one.found_mm, one.limit_mm
             )
         });
-        let told: Vec<String> = told.collect();
+        let limits: Vec<String> = limits.collect();
         let mut letters = self.sentence.trim_end_matches('.').chars();
         let first = letters
             .next()
             .map(|letter| letter.to_lowercase().to_string())
             .unwrap_or_default();
         let sentence = format!("{first}{}", letters.as_str());
-        if told.is_empty() {
+        if limits.is_empty() {
             sentence
         } else {
-            format!("{sentence}: {}", told.join("; "))
+            format!("{sentence}: {}", limits.join("; "))
         }
     }
 }

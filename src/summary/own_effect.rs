@@ -4,13 +4,13 @@ use crate::effect::{EffectDeclaration, ShapeRange};
 use crate::error::{Error, Result};
 use serde::Serialize;
 
-/// The file's text; `told` says where it is from.
-pub(super) fn declared_in_yaml(declaration: &str, told: &str) -> Result<String> {
+/// The file's text; `heading` says where it is from.
+pub(super) fn declared_in_yaml(declaration: &str, heading: &str) -> Result<String> {
     let unreadable =
         |error: serde_json::Error| Error::data("table forms", format!("`{declaration}`: {error}"));
     let declared: EffectDeclaration = serde_json::from_str(declaration).map_err(unreadable)?;
     let mut lines = vec![
-        format!("# {told}."),
+        format!("# {heading}."),
         "# `with: {effects: [this file]}` below `uses: diagnose` tries it; rename it once its cause is known.".into(),
         "calib_effect: 1".into(),
         format!("name: {}", json(&declared.name)),

@@ -12,13 +12,13 @@ const CAUSES: usize = 5;
 
 /// Two runs compared, as text, with the rivals that are gone or new; with `stat` every table of which rows differ.
 pub fn run_diff(diff: &RunDiff, rivals: &[RivalChange], stat: bool) -> String {
-    let told = |letter: char, told: &crate::audit::RunSummary| {
+    let line = |letter: char, run: &crate::audit::RunSummary| {
         format!(
             "{letter}  {}  {}  {:.16}\n",
-            told.run, told.pipeline, told.started
+            run.run, run.pipeline, run.started
         )
     };
-    let mut text = told('A', &diff.a) + &told('B', &diff.b);
+    let mut text = line('A', &diff.a) + &line('B', &diff.b);
     let shown = if stat { diff.causes.len() } else { CAUSES };
     for cause in diff.causes.iter().take(shown) {
         let change = &cause.change;
@@ -75,15 +75,19 @@ pub fn run_diff(diff: &RunDiff, rivals: &[RivalChange], stat: bool) -> String {
             .total_cmp(&largest_mm(a))
             .then(rank(a).cmp(&rank(b)))
     });
-    let (told, rest) = differing.split_at(if stat {
+    let (shown, rest) = differing.split_at(if stat {
         differing.len()
     } else {
         differing.len().min(TABLES)
     });
     text.push_str(&rival_words(rivals));
     text.push('\n');
-    let width = told.iter().map(|table| table.name.len()).max().unwrap_or(0);
-    for table in told {
+    let width = shown
+        .iter()
+        .map(|table| table.name.len())
+        .max()
+        .unwrap_or(0);
+    for table in shown {
         text.push_str(&format!("{:width$}  {}\n", table.name, summary(table)));
     }
     let rest: Vec<&str> = rest.iter().map(|table| table.name.as_str()).collect();

@@ -122,13 +122,13 @@ pub(super) fn sentence(label: &str, text: &str, width: usize) -> String {
 pub(super) fn found(mut findings: Vec<ShortFinding>, width: usize) -> String {
     let size = |finding: &ShortFinding| finding.size.as_ref().map_or(0.0, |(size, _)| *size);
     findings.sort_by(|a, b| size(b).total_cmp(&size(a)));
-    let told = if findings.len() > FOUND + 1 {
+    let shown = if findings.len() > FOUND + 1 {
         FOUND
     } else {
         findings.len()
     };
-    let smaller = findings.len() - told;
-    let sizes: Vec<&str> = findings[..told]
+    let smaller = findings.len() - shown;
+    let sizes: Vec<&str> = findings[..shown]
         .iter()
         .map(|one| one.size.as_ref().map_or("", |(_, size)| size.as_str()))
         .collect();

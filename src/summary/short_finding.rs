@@ -210,7 +210,7 @@ fn phrase(effect: &str) -> Option<(&'static str, Told)> {
     PHRASES
         .iter()
         .find(|(name, ..)| *name == effect)
-        .map(|(_, words, told)| (*words, *told))
+        .map(|(_, words, number)| (*words, *number))
 }
 
 /// What a cause does at a place, whatever its size; one that a user declares by its name.
@@ -320,11 +320,11 @@ fn instead(found: &Found, nearest: Option<&str>) -> Option<String> {
             "not determined: {others} other causes fit as well (--details)"
         ));
     }
-    let said: Vec<String> = rivals
+    let others: Vec<String> = rivals
         .iter()
         .map(|(share, words)| format!("{words} ({:.0} %)", 100.0 * share))
         .collect();
-    Some(format!("or: {}", said.join(", ")))
+    Some(format!("or: {}", others.join(", ")))
 }
 
 impl Told {

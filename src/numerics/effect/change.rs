@@ -41,7 +41,7 @@ pub(super) fn near(term: &Term, survey: &Survey) -> Vec<Term> {
     term.with_bases(others.map(|at| Basis::After { at }))
 }
 
-/// What may have moved, as far as these data tell, when the payload changed for the only time: of a joint or a tool that follows the payload.
+/// What may have moved, as far as these data show, when the payload changed for the only time: of a joint or a tool that follows the payload.
 pub fn moved_with_the_payload(form: &Form, survey: &Survey) -> Option<(&'static str, Place)> {
     let term = form.term().filter(|term| {
         survey.payload_changes_once() && term.law().variables() == [Variable::Payload]
@@ -68,7 +68,7 @@ mod tests {
     const ROWS: usize = 60;
 
     /// What may have moved with the payload of a joint that follows it, and whether a zero that moves in the middle is proposed.
-    fn told(payload: impl Fn(usize) -> f64) -> (Option<(&'static str, Place)>, bool) {
+    fn moved_by(payload: impl Fn(usize) -> f64) -> (Option<(&'static str, Place)>, bool) {
         let robot = small_arm();
         let data = Measurements {
             joints: 2,
@@ -95,14 +95,17 @@ mod tests {
      {
         let shift = Some((names::ZERO_SHIFT, Place::Joint(1)));
         assert_eq!(
-            told(|row| if row < ROWS / 2 { 0.0 } else { 5.0 }),
+            moved_by(|row| if row < ROWS / 2 { 0.0 } else { 5.0 }),
             (shift, false)
         );
         assert_eq!(
-            told(|row| if row % 10 < 5 { 0.0 } else { 5.0 }),
+            moved_by(|row| if row % 10 < 5 { 0.0 } else { 5.0 }),
             (None, true)
         );
         // The lightest two of three payloads differ, too.
-        assert_eq!(told(|row| [0.0, 2.0, 5.0][3 * row / ROWS]), (None, true));
+        assert_eq!(
+            moved_by(|row| [0.0, 2.0, 5.0][3 * row / ROWS]),
+            (None, true)
+        );
     }
 }

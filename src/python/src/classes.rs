@@ -149,11 +149,13 @@ impl Robot {
             let found = api::identify(&robot, &recording, &options)?;
             Ok((None, found.model, found.given))
         })?;
-        let (said, model, given) = found;
+        let (remarks, model, given) = found;
         Ok(Outcome {
-            document: said.as_ref().map(|said| said.document("").to_string()),
-            text: said.as_ref().map(|said| said.text("")),
-            page: said.and_then(|said| said.page("").ok()),
+            document: remarks
+                .as_ref()
+                .map(|remarks| remarks.document("").to_string()),
+            text: remarks.as_ref().map(|remarks| remarks.text("")),
+            page: remarks.and_then(|remarks| remarks.page("").ok()),
             model: Py::new(py, Model::new(model))?,
             notes: given.notes.clone(),
             warnings: given.warnings.clone(),

@@ -149,14 +149,14 @@ impl DiagnosisSummary {
         declared_in_yaml(&row.declaration, &diagnosis)
     }
 
-    fn said(&self, topic: VerdictTopic) -> Vec<&str> {
+    fn statements(&self, topic: VerdictTopic) -> Vec<&str> {
         self.sentences.about(&self.step, topic)
     }
 
     /// What to measure next, a sentence each, then what to type for poses that tell findings from their closest rivals.
     fn next(&self, store: &str) -> Option<Vec<String>> {
         let mut lines: Vec<String> = self
-            .said(VerdictTopic::NextMeasurement)
+            .statements(VerdictTopic::NextMeasurement)
             .into_iter()
             .map(String::from)
             .collect();
@@ -204,13 +204,13 @@ impl DiagnosisSummary {
             }
             Kind::Torques(diagnosis) => {
                 let mut document = diagnosis.document();
-                document["withdrawn"] = json!(self.said(VerdictTopic::Withdrawn));
-                document["remarks"] = json!(self.said(VerdictTopic::Remark));
+                document["withdrawn"] = json!(self.statements(VerdictTopic::Withdrawn));
+                document["remarks"] = json!(self.statements(VerdictTopic::Remark));
                 document
             }
         };
         document["findings"] = self.found.iter().map(Found::document).collect();
-        document["not_observable"] = json!(self.said(VerdictTopic::NotObservable));
+        document["not_observable"] = json!(self.statements(VerdictTopic::NotObservable));
         document
     }
 
@@ -273,8 +273,11 @@ impl DiagnosisSummary {
                 .map(|line| format!("{label}{line}\n"))
                 .collect()
         };
-        text += &lines("withdrawn: ", &self.said(VerdictTopic::Withdrawn));
-        text += &lines("not observable: ", &self.said(VerdictTopic::NotObservable));
+        text += &lines("withdrawn: ", &self.statements(VerdictTopic::Withdrawn));
+        text += &lines(
+            "not observable: ",
+            &self.statements(VerdictTopic::NotObservable),
+        );
         match &self.kind {
             Kind::Positions(diagnosis) => {
                 text += &lines(
@@ -291,7 +294,7 @@ impl DiagnosisSummary {
             }
             Kind::Torques(diagnosis) => text += &diagnosis.left(),
         }
-        text + &lines("", &self.said(VerdictTopic::Remark))
+        text + &lines("", &self.statements(VerdictTopic::Remark))
     }
 
     /// What was measured, and the errors before and after.
@@ -363,8 +366,10 @@ impl DiagnosisSummary {
                 .map(|row| format!("{} ({})", row.point_id, length(row.size_mm)));
             text.push_str(&screen::names("set aside", &Vec::from_iter(aside), width));
         }
-        text.push_str(&screen::withdrawn(self.said(VerdictTopic::Withdrawn).len()));
-        let not_seen = self.said(VerdictTopic::NotObservable);
+        text.push_str(&screen::withdrawn(
+            self.statements(VerdictTopic::Withdrawn).len(),
+        ));
+        let not_seen = self.statements(VerdictTopic::NotObservable);
         text.push_str(&screen::not_seen(&not_seen, width));
         let next = self
             .next_step(&self.run, store)
@@ -426,7 +431,7 @@ impl DiagnosisSummary {
             });
         }
         let joint = self
-            .said(VerdictTopic::NotObservable)
+            .statements(VerdictTopic::NotObservable)
             .into_iter()
             .find(|line| line.starts_with("joint "))?;
         let (joint, why) = joint.split_once(": ")?;

@@ -166,13 +166,13 @@ impl Board {
     pub fn confusion(&self) -> BTreeMap<&str, BTreeMap<String, usize>> {
         let mut out: BTreeMap<&str, BTreeMap<String, usize>> = BTreeMap::new();
         for cause in self.due() {
-            let called = match (cause.outcome, &cause.said) {
+            let called = match (cause.outcome, &cause.label) {
                 (Outcome::Exact, _) => "=".to_string(),
                 (Outcome::InSet, _) => "in the set".to_string(),
-                (Outcome::Wrong, Some(said)) => match said.split_once(" at ") {
+                (Outcome::Wrong, Some(label)) => match label.split_once(" at ") {
                     Some((name, _)) if name == cause.effect => format!("{name} elsewhere"),
                     Some((name, _)) => name.to_string(),
-                    None => said.clone(),
+                    None => label.clone(),
                 },
                 (Outcome::Wrong | Outcome::Silent, _) => "-".to_string(),
             };

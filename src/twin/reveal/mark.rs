@@ -47,7 +47,7 @@ pub struct Marked {
     /// Whether its place was found.
     pub placed: Placed,
     /// What was said instead, strongest first: `effect at place`.
-    pub said: Option<String>,
+    pub label: Option<String>,
     /// The stated probability of the true name, 0 where nothing was called so; none where no finding states any.
     pub probability: Option<f64>,
 }
@@ -110,7 +110,7 @@ impl Case {
     }
 }
 
-fn said(finding: &Finding) -> String {
+fn label_of(finding: &Finding) -> String {
     // The names come from a file and go to a terminal.
     format!("{} at {}", finding.effect, finding.place)
         .chars()
@@ -141,7 +141,7 @@ pub fn mark(truth: &Truth, answer: &Answer) -> Case {
     let true_names: Vec<Atoms> = causes.chain(tampered).collect();
     let accepted_names: Vec<Atoms> = truth.accepted.iter().map(Name::atoms).collect();
     let stray = |finding: &&Finding| reach(finding).is_disjoint(&known);
-    let strays: Vec<String> = answer.findings.iter().filter(stray).map(said).collect();
+    let strays: Vec<String> = answer.findings.iter().filter(stray).map(label_of).collect();
     let causes = truth
         .effects
         .iter()
@@ -166,7 +166,7 @@ pub fn mark(truth: &Truth, answer: &Answer) -> Case {
                 strength: cause.strength,
                 outcome,
                 placed: placed(cause, truth, &answer.findings, &known, reach),
-                said: (outcome == Outcome::Wrong)
+                label: (outcome == Outcome::Wrong)
                     .then(|| strays.first().cloned())
                     .flatten(),
                 probability: probability_of(&own, &answer.findings),

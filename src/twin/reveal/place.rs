@@ -1,4 +1,4 @@
-//! Whether a diagnosis looked in the right place, gave no wrong name, and said `unknown` where it knew no name.
+//! Whether a diagnosis looked in the right place, gave no wrong name, and named `unknown` where it knew no name.
 
 use super::paper::{Atoms, Cause, Finding, Truth, all_atoms};
 use super::share::Share;
@@ -12,7 +12,7 @@ pub const GIVEN: f64 = 0.5;
 /// What has a place and no name.
 pub const NAMELESS: &str = "unknown";
 
-/// What was said of a cause.
+/// What was named of a cause.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Placed {
     /// The strongest finding, but for faults of points and what sits at the other causes' places, is at its place or at an accepted one.
@@ -30,7 +30,7 @@ fn places(names: &Atoms) -> BTreeSet<&str> {
     names.iter().map(|(_, place)| place.as_str()).collect()
 }
 
-/// Judges what was said of `cause`; `known` are all names that are there or accepted, `reach` all that a finding may mean.
+/// Judges what was named of `cause`; `known` are all names that are there or accepted, `reach` all that a finding may mean.
 pub(super) fn placed(
     cause: &Cause,
     truth: &Truth,
@@ -44,16 +44,17 @@ pub(super) fn placed(
     let others: Atoms = truth.effects.iter().flat_map(Cause::atoms).collect();
     let elsewhere: BTreeSet<&str> = places(&others).difference(&right).copied().collect();
 
-    let said: Vec<(&Finding, Atoms)> = findings
+    let named: Vec<(&Finding, Atoms)> = findings
         .iter()
         .map(|finding| (finding, finding.atoms()))
         .collect();
     let physical = || {
-        said.iter()
+        named
+            .iter()
             .filter(|(finding, _)| !POINT_FAULTS.contains(&finding.effect.as_str()))
     };
     let there = |names: &Atoms| !places(names).is_disjoint(&right);
-    let found: Atoms = said.iter().flat_map(|(_, names)| names.clone()).collect();
+    let found: Atoms = named.iter().flat_map(|(_, names)| names.clone()).collect();
     let wrong = |finding: &Finding, names: &Atoms| {
         finding.effect != NAMELESS
             && names.is_disjoint(known)
@@ -65,11 +66,11 @@ pub(super) fn placed(
             .is_some_and(|(_, names)| there(names)),
         name_or_unknown: own.is_subset(&found)
             || !accepted.is_disjoint(&found)
-            || said
+            || named
                 .iter()
                 .any(|(finding, names)| finding.effect == NAMELESS && there(names)),
-        wrong_name: said.iter().any(|(finding, names)| wrong(finding, names)),
-        wrong_given: said.iter().any(|(finding, names)| {
+        wrong_name: named.iter().any(|(finding, names)| wrong(finding, names)),
+        wrong_given: named.iter().any(|(finding, names)| {
             wrong(finding, names) && finding.probability.unwrap_or(1.0) >= GIVEN
         }),
     }

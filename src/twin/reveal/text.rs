@@ -34,7 +34,7 @@ impl Board {
             self.cases.len(),
             self.missing.len()
         );
-        self.tell_strengths(&mut out);
+        self.write_strengths(&mut out);
         let by_effect = self.by_effect();
         if !by_effect.is_empty() {
             let _ = writeln!(
@@ -45,7 +45,7 @@ impl Board {
                 let _ = writeln!(out, "  {effect:<22}{}", line(&counts));
             }
         }
-        self.tell_places(&mut out);
+        self.write_places(&mut out);
         for (title, shared) in FORMULAS {
             let (counts, mean) = self.by_formula(shared);
             if counts.all() > 0 {
@@ -105,9 +105,9 @@ impl Board {
             );
         }
         for subject in SUBJECTS {
-            tell_reliability(&mut out, subject.name(), &self.reliability(subject));
+            write_reliability(&mut out, subject.name(), &self.reliability(subject));
         }
-        self.tell_left_out(&mut out);
+        self.write_left_out(&mut out);
         for ((content, verdict), count) in self.verdicts() {
             let _ = writeln!(out, "{content}: {verdict} {count}");
         }
@@ -127,7 +127,7 @@ impl Board {
     }
 
     /// Effects by how strong they are, alone in their recording and beside others.
-    fn tell_strengths(&self, out: &mut String) {
+    fn write_strengths(&self, out: &mut String) {
         for (title, company) in [
             ("alone in its recording", Company::Alone),
             ("beside others", Company::Beside),
@@ -147,7 +147,7 @@ impl Board {
     }
 
     /// Places and names of due effects, and their recordings' held-out errors.
-    fn tell_places(&self, out: &mut String) {
+    fn write_places(&self, out: &mut String) {
         let (all, by_effect) = self.places();
         if all.place.of == 0 {
             return;
@@ -186,7 +186,7 @@ impl Board {
     }
 
     /// Recordings without their causes.
-    fn tell_left_out(&self, out: &mut String) {
+    fn write_left_out(&self, out: &mut String) {
         for (title, tells) in TOLD.into_iter().filter(|_| !self.left_out.is_empty()) {
             let shares = LeftOutShares::of(&self.left_out, tells);
             let _ = writeln!(
@@ -216,7 +216,7 @@ impl Board {
             }
         }
         if !self.left_out.is_empty() {
-            tell_reliability(out, UNTOLD, &self.untold_reliability());
+            write_reliability(out, UNTOLD, &self.untold_reliability());
             for unlisted in UNLISTED {
                 let _ = writeln!(
                     out,
@@ -320,7 +320,7 @@ impl Board {
 }
 
 /// Stated probabilities against what was true.
-fn tell_reliability(out: &mut String, of: &str, Reliability { bins, brier, auc }: &Reliability) {
+fn write_reliability(out: &mut String, of: &str, Reliability { bins, brier, auc }: &Reliability) {
     if let Some(brier) = brier {
         let auc = auc
             .map(|auc| format!(", area under the ROC curve {auc:.3}"))

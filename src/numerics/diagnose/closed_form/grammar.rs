@@ -89,7 +89,7 @@ fn declaration((place, unit): (&str, &str), of: &str, sketch: Sketch) -> EffectD
         place: place.into(),
         sentence: Some(format!(
             "{{place}} errs by {{values}} times {formulas}{}",
-            told(&sketch.shape)
+            shape_text(&sketch.shape)
         )),
         law: Laws(sketch.laws),
         shape: sketch
@@ -103,7 +103,7 @@ fn declaration((place, unit): (&str, &str), of: &str, sketch: Sketch) -> EffectD
 }
 
 /// The shape numbers, to be filled in.
-fn told(shape: &[(&str, ShapeRange)]) -> String {
+fn shape_text(shape: &[(&str, ShapeRange)]) -> String {
     let each: Vec<String> = shape
         .iter()
         .map(|(name, _)| format!("{name} = {{{name}}}"))

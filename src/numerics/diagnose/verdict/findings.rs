@@ -5,10 +5,9 @@ use super::last_round::LastRound;
 use super::rivals::share_with_identities;
 use crate::criteria::cells::{DETAIL, FAINT, SMALLEST, TRACE};
 use crate::criteria::words::FIRM;
-use crate::diagnose::round::FitState;
 use crate::diagnose::table::FoundCell;
 use crate::diagnose::types::{Evidence, Finding, RivalCause};
-use crate::diagnose::words::{left_out, not_so, sentence, small, told};
+use crate::diagnose::words::{left_out, not_so, sentence, small, with_size};
 use crate::effect::{
     Clock, FittedForms, Form, ModelledFinding, ParameterEstimate, Place, Summary, Variable, names,
     people, turned_holder,
@@ -150,7 +149,7 @@ fn finding(last: &LastRound, found: &FoundCell, details: &[usize]) -> Finding {
     let (effect, statement) = match (impossible, modelled) {
         _ if !named && excluded => (names::UNKNOWN, left_out(&summary, &rms)),
         (Some(why), _) if named => (names::UNKNOWN, not_so(effect, &summary, &why, &rms)),
-        (_, Some(modelled)) => (effect, told(&modelled.sentence, &rms)),
+        (_, Some(modelled)) => (effect, with_size(&modelled.sentence, &rms)),
         _ => (effect, sentence(effect, &summary, &rms)),
     };
     rivals.retain(|rival| {

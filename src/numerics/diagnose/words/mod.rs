@@ -3,7 +3,9 @@
 mod statement;
 mod verdict_statement;
 
-pub(crate) use statement::{hidden, left_out, not_so, sentence, slower_than_noise, small, told};
+pub(crate) use statement::{
+    hidden, left_out, not_so, sentence, slower_than_noise, small, with_size,
+};
 pub(crate) use verdict_statement::{Ground, statement};
 
 use super::round::{FitState, Fitter};

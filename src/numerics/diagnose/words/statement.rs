@@ -18,11 +18,11 @@ pub(crate) fn sentence(effect: &str, summary: &Summary, rms: &str) -> String {
     let text = summary
         .cause(effect)
         .map_or_else(String::new, |cause| cause.sentence(summary));
-    told(&text, rms)
+    with_size(&text, rms)
 }
 
 /// A sentence of a finding as it is in the whole model.
-pub(crate) fn told(text: &str, rms: &str) -> String {
+pub(crate) fn with_size(text: &str, rms: &str) -> String {
     format!("{text} ({rms} rms at the tool).")
 }
 
