@@ -42,7 +42,8 @@ pub(super) fn of(
     let mut follows: BTreeMap<String, String> = BTreeMap::new();
     each(fleet, ledger, records, &mut |robot, rows| {
         let group = round.by.of(&robot.groups).to_string();
-        sums.entry(group.clone()).or_default().add(rows);
+        let given = round.groups.get(&group).map_or(&[][..], Vec::as_slice);
+        sums.entry(group.clone()).or_default().add(rows, given);
         for row in rows {
             let Some(sigma) = row.sigma_mm else { continue };
             follows
@@ -275,12 +276,22 @@ fn named(sums: &GroupSums, cell: &str) -> Option<(f64, f64, Option<(String, f64)
     let own = all.iter().find(|own| own.cell == cell)?;
     let is_same =
         |one: &&CellTotal| one.sum.effect == own.sum.effect && one.sum.place == own.sum.place;
-    let ratio = |one: &CellTotal| (one.odds - own.odds).exp();
-    let of_name: f64 = all.iter().filter(is_same).map(ratio).sum();
+    // Where models are as good as they think, a log ratio has twice its mean as variance; one that scatters by more from robot to robot is
+    // worth less (Vuong, 1989).
+    let ratio = |one: &CellTotal| {
+        let less = own.odds - one.odds;
+        let worth = 2.0 * less.abs() / one.scatter.max(f64::MIN_POSITIVE);
+        -less * worth.min(1.0)
+    };
+    let of_name: f64 = all
+        .iter()
+        .filter(is_same)
+        .map(|one| (one.odds - own.odds).exp())
+        .sum();
     let rivals = all
         .iter()
         .filter(|one| !is_same(one))
-        .map(|one| (one, ratio(one)));
+        .map(|one| (one, ratio(one).exp()));
     let whole = of_name + (-own.odds).exp() + rivals.clone().map(|(_, ratio)| ratio).sum::<f64>();
     let best = rivals.max_by(|a, b| a.1.total_cmp(&b.1));
     let rival = best.map(|(one, ratio)| {

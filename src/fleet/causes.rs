@@ -86,7 +86,9 @@ impl CauseSearch {
                 let one = Alone { robot, given };
                 alone.entry(group.clone()).or_default().push(one);
             }
-            sums.entry(group).or_default().add(rows);
+            let given = self.round.groups.get(&group);
+            let given = given.map_or(&[][..], Vec::as_slice);
+            sums.entry(group).or_default().add(rows, given);
         })?;
         let mut goes_on = false;
         for (group, sums) in &sums {
