@@ -279,9 +279,10 @@ fn named(sums: &GroupSums, cell: &str) -> Option<(f64, f64, Option<(String, f64)
     // Where models are as good as they think, a log ratio has twice its mean as variance; one that scatters by more from robot to robot is
     // worth less (Vuong, 1989).
     let ratio = |one: &CellTotal| {
-        let less = own.odds - one.odds;
-        let worth = 2.0 * less.abs() / one.scatter.max(f64::MIN_POSITIVE);
-        -less * worth.min(1.0)
+        let prior = one.sum.log_prior - own.sum.log_prior;
+        let more = one.odds - own.odds - prior;
+        let worth = 2.0 * more.abs() / one.scatter.max(f64::MIN_POSITIVE);
+        (prior + more * worth.min(1.0)).exp()
     };
     let of_name: f64 = all
         .iter()
@@ -291,7 +292,7 @@ fn named(sums: &GroupSums, cell: &str) -> Option<(f64, f64, Option<(String, f64)
     let rivals = all
         .iter()
         .filter(|one| !is_same(one))
-        .map(|one| (one, ratio(one).exp()));
+        .map(|one| (one, ratio(one)));
     let whole = of_name + (-own.odds).exp() + rivals.clone().map(|(_, ratio)| ratio).sum::<f64>();
     let best = rivals.max_by(|a, b| a.1.total_cmp(&b.1));
     let rival = best.map(|(one, ratio)| {
