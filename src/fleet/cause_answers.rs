@@ -94,7 +94,7 @@ pub(super) fn of(
             size_mm: 0.0,
             spread_mm: None,
             trend: None,
-            decided: true,
+            decided: Some(true),
             statement: String::new(),
         };
         let mut given = round.groups.get(&group).into_iter().flatten();
@@ -153,7 +153,7 @@ pub(super) fn of(
             size_mm: population.usual,
             spread_mm: Some(population.spread),
             trend,
-            decided,
+            decided: Some(decided),
             statement,
             ..finding
         });

@@ -245,7 +245,7 @@ mod tests {
             size_mm: 0.06,
             spread_mm: Some(0.01),
             trend: None,
-            decided: true,
+            decided: Some(true),
             statement: String::new(),
         };
         let of = |robot: &str| {

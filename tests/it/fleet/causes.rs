@@ -176,7 +176,7 @@ fn the_page_of_two_thousand_robots_is_small_and_the_furthest_robot_comes_first()
         size_mm: 0.03,
         spread_mm: Some(0.002),
         trend: None,
-        decided: true,
+        decided: Some(true),
         statement: "backlash at joint 3 in 1500 of 2000 robots".into(),
     };
     let cells = FleetCells((0..2000).map(size).collect());
