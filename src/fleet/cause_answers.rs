@@ -129,7 +129,11 @@ pub(super) fn of(
         let have = robots.iter().filter(|robot| has(robot)).count();
         let is_usual = have as f64 >= *USUALLY * robots.len() as f64;
         let trend = trend(&robots, tests);
-        let (log_odds, probability, rival) = named(sums, &cell).unwrap_or_default();
+        let Named {
+            log_odds,
+            probability,
+            rival,
+        } = named(sums, &cell).unwrap_or_default();
         let decided = probability >= *DECIDED;
         if let Some((name, _)) = rival.as_ref().filter(|_| !decided) {
             words = format!("{words} or {name}");
@@ -270,8 +274,16 @@ pub(super) fn population(robots: &mut [FleetCellRow]) -> Population {
     population
 }
 
-/// ln of the odds of a cell of a group, the probability of its name, and the next probable one with its own.
-fn named(sums: &GroupSums, cell: &str) -> Option<(f64, f64, Option<(String, f64)>)> {
+/// ln of the odds of a cell of a group, the probability of its name, and the next probable name with its own.
+#[derive(Default)]
+struct Named {
+    log_odds: f64,
+    probability: f64,
+    rival: Option<(String, f64)>,
+}
+
+/// The name of a cell of a group.
+fn named(sums: &GroupSums, cell: &str) -> Option<Named> {
     let all: Vec<CellTotal> = sums.cells(cell).collect();
     let own = all.iter().find(|own| own.cell == cell)?;
     let is_same =
@@ -299,8 +311,11 @@ fn named(sums: &GroupSums, cell: &str) -> Option<(f64, f64, Option<(String, f64)
         let name = format!("{} at {}", one.sum.effect.replace('_', " "), one.sum.place);
         (name, (1.0 - *MISLED) * ratio / whole)
     });
-    let rival = rival.filter(|(_, probability)| *probability > *RIVAL);
-    Some((own.odds, (1.0 - *MISLED) * of_name / whole, rival))
+    Some(Named {
+        log_odds: own.odds,
+        probability: (1.0 - *MISLED) * of_name / whole,
+        rival: rival.filter(|(_, probability)| *probability > *RIVAL),
+    })
 }
 
 /// How sizes differ by plant or campaign, where that is no chance (weighted means, Fisher's F with the scatter inside the labels).
