@@ -1,10 +1,11 @@
 //! What the sums of a fleet mean: causes of groups with their size, spread and trend; robots that lack one, or have another size, or one alone.
 
-use super::cause_sums::{GroupSums, each};
+use super::cause_sums::{CellTotal, GroupSums, each};
 use super::ledger::{Ending, RobotRecord};
 use super::round::Round;
-use super::{Fleet, Groups, Ledger};
-use crate::criteria::cells::MISLED;
+use super::{Fleet, Ledger};
+use crate::criteria::cells::{MISLED, RIVAL};
+use crate::criteria::fleet::{APART, CHANCE, DECIDED, LEAST_SPREAD, SIBLINGS, USUALLY};
 use crate::error::{Result, counted};
 use crate::estimate::tail;
 use crate::statistics::{nearest, normal_quantile};
@@ -12,15 +13,6 @@ use crate::table::{
     FleetCellRow, FleetCells, FleetFindingRow, FleetFindings, FleetOutlierRow, FleetOutliers,
 };
 use std::collections::BTreeMap;
-
-/// Chance of a false word on sizes or trends in the whole fleet, shared by all that are tested.
-const ALPHA: f64 = 0.01;
-/// Ratio of a size to the usual one from which a robot is looked at, however sure it is.
-const APART: f64 = 1.5;
-/// Probability of lacking a cause from which a robot is listed.
-const LACKS: f64 = 0.8;
-/// Robots whose sizes make a usual one.
-const SIBLINGS: usize = 4;
 
 /// What was found.
 pub struct Answers {
@@ -32,20 +24,10 @@ pub struct Answers {
     pub outliers: FleetOutliers,
 }
 
-/// A robot's size of a cell.
-struct Sized {
-    robot: String,
-    groups: Groups,
-    log: f64,
-    size: f64,
-    sigma: f64,
-    has: f64,
-}
-
-/// Sizes of robots: the usual one and how it scatters from robot to robot.
-struct Population {
-    usual: f64,
-    spread: f64,
+/// Sizes of robots, mm: the usual one and how it scatters from robot to robot.
+pub(super) struct Population {
+    pub usual: f64,
+    pub spread: f64,
 }
 
 /// Answers by the last round.
@@ -56,23 +38,31 @@ pub(super) fn of(
     records: &[Option<RobotRecord>],
 ) -> Result<Answers> {
     let mut sums: BTreeMap<String, GroupSums> = BTreeMap::new();
-    let mut sized: BTreeMap<(String, String), Vec<Sized>> = BTreeMap::new();
-    let mut labels: BTreeMap<String, (String, String, String)> = BTreeMap::new();
+    let mut sized: BTreeMap<(String, String), Vec<FleetCellRow>> = BTreeMap::new();
+    let mut follows: BTreeMap<String, String> = BTreeMap::new();
     each(fleet, ledger, records, &mut |robot, rows| {
         let group = round.by.of(&robot.groups).to_string();
-        sums.entry(group.clone()).or_default().add(rows);
+        let given = round.groups.get(&group).map_or(&[][..], Vec::as_slice);
+        sums.entry(group.clone()).or_default().add(rows, given);
         for row in rows {
             let Some(sigma) = row.sigma_mm else { continue };
-            let label = (row.effect.clone(), row.place.clone(), row.follows.clone());
-            labels.entry(row.cell.clone()).or_insert(label);
+            follows
+                .entry(row.cell.clone())
+                .or_insert_with(|| row.follows.clone());
             let key = (group.clone(), row.cell.clone());
-            sized.entry(key).or_default().push(Sized {
+            sized.entry(key).or_default().push(FleetCellRow {
+                cell: row.cell.clone(),
                 robot: robot.name.clone(),
-                groups: robot.groups.clone(),
-                log: row.log_evidence,
-                size: row.size_mm,
-                sigma: sigma.max(1e-6),
-                has: 1.0,
+                group: group.clone(),
+                plant: robot.groups.plant.clone(),
+                campaign: robot.groups.campaign.clone(),
+                effect: row.effect.clone(),
+                place: row.place.clone(),
+                log_evidence: row.log_evidence,
+                probability: 1.0,
+                size_mm: row.size_mm,
+                sigma_mm: sigma.max(1e-6),
+                deviation: None,
             });
         }
     })?;
@@ -82,60 +72,72 @@ pub(super) fn of(
         outliers: not_asked(fleet, round, records),
     };
     let tests = sized.values().map(Vec::len).sum::<usize>().max(1) as f64;
+    let limit = normal_quantile(0.5 * *CHANCE / tests);
     for ((group, cell), mut robots) in sized {
-        let (Some((effect, place, follows)), Some(sums)) = (labels.get(&cell), sums.get(&group))
-        else {
+        let (Some(first), Some(sums)) = (robots.first(), sums.get(&group)) else {
             continue;
         };
-        let shared = round.groups.get(&group).into_iter().flatten();
-        let mut shared = shared.filter(|given| given.cell == cell);
-        let words = format!("{} at {place}", effect.replace('_', " "));
-        let Some(given) = shared.next() else {
+        let mut words = format!("{} at {}", first.effect.replace('_', " "), first.place);
+        let finding = FleetFindingRow {
+            group: group.clone(),
+            cell: cell.clone(),
+            robot: String::new(),
+            effect: first.effect.clone(),
+            place: first.place.clone(),
+            follows: follows.get(&cell).cloned().unwrap_or_default(),
+            shape: None,
+            robots: 1,
+            of_robots: sums.robots as i64,
+            log_odds: 0.0,
+            probability: 0.0,
+            rival: None,
+            size_mm: 0.0,
+            spread_mm: None,
+            trend: None,
+            decided: Some(true),
+            statement: String::new(),
+        };
+        let mut given = round.groups.get(&group).into_iter().flatten();
+        let Some(given) = given.find(|given| given.cell == cell) else {
+            let own = sums.cells(&cell).find(|own| own.cell == cell);
+            let prior = own.map_or(0.0, |own| own.sum.log_prior);
             for robot in robots {
-                let prior = sums
-                    .cells(&cell)
-                    .find(|own| own.cell == cell)
-                    .map_or(0.0, |own| own.sum.log_prior);
-                let odds = robot.log + prior;
+                let odds = robot.log_evidence + prior;
                 if odds < 0.0 {
                     continue;
                 }
                 let statement = format!(
                     "{}: {words}, {} mm; its siblings do not show it",
                     robot.robot,
-                    length(robot.size, robot.sigma)
+                    length(&robot)
                 );
                 out.findings.0.push(FleetFindingRow {
-                    group: group.clone(),
-                    cell: cell.clone(),
                     robot: robot.robot.clone(),
-                    effect: effect.clone(),
-                    place: place.clone(),
-                    follows: follows.clone(),
-                    shape: None,
-                    robots: 1,
-                    of_robots: sums.robots as i64,
                     log_odds: odds,
                     probability: (1.0 - *MISLED) / (1.0 + (-odds).exp()),
-                    rival: None,
-                    size_mm: robot.size,
-                    spread_mm: None,
-                    trend: None,
+                    size_mm: robot.size_mm,
                     statement: statement.clone(),
+                    ..finding.clone()
                 });
-                out.outliers
-                    .0
-                    .push(outlier(&robot, &group, &cell, "alone", None, statement));
-                out.cells
-                    .0
-                    .push(size_row(robot, &group, &cell, [effect, place], None));
+                let outliers = &mut out.outliers.0;
+                outliers.push(outlier(&robot, "alone", None, statement));
+                out.cells.0.push(robot);
             }
             continue;
         };
         let population = population(&mut robots);
-        let have = robots.iter().filter(|robot| robot.has >= 0.5).count();
+        let have = robots.iter().filter(|robot| has(robot)).count();
+        let is_usual = have as f64 >= *USUALLY * robots.len() as f64;
         let trend = trend(&robots, tests);
-        let (odds, probability, rival) = named(sums, &cell, [effect, place]);
+        let Named {
+            log_odds,
+            probability,
+            rival,
+        } = named(sums, &cell).unwrap_or_default();
+        let decided = probability >= *DECIDED;
+        if let Some((name, _)) = rival.as_ref().filter(|_| !decided) {
+            words = format!("{words} or {name}");
+        }
         let statement = format!(
             "{words} in {have} of {}: {:.3} mm, {:.3} from robot to robot{}",
             counted(sums.robots, "robot"),
@@ -147,40 +149,32 @@ pub(super) fn of(
                 .unwrap_or_default()
         );
         out.findings.0.push(FleetFindingRow {
-            group: group.clone(),
-            cell: cell.clone(),
-            robot: String::new(),
-            effect: effect.clone(),
-            place: place.clone(),
-            follows: follows.clone(),
             shape: given.shape.clone(),
             robots: have as i64,
-            of_robots: sums.robots as i64,
-            log_odds: odds,
+            log_odds,
             probability,
-            rival,
+            rival: rival.map(|(name, probability)| format!("{name} ({probability:.2})")),
             size_mm: population.usual,
             spread_mm: Some(population.spread),
             trend,
+            decided: Some(decided),
             statement,
+            ..finding
         });
-        let limit = normal_quantile(0.5 * ALPHA / tests);
-        for robot in robots {
-            let deviation = (robot.size - population.usual) / population.spread.hypot(robot.sigma);
-            let ratio = robot.size / population.usual.max(1e-9);
-            let kind = if have < SIBLINGS {
-                None
-            } else if robot.has < 1.0 - LACKS {
-                Some("lacks")
-            } else if deviation > limit && ratio > APART {
-                Some("larger")
-            } else if -deviation > limit && ratio < 1.0 / APART {
-                Some("smaller")
-            } else {
-                None
+        for mut robot in robots {
+            let deviation =
+                (robot.size_mm - population.usual) / population.spread.hypot(robot.sigma_mm);
+            let ratio = robot.size_mm / population.usual.max(1e-9);
+            robot.deviation = Some(deviation);
+            let kind = match () {
+                () if have < *SIBLINGS => None,
+                () if !has(&robot) => (decided && is_usual).then_some("lacks"),
+                () if deviation > limit && ratio > *APART => Some("larger"),
+                () if -deviation > limit && ratio < 1.0 / *APART => Some("smaller"),
+                () => None,
             };
             if let Some(kind) = kind {
-                let size = length(robot.size, robot.sigma);
+                let size = length(&robot);
                 let statement = match kind {
                     "lacks" => format!(
                         "{}: no {words} ({size} mm), which {have} of {} have",
@@ -192,17 +186,10 @@ pub(super) fn of(
                     ),
                 };
                 let usual = Some(population.usual);
-                out.outliers
-                    .0
-                    .push(outlier(&robot, &group, &cell, kind, usual, statement));
+                let outliers = &mut out.outliers.0;
+                outliers.push(outlier(&robot, kind, usual, statement));
             }
-            out.cells.0.push(size_row(
-                robot,
-                &group,
-                &cell,
-                [effect, place],
-                Some(deviation),
-            ));
+            out.cells.0.push(robot);
         }
     }
     let finding = |row: &FleetFindingRow| (row.group.clone(), row.cell.clone(), row.robot.clone());
@@ -214,6 +201,11 @@ pub(super) fn of(
         .0
         .sort_by(|a, b| (&a.robot, &a.kind, &a.cell).cmp(&(&b.robot, &b.kind, &b.cell)));
     Ok(out)
+}
+
+/// Whether a robot has a cause, more probably than not.
+pub(super) fn has(robot: &FleetCellRow) -> bool {
+    robot.probability >= 0.5
 }
 
 /// Robots without a table: their data were rejected, or the machine failed.
@@ -241,112 +233,119 @@ fn not_asked(fleet: &Fleet, round: &Round, records: &[Option<RobotRecord>]) -> F
 }
 
 /// The usual size and its scatter, and of every robot how probable it is that it has the cause: its size is one of those, or noise.
-fn population(robots: &mut [Sized]) -> Population {
+pub(super) fn population(robots: &mut [FleetCellRow]) -> Population {
     let mut population = Population {
         usual: 0.0,
         spread: 0.0,
     };
     let mut share: f64 = 0.9;
     for robot in robots.iter_mut() {
-        robot.has = f64::from(robot.log > 0.0);
+        robot.probability = f64::from(robot.log_evidence > 0.0);
     }
-    if robots.iter().all(|robot| robot.has == 0.0) {
-        robots.iter_mut().for_each(|robot| robot.has = 1.0);
+    if !robots.iter().any(has) {
+        robots.iter_mut().for_each(|robot| robot.probability = 1.0);
     }
     for _ in 0..10 {
-        let having = || robots.iter().filter(|robot| robot.has >= 0.5);
-        let mut sizes: Vec<f64> = having().map(|robot| robot.size).collect();
-        let Some(usual) = nearest(&mut sizes, 0.5) else {
+        let median = |of: &dyn Fn(&FleetCellRow) -> f64| {
+            let mut values: Vec<f64> = robots.iter().filter(|robot| has(robot)).map(of).collect();
+            nearest(&mut values, 0.5)
+        };
+        let Some(usual) = median(&|robot| robot.size_mm) else {
             break;
         };
-        let mut off: Vec<f64> = having().map(|robot| (robot.size - usual).abs()).collect();
-        let scatter = 1.4826 * nearest(&mut off, 0.5).unwrap_or(0.0);
-        let mut errors: Vec<f64> = having().map(|robot| robot.sigma).collect();
-        let error = nearest(&mut errors, 0.5).unwrap_or(0.0);
-        // That few robots scatter by little is chance.
-        let least = 0.1 * usual;
+        let scatter = 1.4826 * median(&|robot| (robot.size_mm - usual).abs()).unwrap_or(0.0);
+        let error = median(&|robot| robot.sigma_mm).unwrap_or(0.0);
+        let least = *LEAST_SPREAD * usual;
         let spread = (scatter * scatter - error * error)
             .max(least * least)
             .sqrt();
         population = Population { usual, spread };
         for robot in robots.iter_mut() {
-            let wide = spread.hypot(robot.sigma);
-            let off = ((robot.size - usual).min(0.0) / wide).powi(2);
-            let none = (robot.size / robot.sigma).powi(2);
-            let log = 0.5 * (none - off) + (robot.sigma / wide).ln() - 2f64.ln();
+            let wide = spread.hypot(robot.sigma_mm);
+            let off = ((robot.size_mm - usual).min(0.0) / wide).powi(2);
+            let none = (robot.size_mm / robot.sigma_mm).powi(2);
+            let log = 0.5 * (none - off) + (robot.sigma_mm / wide).ln() - 2f64.ln();
             let odds = (share / (1.0 - share)).ln() + log;
-            robot.has = 1.0 / (1.0 + (-odds).exp());
+            robot.probability = 1.0 / (1.0 + (-odds).exp());
         }
-        let having: f64 = robots.iter().map(|robot| robot.has).sum();
+        let having: f64 = robots.iter().map(|robot| robot.probability).sum();
         share = (having + 4.5) / (robots.len() as f64 + 5.0);
     }
     population
 }
 
-/// ln of the odds of a cell of a group, the probability of its name, and the next probable one.
-fn named(sums: &GroupSums, cell: &str, name: [&str; 2]) -> (f64, f64, Option<String>) {
-    let all: Vec<_> = sums.cells(cell).collect();
-    let odds = all
-        .iter()
-        .find(|own| own.cell == cell)
-        .map_or(0.0, |own| own.odds);
-    let whole: f64 = all.iter().map(|one| (one.odds - odds).exp()).sum::<f64>() + (-odds).exp();
+/// ln of the odds of a cell of a group, the probability of its name, and the next probable name with its own.
+#[derive(Default)]
+struct Named {
+    log_odds: f64,
+    probability: f64,
+    rival: Option<(String, f64)>,
+}
+
+/// The name of a cell of a group.
+fn named(sums: &GroupSums, cell: &str) -> Option<Named> {
+    let all: Vec<CellTotal> = sums.cells(cell).collect();
+    let own = all.iter().find(|own| own.cell == cell)?;
     let is_same =
-        |one: &&super::cause_sums::CellTotal| [&one.sum.effect[..], &one.sum.place] == name;
-    let own: f64 = all
+        |one: &&CellTotal| one.sum.effect == own.sum.effect && one.sum.place == own.sum.place;
+    // Where models are as good as they think, a log ratio has twice its mean as variance; one that scatters by more from robot to robot is
+    // worth less (Vuong, 1989).
+    let ratio = |one: &CellTotal| {
+        let prior = one.sum.log_prior - own.sum.log_prior;
+        let more = one.odds - own.odds - prior;
+        let worth = 2.0 * more.abs() / one.scatter.max(f64::MIN_POSITIVE);
+        (prior + more * worth.min(1.0)).exp()
+    };
+    let of_name: f64 = all
         .iter()
         .filter(is_same)
-        .map(|one| (one.odds - odds).exp())
+        .map(|one| (one.odds - own.odds).exp())
         .sum();
-    let rival = all
+    let rivals = all
         .iter()
         .filter(|one| !is_same(one))
-        .max_by(|a, b| a.odds.total_cmp(&b.odds))
-        .filter(|one| (one.odds - odds).exp() / whole > 0.01);
-    let rival = rival.map(|one| {
-        format!(
-            "{} at {} ({:.2})",
-            one.sum.effect.replace('_', " "),
-            one.sum.place,
-            (one.odds - odds).exp() / whole
-        )
+        .map(|one| (one, ratio(one)));
+    let whole = of_name + (-own.odds).exp() + rivals.clone().map(|(_, ratio)| ratio).sum::<f64>();
+    let best = rivals.max_by(|a, b| a.1.total_cmp(&b.1));
+    let rival = best.map(|(one, ratio)| {
+        let name = format!("{} at {}", one.sum.effect.replace('_', " "), one.sum.place);
+        (name, (1.0 - *MISLED) * ratio / whole)
     });
-    (odds, (1.0 - *MISLED) * own / whole, rival)
+    Some(Named {
+        log_odds: own.odds,
+        probability: (1.0 - *MISLED) * of_name / whole,
+        rival: rival.filter(|(_, probability)| *probability > *RIVAL),
+    })
 }
 
 /// How sizes differ by plant or campaign, where that is no chance (weighted means, Fisher's F with the scatter inside the labels).
-fn trend(robots: &[Sized], tests: f64) -> Option<String> {
-    let labels: [fn(&Groups) -> Option<&String>; 2] =
-        [|g| g.plant.as_ref(), |g| g.campaign.as_ref()];
-    let sentence = |label: fn(&Groups) -> Option<&String>| {
-        let mut by: BTreeMap<&str, Vec<&Sized>> = BTreeMap::new();
-        for robot in robots.iter().filter(|robot| robot.has >= 0.5) {
-            by.entry(label(&robot.groups)?).or_default().push(robot);
+fn trend(robots: &[FleetCellRow], tests: f64) -> Option<String> {
+    let labels: [fn(&FleetCellRow) -> Option<&String>; 2] =
+        [|row| row.plant.as_ref(), |row| row.campaign.as_ref()];
+    let sentence = |label: fn(&FleetCellRow) -> Option<&String>| {
+        let mut by: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
+        for robot in robots.iter().filter(|robot| has(robot)) {
+            by.entry(label(robot)?).or_default().push(robot.size_mm);
         }
-        by.retain(|_, robots| robots.len() > 1);
+        by.retain(|_, sizes| sizes.len() > 1);
         let count: usize = by.values().map(Vec::len).sum();
         if by.len() < 2 || count < by.len() + 4 {
             return None;
         }
-        let mean = |robots: &[&Sized]| {
-            robots.iter().map(|robot| robot.size).sum::<f64>() / robots.len() as f64
-        };
-        let all = by.values().flatten().map(|robot| robot.size).sum::<f64>() / count as f64;
+        let mean = |sizes: &[f64]| sizes.iter().sum::<f64>() / sizes.len() as f64;
+        let all = by.values().flatten().sum::<f64>() / count as f64;
         let (mut between, mut within) = (0.0, 0.0);
-        for robots in by.values() {
-            let own = mean(robots);
-            between += robots.len() as f64 * (own - all).powi(2);
-            within += robots
-                .iter()
-                .map(|robot| (robot.size - own).powi(2))
-                .sum::<f64>();
+        for sizes in by.values() {
+            let own = mean(sizes);
+            between += sizes.len() as f64 * (own - all).powi(2);
+            within += sizes.iter().map(|size| (size - own).powi(2)).sum::<f64>();
         }
         let freedom = [(by.len() - 1) as f64, (count - by.len()) as f64];
         let ratio = between / freedom[0] / (within / freedom[1]).max(f64::MIN_POSITIVE);
-        (tail(ratio, freedom[0], freedom[1]) < ALPHA / tests.min(20.0)).then(|| {
+        (tail(ratio, freedom[0], freedom[1]) < *CHANCE / tests.min(20.0)).then(|| {
             let sentences = by
                 .iter()
-                .map(|(label, robots)| format!("{:.3} mm at {label}", mean(robots)));
+                .map(|(label, sizes)| format!("{:.3} mm at {label}", mean(sizes)));
             sentences.collect::<Vec<_>>().join(", ")
         })
     };
@@ -354,14 +353,12 @@ fn trend(robots: &[Sized], tests: f64) -> Option<String> {
     (!sentences.is_empty()).then(|| sentences.join("; "))
 }
 
-fn length(size: f64, sigma: f64) -> String {
-    format!("{size:.3} +- {sigma:.3}")
+fn length(robot: &FleetCellRow) -> String {
+    format!("{:.3} +- {:.3}", robot.size_mm, robot.sigma_mm)
 }
 
 fn outlier(
-    robot: &Sized,
-    group: &str,
-    cell: &str,
+    robot: &FleetCellRow,
     kind: &str,
     usual_mm: Option<f64>,
     statement: String,
@@ -369,34 +366,11 @@ fn outlier(
     FleetOutlierRow {
         robot: robot.robot.clone(),
         kind: kind.into(),
-        cell: cell.into(),
-        group: group.into(),
-        size_mm: Some(robot.size),
+        cell: robot.cell.clone(),
+        group: robot.group.clone(),
+        size_mm: Some(robot.size_mm),
         usual_mm,
-        probability: (kind == "lacks").then_some(1.0 - robot.has),
+        probability: (kind == "lacks").then_some(1.0 - robot.probability),
         statement,
-    }
-}
-
-fn size_row(
-    robot: Sized,
-    group: &str,
-    cell: &str,
-    [effect, place]: [&str; 2],
-    deviation: Option<f64>,
-) -> FleetCellRow {
-    FleetCellRow {
-        cell: cell.into(),
-        robot: robot.robot,
-        group: group.into(),
-        plant: robot.groups.plant,
-        campaign: robot.groups.campaign,
-        effect: effect.into(),
-        place: place.into(),
-        log_evidence: robot.log,
-        probability: robot.has,
-        size_mm: robot.size,
-        sigma_mm: robot.sigma,
-        deviation,
     }
 }

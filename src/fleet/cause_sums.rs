@@ -3,6 +3,7 @@
 use super::ledger::{Ledger, RobotRecord};
 use super::{Fleet, FleetRobot};
 use crate::error::Result;
+use crate::stage::Given;
 use crate::table::{CellEvidence, CellEvidenceRow, Table};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -43,6 +44,10 @@ pub(super) struct Sum {
     strongest: f64,
     /// Sizes weighed by how plain they are, and the weights.
     sized: (f64, f64),
+    /// Robots, and sums of what its log evidence is less than that of the cell in whose place it is asked: differences, their squares.
+    less: [f64; 3],
+    /// Sums of that cell's log evidence in the same robots, and of its square.
+    owner: [f64; 2],
 }
 
 impl Sum {
@@ -55,11 +60,19 @@ impl Sum {
             logs: [0.0; SHARES],
             strongest: LEAST,
             sized: (0.0, 0.0),
+            less: [0.0; 3],
+            owner: [0.0; 2],
         }
     }
 
-    fn add(&mut self, row: &CellEvidenceRow) {
+    fn add(&mut self, row: &CellEvidenceRow, owner: f64) {
         let log = row.log_evidence.max(LEAST);
+        let less = owner - log;
+        for (sum, value) in self.less.iter_mut().zip([1.0, less, less * less]) {
+            *sum += value;
+        }
+        self.owner[0] += owner;
+        self.owner[1] += owner * owner;
         for (sum, share) in self.logs.iter_mut().zip(shares()) {
             *sum += mixed(log, share) - mixed(LEAST, share);
         }
@@ -83,6 +96,16 @@ impl Sum {
         log_mean(self.logs.iter().zip(shares()).map(at))
     }
 
+    /// Variance of the sum of what it says less than its owner, whose sums over so many robots are given, by the scatter from robot to robot.
+    fn scatter(&self, owner: &[f64; 2], robots: usize) -> f64 {
+        // Robots without a row say the least.
+        let (count, missing) = (robots as f64, robots as f64 - self.less[0]);
+        let [own, square] = [0, 1].map(|k| owner[k] - self.owner[k]);
+        let sum = self.less[1] + own - missing * LEAST;
+        let square = self.less[2] + square - 2.0 * LEAST * own + missing * LEAST * LEAST;
+        (square - sum * sum / count.max(1.0)).max(0.0)
+    }
+
     /// A usual size, mm.
     pub fn size_mm(&self) -> f64 {
         (self.sized.0 / self.sized.1.max(f64::MIN_POSITIVE))
@@ -98,6 +121,8 @@ type CellKey = (String, String, String);
 #[derive(Debug, Default)]
 pub(super) struct GroupSums {
     pub robots: usize,
+    /// Sums of what each given cell says in its shape, and of the squares.
+    owners: BTreeMap<String, [f64; 2]>,
     sums: BTreeMap<CellKey, Sum>,
 }
 
@@ -110,39 +135,55 @@ pub(super) struct CellTotal<'a> {
     pub odds: f64,
     /// The same without the robot in which it is plainest.
     pub of_the_others: f64,
+    /// Variance of what it says less than the cell in whose place it is asked.
+    pub scatter: f64,
 }
 
 impl GroupSums {
-    /// Takes a robot.
-    pub fn add(&mut self, rows: &[CellEvidenceRow]) {
+    /// Takes a robot that was asked with some given cells.
+    pub fn add(&mut self, rows: &[CellEvidenceRow], given: &[Given]) {
         self.robots += 1;
+        let mut logs: BTreeMap<&str, f64> = BTreeMap::new();
+        for one in given {
+            let shape = one.shape.as_deref().unwrap_or_default();
+            let is_own = |row: &&CellEvidenceRow| {
+                row.given == one.cell && row.cell == one.cell && row.shape == shape
+            };
+            let own = rows.iter().find(is_own);
+            let log = own.map_or(LEAST, |row| row.log_evidence.max(LEAST));
+            logs.insert(&one.cell, log);
+            let sums = self.owners.entry(one.cell.clone()).or_default();
+            (sums[0], sums[1]) = (sums[0] + log, sums[1] + log * log);
+        }
         for row in rows {
             let key = (row.given.clone(), row.cell.clone(), row.shape.clone());
+            let owner = logs.get(row.given.as_str()).copied().unwrap_or(LEAST);
             self.sums
                 .entry(key)
                 .or_insert_with(|| Sum::new(row))
-                .add(row);
+                .add(row, owner);
         }
     }
 
     /// All cells in the place of a given one; of none: next to all.
     pub fn cells<'a>(&'a self, given: &'a str) -> impl Iterator<Item = CellTotal<'a>> {
-        let mut shared: BTreeMap<&str, (f64, f64, f64, &str)> = BTreeMap::new();
+        let mut shared: BTreeMap<&str, (f64, f64, f64, &str, &Sum)> = BTreeMap::new();
         let here = move || self.sums.iter().filter(move |(key, _)| key.0 == given);
         for ((_, cell, shape), sum) in here().filter(|(key, _)| !key.2.is_empty()) {
             let [all, others] = [sum.total(self.robots), sum.of_the_others(self.robots)]
                 .map(|total| total + sum.log_prior);
             let best = shared
                 .entry(cell)
-                .or_insert((all, others, f64::NEG_INFINITY, shape));
+                .or_insert((all, others, f64::NEG_INFINITY, shape, sum));
             if best.2 > f64::NEG_INFINITY {
                 best.0 = log_add(best.0, all);
                 best.1 = log_add(best.1, others);
             }
             if all > best.2 {
-                (best.2, best.3) = (all, shape);
+                (best.2, best.3, best.4) = (all, shape, sum);
             }
         }
+        let owner = self.owners.get(given).copied().unwrap_or_default();
         here()
             .filter(|(key, _)| key.2.is_empty())
             .map(move |((_, cell, _), sum)| {
@@ -157,6 +198,9 @@ impl GroupSums {
                     sum,
                     odds: total + sum.log_prior,
                     of_the_others: others + sum.log_prior,
+                    scatter: together
+                        .map_or(sum, |shared| shared.4)
+                        .scatter(&owner, self.robots),
                 }
             })
     }
@@ -213,7 +257,7 @@ mod tests {
 
     fn odds(logs: &[f64], robots: usize) -> (f64, f64) {
         let mut sums = GroupSums::default();
-        logs.iter().for_each(|log| sums.add(&[row(*log)]));
+        logs.iter().for_each(|log| sums.add(&[row(*log)], &[]));
         sums.robots = robots;
         let cell = sums.cells("").next().expect("a cell");
         (cell.odds, cell.of_the_others)
@@ -227,6 +271,30 @@ mod tests {
         // Ten more robots that show nothing (by Beta(11, 11) at the least: 10 ln 0.5 and the price).
         let (half, _) = odds(&[2.0; 10], 20);
         assert!(half > 2.0 && half < all, "{half}");
+    }
+
+    #[test]
+    fn the_scatter_of_a_difference_is_that_of_its_terms() {
+        let mut sums = GroupSums::default();
+        let given = |cell: &str, log: f64| CellEvidenceRow {
+            given: "a".into(),
+            cell: cell.into(),
+            ..row(log)
+        };
+        // Differences 1, 4 and, where the rival has no row, 5 + 3.3.
+        let own = [Given {
+            cell: "a".into(),
+            shape: None,
+            size_mm: 0.05,
+        }];
+        sums.add(&[given("a", 3.0), given("b", 2.0)], &own);
+        sums.add(&[given("a", 6.0), given("b", 2.0)], &own);
+        sums.add(&[given("a", 5.0)], &own);
+        let cells: Vec<_> = sums.cells("a").collect();
+        let mean = (1.0 + 4.0 + 8.3) / 3.0;
+        let by_hand: f64 = [1.0f64, 4.0, 8.3].iter().map(|d| (d - mean).powi(2)).sum();
+        assert!((cells[1].scatter - by_hand).abs() < 1e-9);
+        assert_eq!(cells[0].scatter, 0.0);
     }
 
     #[test]

@@ -7,6 +7,7 @@ use super::ledger::RobotRecord;
 use super::round::{GroupColumn, Round};
 use super::{Fleet, Ledger};
 use crate::criteria::cells::{COMPONENTS, JOINS, LEAVES};
+use crate::criteria::fleet::{ALONE, EXCHANGED};
 use crate::effect::names;
 use crate::error::{Result, visible};
 use crate::report::fleet_causes as page;
@@ -21,10 +22,6 @@ use std::path::PathBuf;
 const STAGE: &str = "fleet_diagnose";
 /// Where its tables are noted among the fleet's.
 pub(super) const NOTE: &str = "causes.json";
-/// Causes of a single robot that its group does not have, at most.
-const ALONE: usize = 3;
-/// By how much the odds of a rival must be larger to take the place of a cause.
-const EXCHANGED: f64 = 1.0;
 
 /// What a group has so far, and what was tried.
 #[derive(Default)]
@@ -82,14 +79,16 @@ impl CauseSearch {
         each(fleet, ledger, records, &mut |robot, rows| {
             let group = self.round.by.of(&robot.groups).to_string();
             let known = self.round.robots.get(&robot.name);
-            if known.is_none_or(|known| known.len() < ALONE)
+            if known.is_none_or(|known| known.len() < *ALONE)
                 && let Some(given) = likeliest(rows)
             {
                 let robot = robot.name.clone();
                 let one = Alone { robot, given };
                 alone.entry(group.clone()).or_default().push(one);
             }
-            sums.entry(group).or_default().add(rows);
+            let given = self.round.groups.get(&group);
+            let given = given.map_or(&[][..], Vec::as_slice);
+            sums.entry(group).or_default().add(rows, given);
         })?;
         let mut goes_on = false;
         for (group, sums) in &sums {
@@ -171,7 +170,7 @@ impl GroupSearch {
                 continue;
             };
             let best = all.iter().max_by(|a, b| a.odds.total_cmp(&b.odds));
-            let Some(best) = best.filter(|best| best.odds > stays + EXCHANGED) else {
+            let Some(best) = best.filter(|best| best.odds > stays + *EXCHANGED) else {
                 continue;
             };
             let mut next = self.given.clone();
@@ -257,7 +256,7 @@ pub fn publish(
         key_format: KEY_FORMAT,
         id: STAGE.into(),
         stage: STAGE.into(),
-        implementation: 1,
+        implementation: 2,
         settings: json!({ "robots": robots.collect::<Vec<_>>(), "round": search.round() }),
         reads: BTreeMap::new(),
         files: BTreeMap::new(),

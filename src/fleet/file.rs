@@ -150,8 +150,8 @@ pub enum PriorBy {
     Robot,
     /// Mean and spread over all robots of the same `groups.model`, with the robot's own left out.
     Model,
-    /// Causes that `calib fleet diagnose` found in the robots of the same `groups.model`: how usual and how large each is, for a stage
-    /// `diagnose`.
+    /// Causes that `calib fleet diagnose` found in the robots of the same `groups.model`: how usual and how large each is in the
+    /// other robots, for a stage `diagnose`.
     Causes,
 }
 

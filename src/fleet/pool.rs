@@ -4,12 +4,13 @@
 //! value is left out of the prior that it gets, so that nothing is counted twice.
 
 use super::Fleet;
+use super::cause_answers::{Population, has, population};
 use super::causes::noted;
 use super::file::{Groups, PriorBy, PriorFrom};
 use super::ledger::{Ending, Ledger};
 use super::recalibration::Earlier;
 use crate::error::{Error, Result};
-use crate::table::{FleetFindingRow, FleetFindings, Parameters, Table};
+use crate::table::{FleetCellRow, FleetCells, FleetFindingRow, FleetFindings, Parameters, Table};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
@@ -74,10 +75,12 @@ impl Fleet {
         Ok(())
     }
 
-    /// Sets for every robot what the diagnosis of an earlier fleet says of the causes of its model.
+    /// Sets for every robot what the diagnosis of an earlier fleet says of the causes of its model; its own sizes are left out.
     fn expect_causes(&mut self, wanted: &PriorFrom, ledger: &Ledger) -> Result<()> {
         let earlier = Ledger::new(ledger.store, &wanted.fleet);
-        let findings = noted::<FleetFindings>(&earlier, "fleet_findings")?.ok_or_else(|| {
+        let findings = noted::<FleetFindings>(&earlier, "fleet_findings")?;
+        let cells = noted::<FleetCells>(&earlier, "fleet_cells")?;
+        let (findings, cells) = findings.zip(cells).ok_or_else(|| {
             let message = format!(
                 "no fleet `{}` was diagnosed in store {}: calib fleet diagnose",
                 wanted.fleet,
@@ -85,17 +88,16 @@ impl Fleet {
             );
             Error::spec("prior.fleet", message)
         })?;
+        let mut causes: Vec<(&FleetFindingRow, Vec<FleetCellRow>)> = Vec::new();
+        for row in findings.0.iter().filter(|row| row.robot.is_empty()) {
+            let of_row = |cell: &&FleetCellRow| cell.cell == row.cell && cell.group == row.group;
+            causes.push((row, cells.0.iter().filter(of_row).cloned().collect()));
+        }
         for robot in &mut self.roster.0 {
             let model = robot.groups.model.clone().unwrap_or_default();
-            let of_model = findings
-                .0
-                .iter()
-                .filter(|row| row.robot.is_empty() && row.group == model);
-            let prior = |row: &FleetFindingRow| {
-                json!({
-                    "cell": row.cell, "share": row.robots as f64 / row.of_robots as f64,
-                    "size_mm": row.size_mm.max(1e-3), "spread_mm": row.spread_mm.unwrap_or(0.0),
-                })
+            let of_model = causes.iter().filter(|(row, _)| row.group == model);
+            let prior = |(row, sizes): &(&FleetFindingRow, Vec<FleetCellRow>)| {
+                expected(row, sizes, &robot.name)
             };
             let priors: Vec<Value> = of_model.map(prior).collect();
             let target = format!("{}.prior", wanted.stage);
@@ -103,6 +105,25 @@ impl Fleet {
         }
         Ok(())
     }
+}
+
+/// What a cause of the model lets expect of a robot, by the sizes of the others.
+fn expected(row: &FleetFindingRow, sizes: &[FleetCellRow], robot: &str) -> Value {
+    let (mut having, mut all) = (row.robots, row.of_robots);
+    let (mut size_mm, mut spread_mm) = (row.size_mm, row.spread_mm.unwrap_or(0.0));
+    let mut others = sizes.to_vec();
+    others.retain(|other| other.robot != robot);
+    if others.len() < sizes.len() {
+        Population {
+            usual: size_mm,
+            spread: spread_mm,
+        } = population(&mut others);
+        having = others.iter().filter(|other| has(other)).count() as i64;
+        all -= 1;
+    }
+    // A robot has it if its siblings do and if it is that cause.
+    let share = row.probability * having as f64 / all.max(1) as f64;
+    json!({ "cell": row.cell, "share": share, "size_mm": size_mm.max(1e-3), "spread_mm": spread_mm })
 }
 
 /// Changes from nominal that the earlier fleet estimated.
@@ -182,7 +203,63 @@ fn pool(values: &[PooledPrior]) -> Option<PooledPrior> {
 
 #[cfg(test)]
 mod tests {
-    use super::pool;
+    use super::*;
+
+    #[test]
+    fn the_own_size_of_a_robot_is_no_part_of_what_is_expected_of_it() {
+        let row = |name: &str, size_mm: f64| FleetCellRow {
+            cell: "backlash@joint 2".into(),
+            robot: name.into(),
+            group: "m".into(),
+            plant: None,
+            campaign: None,
+            effect: "backlash".into(),
+            place: "joint 2".into(),
+            log_evidence: if size_mm > 0.0 { 9.0 } else { -2.0 },
+            probability: f64::from(size_mm > 0.0),
+            size_mm,
+            sigma_mm: 0.002,
+            deviation: None,
+        };
+        let sizes = [
+            row("a", 0.04),
+            row("b", 0.04),
+            row("c", 0.06),
+            row("d", 0.06),
+            row("e", 0.06),
+            row("f", 0.0),
+        ];
+        let finding = FleetFindingRow {
+            group: "m".into(),
+            cell: "backlash@joint 2".into(),
+            robot: String::new(),
+            effect: "backlash".into(),
+            place: "joint 2".into(),
+            follows: "approach".into(),
+            shape: None,
+            robots: 5,
+            of_robots: 6,
+            log_odds: 30.0,
+            probability: 1.0,
+            rival: None,
+            size_mm: 0.06,
+            spread_mm: Some(0.01),
+            trend: None,
+            decided: Some(true),
+            statement: String::new(),
+        };
+        let of = |robot: &str| {
+            let prior = expected(&finding, &sizes, robot);
+            (prior["share"].as_f64(), prior["size_mm"].as_f64())
+        };
+        // By hand: five of six have it; a median of 0.06, 0.06, 0.06, 0.04, 0.04.
+        assert_eq!(of("new"), (Some(5.0 / 6.0), Some(0.06)));
+        assert_eq!(of("f"), (Some(1.0), Some(0.06)));
+        assert_eq!(of("a"), (Some(0.8), Some(0.06)));
+        // Of the two that remain of c, d, e with a and b either is a median.
+        let (share, size) = of("c");
+        assert!(share == Some(0.8) && size.is_some_and(|size| size < 0.0601));
+    }
 
     #[test]
     fn a_pool_tells_scatter_from_error() {

@@ -48,7 +48,7 @@ impl Stage for CellEvidence {
     const NAME: &'static str = "cell_evidence";
     const SUMMARY: &'static str =
         "says what every possible cause explains of one robot, for the sum over a fleet";
-    const IMPLEMENTATION: u32 = 1;
+    const IMPLEMENTATION: u32 = 2;
     type Reads = DiagnoseReads;
     type Writes = CellEvidenceWrites;
 

@@ -1,29 +1,28 @@
 //! `diagnose`: where the recording and the robot as its user believes it differ, what physics was left out, and the gain of it.
 
-use crate::diagnose::{
-    Diagnosis, KnownCell, Question, VerdictKind as Said, against_simulation, diagnose, wrong_setup,
-};
-use crate::effect::{CAUSES, DeclaredCause, names};
+mod asked_rows;
+
+pub(super) use asked_rows::AskedRows;
+
+use crate::diagnose::{Diagnosis, KnownCell, Question, VerdictKind as Said, diagnose, wrong_setup};
+use crate::effect::{CAUSES, names};
 use crate::error::{Error, Fault, Result, instead};
-use crate::estimate::{Suspect, gauge};
-use crate::observation::values;
-use crate::robot::{Measurements, RobotModel};
+use crate::estimate::Suspect;
+use crate::robot::Measurements;
 use crate::stage::blank_payload::blank_payload;
 use crate::stage::brought;
 use crate::stage::doubtful::{self, KnownModel};
 use crate::stage::misplaced_tool::misplaced_tool;
 use crate::stage::own_effects::own_effects;
 use crate::stage::rounded::rounded_logs;
-use crate::stage::unmoved::must_move;
 use crate::stage::weightless::{WeightlessLinks, weightless_links};
-use crate::stage::{Context, RawFile, Stage, screened};
+use crate::stage::{Context, RawFile, Stage};
 use crate::table::{
     Cells, Corrected, CovarianceTable, FindingNumbers, Findings, Forms, Parameters, Prediction,
     Recording, Rivals, Robot, Shares, Spectrum, Split, Suspects, Verdict, VerdictSentences,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 
 /// Settings of `diagnose`.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
@@ -100,11 +99,6 @@ const HEAVIEST: f64 = 10.0;
 /// Priors between which evidence still decides.
 const MOST_CLOSED: f64 = 0.001;
 const MOST_OPEN: f64 = 0.999;
-
-/// Fewest rows that place a robot before the tracker; what is missing takes more of them.
-const FEWEST: usize = 3;
-
-const SORTED_OTHERWISE: &str = "rows stand in another order than their times (sorted by name?): approach, lag and drift follow the times";
 
 crate::stage::reads! {
     /// Input ports of [`Diagnose`].
@@ -304,79 +298,6 @@ impl Stage for Diagnose {
     }
 }
 
-/// The rows that a diagnosis is asked of, and the robot that they belong to.
-pub(super) struct AskedRows {
-    own: Vec<&'static DeclaredCause>,
-    known: Vec<KnownCell>,
-    data: Measurements,
-    corrected: Corrected,
-    fit: Vec<usize>,
-    validate: Vec<usize>,
-    robot: RobotModel,
-    set: Vec<usize>,
-}
-
-impl AskedRows {
-    /// Of the tables of a stage with these settings; fails where they do not place the robot.
-    pub fn of(settings: &Diagnose, reads: &DiagnoseReads, context: &Context) -> Result<Self> {
-        let own = own_effects(&settings.effects, context)?;
-        let asked = reads.split.rows(&reads.recording, &settings.on)?;
-        let (data, corrected) = mismatch(reads, &asked, context)?;
-        if data.sequence.is_some() {
-            context.services.warn(SORTED_OTHERWISE.into());
-        }
-        let measured = |row: &usize| values(&data, *row) > 0;
-        let fit: Vec<usize> = asked.iter().copied().filter(measured).collect();
-        if fit.len() < FEWEST {
-            let message = format!(
-                "{} measured rows to fit do not even place the robot: at least {FEWEST} are needed",
-                fit.len()
-            );
-            return Err(Error::data("table recording", message));
-        }
-        must_move(&data, &fit)?;
-        let validate: Vec<usize> = (0..data.rows())
-            .filter(|row| asked.binary_search(row).is_err() && measured(row))
-            .collect();
-        let (robot, _) = gauge(
-            RobotModel::new(reads.robot.to_description()?),
-            &data,
-            &fit,
-            &BTreeMap::new(),
-        )
-        .map_err(|message| Error::data("table recording", message))?;
-        let set = screened::numbered(&reads.split);
-        Ok(Self {
-            own,
-            known: settings.prior.iter().map(CellPrior::known).collect(),
-            data,
-            corrected,
-            fit,
-            validate,
-            robot,
-            set,
-        })
-    }
-
-    /// What is asked of them.
-    pub fn question<'a>(&'a self, settings: &'a Diagnose, seed: u64) -> Question<'a> {
-        Question {
-            robot: &self.robot,
-            data: &self.data,
-            fit: &self.fit,
-            validate: &self.validate,
-            set: &self.set,
-            prior_weight: settings.prior_weight,
-            open_world: settings.open_world,
-            without: &settings.without,
-            own: &self.own,
-            beside_simulation: self.corrected == Corrected::OutsideSimulation,
-            known: &self.known,
-            seed,
-        }
-    }
-}
-
 /// What a diagnosed recording shows beside its findings: rounded logs and brought marks in the statement too, a tool out of place as a warning.
 fn remark(
     diagnosis: &mut Diagnosis,
@@ -405,29 +326,6 @@ fn remark(
     misplaced_tool(&diagnosis.model, &diagnosis.fitted)
         .into_iter()
         .for_each(|line| context.services.warn(line));
-}
-
-/// What is diagnosed, and what its parameters correct: the measurements, or what they differ by from an outside simulation.
-fn mismatch(
-    reads: &DiagnoseReads,
-    asked: &[usize],
-    context: &Context,
-) -> Result<(Measurements, Corrected)> {
-    let data = reads.recording.measurements();
-    let Some(simulated) = &reads.recording.simulated else {
-        return Ok((data, Corrected::RobotFile));
-    };
-    let robot = RobotModel::new(reads.robot.to_description()?);
-    let message = "aligning simulation and recording needs three rows to fit with sim_x, sim_y, sim_z and a measured point";
-    let data = against_simulation(&robot, &data, simulated, asked)
-        .ok_or_else(|| Error::data("table recording", message))?;
-    context
-        .services
-        .note("the mismatch is measured minus simulated (sim_x, sim_y, sim_z)".into());
-    context
-        .services
-        .warn("parameters correct that simulation: they are not the robot file's".into());
-    Ok((data, Corrected::OutsideSimulation))
 }
 
 /// Tells a person at once what must not be read past: a wrong set-up, too few rows, and what cannot be known without masses.

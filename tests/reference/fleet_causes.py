@@ -5,8 +5,9 @@
 
 Every robot of a fleet has rigid errors, a tracker's place, poses and noise of its own, and the fleet's cause with a size that scatters by
 10 % (and a phase of its own); one robot lacks it. A first fleet of a few robots scales the cause so that ln of the evidence of its cell in
-one robot is about 5 (--evidence). Counted: the cause named at its place, wrong names, the robot that lacks it listed, others listed; in how
-many single robots the cell's odds alone would have been enough; null fleets with any name.
+one robot is about 5 (--evidence). Counted: the cause named at its place, findings that are this one or a rival, wrong names (of decided
+findings, and of others whose rival is wrong as well), the robot that lacks it listed, others listed; in how many single robots the cell's
+odds alone would have been enough; null fleets with any name.
 """
 
 import argparse
@@ -134,7 +135,7 @@ def main():
     r = random.Random(seed)
     os.makedirs(args.out, exist_ok=True)
     pipeline(args.out, args)
-    score = {"named": 0, "other": 0, "lacking listed": 0, "others listed": 0, "single": 0, "robots": 0}
+    score = {"named": 0, "one of two": 0, "other": 0, "lacking listed": 0, "others listed": 0, "single": 0, "robots": 0}
     for f in range(args.fleets):
         effect, kind, make, strength = CAUSES[f % len(CAUSES)]
         j = r.choice([2, 3, 4])
@@ -155,19 +156,23 @@ def main():
         seconds = time.time() - begun
         single = logs(store, f"fleet{f}", effect, place)
         shared = [row for row in answer["findings"] if not row["robot"]]
-        names = [(row["effect"], row["place"]) for row in shared]
-        named = (effect, place) in names
-        others = [name for name in names if name != (effect, place)]
+        truth = f"{effect.replace('_', ' ')} at {place}"
+        is_true = lambda row: (row["effect"], row["place"]) == (effect, place)
+        named = any(is_true(row) and row["decided"] for row in shared)
+        either = lambda row: not row["decided"] and (is_true(row) or (row["rival"] or "").startswith(truth + " ("))
+        open_ = [f"{row['effect']} at {row['place']} ({row['probability']:.2f}) or {row['rival']}" for row in shared if either(row)]
+        others = [(row["effect"], row["place"], row["decided"]) for row in shared if not is_true(row) and not either(row)]
         listed = {row["robot"] for row in answer["outliers"] if row["kind"] == "lacks"}
         alone = {row["robot"] for row in answer["outliers"] if row["kind"] != "lacks"}
         score["named"] += named
+        score["one of two"] += bool(open_)
         score["other"] += bool(others)
         score["lacking listed"] += f"r{lacking:03}" in listed
         score["others listed"] += len((listed | alone) - {f"r{lacking:03}"})
         score["single"] += sum(log + prior >= 3 for log, prior in single)
         score["robots"] += len(single)
         mean = sum(log for log, _ in single) / len(single)
-        print(f"fleet {f}: {effect} at {place}, strength {strength:.3g}, ln E {mean:.1f} a robot: named {named}, others {others}, "
+        print(f"fleet {f}: {effect} at {place}, strength {strength:.3g}, ln E {mean:.1f} a robot: named {named}, one of two {open_}, others {others}, "
               f"r{lacking:03} listed {f'r{lacking:03}' in listed}, also listed {sorted((listed | alone) - {f'r{lacking:03}'})}; "
               f"{answer['rounds']} rounds, {seconds:.0f} s", flush=True)
         shutil.rmtree(store)

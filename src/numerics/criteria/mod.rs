@@ -17,6 +17,7 @@ pub mod cells;
 pub mod choose;
 pub mod closed_form;
 pub mod effect;
+pub mod fleet;
 pub mod judge;
 pub mod noise;
 pub mod screen;
@@ -36,6 +37,7 @@ pub const TABLES: &[&[CriterionRow]] = &[
     choose::ROWS,
     closed_form::ROWS,
     effect::ROWS,
+    fleet::ROWS,
     judge::ROWS,
     noise::ROWS,
     screen::ROWS,
@@ -73,6 +75,7 @@ fn all() -> impl Iterator<Item = (&'static str, &'static dyn criterion::Scalable
         choose::SCALABLE,
         closed_form::SCALABLE,
         effect::SCALABLE,
+        fleet::SCALABLE,
         judge::SCALABLE,
         noise::SCALABLE,
         screen::SCALABLE,

@@ -12,7 +12,7 @@ const ROBOTS: usize = 8;
 const LACKING: usize = 5;
 
 /// Twins with rigid errors of their own and what `effects` says of each.
-fn twins(folder: &Path, name: &str, effects: impl Fn(usize) -> String) -> std::path::PathBuf {
+pub fn twins(folder: &Path, name: &str, effects: impl Fn(usize) -> String) -> std::path::PathBuf {
     let robot = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sr210d/robot.yaml");
     let pipeline = format!(
         "calib: 1\nname: twins\nseed: 5\nstages:\n  - uses: robot\n    with: {{file: {}}}\n  - uses: simulate\n    with:\n      \
@@ -176,6 +176,7 @@ fn the_page_of_two_thousand_robots_is_small_and_the_furthest_robot_comes_first()
         size_mm: 0.03,
         spread_mm: Some(0.002),
         trend: None,
+        decided: Some(true),
         statement: "backlash at joint 3 in 1500 of 2000 robots".into(),
     };
     let cells = FleetCells((0..2000).map(size).collect());

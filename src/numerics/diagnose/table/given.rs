@@ -7,7 +7,7 @@ use super::scan::CauseTable;
 use super::search::without;
 use super::state::{CellColumns, Component, KnownState, SeenGroup, shape_keys};
 use super::{by_currents, estimated, is_kept};
-use crate::criteria::cells::{CLOSELY, OPEN};
+use crate::criteria::cells::{CLOSELY, OPEN, SMALLEST};
 use crate::diagnose::round::{EstimatedCause, FitState, Fitter, RoundView};
 use crate::effect::{Basis, Form, Place, Term};
 use nalgebra::{DMatrix, DVector};
@@ -235,8 +235,11 @@ impl CauseTable<'_, '_> {
                 (out[k].0.log, out[k].0.size) = (found.log, found.amplitude);
             }
         }
+        // What moves the tool by less than anything sees, as masses that motor currents show may, is no cause of its errors.
+        let is_seen =
+            |whole: &CellAnswer| whole.size > *SMALLEST || whole.size > 0.0 && whole.log <= 0.0;
         out.into_iter()
-            .filter(|(whole, _)| whole.log.is_finite())
+            .filter(|(whole, _)| whole.log.is_finite() && is_seen(whole))
             .flat_map(|(whole, shapes)| std::iter::once(whole).chain(shapes))
             .collect()
     }
