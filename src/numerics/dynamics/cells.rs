@@ -3,6 +3,7 @@
 
 use super::cause::{TORQUE_CONSTANT, UNKNOWN};
 use super::choice::CauseChoice;
+use super::naming::JudgedSet;
 use crate::criteria::cells::{COMMON, NU, SWAPS};
 use crate::criteria::torque::{APART, COMPONENTS, EXCHANGES, LEAST_NOISE, PER_METRE, USUAL};
 use crate::diagnose::table::{
@@ -61,6 +62,8 @@ pub(super) struct TorqueTable<'a, 'b> {
     forms: Vec<FormProducts>,
     /// Coefficient of each column at unit amplitude.
     unit: Vec<f64>,
+    /// Forms that do not leave.
+    kept: Vec<usize>,
     /// What the base leaves of the products of components' columns with all others.
     left: RefCell<BTreeMap<usize, Rc<Vec<f64>>>>,
 }
@@ -77,7 +80,8 @@ impl ComponentSearch for TorqueTable<'_, '_> {
     }
 
     fn odds(&self, components: &[TorqueComponent], place: usize, kappa: f64) -> Option<f64> {
-        let is_free = self.choice.is_whole(&forms(&without(components, place)));
+        let is_free = !self.kept.contains(&components[place].form)
+            && self.choice.is_whole(&forms(&without(components, place)));
         is_free.then(|| self.odds_of(components, place, kappa).log_odds)
     }
 
@@ -171,6 +175,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
             rows,
             forms,
             unit,
+            kept: Vec::new(),
             left: RefCell::default(),
         }
     }
@@ -238,7 +243,8 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
         let shares = vec![1.0 / columns.len() as f64; columns.len()];
         let found = evidence(&gram, &along, &shares, state.known.rows);
         let values = || {
-            let least = 1e-9 * gram.trace();
+            // Their means given the rows: of columns that nearly cancel each other least squares would make whatever is large.
+            let least = columns.len() as f64 / found.amplitude.powi(2);
             let factor = (&gram + DMatrix::identity(gram.nrows(), gram.nrows()) * least).cholesky();
             let solved = factor.map_or_else(
                 || vec![0.0; columns.len()],
@@ -619,6 +625,18 @@ pub(super) fn search(choice: &CauseChoice, start: &[usize]) -> Vec<usize> {
     forms(&TorqueTable::new(choice).searched(start))
 }
 
+/// A judged set without what no longer pays; what is silent stays.
+pub(super) fn pruned(choice: &CauseChoice, judged: &JudgedSet) -> Vec<usize> {
+    let mut table = TorqueTable::new(choice);
+    let is_silent = |number: &usize| {
+        let mut silent = judged.silent.iter();
+        silent.any(|one| choice.form(*one).is_called_as(choice.form(*number)))
+    };
+    table.kept = judged.set.iter().copied().filter(is_silent).collect();
+    let components = table.components(&judged.set);
+    forms(&table.prune(components))
+}
+
 /// A set after exchanges, merges and removals.
 pub(super) fn settle(choice: &CauseChoice, set: &[usize]) -> Vec<usize> {
     let mut table = TorqueTable::new(choice);
@@ -648,4 +666,62 @@ fn pairs(of: &[usize]) -> Vec<Vec<usize>> {
             .collect::<Vec<_>>()
     };
     of.iter().enumerate().flat_map(with).collect()
+}
+
+pub(super) fn dbg_angles(choice: &CauseChoice, set: &[usize], tell: &mut dyn FnMut(String)) {
+    let table = TorqueTable::new(choice);
+    let now = table.components(set);
+    for joint in 0..choice.problem.scene.joints() {
+        let at = |n: &usize| {
+            choice.form(*n).place == Place::Joint(joint) && choice.form(*n).cause.about().of_angle
+        };
+        let own: Vec<usize> = set.iter().copied().filter(at).collect();
+        let d = |n: &usize| {
+            let f = choice.form(*n);
+            format!(
+                "{}{:?}w{}{:?}",
+                f.cause.name(),
+                f.with,
+                f.width,
+                f.shape
+                    .iter()
+                    .map(|x| (x * 100.0).round() / 100.0)
+                    .collect::<Vec<_>>()
+            )
+        };
+        if own.is_empty() {
+            continue;
+        }
+        eprintln!(
+            "{}",
+            format!(
+                "DBG joint {} {:?} total {:.1} noise {:?}",
+                joint + 1,
+                own.iter().map(d).collect::<Vec<_>>(),
+                table.total(&now),
+                choice.problem.noise[joint]
+            )
+        );
+        let rest: Vec<usize> = set.iter().copied().filter(|n| !at(n)).collect();
+        let restc = table.components(&rest);
+        eprintln!("{}", format!("DBG   none {:.1}", table.total(&restc)));
+        let state = table.state(&restc, None);
+        for n in (0..choice.open).filter(at) {
+            let mut one = rest.clone();
+            one.push(n);
+            let f = table.form(n, &state).map(|x| x.0);
+            eprintln!(
+                "{}",
+                format!(
+                    "DBG   {} form {:?} total {:.1} square {:.1}",
+                    d(&n),
+                    f,
+                    table.total(&table.components(&one)),
+                    choice.base.with(&one).square - choice.base.with(set).square
+                )
+            );
+        }
+    }
+    let f = table.state(&now, None).known.kappa;
+    eprintln!("{}", format!("DBG kappa {f}"));
 }

@@ -6,6 +6,7 @@ use super::cause::{COULOMB, OFFSET, TORQUE_CAUSES, TorqueForm, VISCOUS};
 use super::model::TorqueModel;
 use super::newton_euler::INERTIAL_NUMBERS;
 use super::problem::TorqueProblem;
+use super::noise::NoiseMemory;
 use super::rich::noise_beside;
 use super::source::TorqueSource;
 use super::stacked::{CandidateColumns, StackedFit, StackedNormal};
@@ -218,7 +219,7 @@ fn take_columns(
     problem.theta.clone_from(&own.inertials);
     problem.shift(own.latency);
     let forms: Vec<usize> = (0..candidates.len()).collect();
-    problem.noise = noise_beside(problem, &forms).0;
+    problem.noise = noise_beside(problem, &forms, NoiseMemory::Short).0;
     problem.theta.clone_from(&about.inertials);
     problem.shift(own.latency);
 }

@@ -62,12 +62,7 @@ impl<'a> CauseChoice<'a> {
                 || (form.is_called_as(other_form)
                     && (!form.cause.about().may_repeat || form.with == other_form.with))
         };
-        let is_barred = || {
-            self.problem
-                .barred
-                .iter()
-                .any(|(cause, place)| *cause == form.cause.name() && *place == form.place)
-        };
+        let is_barred = || self.problem.barred.iter().any(|one| form.is_of_kind(one));
         let is_same_curve = |other: &usize| form.is_one_curve_with(self.form(*other));
         !set.iter().any(taken)
             && self.has_what_it_modifies(number, set)

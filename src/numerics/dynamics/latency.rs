@@ -1,6 +1,7 @@
 //! Whether torques come later than the positions beside them: the fit of base, friction, offset and rotor over a common shift.
 
 use super::cause::{COULOMB, OFFSET, ROTOR, VISCOUS};
+use super::noise::NoiseMemory;
 use super::problem::TorqueProblem;
 use super::rich::noise_beside;
 use super::sweep::SweptColumns;
@@ -37,7 +38,7 @@ pub(super) fn latency(problem: &TorqueProblem) -> Option<Latency> {
                     .contains(&problem.all.forms[*form].cause.name())
         })
         .collect();
-    let (noise, _) = noise_beside(problem, &basic);
+    let (noise, _) = noise_beside(problem, &basic, NoiseMemory::Short);
     let runs = problem.runs(false);
     let weighing = Weighing {
         noise: &noise,

@@ -14,6 +14,7 @@ use crate::criteria::torque::NAMED;
 const ROUNDS: usize = 40;
 
 /// What explains a recording.
+#[derive(Default)]
 pub(super) struct JudgedSet {
     pub set: Vec<usize>,
     /// What of the set is part of the model, but too little to be named.
@@ -44,8 +45,8 @@ pub(super) fn take_out_ends(
         match one {
             NotNamed::Within(place, form) => set[place] = push(problem, weighted, form),
             NotNamed::Out(place) | NotNamed::Silent(place) => {
-                let form = &problem.all.forms[set.remove(place)];
-                problem.barred.push((form.cause.name(), form.place));
+                let form = problem.all.forms[set.remove(place)].clone();
+                problem.barred.push(form);
             }
         }
     }
@@ -57,7 +58,6 @@ fn at_end(problem: &TorqueProblem, set: &[usize]) -> Option<NotNamed> {
     set.iter().enumerate().find_map(|(place, number)| {
         let form = &problem.all.forms[*number];
         match form.within_ends() {
-            _ if form.cause.name() == UNKNOWN => None,
             None => Some(NotNamed::Out(place)),
             Some(within) => (within.shape != form.shape).then_some(NotNamed::Within(place, within)),
         }

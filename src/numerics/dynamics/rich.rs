@@ -2,7 +2,7 @@
 //!
 //! Noise taken from the present model would be full of the very torque that is looked for.
 
-use super::noise::JointNoise;
+use super::noise::{JointNoise, NoiseMemory};
 use super::problem::TorqueProblem;
 use super::sweep::SweptColumns;
 use super::weighted::{Weighing, WeightedColumns};
@@ -29,6 +29,7 @@ pub(super) fn rich_forms(problem: &TorqueProblem, set: &[usize]) -> Vec<usize> {
 pub(super) fn noise_beside(
     problem: &TorqueProblem,
     forms: &[usize],
+    memory: NoiseMemory,
 ) -> (Vec<JointNoise>, Vec<Vec<f64>>) {
     let runs = problem.runs(false);
     let mut chosen: Vec<usize> = (0..problem.all.base)
@@ -58,10 +59,23 @@ pub(super) fn noise_beside(
     (
         residual
             .iter()
-            .map(|course| JointNoise::of(course, &runs, spent))
+            .map(|course| JointNoise::of(course, &runs, spent, memory))
             .collect(),
         residual,
     )
+}
+
+/// Noise by which what is found is weighed in the end: what the rich model leaves has lost its slow part with what is slow in that model, so
+/// that its course is that of what a set leaves.
+pub(super) fn noise_left(problem: &TorqueProblem, set: &[usize]) -> Vec<JointNoise> {
+    let left = noise_beside(problem, set, NoiseMemory::Long).0;
+    let rich = problem.noise.iter();
+    rich.zip(left)
+        .map(|(rich, left)| JointNoise {
+            sigma: rich.sigma,
+            ..left
+        })
+        .collect()
 }
 
 /// Half of the mean square, half of the median: neither outliers alone nor their absence decides.

@@ -1,7 +1,8 @@
 //! The steps of a diagnosis of torques, one after the other.
 
 use super::arm::DynamicArm;
-use super::cells::{OtherInertials, from_common, search, settle};
+use super::cause::TorqueForm;
+use super::cells::{OtherInertials, from_common, pruned, search, settle};
 use super::choice::CauseChoice;
 use super::clock::RecordingClock;
 use super::contact::{ContactModel, contacts};
@@ -9,11 +10,12 @@ use super::friction_lead::take_friction_lead;
 use super::judge::judge;
 use super::latency::{Latency, latency};
 use super::naming::{JudgedSet, settle_names, take_out_ends};
+use super::noise::NoiseMemory;
 use super::polish::polish;
 use super::problem::TorqueProblem;
 use super::recording::TorqueRecording;
 use super::refine::{one_power_of_speed, power_for_curve, refine};
-use super::rich::{noise_beside, rich_forms};
+use super::rich::{noise_beside, noise_left, rich_forms};
 use super::shape_slopes::ShapeSlopes;
 use super::sign_width::sign_width;
 use super::sweep::SweptColumns;
@@ -61,7 +63,7 @@ pub(super) fn solve<'a>(
             1e3 * latency.seconds
         ));
     }
-    let (noise, residual) = noise_beside(&problem, &rich_forms(&problem, &[]));
+    let (noise, residual) = noise_beside(&problem, &rich_forms(&problem, &[]), NoiseMemory::Short);
     if touched {
         problem.events = contacts(&problem, &residual, &noise, ContactModel::Rich);
     }
@@ -78,14 +80,17 @@ pub(super) fn solve<'a>(
         (set, other) = from_common(&CauseChoice::new(&problem, &weighted));
     }
     tell(told(&problem, &set));
+    trace("common", &problem, &set);
     refine(&mut problem, &mut weighted, &mut set);
     set = again(&mut problem, &mut weighted, set);
+    trace("again", &problem, &set);
     if touched {
         look_for_contacts(&mut problem, &weighted, &set, ContactModel::Judged);
     }
     learn(&mut problem, &set);
     weighted = problem.weighted_of(&set);
     polish(&mut problem, &mut weighted, &mut set);
+    trace("polish", &problem, &set);
     for _ in 0..END_ROUNDS {
         if !take_out_ends(&mut problem, &mut weighted, &mut set) {
             break;
@@ -98,20 +103,47 @@ pub(super) fn solve<'a>(
             polish(&mut problem, &mut weighted, &mut set);
         }
     }
-    weighted = problem.weighted(&set);
-    let mut judged = {
+    let mut judged = JudgedSet::default();
+    for _ in 0..END_ROUNDS {
+        problem.noise = noise_left(&problem, &set);
+        weighted = problem.weighted(&set);
         let choice = CauseChoice::new(&problem, &weighted);
-        let mut judged = judge(&choice, settle(&choice, &set));
-        // What only stood for something that was withdrawn.
-        judged.set = settle(&choice, &judged.set);
-        judged.silent = choice.other_friction(&judged.set);
-        judged.set.extend(&judged.silent);
-        judged
-    };
+        let JudgedSet {
+            set: stays,
+            withdrawn,
+            ..
+        } = judge(&choice, settle(&choice, &set));
+        judged.set = stays;
+        trace("judged", &problem, &judged.set);
+        if withdrawn.is_empty() {
+            break;
+        }
+        let kinds = withdrawn
+            .iter()
+            .map(|(number, _)| problem.all.forms[*number].clone());
+        let kinds: Vec<TorqueForm> = kinds.collect();
+        problem.barred.extend(kinds);
+        judged.withdrawn.extend(withdrawn);
+        // What was in its place.
+        set = again(&mut problem, &mut weighted, judged.set.clone());
+        polish(&mut problem, &mut weighted, &mut set);
+    }
+    judged.silent = CauseChoice::new(&problem, &weighted).other_friction(&judged.set);
+    judged.set.extend(&judged.silent);
     weighted = problem.weighted_of(&judged.set);
     polish(&mut problem, &mut weighted, &mut judged.set);
     settle_names(&mut problem, &mut weighted, &mut judged);
     weighted = problem.weighted(&judged.set);
+    let still = pruned(&CauseChoice::new(&problem, &weighted), &judged);
+    if still.len() < judged.set.len() {
+        trace("still", &problem, &still);
+        judged.set = still;
+        polish(&mut problem, &mut weighted, &mut judged.set);
+        settle_names(&mut problem, &mut weighted, &mut judged);
+        weighted = problem.weighted(&judged.set);
+    }
+    trace("end", &problem, &judged.set);
+    super::cells::dbg_angles(&CauseChoice::new(&problem, &weighted), &judged.set, tell); // DBG
     let slopes = ShapeSlopes::of(&mut problem, &mut weighted, &judged.set);
     SolvedTorques {
         problem,
@@ -193,7 +225,7 @@ fn again(
 
 /// Takes noise from what the rich model and a set leave.
 fn learn(problem: &mut TorqueProblem, set: &[usize]) {
-    problem.noise = noise_beside(problem, &rich_forms(problem, set)).0;
+    problem.noise = noise_beside(problem, &rich_forms(problem, set), NoiseMemory::Short).0;
 }
 
 /// A set as a line.
@@ -203,4 +235,35 @@ fn told(problem: &TorqueProblem, set: &[usize]) -> String {
         format!("{} {}", form.cause.name(), form.place)
     });
     format!("explained by {}", names.collect::<Vec<_>>().join(", "))
+}
+
+fn trace(what: &str, problem: &TorqueProblem, set: &[usize]) {
+    // DBG
+    let names: Vec<String> = set
+        .iter()
+        .map(|n| &problem.all.forms[*n])
+        .filter(|f| !["viscous_friction", "coulomb_friction"].contains(&f.cause.name()))
+        .map(|f| {
+            format!(
+                "{} {} {:?}w{} {:?}",
+                f.cause.name(),
+                f.place,
+                f.with,
+                f.width,
+                f.shape
+                    .iter()
+                    .map(|x| (x * 100.0).round() / 100.0)
+                    .collect::<Vec<_>>()
+            )
+        })
+        .collect();
+    eprintln!(
+        "DBG {what}: {} barred {:?}",
+        names.join("; "),
+        problem
+            .barred
+            .iter()
+            .map(|f| (f.cause.name(), f.place))
+            .collect::<Vec<_>>()
+    );
 }

@@ -21,6 +21,7 @@ mod spring;
 mod stribeck;
 mod torque_constant;
 mod unknown;
+mod unnamed_angle;
 mod unnamed_drag;
 mod unnamed_friction;
 mod unnamed_hysteresis;
@@ -43,7 +44,7 @@ pub(super) use viscous::VISCOUS;
 pub(super) use viscous::line_of_power;
 
 /// All causes with columns; latency and contacts are looked for before.
-pub(super) const TORQUE_CAUSES: [&dyn TorqueCause; 26] = [
+pub(super) const TORQUE_CAUSES: [&dyn TorqueCause; 27] = [
     &viscous::Viscous,
     &coulomb::Coulomb,
     &offset::Offset,
@@ -67,6 +68,7 @@ pub(super) const TORQUE_CAUSES: [&dyn TorqueCause; 26] = [
     &link_inertia::WrongLinkInertia,
     &gravity_direction::GravityDirection,
     &unknown::Unnamed,
+    &unnamed_angle::UnnamedAngle,
     &unnamed_friction::UnnamedFriction,
     &unnamed_drag::UnnamedDrag,
     &unnamed_hysteresis::UnnamedHysteresis,
@@ -342,6 +344,18 @@ impl TorqueForm {
     /// Whether both are the same cause at the same place.
     pub fn is_called_as(&self, other: &Self) -> bool {
         self.cause.name() == other.cause.name() && self.place == other.place
+    }
+
+    /// Whether both are called the same, and what has no name is a function of the same.
+    pub fn is_of_kind(&self, other: &Self) -> bool {
+        let kind = |form: &Self| {
+            form.cause
+                .about()
+                .coefficients
+                .first()
+                .map(|(name, _)| *name)
+        };
+        self.is_called_as(other) && (self.cause.name() != UNKNOWN || kind(self) == kind(other))
     }
 
     /// Shape numbers that are found from the data, each once.

@@ -3,11 +3,13 @@
 use super::{COULOMB, FittedNumber, ShapeSpan, TorqueCause, TorqueForm, about, at_each_joint_with};
 use crate::dynamics::scene::DynamicScene;
 
-/// z - sgn v with z' = (v - |v| z) / travel (Dahl, 1968).
+/// z - sgn v with z' = (v - |v| z) / travel (Dahl, 1968); where bristles differ, the same over a longer travel, too.
 pub(super) struct PreslidingFriction;
 
 /// rad: the one that stands in the rich model, and all that are tried.
 const USUAL: f64 = 0.004;
+/// The longer travel over the other one.
+const LONGER: f64 = 4.0;
 const TRAVELS: [&[f64]; 5] = [&[0.0006], &[0.0015], &[USUAL], &[0.01], &[0.025]];
 /// rad/s below which a joint is at rest.
 const REST: f64 = 2e-3;
@@ -15,7 +17,7 @@ const REST: f64 = 2e-3;
 impl TorqueCause for PreslidingFriction {
     about! {
         name: "presliding_friction",
-        coefficients: &[("kept", "Nm")],
+        coefficients: &[("kept", "Nm"), ("kept_longer", "Nm")],
         price: 25.0,
         of_sign: true,
         modifies: &[COULOMB],
@@ -23,11 +25,14 @@ impl TorqueCause for PreslidingFriction {
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
-        at_each_joint_with(&PreslidingFriction, scene, 1, &TRAVELS)
+        [1, 2]
+            .into_iter()
+            .flat_map(|width| at_each_joint_with(&PreslidingFriction, scene, width, &TRAVELS))
+            .collect()
     }
 
     fn is_rich(&self, form: &TorqueForm) -> bool {
-        form.shape == [USUAL]
+        form.width == 1 && form.shape == [USUAL]
     }
 
     fn spans(&self, _form: &TorqueForm) -> Vec<ShapeSpan> {
@@ -47,10 +52,11 @@ impl TorqueCause for PreslidingFriction {
         form: &TorqueForm,
         scene: &DynamicScene,
         _joint: usize,
-        _column: usize,
+        column: usize,
         out: &mut [f64],
     ) {
-        let (velocity, travel) = (&scene.velocity[form.joint()], form.shape[0]);
+        let velocity = &scene.velocity[form.joint()];
+        let travel = form.shape[0] * if column == 0 { 1.0 } else { LONGER };
         for stretch in &scene.stretches {
             let mut kept = 0.0;
             for row in stretch.clone() {
@@ -68,7 +74,8 @@ impl TorqueCause for PreslidingFriction {
     }
 
     fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
-        let [value, travel] = [fitted[0].value, form.shape[0]];
+        let value: f64 = fitted.iter().map(|kept| kept.value).sum();
+        let travel = form.shape[0];
         format!(
             "friction of {} turns over a travel of {travel:.2e} rad and is kept at rest, {value:.3} Nm of it",
             form.place

@@ -4,7 +4,8 @@ use super::{FittedNumber, TorqueCause, TorqueForm, about, fill, shape};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
-/// Cosine and sine of an order; `with` holds the order and whether it is of the motor.
+/// Cosine and sine of an order, and of a ripple that is no plain wave those of twice the order; `with` holds the order and whether it is of
+/// the motor.
 pub(super) struct Ripple;
 
 /// Per turn of the joint, and of the motor; the last of each only shows that the order is beyond.
@@ -12,6 +13,8 @@ const ORDERS: usize = 9;
 const MOTOR_ORDERS: usize = 3;
 /// Lowest orders stand in the rich model.
 const USUAL: usize = 4;
+/// The highest order that is tried with an overtone.
+const WITH_OVERTONE: usize = 4;
 
 impl Ripple {
     fn periods(form: &TorqueForm) -> f64 {
@@ -27,7 +30,7 @@ impl Ripple {
 impl TorqueCause for Ripple {
     about! {
         name: "torque_ripple",
-        coefficients: &[("cosine", "Nm"), ("sine", "Nm")],
+        coefficients: &[("cosine", "Nm"), ("sine", "Nm"), ("overtone_cosine", "Nm"), ("overtone_sine", "Nm")],
         may_repeat: true,
         of_angle: true,
     }
@@ -35,17 +38,18 @@ impl TorqueCause for Ripple {
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
         let mut forms = Vec::new();
         for joint in 0..scene.joints() {
-            let mut add = |order: usize, motor: usize| {
-                let form =
-                    TorqueForm::at_joint(&Ripple, joint, 2).shaped(&[scene.arm.ratio[joint].abs()]);
+            let mut add = |order: usize, motor: usize, width: usize| {
+                let form = TorqueForm::at_joint(&Ripple, joint, width)
+                    .shaped(&[scene.arm.ratio[joint].abs()]);
                 forms.push(TorqueForm {
                     with: [order, motor],
                     ..form
                 });
             };
-            (1..=ORDERS).for_each(|order| add(order, 0));
+            (1..=ORDERS).for_each(|order| add(order, 0, 2));
+            (1..=WITH_OVERTONE).for_each(|order| add(order, 0, 4));
             if scene.arm.ratio[joint].abs() > ORDERS as f64 {
-                (1..=MOTOR_ORDERS).for_each(|order| add(order, 1));
+                (1..=MOTOR_ORDERS).for_each(|order| add(order, 1, 2));
             }
         }
         forms
@@ -56,7 +60,7 @@ impl TorqueCause for Ripple {
     }
 
     fn is_rich(&self, form: &TorqueForm) -> bool {
-        form.with[1] == 0 && form.with[0] <= USUAL
+        form.width == 2 && form.with[1] == 0 && form.with[0] <= USUAL
     }
 
     fn write(
@@ -68,14 +72,16 @@ impl TorqueCause for Ripple {
         out: &mut [f64],
     ) {
         let (angle, periods) = (&scene.position[form.joint()], Self::periods(form));
-        match column {
-            0 => fill(out, |row| (periods * angle[row]).cos()),
-            _ => fill(out, |row| (periods * angle[row]).sin()),
+        let periods = periods * (1 + column / 2) as f64;
+        if column.is_multiple_of(2) {
+            fill(out, |row| (periods * angle[row]).cos());
+        } else {
+            fill(out, |row| (periods * angle[row]).sin());
         }
     }
 
     fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
-        let (amplitude, sigma) = amplitude(fitted);
+        let (amplitude, sigma) = amplitude(&fitted[..2]);
         let of = if form.with[1] == 1 {
             "motor_order"
         } else {
@@ -99,7 +105,7 @@ impl TorqueCause for Ripple {
         } else {
             "the joint"
         };
-        let (amplitude, _) = amplitude(fitted);
+        let (amplitude, _) = amplitude(&fitted[..2]);
         format!(
             "the torque of {} ripples by {amplitude:.3} Nm, {} times a turn of {of}",
             form.place, form.with[0]
