@@ -316,11 +316,17 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
         let grid = self.cell(cell, &state);
         let prior = self.cells[cell].log_prior;
         let of_itself = self.form(own.form, &state);
-        let log = of_itself.map_or(f64::NEG_INFINITY, |(log, _)| prior + log - count.ln());
-        let best = of_itself.map_or(own, |(_, amplitude)| TorqueComponent { amplitude, ..own });
+        let Some((log, amplitude)) = of_itself else {
+            // One that the arm cannot have, whatever others of its cell would do.
+            return CellPosterior {
+                log_odds: f64::NEG_INFINITY,
+                best: own,
+            };
+        };
+        let log = prior + log - count.ln();
         CellPosterior {
             log_odds: grid.map_or(log, |grid| grid.log_odds.max(log)),
-            best,
+            best: TorqueComponent { amplitude, ..own },
         }
     }
 
@@ -481,6 +487,8 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
 
     /// Exchanges, merges and removals.
     fn settled(&mut self, components: Vec<TorqueComponent>) -> Vec<TorqueComponent> {
+        // What an arm cannot have is first exchanged for what it can have.
+        let components = self.swap(components);
         let components = self.prune(components);
         let components = self.unfold(self.merge(self.swap(components)));
         self.prune(components)

@@ -1,6 +1,6 @@
 //! Forms of a problem: which may stand together, which in each other's place.
 
-use super::cause::{COULOMB, TorqueForm, VISCOUS};
+use super::cause::{COULOMB, TorqueForm, UNKNOWN, VISCOUS};
 use super::problem::TorqueProblem;
 use super::sweep::SweptColumns;
 use super::weighted::WeightedColumns;
@@ -23,6 +23,16 @@ impl<'a> CauseChoice<'a> {
             weighted,
             base: SweptColumns::base(&problem.all, weighted),
             open: problem.all.listed,
+        }
+    }
+
+    /// Over those with a name: a curve without one would be a push, or several causes at once.
+    pub fn named(problem: &'a TorqueProblem<'a>, weighted: &'a WeightedColumns) -> Self {
+        let mut forms = problem.all.forms[..problem.all.listed].iter();
+        let open = forms.position(|form| form.cause.name() == UNKNOWN);
+        Self {
+            open: open.unwrap_or(problem.all.listed),
+            ..Self::new(problem, weighted)
         }
     }
 

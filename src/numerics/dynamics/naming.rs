@@ -21,6 +21,8 @@ pub(super) struct JudgedSet {
     pub silent: Vec<usize>,
     /// What held-out rows did not confirm, with what they gained by each.
     pub withdrawn: Vec<(usize, f64)>,
+    /// Whether held-out rows speak against one of them.
+    pub is_refuted: bool,
 }
 
 /// What becomes of a form.

@@ -69,7 +69,7 @@ pub(super) fn solve<'a>(
     }
     learn(&mut problem, &[]);
     let mut weighted = problem.weighted(&[]);
-    let (mut set, mut other) = from_common(&CauseChoice::new(&problem, &weighted));
+    let (mut set, mut other) = from_common(&CauseChoice::named(&problem, &weighted));
     let before = problem.events.clone();
     if touched {
         look_for_contacts(&mut problem, &weighted, &set, ContactModel::Present);
@@ -77,7 +77,7 @@ pub(super) fn solve<'a>(
     if !alike(&before, &problem.events) {
         learn(&mut problem, &[]);
         weighted = problem.weighted(&[]);
-        (set, other) = from_common(&CauseChoice::new(&problem, &weighted));
+        (set, other) = from_common(&CauseChoice::named(&problem, &weighted));
     }
     tell(told(&problem, &set));
     trace("common", &problem, &set);
@@ -108,25 +108,26 @@ pub(super) fn solve<'a>(
         problem.noise = noise_left(&problem, &set);
         weighted = problem.weighted(&set);
         let choice = CauseChoice::new(&problem, &weighted);
-        let JudgedSet {
-            set: stays,
-            withdrawn,
-            ..
-        } = judge(&choice, settle(&choice, &set));
-        judged.set = stays;
+        let found = judge(&choice, settle(&choice, &set));
+        judged.set = found.set;
         trace("judged", &problem, &judged.set);
-        if withdrawn.is_empty() {
+        if found.withdrawn.is_empty() {
             break;
         }
-        let kinds = withdrawn
+        let form = |number: &usize| problem.all.forms[*number].clone();
+        let barred: Vec<TorqueForm> = found
+            .withdrawn
             .iter()
-            .map(|(number, _)| problem.all.forms[*number].clone());
-        let kinds: Vec<TorqueForm> = kinds.collect();
-        problem.barred.extend(kinds);
-        judged.withdrawn.extend(withdrawn);
-        // What was in its place.
-        set = again(&mut problem, &mut weighted, judged.set.clone());
-        polish(&mut problem, &mut weighted, &mut set);
+            .map(|(number, _)| form(number))
+            .collect();
+        problem.barred.extend(barred);
+        judged.withdrawn.extend(found.withdrawn);
+        set = judged.set.clone();
+        if found.is_refuted {
+            // Something else was in its place.
+            set = again(&mut problem, &mut weighted, set);
+            polish(&mut problem, &mut weighted, &mut set);
+        }
     }
     judged.silent = CauseChoice::new(&problem, &weighted).other_friction(&judged.set);
     judged.set.extend(&judged.silent);
