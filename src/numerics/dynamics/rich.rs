@@ -2,6 +2,7 @@
 //!
 //! Noise taken from the present model would be full of the very torque that is looked for.
 
+use super::cause::{COULOMB, OFFSET, ROTOR, VISCOUS};
 use super::noise::{JointNoise, NoiseMemory};
 use super::problem::TorqueProblem;
 use super::sweep::SweptColumns;
@@ -23,6 +24,16 @@ pub(super) fn rich_forms(problem: &TorqueProblem, set: &[usize]) -> Vec<usize> {
             .filter(|form| forms[*form].cause.is_rich(&forms[*form]) && !set.contains(form)),
     );
     rich
+}
+
+/// What hardly an arm is without.
+pub(super) fn basic_forms(problem: &TorqueProblem) -> Vec<usize> {
+    let forms = &problem.all.forms;
+    let is_basic = |form: &usize| {
+        let form = &forms[*form];
+        form.width == 1 && [VISCOUS, COULOMB, OFFSET, ROTOR].contains(&form.cause.name())
+    };
+    (0..problem.all.listed).filter(is_basic).collect()
 }
 
 /// Noise of each joint and the residual of a fit of the base and some forms to the fitted rows.

@@ -15,7 +15,7 @@ use super::polish::polish;
 use super::problem::TorqueProblem;
 use super::recording::TorqueRecording;
 use super::refine::{one_power_of_speed, power_for_curve, refine};
-use super::rich::{noise_beside, noise_left, rich_forms};
+use super::rich::{basic_forms, noise_beside, noise_left, rich_forms};
 use super::shape_slopes::ShapeSlopes;
 use super::sign_width::sign_width;
 use super::sweep::SweptColumns;
@@ -66,6 +66,12 @@ pub(super) fn solve<'a>(
     let (noise, residual) = noise_beside(&problem, &rich_forms(&problem, &[]), NoiseMemory::Short);
     if touched {
         problem.events = contacts(&problem, &residual, &noise, ContactModel::Rich);
+        if problem.events.is_empty() {
+            // A rich model bends around a push that comes early; what only looks like one is dropped with the first set.
+            let (noise, residual) =
+                noise_beside(&problem, &basic_forms(&problem), NoiseMemory::Short);
+            problem.events = contacts(&problem, &residual, &noise, ContactModel::Present);
+        }
     }
     learn(&mut problem, &[]);
     let mut weighted = problem.weighted(&[]);
@@ -129,6 +135,7 @@ pub(super) fn solve<'a>(
             polish(&mut problem, &mut weighted, &mut set);
         }
     }
+    weighted = problem.weighted(&judged.set);
     judged.silent = CauseChoice::new(&problem, &weighted).other_friction(&judged.set);
     judged.set.extend(&judged.silent);
     weighted = problem.weighted_of(&judged.set);

@@ -44,7 +44,7 @@ pub(super) use viscous::VISCOUS;
 pub(super) use viscous::line_of_power;
 
 /// All causes with columns; latency and contacts are looked for before.
-pub(super) const TORQUE_CAUSES: [&dyn TorqueCause; 28] = [
+pub(super) const TORQUE_CAUSES: [&dyn TorqueCause; 27] = [
     &viscous::Viscous,
     &coulomb::Coulomb,
     &offset::Offset,
@@ -57,7 +57,6 @@ pub(super) const TORQUE_CAUSES: [&dyn TorqueCause; 28] = [
     &torque_constant::TorqueConstant,
     &spring::SPRING_BALANCE,
     &balancer::Balancer,
-    &balancer::GasSpring,
     &spring::CABLE_STIFFNESS,
     &ripple::Ripple,
     &elasticity::Elasticity,
