@@ -42,7 +42,7 @@ const MOVING: f64 = 0.3;
 /// What a residual is left by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ContactModel {
-    /// A model too rich for rows that it was not fitted to.
+    /// A model, the richest or the barest, that was fitted to rows of a push, too, and bends around it.
     Rich,
     /// A model that is still searched for: held-out rows are not looked at.
     Present,

@@ -92,11 +92,6 @@ pub(super) fn judge(choice: &CauseChoice, mut set: Vec<usize>) -> JudgedSet {
         let HeldOutGain {
             square, foretold, ..
         } = gains[worst];
-        eprintln!(
-            "DBG withdraw {} {} {square} {foretold}",
-            choice.form(set[worst]).cause.name(),
-            choice.form(set[worst]).place
-        );
         withdrawn.push((set.remove(worst), square));
         // Nothing would gain nothing: what loses more than it was to gain is not what it stands for.
         is_refuted |= square < -foretold;

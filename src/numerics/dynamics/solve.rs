@@ -70,7 +70,7 @@ pub(super) fn solve<'a>(
             // A rich model bends around a push that comes early; what only looks like one is dropped with the first set.
             let (noise, residual) =
                 noise_beside(&problem, &basic_forms(&problem), NoiseMemory::Short);
-            problem.events = contacts(&problem, &residual, &noise, ContactModel::Present);
+            problem.events = contacts(&problem, &residual, &noise, ContactModel::Rich);
         }
     }
     learn(&mut problem, &[]);
@@ -86,17 +86,14 @@ pub(super) fn solve<'a>(
         (set, other) = from_common(&CauseChoice::named(&problem, &weighted));
     }
     tell(told(&problem, &set));
-    trace("common", &problem, &set);
     refine(&mut problem, &mut weighted, &mut set);
     set = again(&mut problem, &mut weighted, set);
-    trace("again", &problem, &set);
     if touched {
         look_for_contacts(&mut problem, &weighted, &set, ContactModel::Judged);
     }
     learn(&mut problem, &set);
     weighted = problem.weighted_of(&set);
     polish(&mut problem, &mut weighted, &mut set);
-    trace("polish", &problem, &set);
     for _ in 0..END_ROUNDS {
         if !take_out_ends(&mut problem, &mut weighted, &mut set) {
             break;
@@ -116,7 +113,6 @@ pub(super) fn solve<'a>(
         let choice = CauseChoice::new(&problem, &weighted);
         let found = judge(&choice, settle(&choice, &set));
         judged.set = found.set;
-        trace("judged", &problem, &judged.set);
         if found.withdrawn.is_empty() {
             break;
         }
@@ -144,14 +140,11 @@ pub(super) fn solve<'a>(
     weighted = problem.weighted(&judged.set);
     let still = pruned(&CauseChoice::new(&problem, &weighted), &judged);
     if still.len() < judged.set.len() {
-        trace("still", &problem, &still);
         judged.set = still;
         polish(&mut problem, &mut weighted, &mut judged.set);
         settle_names(&mut problem, &mut weighted, &mut judged);
         weighted = problem.weighted(&judged.set);
     }
-    trace("end", &problem, &judged.set);
-    super::cells::dbg_angles(&CauseChoice::new(&problem, &weighted), &judged.set, tell); // DBG
     let slopes = ShapeSlopes::of(&mut problem, &mut weighted, &judged.set);
     SolvedTorques {
         problem,
@@ -243,35 +236,4 @@ fn told(problem: &TorqueProblem, set: &[usize]) -> String {
         format!("{} {}", form.cause.name(), form.place)
     });
     format!("explained by {}", names.collect::<Vec<_>>().join(", "))
-}
-
-fn trace(what: &str, problem: &TorqueProblem, set: &[usize]) {
-    // DBG
-    let names: Vec<String> = set
-        .iter()
-        .map(|n| &problem.all.forms[*n])
-        .filter(|f| !["viscous_friction", "coulomb_friction"].contains(&f.cause.name()))
-        .map(|f| {
-            format!(
-                "{} {} {:?}w{} {:?}",
-                f.cause.name(),
-                f.place,
-                f.with,
-                f.width,
-                f.shape
-                    .iter()
-                    .map(|x| (x * 100.0).round() / 100.0)
-                    .collect::<Vec<_>>()
-            )
-        })
-        .collect();
-    eprintln!(
-        "DBG {what}: {} barred {:?}",
-        names.join("; "),
-        problem
-            .barred
-            .iter()
-            .map(|f| (f.cause.name(), f.place))
-            .collect::<Vec<_>>()
-    );
 }
