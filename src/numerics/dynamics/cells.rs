@@ -110,11 +110,10 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
             let form = choice.form(number);
             let kind = form
                 .cause
-                .about()
                 .coefficients
                 .first()
                 .map_or("", |(name, _)| *name);
-            keys.entry((form.cause.name(), kind, form.place, form.cause.cell(form)))
+            keys.entry((form.cause.name, kind, form.place, (form.cause.cell)(form)))
                 .or_default()
                 .push(number);
         }
@@ -122,7 +121,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
             &(&'static str, &'static str, Place, [usize; 2]),
             &Vec<usize>,
         )| {
-            let price = |form: &usize| choice.form(*form).cause.price(choice.form(*form));
+            let price = |form: &usize| (choice.form(*form).cause.price)(choice.form(*form));
             let least = forms.iter().map(price).fold(f64::INFINITY, f64::min);
             TorqueCell {
                 name,
@@ -411,7 +410,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
 
     /// One wrong mass, drive or mounting instead of several; one curve over a joint's angle instead of two.
     fn merge(&self, components: Vec<TorqueComponent>) -> Vec<TorqueComponent> {
-        let about = |own: &TorqueComponent| self.choice.form(own.form).cause.about();
+        let about = |own: &TorqueComponent| self.choice.form(own.form).cause;
         let inertial: Vec<usize> = (0..components.len())
             .filter(|place| about(&components[*place]).inertial)
             .collect();
@@ -420,7 +419,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
             groups.push(inertial);
         }
         let mut best = self.merged(&components, &groups, &|form| {
-            self.choice.form(form).cause.about().inertial
+            self.choice.form(form).cause.inertial
         });
         let of_angle: Vec<usize> = (0..best.len())
             .filter(|place| about(&best[*place]).of_angle)
@@ -434,7 +433,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
             .filter(|group| same(group, &best))
             .collect();
         best = self.merged(&best, &groups, &|form| {
-            self.choice.form(form).cause.about().of_angle
+            self.choice.form(form).cause.of_angle
         });
         best
     }
@@ -498,7 +497,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
     fn unfold(&self, mut components: Vec<TorqueComponent>) -> Vec<TorqueComponent> {
         let nameless: Vec<usize> = forms(&components)
             .into_iter()
-            .filter(|form| self.choice.form(*form).cause.name() == UNKNOWN)
+            .filter(|form| self.choice.form(*form).cause.name == UNKNOWN)
             .collect();
         for form in nameless {
             let at = self.choice.form(form).place;
@@ -572,7 +571,7 @@ impl OtherInertials {
             .iter()
             .map(|form| {
                 (
-                    (choice.form(*form).cause.name(), choice.form(*form).place),
+                    (choice.form(*form).cause.name, choice.form(*form).place),
                     log,
                 )
             })
@@ -584,11 +583,11 @@ impl OtherInertials {
 /// each joint is asked before masses: where factors explain as much, it is these.
 pub(super) fn from_common(choice: &CauseChoice) -> (Vec<usize>, Option<OtherInertials>) {
     let mut table = TorqueTable::new(choice);
-    let is_drive = |number: &usize| choice.form(*number).cause.name() == TORQUE_CONSTANT;
+    let is_drive = |number: &usize| choice.form(*number).cause.name == TORQUE_CONSTANT;
     let inertial = |set: &[TorqueComponent]| -> Vec<usize> {
         forms(set)
             .into_iter()
-            .filter(|number| choice.form(*number).cause.about().inertial)
+            .filter(|number| choice.form(*number).cause.inertial)
             .collect()
     };
     let masses = table.searched(&choice.common());

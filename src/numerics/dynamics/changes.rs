@@ -142,7 +142,7 @@ fn shared_forms(first: &TorqueModel, second: &TorqueModel) -> Result<Vec<TorqueF
 fn candidate_forms(shared: &[TorqueForm], joints: usize) -> Vec<TorqueForm> {
     let mut forms = shared.to_vec();
     for name in [VISCOUS, COULOMB, OFFSET] {
-        let Some(cause) = TORQUE_CAUSES.into_iter().find(|cause| cause.name() == name) else {
+        let Some(cause) = TORQUE_CAUSES.into_iter().find(|cause| cause.name == name) else {
             continue;
         };
         for joint in 0..joints {
@@ -182,7 +182,7 @@ fn prepared<'a>(
     problem.scene.friction = about.friction(&about.forms()?, &problem.scene);
     let all: Vec<String> = TORQUE_CAUSES
         .iter()
-        .map(|cause| cause.name().to_string())
+        .map(|cause| cause.name.to_string())
         .collect();
     problem.form(&all);
     Ok(problem)
@@ -297,10 +297,10 @@ fn told(
     let form = &problem.all.forms[form];
     let names = form.coefficient_names();
     let of = |(place, (quantity, unit)): (usize, (String, &'static str))| {
-        let name = format!("{}.{}.{quantity}", form.cause.name(), form.place.tag());
+        let name = format!("{}.{}.{quantity}", form.cause.name, form.place.tag());
         number(
             name,
-            form.cause.name(),
+            form.cause.name,
             form.place,
             unit,
             values[place],

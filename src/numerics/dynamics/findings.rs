@@ -38,7 +38,7 @@ pub(super) fn findings(
     let mut found: Vec<TorqueFinding> = named
         .map(|number| {
             let mut odds = table.odds_in_place(&components, *number);
-            let other = other.filter(|_| choice.form(*number).cause.about().inertial);
+            let other = other.filter(|_| choice.form(*number).cause.inertial);
             odds.rivals.extend(
                 other
                     .into_iter()
@@ -98,7 +98,7 @@ fn finding(
         * problem.reduction.rows.len();
     let square: f64 = effect.iter().flatten().map(|value| value * value).sum();
     // Tolerances bend to take the place of a wrong mass, at their price: its size is what the rest leaves as it is.
-    let left_without: Vec<(usize, f64)> = match form.cause.about().inertial {
+    let left_without: Vec<(usize, f64)> = match form.cause.inertial {
         true => solution
             .iter()
             .copied()
@@ -107,10 +107,10 @@ fn finding(
         false => without.solution(),
     };
     TorqueFinding {
-        effect: form.cause.name(),
+        effect: form.cause.name,
         place: form.place,
-        statement: form.cause.statement(form, &fitted),
-        parameters: with_shapes(form.cause.parameters(form, &fitted), form, |index| {
+        statement: (form.cause.statement)(form, &fitted),
+        parameters: with_shapes((form.cause.parameters)(form, &fitted), form, |index| {
             slopes.sigma(uncertain, number, index)
         }),
         evidence: Evidence {

@@ -114,7 +114,7 @@ fn next(choice: &CauseChoice, judged: &JudgedSet, slopes: &ShapeSlopes) -> Optio
     let uncertain = slopes.beside(&sweep);
     let named = |place: &usize| {
         let form = choice.form(set[*place]);
-        form.cause.name() != UNKNOWN
+        form.cause.name != UNKNOWN
             && !judged
                 .silent
                 .iter()
@@ -145,8 +145,7 @@ fn next(choice: &CauseChoice, judged: &JudgedSet, slopes: &ShapeSlopes) -> Optio
             .max_by(|a, b| a.abs().total_cmp(&b.abs()))
             .unwrap_or(0.0)
     };
-    let wrong =
-        |place: usize, sure: f64| choice.form(set[place]).cause.about().brakes && sure <= 0.0;
+    let wrong = |place: usize, sure: f64| choice.form(set[place]).cause.brakes && sure <= 0.0;
     let weak = (0..set.len())
         .filter(named)
         .map(|place| (place, sure(place)));
@@ -162,7 +161,7 @@ fn next(choice: &CauseChoice, judged: &JudgedSet, slopes: &ShapeSlopes) -> Optio
     }
     let mut leaning = (0..set.len()).filter(|other| choice.form(set[*other]).modifies(form));
     let is_summed = choice.is_part_of_curve(form, set);
-    if is_summed || (form.cause.about().brakes && sure > 0.0) {
+    if is_summed || (form.cause.brakes && sure > 0.0) {
         return Some(NotNamed::Silent(place));
     }
     // What leans on friction that is none is none either.

@@ -224,8 +224,7 @@ fn withdrawn(choice: &CauseChoice, withdrawn: &[(usize, f64)]) -> Vec<String> {
         };
         format!(
             "{} at {}: held-out rows do not confirm it (with it their squared error over the noise {squares})",
-            form.cause.name(),
-            form.place
+            form.cause.name, form.place
         )
     };
     withdrawn.iter().map(sentence).collect()

@@ -40,7 +40,7 @@ pub(super) fn one_power_of_speed(
     set: &mut Vec<usize>,
     joint: usize,
 ) -> bool {
-    let is_coulomb = |form: &TorqueForm| form.cause.name() == COULOMB;
+    let is_coulomb = |form: &TorqueForm| form.cause.name == COULOMB;
     powered(problem, weighted, set, (joint, &is_coulomb), 0.0)
 }
 
@@ -76,7 +76,7 @@ fn powered(
         let mut forms = set.iter().map(|number| &problem.all.forms[*number]);
         forms.position(|form| form.place == Place::Joint(joint) && is(form))
     };
-    let viscous = at(&|form| form.cause.name() == VISCOUS);
+    let viscous = at(&|form| form.cause.name == VISCOUS);
     let (Some(viscous), Some(replaced)) = (viscous, at(is_replaced)) else {
         return false;
     };
@@ -108,7 +108,7 @@ pub(super) fn refine_one(
     place: usize,
 ) {
     let form = &problem.all.forms[set[place]];
-    for span in form.cause.spans(form) {
+    for span in (form.cause.spans)(form) {
         for half in HALVES {
             try_grid(problem, weighted, set, place, span, half);
             // What the coarsest grid leaves as it usually is stays so.

@@ -21,7 +21,7 @@ pub(super) fn rich_forms(problem: &TorqueProblem, set: &[usize]) -> Vec<usize> {
     let mut rich = set.to_vec();
     rich.extend(
         (0..forms.len())
-            .filter(|form| forms[*form].cause.is_rich(&forms[*form]) && !set.contains(form)),
+            .filter(|form| (forms[*form].cause.rich)(&forms[*form]) && !set.contains(form)),
     );
     rich
 }
@@ -31,7 +31,7 @@ pub(super) fn basic_forms(problem: &TorqueProblem) -> Vec<usize> {
     let forms = &problem.all.forms;
     let is_basic = |form: &usize| {
         let form = &forms[*form];
-        form.width == 1 && [VISCOUS, COULOMB, OFFSET, ROTOR].contains(&form.cause.name())
+        form.width == 1 && [VISCOUS, COULOMB, OFFSET, ROTOR].contains(&form.cause.name)
     };
     (0..problem.all.listed).filter(is_basic).collect()
 }

@@ -233,7 +233,7 @@ fn learn(problem: &mut TorqueProblem, set: &[usize]) {
 fn told(problem: &TorqueProblem, set: &[usize]) -> String {
     let names = set.iter().map(|number| {
         let form = &problem.all.forms[*number];
-        format!("{} {}", form.cause.name(), form.place)
+        format!("{} {}", form.cause.name, form.place)
     });
     format!("explained by {}", names.collect::<Vec<_>>().join(", "))
 }
