@@ -5,7 +5,9 @@ use super::cause::{TORQUE_CONSTANT, UNKNOWN};
 use super::choice::CauseChoice;
 use super::naming::JudgedSet;
 use crate::criteria::cells::{COMMON, NU, SWAPS};
-use crate::criteria::torque::{APART, COMPONENTS, EXCHANGES, LEAST_NOISE, PER_METRE, USUAL};
+use crate::criteria::torque::{
+    APART, COMPONENTS, EXCHANGES, LEAST_NOISE, PER_METRE, UNFOLDED, USUAL,
+};
 use crate::diagnose::table::{
     AMPLITUDES, ComponentSearch, EvidenceRows, KnownState, evidence, log_sum,
 };
@@ -14,9 +16,6 @@ use nalgebra::{DMatrix, DVector};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::rc::Rc;
-
-/// Named causes that are tried instead of one without a name, at most.
-const UNFOLDED: usize = 3;
 
 /// A cause at a place in every shape that is listed of it.
 struct TorqueCell {
@@ -503,7 +502,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
             let at = self.choice.form(form).place;
             let mut next: Vec<TorqueComponent> = components.clone();
             next.retain(|own| own.form != form);
-            for _ in 0..UNFOLDED {
+            for _ in 0..*UNFOLDED {
                 let state = self.state(&next, None);
                 let named = |cell: &usize| {
                     self.cells[*cell].name != UNKNOWN && self.cells[*cell].place == at

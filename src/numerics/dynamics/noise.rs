@@ -1,14 +1,15 @@
 //! Noise of filtered torques: of each joint an autoregressive course, by which rows are whitened before least squares.
 
+use crate::criteria::torque::MEMORY;
 use std::ops::Range;
 
-/// Rows before that a row remembers, at most.
+/// How many rows before a row remembers, at most.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum NoiseMemory {
     /// What a rich model leaves: slow noise went with what is slow in that model.
-    Short = 4,
+    Short = 0,
     /// What a set leaves: slow noise is all there.
-    Long = 12,
+    Long = 1,
 }
 
 /// The noise of one joint.
@@ -35,7 +36,7 @@ impl JointNoise {
     /// The noise of a residual over runs of rows, `spent` of whose freedoms a fit has taken: Yule and Walker's equations by Levinson, the order by
     /// Akaike's criterion.
     pub fn of(residual: &[f64], runs: &[Range<usize>], spent: f64, longest: NoiseMemory) -> Self {
-        let longest = longest as usize;
+        let longest = MEMORY[longest as usize];
         let rows: usize = runs.iter().map(Range::len).sum();
         let correlation: Vec<f64> = (0..=longest)
             .map(|lag| {

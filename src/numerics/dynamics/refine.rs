@@ -6,18 +6,15 @@ use super::naming::push;
 use super::problem::TorqueProblem;
 use super::sweep::SweptColumns;
 use super::weighted::WeightedColumns;
+use crate::criteria::torque::{BETTER, UNUSUAL};
 use crate::effect::Place;
 
 /// Half widths of the grids: of the logarithm, or of the number itself.
 const HALVES: [f64; 4] = [0.3, 0.1, 0.03, 0.01];
 /// Points on either side.
 const POINTS: i32 = 3;
-/// The same, beyond the logarithm of the number of rows, for a number that is what it usually is.
-const UNUSUAL: f64 = 4.0;
 /// The power of speed from which one is looked for.
 const START_POWER: f64 = 0.7;
-/// A gain that is worth a new shape.
-const BETTER: f64 = 0.05;
 
 /// Replaces forms of a set by better shaped ones; tells whether any was.
 pub(super) fn refine(
@@ -165,9 +162,9 @@ fn try_grid(
         .max_by(|a, b| gain(*a).total_cmp(&gain(*b)))
         .unwrap_or(set[place]);
     let asked = if is_usual {
-        UNUSUAL + (weighted.rows as f64).ln()
+        *UNUSUAL + (weighted.rows as f64).ln()
     } else {
-        BETTER
+        *BETTER
     };
     if gain(best) > gain(set[place]) + asked {
         set[place] = best;
