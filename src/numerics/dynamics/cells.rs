@@ -631,16 +631,22 @@ pub(super) fn search(choice: &CauseChoice, start: &[usize]) -> Vec<usize> {
     forms(&TorqueTable::new(choice).searched(start))
 }
 
-/// A judged set without what no longer pays; what is silent stays.
-pub(super) fn pruned(choice: &CauseChoice, judged: &JudgedSet) -> Vec<usize> {
+/// What of a judged set would not be found under the present noise.
+pub(super) fn faint(choice: &CauseChoice, judged: &JudgedSet) -> Vec<usize> {
     let mut table = TorqueTable::new(choice);
-    let is_silent = |number: &usize| {
-        let mut silent = judged.silent.iter();
-        silent.any(|one| choice.form(*one).is_called_as(choice.form(*number)))
-    };
-    table.kept = judged.set.iter().copied().filter(is_silent).collect();
+    table.kept.clone_from(&judged.silent);
     let components = table.components(&judged.set);
-    forms(&table.prune(components))
+    let clear = table.prune(components);
+    let kappa = table.noise(&clear);
+    // What others need stays in the set, but not for itself.
+    let pays = |place: &usize| table.odds_of(&clear, *place, kappa).log_odds > table.least();
+    let clear: Vec<usize> = (0..clear.len())
+        .filter(pays)
+        .map(|place| clear[place].form)
+        .collect();
+    let mut faint = judged.set.clone();
+    faint.retain(|number| !clear.contains(number) && !judged.silent.contains(number));
+    faint
 }
 
 /// A set after exchanges, merges and removals.

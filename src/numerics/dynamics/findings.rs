@@ -1,6 +1,6 @@
 //! What was found in words and numbers: sizes, evidence, rivals, probabilities.
 
-use super::cause::{FittedNumber, TorqueForm};
+use super::cause::{COULOMB, FittedNumber, TorqueForm, VISCOUS};
 use super::cells::{CellOdds, OtherInertials, TorqueTable};
 use super::choice::CauseChoice;
 use super::friction_line::number_of_line;
@@ -18,7 +18,8 @@ use crate::estimate::tail;
 /// Residual rows of a test, at most: beyond it the tail does not change.
 const FREEDOM: f64 = 1e4;
 
-/// Findings of a judged set but for what is silent, strongest first.
+/// Findings of a judged set but for what is silent, strongest first. A name that the data exclude by others of its place is none; the common
+/// frictions are parts of sums.
 pub(super) fn findings(
     choice: &CauseChoice,
     JudgedSet { set, silent, .. }: &JudgedSet,
@@ -55,6 +56,11 @@ pub(super) fn findings(
                 ),
                 odds,
             )
+        })
+        .filter(|finding| {
+            finding.effect == VISCOUS
+                || finding.effect == COULOMB
+                || finding.probabilities.name >= *RIVAL
         })
         .collect();
     found.sort_by(|a, b| b.evidence.gain.total_cmp(&a.evidence.gain));

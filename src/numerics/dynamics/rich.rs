@@ -7,6 +7,7 @@ use super::noise::{JointNoise, NoiseMemory};
 use super::problem::TorqueProblem;
 use super::sweep::SweptColumns;
 use super::weighted::{Weighing, WeightedColumns};
+use crate::criteria::cells::FAR;
 use crate::statistics::nearest;
 use std::ops::Range;
 
@@ -87,6 +88,25 @@ pub(super) fn noise_left(problem: &TorqueProblem, set: &[usize]) -> Vec<JointNoi
             ..left
         })
         .collect()
+}
+
+/// Noise of a residual without the rows that stand far out: a push is none.
+pub(super) fn noise_apart(problem: &TorqueProblem, residual: &[Vec<f64>]) -> Vec<JointNoise> {
+    let runs = problem.runs(false);
+    let of = |course: &Vec<f64>| {
+        let rows = runs.iter().flat_map(|run| &course[run.clone()]);
+        let mut sizes: Vec<f64> = rows.map(|value| value.abs()).collect();
+        let most = *FAR * MEDIAN * nearest(&mut sizes, 0.5).unwrap_or(0.0);
+        let near = |run: &Range<usize>| {
+            let rows = run.clone().collect::<Vec<usize>>();
+            let parts = rows.split(|row| course[*row].abs() > most);
+            let ends = parts.filter_map(|part| Some(*part.first()?..part.last()? + 1));
+            ends.collect::<Vec<Range<usize>>>()
+        };
+        let near: Vec<Range<usize>> = runs.iter().flat_map(near).collect();
+        JointNoise::of(course, &near, 0.0, NoiseMemory::Short)
+    };
+    residual.iter().map(of).collect()
 }
 
 /// Half of the mean square, half of the median: neither outliers alone nor their absence decides.

@@ -2,7 +2,7 @@
 
 use super::arm::DynamicArm;
 use super::cause::TorqueForm;
-use super::cells::{OtherInertials, from_common, pruned, search, settle};
+use super::cells::{OtherInertials, faint, from_common, search, settle};
 use super::choice::CauseChoice;
 use super::clock::RecordingClock;
 use super::contact::{ContactModel, contacts};
@@ -15,7 +15,7 @@ use super::polish::polish;
 use super::problem::TorqueProblem;
 use super::recording::TorqueRecording;
 use super::refine::{one_power_of_speed, power_for_curve, refine};
-use super::rich::{basic_forms, noise_beside, noise_left, rich_forms};
+use super::rich::{basic_forms, noise_apart, noise_beside, noise_left, rich_forms};
 use super::shape_slopes::ShapeSlopes;
 use super::sign_width::sign_width;
 use super::sweep::SweptColumns;
@@ -24,6 +24,8 @@ use super::weighted::WeightedColumns;
 
 /// Rounds in which others are looked for in place of forms with a number at an end of its search, at most.
 const END_ROUNDS: usize = 3;
+/// Rounds in which others are looked for in place of what held-out rows speak against, at most.
+const JUDGED_ROUNDS: usize = 6;
 /// s.
 const SAME_TIME: f64 = 0.1;
 /// Rounds in which a latency and the lead of friction find each other, at most.
@@ -68,8 +70,8 @@ pub(super) fn solve<'a>(
         problem.events = contacts(&problem, &residual, &noise, ContactModel::Rich);
         if problem.events.is_empty() {
             // A rich model bends around a push that comes early; what only looks like one is dropped with the first set.
-            let (noise, residual) =
-                noise_beside(&problem, &basic_forms(&problem), NoiseMemory::Short);
+            let (_, residual) = noise_beside(&problem, &basic_forms(&problem), NoiseMemory::Short);
+            let noise = noise_apart(&problem, &residual);
             problem.events = contacts(&problem, &residual, &noise, ContactModel::Rich);
         }
     }
@@ -107,8 +109,7 @@ pub(super) fn solve<'a>(
         }
     }
     let mut judged = JudgedSet::default();
-    for _ in 0..END_ROUNDS {
-        problem.noise = noise_left(&problem, &set);
+    for _ in 0..JUDGED_ROUNDS {
         weighted = problem.weighted(&set);
         let choice = CauseChoice::new(&problem, &weighted);
         let found = judge(&choice, settle(&choice, &set));
@@ -137,14 +138,13 @@ pub(super) fn solve<'a>(
     weighted = problem.weighted_of(&judged.set);
     polish(&mut problem, &mut weighted, &mut judged.set);
     settle_names(&mut problem, &mut weighted, &mut judged);
+    let rich = problem.noise.clone();
+    problem.noise = noise_left(&problem, &judged.set);
     weighted = problem.weighted(&judged.set);
-    let still = pruned(&CauseChoice::new(&problem, &weighted), &judged);
-    if still.len() < judged.set.len() {
-        judged.set = still;
-        polish(&mut problem, &mut weighted, &mut judged.set);
-        settle_names(&mut problem, &mut weighted, &mut judged);
-        weighted = problem.weighted(&judged.set);
-    }
+    let faint = faint(&CauseChoice::new(&problem, &weighted), &judged);
+    judged.silent.extend(faint);
+    problem.noise = rich;
+    weighted = problem.weighted(&judged.set);
     let slopes = ShapeSlopes::of(&mut problem, &mut weighted, &judged.set);
     SolvedTorques {
         problem,

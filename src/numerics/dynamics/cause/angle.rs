@@ -180,7 +180,7 @@ pub(super) static BALANCER: TorqueCause = TorqueCause {
         ("second_sine", "Nm"),
         ("constant", "Nm"),
     ],
-    price: |_| 2.0,
+    price: |_| 4.0,
     of_angle: true,
     lengths: &[2],
     forms: |cause, scene| {

@@ -36,6 +36,8 @@ pub(super) static PRESLIDING: TorqueCause = TorqueCause {
             .flat_map(|width| at_each_joint(cause, scene, width, &TRAVELS))
             .collect()
     },
+    // Bristles resist, the short ones and the long ones.
+    is_possible: |_, values| values.iter().all(|kept| *kept >= 0.0),
     spans: |_| vec![span("travel", "rad", [3e-4, 0.05])],
     torque: ColumnTorque::Course(|column, out| {
         let longer = if column.column == 0 { 1.0 } else { LONGER };
