@@ -25,9 +25,9 @@ const FINE_STEPS: i32 = 3;
 /// What a residual is left by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ContactModel {
-    /// A model, the richest or the barest, that was fitted to rows of a push, too, and bends around it.
+    /// A model too rich for rows that it was not fitted to.
     Rich,
-    /// A model that is still searched for: held-out rows are not looked at.
+    /// A model that is bare or still searched for: held-out rows are not looked at.
     Present,
     /// The model that stands.
     Judged,

@@ -65,15 +65,8 @@ pub(super) fn solve<'a>(
             1e3 * latency.seconds
         ));
     }
-    let (noise, residual) = noise_beside(&problem, &rich_forms(&problem, &[]), NoiseMemory::Short);
     if touched {
-        problem.events = contacts(&problem, &residual, &noise, ContactModel::Rich);
-        if problem.events.is_empty() {
-            // A rich model bends around a push that comes early; what only looks like one is dropped with the first set.
-            let (_, residual) = noise_beside(&problem, &basic_forms(&problem), NoiseMemory::Short);
-            let noise = noise_apart(&problem, &residual);
-            problem.events = contacts(&problem, &residual, &noise, ContactModel::Rich);
-        }
+        problem.events = first_contacts(&problem);
     }
     learn(&mut problem, &[]);
     let mut weighted = problem.weighted(&[]);
@@ -172,6 +165,19 @@ fn clocked(
         problem.form(&question.without);
     }
     found
+}
+
+/// What looks like a push before anything else is known: beside what hardly an arm is without, as a rich model bends around a push that comes
+/// early; where nothing does, beside a rich model. What only looks like one is dropped with the first set.
+fn first_contacts(problem: &TorqueProblem) -> Vec<ContactEvent> {
+    let (_, residual) = noise_beside(problem, &basic_forms(problem), NoiseMemory::Short);
+    let noise = noise_apart(problem, &residual);
+    let events = contacts(problem, &residual, &noise, ContactModel::Present);
+    if !events.is_empty() {
+        return events;
+    }
+    let (noise, residual) = noise_beside(problem, &rich_forms(problem, &[]), NoiseMemory::Short);
+    contacts(problem, &residual, &noise, ContactModel::Rich)
 }
 
 /// Sets rows aside in which the residual of a set looks like a push.
