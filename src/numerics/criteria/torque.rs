@@ -66,7 +66,7 @@ criteria! {
     /// The same where the model was fitted to the rows of the push, too, and bends around it.
     PUSH_BENT_SHARE: f64 = 0.35, "share", "judgement: about half of that", "";
     /// Share of the gain that is not of one joint: what only one joint feels is no force at the tool.
-    PUSH_OTHERS: f64 = 0.03, "share", "judgement: levers differ by less than thirty", "";
+    PUSH_OTHERS: f64 = 0.001, "share", "physics: levers differ by less than thirty, squares by less than a thousand", "";
     /// That gain itself, at least.
     PUSH_OTHERS_GAIN: f64 = 25.0, "square", "judgement: five standard deviations", "";
     /// Share of the rows in which the arm must move: at rest a slow change of torque is stiction.
