@@ -7,6 +7,8 @@ use std::f64::consts::PI;
 /// rad: the travel that stands in the rich model, and all that are tried.
 const USUAL_TRAVEL: f64 = 0.004;
 const TRAVELS: [&[f64]; 5] = [&[0.0006], &[0.0015], &[USUAL_TRAVEL], &[0.01], &[0.025]];
+/// Share of the other ones that bristles may drive with.
+const DRIVES: f64 = 0.25;
 /// The longer travel over the other one.
 const LONGER: f64 = 4.0;
 /// rad/s below which a joint is at rest.
@@ -36,8 +38,11 @@ pub(super) static PRESLIDING: TorqueCause = TorqueCause {
             .flat_map(|width| at_each_joint(cause, scene, width, &TRAVELS))
             .collect()
     },
-    // Bristles resist, the short ones and the long ones.
-    is_possible: |_, values| values.iter().all(|kept| *kept >= 0.0),
+    // Bristles resist, the short ones and the long ones; a little less than nothing is the width over which the sign turns.
+    is_possible: |_, values| {
+        let most = values.iter().copied().fold(0.0, f64::max);
+        values.iter().all(|kept| *kept >= -DRIVES * most)
+    },
     spans: |_| vec![span("travel", "rad", [3e-4, 0.05])],
     torque: ColumnTorque::Course(|column, out| {
         let longer = if column.column == 0 { 1.0 } else { LONGER };
