@@ -126,7 +126,7 @@ pub(super) struct TorqueCause {
     /// Shape numbers that are refined once it is found.
     pub spans: fn(&TorqueForm) -> Vec<ShapeSpan>,
     /// Torque per coefficient of a column at a velocity and its smoothed sign, for causes that are friction over velocity.
-    pub friction: Option<fn(&TorqueForm, usize, f64, f64) -> f64>,
+    pub friction: Option<FrictionLaw>,
     /// Whether a number of it that is counted, as an order, is the last that is tried.
     pub has_ends: fn(&TorqueForm) -> bool,
     /// Its numbers as people read them: its coefficients and shape numbers unless it has others.
@@ -134,6 +134,9 @@ pub(super) struct TorqueCause {
     /// A sentence without a full stop, with its size.
     pub statement: fn(&TorqueForm, &[FittedNumber]) -> String,
 }
+
+/// Torque per coefficient of a form's column at a velocity and its smoothed sign.
+pub(super) type FrictionLaw = fn(&TorqueForm, usize, f64, f64) -> f64;
 
 /// Links and changes of their numbers.
 pub(super) type InertialChanges = Vec<(usize, [f64; INERTIAL_NUMBERS])>;
