@@ -38,4 +38,37 @@ criteria! {
     COMPONENTS: usize = 60, "causes", "judgement: bounds time; two frictions a joint are among them", "";
     /// Exchanges of a search at most.
     EXCHANGES: usize = 12, "exchanges", "judgement: bounds time", "";
+    /// Rows before that noise remembers, at most, where it is what the rich model leaves, whose slow part went with what is slow in that model,
+    /// and where it is what a set leaves.
+    MEMORY: [usize; 2] = [4, 12], "judged rows", "count: noise that lasts a fifth of a second has 0.71 of its density at rest by 4 rows, 0.98 by 12", "";
+    /// Named causes that are tried instead of one without a name, at most.
+    UNFOLDED: usize = 3, "causes", "judgement: as of points", "";
+    /// What a shape number that is not the usual one must gain beyond the logarithm of the number of rows.
+    UNUSUAL: f64 = 4.0, "square", "literature: 95 % of one number", "";
+    /// A gain that is worth a new shape or another step.
+    BETTER: f64 = 0.05, "square", "judgement: nothing that rows could show", "";
+    /// Time over which the squared residual is averaged to look for a push.
+    PUSH_AVERAGED: f64 = 0.8, "s", "physics: arms are pushed for about a second", "";
+    /// Pushes of a recording, at most.
+    PUSHES: usize = 4, "pushes", "judgement: bounds time", "";
+    /// Median absolute deviations above the median at which a time is looked at.
+    PUSH_DEVIATIONS: f64 = 6.0, "deviations", "judgement: four standard deviations", "";
+    /// The same, times the median.
+    PUSH_TIMES_USUAL: f64 = 1.7, "ratio", "judgement: no noise is as uneven over a second", "";
+    /// Judged rows of a push, at least.
+    PUSH_FEWEST: usize = 4, "rows", "count: three components of a force and one more", "";
+    /// Time on either side of a push in which no other is looked for.
+    PUSH_APART: f64 = 1.6, "s", "judgement: twice the time of averaging", "";
+    /// What the force of a push must gain.
+    PUSH_GAIN: f64 = 100.0, "square", "judgement: seven standard deviations for each of three components, as some hundred times are looked at", "";
+    /// Share that it must explain of what stands above the noise.
+    PUSH_SHARE: f64 = 0.6, "share", "judgement: more than half", "";
+    /// The same where the model was fitted to the rows of the push, too, and bends around it.
+    PUSH_BENT_SHARE: f64 = 0.35, "share", "judgement: about half of that", "";
+    /// Share of the gain that is not of one joint: what only one joint feels is no force at the tool.
+    PUSH_OTHERS: f64 = 0.001, "share", "physics: levers differ by less than thirty, squares by less than a thousand", "";
+    /// That gain itself, at least.
+    PUSH_OTHERS_GAIN: f64 = 25.0, "square", "judgement: five standard deviations", "";
+    /// Share of the rows in which the arm must move: at rest a slow change of torque is stiction.
+    PUSH_MOVING: f64 = 0.3, "share", "judgement: a third", "";
 }

@@ -159,8 +159,8 @@ fn a_number_at_an_end_of_its_search_is_none() {
     let form = |name: &str, index: usize, value: f64| -> TorqueForm {
         let all = TORQUE_CAUSES
             .iter()
-            .filter(|cause| cause.name() == name)
-            .flat_map(|cause| cause.forms(&scene));
+            .filter(|cause| cause.name == name)
+            .flat_map(|cause| (cause.forms)(cause, &scene));
         all.into_iter()
             .next()
             .expect("a form")

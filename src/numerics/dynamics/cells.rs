@@ -3,8 +3,11 @@
 
 use super::cause::{TORQUE_CONSTANT, UNKNOWN};
 use super::choice::CauseChoice;
+use super::naming::JudgedSet;
 use crate::criteria::cells::{COMMON, NU, SWAPS};
-use crate::criteria::torque::{APART, COMPONENTS, EXCHANGES, LEAST_NOISE, PER_METRE, USUAL};
+use crate::criteria::torque::{
+    APART, COMPONENTS, EXCHANGES, LEAST_NOISE, PER_METRE, UNFOLDED, USUAL,
+};
 use crate::diagnose::table::{
     AMPLITUDES, ComponentSearch, EvidenceRows, KnownState, evidence, log_sum,
 };
@@ -13,9 +16,6 @@ use nalgebra::{DMatrix, DVector};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::rc::Rc;
-
-/// Named causes that are tried instead of one without a name, at most.
-const UNFOLDED: usize = 3;
 
 /// A cause at a place in every shape that is listed of it.
 struct TorqueCell {
@@ -61,6 +61,8 @@ pub(super) struct TorqueTable<'a, 'b> {
     forms: Vec<FormProducts>,
     /// Coefficient of each column at unit amplitude.
     unit: Vec<f64>,
+    /// Forms that do not leave.
+    kept: Vec<usize>,
     /// What the base leaves of the products of components' columns with all others.
     left: RefCell<BTreeMap<usize, Rc<Vec<f64>>>>,
 }
@@ -77,7 +79,8 @@ impl ComponentSearch for TorqueTable<'_, '_> {
     }
 
     fn odds(&self, components: &[TorqueComponent], place: usize, kappa: f64) -> Option<f64> {
-        let is_free = self.choice.is_whole(&forms(&without(components, place)));
+        let is_free = !self.kept.contains(&components[place].form)
+            && self.choice.is_whole(&forms(&without(components, place)));
         is_free.then(|| self.odds_of(components, place, kappa).log_odds)
     }
 
@@ -106,11 +109,10 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
             let form = choice.form(number);
             let kind = form
                 .cause
-                .about()
                 .coefficients
                 .first()
                 .map_or("", |(name, _)| *name);
-            keys.entry((form.cause.name(), kind, form.place, form.cause.cell(form)))
+            keys.entry((form.cause.name, kind, form.place, (form.cause.cell)(form)))
                 .or_default()
                 .push(number);
         }
@@ -118,7 +120,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
             &(&'static str, &'static str, Place, [usize; 2]),
             &Vec<usize>,
         )| {
-            let price = |form: &usize| choice.form(*form).cause.price(choice.form(*form));
+            let price = |form: &usize| (choice.form(*form).cause.price)(choice.form(*form));
             let least = forms.iter().map(price).fold(f64::INFINITY, f64::min);
             TorqueCell {
                 name,
@@ -171,6 +173,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
             rows,
             forms,
             unit,
+            kept: Vec::new(),
             left: RefCell::default(),
         }
     }
@@ -238,7 +241,8 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
         let shares = vec![1.0 / columns.len() as f64; columns.len()];
         let found = evidence(&gram, &along, &shares, state.known.rows);
         let values = || {
-            let least = 1e-9 * gram.trace();
+            // Their means given the rows: of columns that nearly cancel each other least squares would make whatever is large.
+            let least = columns.len() as f64 / found.amplitude.powi(2);
             let factor = (&gram + DMatrix::identity(gram.nrows(), gram.nrows()) * least).cholesky();
             let solved = factor.map_or_else(
                 || vec![0.0; columns.len()],
@@ -310,11 +314,17 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
         let grid = self.cell(cell, &state);
         let prior = self.cells[cell].log_prior;
         let of_itself = self.form(own.form, &state);
-        let log = of_itself.map_or(f64::NEG_INFINITY, |(log, _)| prior + log - count.ln());
-        let best = of_itself.map_or(own, |(_, amplitude)| TorqueComponent { amplitude, ..own });
+        let Some((log, amplitude)) = of_itself else {
+            // One that the arm cannot have, whatever others of its cell would do.
+            return CellPosterior {
+                log_odds: f64::NEG_INFINITY,
+                best: own,
+            };
+        };
+        let log = prior + log - count.ln();
         CellPosterior {
             log_odds: grid.map_or(log, |grid| grid.log_odds.max(log)),
-            best,
+            best: TorqueComponent { amplitude, ..own },
         }
     }
 
@@ -399,7 +409,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
 
     /// One wrong mass, drive or mounting instead of several; one curve over a joint's angle instead of two.
     fn merge(&self, components: Vec<TorqueComponent>) -> Vec<TorqueComponent> {
-        let about = |own: &TorqueComponent| self.choice.form(own.form).cause.about();
+        let about = |own: &TorqueComponent| self.choice.form(own.form).cause;
         let inertial: Vec<usize> = (0..components.len())
             .filter(|place| about(&components[*place]).inertial)
             .collect();
@@ -408,7 +418,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
             groups.push(inertial);
         }
         let mut best = self.merged(&components, &groups, &|form| {
-            self.choice.form(form).cause.about().inertial
+            self.choice.form(form).cause.inertial
         });
         let of_angle: Vec<usize> = (0..best.len())
             .filter(|place| about(&best[*place]).of_angle)
@@ -422,7 +432,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
             .filter(|group| same(group, &best))
             .collect();
         best = self.merged(&best, &groups, &|form| {
-            self.choice.form(form).cause.about().of_angle
+            self.choice.form(form).cause.of_angle
         });
         best
     }
@@ -475,6 +485,8 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
 
     /// Exchanges, merges and removals.
     fn settled(&mut self, components: Vec<TorqueComponent>) -> Vec<TorqueComponent> {
+        // What an arm cannot have is first exchanged for what it can have.
+        let components = self.swap(components);
         let components = self.prune(components);
         let components = self.unfold(self.merge(self.swap(components)));
         self.prune(components)
@@ -484,13 +496,13 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
     fn unfold(&self, mut components: Vec<TorqueComponent>) -> Vec<TorqueComponent> {
         let nameless: Vec<usize> = forms(&components)
             .into_iter()
-            .filter(|form| self.choice.form(*form).cause.name() == UNKNOWN)
+            .filter(|form| self.choice.form(*form).cause.name == UNKNOWN)
             .collect();
         for form in nameless {
             let at = self.choice.form(form).place;
             let mut next: Vec<TorqueComponent> = components.clone();
             next.retain(|own| own.form != form);
-            for _ in 0..UNFOLDED {
+            for _ in 0..*UNFOLDED {
                 let state = self.state(&next, None);
                 let named = |cell: &usize| {
                     self.cells[*cell].name != UNKNOWN && self.cells[*cell].place == at
@@ -558,7 +570,7 @@ impl OtherInertials {
             .iter()
             .map(|form| {
                 (
-                    (choice.form(*form).cause.name(), choice.form(*form).place),
+                    (choice.form(*form).cause.name, choice.form(*form).place),
                     log,
                 )
             })
@@ -570,11 +582,11 @@ impl OtherInertials {
 /// each joint is asked before masses: where factors explain as much, it is these.
 pub(super) fn from_common(choice: &CauseChoice) -> (Vec<usize>, Option<OtherInertials>) {
     let mut table = TorqueTable::new(choice);
-    let is_drive = |number: &usize| choice.form(*number).cause.name() == TORQUE_CONSTANT;
+    let is_drive = |number: &usize| choice.form(*number).cause.name == TORQUE_CONSTANT;
     let inertial = |set: &[TorqueComponent]| -> Vec<usize> {
         forms(set)
             .into_iter()
-            .filter(|number| choice.form(*number).cause.about().inertial)
+            .filter(|number| choice.form(*number).cause.inertial)
             .collect()
     };
     let masses = table.searched(&choice.common());
@@ -617,6 +629,24 @@ pub(super) fn from_common(choice: &CauseChoice) -> (Vec<usize>, Option<OtherIner
 /// The best set from a start.
 pub(super) fn search(choice: &CauseChoice, start: &[usize]) -> Vec<usize> {
     forms(&TorqueTable::new(choice).searched(start))
+}
+
+/// What of a judged set would not be found under the present noise.
+pub(super) fn faint(choice: &CauseChoice, judged: &JudgedSet) -> Vec<usize> {
+    let mut table = TorqueTable::new(choice);
+    table.kept.clone_from(&judged.silent);
+    let components = table.components(&judged.set);
+    let clear = table.prune(components);
+    let kappa = table.noise(&clear);
+    // What others need stays in the set, but not for itself.
+    let pays = |place: &usize| table.odds_of(&clear, *place, kappa).log_odds > table.least();
+    let clear: Vec<usize> = (0..clear.len())
+        .filter(pays)
+        .map(|place| clear[place].form)
+        .collect();
+    let mut faint = judged.set.clone();
+    faint.retain(|number| !clear.contains(number) && !judged.silent.contains(number));
+    faint
 }
 
 /// A set after exchanges, merges and removals.

@@ -5,6 +5,7 @@ use super::arm::DynamicArm;
 use super::cause::{COULOMB, OFFSET, TORQUE_CAUSES, TorqueForm, VISCOUS};
 use super::model::TorqueModel;
 use super::newton_euler::INERTIAL_NUMBERS;
+use super::noise::NoiseMemory;
 use super::problem::TorqueProblem;
 use super::rich::noise_beside;
 use super::source::TorqueSource;
@@ -141,7 +142,7 @@ fn shared_forms(first: &TorqueModel, second: &TorqueModel) -> Result<Vec<TorqueF
 fn candidate_forms(shared: &[TorqueForm], joints: usize) -> Vec<TorqueForm> {
     let mut forms = shared.to_vec();
     for name in [VISCOUS, COULOMB, OFFSET] {
-        let Some(cause) = TORQUE_CAUSES.into_iter().find(|cause| cause.name() == name) else {
+        let Some(cause) = TORQUE_CAUSES.into_iter().find(|cause| cause.name == name) else {
             continue;
         };
         for joint in 0..joints {
@@ -181,7 +182,7 @@ fn prepared<'a>(
     problem.scene.friction = about.friction(&about.forms()?, &problem.scene);
     let all: Vec<String> = TORQUE_CAUSES
         .iter()
-        .map(|cause| cause.name().to_string())
+        .map(|cause| cause.name.to_string())
         .collect();
     problem.form(&all);
     Ok(problem)
@@ -218,7 +219,7 @@ fn take_columns(
     problem.theta.clone_from(&own.inertials);
     problem.shift(own.latency);
     let forms: Vec<usize> = (0..candidates.len()).collect();
-    problem.noise = noise_beside(problem, &forms).0;
+    problem.noise = noise_beside(problem, &forms, NoiseMemory::Short).0;
     problem.theta.clone_from(&about.inertials);
     problem.shift(own.latency);
 }
@@ -296,10 +297,10 @@ fn told(
     let form = &problem.all.forms[form];
     let names = form.coefficient_names();
     let of = |(place, (quantity, unit)): (usize, (String, &'static str))| {
-        let name = format!("{}.{}.{quantity}", form.cause.name(), form.place.tag());
+        let name = format!("{}.{}.{quantity}", form.cause.name, form.place.tag());
         number(
             name,
-            form.cause.name(),
+            form.cause.name,
             form.place,
             unit,
             values[place],

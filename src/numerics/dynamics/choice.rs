@@ -1,6 +1,6 @@
 //! Forms of a problem: which may stand together, which in each other's place.
 
-use super::cause::{COULOMB, TorqueForm, VISCOUS};
+use super::cause::{COULOMB, TorqueForm, UNKNOWN, VISCOUS};
 use super::problem::TorqueProblem;
 use super::sweep::SweptColumns;
 use super::weighted::WeightedColumns;
@@ -26,6 +26,16 @@ impl<'a> CauseChoice<'a> {
         }
     }
 
+    /// Over those with a name: a curve without one would be a push, or several causes at once.
+    pub fn named(problem: &'a TorqueProblem<'a>, weighted: &'a WeightedColumns) -> Self {
+        let mut forms = problem.all.forms[..problem.all.listed].iter();
+        let open = forms.position(|form| form.cause.name == UNKNOWN);
+        Self {
+            open: open.unwrap_or(problem.all.listed),
+            ..Self::new(problem, weighted)
+        }
+    }
+
     pub fn form(&self, number: usize) -> &TorqueForm {
         &self.problem.all.forms[number]
     }
@@ -39,11 +49,11 @@ impl<'a> CauseChoice<'a> {
         values: impl Fn() -> Vec<f64>,
     ) -> bool {
         let form = self.form(number);
-        let about = form.cause.about();
+        let about = form.cause;
         let only_positive = about.positive || (about.brakes && !self.is_part_of_curve(form, set));
         (!only_positive || rises())
-            && form.cause.is_itself(form, &self.problem.scene)
-            && form.cause.is_possible(form, &values())
+            && (form.cause.is_itself)(form, &self.problem.scene)
+            && (form.cause.is_possible)(form, &values())
     }
 
     /// Whether a curve of speed without a name is at the place of a form, in a set.
@@ -60,14 +70,9 @@ impl<'a> CauseChoice<'a> {
             let other_form = self.form(*other);
             *other == number
                 || (form.is_called_as(other_form)
-                    && (!form.cause.about().may_repeat || form.with == other_form.with))
+                    && (!form.cause.may_repeat || form.with == other_form.with))
         };
-        let is_barred = || {
-            self.problem
-                .barred
-                .iter()
-                .any(|(cause, place)| *cause == form.cause.name() && *place == form.place)
-        };
+        let is_barred = || self.problem.barred.iter().any(|one| form.is_of_kind(one));
         let is_same_curve = |other: &usize| form.is_one_curve_with(self.form(*other));
         !set.iter().any(taken)
             && self.has_what_it_modifies(number, set)
@@ -80,10 +85,10 @@ impl<'a> CauseChoice<'a> {
         let form = self.form(number);
         let has = |name: &&str| {
             set.iter().any(|other| {
-                self.form(*other).cause.name() == *name && self.form(*other).place == form.place
+                self.form(*other).cause.name == *name && self.form(*other).place == form.place
             })
         };
-        form.cause.about().modifies.iter().all(has)
+        form.cause.modifies.iter().all(has)
     }
 
     /// Whether all of a set have what they modify.
@@ -94,7 +99,7 @@ impl<'a> CauseChoice<'a> {
 
     /// Viscous and Coulomb friction of every joint: hardly an arm is without.
     pub fn common(&self) -> Vec<usize> {
-        let common = |number: &usize| [VISCOUS, COULOMB].contains(&self.form(*number).cause.name());
+        let common = |number: &usize| [VISCOUS, COULOMB].contains(&self.form(*number).cause.name);
         (0..self.open).filter(common).collect()
     }
 
@@ -110,7 +115,7 @@ impl<'a> CauseChoice<'a> {
     /// Whether two forms may stand in each other's place: on one joint, or both wrong masses, drives or mounting.
     pub fn compete(&self, a: usize, b: usize) -> bool {
         let (a, b) = (self.form(a), self.form(b));
-        a.place == b.place || (a.cause.about().inertial && b.cause.about().inertial)
+        a.place == b.place || (a.cause.inertial && b.cause.inertial)
     }
 
     /// Viscous or Coulomb friction where a set has only the other one: hardly a joint is without either, and the missing one would bias the
@@ -118,17 +123,17 @@ impl<'a> CauseChoice<'a> {
     pub fn other_friction(&self, set: &[usize]) -> Vec<usize> {
         let is_in = |name: &str, place: Place| {
             set.iter().any(|number| {
-                self.form(*number).cause.name() == name && self.form(*number).place == place
+                self.form(*number).cause.name == name && self.form(*number).place == place
             })
         };
         let missing = |number: &usize| {
             let form = self.form(*number);
-            let other = if form.cause.name() == VISCOUS {
+            let other = if form.cause.name == VISCOUS {
                 COULOMB
             } else {
                 VISCOUS
             };
-            !is_in(form.cause.name(), form.place) && is_in(other, form.place)
+            !is_in(form.cause.name, form.place) && is_in(other, form.place)
         };
         let sweep = self.base.with(set);
         // Friction that would drive is none.

@@ -63,8 +63,8 @@ impl TorqueColumns {
         };
         let causes = TORQUE_CAUSES
             .iter()
-            .filter(|cause| without.iter().all(|name| name != cause.name()));
-        for form in causes.flat_map(|cause| cause.forms(scene)) {
+            .filter(|cause| without.iter().all(|name| name != cause.name));
+        for form in causes.flat_map(|cause| (cause.forms)(cause, scene)) {
             all.push(form, scene, reduction, regressor);
         }
         all.listed = all.forms.len();
@@ -80,8 +80,8 @@ impl TorqueColumns {
         regressor: &ReducedRegressor,
     ) -> usize {
         let known = self.forms.iter().position(|known| {
-            form.cause.about().alike_at_joints
-                && known.cause.name() == form.cause.name()
+            form.cause.alike_at_joints
+                && known.cause.name == form.cause.name
                 && known.with == form.with
         });
         let columns = match known {
@@ -109,7 +109,7 @@ impl TorqueColumns {
     /// 1 / variance beforehand of a coefficient: a law of friction alone is hardly more than the whole torque of its joint, so that two of them
     /// do not cancel each other.
     fn friction_prior(&self, form: &TorqueForm, column: &TorqueColumn) -> f64 {
-        let about = form.cause.about();
+        let about = form.cause;
         let Some(most) = self
             .torque
             .get(form.joint())
@@ -133,7 +133,7 @@ impl TorqueColumns {
         regressor: &ReducedRegressor,
     ) {
         for number in 0..self.forms.len() {
-            if self.forms[number].cause.about().of_rigid {
+            if self.forms[number].cause.of_rigid {
                 let fresh = columns_of(&self.forms[number], scene, reduction, regressor);
                 let range = self.of(number);
                 self.columns[range].clone_from_slice(&fresh);
@@ -152,7 +152,7 @@ impl TorqueColumns {
         for number in forms
             .iter()
             .copied()
-            .filter(|number| self.forms[*number].cause.about().of_sign)
+            .filter(|number| self.forms[*number].cause.of_sign)
             .collect::<Vec<_>>()
         {
             let fresh = columns_of(&self.forms[number], scene, reduction, regressor);
@@ -211,10 +211,10 @@ pub(super) fn columns_of(
             .map(|(link, ten)| regressor.column(*link, ten))
             .collect();
     }
-    let joints = form.cause.acts_on(form, scene.joints());
+    let joints = form.acts_on(scene.joints());
     let written = |(number, joint): (usize, usize)| {
         let mut whole = vec![0.0; scene.rows()];
-        form.cause.write(form, scene, joint, number, &mut whole);
+        form.write(scene, joint, number, &mut whole);
         whole
     };
     let places =

@@ -3,17 +3,14 @@
 use super::noise::JointNoise;
 use super::problem::TorqueProblem;
 use super::types::ContactEvent;
+use crate::criteria::torque::{
+    PUSH_APART, PUSH_AVERAGED, PUSH_BENT_SHARE, PUSH_DEVIATIONS, PUSH_FEWEST, PUSH_GAIN,
+    PUSH_MOVING, PUSH_OTHERS, PUSH_OTHERS_GAIN, PUSH_SHARE, PUSH_TIMES_USUAL, PUSHES,
+};
 use crate::statistics::nearest;
 use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::PI;
 
-/// s over which the squared residual is averaged.
-const AVERAGED: f64 = 0.8;
-/// Events of a recording, at most.
-const MOST: usize = 4;
-/// Median absolute deviations above the median, and times the median, at which a time is looked at.
-const DEVIATIONS: f64 = 6.0;
-const TIMES_USUAL: f64 = 1.7;
 /// s that are tried.
 const DURATIONS: [f64; 6] = [0.6, 0.9, 1.2, 1.6, 2.0, 2.6];
 /// Share of a push in which it rises and falls: all of it, or one that is held between.
@@ -24,27 +21,13 @@ const STEP: f64 = 0.1;
 /// s by which start and end are then moved, so many steps on either side.
 const FINE: [f64; 2] = [0.08, 0.02];
 const FINE_STEPS: i32 = 3;
-/// Judged rows of an event, at least.
-const FEWEST: usize = 4;
-/// s on either side of an event where no other is looked for.
-const APART: f64 = 1.6;
-/// What a force must gain, and which share it must explain of what stands above the noise.
-const GAIN: f64 = 100.0;
-const SHARE: f64 = 0.6;
-/// The same beside a rich model, which takes part of it away: there rows are only set aside.
-const RICH_SHARE: f64 = 0.35;
-/// Share of the gain that is not of one joint, and that gain itself: what only one joint feels is no force at the tool.
-const OTHERS: f64 = 0.03;
-const OTHERS_GAIN: f64 = 25.0;
-/// Share of the rows in which the arm must move: at rest a slow change of torque is stiction.
-const MOVING: f64 = 0.3;
 
 /// What a residual is left by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ContactModel {
     /// A model too rich for rows that it was not fitted to.
     Rich,
-    /// A model that is still searched for: held-out rows are not looked at.
+    /// A model that is bare or still searched for: held-out rows are not looked at.
     Present,
     /// The model that stands.
     Judged,
@@ -95,24 +78,24 @@ pub(super) fn contacts(
     let energy: Vec<f64> = shown.iter().map(|row| energy[*row]).collect();
     let average = averaged(
         &energy,
-        ((AVERAGED * problem.reduction.rate) as usize).max(3),
+        ((*PUSH_AVERAGED * problem.reduction.rate) as usize).max(3),
     );
     let median = nearest(&mut average.clone(), 0.5).unwrap_or(0.0);
     let mut apart: Vec<f64> = average.iter().map(|value| (value - median).abs()).collect();
     let spread = 1.4826 * nearest(&mut apart, 0.5).unwrap_or(0.0);
     let least_share = if beside == ContactModel::Rich {
-        RICH_SHARE
+        *PUSH_BENT_SHARE
     } else {
-        SHARE
+        *PUSH_SHARE
     };
     let (mut used, mut events) = (vec![false; shown.len()], Vec::new());
-    for _ in 0..MOST {
+    for _ in 0..*PUSHES {
         let free = (0..shown.len()).filter(|row| !used[*row]);
         let Some(highest) = free.max_by(|a, b| average[*a].total_cmp(&average[*b])) else {
             break;
         };
-        if average[highest] < median + DEVIATIONS * spread
-            || average[highest] < TIMES_USUAL * median
+        if average[highest] < median + *PUSH_DEVIATIONS * spread
+            || average[highest] < *PUSH_TIMES_USUAL * median
         {
             break;
         }
@@ -125,7 +108,7 @@ pub(super) fn contacts(
             least_share,
         );
         events.extend(found.filter(|event| moves(problem, &time, event)));
-        let near = |row: &usize| (time[shown[*row]] - time[shown[highest]]).abs() < APART;
+        let near = |row: &usize| (time[shown[*row]] - time[shown[highest]]).abs() < *PUSH_APART;
         (0..shown.len())
             .filter(near)
             .for_each(|row| used[row] = true);
@@ -147,7 +130,7 @@ fn best_window(
     let mut look = |start: f64, duration: f64| {
         let first = time.partition_point(|time| *time < start);
         let last = time.partition_point(|time| *time <= start + duration);
-        if last >= first + FEWEST {
+        if last >= first + *PUSH_FEWEST {
             for taper in TAPERS {
                 let window = PushWindow {
                     start,
@@ -181,7 +164,7 @@ fn best_window(
             now = look(start + begin, duration + end - begin);
         }
     }
-    best.filter(|(event, share)| event.gain > GAIN && *share > least_share)
+    best.filter(|(event, share)| event.gain > *PUSH_GAIN && *share > least_share)
         .map(|(event, _)| event)
 }
 
@@ -256,7 +239,7 @@ fn pushed(
         sigma: [0, 1, 2].map(|axis| inverse[(axis, axis)].max(0.0).sqrt()),
         gain,
     };
-    let share = if gain - most < (OTHERS * gain).max(OTHERS_GAIN) {
+    let share = if gain - most < (*PUSH_OTHERS * gain).max(*PUSH_OTHERS_GAIN) {
         0.0
     } else {
         gain / (square - usual).max(gain)
@@ -277,7 +260,7 @@ fn moves(problem: &TorqueProblem, time: &[f64], event: &ContactEvent) -> bool {
             .iter()
             .any(|course| course[row].abs() > 2.0 * scene.sign_width)
     });
-    moving.count() as f64 >= MOVING * rows.len() as f64
+    moving.count() as f64 >= *PUSH_MOVING * rows.len() as f64
 }
 
 /// Mean over `width` values about each; beyond the ends there is nothing.

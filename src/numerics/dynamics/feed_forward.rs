@@ -133,10 +133,10 @@ impl TorqueModel {
         let mut courses = Vec::new();
         let mut first = 0;
         for (term, form) in forms.iter().enumerate() {
-            for joint in form.cause.acts_on(form, self.joints()) {
+            for joint in form.acts_on(self.joints()) {
                 for number in 0..form.width {
                     let mut course = vec![0.0; scene.rows()];
-                    form.cause.write(form, scene, joint, number, &mut course);
+                    form.write(scene, joint, number, &mut course);
                     courses.push(TermCourse {
                         term,
                         coefficient: first + number,

@@ -132,13 +132,12 @@ impl JointRange {
                 0.0
             }
         };
-        let load = if form.cause.about().of_rigid {
+        let load = if form.cause.of_rigid {
             above(scene.rigid[joint][row], self.load)
         } else {
             0.0
         };
-        let is_friction = !form.cause.about().modifies.is_empty()
-            || form.cause.friction(form, 0, 1.0, 1.0).is_some();
+        let is_friction = !form.cause.modifies.is_empty() || form.friction(0, 1.0, 1.0).is_some();
         if is_friction {
             return load.max(above(scene.velocity[joint][row], self.speed));
         }

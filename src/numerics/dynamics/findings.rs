@@ -1,6 +1,6 @@
 //! What was found in words and numbers: sizes, evidence, rivals, probabilities.
 
-use super::cause::{FittedNumber, TorqueForm};
+use super::cause::{COULOMB, FittedNumber, TorqueForm, VISCOUS};
 use super::cells::{CellOdds, OtherInertials, TorqueTable};
 use super::choice::CauseChoice;
 use super::friction_line::number_of_line;
@@ -18,7 +18,8 @@ use crate::estimate::tail;
 /// Residual rows of a test, at most: beyond it the tail does not change.
 const FREEDOM: f64 = 1e4;
 
-/// Findings of a judged set but for what is silent, strongest first.
+/// Findings of a judged set but for what is silent, strongest first. A name that the data exclude by others of its place is none; the common
+/// frictions are parts of sums.
 pub(super) fn findings(
     choice: &CauseChoice,
     JudgedSet { set, silent, .. }: &JudgedSet,
@@ -38,7 +39,7 @@ pub(super) fn findings(
     let mut found: Vec<TorqueFinding> = named
         .map(|number| {
             let mut odds = table.odds_in_place(&components, *number);
-            let other = other.filter(|_| choice.form(*number).cause.about().inertial);
+            let other = other.filter(|_| choice.form(*number).cause.inertial);
             odds.rivals.extend(
                 other
                     .into_iter()
@@ -55,6 +56,11 @@ pub(super) fn findings(
                 ),
                 odds,
             )
+        })
+        .filter(|finding| {
+            finding.effect == VISCOUS
+                || finding.effect == COULOMB
+                || finding.probabilities.name >= *RIVAL
         })
         .collect();
     found.sort_by(|a, b| b.evidence.gain.total_cmp(&a.evidence.gain));
@@ -98,7 +104,7 @@ fn finding(
         * problem.reduction.rows.len();
     let square: f64 = effect.iter().flatten().map(|value| value * value).sum();
     // Tolerances bend to take the place of a wrong mass, at their price: its size is what the rest leaves as it is.
-    let left_without: Vec<(usize, f64)> = match form.cause.about().inertial {
+    let left_without: Vec<(usize, f64)> = match form.cause.inertial {
         true => solution
             .iter()
             .copied()
@@ -107,10 +113,10 @@ fn finding(
         false => without.solution(),
     };
     TorqueFinding {
-        effect: form.cause.name(),
+        effect: form.cause.name,
         place: form.place,
-        statement: form.cause.statement(form, &fitted),
-        parameters: with_shapes(form.cause.parameters(form, &fitted), form, |index| {
+        statement: (form.cause.statement)(form, &fitted),
+        parameters: with_shapes((form.cause.parameters)(form, &fitted), form, |index| {
             slopes.sigma(uncertain, number, index)
         }),
         evidence: Evidence {

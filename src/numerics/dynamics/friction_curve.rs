@@ -23,10 +23,7 @@ impl FrictionLaw<'_> {
     fn torque(&self, form: &TorqueForm, velocity: f64, width: f64) -> f64 {
         let sign = (velocity / width).tanh();
         let of = |(column, value): (usize, &f64)| {
-            form.cause
-                .friction(form, column, velocity, sign)
-                .unwrap_or(0.0)
-                * value
+            form.friction(column, velocity, sign).unwrap_or(0.0) * value
         };
         self.coefficients.iter().enumerate().map(of).sum()
     }
@@ -48,7 +45,7 @@ impl TorqueModel {
     /// None where speed enters by its first power. Fails where no cause has a term's name.
     pub fn friction_line(&self, joint: usize) -> Result<Option<[FittedNumber; 2]>> {
         let (laws, numbers) = self.laws()?;
-        let of = |name: &str| laws[joint].iter().find(|law| law.form.cause.name() == name);
+        let of = |name: &str| laws[joint].iter().find(|law| law.form.cause.name == name);
         let Some(power) = of(VISCOUS).filter(|law| {
             law.form
                 .shape
@@ -103,9 +100,7 @@ impl TorqueModel {
             let (own, numbers) = (first, shapes);
             first += term.coefficients.len();
             shapes += form.shape_numbers().len();
-            if let (Place::Joint(joint), Some(_)) =
-                (form.place, form.cause.friction(&form, 0, 0.0, 0.0))
-            {
+            if let (Place::Joint(joint), Some(_)) = (form.place, form.friction(0, 0.0, 0.0)) {
                 laws[joint].push(FrictionLaw {
                     form,
                     coefficients: &term.coefficients,
@@ -154,12 +149,7 @@ impl TorqueModel {
             )];
             for law in laws {
                 let sign = (velocity / range.sign_width).tanh();
-                let of = |column: usize| {
-                    law.form
-                        .cause
-                        .friction(&law.form, column, *velocity, sign)
-                        .unwrap_or(0.0)
-                };
+                let of = |column: usize| law.form.friction(column, *velocity, sign).unwrap_or(0.0);
                 along.extend(
                     (0..law.coefficients.len()).map(|column| (law.first + column, of(column))),
                 );

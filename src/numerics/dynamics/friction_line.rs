@@ -14,11 +14,11 @@ pub(super) fn number_of_line(
     (uncertain, slopes): (&SweptColumns, &ShapeSlopes),
 ) -> Option<FittedNumber> {
     let (all, form) = (&choice.problem.all, choice.form(number));
-    if !form.cause.about().brakes {
+    if !form.cause.brakes {
         return None;
     }
     let is_power = |own: &TorqueForm| {
-        own.place == form.place && own.cause.name() == VISCOUS && !own.shape_numbers().is_empty()
+        own.place == form.place && own.cause.name == VISCOUS && !own.shape_numbers().is_empty()
     };
     let power = *set.iter().find(|own| is_power(choice.form(**own)))?;
     let exponent = choice.form(power).shape[0];
@@ -31,7 +31,7 @@ pub(super) fn number_of_line(
             .find(|(pivot, _)| *pivot == column)
             .map_or(0.0, |(_, value)| *value)
     };
-    let (column, is_viscous) = (all.of(power).start, form.cause.name() == VISCOUS);
+    let (column, is_viscous) = (all.of(power).start, form.cause.name == VISCOUS);
     let of = |exponent: f64| line_of_power(exponent, fastest)[usize::from(is_viscous)];
     let mut along = vec![(column, of(exponent))];
     if !is_viscous {

@@ -25,8 +25,18 @@ fn held_out_errors(
     )
 }
 
-/// What held-out rows gain by each of a set, and what they must.
-fn gains(choice: &CauseChoice, set: &[usize]) -> Vec<(f64, f64)> {
+/// What held-out rows gain by a form.
+#[derive(Clone, Copy)]
+struct HeldOutGain {
+    square: f64,
+    /// What it must be.
+    least: f64,
+    /// What it would be if the form were right.
+    foretold: f64,
+}
+
+/// What held-out rows gain by each of a set.
+fn gains(choice: &CauseChoice, set: &[usize]) -> Vec<HeldOutGain> {
     let runs = choice.problem.runs(true);
     let weighing = choice.problem.weighing(&runs);
     let (whole, stretched) = held_out_errors(choice.problem, weighing, &choice.base.with(set));
@@ -50,27 +60,27 @@ fn gains(choice: &CauseChoice, set: &[usize]) -> Vec<(f64, f64)> {
             - stretched;
         // The gain of a right finding scatters about its own square by twice its root.
         let least = foretold - *NAMED * 2.0 * foretold.max(0.0).sqrt();
-        (
-            gain,
-            least.min(*CONFIRMED * choice.form(set[place]).width as f64),
-        )
+        HeldOutGain {
+            square: gain,
+            least: least.min(*CONFIRMED * choice.form(set[place]).width as f64),
+            foretold,
+        }
     };
     (0..set.len()).map(without).collect()
 }
 
 /// Withdraws the worst until all are confirmed; nothing where no rows are held out.
 pub(super) fn judge(choice: &CauseChoice, mut set: Vec<usize>) -> JudgedSet {
-    let mut withdrawn = Vec::new();
+    let (mut withdrawn, mut is_refuted) = (Vec::new(), false);
     if choice.problem.runs(true).is_empty() {
         return JudgedSet {
             set,
-            silent: Vec::new(),
-            withdrawn,
+            ..JudgedSet::default()
         };
     }
     loop {
         let gains = gains(choice, &set);
-        let short = |place: &usize| gains[*place].0 - gains[*place].1;
+        let short = |place: &usize| gains[*place].square - gains[*place].least;
         let needed = |place: &usize| {
             let form = choice.form(set[*place]);
             set.iter().any(|other| choice.form(*other).modifies(form))
@@ -79,11 +89,17 @@ pub(super) fn judge(choice: &CauseChoice, mut set: Vec<usize>) -> JudgedSet {
         let Some(worst) = worst.min_by(|a, b| short(a).total_cmp(&short(b))) else {
             break;
         };
-        withdrawn.push((set.remove(worst), gains[worst].0));
+        let HeldOutGain {
+            square, foretold, ..
+        } = gains[worst];
+        withdrawn.push((set.remove(worst), square));
+        // Nothing would gain nothing: what loses more than it was to gain is not what it stands for.
+        is_refuted |= square < -foretold;
     }
     JudgedSet {
         set,
-        silent: Vec::new(),
         withdrawn,
+        is_refuted,
+        ..JudgedSet::default()
     }
 }

@@ -1,8 +1,8 @@
 //! Whether torques come later than the positions beside them: the fit of base, friction, offset and rotor over a common shift.
 
-use super::cause::{COULOMB, OFFSET, ROTOR, VISCOUS};
+use super::noise::NoiseMemory;
 use super::problem::TorqueProblem;
-use super::rich::noise_beside;
+use super::rich::{basic_forms, noise_beside};
 use super::sweep::SweptColumns;
 use super::weighted::{Weighing, WeightedColumns};
 
@@ -30,14 +30,8 @@ pub(super) struct Latency {
 
 /// The latency, where there is one that most joints agree on.
 pub(super) fn latency(problem: &TorqueProblem) -> Option<Latency> {
-    let basic: Vec<usize> = (0..problem.all.forms.len())
-        .filter(|form| {
-            problem.all.forms[*form].width == 1
-                && [VISCOUS, COULOMB, OFFSET, ROTOR]
-                    .contains(&problem.all.forms[*form].cause.name())
-        })
-        .collect();
-    let (noise, _) = noise_beside(problem, &basic);
+    let basic = basic_forms(problem);
+    let (noise, _) = noise_beside(problem, &basic, NoiseMemory::Short);
     let runs = problem.runs(false);
     let weighing = Weighing {
         noise: &noise,

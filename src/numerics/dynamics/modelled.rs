@@ -40,7 +40,7 @@ impl TorqueModel {
         let term = |number: &usize| {
             let form = choice.form(*number);
             TorqueTerm {
-                effect: form.cause.name().into(),
+                effect: form.cause.name.into(),
                 place: form.place,
                 with: form.with,
                 shape: form.shape.clone(),

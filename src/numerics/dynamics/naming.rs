@@ -14,12 +14,15 @@ use crate::criteria::torque::NAMED;
 const ROUNDS: usize = 40;
 
 /// What explains a recording.
+#[derive(Default)]
 pub(super) struct JudgedSet {
     pub set: Vec<usize>,
     /// What of the set is part of the model, but too little to be named.
     pub silent: Vec<usize>,
     /// What held-out rows did not confirm, with what they gained by each.
     pub withdrawn: Vec<(usize, f64)>,
+    /// Whether held-out rows speak against one of them.
+    pub is_refuted: bool,
 }
 
 /// What becomes of a form.
@@ -44,8 +47,8 @@ pub(super) fn take_out_ends(
         match one {
             NotNamed::Within(place, form) => set[place] = push(problem, weighted, form),
             NotNamed::Out(place) | NotNamed::Silent(place) => {
-                let form = &problem.all.forms[set.remove(place)];
-                problem.barred.push((form.cause.name(), form.place));
+                let form = problem.all.forms[set.remove(place)].clone();
+                problem.barred.push(form);
             }
         }
     }
@@ -57,7 +60,6 @@ fn at_end(problem: &TorqueProblem, set: &[usize]) -> Option<NotNamed> {
     set.iter().enumerate().find_map(|(place, number)| {
         let form = &problem.all.forms[*number];
         match form.within_ends() {
-            _ if form.cause.name() == UNKNOWN => None,
             None => Some(NotNamed::Out(place)),
             Some(within) => (within.shape != form.shape).then_some(NotNamed::Within(place, within)),
         }
@@ -112,7 +114,7 @@ fn next(choice: &CauseChoice, judged: &JudgedSet, slopes: &ShapeSlopes) -> Optio
     let uncertain = slopes.beside(&sweep);
     let named = |place: &usize| {
         let form = choice.form(set[*place]);
-        form.cause.name() != UNKNOWN
+        form.cause.name != UNKNOWN
             && !judged
                 .silent
                 .iter()
@@ -143,8 +145,7 @@ fn next(choice: &CauseChoice, judged: &JudgedSet, slopes: &ShapeSlopes) -> Optio
             .max_by(|a, b| a.abs().total_cmp(&b.abs()))
             .unwrap_or(0.0)
     };
-    let wrong =
-        |place: usize, sure: f64| choice.form(set[place]).cause.about().brakes && sure <= 0.0;
+    let wrong = |place: usize, sure: f64| choice.form(set[place]).cause.brakes && sure <= 0.0;
     let weak = (0..set.len())
         .filter(named)
         .map(|place| (place, sure(place)));
@@ -160,7 +161,7 @@ fn next(choice: &CauseChoice, judged: &JudgedSet, slopes: &ShapeSlopes) -> Optio
     }
     let mut leaning = (0..set.len()).filter(|other| choice.form(set[*other]).modifies(form));
     let is_summed = choice.is_part_of_curve(form, set);
-    if is_summed || (form.cause.about().brakes && sure > 0.0) {
+    if is_summed || (form.cause.brakes && sure > 0.0) {
         return Some(NotNamed::Silent(place));
     }
     // What leans on friction that is none is none either.

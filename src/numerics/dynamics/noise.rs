@@ -1,9 +1,16 @@
 //! Noise of filtered torques: of each joint an autoregressive course, by which rows are whitened before least squares.
 
+use crate::criteria::torque::MEMORY;
 use std::ops::Range;
 
-/// Rows before that a row remembers, at most.
-const ORDER: usize = 4;
+/// How many rows before a row remembers, at most.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum NoiseMemory {
+    /// What a rich model leaves: slow noise went with what is slow in that model.
+    Short = 0,
+    /// What a set leaves: slow noise is all there.
+    Long = 1,
+}
 
 /// The noise of one joint.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,9 +35,10 @@ impl JointNoise {
 
     /// The noise of a residual over runs of rows, `spent` of whose freedoms a fit has taken: Yule and Walker's equations by Levinson, the order by
     /// Akaike's criterion.
-    pub fn of(residual: &[f64], runs: &[Range<usize>], spent: f64) -> Self {
+    pub fn of(residual: &[f64], runs: &[Range<usize>], spent: f64, longest: NoiseMemory) -> Self {
+        let longest = MEMORY[longest as usize];
         let rows: usize = runs.iter().map(Range::len).sum();
-        let correlation: Vec<f64> = (0..=ORDER)
+        let correlation: Vec<f64> = (0..=longest)
             .map(|lag| {
                 let product = |run: &Range<usize>| {
                     let run = &residual[run.clone()];
@@ -46,7 +54,7 @@ impl JointNoise {
         let mut memory: Vec<f64> = Vec::new();
         let mut left = correlation[0].max(f64::MIN_POSITIVE);
         let mut best = (rows as f64 * left.ln(), left, memory.clone());
-        for order in 1..=ORDER {
+        for order in 1..=longest {
             let ahead: f64 = memory
                 .iter()
                 .enumerate()
@@ -114,7 +122,7 @@ mod tests {
             .collect();
         let whole = 0..course.len();
         let runs = std::slice::from_ref(&whole);
-        let noise = JointNoise::of(&course, runs, 0.0);
+        let noise = JointNoise::of(&course, runs, 0.0, NoiseMemory::Short);
         assert!(
             (noise.memory[0] - 0.8).abs() < 0.03 && (noise.innovation - 1.0).abs() < 0.02,
             "{noise:?}"

@@ -7,7 +7,7 @@ use super::findings::{contact, findings, plain_finding};
 use super::inertial_names::{INERTIAL_NAMES, inertial_unit};
 use super::model::TorqueModel;
 use super::newton_euler::INERTIAL_NUMBERS;
-use super::noise::JointNoise;
+use super::noise::{JointNoise, NoiseMemory};
 use super::problem::TorqueProblem;
 use super::solve::SolvedTorques;
 use super::sweep::SweptColumns;
@@ -224,8 +224,7 @@ fn withdrawn(choice: &CauseChoice, withdrawn: &[(usize, f64)]) -> Vec<String> {
         };
         format!(
             "{} at {}: held-out rows do not confirm it (with it their squared error over the noise {squares})",
-            form.cause.name(),
-            form.place
+            form.cause.name, form.place
         )
     };
     withdrawn.iter().map(sentence).collect()
@@ -235,7 +234,7 @@ fn withdrawn(choice: &CauseChoice, withdrawn: &[(usize, f64)]) -> Vec<String> {
 fn leftover(problem: &TorqueProblem, residual: &[Vec<f64>]) -> Vec<TorqueLeftover> {
     let runs = problem.runs(false);
     let of = |(joint, course): (usize, &Vec<f64>)| {
-        let noise = JointNoise::of(course, &runs, 0.0);
+        let noise = JointNoise::of(course, &runs, 0.0, NoiseMemory::Short);
         let lasting = noise.autocorrelation();
         let signature = (lasting > LASTING)
             .then(|| format!("correlated over {lasting:.0} rows: not white noise"));

@@ -6,13 +6,12 @@ use super::problem::TorqueProblem;
 use super::shape_slopes::{ShapeNumber, ShapeSlopes};
 use super::sweep::SweptColumns;
 use super::weighted::WeightedColumns;
+use crate::criteria::torque::BETTER;
 
 /// Steps, at most.
 const STEPS: usize = 3;
 /// A number changes by less than this factor in a step.
 const FARTHEST: f64 = 1.4;
-/// A fall of the whitened squared residual that is worth another step.
-const BETTER: f64 = 0.05;
 /// rad/s between which the width lies.
 const WIDTHS: [f64; 2] = [5e-4, 0.2];
 
@@ -65,7 +64,7 @@ fn step(problem: &mut TorqueProblem, weighted: &mut WeightedColumns, set: &mut [
     }
     problem.renew_signs(set);
     *weighted = problem.weighted_of(set);
-    if SweptColumns::base(&problem.all, weighted).with(set).square < square - BETTER {
+    if SweptColumns::base(&problem.all, weighted).with(set).square < square - *BETTER {
         return true;
     }
     set.copy_from_slice(&before);

@@ -39,8 +39,9 @@ pub(super) struct TorqueProblem<'a> {
     held_out: Vec<bool>,
     pub events: Vec<ContactEvent>,
     pub noise: Vec<JointNoise>,
-    /// Causes, with their places, of which only a number at an end of its search would explain the torques.
-    pub barred: Vec<(&'static str, Place)>,
+    /// Causes at their places that are none: only a number at an end of its search would explain the torques, or held-out rows did not
+    /// confirm them.
+    pub barred: Vec<TorqueForm>,
     /// Whether the width of a sign has changed since columns of forms outside a set were made.
     is_stale: bool,
     /// Least and greatest, C, where it was recorded.

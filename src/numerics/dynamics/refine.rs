@@ -6,18 +6,15 @@ use super::naming::push;
 use super::problem::TorqueProblem;
 use super::sweep::SweptColumns;
 use super::weighted::WeightedColumns;
+use crate::criteria::torque::{BETTER, UNUSUAL};
 use crate::effect::Place;
 
 /// Half widths of the grids: of the logarithm, or of the number itself.
 const HALVES: [f64; 4] = [0.3, 0.1, 0.03, 0.01];
 /// Points on either side.
 const POINTS: i32 = 3;
-/// The same, beyond the logarithm of the number of rows, for a number that is what it usually is.
-const UNUSUAL: f64 = 4.0;
 /// The power of speed from which one is looked for.
 const START_POWER: f64 = 0.7;
-/// A gain that is worth a new shape.
-const BETTER: f64 = 0.05;
 
 /// Replaces forms of a set by better shaped ones; tells whether any was.
 pub(super) fn refine(
@@ -40,7 +37,7 @@ pub(super) fn one_power_of_speed(
     set: &mut Vec<usize>,
     joint: usize,
 ) -> bool {
-    let is_coulomb = |form: &TorqueForm| form.cause.name() == COULOMB;
+    let is_coulomb = |form: &TorqueForm| form.cause.name == COULOMB;
     powered(problem, weighted, set, (joint, &is_coulomb), 0.0)
 }
 
@@ -76,7 +73,7 @@ fn powered(
         let mut forms = set.iter().map(|number| &problem.all.forms[*number]);
         forms.position(|form| form.place == Place::Joint(joint) && is(form))
     };
-    let viscous = at(&|form| form.cause.name() == VISCOUS);
+    let viscous = at(&|form| form.cause.name == VISCOUS);
     let (Some(viscous), Some(replaced)) = (viscous, at(is_replaced)) else {
         return false;
     };
@@ -108,7 +105,7 @@ pub(super) fn refine_one(
     place: usize,
 ) {
     let form = &problem.all.forms[set[place]];
-    for span in form.cause.spans(form) {
+    for span in (form.cause.spans)(form) {
         for half in HALVES {
             try_grid(problem, weighted, set, place, span, half);
             // What the coarsest grid leaves as it usually is stays so.
@@ -165,9 +162,9 @@ fn try_grid(
         .max_by(|a, b| gain(*a).total_cmp(&gain(*b)))
         .unwrap_or(set[place]);
     let asked = if is_usual {
-        UNUSUAL + (weighted.rows as f64).ln()
+        *UNUSUAL + (weighted.rows as f64).ln()
     } else {
-        BETTER
+        *BETTER
     };
     if gain(best) > gain(set[place]) + asked {
         set[place] = best;

@@ -181,7 +181,7 @@ pub(super) fn planned_slopes(
     for (form, values) in forms.iter().zip(coefficients) {
         for span in form.shape_numbers() {
             let size = form.shape[span.index];
-            for joint in form.cause.acts_on(form, scene.joints()) {
+            for joint in form.acts_on(scene.joints()) {
                 let [less, more] = [1.0 - STEP, 1.0 + STEP].map(|share| {
                     torque_at(
                         &form.with_shape(span.index, share * size),
@@ -201,7 +201,7 @@ pub(super) fn planned_slopes(
             forms
                 .iter()
                 .zip(coefficients)
-                .filter(|(form, _)| form.cause.acts_on(form, scene.joints()).contains(&joint))
+                .filter(|(form, _)| form.acts_on(scene.joints()).contains(&joint))
         };
         let own: Vec<_> = acting().collect();
         let [less, more] = [1.0 - STEP, 1.0 + STEP].map(|share| {
@@ -229,7 +229,7 @@ pub(super) fn slope(size: f64, of: impl Fn(f64) -> f64) -> f64 {
 fn torque_at(form: &TorqueForm, values: &[f64], scene: &DynamicScene, joint: usize) -> Vec<f64> {
     let (mut sum, mut course) = (vec![0.0; scene.rows()], vec![0.0; scene.rows()]);
     for (number, value) in values.iter().enumerate() {
-        form.cause.write(form, scene, joint, number, &mut course);
+        form.write(scene, joint, number, &mut course);
         sum.iter_mut()
             .zip(&course)
             .for_each(|(sum, part)| *sum += value * part);

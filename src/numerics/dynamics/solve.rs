@@ -1,7 +1,8 @@
 //! The steps of a diagnosis of torques, one after the other.
 
 use super::arm::DynamicArm;
-use super::cells::{OtherInertials, from_common, search, settle};
+use super::cause::TorqueForm;
+use super::cells::{OtherInertials, faint, from_common, search, settle};
 use super::choice::CauseChoice;
 use super::clock::RecordingClock;
 use super::contact::{ContactModel, contacts};
@@ -9,11 +10,12 @@ use super::friction_lead::take_friction_lead;
 use super::judge::judge;
 use super::latency::{Latency, latency};
 use super::naming::{JudgedSet, settle_names, take_out_ends};
+use super::noise::NoiseMemory;
 use super::polish::polish;
 use super::problem::TorqueProblem;
 use super::recording::TorqueRecording;
 use super::refine::{one_power_of_speed, power_for_curve, refine};
-use super::rich::{noise_beside, rich_forms};
+use super::rich::{basic_forms, noise_apart, noise_beside, noise_left, rich_forms};
 use super::shape_slopes::ShapeSlopes;
 use super::sign_width::sign_width;
 use super::sweep::SweptColumns;
@@ -22,6 +24,8 @@ use super::weighted::WeightedColumns;
 
 /// Rounds in which others are looked for in place of forms with a number at an end of its search, at most.
 const END_ROUNDS: usize = 3;
+/// Rounds in which others are looked for in place of what held-out rows speak against, at most.
+const JUDGED_ROUNDS: usize = 6;
 /// s.
 const SAME_TIME: f64 = 0.1;
 /// Rounds in which a latency and the lead of friction find each other, at most.
@@ -61,13 +65,12 @@ pub(super) fn solve<'a>(
             1e3 * latency.seconds
         ));
     }
-    let (noise, residual) = noise_beside(&problem, &rich_forms(&problem, &[]));
     if touched {
-        problem.events = contacts(&problem, &residual, &noise, ContactModel::Rich);
+        problem.events = first_contacts(&problem);
     }
     learn(&mut problem, &[]);
     let mut weighted = problem.weighted(&[]);
-    let (mut set, mut other) = from_common(&CauseChoice::new(&problem, &weighted));
+    let (mut set, mut other) = from_common(&CauseChoice::named(&problem, &weighted));
     let before = problem.events.clone();
     if touched {
         look_for_contacts(&mut problem, &weighted, &set, ContactModel::Present);
@@ -75,7 +78,7 @@ pub(super) fn solve<'a>(
     if !alike(&before, &problem.events) {
         learn(&mut problem, &[]);
         weighted = problem.weighted(&[]);
-        (set, other) = from_common(&CauseChoice::new(&problem, &weighted));
+        (set, other) = from_common(&CauseChoice::named(&problem, &weighted));
     }
     tell(told(&problem, &set));
     refine(&mut problem, &mut weighted, &mut set);
@@ -98,19 +101,42 @@ pub(super) fn solve<'a>(
             polish(&mut problem, &mut weighted, &mut set);
         }
     }
-    weighted = problem.weighted(&set);
-    let mut judged = {
+    let mut judged = JudgedSet::default();
+    for _ in 0..JUDGED_ROUNDS {
+        weighted = problem.weighted(&set);
         let choice = CauseChoice::new(&problem, &weighted);
-        let mut judged = judge(&choice, settle(&choice, &set));
-        // What only stood for something that was withdrawn.
-        judged.set = settle(&choice, &judged.set);
-        judged.silent = choice.other_friction(&judged.set);
-        judged.set.extend(&judged.silent);
-        judged
-    };
+        let found = judge(&choice, settle(&choice, &set));
+        judged.set = found.set;
+        if found.withdrawn.is_empty() {
+            break;
+        }
+        let form = |number: &usize| problem.all.forms[*number].clone();
+        let barred: Vec<TorqueForm> = found
+            .withdrawn
+            .iter()
+            .map(|(number, _)| form(number))
+            .collect();
+        problem.barred.extend(barred);
+        judged.withdrawn.extend(found.withdrawn);
+        set = judged.set.clone();
+        if found.is_refuted {
+            // Something else was in its place.
+            set = again(&mut problem, &mut weighted, set);
+            polish(&mut problem, &mut weighted, &mut set);
+        }
+    }
+    weighted = problem.weighted(&judged.set);
+    judged.silent = CauseChoice::new(&problem, &weighted).other_friction(&judged.set);
+    judged.set.extend(&judged.silent);
     weighted = problem.weighted_of(&judged.set);
     polish(&mut problem, &mut weighted, &mut judged.set);
     settle_names(&mut problem, &mut weighted, &mut judged);
+    let rich = problem.noise.clone();
+    problem.noise = noise_left(&problem, &judged.set);
+    weighted = problem.weighted(&judged.set);
+    let faint = faint(&CauseChoice::new(&problem, &weighted), &judged);
+    judged.silent.extend(faint);
+    problem.noise = rich;
     weighted = problem.weighted(&judged.set);
     let slopes = ShapeSlopes::of(&mut problem, &mut weighted, &judged.set);
     SolvedTorques {
@@ -139,6 +165,19 @@ fn clocked(
         problem.form(&question.without);
     }
     found
+}
+
+/// What looks like a push before anything else is known: beside what hardly an arm is without, as a rich model bends around a push that comes
+/// early; where nothing does, beside a rich model. What only looks like one is dropped with the first set.
+fn first_contacts(problem: &TorqueProblem) -> Vec<ContactEvent> {
+    let (_, residual) = noise_beside(problem, &basic_forms(problem), NoiseMemory::Short);
+    let noise = noise_apart(problem, &residual);
+    let events = contacts(problem, &residual, &noise, ContactModel::Present);
+    if !events.is_empty() {
+        return events;
+    }
+    let (noise, residual) = noise_beside(problem, &rich_forms(problem, &[]), NoiseMemory::Short);
+    contacts(problem, &residual, &noise, ContactModel::Rich)
 }
 
 /// Sets rows aside in which the residual of a set looks like a push.
@@ -193,14 +232,14 @@ fn again(
 
 /// Takes noise from what the rich model and a set leave.
 fn learn(problem: &mut TorqueProblem, set: &[usize]) {
-    problem.noise = noise_beside(problem, &rich_forms(problem, set)).0;
+    problem.noise = noise_beside(problem, &rich_forms(problem, set), NoiseMemory::Short).0;
 }
 
 /// A set as a line.
 fn told(problem: &TorqueProblem, set: &[usize]) -> String {
     let names = set.iter().map(|number| {
         let form = &problem.all.forms[*number];
-        format!("{} {}", form.cause.name(), form.place)
+        format!("{} {}", form.cause.name, form.place)
     });
     format!("explained by {}", names.collect::<Vec<_>>().join(", "))
 }

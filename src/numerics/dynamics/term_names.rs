@@ -13,7 +13,7 @@ impl TorqueTerm {
     pub(super) fn form(&self) -> Result<TorqueForm> {
         let cause = TORQUE_CAUSES
             .into_iter()
-            .find(|cause| cause.name() == self.effect && cause.has_shape(&self.shape));
+            .find(|cause| cause.name == self.effect && cause.has_shape(&self.shape));
         let cause = cause.ok_or_else(|| {
             Error::data(
                 "torque model",
@@ -105,13 +105,12 @@ mod tests {
         );
         let mut tried = 0;
         for cause in TORQUE_CAUSES {
-            for form in cause
-                .forms(&scene)
+            for form in (cause.forms)(cause, &scene)
                 .into_iter()
-                .filter(|_| !cause.about().coefficients.is_empty())
+                .filter(|_| !cause.coefficients.is_empty())
             {
                 let term = TorqueTerm {
-                    effect: cause.name().into(),
+                    effect: cause.name.into(),
                     place: form.place,
                     with: form.with,
                     shape: form.shape.clone(),
@@ -120,15 +119,15 @@ mod tests {
                 };
                 let read = term.form().expect("a cause");
                 assert!(
-                    std::ptr::eq(read.cause.about().coefficients, cause.about().coefficients),
+                    std::ptr::eq(read.cause.coefficients, cause.coefficients),
                     "{}",
-                    cause.name()
+                    cause.name
                 );
-                assert_eq!(read.width, form.width, "{}", cause.name());
+                assert_eq!(read.width, form.width, "{}", cause.name);
                 assert!(
-                    read.cause.about().coefficients.len() >= form.width,
+                    read.cause.coefficients.len() >= form.width,
                     "{}",
-                    cause.name()
+                    cause.name
                 );
                 tried += 1;
             }

@@ -40,15 +40,11 @@ pub(super) fn not_observable(
         let found = set
             .iter()
             .any(|other| choice.form(*other).is_called_as(form));
-        if !found
-            && form.width == 1
-            && form.cause.about().inertial
-            && is_unseen(choice, sweep, number)
-        {
+        if !found && form.width == 1 && form.cause.inertial && is_unseen(choice, sweep, number) {
             sentences.push(format!(
                 "{} {}: these motions do not show it",
                 form.place,
-                form.cause.name().replace('_', " ")
+                form.cause.name.replace('_', " ")
             ));
         }
     }

@@ -1,32 +1,15 @@
-//! What a rigid arm lacks: each cause in a file of its own, one line each in [`TORQUE_CAUSES`].
+//! What a rigid arm lacks: each cause a row of [`TORQUE_CAUSES`].
 //!
-//! A cause proposes forms: itself at a place with shape numbers. A form is a group of columns, torques at joints that enter linearly.
+//! A cause proposes forms: itself at a place with shape numbers. A form is a group of columns, torques at joints that enter linearly. Most
+//! columns are functions of a row; what remembers rows before writes whole courses.
 
-mod asymmetric;
-mod balancer;
-mod coulomb;
-mod elasticity;
-mod gravity_direction;
-mod link_com;
-mod link_inertia;
-mod link_mass;
-mod load;
-mod offset;
-mod payload;
-mod presliding;
-mod ripple;
-mod rotor;
-mod spikes;
-mod spring;
-mod stribeck;
-mod torque_constant;
-mod unknown;
-mod unnamed_drag;
+mod angle;
+mod drive;
+mod friction;
+mod masses;
+mod memory;
+mod shared_friction;
 mod unnamed_friction;
-mod unnamed_hysteresis;
-mod viscous;
-mod warmup;
-mod wrist_coupling;
 
 use super::inertials::DeclaredInertials;
 use super::newton_euler::INERTIAL_NUMBERS;
@@ -34,42 +17,40 @@ use super::scene::DynamicScene;
 use super::types::TorqueParameter;
 use crate::criteria::torque::AT_END;
 use crate::effect::Place;
-pub use coulomb::COULOMB;
-pub(super) use offset::OFFSET;
-pub(super) use rotor::ROTOR;
-pub(super) use torque_constant::TORQUE_CONSTANT;
-pub(super) use unknown::UNKNOWN;
-pub(super) use viscous::VISCOUS;
-pub(super) use viscous::line_of_power;
+pub(super) use angle::{OFFSET, UNKNOWN};
+pub(super) use drive::{ROTOR, TORQUE_CONSTANT};
+pub use friction::COULOMB;
+pub(super) use friction::{VISCOUS, line_of_power};
 
-/// All causes with columns; latency and contacts are looked for before.
-pub(super) const TORQUE_CAUSES: [&dyn TorqueCause; 26] = [
-    &viscous::Viscous,
-    &coulomb::Coulomb,
-    &offset::Offset,
-    &asymmetric::Asymmetric,
-    &stribeck::Stribeck,
-    &presliding::PreslidingFriction,
-    &load::LoadFriction,
-    &warmup::Warmup,
-    &rotor::Rotor,
-    &torque_constant::TorqueConstant,
-    &spring::SPRING_BALANCE,
-    &balancer::Balancer,
-    &spring::CABLE_STIFFNESS,
-    &ripple::Ripple,
-    &elasticity::Elasticity,
-    &spikes::Spikes,
-    &wrist_coupling::WristCoupling,
-    &payload::Payload,
-    &link_mass::HeavierLink,
-    &link_com::WrongLinkCentre,
-    &link_inertia::WrongLinkInertia,
-    &gravity_direction::GravityDirection,
-    &unknown::Unnamed,
-    &unnamed_friction::UnnamedFriction,
-    &unnamed_drag::UnnamedDrag,
-    &unnamed_hysteresis::UnnamedHysteresis,
+/// All causes with columns; latency and contacts are looked for before. What has no name comes last.
+pub(super) static TORQUE_CAUSES: [&TorqueCause; 27] = [
+    &friction::VISCOUS_FRICTION,
+    &friction::COULOMB_FRICTION,
+    &angle::CURRENT_OFFSET,
+    &friction::ASYMMETRIC,
+    &friction::STRIBECK,
+    &memory::PRESLIDING,
+    &friction::LOAD,
+    &friction::WARMUP,
+    &drive::ROTOR_INERTIA,
+    &drive::WRONG_CONSTANT,
+    &angle::SPRING_BALANCE,
+    &angle::BALANCER,
+    &angle::CABLE_STIFFNESS,
+    &angle::RIPPLE,
+    &memory::ELASTICITY,
+    &memory::SPIKES,
+    &shared_friction::WRIST_COUPLING,
+    &masses::PAYLOAD,
+    &masses::LINK_MASS,
+    &masses::LINK_CENTRE,
+    &masses::LINK_INERTIA,
+    &masses::GRAVITY_DIRECTION,
+    &angle::TWO_ANGLES,
+    &angle::ONE_ANGLE,
+    &unnamed_friction::BY_SPEED,
+    &unnamed_friction::BY_ANGLE,
+    &memory::HYSTERESIS,
 ];
 
 /// A shape number that is refined.
@@ -96,18 +77,18 @@ impl ShapeSpan {
     }
 }
 
-/// What a cause is, whatever its form.
-pub(super) struct TorqueCauseDescription {
+/// A physical reason why measured torques differ from those of the rigid arm.
+pub(super) struct TorqueCause {
     /// Canonical.
     pub name: &'static str,
     /// What its coefficients are called in a model, and their units; wrong masses, which are in the inertial numbers, have none.
     pub coefficients: &'static [CoefficientName],
-    /// -2 ln of how common it is beside a common one.
-    pub price: f64,
+    /// -2 ln of how common a form of it is beside a common one.
+    pub price: fn(&TorqueForm) -> f64,
     /// Frictions of the same joint that it modifies, and without which it is none.
     pub modifies: &'static [&'static str],
-    /// Whether it is part of the rich model, which noise is taken from.
-    pub rich: bool,
+    /// Whether a form is part of the rich model, which noise is taken from.
+    pub rich: fn(&TorqueForm) -> bool,
     /// Whether its coefficients can only be positive: a friction that falls with speed, a rotor.
     pub positive: bool,
     /// Whether it brakes, so that its coefficient is positive unless a curve of speed without a name stands beside it, with which it is a sum.
@@ -124,15 +105,84 @@ pub(super) struct TorqueCauseDescription {
     pub of_sign: bool,
     /// Whether several forms of it may stand at a place.
     pub may_repeat: bool,
+    /// Whether it is a curve of speed, neither proportional to it nor of one size: one without a name stands for all of them.
+    pub bends: bool,
+    /// Lengths of the shapes that its forms have, by which causes of one name are known from each other; whatever length where there are none.
+    pub lengths: &'static [usize],
+    /// All that are tried on a recording.
+    pub forms: fn(&'static TorqueCause, &DynamicScene) -> Vec<TorqueForm>,
+    /// Joints that it acts on besides, but for its own and those that carry its link, or the tool and the base.
+    pub and_on: fn(&TorqueForm) -> Option<usize>,
+    /// Its torque, Nm per unit of a coefficient.
+    pub torque: ColumnTorque,
+    /// Link and change of its numbers per coefficient, for causes that are wrong masses.
+    pub changes: Option<fn(&TorqueForm, &DeclaredInertials) -> InertialChanges>,
+    /// What tells its cells at a place from each other.
+    pub cell: fn(&TorqueForm) -> [usize; 2],
+    /// Whether its coefficients are ones that an arm can have: no link weighs less than nothing.
+    pub is_possible: fn(&TorqueForm, &[f64]) -> bool,
+    /// Whether its shape numbers are still those of this cause and not at an end where it is another's torque.
+    pub is_itself: fn(&TorqueForm, &DynamicScene) -> bool,
+    /// Shape numbers that are refined once it is found.
+    pub spans: fn(&TorqueForm) -> Vec<ShapeSpan>,
+    /// Torque per coefficient of a column at a velocity and its smoothed sign, for causes that are friction over velocity.
+    pub friction: Option<FrictionLaw>,
+    /// Whether a number of it that is counted, as an order, is the last that is tried.
+    pub has_ends: fn(&TorqueForm) -> bool,
+    /// Its numbers as people read them: its coefficients and shape numbers unless it has others.
+    pub parameters: fn(&TorqueForm, &[FittedNumber]) -> Vec<TorqueParameter>,
+    /// A sentence without a full stop, with its size.
+    pub statement: fn(&TorqueForm, &[FittedNumber]) -> String,
+}
+
+/// Torque per coefficient of a form's column at a velocity and its smoothed sign.
+pub(super) type FrictionLaw = fn(&TorqueForm, usize, f64, f64) -> f64;
+
+/// Links and changes of their numbers.
+pub(super) type InertialChanges = Vec<(usize, [f64; INERTIAL_NUMBERS])>;
+
+/// How a column is made.
+pub(super) enum ColumnTorque {
+    /// By each row.
+    Row(fn(&ColumnOf, usize) -> f64),
+    /// All rows as recorded, from zeros.
+    Course(fn(&ColumnOf, &mut [f64])),
+    /// A change of masses alone.
+    Masses,
+}
+
+/// A column of a form at a joint.
+pub(super) struct ColumnOf<'a> {
+    pub form: &'a TorqueForm,
+    pub scene: &'a DynamicScene<'a>,
+    pub joint: usize,
+    pub column: usize,
+}
+
+impl ColumnOf<'_> {
+    /// rad, of the form's joint.
+    fn angle(&self, row: usize) -> f64 {
+        self.scene.position[self.form.joint()][row]
+    }
+
+    /// rad/s, of the form's joint.
+    fn velocity(&self, row: usize) -> f64 {
+        self.scene.velocity[self.form.joint()][row]
+    }
+
+    /// The smoothed sign of the form's joint's velocity.
+    fn direction(&self, row: usize) -> f64 {
+        self.scene.direction(self.form.joint(), row)
+    }
 }
 
 /// What most causes are.
-const PLAIN: TorqueCauseDescription = TorqueCauseDescription {
+const PLAIN: TorqueCause = TorqueCause {
     name: "",
     coefficients: &[],
-    price: 6.0,
+    price: |_| 6.0,
     modifies: &[],
-    rich: false,
+    rich: |_| false,
     positive: false,
     brakes: false,
     of_angle: false,
@@ -141,113 +191,47 @@ const PLAIN: TorqueCauseDescription = TorqueCauseDescription {
     of_rigid: false,
     of_sign: false,
     may_repeat: false,
+    bends: false,
+    lengths: &[],
+    forms: |cause, scene| at_each_joint(cause, scene, cause.coefficients.len(), &[&[]]),
+    and_on: |_| None,
+    torque: ColumnTorque::Masses,
+    changes: None,
+    cell: |_| [0; 2],
+    is_possible: |_, _| true,
+    is_itself: |_, _| true,
+    spans: |_| Vec::new(),
+    friction: None,
+    has_ends: |_| false,
+    parameters: plain_parameters,
+    statement: |form, _| form.place.to_string(),
 };
 
-/// Writes what a cause is: what it does not say is as of most causes.
-macro_rules! about {
-    ($($field:ident: $value:expr),+ $(,)?) => {
-        fn about(&self) -> &'static $crate::dynamics::cause::TorqueCauseDescription {
-            &$crate::dynamics::cause::TorqueCauseDescription { $($field: $value,)+ ..$crate::dynamics::cause::PLAIN }
-        }
-    };
-}
-use about;
+impl TorqueCause {
+    /// Whether its forms have such shape numbers.
+    pub fn has_shape(&self, shape: &[f64]) -> bool {
+        self.lengths.is_empty() || self.lengths.contains(&shape.len())
+    }
 
-/// A physical reason why measured torques differ from those of the rigid arm.
-pub(super) trait TorqueCause: Sync {
-    /// What it is.
-    fn about(&self) -> &'static TorqueCauseDescription;
-    /// Its canonical name.
-    fn name(&self) -> &'static str {
-        self.about().name
-    }
-    /// All that are tried on a recording.
-    fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm>;
-    /// -2 ln of how common it is beside a common one.
-    fn price(&self, _form: &TorqueForm) -> f64 {
-        self.about().price
-    }
-    /// Joints whose torque it changes: its own, and those that carry its link or the tool and the base.
-    fn acts_on(&self, form: &TorqueForm, joints: usize) -> Vec<usize> {
-        match form.place {
-            Place::Joint(joint) => vec![joint],
-            Place::Links(link, _) => (0..=link).collect(),
-            _ => (0..joints).collect(),
-        }
-    }
-    /// Writes a column of the torque at a joint (Nm per unit of its coefficient), rows as recorded; zero of what is a change of masses alone.
-    fn write(
+    /// Links and changes of their numbers per coefficient of a form; none of what is no wrong mass.
+    pub fn inertial(
         &self,
-        _form: &TorqueForm,
-        _scene: &DynamicScene,
-        _joint: usize,
-        _column: usize,
-        out: &mut [f64],
-    ) {
-        out.fill(0.0);
+        form: &TorqueForm,
+        declared: &DeclaredInertials,
+    ) -> Option<InertialChanges> {
+        self.changes.map(|changes| changes(form, declared))
     }
-    /// Link and change of its numbers per coefficient, for causes that are wrong masses: these write nothing.
-    fn inertial(
-        &self,
-        _form: &TorqueForm,
-        _declared: &DeclaredInertials,
-    ) -> Option<Vec<(usize, [f64; INERTIAL_NUMBERS])>> {
-        None
-    }
-    /// What tells its cells at a place from each other.
-    fn cell(&self, _form: &TorqueForm) -> [usize; 2] {
-        [0; 2]
-    }
-    /// Whether the form is part of the rich model, which noise is taken from.
-    fn is_rich(&self, _form: &TorqueForm) -> bool {
-        self.about().rich
-    }
-    /// Whether its coefficients are ones that an arm can have: no link weighs less than nothing.
-    fn is_possible(&self, _form: &TorqueForm, _values: &[f64]) -> bool {
-        true
-    }
-    /// Whether its shape numbers are still those of this cause and not at an end where it is another's torque.
-    fn is_itself(&self, _form: &TorqueForm, _scene: &DynamicScene) -> bool {
-        true
-    }
-    /// Shape numbers that are refined once it is found.
-    fn spans(&self, _form: &TorqueForm) -> Vec<ShapeSpan> {
-        Vec::new()
-    }
-    /// Torque per coefficient of a column at a velocity and its smoothed sign, for causes that are friction over velocity.
-    fn friction(
-        &self,
-        _form: &TorqueForm,
-        _column: usize,
-        _velocity: f64,
-        _sign: f64,
-    ) -> Option<f64> {
-        None
-    }
-    /// Whether it is a curve of speed, neither proportional to it nor of one size: one without a name stands for all of them.
-    fn bends(&self, _form: &TorqueForm) -> bool {
-        false
-    }
-    /// Whether its forms have such shape numbers, by which causes of one name are known from each other.
-    fn has_shape(&self, _shape: &[f64]) -> bool {
-        true
-    }
-    /// Whether a number of it that is counted, as an order, is the last that is tried.
-    fn has_ends(&self, _form: &TorqueForm) -> bool {
-        false
-    }
-    /// Its numbers as people read them: its coefficients and shape numbers unless it has others.
-    fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
-        let coefficients = self.about().coefficients.iter().zip(fitted);
-        let coefficients = coefficients.map(|((name, unit), number)| plain(name, *number, unit));
-        let shapes = form
-            .shape_numbers()
-            .into_iter()
-            .map(|span| shape(span.name, form.shape[span.index], span.unit));
-        coefficients.chain(shapes).collect()
-    }
-    /// A sentence without a full stop, with its size.
-    fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String;
+}
+
+/// Coefficients by their names, then shape numbers.
+fn plain_parameters(form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
+    let coefficients = form.cause.coefficients.iter().zip(fitted);
+    let coefficients = coefficients.map(|((name, unit), number)| plain(name, *number, unit));
+    let shapes = form
+        .shape_numbers()
+        .into_iter()
+        .map(|span| shape(span.name, form.shape[span.index], span.unit));
+    coefficients.chain(shapes).collect()
 }
 
 /// Quantity and unit of a coefficient.
@@ -265,7 +249,7 @@ pub struct FittedNumber {
 /// A cause at a place with its shape numbers.
 #[derive(Clone)]
 pub(super) struct TorqueForm {
-    pub cause: &'static dyn TorqueCause,
+    pub cause: &'static TorqueCause,
     pub place: Place,
     /// Further joints (from 0) or an order, as the cause reads them.
     pub with: [usize; 2],
@@ -276,7 +260,7 @@ pub(super) struct TorqueForm {
 
 impl TorqueForm {
     /// A form at a joint, without shape numbers.
-    pub fn at_joint(cause: &'static dyn TorqueCause, joint: usize, width: usize) -> Self {
+    pub fn at_joint(cause: &'static TorqueCause, joint: usize, width: usize) -> Self {
         Self {
             cause,
             place: Place::Joint(joint),
@@ -306,14 +290,53 @@ impl TorqueForm {
         self.joint()
     }
 
+    /// Joints whose torque it changes: its own, and those that carry its link or the tool and the base.
+    pub fn acts_on(&self, joints: usize) -> Vec<usize> {
+        match self.place {
+            Place::Joint(joint) => [joint]
+                .into_iter()
+                .chain((self.cause.and_on)(self))
+                .collect(),
+            Place::Links(link, _) => (0..=link).collect(),
+            _ => (0..joints).collect(),
+        }
+    }
+
+    /// Torque per coefficient of a column at a velocity and its smoothed sign, of what is friction over velocity.
+    pub fn friction(&self, column: usize, velocity: f64, sign: f64) -> Option<f64> {
+        let friction = self.cause.friction?;
+        Some(friction(self, column, velocity, sign))
+    }
+
+    /// Writes a column of the torque at a joint (Nm per unit of its coefficient), rows as recorded; zero of what is a change of masses alone.
+    pub fn write(&self, scene: &DynamicScene, joint: usize, column: usize, out: &mut [f64]) {
+        let column = ColumnOf {
+            form: self,
+            scene,
+            joint,
+            column,
+        };
+        match self.cause.torque {
+            ColumnTorque::Row(of) => {
+                let rows = out.iter_mut().enumerate();
+                rows.for_each(|(row, value)| *value = of(&column, row));
+            }
+            ColumnTorque::Course(of) => {
+                out.fill(0.0);
+                of(&column, out);
+            }
+            ColumnTorque::Masses => out.fill(0.0),
+        }
+    }
+
     /// Whether it is a curve of speed without a name, which viscous and Coulomb friction of its joint are parts of.
     pub fn is_nameless_curve(&self) -> bool {
-        self.cause.name() == UNKNOWN && self.cause.bends(self)
+        self.cause.name == UNKNOWN && self.cause.bends
     }
 
     /// Whether a curve without a name and another curve of speed would be one sum at one joint.
     pub fn is_one_curve_with(&self, other: &Self) -> bool {
-        let [one, two] = [self, other].map(|form| form.cause.bends(form));
+        let [one, two] = [self, other].map(|form| form.cause.bends);
         self.place == other.place
             && one
             && two
@@ -331,23 +354,29 @@ impl TorqueForm {
         {
             within.shape[span.index] = span.usual?;
         }
-        (!self.cause.has_ends(self)).then_some(within)
+        (!(self.cause.has_ends)(self)).then_some(within)
     }
 
     /// Whether it modifies the friction that another form is.
     pub fn modifies(&self, friction: &Self) -> bool {
-        self.place == friction.place && self.cause.about().modifies.contains(&friction.cause.name())
+        self.place == friction.place && self.cause.modifies.contains(&friction.cause.name)
     }
 
     /// Whether both are the same cause at the same place.
     pub fn is_called_as(&self, other: &Self) -> bool {
-        self.cause.name() == other.cause.name() && self.place == other.place
+        self.cause.name == other.cause.name && self.place == other.place
+    }
+
+    /// Whether both are called the same, and what has no name is a function of the same.
+    pub fn is_of_kind(&self, other: &Self) -> bool {
+        let kind = |form: &Self| form.cause.coefficients.first().map(|(name, _)| *name);
+        self.is_called_as(other) && (self.cause.name != UNKNOWN || kind(self) == kind(other))
     }
 
     /// Shape numbers that are found from the data, each once.
     pub fn shape_numbers(&self) -> Vec<ShapeSpan> {
         let mut numbers: Vec<ShapeSpan> = Vec::new();
-        for span in self.cause.spans(self) {
+        for span in (self.cause.spans)(self) {
             let is_found = span.usual != Some(self.shape[span.index]);
             if is_found && !numbers.iter().any(|known| known.index == span.index) {
                 numbers.push(span);
@@ -365,7 +394,7 @@ impl TorqueForm {
 
     /// What its coefficients are called, one a column, with their units.
     pub fn coefficient_names(&self) -> Vec<(String, &'static str)> {
-        let known = self.cause.about().coefficients;
+        let known = self.cause.coefficients;
         let name = |column: usize| match known.get(column) {
             Some((quantity, unit)) => ((*quantity).to_string(), *unit),
             None => (format!("coefficient_{}", column + 1), "1"),
@@ -382,7 +411,7 @@ pub(super) fn friction_of<'f>(
     let mut friction = vec![vec![0.0; scene.rows()]; scene.joints()];
     let mut course = vec![0.0; scene.rows()];
     for (form, coefficients) in forms {
-        let about = form.cause.about();
+        let about = form.cause;
         let Place::Joint(joint) = form.place else {
             continue;
         };
@@ -390,7 +419,7 @@ pub(super) fn friction_of<'f>(
             continue;
         }
         for (column, coefficient) in coefficients.iter().enumerate() {
-            form.cause.write(form, scene, joint, column, &mut course);
+            form.write(scene, joint, column, &mut course);
             let sums = friction[joint].iter_mut().zip(&course);
             sums.for_each(|(sum, value)| *sum += coefficient * value);
         }
@@ -418,38 +447,9 @@ fn shape(name: &str, value: f64, unit: &'static str) -> TorqueParameter {
     }
 }
 
-/// The forms of a cause that sits at each joint.
-fn at_each_joint(
-    cause: &'static dyn TorqueCause,
-    scene: &DynamicScene,
-    width: usize,
-) -> Vec<TorqueForm> {
-    (0..scene.joints())
-        .map(|joint| TorqueForm::at_joint(cause, joint, width))
-        .collect()
-}
-
-/// The forms of a cause that sits at each link of declared masses.
-fn at_each_link(
-    cause: &'static dyn TorqueCause,
-    scene: &DynamicScene,
-    width: usize,
-) -> Vec<TorqueForm> {
-    let links = if scene.declared.is_some() {
-        scene.joints()
-    } else {
-        0
-    };
-    let form = |link| TorqueForm {
-        place: Place::Links(link, link),
-        ..TorqueForm::at_joint(cause, link, width)
-    };
-    (0..links).map(form).collect()
-}
-
 /// The forms of a cause at each joint with each of some shape numbers.
-fn at_each_joint_with(
-    cause: &'static dyn TorqueCause,
+fn at_each_joint(
+    cause: &'static TorqueCause,
     scene: &DynamicScene,
     width: usize,
     shapes: &[&[f64]],
@@ -462,9 +462,39 @@ fn at_each_joint_with(
     (0..scene.joints()).flat_map(of).collect()
 }
 
-/// Writes a function of the row.
-fn fill(out: &mut [f64], of: impl Fn(usize) -> f64) {
-    out.iter_mut()
-        .enumerate()
-        .for_each(|(row, value)| *value = of(row));
+/// The forms of a cause that sits at each link of declared masses.
+fn at_each_link(
+    cause: &'static TorqueCause,
+    scene: &DynamicScene,
+    width: usize,
+) -> Vec<TorqueForm> {
+    let links = scene.declared.as_ref().map_or(0, |_| scene.joints());
+    let form = |link| TorqueForm {
+        place: Place::Links(link, link),
+        ..TorqueForm::at_joint(cause, link, width)
+    };
+    (0..links).map(form).collect()
+}
+
+/// A shape number that is refined by ratios between two ends.
+fn span(name: &'static str, unit: &'static str, [least, most]: [f64; 2]) -> ShapeSpan {
+    ShapeSpan {
+        name,
+        unit,
+        index: 0,
+        least,
+        most,
+        by_ratio: true,
+        usual: None,
+    }
+}
+
+/// The size of two coefficients, with its standard deviation.
+fn size_of_two(fitted: &[FittedNumber]) -> FittedNumber {
+    let value = fitted[0].value.hypot(fitted[1].value);
+    let weighted = (fitted[0].value * fitted[0].sigma).hypot(fitted[1].value * fitted[1].sigma);
+    FittedNumber {
+        value,
+        sigma: weighted / value.max(f64::MIN_POSITIVE),
+    }
 }

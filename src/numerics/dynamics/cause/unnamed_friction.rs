@@ -1,82 +1,58 @@
-//! Friction without a name: a smooth curve of speed, of which viscous and Coulomb friction are the straight line.
+//! Friction without a name: curves of speed, and friction that is greater at some angles.
 
-use super::unknown::UNKNOWN;
-use super::{COULOMB, FittedNumber, TorqueCause, TorqueForm, VISCOUS, about, fill};
-use crate::dynamics::scene::DynamicScene;
+use super::angle::{UNKNOWN, ends};
+use super::friction::{COULOMB, VISCOUS};
+use super::{ColumnTorque, PLAIN, TorqueCause, TorqueForm, plain, shape};
 use nalgebra::{Matrix2, Vector2};
 use std::f64::consts::PI;
-
-/// Half a wave and a whole one of speed, up to the fastest (shape, rad/s), with the sign of the velocity, each without the straight line of
-/// speed that is nearest to it over the recorded rows (two further numbers each): that line is viscous and Coulomb friction, which so are
-/// those of the whole curve.
-pub(super) struct UnnamedFriction;
 
 /// Columns.
 const WAVES: usize = 4;
 /// Share of the fastest speed below which a joint hardly moves.
 const STILL: f64 = 0.02;
 
-impl TorqueCause for UnnamedFriction {
-    about! {
-        name: UNKNOWN,
-        coefficients: &[("half_wave_sin", "Nm"), ("half_wave_cos", "Nm"), ("wave_sin", "Nm"), ("wave_cos", "Nm")],
-        price: 30.0,
-        of_sign: true,
-        modifies: &[VISCOUS, COULOMB],
-        may_repeat: true,
-    }
-
-    fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
+/// A smooth curve of speed, of which viscous and Coulomb friction are the straight line: half a wave and a whole one of speed, up to the fastest
+/// (shape, rad/s), with the sign of the velocity, each without the straight line of speed that is nearest to it over the recorded rows (two
+/// further numbers each): that line is viscous and Coulomb friction, which so are those of the whole curve.
+pub(super) static BY_SPEED: TorqueCause = TorqueCause {
+    name: UNKNOWN,
+    coefficients: &[
+        ("half_wave_sin", "Nm"),
+        ("half_wave_cos", "Nm"),
+        ("wave_sin", "Nm"),
+        ("wave_cos", "Nm"),
+    ],
+    price: |_| 30.0,
+    of_sign: true,
+    modifies: &[VISCOUS, COULOMB],
+    may_repeat: true,
+    bends: true,
+    // Tables of before lines were taken off have none.
+    lengths: &[1, 1 + 2 * WAVES],
+    forms: |cause, scene| {
         let form = |joint: usize| {
-            let fastest = scene.velocity[joint]
-                .iter()
-                .fold(1e-6, |most: f64, velocity| most.max(velocity.abs()));
-            let speeds: Vec<f64> = scene.velocity[joint]
-                .iter()
-                .map(|v| v.abs() / fastest)
-                .filter(|speed| *speed > STILL)
-                .collect();
+            let velocities = scene.velocity[joint].iter();
+            let fastest = velocities.fold(1e-6, |most: f64, velocity| most.max(velocity.abs()));
+            let speeds = scene.velocity[joint].iter().map(|v| v.abs() / fastest);
+            let speeds: Vec<f64> = speeds.filter(|speed| *speed > STILL).collect();
             let lines = (0..WAVES).flat_map(|column| line(&speeds, column));
             let shape: Vec<f64> = std::iter::once(fastest).chain(lines).collect();
-            TorqueForm::at_joint(&UnnamedFriction, joint, WAVES).shaped(&shape)
+            TorqueForm::at_joint(cause, joint, WAVES).shaped(&shape)
         };
         (0..scene.joints()).map(form).collect()
-    }
-
-    fn write(
-        &self,
-        form: &TorqueForm,
-        scene: &DynamicScene,
-        _joint: usize,
-        column: usize,
-        out: &mut [f64],
-    ) {
-        let velocity = &scene.velocity[form.joint()];
-        fill(out, |row| {
-            scene.direction(form.joint(), row) * bent(form, column, velocity[row])
-        });
-    }
-
-    fn friction(&self, form: &TorqueForm, column: usize, velocity: f64, sign: f64) -> Option<f64> {
-        Some(sign * bent(form, column, velocity))
-    }
-
-    fn bends(&self, _form: &TorqueForm) -> bool {
-        true
-    }
-
-    fn has_shape(&self, shape: &[f64]) -> bool {
-        // Tables of before lines were taken off have none.
-        shape.len() == 1 || shape.len() == 1 + 2 * WAVES
-    }
-
-    fn statement(&self, form: &TorqueForm, _fitted: &[FittedNumber]) -> String {
+    },
+    torque: ColumnTorque::Row(|column, row| {
+        column.direction(row) * bent(column.form, column.column, column.velocity(row))
+    }),
+    friction: Some(|form, column, velocity, sign| sign * bent(form, column, velocity)),
+    statement: |form, _| {
         format!(
             "friction without a name acts at {}: a curve of how fast the joint moves, of which viscous and Coulomb friction are the straight line",
             form.place
         )
-    }
-}
+    },
+    ..PLAIN
+};
 
 /// A wave of a speed, as a share of the fastest.
 fn wave(column: usize, speed: f64) -> f64 {
@@ -110,3 +86,51 @@ fn line(speeds: &[f64], column: usize) -> [f64; 2] {
         .cholesky()
         .map_or([0.0; 2], |factor| factor.solve(&right).into())
 }
+
+/// Waves a turn.
+const ORDERS: usize = 4;
+
+/// Friction that is greater at some angles of its joint, as ways, seals and lubricant differ along a turn: so many waves a turn (`with`), with
+/// the sign of the velocity; shape: least and greatest angle of the joint, rad.
+pub(super) static BY_ANGLE: TorqueCause = TorqueCause {
+    name: UNKNOWN,
+    coefficients: &[("drag_cosine", "Nm"), ("drag_sine", "Nm")],
+    price: |_| 30.0,
+    of_sign: true,
+    modifies: &[COULOMB],
+    may_repeat: true,
+    lengths: &[2],
+    forms: |cause, scene| {
+        let of = |joint: usize| {
+            let ends = ends(scene, joint);
+            (1..=ORDERS).map(move |order| TorqueForm {
+                with: [order, 0],
+                ..TorqueForm::at_joint(cause, joint, 2).shaped(&ends)
+            })
+        };
+        (0..scene.joints()).flat_map(of).collect()
+    },
+    torque: ColumnTorque::Row(|column, row| {
+        let turn = column.form.with[0] as f64 * column.angle(row);
+        let wave = if column.column == 0 {
+            turn.cos()
+        } else {
+            turn.sin()
+        };
+        column.direction(row) * wave
+    }),
+    parameters: |form, fitted| {
+        vec![
+            plain("drag_cosine", fitted[0], "Nm"),
+            plain("drag_sine", fitted[1], "Nm"),
+            shape("order", form.with[0] as f64, "1"),
+        ]
+    },
+    statement: |form, _| {
+        format!(
+            "friction without a name acts at {} beside Coulomb friction; it depends on the angle of the joint",
+            form.place
+        )
+    },
+    ..PLAIN
+};
