@@ -15,7 +15,7 @@ use crate::stage::Given;
 use crate::store::{Account, KEY_FORMAT, PendingTable, StageKey, TableRef};
 use crate::table::{CellEvidence, CellEvidenceRow, Table};
 use serde_json::json;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// The stage's id and name in keys and paths.
@@ -23,12 +23,12 @@ const STAGE: &str = "fleet_diagnose";
 /// Where its tables are noted among the fleet's.
 pub(super) const NOTE: &str = "causes.json";
 
-/// What a group has so far, and what was tried.
+/// What a group has so far, what was dropped how often, and by what ln of odds sets of cells were left for another one.
 #[derive(Default)]
 struct GroupSearch {
     given: Vec<Given>,
     dropped: BTreeMap<String, usize>,
-    seen: BTreeSet<Vec<String>>,
+    left: BTreeMap<Vec<String>, f64>,
 }
 
 /// The likeliest cause of a robot by itself.
@@ -165,8 +165,8 @@ impl GroupSearch {
     fn exchange(&mut self, sums: &GroupSums) -> bool {
         for i in 0..self.given.len() {
             let all: Vec<CellTotal> = sums.cells(&self.given[i].cell).collect();
-            let own = all.iter().find(|own| own.cell == self.given[i].cell);
-            let Some(stays) = own.map(|own| own.odds) else {
+            let present = all.iter().find(|cell| cell.cell == self.given[i].cell);
+            let Some(stays) = present.map(|cell| cell.odds) else {
                 continue;
             };
             let best = all.iter().max_by(|a, b| a.odds.total_cmp(&b.odds));
@@ -175,8 +175,10 @@ impl GroupSearch {
             };
             let mut next = self.given.clone();
             next[i] = given(best.cell, best.shape, best.sum.size_mm());
-            self.seen.insert(Self::key(&self.given));
-            if self.seen.insert(Self::key(&next)) {
+            // Of two sets that each speak for the other one, that stays which does so less.
+            let gain = best.odds - stays;
+            if self.left.get(&Self::key(&next)).is_none_or(|by| gain > *by) {
+                self.left.insert(Self::key(&self.given), gain);
                 self.given = next;
                 return true;
             }
