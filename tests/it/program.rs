@@ -144,6 +144,11 @@ fn brackets_without_end_are_a_fault_and_no_overflow() {
         refused(Language::Rapid, &format!("X:={};", deep("[", "]"))),
         ["1:19: brackets are nested too deep"]
     );
+    let tool = format!("PERS tooldata t:={};", deep("[", "]"));
+    assert_eq!(
+        refused(Language::Rapid, &tool),
+        ["1:33: brackets are nested too deep"]
+    );
 }
 
 #[test]

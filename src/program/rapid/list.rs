@@ -1,7 +1,8 @@
 //! Bracket lists of RAPID: `[[x,y,z],[q1,q2,q3,q4],[cf1,cf4,cf6,cfx],[eax..]]` and `[[rax_1..rax_6],[eax..]]`, and arrays of them.
 
 use super::super::token::{ProgramText, Token};
-use super::super::{Gathered, Literal, PostureStatement, TargetKind, quoted};
+use super::super::{DEPTH, Gathered, Literal, PostureStatement, TargetKind, quoted};
+use super::arguments::depths;
 use crate::error::counted;
 use std::ops::Range;
 
@@ -51,22 +52,34 @@ pub(super) struct List<'t> {
 }
 
 impl<'t> List<'t> {
-    /// Reads the list that opens at `tokens[0]`; its brackets match.
+    /// Reads the list that opens at `tokens[0]`; its brackets match. It has no items where they are nested too deep.
     pub fn read(source: ProgramText<'t>, tokens: &'t [Token]) -> Self {
+        if depths(tokens).any(|(_, depth)| depth >= DEPTH as i32) {
+            return Self {
+                source,
+                span: source.over(tokens, 0),
+                tokens: tokens.len(),
+                items: Vec::new(),
+            };
+        }
+        Self::nested(source, tokens)
+    }
+
+    fn nested(source: ProgramText<'t>, tokens: &'t [Token]) -> Self {
         let mut items = Vec::new();
         let (mut k, mut from, mut round) = (1, 1, 0);
         let mut inner: Option<List> = None;
         while k < tokens.len() {
             let token = &tokens[k];
             if token.is(b'[') && k == from {
-                let list = Self::read(source, &tokens[k..]);
+                let list = Self::nested(source, &tokens[k..]);
                 k += list.tokens;
                 inner = Some(list);
                 continue;
             }
             // A list inside an expression, `Offs([..],..)`: a leaf holds it whole.
             if token.is(b'[') {
-                k += Self::read(source, &tokens[k..]).tokens;
+                k += Self::nested(source, &tokens[k..]).tokens;
                 continue;
             }
             round += i32::from(token.is(b'(') || token.is(b'{'))
