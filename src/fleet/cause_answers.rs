@@ -99,8 +99,8 @@ pub(super) fn of(
         };
         let mut given = round.groups.get(&group).into_iter().flatten();
         let Some(given) = given.find(|given| given.cell == cell) else {
-            let own = sums.cells(&cell).find(|own| own.cell == cell);
-            let prior = own.map_or(0.0, |own| own.sum.log_prior);
+            let found = sums.cells(&cell).find(|found| found.cell == cell);
+            let prior = found.map_or(0.0, |found| found.sum.log_prior);
             for robot in robots {
                 let odds = robot.log_evidence + prior;
                 if odds < 0.0 {
@@ -274,7 +274,7 @@ pub(super) fn population(robots: &mut [FleetCellRow]) -> Population {
     population
 }
 
-/// ln of the odds of a cell of a group, the probability of its name, and the next probable name with its own.
+/// ln of the odds of a cell of a group, the probability of its name, and the next probable name with its probability.
 #[derive(Default)]
 struct Named {
     log_odds: f64,
@@ -285,34 +285,34 @@ struct Named {
 /// The name of a cell of a group.
 fn named(sums: &GroupSums, cell: &str) -> Option<Named> {
     let all: Vec<CellTotal> = sums.cells(cell).collect();
-    let own = all.iter().find(|own| own.cell == cell)?;
+    let named = all.iter().find(|named| named.cell == cell)?;
     let is_same =
-        |one: &&CellTotal| one.sum.effect == own.sum.effect && one.sum.place == own.sum.place;
+        |one: &&CellTotal| one.sum.effect == named.sum.effect && one.sum.place == named.sum.place;
     // Where models are as good as they think, a log ratio has twice its mean as variance; one that scatters by more from robot to robot is
     // worth less (Vuong, 1989).
     let ratio = |one: &CellTotal| {
-        let prior = one.sum.log_prior - own.sum.log_prior;
-        let more = one.odds - own.odds - prior;
+        let prior = one.sum.log_prior - named.sum.log_prior;
+        let more = one.odds - named.odds - prior;
         let worth = 2.0 * more.abs() / one.scatter.max(f64::MIN_POSITIVE);
         (prior + more * worth.min(1.0)).exp()
     };
     let of_name: f64 = all
         .iter()
         .filter(is_same)
-        .map(|one| (one.odds - own.odds).exp())
+        .map(|one| (one.odds - named.odds).exp())
         .sum();
     let rivals = all
         .iter()
         .filter(|one| !is_same(one))
         .map(|one| (one, ratio(one)));
-    let whole = of_name + (-own.odds).exp() + rivals.clone().map(|(_, ratio)| ratio).sum::<f64>();
+    let whole = of_name + (-named.odds).exp() + rivals.clone().map(|(_, ratio)| ratio).sum::<f64>();
     let best = rivals.max_by(|a, b| a.1.total_cmp(&b.1));
     let rival = best.map(|(one, ratio)| {
         let name = format!("{} at {}", one.sum.effect.replace('_', " "), one.sum.place);
         (name, (1.0 - *MISLED) * ratio / whole)
     });
     Some(Named {
-        log_odds: own.odds,
+        log_odds: named.odds,
         probability: (1.0 - *MISLED) * of_name / whole,
         rival: rival.filter(|(_, probability)| *probability > *RIVAL),
     })
@@ -336,9 +336,12 @@ fn trend(robots: &[FleetCellRow], tests: f64) -> Option<String> {
         let all = by.values().flatten().sum::<f64>() / count as f64;
         let (mut between, mut within) = (0.0, 0.0);
         for sizes in by.values() {
-            let own = mean(sizes);
-            between += sizes.len() as f64 * (own - all).powi(2);
-            within += sizes.iter().map(|size| (size - own).powi(2)).sum::<f64>();
+            let group_mean = mean(sizes);
+            between += sizes.len() as f64 * (group_mean - all).powi(2);
+            within += sizes
+                .iter()
+                .map(|size| (size - group_mean).powi(2))
+                .sum::<f64>();
         }
         let freedom = [(by.len() - 1) as f64, (count - by.len()) as f64];
         let ratio = between / freedom[0] / (within / freedom[1]).max(f64::MIN_POSITIVE);

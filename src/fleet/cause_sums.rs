@@ -100,9 +100,9 @@ impl Sum {
     fn scatter(&self, owner: &[f64; 2], robots: usize) -> f64 {
         // Robots without a row say the least.
         let (count, missing) = (robots as f64, robots as f64 - self.less[0]);
-        let [own, square] = [0, 1].map(|k| owner[k] - self.owner[k]);
-        let sum = self.less[1] + own - missing * LEAST;
-        let square = self.less[2] + square - 2.0 * LEAST * own + missing * LEAST * LEAST;
+        let [absent, square] = [0, 1].map(|k| owner[k] - self.owner[k]);
+        let sum = self.less[1] + absent - missing * LEAST;
+        let square = self.less[2] + square - 2.0 * LEAST * absent + missing * LEAST * LEAST;
         (square - sum * sum / count.max(1.0)).max(0.0)
     }
 
@@ -149,8 +149,8 @@ impl GroupSums {
             let is_own = |row: &&CellEvidenceRow| {
                 row.given == one.cell && row.cell == one.cell && row.shape == shape
             };
-            let own = rows.iter().find(is_own);
-            let log = own.map_or(LEAST, |row| row.log_evidence.max(LEAST));
+            let present = rows.iter().find(is_own);
+            let log = present.map_or(LEAST, |row| row.log_evidence.max(LEAST));
             logs.insert(&one.cell, log);
             let sums = self.owners.entry(one.cell.clone()).or_default();
             (sums[0], sums[1]) = (sums[0] + log, sums[1] + log * log);
@@ -187,9 +187,9 @@ impl GroupSums {
         here()
             .filter(|(key, _)| key.2.is_empty())
             .map(move |((_, cell, _), sum)| {
-                let own = sum.total(self.robots);
-                let together = shared.get(cell.as_str()).filter(|shared| shared.0 > own);
-                let total = together.map_or(own, |shared| shared.0);
+                let alone = sum.total(self.robots);
+                let together = shared.get(cell.as_str()).filter(|shared| shared.0 > alone);
+                let total = together.map_or(alone, |shared| shared.0);
                 let others =
                     together.map_or_else(|| sum.of_the_others(self.robots), |shared| shared.1);
                 CellTotal {
@@ -282,14 +282,14 @@ mod tests {
             ..row(log)
         };
         // Differences 1, 4 and, where the rival has no row, 5 + 3.3.
-        let own = [Given {
+        let asked = [Given {
             cell: "a".into(),
             shape: None,
             size_mm: 0.05,
         }];
-        sums.add(&[given("a", 3.0), given("b", 2.0)], &own);
-        sums.add(&[given("a", 6.0), given("b", 2.0)], &own);
-        sums.add(&[given("a", 5.0)], &own);
+        sums.add(&[given("a", 3.0), given("b", 2.0)], &asked);
+        sums.add(&[given("a", 6.0), given("b", 2.0)], &asked);
+        sums.add(&[given("a", 5.0)], &asked);
         let cells: Vec<_> = sums.cells("a").collect();
         let mean = (1.0 + 4.0 + 8.3) / 3.0;
         let by_hand: f64 = [1.0f64, 4.0, 8.3].iter().map(|d| (d - mean).powi(2)).sum();

@@ -23,7 +23,7 @@ const STAGE: &str = "fleet_diagnose";
 /// Where its tables are noted among the fleet's.
 pub(super) const NOTE: &str = "causes.json";
 
-/// What a group has so far, what was dropped how often, and by what ln of odds sets of cells were left for another one.
+/// What a group has so far, what was dropped how often, and the gain in ln of odds for which each set of cells was left.
 #[derive(Default)]
 struct GroupSearch {
     given: Vec<Given>,
@@ -102,9 +102,9 @@ impl CauseSearch {
             }
             // What is plain in single robots comes when their group has all of its causes.
             for Alone { robot, given } in alone.remove(group).unwrap_or_default() {
-                let own = self.round.robots.entry(robot).or_default();
-                if !own.iter().any(|known| known.cell == given.cell) {
-                    own.push(given);
+                let of_robot = self.round.robots.entry(robot).or_default();
+                if !of_robot.iter().any(|known| known.cell == given.cell) {
+                    of_robot.push(given);
                     goes_on = true;
                 }
             }
@@ -146,8 +146,12 @@ impl GroupSearch {
 
     fn drop_weak(&mut self, sums: &GroupSums) -> bool {
         let odds = |given: &Given| {
-            let own = sums.cells(&given.cell).find(|own| own.cell == given.cell);
-            own.map_or(f64::NEG_INFINITY, |own| own.odds.min(own.of_the_others))
+            let present = sums
+                .cells(&given.cell)
+                .find(|present| present.cell == given.cell);
+            present.map_or(f64::NEG_INFINITY, |present| {
+                present.odds.min(present.of_the_others)
+            })
         };
         let weak: Vec<String> = self
             .given
@@ -175,7 +179,7 @@ impl GroupSearch {
             };
             let mut next = self.given.clone();
             next[i] = given(best.cell, best.shape, best.sum.size_mm());
-            // Of two sets that each speak for the other one, that stays which does so less.
+            // Of two sets of which each is left for the other one, that stays which gains less by it.
             let gain = best.odds - stays;
             if self.left.get(&Self::key(&next)).is_none_or(|by| gain > *by) {
                 self.left.insert(Self::key(&self.given), gain);

@@ -58,7 +58,7 @@ impl Fleet {
             let known = EarlierChanges::read(&earlier, &wanted, ledger)?;
             for robot in &mut self.roster.0 {
                 let priors = match wanted.by {
-                    PriorBy::Robot => known.own(&robot.name),
+                    PriorBy::Robot => known.of_robot(&robot.name),
                     PriorBy::Model | PriorBy::Causes => known.pooled(&robot.name, &robot.groups),
                 };
                 if !priors.is_empty() {
@@ -160,7 +160,7 @@ impl EarlierChanges {
         Ok(Self { robots })
     }
 
-    fn own(&self, robot: &str) -> BTreeMap<String, PooledPrior> {
+    fn of_robot(&self, robot: &str) -> BTreeMap<String, PooledPrior> {
         self.robots
             .get(robot)
             .map(|(_, values)| values.clone())

@@ -6,7 +6,7 @@ use minijinja::{Environment, UndefinedBehavior, value::Serde};
 use serde_json::Value;
 
 /// The page of a template, behind the head, for which it has `title`, and where they are not those of the report `style` and `policy` (what
-/// the page may do besides showing itself). Fails where the template asks for what the page does not have.
+/// the page may load and run). Fails where the template asks for what the page does not have.
 pub(super) fn render(name: &str, template: &str, mut page: Value) -> Result<String> {
     let usual = [
         ("version", env!("CARGO_PKG_VERSION")),

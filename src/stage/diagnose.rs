@@ -4,7 +4,7 @@ mod asked_rows;
 
 pub(super) use asked_rows::AskedRows;
 
-use crate::diagnose::{Diagnosis, KnownCell, Question, VerdictKind as Said, diagnose, wrong_setup};
+use crate::diagnose::{Diagnosis, KnownCell, Question, VerdictKind, diagnose, wrong_setup};
 use crate::effect::{CAUSES, names};
 use crate::error::{Error, Fault, Result, instead};
 use crate::estimate::Suspect;
@@ -237,7 +237,10 @@ impl Stage for Diagnose {
         blank_payload(&reads.recording)
             .into_iter()
             .for_each(|line| context.services.warn(line));
-        if !matches!(diagnosis.verdict, Said::WrongSetup | Said::NotAsked) {
+        if !matches!(
+            diagnosis.verdict,
+            VerdictKind::WrongSetup | VerdictKind::NotAsked
+        ) {
             remark(&mut diagnosis, data, &reads.recording, context);
         }
         let step = context.id;
@@ -257,8 +260,9 @@ impl Stage for Diagnose {
             .filter(|suspect| !suspect.used())
             .map(|Suspect { row, .. }| *row);
         let unseen: Vec<usize> = (0..data.rows()).filter(|row| held_out[*row]).collect();
-        let known = covariance
-            .filter(|_| corrected == Corrected::RobotFile && diagnosis.verdict != Said::WrongSetup);
+        let known = covariance.filter(|_| {
+            corrected == Corrected::RobotFile && diagnosis.verdict != VerdictKind::WrongSetup
+        });
         let doubtful = KnownModel {
             model: &diagnosis.model,
             covariance: known,
@@ -335,8 +339,8 @@ fn with_remarks(
     context: &Context,
 ) -> Result<Diagnosis> {
     match diagnosis.verdict {
-        Said::NotAsked => context.services.warn(diagnosis.not_observable.join("; ")),
-        Said::WrongSetup => match diagnosis.findings.first() {
+        VerdictKind::NotAsked => context.services.warn(diagnosis.not_observable.join("; ")),
+        VerdictKind::WrongSetup => match diagnosis.findings.first() {
             Some(finding) => context
                 .services
                 .warn(format!("the set-up is wrong: {}", finding.statement)),

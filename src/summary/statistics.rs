@@ -99,8 +99,8 @@ fn errors(title: &str, rows: &[&StatisticsRow]) -> String {
 fn folds(rows: &[StatisticsRow]) -> String {
     let rows = rows.iter().filter(|row| row.fold_rms_mm.is_some());
     let rows: Vec<&StatisticsRow> = rows.collect();
-    let brought = rows.iter().filter(|row| row.is_contact()).count();
-    let blocks = match brought {
+    let contacts = rows.iter().filter(|row| row.is_contact()).count();
+    let blocks = match contacts {
         _ if rows.is_empty() => return String::new(),
         0 => "contiguous folds",
         some if some == rows.len() => "whole places",

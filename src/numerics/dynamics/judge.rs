@@ -32,7 +32,7 @@ struct HeldOutGain {
     /// What it must be.
     least: f64,
     /// What it would be if the form were right.
-    foretold: f64,
+    expected: f64,
 }
 
 /// What held-out rows gain by each of a set.
@@ -53,17 +53,17 @@ fn gains(choice: &CauseChoice, set: &[usize]) -> Vec<HeldOutGain> {
             .sum::<f64>()
             + rest_stretched
             - stretched;
-        let foretold = pairs()
+        let expected = pairs()
             .map(|(without, with)| (without - with).powi(2))
             .sum::<f64>()
             + rest_stretched
             - stretched;
         // The gain of a right finding scatters about its own square by twice its root.
-        let least = foretold - *NAMED * 2.0 * foretold.max(0.0).sqrt();
+        let least = expected - *NAMED * 2.0 * expected.max(0.0).sqrt();
         HeldOutGain {
             square: gain,
             least: least.min(*CONFIRMED * choice.form(set[place]).width as f64),
-            foretold,
+            expected,
         }
     };
     (0..set.len()).map(without).collect()
@@ -90,11 +90,11 @@ pub(super) fn judge(choice: &CauseChoice, mut set: Vec<usize>) -> JudgedSet {
             break;
         };
         let HeldOutGain {
-            square, foretold, ..
+            square, expected, ..
         } = gains[worst];
         withdrawn.push((set.remove(worst), square));
-        // Nothing would gain nothing: what loses more than it was to gain is not what it stands for.
-        is_refuted |= square < -foretold;
+        // A form that explains nothing gains nothing; one that loses more than it was expected to gain is another cause's.
+        is_refuted |= square < -expected;
     }
     JudgedSet {
         set,

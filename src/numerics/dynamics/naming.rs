@@ -21,7 +21,7 @@ pub(super) struct JudgedSet {
     pub silent: Vec<usize>,
     /// What held-out rows did not confirm, with what they gained by each.
     pub withdrawn: Vec<(usize, f64)>,
-    /// Whether held-out rows speak against one of them.
+    /// Whether held-out rows are predicted worse with one of them.
     pub is_refuted: bool,
 }
 

@@ -24,7 +24,7 @@ use super::weighted::WeightedColumns;
 
 /// Rounds in which others are looked for in place of forms with a number at an end of its search, at most.
 const END_ROUNDS: usize = 3;
-/// Rounds in which others are looked for in place of what held-out rows speak against, at most.
+/// Rounds in which causes that predict held-out rows worse are replaced, at most.
 const JUDGED_ROUNDS: usize = 6;
 /// s.
 const SAME_TIME: f64 = 0.1;
@@ -167,8 +167,8 @@ fn clocked(
     found
 }
 
-/// What looks like a push before anything else is known: beside what hardly an arm is without, as a rich model bends around a push that comes
-/// early; where nothing does, beside a rich model. What only looks like one is dropped with the first set.
+/// Candidates for pushes before anything else is known: in what the common causes leave, as a rich model bends around a push that comes early;
+/// where there are none, in what a rich model leaves. What only looks like one is dropped with the first set.
 fn first_contacts(problem: &TorqueProblem) -> Vec<ContactEvent> {
     let (_, residual) = noise_beside(problem, &basic_forms(problem), NoiseMemory::Short);
     let noise = noise_apart(problem, &residual);

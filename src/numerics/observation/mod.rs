@@ -385,12 +385,12 @@ pub fn kinds(data: &Measurements) -> Vec<&'static dyn MeasurementKind> {
 /// Whether all that these rows measured is that the target was brought to places: nothing was read but the joints.
 pub fn only_brought(data: &Measurements, rows: &[usize]) -> bool {
     let kinds = kinds(data);
-    let brought = |row: &usize| {
+    let is_contact = |row: &usize| {
         kinds
             .iter()
             .all(|kind| kind.is_contact() || kind.axes(data, *row) == 0)
     };
-    kinds.iter().any(|kind| kind.is_contact()) && rows.iter().all(brought)
+    kinds.iter().any(|kind| kind.is_contact()) && rows.iter().all(is_contact)
 }
 
 /// Numbers that a row measured, of all kinds.

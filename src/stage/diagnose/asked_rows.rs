@@ -1,4 +1,4 @@
-//! The rows that a diagnosis, or a fleet, asks of: measured, placed, and beside an outside simulation where there is one.
+//! The rows that a diagnosis, or a fleet, asks of: measured, placed, and compared with an outside simulation where there is one.
 
 use super::{CellPrior, Diagnose, DiagnoseReads};
 use crate::diagnose::{KnownCell, Question, against_simulation};

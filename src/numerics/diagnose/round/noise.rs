@@ -198,7 +198,7 @@ impl RepeatPairs {
     }
 
     /// What the pairs show of the instrument's noise, with the joints' repeatability at that: where they follow each other at once, are enough,
-    /// and speak clearly for another noise than the stated one. Where noise `lasts` from pose to pose, shots of a standing arm agree better than
+    /// and are clear evidence of another noise than the stated one. Where noise `lasts` from pose to pose, shots of a standing arm agree better than
     /// it is small.
     pub fn noise(
         &self,

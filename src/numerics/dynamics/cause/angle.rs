@@ -192,7 +192,7 @@ pub(super) static BALANCER: TorqueCause = TorqueCause {
         joints.flat_map(of).collect()
     },
     torque: ColumnTorque::Row(|column, row| waves(column.angle(row))[column.column]),
-    // The second wave only bends the first: what is left of two that cancel each other where the joint moves is another torque.
+    // The second wave only bends the first: the remainder of two that cancel each other where the joint moves is another torque.
     is_possible: |form, values| {
         let &[least, most] = &form.shape[..] else {
             return true;

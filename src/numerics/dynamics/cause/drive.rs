@@ -41,7 +41,7 @@ pub(super) static WRONG_CONSTANT: TorqueCause = TorqueCause {
     of_rigid: true,
     rich: |form| form.shape.is_empty(),
     forms: |cause, scene| {
-        // Beside identified masses it is a part of them.
+        // Where masses are identified it is confounded with them.
         if scene.declared.is_none() {
             return Vec::new();
         }

@@ -4,6 +4,7 @@ use super::{
     ColumnTorque, FittedNumber, PLAIN, TorqueCause, TorqueForm, at_each_link, plain, shape,
     size_of_two,
 };
+use crate::dynamics::inertial_names::{INERTIAL_NAMES, inertial_unit};
 use crate::dynamics::newton_euler::INERTIAL_NUMBERS;
 use crate::dynamics::scene::GRAVITY;
 use crate::dynamics::types::TorqueParameter;
@@ -27,15 +28,8 @@ const LIGHTEST: f64 = 0.1;
 /// m by which a payload's centre is elsewhere, at most.
 const PAYLOAD_FARTHEST: f64 = 0.5;
 const CENTRE: [&str; 3] = ["centre_x", "centre_y", "centre_z"];
-const MOMENTS: [&str; 3] = ["moment_x", "moment_y", "moment_z"];
-const INERTIA: [&str; 6] = [
-    "inertia_xx",
-    "inertia_xy",
-    "inertia_xz",
-    "inertia_yy",
-    "inertia_yz",
-    "inertia_zz",
-];
+/// Entries of an inertia tensor.
+const INERTIA: usize = INERTIAL_NUMBERS - 4;
 /// Mass at the declared centre; mass and centre; all ten numbers.
 const PAYLOADS: [usize; 3] = [1, 4, INERTIAL_NUMBERS];
 
@@ -74,10 +68,10 @@ pub(super) static PAYLOAD: TorqueCause = TorqueCause {
         let mut all = vec![plain("mass", fitted[0], "kg")];
         let others = &fitted[1..];
         if form.width == INERTIAL_NUMBERS {
-            let moments = MOMENTS.iter().map(|name| (name, "kg m"));
-            let names = moments.chain(INERTIA.iter().map(|name| (name, "kg m2")));
-            let numbers = names.zip(others);
-            all.extend(numbers.map(|((name, unit), number)| plain(name, *number, unit)));
+            let numbers = (1..).zip(others);
+            all.extend(
+                numbers.map(|(k, value)| plain(INERTIAL_NAMES[k], *value, inertial_unit(k))),
+            );
         } else {
             // What a payload without its mass would be at: the moment that is found, of all the mass that is there.
             let whole = (form.shape[0] + fitted[0].value).abs().max(LIGHTEST);
@@ -112,8 +106,8 @@ pub(super) static LINK_MASS: TorqueCause = TorqueCause {
     forms: |cause, scene| at_each_link(cause, scene, 1),
     is_possible: |_, values| MASSES.contains(&values[0]),
     changes: Some(|form, declared| {
-        let own = &declared.links[INERTIAL_NUMBERS * form.link()..];
-        vec![(form.link(), std::array::from_fn(|number| own[number]))]
+        let link = &declared.links[INERTIAL_NUMBERS * form.link()..];
+        vec![(form.link(), std::array::from_fn(|number| link[number]))]
     }),
     parameters: |_, fitted| vec![plain("relative", fitted[0], "1")],
     statement: |form, fitted| {
@@ -160,15 +154,15 @@ pub(super) static LINK_INERTIA: TorqueCause = TorqueCause {
     name: "link_inertia",
     price: |_| 8.0,
     inertial: true,
-    forms: |cause, scene| at_each_link(cause, scene, INERTIA.len()),
+    forms: |cause, scene| at_each_link(cause, scene, INERTIA),
     changes: Some(|form, _| {
-        let numbers = 0..INERTIA.len();
+        let numbers = 0..INERTIA;
         numbers
             .map(|number| (form.link(), unit(4 + number)))
             .collect()
     }),
     parameters: |_, fitted| {
-        let numbers = INERTIA.iter().zip(fitted);
+        let numbers = INERTIAL_NAMES[4..].iter().zip(fitted);
         let numbers: Vec<TorqueParameter> = numbers
             .map(|(name, value)| plain(name, *value, "kg m2"))
             .collect();

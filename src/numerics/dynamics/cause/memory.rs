@@ -161,7 +161,7 @@ const HERTZ: [f64; 8] = [3.0, 4.0, 5.0, 6.0, 7.0, 8.5, 10.0, 12.0];
 const DAMPING: [f64; 2] = [0.05, 0.15];
 
 /// A joint that swings, its torque that of the rigid arm behind a resonance: G tau - tau with G = w^2 / (s^2 + 2 z w s + w^2), and w s / (s^2 +
-/// 2 z w s + w^2) tau; shape: Hz and z. A damper beside the spring transmits torque, 2 z of the second column; one that brakes the swinging
+/// 2 z w s + w^2) tau; shape: Hz and z. A damper parallel to the spring transmits torque, 2 z of the second column; one that brakes the swinging
 /// side against the base does not.
 pub(super) static ELASTICITY: TorqueCause = TorqueCause {
     name: "joint_elasticity",
@@ -190,7 +190,7 @@ pub(super) static ELASTICITY: TorqueCause = TorqueCause {
     torque: ColumnTorque::Course(|column, out| {
         let (scene, form) = (column.scene, column.form);
         let (torque, rate, damping) = (&scene.rigid[form.joint()], scene.rate, form.shape[1]);
-        // Bilinear, with the resonance where it is said to be.
+        // Bilinear transform, prewarped at the resonance.
         let w = 2.0 * rate * (PI * form.shape[0] / rate).tan();
         let k = 2.0 * rate;
         let (d1, d0) = (2.0 * damping * w, w * w);

@@ -83,7 +83,7 @@ pub(super) struct TorqueCause {
     pub name: &'static str,
     /// What its coefficients are called in a model, and their units; wrong masses, which are in the inertial numbers, have none.
     pub coefficients: &'static [CoefficientName],
-    /// -2 ln of how common a form of it is beside a common one.
+    /// -2 ln of the prior odds of a form of it, relative to a common one.
     pub price: fn(&TorqueForm) -> f64,
     /// Frictions of the same joint that it modifies, and without which it is none.
     pub modifies: &'static [&'static str],
@@ -91,7 +91,7 @@ pub(super) struct TorqueCause {
     pub rich: fn(&TorqueForm) -> bool,
     /// Whether its coefficients can only be positive: a friction that falls with speed, a rotor.
     pub positive: bool,
-    /// Whether it brakes, so that its coefficient is positive unless a curve of speed without a name stands beside it, with which it is a sum.
+    /// Whether it brakes, so that its coefficient is positive unless a curve of speed without a name is in the model too, with which it is a sum.
     pub brakes: bool,
     /// Whether it is, like others of its kind, a torque over its joint's angle: one curve looks like several of others.
     pub of_angle: bool,
@@ -111,13 +111,13 @@ pub(super) struct TorqueCause {
     pub lengths: &'static [usize],
     /// All that are tried on a recording.
     pub forms: fn(&'static TorqueCause, &DynamicScene) -> Vec<TorqueForm>,
-    /// Joints that it acts on besides, but for its own and those that carry its link, or the tool and the base.
+    /// A further joint whose torque it changes: neither its place nor one that carries its link, or the tool and the base.
     pub and_on: fn(&TorqueForm) -> Option<usize>,
     /// Its torque, Nm per unit of a coefficient.
     pub torque: ColumnTorque,
     /// Link and change of its numbers per coefficient, for causes that are wrong masses.
     pub changes: Option<fn(&TorqueForm, &DeclaredInertials) -> InertialChanges>,
-    /// What tells its cells at a place from each other.
+    /// What distinguishes its cells at a place.
     pub cell: fn(&TorqueForm) -> [usize; 2],
     /// Whether its coefficients are ones that an arm can have: no link weighs less than nothing.
     pub is_possible: fn(&TorqueForm, &[f64]) -> bool,

@@ -128,7 +128,7 @@ pub(super) static BY_ANGLE: TorqueCause = TorqueCause {
     },
     statement: |form, _| {
         format!(
-            "friction without a name acts at {} beside Coulomb friction; it depends on the angle of the joint",
+            "friction without a name acts at {} in addition to Coulomb friction; it depends on the angle of the joint",
             form.place
         )
     },
