@@ -63,13 +63,13 @@ pub(crate) fn correlation_left_by(
     if slow.contains(&true) {
         let kept: Vec<bool> = slow.iter().map(|slow| !slow).collect();
         let (cost, other) = Regression::of((&problem, width), settled, fitter, &kept).likeliest();
-        // Causes that were not found yet look like such noise, too.
-        let clearer = if answer.nothing_last > *SETTLED {
-            0.0
+        // A cause has to be clearly likelier than such noise; as long as more is there, causes that were not found yet look like it, too.
+        let margin = if answer.nothing_last > *SETTLED {
+            -*CLEARER
         } else {
             10.0 * *CLEARER
         };
-        if cost + clearer < best.min(believed) && other.is_some() {
+        if cost + margin < best.min(believed) && other.is_some() {
             return (other != fitter.correlated).then(|| change(other));
         }
     }
