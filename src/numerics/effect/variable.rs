@@ -243,6 +243,17 @@ impl Variable {
         }
     }
 
+    /// Whether both are one quantity, with other numbers (a limit, a time, a direction) or the same.
+    pub fn is_alike(self, other: Self) -> bool {
+        match (self, other) {
+            (Self::Stretch { joint, .. }, Self::Stretch { joint: of, .. })
+            | (Self::Recent { joint, .. }, Self::Recent { joint: of, .. }) => joint == of,
+            (Self::Position { .. }, Self::Position { .. })
+            | (Self::Sighted { .. }, Self::Sighted { .. }) => true,
+            _ => self == other,
+        }
+    }
+
     /// Whether its value needs to know how the arm hangs.
     pub(super) fn needs_torque(self) -> bool {
         matches!(

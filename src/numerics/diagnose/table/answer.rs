@@ -124,7 +124,10 @@ impl CauseTable<'_, '_> {
             log += log_of(i, &given, &known).max(0.0);
             known.push(&components[i]);
         }
-        let mut scan = self.scan_alike(&components[main], &state, &rest, 8, &[cell]);
+        let also: Vec<usize> = std::iter::once(cell)
+            .chain(self.over_the_same(&components[main]))
+            .collect();
+        let mut scan = self.scan_alike(&components[main], &state, &rest, 8, &also);
         // Others are asked what the strongest does: further ones of its cell add to any of them.
         scan.log_odds[cell] = self.cells[cell].log_prior + log_main;
         let (effect, place) = (self.name_of(&components[main]), self.cells[cell].place);

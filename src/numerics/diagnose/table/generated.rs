@@ -113,7 +113,7 @@ pub(super) fn products(
         frame.prepare(&[*motion], &others);
         let mut seen: Vec<Variable> = Vec::new();
         for other in others {
-            if seen.contains(&other) || is_alike(*of, other) {
+            if seen.contains(&other) || is_square(*of, other) {
                 continue;
             }
             seen.push(other);
@@ -148,7 +148,7 @@ pub(super) fn pairs(survey: &Survey, frame: &mut SearchRows) -> Vec<FreeShape> {
                 if frame
                     .values(of)
                     .is_some_and(|values| super::cell::line(&values).is_some())
-                    && !variables.iter().any(|known| is_alike(*known, of))
+                    && !variables.iter().any(|known| is_square(*known, of))
                 {
                     variables.push(of);
                 }
@@ -192,9 +192,10 @@ pub(super) fn pair_cells(seen: &[FreeShape]) -> Vec<CauseCell> {
     seen.iter().map(|free| cell(*free, PAIR.ln())).collect()
 }
 
-/// Whether two variables are one with another number.
-fn is_alike(a: Variable, b: Variable) -> bool {
-    a.to_string() == b.to_string()
+/// Whether a product of both is one of a variable with itself: two directions in space are two variables.
+fn is_square(a: Variable, b: Variable) -> bool {
+    let space = matches!(a, Variable::Position { .. } | Variable::Sighted { .. });
+    a == b || !space && a.is_alike(b)
 }
 
 fn cell(free: FreeShape, log_prior: f64) -> CauseCell {
@@ -280,6 +281,14 @@ pub(super) fn kinds(place: Place, motion: Motion, survey: &Survey) -> Vec<Kind> 
     let others = || (0..joints).filter(move |joint| *joint != own);
     let turns = matches!(motion, Motion::Joint { .. });
     let arrows = ARROWS.map(|arrow| Vector3::from(arrow).map(f64::from).normalize().into());
+    let stretch = |joint: usize| Variable::Stretch {
+        joint,
+        limit: LIMITS[1] * survey.travel(joint),
+    };
+    let recent = |joint| Variable::Recent {
+        joint,
+        time: FADING[1],
+    };
     let mut out: Vec<Kind> = Vec::new();
     if let Motion::Instrument { .. } = motion {
         out.extend(
@@ -305,6 +314,10 @@ pub(super) fn kinds(place: Place, motion: Motion, survey: &Survey) -> Vec<Kind> 
                 .map(|along| (Variable::Sighted { along }, SLOW))
                 .to_vec(),
         );
+        out.push((0..joints).map(|joint| (stretch(joint), SLOW)).collect());
+        if survey.data.has_clock() {
+            out.push((0..joints).map(|joint| (recent(joint), SLOW)).collect());
+        }
     } else {
         out.push(vec![(
             Variable::Angle { joint: own },
@@ -351,30 +364,14 @@ pub(super) fn kinds(place: Place, motion: Motion, survey: &Survey) -> Vec<Kind> 
             limit: share * survey.travel(own),
         });
         out.push(limits.map(|of| (of, SLOW)).to_vec());
-        let other = |joint: usize| Variable::Stretch {
-            joint,
-            limit: LIMITS[1] * survey.travel(joint),
-        };
-        out.push(others().map(|joint| (other(joint), SLOW)).collect());
+        out.push(others().map(|joint| (stretch(joint), SLOW)).collect());
         if survey.data.has_clock() {
             out.push(
                 FADING
                     .map(|time| (Variable::Recent { joint: own, time }, SLOW))
                     .to_vec(),
             );
-            out.push(
-                others()
-                    .map(|joint| {
-                        (
-                            Variable::Recent {
-                                joint,
-                                time: FADING[1],
-                            },
-                            SLOW,
-                        )
-                    })
-                    .collect(),
-            );
+            out.push(others().map(|joint| (recent(joint), SLOW)).collect());
         }
     }
     if place == Place::Tool {

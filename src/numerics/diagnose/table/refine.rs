@@ -30,12 +30,13 @@ impl CauseTable<'_, '_> {
             open && scan.log_odds[*cell] > most - (0.2 * most).max(10.0)
                 && scan.log_odds[*cell] > -5.0
         };
-        let named = |cell: &usize| {
+        let asked = |cell: &usize| {
             Some(*cell) == best
                 || self.declared.contains(cell)
-                || self.cells[*cell].is_named() && near(cell)
+                || near(cell)
+                || self.is_over_numbers(*cell)
         };
-        let listed: Vec<usize> = scan.closely.keys().copied().filter(named).collect();
+        let listed: Vec<usize> = scan.closely.keys().copied().filter(asked).collect();
         let refined: Vec<(usize, Refined)> = listed
             .into_par_iter()
             .filter_map(|cell| {
@@ -90,8 +91,12 @@ impl CauseTable<'_, '_> {
                         let group = groups.get(found.shape.0)?;
                         Some((free, self.forms_of(group, found.shape.1)?))
                     };
+                    let known = self.numbers.iter().filter(|of| free.of.is_alike(**of));
+                    let known = known.filter(|of| level == 0 && **of != free.of);
+                    let known = known.map(|of| FreeShape { of: *of, ..*free });
                     free.near(level)
                         .into_iter()
+                        .chain(known)
                         .filter_map(forms)
                         .filter(|(_, forms)| !is_there(forms))
                         .collect::<Vec<_>>()
@@ -126,6 +131,17 @@ impl CauseTable<'_, '_> {
                 Some((vec![form], log, amplitude))
             }
             _ => None,
+        }
+    }
+
+    /// Whether a cell follows a variable with numbers that a component follows with others.
+    fn is_over_numbers(&self, cell: usize) -> bool {
+        match &self.cells[cell].shapes {
+            Shapes::Free(free) => self
+                .numbers
+                .iter()
+                .any(|of| free.of.is_alike(*of) && free.of != *of),
+            Shapes::Listed(_) => false,
         }
     }
 

@@ -30,6 +30,8 @@ pub(super) struct CauseTable<'f, 'a> {
     pub first: Vec<usize>,
     columns: usize,
     pub next: u64,
+    /// Variables with numbers that components follow.
+    pub numbers: Vec<Variable>,
     /// Cells that were likely at the last look.
     pub likely: Vec<usize>,
     /// Keys of cells that are in the model around which the rows are looked at.
@@ -163,6 +165,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             first,
             columns,
             next: 0,
+            numbers: Vec::new(),
             likely: Vec::new(),
             declared,
             from_before: Vec::new(),
@@ -334,6 +337,24 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         let named_here = |other: &CauseCell| other.is_named() && other.place == cell.place;
         (0..self.cells.len())
             .filter(|k| near(&self.cells[*k]) || named_here(&self.cells[*k]))
+            .collect()
+    }
+
+    /// Other motions over a variable with numbers that a component follows: coarsely asked they have other numbers.
+    pub fn over_the_same(&self, component: &Component) -> Vec<usize> {
+        let Shapes::Free(free) = &self.cells[component.cell].shapes else {
+            return Vec::new();
+        };
+        let is_curve = |over| matches!(over, Over::Curve { .. });
+        let same = |cell: &CauseCell| match &cell.shapes {
+            Shapes::Free(other) => is_curve(other.over) && other.of.is_alike(free.of),
+            Shapes::Listed(_) => false,
+        };
+        if !is_curve(free.over) || free.near(0).is_empty() {
+            return Vec::new();
+        }
+        (0..self.cells.len())
+            .filter(|cell| same(&self.cells[*cell]))
             .collect()
     }
 
@@ -581,6 +602,9 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             self.next += 1;
             return found_component.with_part(self.next);
         };
+        let new = |of: &Variable| !self.numbers.contains(of);
+        let variables = forms.iter().flat_map(|form| form.variables()).filter(new);
+        self.numbers.extend(variables.collect::<Vec<_>>());
         let found_component = Component {
             forms,
             amplitude,
