@@ -43,19 +43,24 @@ impl FitState {
             .any(|cause| cause.form.variables().contains(&Variable::Time))
     }
 
-    /// The squared size of some causes together in their own uncertainty, a mean over their numbers; 0 where none of these is estimated,
-    /// none where there is no covariance.
+    /// The squared size of some causes together in their uncertainty, a mean over as many numbers as the rows show of them; 0 where none of
+    /// these is estimated, none where there is no covariance.
     pub fn square_size(&self, causes: &[usize]) -> Option<f64> {
-        let own = causes.iter().flat_map(|i| self.ranges[*i].clone());
-        let free: Vec<usize> = own
-            .filter(|k| matches!(self.fitted.statuses[*k], ParameterStatus::Free(_)))
-            .collect();
+        let (mut free, mut shown) = (Vec::new(), 0.0);
+        for i in causes {
+            for (k, prior) in self.ranges[*i].clone().zip(&self.causes[*i].priors) {
+                if let ParameterStatus::Free(sigma) = self.fitted.statuses[k] {
+                    free.push(k);
+                    shown += (1.0 - (sigma / prior.sigma).powi(2)).max(0.0);
+                }
+            }
+        }
         if free.is_empty() {
             return Some(0.0);
         }
         let values: Vec<f64> = free.iter().map(|k| self.model.x[*k]).collect();
         let square = self.fitted.covariance.as_ref()?.distance(&free, &values)?;
-        Some(square / free.len() as f64)
+        Some(square / shown.max(1.0))
     }
 }
 
