@@ -76,7 +76,7 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
             round.causes.iter().map(|cause| &cause.form),
         ));
         let next = fitter.fit(&now.model, round.causes);
-        let Some(answer) = round.answer else {
+        let Some(mut answer) = round.answer else {
             now = next;
             fitter.follow(&now);
             continue;
@@ -86,7 +86,7 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         let settled = answer.nothing_last > *SETTLED;
         let asked = settled || fitter.data.in_motion(&next.screening.kept) || next.follows_time();
         if let Some(change) = asked
-            .then(|| correlation_left_by(&next, &answer, &fitter))
+            .then(|| correlation_left_by(&next, &mut answer, &fitter))
             .flatten()
         {
             let kept = fitter.take_correlation(&change, &next);

@@ -18,10 +18,11 @@ use faer::linalg::matmul::triangular::{BlockStructure, matmul};
 use faer::{Accum, Mat, MatRef, Par, Side};
 use rayon::prelude::*;
 
-/// What noise does from row to row, if the settled model shows it to be otherwise than believed.
+/// What noise does from row to row, if the settled model shows it to be otherwise than believed. Findings that follow time are as probable as
+/// such noise leaves them.
 pub(crate) fn correlation_left_by(
     settled: &FitState,
-    answer: &Answer,
+    answer: &mut Answer,
     fitter: &Fitter,
 ) -> Option<CorrelationChange> {
     let change = |noise| CorrelationChange {
@@ -63,14 +64,21 @@ pub(crate) fn correlation_left_by(
     if slow.contains(&true) {
         let kept: Vec<bool> = slow.iter().map(|slow| !slow).collect();
         let (cost, other) = Regression::of((&problem, width), settled, fitter, &kept).likeliest();
-        // A cause has to be clearly likelier than such noise; as long as more is there, causes that were not found yet look like it, too.
-        let margin = if answer.nothing_last > *SETTLED {
-            -*CLEARER
+        // What such noise explains as well is noise; as long as more is there, causes that were not found yet look like it, too.
+        let is_settled = answer.nothing_last > *SETTLED;
+        let margin = if is_settled {
+            -*AS_GOOD
         } else {
             10.0 * *CLEARER
         };
-        if cost + margin < best.min(believed) && other.is_some() {
+        let likelier = cost - best.min(believed);
+        if likelier < -margin && other.is_some() {
             return (other != fitter.correlated).then(|| change(other));
+        }
+        let noise_instead = 1.0 / (1.0 + (likelier / 2.0).exp());
+        let of_time = |found: &&mut FoundCell| is_settled && found.members.iter().any(|i| slow[*i]);
+        for found in answer.found.iter_mut().filter(of_time) {
+            found.or_nothing(noise_instead);
         }
     }
     (best < believed - *PLAIN && noise != fitter.correlated).then(|| change(noise))

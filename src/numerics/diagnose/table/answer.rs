@@ -32,6 +32,21 @@ pub(crate) struct FoundCell {
     pub bounds: Vec<(bool, f64)>,
 }
 
+impl FoundCell {
+    /// That it is no cause at all with a probability, names and places as probable among the rest as before.
+    pub fn or_nothing(&mut self, probability: f64) {
+        let rest = 1.0 - probability;
+        self.probabilities = Probabilities {
+            name: rest * self.probabilities.name,
+            place: rest * self.probabilities.place,
+            none: rest * self.probabilities.none + probability,
+        };
+        for rival in &mut self.rivals {
+            rival.probability *= rest;
+        }
+    }
+}
+
 /// What the table says of the last model.
 pub(crate) struct Answer {
     pub found: Vec<FoundCell>,
