@@ -94,6 +94,11 @@ impl TorqueColumns {
             }
             None => columns_of(&form, scene, reduction, regressor),
         };
+        self.take(form, columns)
+    }
+
+    /// Takes a form with its columns; its number.
+    pub fn take(&mut self, form: TorqueForm, columns: Vec<TorqueColumn>) -> usize {
         self.first.push(self.columns.len());
         self.prior.resize(self.columns.len(), 0.0);
         let prior: Vec<f64> = columns
@@ -195,7 +200,7 @@ impl TorqueColumns {
 }
 
 /// A form's columns.
-pub(super) fn columns_of(
+fn columns_of(
     form: &TorqueForm,
     scene: &DynamicScene,
     reduction: &Reduction,

@@ -43,7 +43,6 @@ mod filter;
 mod findings;
 mod friction_curve;
 mod friction_lead;
-mod friction_line;
 mod inertial_names;
 mod inertials;
 mod judge;

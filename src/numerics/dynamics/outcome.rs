@@ -223,7 +223,7 @@ fn withdrawn(choice: &CauseChoice, withdrawn: &[(usize, f64)]) -> Vec<String> {
             format!("falls by {gain:.1} only")
         };
         format!(
-            "{} at {}: held-out rows do not confirm it (with it their squared error over the noise {squares})",
+            "{} at {}: blocks of the fitted rows that are predicted by the others do not confirm it (with it their squared error over the noise {squares})",
             form.cause.name, form.place
         )
     };

@@ -13,6 +13,16 @@ pub(super) struct TorqueColumn {
     pub courses: Vec<Vec<f64>>,
 }
 
+impl TorqueColumn {
+    /// Adds it with a coefficient to torques, `[joint][judged row]`.
+    pub fn add(&self, coefficient: f64, torques: &mut [Vec<f64>]) {
+        for (joint, course) in self.joints.iter().zip(&self.courses) {
+            let sums = torques[*joint].iter_mut().zip(course);
+            sums.for_each(|(sum, part)| *sum += coefficient * part);
+        }
+    }
+}
+
 /// Judged rows of the regressor, `[joint][10 link + number]`; links before the joint are empty.
 pub(super) struct ReducedRegressor(Vec<Vec<Vec<f64>>>);
 

@@ -2,7 +2,7 @@
 
 use super::arm::DynamicArm;
 use super::cause::TorqueForm;
-use super::cells::{OtherInertials, faint, from_common, search, settle};
+use super::cells::{OtherInertials, faint, from_common, search, settle, settle_with_priors};
 use super::choice::CauseChoice;
 use super::clock::RecordingClock;
 use super::contact::{ContactModel, contacts};
@@ -24,7 +24,7 @@ use super::weighted::WeightedColumns;
 
 /// Rounds in which others are looked for in place of forms with a number at an end of its search, at most.
 const END_ROUNDS: usize = 3;
-/// Rounds in which causes that predict held-out rows worse are replaced, at most.
+/// Rounds in which causes that predict left-out rows worse are replaced, at most.
 const JUDGED_ROUNDS: usize = 6;
 /// s.
 const SAME_TIME: f64 = 0.1;
@@ -105,7 +105,8 @@ pub(super) fn solve<'a>(
     for _ in 0..JUDGED_ROUNDS {
         weighted = problem.weighted(&set);
         let choice = CauseChoice::new(&problem, &weighted);
-        let found = judge(&choice, settle(&choice, &set));
+        let (settled, priors) = settle_with_priors(&choice, &set);
+        let found = judge(&choice, settled, &priors);
         judged.set = found.set;
         if found.withdrawn.is_empty() {
             break;

@@ -334,6 +334,16 @@ impl TorqueForm {
         self.cause.name == UNKNOWN && self.cause.bends
     }
 
+    /// Whether it is a torque over the angles of joints.
+    pub fn is_over_angles(&self) -> bool {
+        self.cause.of_angle || self.cause.alike_at_joints
+    }
+
+    /// Whether it is a gear that turns with two joints.
+    pub fn is_gear_of_two(&self) -> bool {
+        (self.cause.and_on)(self).is_some()
+    }
+
     /// Whether a curve without a name and another curve of speed would be one sum at one joint.
     pub fn is_one_curve_with(&self, other: &Self) -> bool {
         let [one, two] = [self, other].map(|form| form.cause.bends);
