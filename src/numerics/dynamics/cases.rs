@@ -112,7 +112,7 @@ pub(super) fn record_at(
     extra: &dyn Fn(Row) -> f64,
 ) -> TorqueRecording {
     let n = real.joints();
-    let theta = inertials::DeclaredInertials::of(real, real.links.as_deref().unwrap()).theta;
+    let theta = arm::DeclaredInertials::of(real, real.links.as_deref().unwrap()).theta;
     let mut dynamics = InverseDynamics::new(real);
     let rows = (DURATION * rate) as usize;
     let mut dice = ChaCha8Rng::seed_from_u64(3);

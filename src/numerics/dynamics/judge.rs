@@ -106,7 +106,7 @@ pub(super) fn judge(
     mut set: Vec<usize>,
     priors: &[(usize, f64)],
 ) -> JudgedSet {
-    let (mut withdrawn, mut is_refuted) = (Vec::new(), false);
+    let mut withdrawn = Vec::new();
     let folds = Fold::all(choice.problem, &set, priors);
     loop {
         let gains = gains(choice.problem, &folds, &set);
@@ -125,15 +125,11 @@ pub(super) fn judge(
         let Some(worst) = worst.min_by(|a, b| short(a).total_cmp(&short(b))) else {
             break;
         };
-        let LeftOutGain { square, expected } = gains[worst];
-        withdrawn.push((set.remove(worst), square));
-        // A form that explains nothing gains nothing; one that loses more than it was expected to gain is another cause's.
-        is_refuted |= square < -expected;
+        withdrawn.push((set.remove(worst), gains[worst].square));
     }
     JudgedSet {
         set,
         withdrawn,
-        is_refuted,
         ..JudgedSet::default()
     }
 }

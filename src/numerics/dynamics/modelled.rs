@@ -4,6 +4,7 @@ use super::choice::CauseChoice;
 use super::model::{JointRange, TorqueModel, TorqueTerm};
 use super::newton_euler::INERTIAL_NUMBERS;
 use super::problem::TorqueProblem;
+use super::scene::{ends, largest};
 use super::shape_slopes::ShapeSlopes;
 use super::sweep::SweptColumns;
 use crate::statistics::nearest;
@@ -137,14 +138,10 @@ fn range(problem: &TorqueProblem, joint: usize, misfit: f64, usual: f64) -> Join
             .filter(|row| !problem.in_event(*row))
             .map(|row| problem.reduction.rows[row])
     };
-    let most = |course: &[f64]| rows().map(|row| course[row].abs()).fold(0.0, f64::max);
+    let most = |course: &[f64]| largest(rows().map(|row| &course[row]));
     let position = &problem.scene.position[joint];
-    let ends = rows().map(|row| position[row]).fold(
-        [f64::INFINITY, f64::NEG_INFINITY],
-        |[least, greatest], value| [least.min(value), greatest.max(value)],
-    );
     JointRange {
-        position: ends,
+        position: ends(rows().map(|row| position[row])),
         speed: most(&problem.scene.velocity[joint]),
         acceleration: most(&problem.scene.acceleration[joint]),
         load: most(&problem.scene.rigid[joint]),

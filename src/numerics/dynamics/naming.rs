@@ -3,8 +3,9 @@
 
 use super::cause::{FittedNumber, TorqueForm, UNKNOWN, VISCOUS, line_of_power};
 use super::choice::CauseChoice;
-use super::polish::polish;
 use super::problem::TorqueProblem;
+use super::refine::polish;
+use super::scene::largest;
 use super::shape_slopes::{ShapeNumber, ShapeSlopes, slope};
 use super::sweep::{SweptColumns, value_of};
 use super::weighted::WeightedColumns;
@@ -21,8 +22,6 @@ pub(super) struct JudgedSet {
     pub silent: Vec<usize>,
     /// What cross-validation did not confirm, with what left-out rows gained by each.
     pub withdrawn: Vec<(usize, f64)>,
-    /// Whether left-out rows are predicted worse with one of them.
-    pub is_refuted: bool,
 }
 
 /// What becomes of a form.
@@ -190,9 +189,7 @@ fn number_of_line(
     };
     let power = *set.iter().find(|own| is_power(choice.form(**own)))?;
     let exponent = choice.form(power).shape[0];
-    let fastest = choice.problem.scene.velocity[form.joint()]
-        .iter()
-        .fold(0.0, |most: f64, velocity| most.max(velocity.abs()));
+    let fastest = largest(&choice.problem.scene.velocity[form.joint()]);
     let (column, is_viscous) = (all.of(power).start, form.cause.name == VISCOUS);
     let of = |exponent: f64| line_of_power(exponent, fastest)[usize::from(is_viscous)];
     let mut along = vec![(column, of(exponent))];

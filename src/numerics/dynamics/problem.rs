@@ -7,9 +7,9 @@ use super::columns::TorqueColumns;
 use super::newton_euler::INERTIAL_NUMBERS;
 use super::noise::JointNoise;
 use super::recording::TorqueRecording;
+use super::reduce::ReducedRegressor;
 use super::reduce::Reduction;
-use super::regressor::ReducedRegressor;
-use super::scene::{DynamicScene, column};
+use super::scene::{DynamicScene, column, ends};
 use super::sweep::value_of;
 use super::types::{ContactEvent, TorqueQuestion};
 use super::weighted::{Weighing, WeightedColumns};
@@ -68,6 +68,10 @@ impl<'a> TorqueProblem<'a> {
             || vec![0.0; 10 * recording.joints],
             |declared| declared.theta.clone(),
         );
+        let temperature = recording
+            .temperature
+            .as_ref()
+            .map(|all| ends(all.iter().copied()));
         let mut problem = Self {
             held_out: reduction
                 .rows
@@ -87,7 +91,7 @@ impl<'a> TorqueProblem<'a> {
             noise: Vec::new(),
             barred: Vec::new(),
             is_stale: false,
-            temperature: recording.temperature.as_deref().and_then(ends),
+            temperature: temperature.filter(|[least, most]| least <= most),
         };
         problem.shift(0.0);
         problem
@@ -101,8 +105,7 @@ impl<'a> TorqueProblem<'a> {
                 .iter()
                 .zip(&self.held_out)
                 .filter(|(_, held)| !**held);
-            let fitted: Vec<f64> = fitted.map(|(torque, _)| *torque).collect();
-            let [least, most] = ends(&fitted).unwrap_or_default();
+            let [least, most] = ends(fitted.map(|(torque, _)| *torque));
             0.5 * (most - least)
         };
         let torque = (0..self.joints()).map(half_range).collect();
@@ -358,14 +361,6 @@ impl<'a> TorqueProblem<'a> {
         }
         left
     }
-}
-
-/// Least and greatest; `None` where no value is known.
-fn ends(values: &[f64]) -> Option<[f64; 2]> {
-    let ends = |[least, greatest]: [f64; 2], value: &f64| [least.min(*value), greatest.max(*value)];
-    let known = values.iter().filter(|value| value.is_finite());
-    let found = known.fold([f64::INFINITY, f64::NEG_INFINITY], ends);
-    (found[0] <= found[1]).then_some(found)
 }
 
 /// A smooth course between its rows: cubic through the four nearest.

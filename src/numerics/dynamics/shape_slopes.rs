@@ -5,7 +5,7 @@
 
 use super::cause::TorqueForm;
 use super::problem::TorqueProblem;
-use super::regressor::TorqueColumn;
+use super::reduce::TorqueColumn;
 use super::scene::DynamicScene;
 use super::sweep::SweptColumns;
 use super::weighted::WeightedColumns;

@@ -11,11 +11,11 @@ use super::judge::judge;
 use super::latency::{Latency, latency};
 use super::naming::{JudgedSet, settle_names, take_out_ends};
 use super::noise::NoiseMemory;
-use super::polish::polish;
+use super::noise::{basic_forms, noise_apart, noise_beside, noise_left, rich_forms};
 use super::problem::TorqueProblem;
 use super::recording::TorqueRecording;
+use super::refine::polish;
 use super::refine::{one_power_of_speed, power_for_curve, refine};
-use super::rich::{basic_forms, noise_apart, noise_beside, noise_left, rich_forms};
 use super::shape_slopes::ShapeSlopes;
 use super::sign_width::sign_width;
 use super::sweep::SweptColumns;
@@ -119,12 +119,9 @@ pub(super) fn solve<'a>(
             .collect();
         problem.barred.extend(barred);
         judged.withdrawn.extend(found.withdrawn);
-        set = judged.set.clone();
-        if found.is_refuted {
-            // Something else was in its place.
-            set = again(&mut problem, &mut weighted, set);
-            polish(&mut problem, &mut weighted, &mut set);
-        }
+        // Something else may be in their place.
+        set = again(&mut problem, &mut weighted, judged.set.clone());
+        polish(&mut problem, &mut weighted, &mut set);
     }
     weighted = problem.weighted(&judged.set);
     judged.silent = CauseChoice::new(&problem, &weighted).other_friction(&judged.set);

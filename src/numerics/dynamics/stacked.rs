@@ -5,7 +5,7 @@ use super::cause::{TORQUE_CAUSES, TorqueForm};
 use super::columns::TorqueColumns;
 use super::newton_euler::INERTIAL_NUMBERS;
 use super::problem::TorqueProblem;
-use super::regressor::TorqueColumn;
+use super::reduce::TorqueColumn;
 use super::sweep::SweptColumns;
 use super::weighted::WeightedColumns;
 use crate::effect::Place;

@@ -2,7 +2,7 @@
 
 use super::columns::TorqueColumns;
 use super::noise::JointNoise;
-use super::regressor::TorqueColumn;
+use super::reduce::TorqueColumn;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 use std::ops::Range;

@@ -11,7 +11,7 @@ mod memory;
 mod shared_friction;
 mod unnamed_friction;
 
-use super::inertials::DeclaredInertials;
+use super::arm::DeclaredInertials;
 use super::newton_euler::INERTIAL_NUMBERS;
 use super::scene::DynamicScene;
 use super::types::TorqueParameter;
