@@ -1,5 +1,7 @@
-//! What the user believes of the arm that moves: axes, masses, tolerances, in the base frame at zero pose, SI.
+//! The arm that moves as the user believes it: axes, masses and tolerances in the base frame at zero pose, SI; and its inertial numbers as the
+//! regressor counts them.
 
+use super::newton_euler::{INERTIA_ENTRIES, INERTIAL_NUMBERS, inertia_matrix};
 use nalgebra::{Matrix3, Point3, Vector3};
 
 /// Mass, centre and inertia of a body.
@@ -53,5 +55,205 @@ impl DynamicArm {
     /// Number of joints n.
     pub fn joints(&self) -> usize {
         self.axes.len()
+    }
+}
+
+/// The ten numbers of a body about `point`.
+pub(super) fn numbers(body: &Inertial, point: &Vector3<f64>) -> [f64; INERTIAL_NUMBERS] {
+    let arm = body.centre.coords - point;
+    let about = body.inertia + steiner(body.mass, &arm);
+    let mut ten = [
+        body.mass,
+        body.mass * arm.x,
+        body.mass * arm.y,
+        body.mass * arm.z,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+    ];
+    for (number, (row, column)) in INERTIA_ENTRIES.into_iter().enumerate() {
+        ten[4 + number] = about[(row, column)];
+    }
+    ten
+}
+
+/// What a point mass adds to the inertia at a distance.
+fn steiner(mass: f64, arm: &Vector3<f64>) -> Matrix3<f64> {
+    (Matrix3::identity() * arm.norm_squared() - arm * arm.transpose()) * mass
+}
+
+/// Two bodies as one.
+fn joined(a: &Inertial, b: &Inertial) -> Inertial {
+    let mass = a.mass + b.mass;
+    let centre = ((a.centre.coords * a.mass + b.centre.coords * b.mass) / mass.max(1e-9)).into();
+    let of = |body: &Inertial| body.inertia + steiner(body.mass, &(body.centre - centre));
+    Inertial {
+        mass,
+        centre,
+        inertia: of(a) + of(b),
+    }
+}
+
+/// Inertial numbers of the whole arm, payload included, and their tolerance.
+#[derive(Debug, Clone)]
+pub(super) struct DeclaredInertials {
+    /// 10 n, of the links alone.
+    pub links: Vec<f64>,
+    /// 10 n, with the declared payload on the last link.
+    pub theta: Vec<f64>,
+    /// The last link's numbers of a payload of 1 kg as declared (of a point at the tool where none is).
+    pub payload: [f64; INERTIAL_NUMBERS],
+    /// Change of the last link's numbers per kg m by which a payload's centre is elsewhere, in three coordinates.
+    pub payload_shift: [[f64; INERTIAL_NUMBERS]; 3],
+    /// Per link: change of its numbers per m of its centre, in three coordinates.
+    pub centre_shift: Vec<[[f64; INERTIAL_NUMBERS]; 3]>,
+    /// Per link, 10 x 10 by columns: change of its numbers by one standard deviation of mass, centre (3), inertia (6).
+    pub tolerance: Vec<[[f64; INERTIAL_NUMBERS]; INERTIAL_NUMBERS]>,
+}
+
+impl DeclaredInertials {
+    /// The inertial numbers of an arm that declares its links.
+    pub fn of(arm: &DynamicArm, bodies: &[Inertial]) -> Self {
+        let last = bodies.len() - 1;
+        let point = |link: usize| arm.points[link].coords;
+        let links: Vec<f64> = bodies
+            .iter()
+            .enumerate()
+            .flat_map(|(link, body)| numbers(body, &point(link)))
+            .collect();
+        let mut theta = links.clone();
+        if let Some(payload) = &arm.payload {
+            let own = numbers(payload, &point(last));
+            theta[INERTIAL_NUMBERS * last..]
+                .iter_mut()
+                .zip(own)
+                .for_each(|(sum, value)| *sum += value);
+        }
+        let tolerance = (0..bodies.len()).map(|link| {
+            let whole = match &arm.payload {
+                Some(payload) if link == last => joined(&bodies[link], payload),
+                _ => bodies[link],
+            };
+            tolerance(arm, &whole, &point(link))
+        });
+        let payload = unit_payload(arm);
+        Self {
+            tolerance: tolerance.collect(),
+            payload: numbers(&payload, &point(last)),
+            payload_shift: shifts(&payload, &point(last)),
+            centre_shift: bodies
+                .iter()
+                .enumerate()
+                .map(|(link, body)| shifts(body, &point(link)))
+                .collect(),
+            links,
+            theta,
+        }
+    }
+}
+
+/// A payload of 1 kg.
+fn unit_payload(arm: &DynamicArm) -> Inertial {
+    match &arm.payload {
+        Some(payload) if payload.mass > 0.0 => Inertial {
+            mass: 1.0,
+            inertia: payload.inertia / payload.mass,
+            ..*payload
+        },
+        _ => Inertial {
+            mass: 1.0,
+            centre: arm.tool,
+            inertia: Matrix3::zeros(),
+        },
+    }
+}
+
+/// Change of a body's numbers per m of its centre.
+fn shifts(body: &Inertial, point: &Vector3<f64>) -> [[f64; INERTIAL_NUMBERS]; 3] {
+    let arm = body.centre.coords - point;
+    std::array::from_fn(|axis| {
+        let along = Vector3::ith(axis, body.mass);
+        let inertia = Matrix3::identity() * (2.0 * arm.dot(&along))
+            - arm * along.transpose()
+            - along * arm.transpose();
+        let mut ten = [0.0, along.x, along.y, along.z, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+        for (number, (row, column)) in INERTIA_ENTRIES.into_iter().enumerate() {
+            ten[4 + number] = inertia[(row, column)];
+        }
+        ten
+    })
+}
+
+/// Change of a body's numbers by one standard deviation of each of its own.
+fn tolerance(
+    arm: &DynamicArm,
+    body: &Inertial,
+    point: &Vector3<f64>,
+) -> [[f64; INERTIAL_NUMBERS]; INERTIAL_NUMBERS] {
+    /// Step of a coordinate of the centre: small against its tolerance, as an inertia is quadratic in it.
+    const STEP: f64 = 1e-2;
+    let base = numbers(body, point);
+    let largest = (0..3)
+        .map(|axis| body.inertia[(axis, axis)])
+        .fold(0.0, f64::max);
+    std::array::from_fn(|number| {
+        let (mut moved, mut step) = (*body, 1.0);
+        match number {
+            0 => {
+                moved.mass *= 1.0 + arm.tolerance.mass_relative;
+                moved.inertia *= 1.0 + arm.tolerance.mass_relative;
+            }
+            1..=3 => {
+                step = STEP;
+                moved.centre.coords[number - 1] += step * arm.tolerance.centre;
+            }
+            _ => {
+                let (row, column) = INERTIA_ENTRIES[number - 4];
+                let mut six = [0.0; 6];
+                six[number - 4] = arm.tolerance.inertia_relative
+                    * largest
+                    * if row == column { 1.0 } else { 0.5 };
+                moved.inertia += inertia_matrix(&six);
+            }
+        }
+        let ten = numbers(&moved, point);
+        std::array::from_fn(|entry| (ten[entry] - base[entry]) / step)
+    })
+}
+
+// What the ten inertial numbers of a link are called, and their units.
+
+/// As the regressor counts them: moments are mass times centre from the joint's point, inertias about that point.
+pub const INERTIAL_NAMES: [&str; INERTIAL_NUMBERS] = [
+    "mass",
+    "moment_x",
+    "moment_y",
+    "moment_z",
+    "inertia_xx",
+    "inertia_xy",
+    "inertia_xz",
+    "inertia_yy",
+    "inertia_yz",
+    "inertia_zz",
+];
+
+/// `rigid_body.l3.mass`; `number` counts 10 a link.
+pub(super) fn inertial_name(number: usize) -> String {
+    format!(
+        "rigid_body.l{}.{}",
+        number / INERTIAL_NUMBERS + 1,
+        INERTIAL_NAMES[number % INERTIAL_NUMBERS]
+    )
+}
+
+/// kg, kg m or kg m2.
+pub(super) fn inertial_unit(number: usize) -> &'static str {
+    match number % INERTIAL_NUMBERS {
+        0 => "kg",
+        1..=3 => "kg m",
+        _ => "kg m2",
     }
 }

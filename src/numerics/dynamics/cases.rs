@@ -112,7 +112,7 @@ pub(super) fn record_at(
     extra: &dyn Fn(Row) -> f64,
 ) -> TorqueRecording {
     let n = real.joints();
-    let theta = inertials::DeclaredInertials::of(real, real.links.as_deref().unwrap()).theta;
+    let theta = arm::DeclaredInertials::of(real, real.links.as_deref().unwrap()).theta;
     let mut dynamics = InverseDynamics::new(real);
     let rows = (DURATION * rate) as usize;
     let mut dice = ChaCha8Rng::seed_from_u64(3);
@@ -383,7 +383,7 @@ fn torques_that_come_late_are_no_physics_of_the_arm() {
 }
 
 /// Velocity of the tool point per velocity of a joint, by differences.
-fn lever(joint: usize, time: f64) -> Vector3<f64> {
+pub(super) fn lever(joint: usize, time: f64) -> Vector3<f64> {
     const STEP: f64 = 1e-6;
     let tool = |by: f64| {
         let arm = arm();

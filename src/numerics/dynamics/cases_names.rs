@@ -1,8 +1,10 @@
 //! What is named and what is not: parts of a sum, numbers at an end of their search, drives before masses, uneven stamps.
 
-use super::cases::{arm, found, record};
+use super::cases::{arm, found, lever, record};
 use super::cause::{TORQUE_CAUSES, TorqueForm};
 use super::*;
+use rand::rngs::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
 
 fn diagnosed(recording: &TorqueRecording) -> TorqueDiagnosis {
     diagnose(&arm(), recording, &TorqueQuestion::default(), &mut |_| ()).unwrap()
@@ -181,4 +183,101 @@ fn a_number_at_an_end_of_its_search_is_none() {
         ..form("torque_ripple", 0, 100.0)
     };
     assert!(order(6).within_ends().is_some() && order(9).within_ends().is_none());
+}
+
+#[test]
+fn held_out_rows_judge_and_choose_nothing() {
+    let plain = record(&arm(), 0.0, &|row| 5.0 * (row.3 / 0.003).tanh());
+    let mut other = plain.clone();
+    // From 2 s after the first held-out row on, as filters feel what is near: a torque at joint 3 that no fitted row has.
+    let first = plain.held_out.iter().position(|held| *held).unwrap() + 200;
+    for row in first..plain.rows() {
+        other.torque[4 * row + 2] += 4.0 * libm::sin(3.0 * plain.time[row]);
+    }
+    let [plain, other] = [plain, other].map(|recording| diagnosed(&recording));
+    let numbers = |diagnosis: &TorqueDiagnosis| -> Vec<(String, f64)> {
+        let terms = diagnosis.model.terms.iter();
+        terms
+            .flat_map(|term| {
+                term.coefficients
+                    .iter()
+                    .map(|value| (term.effect.clone(), *value))
+            })
+            .collect()
+    };
+    assert_eq!(found(&plain), found(&other));
+    assert_eq!(numbers(&plain), numbers(&other));
+    assert!(other.after.rms[2] > 10.0 * plain.after.rms[2]);
+}
+
+#[test]
+fn one_curve_over_the_angle_of_its_joint_is_one_finding() {
+    // Neither a line nor waves: a hump 0.3 rad wide.
+    let diagnosis = diagnosed(&record(&arm(), 0.0, &|(joint, _, angle, velocity, ..)| {
+        let hump = 6.0 * libm::exp(-((angle - 0.3) / 0.3).powi(2));
+        5.0 * (velocity / 0.003).tanh() + if joint == 2 { hump } else { 0.0 }
+    }));
+    let at_joint: Vec<String> = found(&diagnosis)
+        .into_iter()
+        .filter(|name| name.ends_with("joint 3"))
+        .collect();
+    assert_eq!(at_joint, ["coulomb_friction joint 3", "unknown joint 3"]);
+    let curve = diagnosis
+        .findings
+        .iter()
+        .find(|finding| finding.effect == "unknown")
+        .unwrap();
+    assert!(
+        curve
+            .statement
+            .ends_with("it depends on the angle of the joint"),
+        "{}",
+        curve.statement
+    );
+}
+
+#[test]
+fn a_push_in_the_first_seconds_is_one_and_no_friction_that_fades() {
+    let push = |time: f64| {
+        let share = (time - 1.0) / 1.3;
+        if (0.0..1.0).contains(&share) {
+            libm::sin(std::f64::consts::PI * share).powi(2)
+        } else {
+            0.0
+        }
+    };
+    let force = nalgebra::Vector3::new(20.0, -30.0, 25.0);
+    let recording = record(&arm(), 0.0, &|(joint, time, _, velocity, ..)| {
+        5.0 * (velocity / 0.003).tanh() - push(time) * lever(joint, time).dot(&force)
+    });
+    let diagnosis = diagnosed(&recording);
+    let frictions = (1..=4).map(|joint| format!("coulomb_friction joint {joint}"));
+    let expected: Vec<String> = ["contact arm".into()]
+        .into_iter()
+        .chain(frictions)
+        .collect();
+    assert_eq!(found(&diagnosis), expected);
+    let event = &diagnosis.events[0];
+    assert!(
+        (event.start - 1.0).abs() < 0.3 && (event.end - 2.3).abs() < 0.3,
+        "{event:?}"
+    );
+}
+
+#[test]
+fn noise_that_lasts_is_named_nothing() {
+    let mut dice = ChaCha8Rng::seed_from_u64(6);
+    let mut recording = record(&arm(), 0.0, &|_| 0.0);
+    // 0.5 Nm that lasts a fifth of a second at 100 Hz.
+    let keeps = libm::exp(-0.05_f64);
+    let new = 0.5 * (1.0 - keeps * keeps).sqrt();
+    let mut now = [0.0; 4];
+    for row in recording.torque.chunks_exact_mut(4) {
+        for (torque, now) in row.iter_mut().zip(&mut now) {
+            let normal: f64 = (0..12).map(|_| dice.random::<f64>() - 0.5).sum();
+            *now = keeps * *now + new * normal;
+            *torque += *now;
+        }
+    }
+    assert_eq!(found(&diagnosed(&recording)), Vec::<String>::new());
 }

@@ -1,7 +1,7 @@
 //! Torques by the evidence of the table of causes: a cell is a cause at a place in every shape that it may have; what was accepted stands in the
 //! covariance with its amplitude, and every other cell is compared given these.
 
-use super::cause::{TORQUE_CONSTANT, UNKNOWN};
+use super::cause::{TORQUE_CONSTANT, TorqueForm, UNKNOWN};
 use super::choice::CauseChoice;
 use super::naming::JudgedSet;
 use crate::criteria::cells::{COMMON, NU, SWAPS};
@@ -407,34 +407,43 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
         components
     }
 
-    /// One wrong mass, drive or mounting instead of several; one curve over a joint's angle instead of two.
-    fn merge(&self, components: Vec<TorqueComponent>) -> Vec<TorqueComponent> {
-        let about = |own: &TorqueComponent| self.choice.form(own.form).cause;
-        let inertial: Vec<usize> = (0..components.len())
-            .filter(|place| about(&components[*place]).inertial)
-            .collect();
-        let mut groups = pairs(&inertial);
-        if inertial.len() > 2 {
-            groups.push(inertial);
+    /// One wrong mass, drive or mounting instead of several; one gear that turns with two joints instead of another and friction of its joint;
+    /// one torque over angles instead of several at a joint.
+    fn merge(&self, mut components: Vec<TorqueComponent>) -> Vec<TorqueComponent> {
+        let kinds: [(fn(&TorqueForm) -> bool, fn(&TorqueForm) -> bool); 3] = [
+            (|form| form.cause.inertial, |form| form.cause.inertial),
+            (TorqueForm::is_gear_of_two, |form| {
+                form.is_gear_of_two() || form.cause.brakes
+            }),
+            (TorqueForm::is_over_angles, TorqueForm::is_over_angles),
+        ];
+        for (is_one, may_leave) in kinds {
+            let form = |place: &usize| self.choice.form(components[*place].form);
+            let places: Vec<usize> = (0..components.len())
+                .filter(|place| may_leave(form(place)))
+                .collect();
+            let alike = |a: &usize, b: &usize| {
+                let [a, b] = [form(a), form(b)];
+                a.place == b.place || (a.cause.inertial && b.cause.inertial)
+            };
+            let together = |group: &Vec<usize>| {
+                group.len() > 1
+                    && group.iter().all(|place| alike(&group[0], place))
+                    && group.iter().any(|place| is_one(form(place)))
+            };
+            let of_one = |place: &usize| -> Vec<usize> {
+                let others = places.iter().copied();
+                others.filter(|other| alike(place, other)).collect()
+            };
+            let whole = places.iter().map(of_one).filter(|group| group.len() > 2);
+            let mut groups: Vec<Vec<usize>> = pairs(&places).into_iter().chain(whole).collect();
+            groups.retain(together);
+            groups.dedup();
+            components = self.merged(&components, &groups, &|number| {
+                is_one(self.choice.form(number))
+            });
         }
-        let mut best = self.merged(&components, &groups, &|form| {
-            self.choice.form(form).cause.inertial
-        });
-        let of_angle: Vec<usize> = (0..best.len())
-            .filter(|place| about(&best[*place]).of_angle)
-            .collect();
-        let same = |group: &Vec<usize>, best: &[TorqueComponent]| {
-            self.choice.form(best[group[0]].form).place
-                == self.choice.form(best[group[1]].form).place
-        };
-        let groups: Vec<Vec<usize>> = pairs(&of_angle)
-            .into_iter()
-            .filter(|group| same(group, &best))
-            .collect();
-        best = self.merged(&best, &groups, &|form| {
-            self.choice.form(form).cause.of_angle
-        });
-        best
+        components
     }
 
     fn merged(
@@ -456,7 +465,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
             };
             let next = self.backfit(rest.into_iter().chain([one.best]).collect());
             let total = self.total(&next);
-            if total > best.0 {
+            if total > best.0 && self.choice.is_whole(&forms(&next)) {
                 best = (total, next);
             }
         }
@@ -651,9 +660,21 @@ pub(super) fn faint(choice: &CauseChoice, judged: &JudgedSet) -> Vec<usize> {
 
 /// A set after exchanges, merges and removals.
 pub(super) fn settle(choice: &CauseChoice, set: &[usize]) -> Vec<usize> {
+    settle_with_priors(choice, set).0
+}
+
+/// The same with 1 / variance beforehand of its columns, by the amplitudes that the rows show.
+pub(super) fn settle_with_priors(
+    choice: &CauseChoice,
+    set: &[usize],
+) -> (Vec<usize>, Vec<(usize, f64)>) {
     let mut table = TorqueTable::new(choice);
     let components = table.components(set);
-    forms(&table.settled(components))
+    let settled = table.settled(components);
+    let state = table.state(&settled, None);
+    let seen = state.columns.iter().filter(|(_, root)| *root > 0.0);
+    let priors = seen.map(|(column, root)| (*column, root.powi(-2)));
+    (forms(&settled), priors.collect())
 }
 
 fn forms(components: &[TorqueComponent]) -> Vec<usize> {

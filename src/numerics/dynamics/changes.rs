@@ -6,10 +6,11 @@ use super::cause::{COULOMB, OFFSET, TORQUE_CAUSES, TorqueForm, VISCOUS};
 use super::model::TorqueModel;
 use super::newton_euler::INERTIAL_NUMBERS;
 use super::noise::NoiseMemory;
+use super::noise::noise_beside;
 use super::problem::TorqueProblem;
-use super::rich::noise_beside;
-use super::source::TorqueSource;
-use super::stacked::{CandidateColumns, StackedFit, StackedNormal};
+use super::recording::TorqueSource;
+use super::stacked::StackedColumns;
+use super::sweep::{SweptColumns, value_of};
 use super::types::{ContactEvent, TorqueQuestion};
 use super::used::UsedRecording;
 use crate::effect::Place;
@@ -99,26 +100,27 @@ pub fn changes(
         .for_each(|(problem, one)| {
             take_columns(problem, &base, &candidates, one.model, first.model)
         });
-    let normal = StackedNormal::new(&problems, &candidates_columns(&problems[1], shared.len()));
-    let (set, fit) = normal.search();
+    let both = StackedColumns::new(&problems, shared.len());
+    let mut set = both.search();
+    let fit = both.fit(&set);
+    let solution = fit.solution();
+    set.sort_by(|a, b| {
+        let gain = |form: usize| fit.loss(form, &solution).square;
+        gain(*b).total_cmp(&gain(*a))
+    });
     let mut changes = Vec::new();
-    let mut ranked: Vec<usize> = set.clone();
-    ranked.sort_by(|a, b| fit.gain(*b).total_cmp(&fit.gain(*a)));
-    for (rank, group) in ranked.iter().enumerate() {
-        changes.extend(told(&problems[1], &normal, &fit, *group, Some(rank + 1)));
+    for (rank, form) in set.iter().enumerate() {
+        changes.extend(change(&problems[1], &both, &fit, *form, Some(rank + 1)));
     }
-    for group in (0..normal.groups()).filter(|group| !set.contains(group)) {
-        let with = normal.fit(&[set.as_slice(), &[group]].concat());
-        changes.extend(told(&problems[1], &normal, &with, group, None));
+    for form in (0..both.all.forms.len()).filter(|form| !set.contains(form)) {
+        let with = fit.with(&[form]);
+        changes.extend(change(&problems[1], &both, &with, form, None));
     }
-    let [before, after] = [normal.fit(&[]), fit].map(|fit| normal.residual_rms(&problems[1], &fit));
+    let [before, after] = [&both.fit(&[]), &fit].map(|fit| both.residual_rms(fit));
+    let rms = before.into_iter().zip(after);
     Ok(TorqueChanges {
         changes,
-        rms: before
-            .into_iter()
-            .zip(after)
-            .map(|(before, after)| [before, after])
-            .collect(),
+        rms: rms.map(|(before, after)| [before, after]).collect(),
     })
 }
 
@@ -224,28 +226,25 @@ fn take_columns(
     problem.shift(own.latency);
 }
 
-fn candidates_columns(problem: &TorqueProblem, shared: usize) -> Vec<CandidateColumns> {
-    (0..problem.all.forms.len())
-        .map(|form| CandidateColumns {
-            columns: problem.all.of(form),
-            shared: form < shared,
-        })
-        .collect()
-}
-
-/// A group's numbers.
-fn told(
+/// The numbers of a form.
+fn change(
     problem: &TorqueProblem,
-    normal: &StackedNormal,
-    fit: &StackedFit,
-    group: usize,
+    both: &StackedColumns,
+    fit: &SweptColumns,
+    number: usize,
     rank: Option<usize>,
 ) -> Vec<TorqueChange> {
-    let (values, covariance) = fit.of_group(group);
-    let gain = fit.gain(group);
+    let (form, solution) = (&both.all.forms[number], fit.solution());
+    let columns: Vec<usize> = both.all.of(number).collect();
+    let values: Vec<f64> = columns
+        .iter()
+        .map(|column| value_of(&solution, *column))
+        .collect();
+    let covariance = fit.covariance(&columns);
+    let gain = fit.loss(number, &solution).square;
     let count = values.len();
     let p_value = tail(gain / count.max(1) as f64, count.max(1) as f64, FREEDOM);
-    let probability = 1.0 / (1.0 + (-(gain - normal.penalty(group)) / (2.0 * TEMPERATURE)).exp());
+    let probability = 1.0 / (1.0 + (-(gain - both.penalty(number)) / (2.0 * TEMPERATURE)).exp());
     let number =
         |name: String, effect: &str, place: Place, unit: &'static str, change: f64, sigma: f64| {
             TorqueChange {
@@ -260,7 +259,7 @@ fn told(
                 rank,
             }
         };
-    let Some(form) = normal.form_of(group) else {
+    if form.place == Place::Tool {
         let point = problem.scene.arm.points[problem.joints() - 1].coords;
         let mass = values[0];
         let sigma = |number: usize| covariance[number * (count + 1)].max(0.0).sqrt();
@@ -293,8 +292,7 @@ fn told(
             }
         }
         return all;
-    };
-    let form = &problem.all.forms[form];
+    }
     let names = form.coefficient_names();
     let of = |(place, (quantity, unit)): (usize, (String, &'static str))| {
         let name = format!("{}.{}.{quantity}", form.cause.name, form.place.tag());

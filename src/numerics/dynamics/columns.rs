@@ -4,8 +4,8 @@ use super::base_parameters::base_parameters;
 use super::cause::{TORQUE_CAUSES, TorqueForm};
 use super::newton_euler::INERTIAL_NUMBERS;
 use super::reduce::Reduction;
-use super::regressor::{ReducedRegressor, TorqueColumn};
-use super::scene::DynamicScene;
+use super::reduce::{ReducedRegressor, TorqueColumn};
+use super::scene::{DynamicScene, largest};
 use crate::criteria::torque::FRICTION;
 
 /// Base columns, then those of all forms, form after form.
@@ -94,6 +94,11 @@ impl TorqueColumns {
             }
             None => columns_of(&form, scene, reduction, regressor),
         };
+        self.take(form, columns)
+    }
+
+    /// Takes a form with its columns; its number.
+    pub fn take(&mut self, form: TorqueForm, columns: Vec<TorqueColumn>) -> usize {
         self.first.push(self.columns.len());
         self.prior.resize(self.columns.len(), 0.0);
         let prior: Vec<f64> = columns
@@ -117,12 +122,8 @@ impl TorqueColumns {
         else {
             return 0.0;
         };
-        let largest = column
-            .courses
-            .iter()
-            .flatten()
-            .fold(0.0, |largest: f64, value| largest.max(value.abs()));
-        (largest / (*FRICTION * most).max(f64::MIN_POSITIVE)).powi(2)
+        (largest(column.courses.iter().flatten()) / (*FRICTION * most).max(f64::MIN_POSITIVE))
+            .powi(2)
     }
 
     /// Columns of forms that are made of the rigid torque, anew.
@@ -195,7 +196,7 @@ impl TorqueColumns {
 }
 
 /// A form's columns.
-pub(super) fn columns_of(
+fn columns_of(
     form: &TorqueForm,
     scene: &DynamicScene,
     reduction: &Reduction,

@@ -2,7 +2,7 @@
 //! condition that the pseudo-inertia be positive (Wensing, Kim, Slotine, RA-L 2018).
 
 use super::arm::Inertial;
-use super::inertials::numbers;
+use super::arm::numbers;
 use super::model::TorqueModel;
 use super::newton_euler::{INERTIAL_NUMBERS, inertia_matrix};
 use nalgebra::{DMatrix, Matrix3, Point3, Vector3};

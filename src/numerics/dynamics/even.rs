@@ -5,8 +5,8 @@
 
 use super::check::row_faults;
 use super::recording::TorqueRecording;
+use super::recording::TorqueSource;
 use super::resample::Resampler;
-use super::source::TorqueSource;
 use crate::criteria::torque::{PAUSE, UNEVEN, UNEVEN_ROWS};
 use crate::error::Result;
 use crate::statistics::nearest;

@@ -1,10 +1,9 @@
 //! What was found in words and numbers: sizes, evidence, rivals, probabilities.
 
-use super::cause::{COULOMB, FittedNumber, TorqueForm, VISCOUS};
+use super::cause::{COULOMB, TorqueForm, VISCOUS};
 use super::cells::{CellOdds, OtherInertials, TorqueTable};
 use super::choice::CauseChoice;
-use super::friction_line::number_of_line;
-use super::naming::JudgedSet;
+use super::naming::{JudgedSet, fitted};
 use super::problem::TorqueProblem;
 use super::shape_slopes::ShapeSlopes;
 use super::sweep::SweptColumns;
@@ -76,11 +75,7 @@ fn finding(
     (uncertain, slopes): (&SweptColumns, &ShapeSlopes),
 ) -> TorqueFinding {
     let (problem, form) = (choice.problem, choice.form(number));
-    let line = number_of_line(choice, set, number, solution, (uncertain, slopes));
-    let fitted = line.map_or_else(
-        || fitted(problem, uncertain, solution, number),
-        |line| vec![line],
-    );
+    let fitted = fitted(choice, set, number, solution, (uncertain, slopes));
     let rest: Vec<usize> = set
         .iter()
         .copied()
@@ -90,19 +85,6 @@ fn finding(
     let loss = sweep.loss(number, solution);
     let rank = loss.rank.max(1) as f64;
     let delta_bic = loss.square - rank * (choice.weighted.rows as f64).ln();
-    let own: Vec<(usize, f64)> = solution
-        .iter()
-        .copied()
-        .filter(|(column, _)| problem.all.of(number).contains(column))
-        .collect();
-    let effect = problem.predicted(&own);
-    let count = effect
-        .iter()
-        .filter(|course| course.iter().any(|value| *value != 0.0))
-        .count()
-        .max(1)
-        * problem.reduction.rows.len();
-    let square: f64 = effect.iter().flatten().map(|value| value * value).sum();
     // Tolerances bend to take the place of a wrong mass, at their price: its size is what the rest leaves as it is.
     let left_without: Vec<(usize, f64)> = match form.cause.inertial {
         true => solution
@@ -126,7 +108,7 @@ fn finding(
             delta_bic,
             heldout_gain: (!held_out.is_empty())
                 .then(|| held_out_gain(problem, &left_without, solution, held_out)),
-            effect_rms: (square / count as f64).sqrt(),
+            effect_rms: problem.rms_of(number, solution),
         },
         rivals: Vec::new(),
         probabilities: Probabilities::default(),
@@ -183,25 +165,6 @@ fn with_shapes(
             .for_each(|parameter| parameter.sigma = sigma(span.index));
     }
     all
-}
-
-/// Coefficients of a form with their standard deviations.
-fn fitted(
-    problem: &TorqueProblem,
-    sweep: &SweptColumns,
-    solution: &[(usize, f64)],
-    number: usize,
-) -> Vec<FittedNumber> {
-    let columns: Vec<usize> = problem.all.of(number).collect();
-    let covariance = sweep.covariance(&columns);
-    let of = |(place, column): (usize, &usize)| FittedNumber {
-        value: solution
-            .iter()
-            .find(|(pivot, _)| pivot == column)
-            .map_or(0.0, |(_, value)| *value),
-        sigma: covariance[place * (columns.len() + 1)].max(0.0).sqrt(),
-    };
-    columns.iter().enumerate().map(of).collect()
 }
 
 /// Fall of the rms of held-out rows, Nm, over all joints.

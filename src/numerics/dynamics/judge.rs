@@ -1,86 +1,122 @@
-//! Held-out rows in the end: what does not lower their error, or only by stretching tolerances, is no finding. Evidence is of the fitted rows; a
-//! motion that comes later shows what a law is worth beyond them. Where held-out rows hardly show a finding, nothing is asked.
+//! Cross-validation over blocks of the fitted rows: what does not lower the error of rows that it was not fitted to, or only by stretching
+//! tolerances, is no finding. Held-out rows choose nothing. Where the rows of a block hardly show a finding, nothing is asked.
 
 use super::choice::CauseChoice;
 use super::naming::JudgedSet;
 use super::problem::TorqueProblem;
 use super::sweep::SweptColumns;
-use super::weighted::Weighing;
-use crate::criteria::torque::{CONFIRMED, NAMED};
+use super::weighted::WeightedColumns;
+use crate::criteria::torque::{BLOCKS, CONFIRMED, NAMED};
+use std::ops::Range;
 
-/// Whitened errors of held-out rows of a solution, and what tolerances are stretched by.
-fn held_out_errors(
-    problem: &TorqueProblem,
-    weighing: Weighing,
-    sweep: &SweptColumns,
-) -> (Vec<f64>, f64) {
-    let solution = sweep.solution();
-    let stretched = solution
-        .iter()
-        .filter_map(|(column, value)| Some(problem.all.prior.get(*column)? * value * value))
-        .sum();
-    (
-        weighing.measured(&problem.residual(&solution)).concat(),
-        stretched,
-    )
+/// A block of rows in time, and what is fitted to all others.
+struct Fold {
+    left_out: Vec<Range<usize>>,
+    others: WeightedColumns,
 }
 
-/// What held-out rows gain by a form.
-#[derive(Clone, Copy)]
-struct HeldOutGain {
+impl Fold {
+    /// The blocks of the fitted rows. Coefficients are known beforehand by the amplitudes of their causes, so that what the others do not show
+    /// of a block is nothing and not anything.
+    fn all(problem: &TorqueProblem, set: &[usize], priors: &[(usize, f64)]) -> Vec<Self> {
+        let runs = problem.runs(false);
+        let rows: usize = runs.iter().map(Range::len).sum();
+        let of_set = set.iter().flat_map(|form| problem.all.of(*form));
+        let mut chosen: Vec<usize> = (0..problem.all.base).chain(of_set).collect();
+        chosen.sort_unstable();
+        let fold = |block: usize| {
+            let ends = [block, block + 1].map(|block| rows * block / *BLOCKS);
+            let others = [between(&runs, 0..ends[0]), between(&runs, ends[1]..rows)].concat();
+            let mut others = WeightedColumns::new(
+                &problem.all,
+                &problem.measured,
+                problem.weighing(&others),
+                &chosen,
+            );
+            for (column, precision) in priors {
+                others.gram[*column][*column] += precision;
+            }
+            Self {
+                left_out: between(&runs, ends[0]..ends[1]),
+                others,
+            }
+        };
+        (0..*BLOCKS).map(fold).collect()
+    }
+
+    /// Whitened errors of the rows that are left out, and what tolerances are stretched by.
+    fn errors(&self, problem: &TorqueProblem, set: &[usize]) -> (Vec<f64>, f64) {
+        let base = SweptColumns::base(&problem.all, &self.others);
+        let solution = base.with(set).solution();
+        let stretched = solution
+            .iter()
+            .filter_map(|(column, value)| Some(problem.all.prior.get(*column)? * value * value))
+            .sum();
+        let weighing = problem.weighing(&self.left_out);
+        let errors = weighing.measured(&problem.residual(&solution)).concat();
+        (errors, stretched)
+    }
+}
+
+/// The parts of runs that lie between two rows, counted over all of them.
+fn between(runs: &[Range<usize>], rows: Range<usize>) -> Vec<Range<usize>> {
+    let (mut passed, mut parts) = (0, Vec::new());
+    for run in runs {
+        let first = rows.start.clamp(passed, passed + run.len());
+        let last = rows.end.clamp(passed, passed + run.len());
+        if first < last {
+            parts.push(run.start + first - passed..run.start + last - passed);
+        }
+        passed += run.len();
+    }
+    parts
+}
+
+/// What rows that are left out gain by a form.
+#[derive(Clone, Copy, Default)]
+struct LeftOutGain {
     square: f64,
-    /// What it must be.
-    least: f64,
     /// What it would be if the form were right.
     expected: f64,
 }
 
-/// What held-out rows gain by each of a set.
-fn gains(choice: &CauseChoice, set: &[usize]) -> Vec<HeldOutGain> {
-    let runs = choice.problem.runs(true);
-    let weighing = choice.problem.weighing(&runs);
-    let (whole, stretched) = held_out_errors(choice.problem, weighing, &choice.base.with(set));
-    let without = |place: usize| {
-        let rest: Vec<usize> = (0..set.len())
-            .filter(|other| *other != place)
-            .map(|other| set[other])
-            .collect();
-        let (errors, rest_stretched) =
-            held_out_errors(choice.problem, weighing, &choice.base.with(&rest));
-        let pairs = || errors.iter().zip(&whole);
-        let gain = pairs()
-            .map(|(without, with)| without * without - with * with)
-            .sum::<f64>()
-            + rest_stretched
-            - stretched;
-        let expected = pairs()
-            .map(|(without, with)| (without - with).powi(2))
-            .sum::<f64>()
-            + rest_stretched
-            - stretched;
-        // The gain of a right finding scatters about its own square by twice its root.
-        let least = expected - *NAMED * 2.0 * expected.max(0.0).sqrt();
-        HeldOutGain {
-            square: gain,
-            least: least.min(*CONFIRMED * choice.form(set[place]).width as f64),
-            expected,
+/// What rows that are left out gain by each of a set.
+fn gains(problem: &TorqueProblem, folds: &[Fold], set: &[usize]) -> Vec<LeftOutGain> {
+    let mut all = vec![LeftOutGain::default(); set.len()];
+    for fold in folds {
+        let (whole, stretched) = fold.errors(problem, set);
+        for (place, gain) in all.iter_mut().enumerate() {
+            let mut rest = set.to_vec();
+            rest.remove(place);
+            let (errors, by_rest) = fold.errors(problem, &rest);
+            for (without, with) in errors.iter().zip(&whole) {
+                gain.square += without * without - with * with;
+                gain.expected += (without - with).powi(2);
+            }
+            gain.square += by_rest - stretched;
+            gain.expected += by_rest - stretched;
         }
-    };
-    (0..set.len()).map(without).collect()
+    }
+    all
 }
 
-/// Withdraws the worst until all are confirmed; nothing where no rows are held out.
-pub(super) fn judge(choice: &CauseChoice, mut set: Vec<usize>) -> JudgedSet {
-    let (mut withdrawn, mut is_refuted) = (Vec::new(), false);
-    if choice.problem.runs(true).is_empty() {
-        return JudgedSet {
-            set,
-            ..JudgedSet::default()
-        };
-    }
+/// Withdraws the worst of a set, whose columns have such 1 / variances beforehand, until all are confirmed.
+pub(super) fn judge(
+    choice: &CauseChoice,
+    mut set: Vec<usize>,
+    priors: &[(usize, f64)],
+) -> JudgedSet {
+    let mut withdrawn = Vec::new();
+    let folds = Fold::all(choice.problem, &set, priors);
     loop {
-        let gains = gains(choice, &set);
-        let short = |place: &usize| gains[*place].square - gains[*place].least;
+        let gains = gains(choice.problem, &folds, &set);
+        let short = |place: &usize| {
+            let gain = gains[*place];
+            // The gain of a right finding scatters about its own square by twice its root.
+            let scatter = *NAMED * 2.0 * gain.expected.max(0.0).sqrt();
+            let confirmed = *CONFIRMED * choice.form(set[*place]).width as f64;
+            gain.square - (gain.expected - scatter).min(confirmed)
+        };
         let needed = |place: &usize| {
             let form = choice.form(set[*place]);
             set.iter().any(|other| choice.form(*other).modifies(form))
@@ -89,17 +125,11 @@ pub(super) fn judge(choice: &CauseChoice, mut set: Vec<usize>) -> JudgedSet {
         let Some(worst) = worst.min_by(|a, b| short(a).total_cmp(&short(b))) else {
             break;
         };
-        let HeldOutGain {
-            square, expected, ..
-        } = gains[worst];
-        withdrawn.push((set.remove(worst), square));
-        // A form that explains nothing gains nothing; one that loses more than it was expected to gain is another cause's.
-        is_refuted |= square < -expected;
+        withdrawn.push((set.remove(worst), gains[worst].square));
     }
     JudgedSet {
         set,
         withdrawn,
-        is_refuted,
         ..JudgedSet::default()
     }
 }

@@ -1,8 +1,8 @@
 //! Whether torques come later than the positions beside them: the fit of base, friction, offset and rotor over a common shift.
 
 use super::noise::NoiseMemory;
+use super::noise::{basic_forms, noise_beside};
 use super::problem::TorqueProblem;
-use super::rich::{basic_forms, noise_beside};
 use super::sweep::SweptColumns;
 use super::weighted::{Weighing, WeightedColumns};
 

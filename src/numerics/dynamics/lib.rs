@@ -11,7 +11,6 @@ use crate as dynamics;
 
 mod arm;
 mod base_parameters;
-mod bodies;
 mod bridge;
 #[cfg(test)]
 mod cases;
@@ -29,23 +28,15 @@ mod clock;
 mod columns;
 mod consistency;
 mod contact;
-mod cutoff;
-mod derivatives;
 mod enforce;
-mod errors;
 mod even;
 mod excite;
-mod extremes;
 mod feed_forward;
 mod feed_gate;
-mod feed_uncertainty;
 mod filter;
 mod findings;
 mod friction_curve;
 mod friction_lead;
-mod friction_line;
-mod inertial_names;
-mod inertials;
 mod judge;
 mod latency;
 mod masses;
@@ -55,29 +46,23 @@ mod naming;
 mod newton_euler;
 mod noise;
 mod outcome;
-mod polish;
 mod problem;
 mod recording;
 mod reduce;
 mod refine;
-mod regressor;
 mod resample;
-mod rich;
 mod scene;
 mod shape_slopes;
 mod sign_width;
 mod solve;
-mod source;
 mod stacked;
-mod survey;
 mod sweep;
-mod term_names;
 mod thin;
 mod types;
-mod unseen;
 mod used;
 mod weighted;
 
+pub use arm::INERTIAL_NAMES;
 pub use arm::{DynamicArm, Inertial, InertialTolerance};
 pub use cause::{COULOMB, FittedNumber};
 pub use changes::{DiagnosedRecording, TorqueChange, TorqueChanges, changes};
@@ -85,12 +70,11 @@ pub use consistency::{BodyConsistency, inertial_numbers};
 pub use excite::{ExciteRequest, ExcitingMotion, ExpectedSigma, excite};
 pub use feed_forward::{NeededTorques, PlannedMotion};
 pub use feed_gate::{JudgedRow, TorqueGate, TorqueRemark};
-pub use inertial_names::INERTIAL_NAMES;
 pub use masses::LinkFromTorques;
 pub use model::{JointRange, TorqueModel, TorqueTerm};
 pub use newton_euler::{INERTIAL_NUMBERS, InverseDynamics, MotionRow};
 pub use recording::TorqueRecording;
-pub use source::TorqueSource;
+pub use recording::TorqueSource;
 pub use types::{
     ContactEvent, EnforcedBodies, FrictionCurve, InertialBasis, InertialEstimate, TorqueCourses,
     TorqueDiagnosis, TorqueErrors, TorqueFinding, TorqueLeftover, TorqueNoise, TorqueParameter,
@@ -155,7 +139,7 @@ fn diagnose_used(
     }
     let cutoff = question
         .cutoff
-        .unwrap_or_else(|| cutoff::cutoff(&recording, &clock))
+        .unwrap_or_else(|| clock::cutoff(&recording, &clock))
         .min(HIGHEST_CUTOFF * clock.rate);
     let solved = solve::solve(arm, recording, question, &clock, cutoff, tell);
     let mut diagnosis = outcome::outcome(&solved, question, remarks);

@@ -4,9 +4,9 @@
 //! itself, so that any mass may be written to a link when the links before it give it back; gravity is the same. A link keeps the mass that
 //! is declared for it, and its centre is where the torques need it.
 
+use super::arm::numbers;
 use super::arm::{DynamicArm, Inertial};
 use super::consistency::nearest;
-use super::inertials::numbers;
 use super::model::TorqueModel;
 use super::newton_euler::INERTIAL_NUMBERS;
 use nalgebra::{Matrix3, Point3, Vector3};
@@ -72,8 +72,8 @@ impl TorqueModel {
 
 #[cfg(test)]
 mod tests {
+    use super::super::arm::DeclaredInertials;
     use super::super::cases::arm;
-    use super::super::inertials::DeclaredInertials;
     use super::super::model::JointRange;
     use super::super::newton_euler::{InverseDynamics, MotionRow};
     use super::*;

@@ -4,6 +4,7 @@ use super::choice::CauseChoice;
 use super::model::{JointRange, TorqueModel, TorqueTerm};
 use super::newton_euler::INERTIAL_NUMBERS;
 use super::problem::TorqueProblem;
+use super::scene::{ends, largest};
 use super::shape_slopes::ShapeSlopes;
 use super::sweep::SweptColumns;
 use crate::statistics::nearest;
@@ -31,12 +32,6 @@ impl TorqueModel {
                 .is_none_or(|declared| form.cause.inertial(form, declared).is_none())
         };
         let adding: Vec<usize> = set.iter().copied().filter(adds).collect();
-        let value = |column: usize| {
-            solution
-                .iter()
-                .find(|(pivot, _)| *pivot == column)
-                .map_or(0.0, |(_, value)| *value)
-        };
         let term = |number: &usize| {
             let form = choice.form(*number);
             TorqueTerm {
@@ -44,15 +39,8 @@ impl TorqueModel {
                 place: form.place,
                 with: form.with,
                 shape: form.shape.clone(),
-                coefficients: problem.all.of(*number).map(value).collect(),
-                rms: rms(
-                    problem,
-                    problem
-                        .all
-                        .of(*number)
-                        .map(|column| (column, value(column)))
-                        .collect(),
-                ),
+                coefficients: problem.coefficients(*number, solution),
+                rms: problem.rms_of(*number, solution),
             }
         };
         let (identified, covariance) = covariance(problem, set, &adding, (uncertain, slopes));
@@ -80,23 +68,6 @@ impl TorqueModel {
             temperature: problem.temperature,
         }
     }
-}
-
-/// Rms of the torque of coefficients over the joints that have some, Nm.
-fn rms(problem: &TorqueProblem, own: Vec<(usize, f64)>) -> f64 {
-    let torque = problem.predicted(&own);
-    let acting: Vec<&Vec<f64>> = torque
-        .iter()
-        .filter(|course| course.iter().any(|value| *value != 0.0))
-        .collect();
-    let count = (acting.len() * problem.reduction.rows.len()).max(1) as f64;
-    (acting
-        .into_iter()
-        .flatten()
-        .map(|value| value * value)
-        .sum::<f64>()
-        / count)
-        .sqrt()
 }
 
 /// What held-out rows (fitted ones where none are) of each joint leave beyond noise and the covariance of the numbers, Nm, one standard
@@ -167,14 +138,10 @@ fn range(problem: &TorqueProblem, joint: usize, misfit: f64, usual: f64) -> Join
             .filter(|row| !problem.in_event(*row))
             .map(|row| problem.reduction.rows[row])
     };
-    let most = |course: &[f64]| rows().map(|row| course[row].abs()).fold(0.0, f64::max);
+    let most = |course: &[f64]| largest(rows().map(|row| &course[row]));
     let position = &problem.scene.position[joint];
-    let ends = rows().map(|row| position[row]).fold(
-        [f64::INFINITY, f64::NEG_INFINITY],
-        |[least, greatest], value| [least.min(value), greatest.max(value)],
-    );
     JointRange {
-        position: ends,
+        position: ends(rows().map(|row| position[row])),
         speed: most(&problem.scene.velocity[joint]),
         acceleration: most(&problem.scene.acceleration[joint]),
         load: most(&problem.scene.rigid[joint]),

@@ -1,12 +1,13 @@
 //! What of a set is named. A number at an end of its search would be better beyond it, friction that drives is none, and what is less than
 //! two standard deviations may as well be nothing: such forms leave the set, or stay as parts of a sum without a name.
 
-use super::cause::{TorqueForm, UNKNOWN};
+use super::cause::{FittedNumber, TorqueForm, UNKNOWN, VISCOUS, line_of_power};
 use super::choice::CauseChoice;
-use super::friction_line::number_of_line;
-use super::polish::polish;
 use super::problem::TorqueProblem;
-use super::shape_slopes::ShapeSlopes;
+use super::refine::polish;
+use super::scene::largest;
+use super::shape_slopes::{ShapeNumber, ShapeSlopes, slope};
+use super::sweep::{SweptColumns, value_of};
 use super::weighted::WeightedColumns;
 use crate::criteria::torque::NAMED;
 
@@ -19,10 +20,8 @@ pub(super) struct JudgedSet {
     pub set: Vec<usize>,
     /// What of the set is part of the model, but too little to be named.
     pub silent: Vec<usize>,
-    /// What held-out rows did not confirm, with what they gained by each.
+    /// What cross-validation did not confirm, with what left-out rows gained by each.
     pub withdrawn: Vec<(usize, f64)>,
-    /// Whether held-out rows are predicted worse with one of them.
-    pub is_refuted: bool,
 }
 
 /// What becomes of a form.
@@ -108,7 +107,7 @@ pub(super) fn push(
 
 /// The form with the least right to its name.
 fn next(choice: &CauseChoice, judged: &JudgedSet, slopes: &ShapeSlopes) -> Option<NotNamed> {
-    let (all, set) = (&choice.problem.all, &judged.set);
+    let set = &judged.set;
     let sweep = choice.base.with(set);
     let solution = sweep.solution();
     let uncertain = slopes.beside(&sweep);
@@ -122,27 +121,11 @@ fn next(choice: &CauseChoice, judged: &JudgedSet, slopes: &ShapeSlopes) -> Optio
     };
     // The largest of its numbers in standard deviations, with its sign.
     let sure = |place: usize| {
-        if let Some(line) = number_of_line(choice, set, set[place], &solution, (&uncertain, slopes))
-        {
-            return line.value / line.sigma.max(f64::MIN_POSITIVE);
-        }
-        let columns: Vec<usize> = all.of(set[place]).collect();
-        let covariance = uncertain.covariance(&columns);
-        let of = |(k, column): (usize, &usize)| {
-            let value = solution
-                .iter()
-                .find(|(pivot, _)| pivot == column)
-                .map_or(0.0, |(_, value)| *value);
-            value
-                / covariance[k * (columns.len() + 1)]
-                    .max(f64::MIN_POSITIVE)
-                    .sqrt()
-        };
-        columns
+        let numbers = fitted(choice, set, set[place], &solution, (&uncertain, slopes));
+        let over = numbers
             .iter()
-            .enumerate()
-            .map(of)
-            .max_by(|a, b| a.abs().total_cmp(&b.abs()))
+            .map(|number| number.value / number.sigma.max(f64::MIN_POSITIVE));
+        over.max_by(|a, b| a.abs().total_cmp(&b.abs()))
             .unwrap_or(0.0)
     };
     let wrong = |place: usize, sure: f64| choice.form(set[place]).cause.brakes && sure <= 0.0;
@@ -166,4 +149,70 @@ fn next(choice: &CauseChoice, judged: &JudgedSet, slopes: &ShapeSlopes) -> Optio
     }
     // What leans on friction that is none is none either.
     Some(NotNamed::Out(leaning.next().unwrap_or(place)))
+}
+
+/// Coefficients of a form with their standard deviations; of viscous and Coulomb friction where speed enters by another power than the first,
+/// the number of the straight line of both together.
+pub(super) fn fitted(
+    choice: &CauseChoice,
+    set: &[usize],
+    number: usize,
+    solution: &[(usize, f64)],
+    (uncertain, slopes): (&SweptColumns, &ShapeSlopes),
+) -> Vec<FittedNumber> {
+    if let Some(line) = number_of_line(choice, set, number, solution, (uncertain, slopes)) {
+        return vec![line];
+    }
+    let columns: Vec<usize> = choice.problem.all.of(number).collect();
+    let covariance = uncertain.covariance(&columns);
+    let of = |(place, column): (usize, &usize)| FittedNumber {
+        value: value_of(solution, *column),
+        sigma: covariance[place * (columns.len() + 1)].max(0.0).sqrt(),
+    };
+    columns.iter().enumerate().map(of).collect()
+}
+
+/// The number of viscous or Coulomb friction in a set that is of the line; none where speed enters by its first power.
+fn number_of_line(
+    choice: &CauseChoice,
+    set: &[usize],
+    number: usize,
+    solution: &[(usize, f64)],
+    (uncertain, slopes): (&SweptColumns, &ShapeSlopes),
+) -> Option<FittedNumber> {
+    let (all, form) = (&choice.problem.all, choice.form(number));
+    if !form.cause.brakes {
+        return None;
+    }
+    let is_power = |own: &TorqueForm| {
+        own.place == form.place && own.cause.name == VISCOUS && !own.shape_numbers().is_empty()
+    };
+    let power = *set.iter().find(|own| is_power(choice.form(**own)))?;
+    let exponent = choice.form(power).shape[0];
+    let fastest = largest(&choice.problem.scene.velocity[form.joint()]);
+    let (column, is_viscous) = (all.of(power).start, form.cause.name == VISCOUS);
+    let of = |exponent: f64| line_of_power(exponent, fastest)[usize::from(is_viscous)];
+    let mut along = vec![(column, of(exponent))];
+    if !is_viscous {
+        along.push((all.of(number).start, 1.0));
+    }
+    let shape = slopes
+        .0
+        .iter()
+        .find(|(known, _)| *known == ShapeNumber::Of(power, 0));
+    let line = along
+        .iter()
+        .map(|(column, share)| share * value_of(solution, *column))
+        .sum();
+    along.extend(shape.map(|(_, own)| (*own, value_of(solution, column) * slope(exponent, of))));
+    let columns: Vec<usize> = along.iter().map(|(column, _)| *column).collect();
+    let covariance = uncertain.covariance(&columns);
+    let pairs = (0..along.len()).flat_map(|a| (0..along.len()).map(move |b| (a, b)));
+    let variance: f64 = pairs
+        .map(|(a, b)| along[a].1 * along[b].1 * covariance[a * along.len() + b])
+        .sum();
+    Some(FittedNumber {
+        value: line,
+        sigma: variance.max(0.0).sqrt(),
+    })
 }

@@ -239,8 +239,8 @@ pub fn inertia_matrix(six: &[f64]) -> Matrix3<f64> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::arm::numbers;
     use super::super::arm::{Inertial, InertialTolerance};
-    use super::super::inertials::numbers;
     use super::*;
     use nalgebra::{Point3, Rotation3};
 

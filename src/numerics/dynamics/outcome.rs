@@ -1,21 +1,20 @@
 //! The answer to a diagnosis of torques, from what was solved.
 
-use super::bodies::with_bodies;
+use super::arm::{INERTIAL_NAMES, inertial_unit};
 use super::choice::CauseChoice;
-use super::errors::{errors, rests};
+use super::enforce::with_bodies;
 use super::findings::{contact, findings, plain_finding};
-use super::inertial_names::{INERTIAL_NAMES, inertial_unit};
 use super::model::TorqueModel;
 use super::newton_euler::INERTIAL_NUMBERS;
 use super::noise::{JointNoise, NoiseMemory};
 use super::problem::TorqueProblem;
+use super::scene::{ends, largest};
 use super::solve::SolvedTorques;
 use super::sweep::SweptColumns;
 use super::types::{
     EnforcedBodies, InertialBasis, InertialEstimate, TorqueCourses, TorqueDiagnosis, TorqueErrors,
     TorqueFinding, TorqueLeftover, TorqueNoise, TorqueParameter, TorqueQuestion,
 };
-use super::unseen::not_observable;
 use crate::diagnose::VerdictKind;
 use crate::effect::Place;
 use crate::error::counted;
@@ -223,7 +222,7 @@ fn withdrawn(choice: &CauseChoice, withdrawn: &[(usize, f64)]) -> Vec<String> {
             format!("falls by {gain:.1} only")
         };
         format!(
-            "{} at {}: held-out rows do not confirm it (with it their squared error over the noise {squares})",
+            "{} at {}: blocks of the fitted rows that are predicted by the others do not confirm it (with it their squared error over the noise {squares})",
             form.cause.name, form.place
         )
     };
@@ -314,4 +313,140 @@ fn inertials(
         }
     }
     estimates
+}
+
+// Differences of measured and predicted torque, moving and resting rows apart.
+
+/// Times the width of a sign below which a joint rests.
+const REST: f64 = 2.0;
+
+/// Whether a joint rests in a judged row.
+pub(super) fn rests(problem: &TorqueProblem, joint: usize, row: usize) -> bool {
+    problem.scene.velocity[joint][problem.reduction.rows[row]].abs()
+        < REST * problem.scene.width_at(joint)
+}
+
+/// Errors by a residual (`[joint][judged row]`, Nm) in some rows.
+pub(super) fn errors(
+    problem: &TorqueProblem,
+    residual: &[Vec<f64>],
+    rows: &[usize],
+) -> TorqueErrors {
+    let n = problem.joints();
+    let rms = |joint: usize, counts: &dyn Fn(usize) -> bool| {
+        let squares: Vec<f64> = rows
+            .iter()
+            .filter(|row| counts(**row))
+            .map(|row| residual[joint][*row].powi(2))
+            .collect();
+        (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
+    };
+    let all: Vec<f64> = (0..n)
+        .map(|joint| rms(joint, &|_| true).unwrap_or(0.0))
+        .collect();
+    let nrmse: Vec<f64> = (0..n)
+        .map(|joint| all[joint] / spread(problem, joint, rows))
+        .collect();
+    TorqueErrors {
+        nrmse_mean: nrmse.iter().sum::<f64>() / n as f64,
+        nrmse,
+        rms: all,
+        rms_moving: (0..n)
+            .map(|joint| rms(joint, &|row| !rests(problem, joint, row)))
+            .collect(),
+        rms_rest: (0..n)
+            .map(|joint| rms(joint, &|row| rests(problem, joint, row)))
+            .collect(),
+    }
+}
+
+/// Rms (Nm) of measured torque about its mean.
+fn spread(problem: &TorqueProblem, joint: usize, rows: &[usize]) -> f64 {
+    let torque = problem.torque_at(joint, problem.latency);
+    let count = rows.len().max(1) as f64;
+    let mean = rows.iter().map(|row| torque[*row]).sum::<f64>() / count;
+    (rows
+        .iter()
+        .map(|row| (torque[*row] - mean).powi(2))
+        .sum::<f64>()
+        / count)
+        .sqrt()
+        .max(f64::MIN_POSITIVE)
+}
+
+// What these data cannot show, a sentence each.
+
+/// rad over which a joint must move for its gravity to show.
+const SMALL_RANGE: f64 = 0.2;
+/// A coefficient whose standard deviation is above this share of the joint's largest torque is not seen.
+const UNSEEN: f64 = 0.5;
+
+/// Sentences on a set's problem.
+pub(super) fn not_observable(
+    choice: &CauseChoice,
+    set: &[usize],
+    sweep: &SweptColumns,
+) -> Vec<String> {
+    let scene = &choice.problem.scene;
+    let mut sentences = Vec::new();
+    if scene.declared.is_none() {
+        sentences.push(
+            "masses are identified, not declared: a wrong payload, link, torque constant or tilted base vanishes in them".into(),
+        );
+    }
+    for joint in 0..scene.joints() {
+        let [least, most] = ends(scene.position[joint].iter().copied());
+        let name = joint + 1;
+        if most - least < SMALL_RANGE {
+            sentences.push(format!(
+                "joint {name}: it moves over {:.3} rad only; an offset, a cable or spring and gravity are one there",
+                most - least
+            ));
+        }
+        let (slowest, fastest) = speeds(&scene.velocity[joint], scene.sign_width);
+        if fastest < 1.5 * slowest {
+            sentences.push(format!("joint {name}: it moves at one speed only; viscous and Coulomb friction are one there"));
+        }
+    }
+    for number in 0..choice.open {
+        let form = choice.form(number);
+        let found = set
+            .iter()
+            .any(|other| choice.form(*other).is_called_as(form));
+        if !found && form.width == 1 && form.cause.inertial && is_unseen(choice, sweep, number) {
+            sentences.push(format!(
+                "{} {}: these motions do not show it",
+                form.place,
+                form.cause.name.replace('_', " ")
+            ));
+        }
+    }
+    sentences
+}
+
+/// Speeds below and above which a tenth of the moving rows are.
+fn speeds(velocity: &[f64], width: f64) -> (f64, f64) {
+    let mut moving: Vec<f64> = velocity
+        .iter()
+        .map(|value| value.abs())
+        .filter(|speed| *speed > 2.0 * width)
+        .collect();
+    moving.sort_by(f64::total_cmp);
+    let at = |share: f64| crate::statistics::quantile(&moving, share).unwrap_or(0.0);
+    (at(0.1), at(0.9))
+}
+
+/// Whether a form as large as a good part of the joint's torque would not be noticed.
+fn is_unseen(choice: &CauseChoice, sweep: &SweptColumns, number: usize) -> bool {
+    let problem = choice.problem;
+    let column = &problem.all.columns[problem.all.of(number).start];
+    let size = largest(column.courses.iter().flatten());
+    let measured = column.joints.iter().map(|joint| &problem.measured[*joint]);
+    let torque = largest(measured.flatten());
+    let mut with = sweep.clone();
+    with.add(number);
+    let sigma = with.covariance(&[problem.all.of(number).start])[0]
+        .max(0.0)
+        .sqrt();
+    sigma == 0.0 || sigma * size > UNSEEN * torque
 }

@@ -3,17 +3,17 @@
 use super::arm::DynamicArm;
 use super::cause::{TorqueForm, friction_of};
 use super::clock::RecordingClock;
-use super::columns::{TorqueColumns, columns_of};
+use super::columns::TorqueColumns;
 use super::newton_euler::INERTIAL_NUMBERS;
 use super::noise::JointNoise;
 use super::recording::TorqueRecording;
+use super::reduce::ReducedRegressor;
 use super::reduce::Reduction;
-use super::regressor::{ReducedRegressor, TorqueColumn};
-use super::scene::{DynamicScene, column};
+use super::scene::{DynamicScene, column, ends};
+use super::sweep::value_of;
 use super::types::{ContactEvent, TorqueQuestion};
 use super::weighted::{Weighing, WeightedColumns};
 use crate::effect::Place;
-use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// s around an event whose rows do not count either.
@@ -39,8 +39,8 @@ pub(super) struct TorqueProblem<'a> {
     held_out: Vec<bool>,
     pub events: Vec<ContactEvent>,
     pub noise: Vec<JointNoise>,
-    /// Causes at their places that are none: only a number at an end of its search would explain the torques, or held-out rows did not
-    /// confirm them.
+    /// Causes at their places that are none: only a number at an end of its search would explain the torques, or cross-validation
+    /// did not confirm them.
     pub barred: Vec<TorqueForm>,
     /// Whether the width of a sign has changed since columns of forms outside a set were made.
     is_stale: bool,
@@ -68,6 +68,10 @@ impl<'a> TorqueProblem<'a> {
             || vec![0.0; 10 * recording.joints],
             |declared| declared.theta.clone(),
         );
+        let temperature = recording
+            .temperature
+            .as_ref()
+            .map(|all| ends(all.iter().copied()));
         let mut problem = Self {
             held_out: reduction
                 .rows
@@ -87,7 +91,7 @@ impl<'a> TorqueProblem<'a> {
             noise: Vec::new(),
             barred: Vec::new(),
             is_stale: false,
-            temperature: recording.temperature.as_deref().and_then(ends),
+            temperature: temperature.filter(|[least, most]| least <= most),
         };
         problem.shift(0.0);
         problem
@@ -96,7 +100,12 @@ impl<'a> TorqueProblem<'a> {
     /// Forms the columns.
     pub fn form(&mut self, without: &[String]) {
         let half_range = |joint: usize| {
-            let [least, most] = ends(&self.torque_at(joint, self.latency)).unwrap_or_default();
+            let course = self.torque_at(joint, self.latency);
+            let fitted = course
+                .iter()
+                .zip(&self.held_out)
+                .filter(|(_, held)| !**held);
+            let [least, most] = ends(fitted.map(|(torque, _)| *torque));
             0.5 * (most - least)
         };
         let torque = (0..self.joints()).map(half_range).collect();
@@ -129,11 +138,6 @@ impl<'a> TorqueProblem<'a> {
             self.all
                 .renew_signs(&listed, &self.scene, &self.reduction, &self.regressor);
         }
-    }
-
-    /// Columns of a form that is not taken.
-    pub fn columns_of(&self, form: &TorqueForm) -> Vec<TorqueColumn> {
-        columns_of(form, &self.scene, &self.reduction, &self.regressor)
     }
 
     /// Columns that change a link's inertial numbers, and by what: of the base, and of the forms of a set.
@@ -170,11 +174,10 @@ impl<'a> TorqueProblem<'a> {
         for link in 0..self.joints() {
             let own = &mut theta[INERTIAL_NUMBERS * link..INERTIAL_NUMBERS * (link + 1)];
             for (column, ten) in self.inertial_changes(set, link) {
-                if let Some((_, value)) = solution.iter().find(|(pivot, _)| *pivot == column) {
-                    own.iter_mut()
-                        .zip(ten)
-                        .for_each(|(sum, part)| *sum += value * part);
-                }
+                let value = value_of(solution, column);
+                own.iter_mut()
+                    .zip(ten)
+                    .for_each(|(sum, part)| *sum += value * part);
             }
         }
         theta
@@ -183,12 +186,10 @@ impl<'a> TorqueProblem<'a> {
     /// Makes columns of the rigid torque and of friction anew, from the inertial numbers and the solution of a fit with a set of forms.
     pub fn believe(&mut self, theta: &[f64], set: &[usize], solution: &[(usize, f64)]) {
         self.scene.believe(theta);
-        let values: BTreeMap<usize, f64> = solution.iter().copied().collect();
-        let of_form = |number: &usize| {
-            let value = |column| values.get(&column).copied().unwrap_or(0.0);
-            self.all.of(*number).map(value).collect::<Vec<f64>>()
-        };
-        let coefficients: Vec<Vec<f64>> = set.iter().map(of_form).collect();
+        let coefficients: Vec<Vec<f64>> = set
+            .iter()
+            .map(|number| self.coefficients(*number, solution))
+            .collect();
         let forms = set.iter().map(|number| &self.all.forms[*number]);
         let forms = forms.zip(coefficients.iter().map(Vec::as_slice));
         self.scene.friction = friction_of(forms, &self.scene);
@@ -201,6 +202,23 @@ impl<'a> TorqueProblem<'a> {
         }
         self.all
             .renew(&self.scene, &self.reduction, &self.regressor);
+    }
+
+    /// Coefficients of a form in a solution.
+    pub fn coefficients(&self, form: usize, solution: &[(usize, f64)]) -> Vec<f64> {
+        let columns = self.all.of(form);
+        columns.map(|column| value_of(solution, column)).collect()
+    }
+
+    /// Nm, rms of the torque of a form in a solution, over the joints that it acts on.
+    pub fn rms_of(&self, form: usize, solution: &[(usize, f64)]) -> f64 {
+        let mut torques = vec![vec![0.0; self.reduction.rows.len()]; self.joints()];
+        for column in self.all.of(form) {
+            self.all.columns[column].add(value_of(solution, column), &mut torques);
+        }
+        torques.retain(|course| course.iter().any(|value| *value != 0.0));
+        let square: f64 = torques.iter().flatten().map(|value| value * value).sum();
+        (square / torques.iter().map(Vec::len).sum::<usize>().max(1) as f64).sqrt()
     }
 
     /// Number of joints.
@@ -335,40 +353,14 @@ impl<'a> TorqueProblem<'a> {
         }
     }
 
-    /// Torques (`[joint][judged row]`) of coefficients.
-    pub fn predicted(&self, solution: &[(usize, f64)]) -> Vec<Vec<f64>> {
-        let mut torques = vec![vec![0.0; self.reduction.rows.len()]; self.joints()];
-        for (column, value) in solution {
-            let column = &self.all.columns[*column];
-            for (joint, course) in column.joints.iter().zip(&column.courses) {
-                torques[*joint]
-                    .iter_mut()
-                    .zip(course)
-                    .for_each(|(sum, part)| *sum += value * part);
-            }
-        }
-        torques
-    }
-
     /// What coefficients leave of the measured torque, Nm.
     pub fn residual(&self, solution: &[(usize, f64)]) -> Vec<Vec<f64>> {
         let mut left = self.measured.clone();
-        for (course, predicted) in left.iter_mut().zip(self.predicted(solution)) {
-            course
-                .iter_mut()
-                .zip(predicted)
-                .for_each(|(value, predicted)| *value -= predicted);
+        for (column, value) in solution {
+            self.all.columns[*column].add(-value, &mut left);
         }
         left
     }
-}
-
-/// Least and greatest; `None` where no value is known.
-fn ends(values: &[f64]) -> Option<[f64; 2]> {
-    let ends = |[least, greatest]: [f64; 2], value: &f64| [least.min(*value), greatest.max(*value)];
-    let known = values.iter().filter(|value| value.is_finite());
-    let found = known.fold([f64::INFINITY, f64::NEG_INFINITY], ends);
-    (found[0] <= found[1]).then_some(found)
 }
 
 /// A smooth course between its rows: cubic through the four nearest.

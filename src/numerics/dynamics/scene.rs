@@ -1,10 +1,10 @@
 //! The recording as causes see it: motion, rigid torque and clock at the recording's own rate, joint after joint.
 
+use super::arm::DeclaredInertials;
 use super::arm::DynamicArm;
 use super::clock::RecordingClock;
-use super::derivatives::derivatives;
 use super::filter::ZeroPhase;
-use super::inertials::DeclaredInertials;
+use super::filter::derivatives;
 use super::newton_euler::{InverseDynamics, MotionRow, turn};
 use super::recording::TorqueRecording;
 use nalgebra::{Matrix3, Vector3};
@@ -248,6 +248,21 @@ pub(super) fn split(motion: &[f64], n: usize) -> MotionRow<'_> {
         velocity: &motion[n..2 * n],
         acceleration: &motion[2 * n..],
     }
+}
+
+/// Least and greatest of what is known of some values; none are beyond each other.
+pub(super) fn ends(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
+    let known = values.into_iter().filter(|value| value.is_finite());
+    known.fold(
+        [f64::INFINITY, f64::NEG_INFINITY],
+        |[least, most], value| [least.min(value), most.max(value)],
+    )
+}
+
+/// The largest size of some values, 0 of none.
+pub(super) fn largest<'v>(values: impl IntoIterator<Item = &'v f64>) -> f64 {
+    let sizes = values.into_iter().map(|value| value.abs());
+    sizes.fold(0.0, f64::max)
 }
 
 /// One column of row-major values.

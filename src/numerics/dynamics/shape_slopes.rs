@@ -5,7 +5,7 @@
 
 use super::cause::TorqueForm;
 use super::problem::TorqueProblem;
-use super::regressor::TorqueColumn;
+use super::reduce::TorqueColumn;
 use super::scene::DynamicScene;
 use super::sweep::SweptColumns;
 use super::weighted::WeightedColumns;
@@ -33,29 +33,42 @@ impl ShapeSlopes {
         let solution = SweptColumns::base(&problem.all, weighted)
             .with(set)
             .solution();
-        let mut slopes = Vec::new();
-        for number in set {
-            for span in problem.all.forms[*number].shape_numbers() {
-                let size = problem.all.forms[*number].shape[span.index];
-                let slope = shape_slope(problem, *number, span.index, &solution);
-                slopes.push((ShapeNumber::Of(*number, span.index), slope, size));
-            }
+        let forms: Vec<TorqueForm> = set
+            .iter()
+            .map(|number| problem.all.forms[*number].clone())
+            .collect();
+        let values: Vec<Vec<f64>> = set
+            .iter()
+            .map(|number| problem.coefficients(*number, &solution))
+            .collect();
+        let values: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
+        let mut numbers: Vec<(ShapeNumber, f64)> = Vec::new();
+        for (number, form) in set.iter().zip(&forms) {
+            let spans = form.shape_numbers().into_iter();
+            numbers.extend(spans.map(|span| {
+                let of = ShapeNumber::Of(*number, span.index);
+                (of, form.shape[span.index])
+            }));
         }
-        let width = problem.scene.sign_width;
-        slopes.push((
-            ShapeNumber::SignWidth,
-            width_slope(problem, set, &solution),
-            width,
-        ));
+        numbers.push((ShapeNumber::SignWidth, problem.scene.sign_width));
+        let (mut joints, mut courses) = (vec![Vec::new(); numbers.len()], Vec::new());
+        for (number, joint, course) in planned_slopes(&forms, &values, &mut problem.scene, 0) {
+            joints[number].push(joint);
+            courses.push(course);
+        }
+        let mut courses = problem.reduction.reduce(courses).into_iter();
         let runs = problem.runs(false);
-        let mut numbers = Vec::new();
-        for (number, slope, size) in slopes {
+        let column = |((number, size), joints): ((ShapeNumber, f64), Vec<usize>)| {
+            let slope = TorqueColumn {
+                courses: courses.by_ref().take(joints.len()).collect(),
+                joints,
+            };
             weighted.push(&slope, problem.weighing(&runs));
             let column = problem.all.push_bare(slope);
             weighted.gram[column][column] += (BEFOREHAND * size).powi(-2);
-            numbers.push((number, column));
-        }
-        Self(numbers)
+            (number, column)
+        };
+        Self(numbers.into_iter().zip(joints).map(column).collect())
     }
 
     /// A fit that knows nothing of its shapes beforehand: for covariances.
@@ -75,102 +88,8 @@ impl ShapeSlopes {
     }
 }
 
-/// The slope by a shape number at its form's coefficients.
-fn shape_slope(
-    problem: &TorqueProblem,
-    number: usize,
-    index: usize,
-    solution: &[(usize, f64)],
-) -> TorqueColumn {
-    let form = &problem.all.forms[number];
-    let size = form.shape[index];
-    let [less, more] = [size * (1.0 - STEP), size * (1.0 + STEP)]
-        .map(|moved| problem.columns_of(&form.with_shape(index, moved)));
-    let mut slope = nothing(&less[0]);
-    add_difference(
-        &mut slope,
-        [&less, &more],
-        &values(problem, number, solution),
-        2.0 * STEP * size,
-    );
-    slope
-}
-
-/// The slope by the width of a sign, over all forms of a set.
-fn width_slope(
-    problem: &mut TorqueProblem,
-    set: &[usize],
-    solution: &[(usize, f64)],
-) -> TorqueColumn {
-    let (joints, width) = (problem.joints(), problem.scene.sign_width);
-    let rows = problem.reduction.rows.len();
-    let mut slope = TorqueColumn {
-        joints: (0..joints).collect(),
-        courses: vec![vec![0.0; rows]; joints],
-    };
-    for number in set {
-        let form = problem.all.forms[*number].clone();
-        let [less, more] = [1.0 - STEP, 1.0 + STEP].map(|share| {
-            problem.scene.sign_width = share * width;
-            problem.columns_of(&form)
-        });
-        add_difference(
-            &mut slope,
-            [&less, &more],
-            &values(problem, *number, solution),
-            2.0 * STEP * width,
-        );
-    }
-    problem.scene.sign_width = width;
-    slope
-}
-
-/// Coefficients of a form; of columns that are not seen, 0.
-fn values(problem: &TorqueProblem, number: usize, solution: &[(usize, f64)]) -> Vec<f64> {
-    let value = |column: usize| {
-        solution
-            .iter()
-            .find(|(pivot, _)| *pivot == column)
-            .map_or(0.0, |(_, value)| *value)
-    };
-    problem.all.of(number).map(value).collect()
-}
-
-fn nothing(like: &TorqueColumn) -> TorqueColumn {
-    TorqueColumn {
-        joints: like.joints.clone(),
-        courses: like
-            .courses
-            .iter()
-            .map(|course| vec![0.0; course.len()])
-            .collect(),
-    }
-}
-
-/// Adds the difference of columns, each by its coefficient, over a step.
-fn add_difference(
-    slope: &mut TorqueColumn,
-    [less, more]: [&[TorqueColumn]; 2],
-    values: &[f64],
-    step: f64,
-) {
-    for ((less, more), value) in less.iter().zip(more).zip(values) {
-        for (joint, (less, more)) in less
-            .joints
-            .iter()
-            .zip(less.courses.iter().zip(&more.courses))
-        {
-            let Some(place) = slope.joints.iter().position(|one| one == joint) else {
-                continue;
-            };
-            let own = slope.courses[place].iter_mut().zip(less.iter().zip(more));
-            own.for_each(|(sum, (less, more))| *sum += value * (more - less) / step);
-        }
-    }
-}
-
 /// Torque of forms at a joint as recorded per unit of each shape number they have, and of the width of a sign: `(number, joint, course)`,
-/// numbers in the order of [`ShapeSlopes`], counted from `first`.
+/// numbers in the order of [`ShapeSlopes`], counted from `first`, and in that order.
 pub(super) fn planned_slopes(
     forms: &[TorqueForm],
     coefficients: &[&[f64]],
@@ -198,10 +117,9 @@ pub(super) fn planned_slopes(
     let width = scene.sign_width;
     for joint in 0..scene.joints() {
         let acting = || {
-            forms
-                .iter()
-                .zip(coefficients)
-                .filter(|(form, _)| form.acts_on(scene.joints()).contains(&joint))
+            forms.iter().zip(coefficients).filter(|(form, _)| {
+                form.cause.of_sign && form.acts_on(scene.joints()).contains(&joint)
+            })
         };
         let own: Vec<_> = acting().collect();
         let [less, more] = [1.0 - STEP, 1.0 + STEP].map(|share| {

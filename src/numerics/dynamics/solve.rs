@@ -2,7 +2,7 @@
 
 use super::arm::DynamicArm;
 use super::cause::TorqueForm;
-use super::cells::{OtherInertials, faint, from_common, search, settle};
+use super::cells::{OtherInertials, faint, from_common, search, settle, settle_with_priors};
 use super::choice::CauseChoice;
 use super::clock::RecordingClock;
 use super::contact::{ContactModel, contacts};
@@ -11,11 +11,11 @@ use super::judge::judge;
 use super::latency::{Latency, latency};
 use super::naming::{JudgedSet, settle_names, take_out_ends};
 use super::noise::NoiseMemory;
-use super::polish::polish;
+use super::noise::{basic_forms, noise_apart, noise_beside, noise_left, rich_forms};
 use super::problem::TorqueProblem;
 use super::recording::TorqueRecording;
+use super::refine::polish;
 use super::refine::{one_power_of_speed, power_for_curve, refine};
-use super::rich::{basic_forms, noise_apart, noise_beside, noise_left, rich_forms};
 use super::shape_slopes::ShapeSlopes;
 use super::sign_width::sign_width;
 use super::sweep::SweptColumns;
@@ -24,7 +24,7 @@ use super::weighted::WeightedColumns;
 
 /// Rounds in which others are looked for in place of forms with a number at an end of its search, at most.
 const END_ROUNDS: usize = 3;
-/// Rounds in which causes that predict held-out rows worse are replaced, at most.
+/// Rounds in which causes that predict left-out rows worse are replaced, at most.
 const JUDGED_ROUNDS: usize = 6;
 /// s.
 const SAME_TIME: f64 = 0.1;
@@ -105,7 +105,8 @@ pub(super) fn solve<'a>(
     for _ in 0..JUDGED_ROUNDS {
         weighted = problem.weighted(&set);
         let choice = CauseChoice::new(&problem, &weighted);
-        let found = judge(&choice, settle(&choice, &set));
+        let (settled, priors) = settle_with_priors(&choice, &set);
+        let found = judge(&choice, settled, &priors);
         judged.set = found.set;
         if found.withdrawn.is_empty() {
             break;
@@ -118,12 +119,9 @@ pub(super) fn solve<'a>(
             .collect();
         problem.barred.extend(barred);
         judged.withdrawn.extend(found.withdrawn);
-        set = judged.set.clone();
-        if found.is_refuted {
-            // Something else was in its place.
-            set = again(&mut problem, &mut weighted, set);
-            polish(&mut problem, &mut weighted, &mut set);
-        }
+        // Something else may be in their place.
+        set = again(&mut problem, &mut weighted, judged.set.clone());
+        polish(&mut problem, &mut weighted, &mut set);
     }
     weighted = problem.weighted(&judged.set);
     judged.silent = CauseChoice::new(&problem, &weighted).other_friction(&judged.set);

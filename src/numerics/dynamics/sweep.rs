@@ -34,6 +34,12 @@ pub(super) struct SweptColumns<'a> {
     pub square: f64,
 }
 
+/// The coefficient of a column; 0 of one that is not seen.
+pub(super) fn value_of(solution: &[(usize, f64)], column: usize) -> f64 {
+    let known = solution.iter().find(|(pivot, _)| *pivot == column);
+    known.map_or(0.0, |(_, value)| *value)
+}
+
 impl<'a> SweptColumns<'a> {
     /// The base alone.
     pub fn base(all: &'a TorqueColumns, weighted: &'a WeightedColumns) -> Self {

@@ -6,8 +6,8 @@ use super::check;
 use super::clock::RecordingClock;
 use super::even::EvenSource;
 use super::recording::TorqueRecording;
-use super::source::TorqueSource;
-use super::survey::RecordingSurvey;
+use super::recording::TorqueSource;
+use super::thin::RecordingSurvey;
 use super::thin::{ThinnedRecording, ThinningPlan};
 use crate::error::Result;
 

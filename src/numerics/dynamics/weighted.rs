@@ -2,7 +2,7 @@
 
 use super::columns::TorqueColumns;
 use super::noise::JointNoise;
-use super::regressor::TorqueColumn;
+use super::reduce::TorqueColumn;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 use std::ops::Range;
@@ -77,9 +77,14 @@ impl WeightedColumns {
         chosen
             .iter()
             .for_each(|number| white[*number] = weighing.column(&columns.columns[*number]));
-        let measured = weighing.measured(measured);
+        Self::of_white(white, weighing.measured(measured), chosen)
+    }
+
+    /// The same of columns and torques that are whitened already.
+    pub fn of_white(columns: Vec<TorqueColumn>, measured: Vec<Vec<f64>>, chosen: &[usize]) -> Self {
+        let count = columns.len();
         let mut all = Self {
-            columns: white,
+            columns,
             square: measured.iter().flatten().map(|value| value * value).sum(),
             rows: measured.iter().map(Vec::len).max().unwrap_or(0),
             measured,
@@ -151,13 +156,7 @@ impl WeightedColumns {
     /// Takes what coefficients explain off the measured torque; inner products stay as they were.
     pub fn subtract(&mut self, solution: &[(usize, f64)]) {
         for (column, value) in solution {
-            let column = &self.columns[*column];
-            for (joint, course) in column.joints.iter().zip(&column.courses) {
-                self.measured[*joint]
-                    .iter_mut()
-                    .zip(course)
-                    .for_each(|(left, part)| *left -= value * part);
-            }
+            self.columns[*column].add(-value, &mut self.measured);
         }
     }
 

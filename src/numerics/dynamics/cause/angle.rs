@@ -5,7 +5,7 @@ use super::{
     size_of_two, span,
 };
 use crate::criteria::cells::MARGIN;
-use crate::dynamics::scene::DynamicScene;
+use crate::dynamics::scene::{self, DynamicScene};
 use std::f64::consts::PI;
 
 /// Its name.
@@ -17,8 +17,7 @@ const SPRING_BALANCE_NAME: &str = "spring_balance";
 
 /// Least and greatest angle of a joint, rad.
 pub(super) fn ends(scene: &DynamicScene, joint: usize) -> [f64; 2] {
-    let angles = scene.position[joint].iter();
-    angles.fold([f64::MAX, f64::MIN], |[a, b], q| [a.min(*q), b.max(*q)])
+    scene::ends(scene.position[joint].iter().copied())
 }
 
 /// s in which a sensor warms up.

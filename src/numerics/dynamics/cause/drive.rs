@@ -1,6 +1,7 @@
 //! Motors and drives.
 
 use super::{ColumnTorque, PLAIN, TorqueCause, TorqueForm, at_each_joint, span};
+use crate::dynamics::scene::largest;
 
 /// Its name.
 pub(crate) const ROTOR: &str = "rotor_inertia";
@@ -47,8 +48,7 @@ pub(super) static WRONG_CONSTANT: TorqueCause = TorqueCause {
         }
         let mut forms = at_each_joint(cause, scene, 1, &[&[]]);
         for joint in 0..scene.joints() {
-            let torques = scene.rigid[joint].iter();
-            let largest = torques.fold(1e-9, |most: f64, torque| most.max(torque.abs()));
+            let largest = largest(&scene.rigid[joint]).max(1e-9);
             forms.extend(HALVES.map(|half| {
                 TorqueForm::at_joint(cause, joint, 1).shaped(&[half * largest, largest])
             }));

@@ -4,7 +4,7 @@ use super::{
     ColumnTorque, FittedNumber, PLAIN, TorqueCause, TorqueForm, at_each_link, plain, shape,
     size_of_two,
 };
-use crate::dynamics::inertial_names::{INERTIAL_NAMES, inertial_unit};
+use crate::dynamics::arm::{INERTIAL_NAMES, inertial_unit};
 use crate::dynamics::newton_euler::INERTIAL_NUMBERS;
 use crate::dynamics::scene::GRAVITY;
 use crate::dynamics::types::TorqueParameter;

@@ -11,7 +11,7 @@ mod memory;
 mod shared_friction;
 mod unnamed_friction;
 
-use super::inertials::DeclaredInertials;
+use super::arm::DeclaredInertials;
 use super::newton_euler::INERTIAL_NUMBERS;
 use super::scene::DynamicScene;
 use super::types::TorqueParameter;
@@ -332,6 +332,16 @@ impl TorqueForm {
     /// Whether it is a curve of speed without a name, which viscous and Coulomb friction of its joint are parts of.
     pub fn is_nameless_curve(&self) -> bool {
         self.cause.name == UNKNOWN && self.cause.bends
+    }
+
+    /// Whether it is a torque over the angles of joints.
+    pub fn is_over_angles(&self) -> bool {
+        self.cause.of_angle || self.cause.alike_at_joints
+    }
+
+    /// Whether it is a gear that turns with two joints.
+    pub fn is_gear_of_two(&self) -> bool {
+        (self.cause.and_on)(self).is_some()
     }
 
     /// Whether a curve without a name and another curve of speed would be one sum at one joint.

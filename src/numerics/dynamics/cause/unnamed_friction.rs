@@ -3,6 +3,7 @@
 use super::angle::{UNKNOWN, ends};
 use super::friction::{COULOMB, VISCOUS};
 use super::{ColumnTorque, PLAIN, TorqueCause, TorqueForm, plain, shape};
+use crate::dynamics::scene::largest;
 use nalgebra::{Matrix2, Vector2};
 use std::f64::consts::PI;
 
@@ -31,8 +32,7 @@ pub(super) static BY_SPEED: TorqueCause = TorqueCause {
     lengths: &[1, 1 + 2 * WAVES],
     forms: |cause, scene| {
         let form = |joint: usize| {
-            let velocities = scene.velocity[joint].iter();
-            let fastest = velocities.fold(1e-6, |most: f64, velocity| most.max(velocity.abs()));
+            let fastest = largest(&scene.velocity[joint]).max(1e-6);
             let speeds = scene.velocity[joint].iter().map(|v| v.abs() / fastest);
             let speeds: Vec<f64> = speeds.filter(|speed| *speed > STILL).collect();
             let lines = (0..WAVES).flat_map(|column| line(&speeds, column));

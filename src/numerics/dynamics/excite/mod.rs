@@ -5,7 +5,8 @@ mod information;
 mod series;
 
 use super::arm::DynamicArm;
-use super::inertial_names::{inertial_name, inertial_unit};
+use super::arm::{inertial_name, inertial_unit};
+use super::scene::ends;
 use crate::error::{Error, Fault, Result};
 use crate::estimate::swarm::{Budget, ParticleSwarm, SearchBox, minimise};
 use information::{Information, base_of};
@@ -253,8 +254,8 @@ fn unseen(position: &[f64], n: usize, parameters: &[ExpectedSigma]) -> Vec<Strin
         "the payload apart from the last link: they are one body; two recordings, with and without it, show it".to_string(),
     ];
     for joint in 0..n {
-        let own = || position.iter().skip(joint).step_by(n).copied();
-        let range = own().fold(f64::NEG_INFINITY, f64::max) - own().fold(f64::INFINITY, f64::min);
+        let [least, most] = ends(position.iter().skip(joint).step_by(n).copied());
+        let range = most - least;
         if range < SMALL_RANGE {
             sentences.push(format!(
                 "joint {} moves over {range:.3} rad only: its gravity, an offset and a spring are one there",
