@@ -102,13 +102,19 @@ pub fn compare_runs(
     };
     let mut tables = Vec::new();
     for name in order {
-        let of = |outputs: &[(String, OutputRecord)]| {
+        let record = |outputs: &[(String, OutputRecord)]| {
             outputs
                 .iter()
                 .find(|(other, _)| other == name)
                 .map(|(_, output)| output.clone())
         };
-        tables.push(table(store, name, of(&outputs_a), of(&outputs_b), options)?);
+        tables.push(table(
+            store,
+            name,
+            record(&outputs_a),
+            record(&outputs_b),
+            options,
+        )?);
     }
     Ok(RunDiff {
         a: summary_of(&left),

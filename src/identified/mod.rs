@@ -470,7 +470,7 @@ impl IdentifiedModel {
             .clone()
             .map(|covariance| Uncertainty::new(arm, covariance, self.scatter));
         own.map(|own| match &self.data {
-            Some(data) => own.beside(arm, data),
+            Some(data) => own.with_recording(arm, data),
             None => own,
         })
     }

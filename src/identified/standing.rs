@@ -48,7 +48,7 @@ fn diagnosed(manifest: &Manifest, store: &Store) -> Result<Option<(Verdict, Find
 /// The step that stands for a run; none where nothing predicts, the last diagnosis speaks of an outside simulation, or the set-up is
 /// wrong. Fails where a table has left the store.
 pub fn standing_of(manifest: &Manifest, store: &Store) -> Result<Option<Standing>> {
-    let of = |stage: &StageReport, kind: &str| -> Option<TableRef> {
+    let output = |stage: &StageReport, kind: &str| -> Option<TableRef> {
         stage
             .outputs
             .iter()
@@ -58,13 +58,13 @@ pub fn standing_of(manifest: &Manifest, store: &Store) -> Result<Option<Standing
     let steps = manifest
         .stages
         .iter()
-        .filter_map(|stage| Some((stage, of(stage, Prediction::KIND)?)));
+        .filter_map(|stage| Some((stage, output(stage, Prediction::KIND)?)));
     let diagnosed = steps
         .clone()
         .rfind(|(stage, _)| stage.uses == Diagnose::NAME);
     if let Some(table) = diagnosed
         .as_ref()
-        .and_then(|(stage, _)| of(stage, Parameters::KIND))
+        .and_then(|(stage, _)| output(stage, Parameters::KIND))
         && Parameters::from_frame(&store.load(&table)?)?.corrected() == Corrected::OutsideSimulation
     {
         return Ok(None);
@@ -76,7 +76,7 @@ pub fn standing_of(manifest: &Manifest, store: &Store) -> Result<Option<Standing
         let unseen = Unseen::of_frame(&store.load(&prediction)?)?;
         Ok(Step {
             id: stage.id.clone(),
-            own: of(stage, Parameters::KIND).is_some(),
+            own: output(stage, Parameters::KIND).is_some(),
             unseen,
         })
     };

@@ -1,18 +1,17 @@
 //! What a person could measure to see what these data do not show, in words.
 
-use crate::estimate::{Fitted, Model, ParameterStatus, Remedy, remedies};
-use crate::robot::Measurements;
+use crate::estimate::{ParameterStatus, Remedy, Session, remedies};
 use crate::stage::Context;
 use std::collections::BTreeMap;
 
 /// Sentences for the remarks of redundant and unseen parameters, by name; the measurements that would show most are noted.
-pub fn advice(
-    context: &Context,
-    model: &Model,
-    data: &Measurements,
-    rows: &[usize],
-    fitted: &Fitted,
-) -> BTreeMap<String, String> {
+pub fn advice(context: &Context, session: &Session) -> BTreeMap<String, String> {
+    let Session {
+        data,
+        rows,
+        model,
+        fitted,
+    } = *session;
     let found = remedies(model, data, rows, fitted);
     let last = model.robot.joints();
     let mut counts: BTreeMap<&Remedy, usize> = BTreeMap::new();
@@ -36,7 +35,7 @@ pub fn advice(
             } else {
                 format!("{count} parameters")
             };
-            context.services.note(format!(
+            context.note(format!(
                 "{measure} would show {what} that these data do not"
             ));
         }

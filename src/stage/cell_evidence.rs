@@ -3,7 +3,7 @@
 
 use crate::diagnose::{CellAnswer, GivenCell, cell_evidence};
 use crate::effect::names;
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Place, Result};
 use crate::stage::{AskedRows, Context, Diagnose, DiagnoseReads, RawFile, Stage};
 use crate::table::{CellEvidence as CellEvidenceTable, CellEvidenceRow};
 use schemars::JsonSchema;
@@ -52,17 +52,14 @@ impl Stage for CellEvidence {
     type Reads = DiagnoseReads;
     type Writes = CellEvidenceWrites;
 
-    fn check(&self) -> Vec<Fault> {
-        let below = |fault: Fault| Fault::new(format!("diagnose.{}", fault.place), fault.message);
-        let mut faults: Vec<Fault> = self.diagnose.check().into_iter().map(below).collect();
-        let wrong = |given: &Given| !(given.size_mm > 0.0 && given.size_mm < 1e3);
-        if let Some(k) = self.given.iter().position(wrong) {
-            faults.push(Fault::new(
-                format!("given[{k}].size_mm"),
+    fn faults(&self, at: &mut Place) {
+        self.diagnose.faults(&mut at.at("diagnose"));
+        for (k, given) in self.given.iter().enumerate() {
+            at.at(format!("given[{k}].size_mm")).must(
+                given.size_mm > 0.0 && given.size_mm < 1e3,
                 "expected a length above 0 and below 1000 mm",
-            ));
+            );
         }
-        faults
     }
 
     fn files(&self) -> Vec<(String, RawFile)> {

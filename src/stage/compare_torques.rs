@@ -75,15 +75,16 @@ impl Stage for CompareTorques {
             &diagnosed(&later, &second, &second_events),
         )?;
         let strongest = found.changes.iter().filter(|change| change.rank.is_some());
-        let told: Vec<&TorqueChange> = strongest.collect();
-        told.iter()
-            .for_each(|change| context.services.note(sentence(change)));
-        if told.is_empty() {
-            context.services.note("nothing changed beyond noise".into());
+        let ranked: Vec<&TorqueChange> = strongest.collect();
+        ranked
+            .iter()
+            .for_each(|change| context.note(sentence(change)));
+        if ranked.is_empty() {
+            context.note("nothing changed beyond noise");
         }
         for (joint, [before, after]) in (1..).zip(&found.rms) {
             let joint: usize = joint;
-            context.services.note(format!(
+            context.note(format!(
                 "joint {joint}: {before:.3} Nm rms are left where nothing changed, {after:.3} Nm with the changes"
             ));
         }
@@ -92,7 +93,7 @@ impl Stage for CompareTorques {
             .iter()
             .filter(|change| change.rank.is_none())
             .count();
-        context.services.note(format!(
+        context.note(format!(
             "{} held to be unchanged",
             counted(unchanged, "number")
         ));

@@ -29,8 +29,8 @@ pub(super) fn copied_rows(recording: &Recording) -> Vec<(usize, usize)> {
             std::collections::btree_map::Entry::Occupied(earlier) => {
                 copies.push((*earlier.get(), row))
             }
-            std::collections::btree_map::Entry::Vacant(own) => {
-                own.insert(row);
+            std::collections::btree_map::Entry::Vacant(place) => {
+                place.insert(row);
             }
         }
     }

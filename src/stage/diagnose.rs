@@ -6,14 +6,14 @@ pub(super) use asked_rows::AskedRows;
 
 use crate::diagnose::{Diagnosis, KnownCell, Question, VerdictKind, diagnose, wrong_setup};
 use crate::effect::{CAUSES, names};
-use crate::error::{Error, Fault, Result, instead};
-use crate::estimate::Suspect;
+use crate::error::{Error, Place, Result, instead};
+use crate::estimate::Session;
 use crate::robot::Measurements;
 use crate::stage::blank_payload::blank_payload;
-use crate::stage::brought;
+use crate::stage::contact;
+use crate::stage::declared_effects::declared_effects;
 use crate::stage::doubtful::{self, KnownModel};
 use crate::stage::misplaced_tool::misplaced_tool;
-use crate::stage::own_effects::own_effects;
 use crate::stage::rounded::rounded_logs;
 use crate::stage::weightless::{WeightlessLinks, weightless_links};
 use crate::stage::{Context, RawFile, Stage};
@@ -135,62 +135,40 @@ impl Stage for Diagnose {
     type Reads = DiagnoseReads;
     type Writes = DiagnoseWrites;
 
-    fn check(&self) -> Vec<Fault> {
-        let mut faults: Vec<Fault> = crate::stage::no_set(&self.on, "fit").into_iter().collect();
-        if !(0.0..=HEAVIEST).contains(&self.prior_weight) {
-            faults.push(Fault::new(
-                "prior_weight",
-                format!("expected a number from 0 to {HEAVIEST}"),
-            ));
-        }
-        if !(MOST_CLOSED..=MOST_OPEN).contains(&self.open_world) {
-            faults.push(Fault::new(
-                "open_world",
-                format!("expected a probability from {MOST_CLOSED} to {MOST_OPEN}"),
-            ));
-        }
+    fn faults(&self, at: &mut Place) {
+        crate::stage::must_name_sets(&self.on, "fit", at);
+        at.at("prior_weight").must(
+            (0.0..=HEAVIEST).contains(&self.prior_weight),
+            format!("expected a number from 0 to {HEAVIEST}"),
+        );
+        at.at("open_world").must(
+            (MOST_CLOSED..=MOST_OPEN).contains(&self.open_world),
+            format!("expected a probability from {MOST_CLOSED} to {MOST_OPEN}"),
+        );
         for (k, prior) in self.prior.iter().enumerate() {
             let sizes = [prior.size_mm, prior.size_mm + prior.spread_mm];
-            if !(0.0..=1.0).contains(&prior.share) {
-                faults.push(Fault::new(
-                    format!("prior[{k}].share"),
-                    "expected a share from 0 to 1",
-                ));
-            }
-            if !sizes.iter().all(|size| (1e-3..=30.0).contains(size)) || prior.spread_mm < 0.0 {
-                faults.push(Fault::new(
-                    format!("prior[{k}].size_mm"),
-                    "expected sizes from 0.001 to 30 mm and a spread_mm of 0 or more",
-                ));
-            }
+            let possible =
+                sizes.iter().all(|size| (1e-3..=30.0).contains(size)) && prior.spread_mm >= 0.0;
+            let mut at = at.at(format!("prior[{k}]"));
+            at.at("share").must(
+                (0.0..=1.0).contains(&prior.share),
+                "expected a share from 0 to 1",
+            );
+            at.at("size_mm").must(
+                possible,
+                "expected sizes from 0.001 to 30 mm and a spread_mm of 0 or more",
+            );
         }
-        let tried = || {
-            CAUSES
-                .iter()
-                .filter(|cause| !cause.is_nameless())
-                .map(|cause| cause.name())
-        };
-        for (k, name) in self
-            .without
-            .iter()
-            .enumerate()
-            .filter(|(_, name)| !tried().any(|other| other == name.as_str()))
-        {
-            let allowed: Vec<&str> = tried().collect();
-            faults.push(Fault::new(
-                format!("without[{k}]"),
+        let named = CAUSES.iter().filter(|cause| !cause.is_nameless());
+        let allowed: Vec<&str> = named.map(|cause| cause.name()).collect();
+        for (k, name) in self.without.iter().enumerate() {
+            let mut at = at.at(format!("without[{k}]"));
+            at.must(
+                allowed.contains(&name.as_str()),
                 format!("`{name}` is no cause{}", instead(name, &allowed)),
-            ));
+            );
+            at.must(name != names::BASE_FRAME, "`base_frame` places the robot before the instrument: without it nothing can be diagnosed");
         }
-        if let Some(k) = self
-            .without
-            .iter()
-            .position(|name| name == names::BASE_FRAME)
-        {
-            let message = "`base_frame` places the robot before the instrument: without it nothing can be diagnosed";
-            faults.push(Fault::new(format!("without[{k}]"), message));
-        }
-        faults
     }
 
     fn files(&self) -> Vec<(String, RawFile)> {
@@ -206,7 +184,7 @@ impl Stage for Diagnose {
         _reads: Option<DiagnoseReads>,
         context: &Context,
     ) -> Result<Option<DiagnoseWrites>> {
-        own_effects(&self.effects, context).map(|_| None)
+        declared_effects(&self.effects, context).map(|_| None)
     }
 
     fn sets_named(&self) -> Vec<(String, String)> {
@@ -229,14 +207,12 @@ impl Stage for Diagnose {
         let mut steps = 0;
         let tell = |line: String| {
             steps += 1;
-            context.services.note(line.clone());
+            context.note(line.clone());
             context.services.advance(steps, &line);
         };
         let diagnosis = wrong_setup(&question).unwrap_or_else(|| diagnose(&question, tell));
         let mut diagnosis = with_remarks(diagnosis, &question, context)?;
-        blank_payload(&reads.recording)
-            .into_iter()
-            .for_each(|line| context.services.warn(line));
+        context.warn_each(blank_payload(&reads.recording));
         if !matches!(
             diagnosis.verdict,
             VerdictKind::WrongSetup | VerdictKind::NotAsked
@@ -253,12 +229,6 @@ impl Stage for Diagnose {
             .folds
             .iter()
             .flat_map(|folds| kept.iter().zip(folds.random.iter().zip(&folds.blocks)));
-        let aside = diagnosis
-            .screening
-            .suspects
-            .iter()
-            .filter(|suspect| !suspect.used())
-            .map(|Suspect { row, .. }| *row);
         let unseen: Vec<usize> = (0..data.rows()).filter(|row| held_out[*row]).collect();
         let known = covariance.filter(|_| {
             corrected == Corrected::RobotFile && diagnosis.verdict != VerdictKind::WrongSetup
@@ -277,7 +247,7 @@ impl Stage for Diagnose {
             &held_out,
             covariance,
         )
-        .with_suspects(aside)
+        .with_suspects(diagnosis.screening.set_aside())
         .with_weights(&diagnosis.kept, &diagnosis.fitted)
         .with_folds(errors)
         .with_remarks(doubtful.remarks(data, &unseen));
@@ -302,7 +272,7 @@ impl Stage for Diagnose {
     }
 }
 
-/// What a diagnosed recording shows beside its findings: rounded logs and brought marks in the statement too, a tool out of place as a warning.
+/// What a diagnosed recording shows in addition to its findings: rounded logs and events at contacts in the statement too, a tool out of place as a warning.
 fn remark(
     diagnosis: &mut Diagnosis,
     data: &Measurements,
@@ -316,20 +286,18 @@ fn remark(
         .filter(|row| data.has_point(*row))
         .collect();
     let rounded = rounded_logs(&diagnosis.model, data, &points);
-    let events = brought::events(
-        &diagnosis.model,
-        &diagnosis.fitted,
+    let session = Session {
         data,
-        recording,
-        &diagnosis.kept,
-    );
+        rows: &diagnosis.kept,
+        model: &diagnosis.model,
+        fitted: &diagnosis.fitted,
+    };
+    let events = contact::events(&session, recording);
     for line in rounded.into_iter().chain(events) {
         diagnosis.statement.push_str(&format!("; {line}"));
-        context.services.warn(line);
+        context.warn(line);
     }
-    misplaced_tool(&diagnosis.model, &diagnosis.fitted)
-        .into_iter()
-        .for_each(|line| context.services.warn(line));
+    context.warn_each(misplaced_tool(&diagnosis.model, &diagnosis.fitted));
 }
 
 /// Tells a person at once what must not be read past: a wrong set-up, too few rows, and what cannot be known without masses.
@@ -339,11 +307,9 @@ fn with_remarks(
     context: &Context,
 ) -> Result<Diagnosis> {
     match diagnosis.verdict {
-        VerdictKind::NotAsked => context.services.warn(diagnosis.not_observable.join("; ")),
+        VerdictKind::NotAsked => context.warn(diagnosis.not_observable.join("; ")),
         VerdictKind::WrongSetup => match diagnosis.findings.first() {
-            Some(finding) => context
-                .services
-                .warn(format!("the set-up is wrong: {}", finding.statement)),
+            Some(finding) => context.warn(format!("the set-up is wrong: {}", finding.statement)),
             None => return Err(Error::data("table recording", diagnosis.statement)),
         },
         _ => {
@@ -351,7 +317,7 @@ fn with_remarks(
                 weightless_links(question.robot, question.data, question.fit)
             {
                 diagnosis.statement.push_str(&format!("; {missing}"));
-                context.services.warn(warning);
+                context.warn(warning);
             }
         }
     }

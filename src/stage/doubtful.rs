@@ -24,7 +24,7 @@ impl KnownModel<'_> {
         };
         let arm = IdentifiedArm::new(self.model.clone(), None);
         let uncertainty = Uncertainty::new(&arm, covariance.clone(), Scatter::default())
-            .beside(&arm, self.measured);
+            .with_recording(&arm, self.measured);
         for (row, doubt) in rows.iter().zip(doubts(&arm, &uncertainty, data, rows)) {
             out[*row] = doubt.map(|doubt| doubt.to_string());
         }

@@ -51,10 +51,10 @@ pub(crate) fn dynamic_arm(robot: &RobotDescription) -> Result<(DynamicArm, Vec<S
         }
     };
     let tolerance = match robot.inertias.tolerance {
-        Some(own) => InertialTolerance {
-            mass_relative: own.mass,
-            centre: own.centre,
-            inertia_relative: own.inertia,
+        Some(stated) => InertialTolerance {
+            mass_relative: stated.mass,
+            centre: stated.centre,
+            inertia_relative: stated.inertia,
         },
         None => {
             if links.is_some() {

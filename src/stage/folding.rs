@@ -1,7 +1,7 @@
 //! Cross-validation as the settings ask for it: in so many parts, or pose by pose.
 
 use super::Context;
-use crate::error::{Fault, counted};
+use crate::error::{Place, counted};
 use crate::estimate::{Folds, Session, cross_validate, fold_poses, leave_one_out};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{self, Deserializer, Unexpected, Visitor};
@@ -30,13 +30,14 @@ impl Default for FoldSetting {
 }
 
 impl FoldSetting {
-    pub(super) fn fault(self) -> Option<Fault> {
-        let Self::Parts(parts) = self else {
-            return None;
-        };
-        (parts == 1 || parts > MOST_PARTS).then(|| {
-            Fault::new("folds", format!("allowed: 0 for none, 2 to {MOST_PARTS}, or n to leave out one pose after the other"))
-        })
+    pub(super) fn faults(self, at: &mut Place) {
+        let possible = !matches!(self, Self::Parts(parts) if parts == 1 || parts > MOST_PARTS);
+        at.at("folds").must(
+            possible,
+            format!(
+                "allowed: 0 for none, 2 to {MOST_PARTS}, or n to leave out one pose after the other"
+            ),
+        );
     }
 
     /// The folds of a fit, or why there are none though they were asked for.
@@ -70,7 +71,7 @@ impl FoldSetting {
         match self.divide(whole, context.seed) {
             Ok(folds) => (folds, None),
             Err(why) => {
-                context.services.warn(format!("not cross-validated: {why}"));
+                context.warn(format!("not cross-validated: {why}"));
                 (None, Some(fold_poses(whole.data, whole.rows)))
             }
         }

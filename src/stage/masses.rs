@@ -51,9 +51,7 @@ impl Stage for Masses {
         let links = model.links(&arm, &masses);
         robot.inertias.links.resize(links.len(), None);
         for (index, (joint, link)) in robot.joints.iter_mut().zip(&links).enumerate() {
-            context
-                .services
-                .note(change_text(index, joint.mass, joint.centre, link));
+            context.note(change_text(index, joint.mass, joint.centre, link));
             joint.mass = Some(link.mass);
             joint.centre = Some(link.centre.into());
             if let Some(i) = &link.inertia {
@@ -68,17 +66,16 @@ impl Stage for Masses {
             }
         }
         let friction = reads.parameters.dry_friction(links.len());
-        context.services.note(friction_text(&friction));
+        context.note(friction_text(&friction));
         for (joint, friction) in robot.joints.iter_mut().zip(friction) {
             joint.coulomb = friction;
         }
         if !(0..links.len()).all(|link| model.is_whole(link)) {
-            context.services.note(
-                "base parameters alone were identified: masses stay as declared, centres are where gravity needs them; inertias stay as declared"
-                    .into(),
+            context.note(
+                "base parameters alone were identified: masses stay as declared, centres are where gravity needs them; inertias stay as declared",
             );
         }
-        context.services.note("what the tool carried beyond the declared payload is part of the last link from here on".into());
+        context.note("what the tool carried beyond the declared payload is part of the last link from here on");
         Ok(MassesWrites {
             robot: Robot::from_description(&robot),
         })
@@ -87,13 +84,13 @@ impl Stage for Masses {
 
 /// Friction of the joints.
 fn friction_text(friction: &[Option<f64>]) -> String {
-    let of = |friction: &Option<f64>| {
+    let shown = |friction: &Option<f64>| {
         friction.map_or_else(
             || "none found".into(),
             |friction| format!("{friction:.3} Nm"),
         )
     };
-    let all: Vec<String> = friction.iter().map(of).collect();
+    let all: Vec<String> = friction.iter().map(shown).collect();
     format!(
         "dry friction of joints 1 to {} by the torques: {}; below it approach decides on which side a joint rests",
         all.len(),

@@ -10,7 +10,7 @@ const CLEARLY: f64 = 5.0;
 
 /// What is said of the tool that has no name; none where the point is where the robot file has it.
 pub(super) fn misplaced_tool(model: &Model, fitted: &Fitted) -> Option<String> {
-    let of = |axis: &str| {
+    let estimate = |axis: &str| {
         let name = format!("{}{axis}", ToolOffset::prefix(""));
         let k = model
             .stack
@@ -22,8 +22,11 @@ pub(super) fn misplaced_tool(model: &Model, fitted: &Fitted) -> Option<String> {
             _ => None,
         }
     };
-    let axes = ["x", "y", "z"].map(|axis| (axis, of(axis)));
-    let known = || axes.iter().filter_map(|(axis, own)| Some((axis, (*own)?)));
+    let axes = ["x", "y", "z"].map(|axis| (axis, estimate(axis)));
+    let known = || {
+        axes.iter()
+            .filter_map(|(axis, estimate)| Some((axis, (*estimate)?)))
+    };
     let off = known()
         .map(|(_, (value, _))| value * value)
         .sum::<f64>()

@@ -2,13 +2,14 @@
 
 mod advice;
 mod blank_payload;
-mod brought;
 mod cell_evidence;
 mod compare;
 mod compare_torques;
 mod computed;
+mod contact;
 mod copied;
 mod curves;
+mod declared_effects;
 mod diagnose;
 mod diagnose_torques;
 mod doubtful;
@@ -23,7 +24,6 @@ mod masses;
 mod misplaced_tool;
 mod named_column;
 mod optimise;
-mod own_effects;
 mod parameter_set;
 mod registry;
 mod repeated;
@@ -69,7 +69,7 @@ pub use stored::{Chunks, InputTable, StoredTable};
 pub use transfer::{Transfer, TransferReads};
 pub use validate::{Validate, ValidateReads};
 
-use crate::error::{Fault, Result};
+use crate::error::{Fault, Place, Result};
 use crate::raw::InputSource;
 use crate::table::{Frame, Table};
 use schemars::JsonSchema;
@@ -328,6 +328,21 @@ pub struct Context<'a> {
     pub services: &'a dyn Services,
 }
 
+impl Context<'_> {
+    /// As [`Services::note`].
+    pub fn note(&self, line: impl Into<String>) {
+        self.services.note(line.into());
+    }
+    /// As [`Services::warn`].
+    pub fn warn(&self, line: impl Into<String>) {
+        self.services.warn(line.into());
+    }
+    /// The same of every line.
+    pub fn warn_each(&self, lines: impl IntoIterator<Item = String>) {
+        lines.into_iter().for_each(|line| self.services.warn(line));
+    }
+}
+
 /// A step of a pipeline: settings (`with:`), typed ports and a body. The settings are the type itself.
 pub trait Stage: DeserializeOwned + Serialize + JsonSchema + Send + Sync + 'static {
     /// In `uses:` of the YAML.
@@ -340,9 +355,11 @@ pub trait Stage: DeserializeOwned + Serialize + JsonSchema + Send + Sync + 'stat
     type Reads: Reads;
     /// Tables that it gives.
     type Writes: Writes;
-    /// Faults of the settings that types cannot express, each with its path below `with`.
+    /// Finds faults of the settings that types cannot express, each at its place below `with`.
+    fn faults(&self, _at: &mut Place) {}
+    /// All of them.
     fn check(&self) -> Vec<Fault> {
-        Vec::new()
+        Place::faults(|at| self.faults(at))
     }
     /// The input files among the settings, each with its path below `with`.
     fn files(&self) -> Vec<(String, RawFile)> {
@@ -369,10 +386,12 @@ pub trait Stage: DeserializeOwned + Serialize + JsonSchema + Send + Sync + 'stat
     fn run(&self, reads: Self::Reads, context: &Context) -> Result<Self::Writes>;
 }
 
-/// The fault of a setting `on` that names no set; `example` is one.
-fn no_set(sets: &[String], example: &str) -> Option<Fault> {
-    sets.is_empty()
-        .then(|| Fault::new("on", format!("expected at least one set, e.g. [{example}]")))
+/// A setting `on` names a set; `example` is one.
+fn must_name_sets(sets: &[String], example: &str, at: &mut Place) {
+    at.at("on").must(
+        !sets.is_empty(),
+        format!("expected at least one set, e.g. [{example}]"),
+    );
 }
 
 /// The sets of a setting `on`, as [`Stage::sets_named`].

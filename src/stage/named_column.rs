@@ -1,6 +1,6 @@
 //! Columns of a recording that name what rows measured, or what with.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, listed};
 use crate::table::Recording;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -40,22 +40,17 @@ impl NamedColumn {
             recording.names.get(self.name())
         };
         let column = column.ok_or_else(|| {
-            let there: Vec<&str> = recording
+            let there = recording
                 .names
                 .keys()
                 .copied()
-                .chain(recording.target.as_ref().map(|_| "target"))
-                .collect();
-            let there = if there.is_empty() {
-                "none".to_string()
-            } else {
-                there.join(", ")
-            };
+                .chain(recording.target.as_ref().map(|_| "target"));
             Error::data(
                 format!("with.{place}"),
                 format!(
-                    "the recording has no names of `{}`; it has: {there}",
-                    self.name()
+                    "the recording has no names of `{}`; it has: {}",
+                    self.name(),
+                    listed(there)
                 ),
             )
         })?;

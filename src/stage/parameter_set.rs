@@ -4,7 +4,7 @@
 //! setting match a parameter the longest counts.
 
 use crate::effect::{identified, names};
-use crate::error::{Fault, nearest};
+use crate::error::{Place, did_you_mean};
 use crate::estimate::{Bounds, Known, Model, Prior};
 use crate::stage::Context;
 use schemars::JsonSchema;
@@ -48,52 +48,41 @@ impl ParameterSet<'_> {
     }
 
     /// What is wrong with the settings whatever the robot.
-    pub fn faults(&self) -> Vec<Fault> {
+    pub fn faults(&self, at: &mut Place) {
         let names: Vec<&str> = identified().map(|cause| cause.name()).collect();
-        let mut faults = Vec::new();
         for (setting, pattern) in self.patterns() {
             let effect = pattern.split('.').next().unwrap_or_default();
-            let base = matches!(setting, "prior" | "bounds") && effect == names::BASE_FRAME;
-            if base {
+            if matches!(setting, "prior" | "bounds") && effect == names::BASE_FRAME {
                 let message = "where the robot stands in the tracker's frame is found by alignment: only `free` and `hold` apply";
-                faults.push(Fault::new(format!("{setting}.{pattern}"), message));
+                at.at(format!("{setting}.{pattern}")).fault(message);
             } else if !names.iter().any(|name| matches(effect, name)) {
-                let near = nearest(effect, names.iter().copied())
-                    .map(|near| format!("did you mean `{near}`? "));
-                faults.push(Fault::new(
-                    setting,
-                    format!(
-                        "`{pattern}` names no effect; {}allowed are names as in the table parameters, e.g. reduction_ratio.j2, \
-                         link_geometry.l3.x, or with `*` for anything; effects: {}",
-                        near.unwrap_or_default(),
-                        names.join(", ")
-                    ),
+                at.at(setting).fault(format!(
+                    "`{pattern}` names no effect{}; allowed are names as in the table parameters, e.g. reduction_ratio.j2, \
+                     link_geometry.l3.x, or with `*` for anything; effects: {}",
+                    did_you_mean(effect, names.iter().copied()),
+                    names.join(", ")
                 ));
             }
         }
-        if self.free.is_some_and(<[String]>::is_empty) {
-            faults.push(Fault::new(
-                "free",
-                "name at least one parameter, or leave it out: then all are free that are not held",
-            ));
-        }
-        for (pattern, prior) in self.prior {
-            if !(prior.sigma > 0.0 && prior.sigma.is_finite() && prior.mean.is_finite()) {
-                faults.push(Fault::new(
-                    format!("prior.{pattern}"),
-                    "expected a sigma above zero, e.g. {sigma: 0.1, mean: 0}",
-                ));
-            }
+        let none = self.free.is_some_and(<[String]>::is_empty);
+        at.at("free").must(
+            !none,
+            "name at least one parameter, or leave it out: then all are free that are not held",
+        );
+        for (pattern, PriorSetting { sigma, mean }) in self.prior {
+            let possible = *sigma > 0.0 && sigma.is_finite() && mean.is_finite();
+            at.at(format!("prior.{pattern}")).must(
+                possible,
+                "expected a sigma above zero, e.g. {sigma: 0.1, mean: 0}",
+            );
         }
         for (pattern, [low, high]) in self.bounds {
-            if !(low < high && low.is_finite() && high.is_finite()) {
-                faults.push(Fault::new(
-                    format!("bounds.{pattern}"),
-                    "expected two numbers, the lower one first, e.g. [-0.5, 0.5]",
-                ));
-            }
+            let possible = low < high && low.is_finite() && high.is_finite();
+            at.at(format!("bounds.{pattern}")).must(
+                possible,
+                "expected two numbers, the lower one first, e.g. [-0.5, 0.5]",
+            );
         }
-        faults
     }
 
     /// Sorts the parameters that this stage may estimate (`open`, positions in the stack) into (candidates, held), and tells the
@@ -110,11 +99,9 @@ impl ParameterSet<'_> {
             .patterns()
             .filter(|(_, pattern)| !names.iter().any(|name| matches(pattern, name)))
         {
-            let near = nearest(pattern, names.iter().copied())
-                .map(|near| format!("; did you mean `{near}`?"));
-            context.services.warn(format!(
-                "{setting}: `{pattern}` matches no parameter of this model{}",
-                near.unwrap_or_default()
+            let hint = did_you_mean(pattern, names.iter().copied());
+            context.warn(format!(
+                "{setting}: `{pattern}` matches no parameter of this model{hint}"
             ));
         }
         let any =

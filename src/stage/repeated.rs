@@ -1,6 +1,6 @@
 //! What identifications make of poses measured more than once: weights by the joints' repeatability, and words for the person.
 
-use crate::error::{Fault, counted};
+use crate::error::{Place, counted};
 use crate::estimate::{Model, Poses, Repeated, spread};
 use crate::robot::{Measurements, NoiseBasis};
 use crate::stage::Context;
@@ -24,15 +24,12 @@ pub enum Repeatability {
 const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
 
 impl Repeatability {
-    /// What is wrong with the figure, if anything.
-    pub fn fault(&self) -> Option<Fault> {
-        let wrong = matches!(self, Self::Arcsec(sigma) if !(*sigma > 0.0 && sigma.is_finite()));
-        wrong.then(|| {
-            Fault::new(
-                "repeatability",
-                "expected `measured`, `ignored`, or a figure above zero, e.g. {arcsec: 3}",
-            )
-        })
+    pub fn faults(&self, at: &mut Place) {
+        let possible = !matches!(self, Self::Arcsec(sigma) if !(*sigma > 0.0 && sigma.is_finite()));
+        at.at("repeatability").must(
+            possible,
+            "expected `measured`, `ignored`, or a figure above zero, e.g. {arcsec: 3}",
+        );
     }
 
     /// Gives every row the covariance that the joints make of it; the standard deviation of a joint (rad), where one is known.
@@ -48,9 +45,7 @@ impl Repeatability {
             Self::Arcsec(sigma) => Some(sigma * ARCSEC),
             Self::Measured => Poses::of(data, rows).joint_repeatability(model, data).inspect(|sigma| {
                 let arcsec = sigma / ARCSEC;
-                context
-                    .services
-                    .note(format!("joints return to a pose to {arcsec:.1} arcsec each (one sigma): rows are weighted by it"));
+                context.note(format!("joints return to a pose to {arcsec:.1} arcsec each (one sigma): rows are weighted by it"));
             }),
         };
         data.spread = sigma.map(|sigma| spread(model, data, sigma));
@@ -95,5 +90,5 @@ pub fn note(context: &Context, repeated: &Repeated) {
             )
         };
     }
-    context.services.note(line);
+    context.note(line);
 }

@@ -1,7 +1,7 @@
 //! `report`: everything the earlier stages found, as one HTML file that a person reads, prints and files.
 
 use crate::effect::Load;
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, Place, Result};
 use crate::report::{AcceptanceLimits, PageLanguage, ReportOptions, Tables, pages};
 use crate::robot::RobotModel;
 use crate::stage::{Context, Labelled, Stage, curves, reads, writes};
@@ -133,7 +133,7 @@ impl Stage for Report {
         stands
             .iter()
             .flat_map(Standing::warnings)
-            .for_each(|warning| context.services.warn(warning));
+            .for_each(|warning| context.warn(warning));
         let counting = counting(&reads)?;
         let mut standing = stands
             .as_ref()
@@ -213,18 +213,17 @@ impl Stage for Report {
         })
     }
 
-    fn check(&self) -> Vec<Fault> {
-        let limits = [
-            ("mean_mm", self.limits.mean_mm),
-            ("p95_mm", self.limits.p95_mm),
-            ("max_mm", self.limits.max_mm),
-        ];
-        let wrong = limits
-            .into_iter()
-            .filter(|(_, limit)| limit.is_some_and(|limit| !(limit.is_finite() && limit > 0.0)));
-        wrong
-            .map(|(name, _)| Fault::new(format!("limits.{name}"), "expected a length above 0, mm"))
-            .collect()
+    fn faults(&self, at: &mut Place) {
+        let Accepted {
+            mean_mm,
+            p95_mm,
+            max_mm,
+        } = self.limits;
+        for (name, limit) in [("mean_mm", mean_mm), ("p95_mm", p95_mm), ("max_mm", max_mm)] {
+            let possible = limit.is_none_or(|limit| limit.is_finite() && limit > 0.0);
+            at.at(format!("limits.{name}"))
+                .must(possible, "expected a length above 0, mm");
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::text_file::text;
 use super::{Context, RawFile, Stage, reads, writes};
-use crate::error::{Fault, Result};
+use crate::error::{Place, Result};
 use crate::robot::import::{RobotFileText, read_calib, read_case};
 use crate::table::Robot;
 use schemars::JsonSchema;
@@ -55,13 +55,10 @@ impl Stage for ReadRobot {
     type Reads = RobotReads;
     type Writes = RobotWrites;
 
-    fn check(&self) -> Vec<Fault> {
-        match (self.format, &self.urdf) {
-            (RobotFormat::Case, Some(_)) => {
-                vec![Fault::new("urdf", "the format `case` takes no URDF")]
-            }
-            _ => Vec::new(),
-        }
+    fn faults(&self, at: &mut Place) {
+        let possible = self.format == RobotFormat::Calib || self.urdf.is_none();
+        at.at("urdf")
+            .must(possible, "the format `case` takes no URDF");
     }
 
     fn files(&self) -> Vec<(String, RawFile)> {
@@ -100,7 +97,7 @@ impl Stage for ReadRobot {
             }
         };
         for note in imported.notes {
-            context.services.warn(note);
+            context.warn(note);
         }
         Ok(RobotWrites {
             robot: Robot::from_description(&imported.robot),

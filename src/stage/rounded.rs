@@ -35,7 +35,7 @@ pub(super) fn rounded_logs(model: &Model, data: &Measurements, rows: &[usize]) -
         .iter()
         .map(|row| data.points.residual(*row, &predicted[*row]).norm()));
     let noise = rms(rows.iter().map(|row| data.noise(*row)));
-    let said = |rounding: Rounding| {
+    let sentence = |rounding: Rounding| {
         let Rounding { what, rms, most } = rounding;
         let matters = left > EXACT * rms && left < DROWNED * rms && noise < DROWNED * rms;
         matters.then(|| {
@@ -50,7 +50,7 @@ pub(super) fn rounded_logs(model: &Model, data: &Measurements, rows: &[usize]) -
     joints(model, data, rows)
         .into_iter()
         .chain(points(data, rows))
-        .filter_map(said)
+        .filter_map(sentence)
         .collect()
 }
 
@@ -84,13 +84,13 @@ fn of_joint(values: &[f64], revolute: bool) -> Option<(f64, Unit)> {
     } else {
         [Unit::Millimetre, Unit::Metre]
     };
-    let of = |unit: Unit| {
-        let own: Vec<f64> = values.iter().map(|value| unit.from_si(*value)).collect();
-        step(&own).map(|step| (step, unit))
+    let step_in = |unit: Unit| {
+        let values: Vec<f64> = values.iter().map(|value| unit.from_si(*value)).collect();
+        step(&values).map(|step| (step, unit))
     };
     units
         .into_iter()
-        .filter_map(of)
+        .filter_map(step_in)
         .max_by(|a, b| a.1.to_si(a.0).total_cmp(&b.1.to_si(b.0)))
 }
 
@@ -104,7 +104,7 @@ fn joints(model: &Model, data: &Measurements, rows: &[usize]) -> Option<Rounding
             continue;
         };
         let si = unit.to_si(step);
-        if coarsest.is_none_or(|(other, own)| si > own.to_si(other)) {
+        if coarsest.is_none_or(|(other, by)| si > by.to_si(other)) {
             coarsest = Some((step, unit));
         }
         let mut turned = data.clone();

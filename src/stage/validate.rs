@@ -120,44 +120,39 @@ impl Stage for Validate {
                     counted(row.suspects, "suspect"),
                     if row.suspects == 1 { "it" } else { "them" },
                 );
-                context.services.note(format!(
+                context.note(format!(
                     "{} on {}: the held-out mean of {:.3} mm includes {suspects}; without {them} {without:.3} mm",
                     row.step, row.set, row.mean_mm
                 ));
             }
             if let Some(line) = row.doubts() {
-                context
-                    .services
-                    .note(format!("{} on {}: {line}", row.step, row.set));
+                context.note(format!("{} on {}: {line}", row.step, row.set));
             }
         }
         for reference in &self.reference {
-            let mut beside = statistics
+            let mut matching = statistics
                 .0
                 .iter_mut()
                 .filter(|row| row.step == reference.step && row.set == reference.set)
                 .peekable();
-            if beside.peek().is_none() {
+            if matching.peek().is_none() {
                 let message = format!(
                     "reference: no statistics of step `{}` on set `{}`",
                     reference.step, reference.set
                 );
                 return Err(Error::spec(context.id, message));
             }
-            for row in beside {
+            for row in matching {
                 row.reference = Some(reference.label.clone());
                 row.reference_mean_mm = Some(reference.mean_mm);
                 row.reference_std_mm = reference.std_mm;
                 row.reference_max_mm = reference.max_mm;
             }
         }
-        suspicion
-            .into_iter()
-            .for_each(|line| context.services.warn(line));
+        context.warn_each(suspicion);
         if !statistics.0.iter().any(|row| row.held_out) {
-            context.services.warn(
-                "no held-out rows: only the training error can be stated, and it flatters".into(),
-            );
+            context
+                .warn("no held-out rows: only the training error can be stated, and it flatters");
         }
         Ok(ValidateWrites { statistics })
     }

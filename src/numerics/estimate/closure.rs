@@ -6,7 +6,7 @@
 use super::factor::TriangularFactor;
 use super::model::Model;
 use super::problem::Problem;
-use crate::observation::{MeasurementKind, kinds};
+use crate::observation::{contacts, kinds};
 use crate::robot::Measurements;
 
 /// Steps towards joints that close; each squares what is left of the error.
@@ -15,7 +15,7 @@ const STEPS: usize = 12;
 const CLOSED: f64 = 1e-14;
 
 impl Problem<'_> {
-    /// The data of all candidates from joints at which what was brought to a place lies there; none where nothing was.
+    /// The data of all candidates from joints at which all contacts close; none where there is none.
     pub fn shown(&self, model: &Model, candidates: &[usize]) -> Option<TriangularFactor> {
         let data = closed(model, self.data, self.rows)?;
         Some(
@@ -29,19 +29,15 @@ impl Problem<'_> {
     }
 }
 
-/// The measurements with joints that close in these rows; none where no row was brought to a place.
+/// The measurements with joints that close in these rows; none where no row is a contact.
 pub(super) fn closed(model: &Model, data: &Measurements, rows: &[usize]) -> Option<Measurements> {
-    let brought: Vec<&dyn MeasurementKind> = kinds(data)
-        .into_iter()
-        .filter(|kind| kind.is_contact())
-        .collect();
-    if brought.is_empty() {
+    if !kinds(data).iter().any(|kind| kind.is_contact()) {
         return None;
     }
     let mut out = data.clone();
     let mut scratch = model.stack.scratch(&model.robot);
     for row in rows {
-        for kind in brought.iter().filter(|kind| kind.axes(data, *row) > 0) {
+        for (kind, _) in contacts(data, *row) {
             for _ in 0..STEPS {
                 let mut placed = model.place(&out, *row, &mut scratch);
                 let error = kind

@@ -49,9 +49,10 @@ pub(crate) fn clustered(
                         jacobian.resize(height * p, 0.0);
                         term.derivatives(&mut placed, |parameter, derivative| {
                             if column[parameter] < p {
-                                let own =
+                                let entries =
                                     &mut jacobian[height * column[parameter]..][..derivative.len()];
-                                own.iter_mut()
+                                entries
+                                    .iter_mut()
                                     .zip(derivative)
                                     .for_each(|(sum, value)| *sum += value);
                             }
@@ -77,7 +78,7 @@ pub(crate) fn clustered(
         .iter()
         .enumerate()
         .filter_map(|(j, k)| model.known(*k).prior.map(|prior| (j, 1.0 / prior.sigma)));
-    let told = priors.map(|(j, weight)| {
+    let prior_lines = priors.map(|(j, weight)| {
         upwards(inverse, |k| {
             if k < j {
                 0.0
@@ -86,7 +87,7 @@ pub(crate) fn clustered(
             }
         })
     });
-    triangle(p, lines.into_iter().chain(told))
+    triangle(p, lines.into_iter().chain(prior_lines))
 }
 
 /// What one pose does to the parameters: R^-1 G' (1 - G G')^-1/2 e.

@@ -8,7 +8,7 @@ use faer::Mat;
 
 impl Model {
     /// Where a parameter stands that nothing estimates: its prior's mean or nominal, within its bounds.
-    pub(crate) fn rest(&self, parameter: usize) -> f64 {
+    pub(crate) fn prior_value(&self, parameter: usize) -> f64 {
         let known = self.known(parameter);
         self.within(parameter, known.prior.map_or(0.0, |prior| prior.mean))
     }

@@ -55,10 +55,10 @@ pub const CONFLICT: f64 = 3.0;
 impl PriorCheck {
     /// From the estimate and its variance with the prior: the prior's information taken off again.
     pub(crate) fn of(prior: Prior, estimate: f64, variance: f64) -> Self {
-        let (own, off) = (prior.sigma * prior.sigma, estimate - prior.mean);
-        let rest = own - variance;
+        let (prior_variance, off) = (prior.sigma * prior.sigma, estimate - prior.mean);
+        let gained = prior_variance - variance;
         // The data's share of the information is rest / own: smaller, it is rounding.
-        if rest <= 1e-6 * own {
+        if gained <= 1e-6 * prior_variance {
             return Self {
                 prior,
                 without: None,
@@ -66,13 +66,13 @@ impl PriorCheck {
             };
         }
         let without = (
-            prior.mean + off * own / rest,
-            (variance * own / rest).sqrt(),
+            prior.mean + off * prior_variance / gained,
+            (variance * prior_variance / gained).sqrt(),
         );
         Self {
             prior,
             without: Some(without),
-            conflict: off.abs() / rest.sqrt(),
+            conflict: off.abs() / gained.sqrt(),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! What no fitted row was brought to: a socket, plane or sphere of rows that were left out is placed by these rows themselves, and the
+//! Contacts that no fitted row has: a socket, plane or sphere of rows that were left out is placed by these rows themselves, and the
 //! arm by the others. How well they close together there is what a calibration is worth at a place that it has not seen.
 
 use super::error_scale::ErrorScale;
@@ -8,7 +8,7 @@ use super::model::Model;
 use super::problem::Problem;
 use super::session::Session;
 use crate::effect::names;
-use crate::observation::kinds;
+use crate::observation::contacts;
 use crate::robot::Measurements;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -20,16 +20,7 @@ fn unseen(
     others: &[usize],
 ) -> BTreeMap<usize, Vec<usize>> {
     let setup = model.robot.setup();
-    let brought: Vec<_> = kinds(data)
-        .into_iter()
-        .filter(|kind| kind.is_contact())
-        .collect();
-    let anchor = |row: &usize| {
-        let mut readings = brought.iter().filter_map(|kind| kind.reading(data, *row));
-        readings
-            .next()
-            .and_then(|reading| setup.anchor(reading.anchor))
-    };
+    let anchor = |row: &usize| setup.anchor(contacts(data, *row).next()?.1.anchor);
     let seen: BTreeSet<usize> = rows.iter().filter_map(anchor).collect();
     let mut unseen: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     for row in others {
@@ -46,11 +37,11 @@ fn parameters<'a>(model: &Model, anchors: impl Iterator<Item = &'a usize>) -> Ve
     let Some(first) = model.stack.parameters_of(names::ANCHOR).next() else {
         return Vec::new();
     };
-    let of = |number: &usize| {
+    let range = |number: &usize| {
         let begin = first + setup.first_of_anchor(*number);
         begin..begin + setup.anchors[*number].shape.parameters()
     };
-    anchors.flat_map(of).collect()
+    anchors.flat_map(range).collect()
 }
 
 /// The model of a fit to `rows` with every anchor that only other rows name placed by these, robustly; and by how much their errors are
@@ -78,16 +69,14 @@ fn placed_by(
     }
     let rows: BTreeSet<usize> = unseen.values().flatten().copied().collect();
     let rows: Vec<usize> = rows.into_iter().collect();
-    for (number, own) in unseen {
+    for (number, rows) in unseen {
         let axes = |row: &usize| {
-            kinds(data)
-                .iter()
-                .filter(|kind| kind.is_contact())
-                .map(|kind| kind.axes(data, *row))
+            contacts(data, *row)
+                .map(|(kind, _)| kind.axes(data, *row))
                 .sum::<usize>()
         };
         let (values, placed) = (
-            own.iter().map(axes).sum::<usize>(),
+            rows.iter().map(axes).sum::<usize>(),
             model.robot.setup().anchors[*number].shape.parameters(),
         );
         let by = if values > placed {
@@ -95,7 +84,7 @@ fn placed_by(
         } else {
             f64::NAN
         };
-        inflation.extend(own.iter().map(|row| (*row, by)));
+        inflation.extend(rows.iter().map(|row| (*row, by)));
     }
     // Lengths belong to the arm's fit: here the arm stands.
     let start = Model {

@@ -29,7 +29,7 @@ pub(crate) struct Evaluation {
     pub residuals: Vec<Residual>,
     /// Sum of Huber's losses, of the priors' and of known lengths', dimensionless.
     pub cost: f64,
-    /// Sum over what was brought to a place of the logarithm of the volume that joint noise is spread over, and its derivatives by the
+    /// Sum over contacts of the logarithm of the volume that joint noise is spread over, and its derivatives by the
     /// parameters.
     pub volume: f64,
     pub pull: Vec<f64>,

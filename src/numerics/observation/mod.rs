@@ -193,7 +193,7 @@ pub trait MeasurementKind: Sync {
         weight: Weight,
     ) -> Sensitivity;
 
-    /// In which directions the target was brought to something, where that is the measurement: nothing was read but the joints.
+    /// In which directions a contact holds the target, where that is the measurement: nothing was read but the joints.
     fn closing(&self, _data: &Measurements, _row: usize, _placed: &PlacedRow) -> Option<Closing> {
         None
     }
@@ -318,7 +318,7 @@ impl dyn MeasurementKind + '_ {
             .filter(move |column| column.part == part)
     }
 
-    /// Columns that say that a row measured it: its values or, of a kind that reads none, the name of what the target was brought to.
+    /// Columns that say that a row measured it: its values or, of a kind that reads none, the name of what holds the target.
     pub fn telling(&self) -> impl Iterator<Item = &'static DeclaredColumn> {
         let part = if self.is_contact() {
             Part::Anchor
@@ -331,7 +331,7 @@ impl dyn MeasurementKind + '_ {
             .filter(move |column| column.part == part)
     }
 
-    /// Whether the target is brought to something, and nothing is read but the joints.
+    /// Whether a contact holds the target, and nothing is read but the joints.
     pub fn is_contact(&self) -> bool {
         self.columns(Part::Value).next().is_none()
     }
@@ -382,8 +382,17 @@ pub fn kinds(data: &Measurements) -> Vec<&'static dyn MeasurementKind> {
         .collect()
 }
 
-/// Whether all that these rows measured is that the target was brought to places: nothing was read but the joints.
-pub fn only_brought(data: &Measurements, rows: &[usize]) -> bool {
+/// The contacts that hold the target in a row: their kinds, and what holds it.
+pub fn contacts(
+    data: &Measurements,
+    row: usize,
+) -> impl Iterator<Item = (&'static dyn MeasurementKind, Reading<'_>)> {
+    let kinds = KINDS.iter().filter(|kind| kind.is_contact());
+    kinds.filter_map(move |kind| Some((*kind, kind.reading(data, row)?)))
+}
+
+/// Whether contacts are all that these rows measured: nothing was read but the joints.
+pub fn only_contacts(data: &Measurements, rows: &[usize]) -> bool {
     let kinds = kinds(data);
     let is_contact = |row: &usize| {
         kinds

@@ -27,15 +27,15 @@ impl PointReadings {
 
     /// The readings of some rows, in their order.
     pub fn subset(&self, rows: &[usize]) -> Self {
-        let of = |all: &[Vector3<f64>]| {
+        let picked = |all: &[Vector3<f64>]| {
             rows.iter()
                 .filter_map(|row| all.get(*row))
                 .copied()
                 .collect()
         };
         Self {
-            position: of(&self.position),
-            sigma: of(&self.sigma),
+            position: picked(&self.position),
+            sigma: picked(&self.sigma),
         }
     }
 

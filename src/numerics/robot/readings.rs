@@ -14,7 +14,7 @@ pub struct Named {
 pub struct Readings {
     /// The kind's name.
     pub kind: &'static str,
-    /// Numbers of a row; none of kinds that say only what the target was brought to.
+    /// Numbers of a row; none of contacts.
     pub width: usize,
     /// Row-major; NaN where a row measured none.
     pub values: Vec<f64>,

@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::estimate::gauge;
 use crate::observation::values;
 use crate::robot::{Measurements, RobotModel};
-use crate::stage::own_effects::own_effects;
+use crate::stage::declared_effects::declared_effects;
 use crate::stage::unmoved::must_move;
 use crate::stage::{Context, screened};
 use crate::table::Corrected;
@@ -33,11 +33,11 @@ pub(in crate::stage) struct AskedRows {
 impl AskedRows {
     /// Of the tables of a stage with these settings; fails where they do not place the robot.
     pub fn of(settings: &Diagnose, reads: &DiagnoseReads, context: &Context) -> Result<Self> {
-        let own = own_effects(&settings.effects, context)?;
+        let own = declared_effects(&settings.effects, context)?;
         let asked = reads.split.rows(&reads.recording, &settings.on)?;
         let (data, corrected) = mismatch(reads, &asked, context)?;
         if data.sequence.is_some() {
-            context.services.warn(SORTED_OTHERWISE.into());
+            context.warn(SORTED_OTHERWISE);
         }
         let measured = |row: &usize| values(&data, *row) > 0;
         let fit: Vec<usize> = asked.iter().copied().filter(measured).collect();
@@ -105,11 +105,7 @@ fn mismatch(
     let message = "aligning simulation and recording needs three rows to fit with sim_x, sim_y, sim_z and a measured point";
     let data = against_simulation(&robot, &data, simulated, asked)
         .ok_or_else(|| Error::data("table recording", message))?;
-    context
-        .services
-        .note("the mismatch is measured minus simulated (sim_x, sim_y, sim_z)".into());
-    context
-        .services
-        .warn("parameters correct that simulation: they are not the robot file's".into());
+    context.note("the mismatch is measured minus simulated (sim_x, sim_y, sim_z)");
+    context.warn("parameters correct that simulation: they are not the robot file's");
     Ok((data, Corrected::OutsideSimulation))
 }

@@ -37,7 +37,7 @@ pub(super) fn corrected(
         rows[*row].held_out = false;
     }
     if fading + outside > 0 {
-        context.services.note(format!(
+        context.note(format!(
             "{} of {} rows lie outside the region (joints, payload) that the correction saw: it fades out on {fading} and is silent on {outside}",
             fading + outside,
             rows.len()

@@ -1,4 +1,4 @@
-//! The recording of a ball that is brought to fixtures, and the truth about these.
+//! The recording of a ball that fixtures hold, and the truth about these.
 
 use crate::description::{JointKind, RobotDescription};
 use crate::table::{Recording, TruthRow};
@@ -14,28 +14,29 @@ const KINDS: [(FixtureKind, &str, &str); 3] = [
     (FixtureKind::Sphere, "sphere", "sigma_sphere"),
 ];
 
-/// Joints with the names of what the ball was brought to.
+/// Joints with the names of what holds the ball.
 pub(super) fn recording(
     robot: &RobotDescription,
     fixtures: &[Fixture],
     touches: &[Touch],
 ) -> Recording {
-    let of = |touch: &Touch| &fixtures[touch.fixture];
+    let fixture_of = |touch: &Touch| &fixtures[touch.fixture];
     let (mut readings, mut names) = (BTreeMap::new(), BTreeMap::new());
     for (kind, setting, sigma) in KINDS
         .into_iter()
         .filter(|(kind, ..)| fixtures.iter().any(|fixture| fixture.kind == *kind))
     {
-        let own = |touch: &Touch| Some(of(touch)).filter(|fixture| fixture.kind == kind);
+        let touched =
+            |touch: &Touch| Some(fixture_of(touch)).filter(|fixture| fixture.kind == kind);
         names.insert(
             setting,
             touches
                 .iter()
-                .map(|touch| own(touch).map(|fixture| fixture.name.clone()))
+                .map(|touch| touched(touch).map(|fixture| fixture.name.clone()))
                 .collect(),
         );
         let noise = |touch: &Touch| {
-            own(touch).map_or(f64::NAN, |fixture| {
+            touched(touch).map_or(f64::NAN, |fixture| {
                 (1e-6 * fixture.sigma_um).max(LEAST_SIGMA)
             })
         };
@@ -44,7 +45,7 @@ pub(super) fn recording(
     let mut counts = vec![0; fixtures.len()];
     let mut name = |touch: &Touch| {
         counts[touch.fixture] += 1;
-        format!("{}-{:04}", of(touch).name, counts[touch.fixture])
+        format!("{}-{:04}", fixture_of(touch).name, counts[touch.fixture])
     };
     Recording {
         joints: robot.joints.len(),
@@ -57,7 +58,7 @@ pub(super) fn recording(
         point_id: touches.iter().map(&mut name).collect(),
         usage: touches
             .iter()
-            .map(|touch| Some(of(touch).usage.clone()))
+            .map(|touch| Some(fixture_of(touch).usage.clone()))
             .collect(),
         q: touches
             .iter()

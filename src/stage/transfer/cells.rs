@@ -28,20 +28,20 @@ impl VisitedCells {
             cells: BTreeSet::new(),
         };
         for row in rows {
-            let own = out.cell(data.q(*row));
+            let cell = out.cell(data.q(*row));
             out.cells
-                .extend(pairs(own.len()).map(|(a, b)| (a, b, own[a], own[b])));
+                .extend(pairs(cell.len()).map(|(a, b)| (a, b, cell[a], cell[b])));
         }
         out
     }
 
     /// Whether joints lie where rows lie.
     pub fn has(&self, q: &[f64]) -> bool {
-        let own = self.cell(q);
-        let beside = |cell: i64| cell - 1..=cell + 1;
-        pairs(own.len()).all(|(a, b)| {
-            beside(own[a])
-                .any(|one| beside(own[b]).any(|other| self.cells.contains(&(a, b, one, other))))
+        let cell = self.cell(q);
+        let near = |cell: i64| cell - 1..=cell + 1;
+        pairs(cell.len()).all(|(a, b)| {
+            near(cell[a])
+                .any(|one| near(cell[b]).any(|other| self.cells.contains(&(a, b, one, other))))
         })
     }
 

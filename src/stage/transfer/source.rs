@@ -18,11 +18,11 @@ pub(super) struct CarriedFrom<'a> {
 impl<'a> CarriedFrom<'a> {
     /// The recording of the carried model; none where the tables do not tell.
     pub fn of(reads: &'a TransferReads) -> Option<Self> {
-        let own = reads
+        let carried = reads
             .models
             .iter()
             .rfind(|model| model.table == reads.parameters)?;
-        Self::of_stage(reads, &own.stage)
+        Self::of_stage(reads, &carried.stage)
     }
 
     fn of_stage(reads: &'a TransferReads, stage: &str) -> Option<Self> {

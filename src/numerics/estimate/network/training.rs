@@ -423,8 +423,8 @@ fn draw(rng: &mut ChaCha8Rng, rows: usize, count: usize) -> (Vec<usize>, Vec<usi
         let j = rng.random_range(i..rows);
         order.swap(i, j);
     }
-    let mut rest = order.split_off(count);
+    let mut others = order.split_off(count);
     order.sort_unstable();
-    rest.sort_unstable();
-    (order, rest)
+    others.sort_unstable();
+    (order, others)
 }

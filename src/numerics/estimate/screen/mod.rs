@@ -62,6 +62,14 @@ pub struct Screening {
     pub apart: Option<i64>,
 }
 
+impl Screening {
+    /// Rows that were set aside, ascending.
+    pub fn set_aside(&self) -> impl Iterator<Item = usize> {
+        let aside = self.suspects.iter().filter(|suspect| !suspect.used());
+        aside.map(|suspect| suspect.row)
+    }
+}
+
 /// Fits as [`fit`] does, sets aside what no smooth model can follow among the rows to fit, and fits again until nothing changes.
 ///
 /// All rows of the recording are screened. `set[row]` numbers the set of a row: every set is measured by its own spread, since
@@ -238,7 +246,7 @@ fn screen(
         .filter(|row| standings[*row].distance > limit || held.contains(row))
         .collect();
     let mut named = kind::name(data, &standings, &flagged, limit, data.in_motion(kept));
-    named.extend(beside(data, &named));
+    named.extend(at_the_same_stops(data, &named));
     let crowded = crowded(data, &named, set);
     // What a free form does not follow is its own fault before it is a row's, but where the row is off by more than such forms move any.
     let free = if named.is_empty() {
@@ -365,7 +373,7 @@ fn bulk(standings: &[LeaveOneOut], rows: &[usize]) -> Vec<f64> {
 }
 
 /// The other targets of stops at which most are off without a reason of their own: it is the joints of the stop that are wrong.
-fn beside(data: &Measurements, named: &[ClassedRow]) -> Vec<ClassedRow> {
+fn at_the_same_stops(data: &Measurements, named: &[ClassedRow]) -> Vec<ClassedRow> {
     let off: Vec<usize> = named
         .iter()
         .filter(|(_, kind, _)| *kind == SuspectKind::Outlier)

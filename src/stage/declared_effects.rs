@@ -26,7 +26,7 @@ const VERSION: &str = "calib_effect";
 const LIST: &str = "effects";
 
 /// The declared effects of some files, in their order. Fails with every fault of all files.
-pub(super) fn own_effects(
+pub(super) fn declared_effects(
     files: &[RawFile],
     context: &Context,
 ) -> Result<Vec<&'static DeclaredCause>> {
@@ -52,11 +52,8 @@ pub(super) fn own_effects(
         }
         faults.extend(troubles.into_iter().map(|trouble| trouble.fault(&label)));
     }
-    if faults.is_empty() {
-        Ok(causes)
-    } else {
-        Err(Error::Spec(faults))
-    }
+    Error::if_spec(faults)?;
+    Ok(causes)
 }
 
 /// The effects of a text that are right, with their paths and places; what is wrong goes to `troubles`.
