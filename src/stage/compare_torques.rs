@@ -2,8 +2,8 @@
 
 use crate::dynamics::{ContactEvent, DiagnosedRecording, TorqueChange, TorqueModel, changes};
 use crate::error::{Error, Result, counted};
+use crate::stage::dynamic_arm::RecordedTorques;
 use crate::stage::dynamic_arm::dynamic_arm;
-use crate::stage::torque_signal::RecordedTorques;
 use crate::stage::{Chunks, Context, Stage, reads, writes};
 use crate::table::{ArmMotion, Contacts, Robot, TorqueChangeTable, TorqueParameters};
 use schemars::JsonSchema;

@@ -12,7 +12,6 @@
 //! sentence: "{place} is worn near {centre} rad, by {value}"
 //! ```
 
-use super::text_file::text;
 use super::{Context, RawFile};
 use crate::effect::{DeclaredCause, EffectDeclaration};
 use crate::error::{Error, Result};
@@ -33,7 +32,7 @@ pub(super) fn declared_effects(
     let (mut causes, mut faults) = (Vec::new(), Vec::new());
     let mut names: BTreeMap<String, String> = BTreeMap::new();
     for file in files {
-        let (label, content) = text(file, "effects declared in YAML", MOST_BYTES, context)?;
+        let (label, content) = context.text(file, "effects declared in YAML", MOST_BYTES)?;
         let mut troubles = Vec::new();
         for (path, node, cause) in read(&content, &mut troubles) {
             let name = cause.declaration().name.clone();

@@ -5,11 +5,13 @@ use crate::error::{Result, counted};
 use crate::estimate::{CONFLICT, Covariance, ParameterStatus, Session};
 use crate::observation::noise;
 use crate::robot::{Measurements, NoiseBasis, RobotModel};
-use crate::stage::advice::advice;
+use crate::stage::Context;
 use crate::stage::doubtful::KnownModel;
-use crate::stage::folding::FoldSetting;
+use crate::stage::doubtful::advice;
+use crate::stage::doubtful::suspicion;
 use crate::stage::screened::{self, FittedRows};
-use crate::stage::{Context, computed, repeated};
+use crate::stage::settings::FoldSetting;
+use crate::stage::settings::note_repeats;
 use crate::table::{
     CovarianceTable, Fit, FitContext, Observability, Parameters, Prediction, Recording, Split,
     Suspects,
@@ -55,7 +57,7 @@ macro_rules! identification {
             /// What is known of parameters beforehand, by name: `{link_geometry.*: {sigma: 0.1}}`, in the unit of the table
             /// `parameters`; of several patterns that match the longest counts.
             #[serde(default)]
-            pub prior: std::collections::BTreeMap<String, crate::stage::parameter_set::PriorSetting>,
+            pub prior: std::collections::BTreeMap<String, crate::stage::settings::PriorSetting>,
             /// Between which values parameters may change from nominal, by name: `{reduction_ratio.*: [-5e-4, 5e-4]}`, in the unit of
             /// the table `parameters`.
             #[serde(default)]
@@ -69,16 +71,16 @@ macro_rules! identification {
             /// How well joints come back to a pose: `measured` from poses that the recording returns to, `ignored`, or
             /// `{arcsec: 3}`.
             #[serde(default)]
-            pub repeatability: crate::stage::repeated::Repeatability,
+            pub repeatability: crate::stage::settings::Repeatability,
             /// Cross-validation: the fit is repeated without each of so many parts of its poses, drawn at random, and again without
             /// each contiguous stretch; 0 for none, `n` without each pose in turn.
             #[serde(default)]
-            pub folds: crate::stage::folding::FoldSetting,
+            pub folds: crate::stage::settings::FoldSetting,
         }
 
         impl $name {
-            fn parameter_set(&self) -> crate::stage::parameter_set::ParameterSet<'_> {
-                crate::stage::parameter_set::ParameterSet {
+            fn parameter_set(&self) -> crate::stage::settings::ParameterSet<'_> {
+                crate::stage::settings::ParameterSet {
                     free: self.free.as_deref(),
                     hold: &self.hold,
                     prior: &self.prior,
@@ -233,7 +235,7 @@ impl Identified {
         let of_model = known.then(|| covariance.of_model(model)).flatten();
         note(context, fitting);
         if let Some(repeated) = &fitted.repeated {
-            repeated::note(context, repeated);
+            note_repeats(context, repeated);
         }
         screened::note(context, screening, recording);
         let (folds, dropped) = fitting.folds.folds(&session, context);
@@ -275,7 +277,7 @@ impl Identified {
             .iter()
             .map(|row| &prediction.0[*row])
             .filter(|row| row.measured.is_none());
-        context.warn_each(computed::suspicion(
+        context.warn_each(suspicion(
             points.map(|row| [row.error_mm, row.noise_mm]),
             fitted.singular.len(),
         ));

@@ -15,9 +15,9 @@ use crate::spatial::Pose;
 use crate::stage::contact;
 use crate::stage::identified::{Fitting, Identified, LoadSetting, RowsToFit};
 use crate::stage::known_cell::{self, KnownCell, KnownDistance, KnownPoint, KnownSphere};
+use crate::stage::remarks::weightless_links;
+use crate::stage::remarks::{must_move, unmoved_remark};
 use crate::stage::screened::numbered;
-use crate::stage::unmoved::{self, must_move};
-use crate::stage::weightless::weightless_links;
 use crate::stage::{Context, Stage};
 use crate::table::{Recording, Robot, Split};
 use nalgebra::Vector3;
@@ -167,7 +167,7 @@ impl Identify {
         if !effects.any(|name| GEOMETRY[OF_THE_ARM].contains(&name.as_str())) {
             return;
         }
-        context.warn_each(unmoved::remark(robot, data, rows));
+        context.warn_each(unmoved_remark(robot, data, rows));
         let fit: Vec<usize> = rows
             .iter()
             .copied()

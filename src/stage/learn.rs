@@ -4,8 +4,7 @@
 //! else the table `network` stays empty and the prediction is what it was. The table `corrections` says how all of them did.
 //! Outside the region of its training rows a correction fades to zero.
 
-mod corrected;
-mod told;
+mod tables;
 
 use crate::error::{Error, Place, Result, counted};
 use crate::estimate::network::correction::features;
@@ -20,9 +19,9 @@ use crate::statistics::nearest;
 use crate::table::{
     Corrections, Network, Parameters, Prediction, PredictionRow, Recording, Robot, Split, Training,
 };
-use corrected::corrected;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use tables::{comparison_table, corrected, history, sentence};
 
 /// Fewest rows to learn from: fewer say nothing in cross-validation.
 const FEWEST: usize = 30;
@@ -374,13 +373,13 @@ impl Learn {
                 &format!("best {:.4}", generation.best),
             );
         });
-        let corrections = told::table(context.id, &contest, &comparison, learnt.is_some());
-        context.note(told::sentence(&comparison, learnt.is_some()));
+        let corrections = comparison_table(context.id, &contest, &comparison, learnt.is_some());
+        context.note(sentence(&comparison, learnt.is_some()));
         match learnt {
             Some((correction, course)) => (
                 Network::of(&correction, prismatic),
                 corrections,
-                told::history(context.id, course),
+                history(context.id, course),
             ),
             None => (Network::default(), corrections, Training::default()),
         }

@@ -2,14 +2,18 @@
 
 use crate::effect::Load;
 use crate::error::{Error, Fault, Place, Result};
-use crate::report::{AcceptanceLimits, PageLanguage, ReportOptions, Tables, pages};
+use crate::report::{
+    AcceptanceLimits, PageLanguage, ReportOptions, Tables, TorqueTables, pages, torque_page,
+};
 use crate::robot::RobotModel;
 use crate::stage::{Context, Labelled, Stage, curves, reads, writes};
 use crate::table::{
-    Acceptance, Cells, Corrections, Curves, Document, DocumentRow, FindingNumbers, Findings, Fit,
-    Forms, Frame, Intake, JointConventions, Observability, Parameters, Prediction, Recording,
-    Rejected, Rivals, Robot, Split, Standing, Statistics, Step, Suspects, Table, Training, Unseen,
-    Verdict, VerdictSentences, standing,
+    Acceptance, BodyConsistencies, Cells, Contacts, Corrections, Curves, Document, DocumentRow,
+    FindingNumbers, Findings, Fit, Forms, Frame, FrictionCurves, Inertials, Intake,
+    JointConventions, JointTorques, Observability, Parameters, Prediction, Recording, Rejected,
+    Rivals, Robot, Split, Standing, Statistics, Step, Suspects, Table, TorqueCourse,
+    TorqueFindings, TorqueNumbers, TorqueRivals, TorqueVerdict, Training, Unseen, Verdict,
+    VerdictSentences, standing,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -319,5 +323,88 @@ fn placed(error: Error, stage: &str) -> Error {
                 .collect(),
         ),
         other => other,
+    }
+}
+
+/// Writes `torques.html`.
+#[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ReportTorques {
+    /// Heading of the page; without it, the robot's name.
+    pub title: Option<String>,
+}
+
+reads! {
+    /// Input ports of `report_torques`.
+    pub struct ReportTorquesReads {
+        robot: Robot,
+        verdict: TorqueVerdict,
+        sentences: Vec<Labelled<VerdictSentences>>,
+        findings: TorqueFindings,
+        numbers: TorqueNumbers,
+        rivals: TorqueRivals,
+        joints: JointTorques,
+        course: TorqueCourse,
+        friction: FrictionCurves,
+        inertials: Inertials,
+        contacts: Contacts,
+        consistency: BodyConsistencies,
+    }
+}
+writes! {
+    /// Output ports of `report_torques`.
+    pub struct ReportTorquesWrites {
+        document: Document,
+    }
+}
+
+impl Stage for ReportTorques {
+    const NAME: &'static str = "report_torques";
+    const SUMMARY: &'static str =
+        "writes one self-contained HTML file: torques before and after, friction, what was found";
+    const IMPLEMENTATION: u32 = 5;
+    type Reads = ReportTorquesReads;
+    type Writes = ReportTorquesWrites;
+
+    fn run(&self, reads: ReportTorquesReads, _context: &Context) -> Result<ReportTorquesWrites> {
+        let hash = |name: &str, frame: crate::table::Frame| {
+            (name.to_string(), frame.table_hash().to_string())
+        };
+        let hashes = vec![
+            hash("robot", reads.robot.to_frame()?),
+            hash("findings", reads.findings.to_frame()?),
+            hash("course", reads.course.to_frame()?),
+        ];
+        let tables = TorqueTables {
+            robot: reads.robot,
+            verdict: reads.verdict,
+            // Other diagnoses of the pipeline have theirs: each is asked for by its step.
+            sentences: VerdictSentences(
+                reads
+                    .sentences
+                    .into_iter()
+                    .flat_map(|of| of.table.0)
+                    .collect(),
+            ),
+            findings: reads.findings,
+            numbers: reads.numbers,
+            rivals: reads.rivals,
+            joints: reads.joints,
+            course: reads.course,
+            friction: reads.friction,
+            inertials: reads.inertials,
+            contacts: reads.contacts,
+            consistency: reads.consistency,
+            hashes,
+        };
+        let content = torque_page(&tables, self.title.as_deref())?;
+        let html = DocumentRow {
+            name: "torques.html".into(),
+            media_type: "text/html".into(),
+            content,
+        };
+        Ok(ReportTorquesWrites {
+            document: Document(vec![html]),
+        })
     }
 }

@@ -1,6 +1,5 @@
 //! Stage `robot`: a robot file -> the `robot` table.
 
-use super::text_file::text;
 use super::{Context, RawFile, Stage, reads, writes};
 use crate::error::{Place, Result};
 use crate::robot::import::{RobotFileText, read_calib, read_case};
@@ -10,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 // Bytes; the largest URDF we know is 200 kB. A recording named here by mistake must not fill the memory.
 const MOST_BYTES: u64 = 16 << 20;
+const WHAT: &str = "a robot file";
 
 /// How the robot file is laid out.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -76,7 +76,7 @@ impl Stage for ReadRobot {
     }
 
     fn run(&self, _reads: RobotReads, context: &Context) -> Result<RobotWrites> {
-        let (label, text) = robot_text(&self.file, context)?;
+        let (label, text) = context.text(&self.file, WHAT, MOST_BYTES)?;
         let file = RobotFileText {
             label: &label,
             text: &text,
@@ -87,7 +87,7 @@ impl Stage for ReadRobot {
                 let urdf = self
                     .urdf
                     .as_ref()
-                    .map(|file| robot_text(file, context))
+                    .map(|file| context.text(file, WHAT, MOST_BYTES))
                     .transpose()?;
                 read_calib(
                     file,
@@ -103,8 +103,4 @@ impl Stage for ReadRobot {
             robot: Robot::from_description(&imported.robot),
         })
     }
-}
-
-fn robot_text(file: &RawFile, context: &Context) -> Result<(String, String)> {
-    text(file, "a robot file", MOST_BYTES, context)
 }

@@ -4,13 +4,10 @@
 //! that was seen in training is no test. Targets that are measured one after the other in a pose are never parted. Copies of a row under
 //! other ids go wherever they stand to the set of that row.
 
-mod stops;
-
 use crate::error::{Error, Place, Result, counted, listed};
-use crate::stage::copied::{self, copied_rows};
-use crate::stage::matches;
-use crate::stage::named_column::NamedColumn;
-use crate::stage::{Context, Stage, reads, writes};
+use crate::robot::pose_groups::{NEAR, SAME, near};
+use crate::stage::remarks::{copied_rows, copies_remark};
+use crate::stage::{Context, Stage, matches, reads, writes};
 use crate::table::{Recording, Split, SplitRow};
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
@@ -18,7 +15,7 @@ use rand::seq::SliceRandom;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
-use stops::{poses, stops};
+use std::ops::Range;
 
 /// How rows are dealt out to sets.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -221,7 +218,7 @@ impl Stage for SplitBy {
         copies
             .iter()
             .for_each(|(row, copy)| sets[*copy] = sets[*row].clone());
-        context.warn_each(copied::remark(&copies, recording));
+        context.warn_each(copies_remark(&copies, recording));
         let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
         for set in &sets {
             *counts.entry(set).or_default() += 1;
@@ -459,4 +456,93 @@ fn by_order(rows: usize, sets: &[Stretch]) -> Result<Vec<String>> {
         return Err(Error::data("with.sets", message));
     }
     Ok(dealt)
+}
+
+/// Rows one by one, or where targets are named, all that were measured one after the other in a pose.
+pub(super) fn stops(recording: &Recording) -> Vec<Range<usize>> {
+    let mut stops: Vec<Range<usize>> = Vec::new();
+    for row in 0..recording.rows() {
+        let joins = |stop: &Range<usize>| {
+            let Some(targets) = &recording.target else {
+                return false;
+            };
+            let new = stop.clone().all(|other| targets[other] != targets[row]);
+            new && near(recording.q(stop.start), recording.q(row), NEAR)
+        };
+        match stops.last_mut() {
+            Some(last) if joins(last) => last.end = row + 1,
+            _ => stops.push(row..row + 1),
+        }
+    }
+    stops
+}
+
+/// Stretches of neighbouring rows with the same joints, the targets of a pose together.
+pub(super) fn poses(recording: &Recording) -> Vec<Range<usize>> {
+    let mut poses: Vec<Range<usize>> = Vec::new();
+    for stop in stops(recording) {
+        let (named, joints) = (stop.len() > 1, recording.q(stop.start));
+        let limit = if named { NEAR } else { SAME };
+        match poses.last_mut() {
+            Some(last) if near(recording.q(last.start), joints, limit) => last.end = stop.end,
+            _ => poses.push(stop),
+        }
+    }
+    poses
+}
+
+/// A column of names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum NamedColumn {
+    /// What sockets the target lay in.
+    Socket,
+    /// Planes that it touched.
+    Plane,
+    /// Spheres that it touched.
+    Sphere,
+    /// Ends of distances.
+    Anchor,
+    /// Targets on the tool.
+    Target,
+}
+
+impl NamedColumn {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Socket => "socket",
+            Self::Plane => "plane",
+            Self::Sphere => "sphere",
+            Self::Anchor => "anchor",
+            Self::Target => "target",
+        }
+    }
+
+    /// The names of the rows; blank where a row has none. Fails where the recording has no such column.
+    pub(super) fn of<'a>(self, recording: &'a Recording, place: &str) -> Result<Vec<&'a str>> {
+        let column = if self == Self::Target {
+            recording.target.as_ref()
+        } else {
+            recording.names.get(self.name())
+        };
+        let column = column.ok_or_else(|| {
+            let there = recording
+                .names
+                .keys()
+                .copied()
+                .chain(recording.target.as_ref().map(|_| "target"));
+            Error::data(
+                format!("with.{place}"),
+                format!(
+                    "the recording has no names of `{}`; it has: {}",
+                    self.name(),
+                    listed(there)
+                ),
+            )
+        })?;
+        Ok(column
+            .iter()
+            .map(|name| name.as_deref().unwrap_or_default())
+            .collect())
+    }
 }

@@ -2,7 +2,8 @@
 
 use crate::error::{Error, Result, counted};
 use crate::robot::NoiseBasis;
-use crate::stage::{Context, Labelled, Stage, computed, doubtful, reads, writes};
+use crate::stage::doubtful::{named, suspicion};
+use crate::stage::{Context, Labelled, Stage, reads, writes};
 use crate::statistics::quantile;
 use crate::table::{Observability, Prediction, PredictionRow, Statistics, StatisticsRow};
 use schemars::JsonSchema;
@@ -75,7 +76,7 @@ impl Stage for Validate {
             ));
         }
         let mut statistics = Statistics::default();
-        let mut suspicion = None;
+        let mut suspected = None;
         for (order, step) in (0..).zip(&reads.prediction) {
             let fit = reads
                 .observability
@@ -102,10 +103,9 @@ impl Stage for Validate {
                 let whole = rows
                     .iter()
                     .filter(|row| held_out && row.measured.is_none() && !row.suspect);
-                let suspected =
-                    computed::suspicion(whole.map(|row| [row.error_mm, row.noise_mm]), 0);
-                suspicion = suspicion
-                    .or(suspected.map(|line| format!("{name} on {set}, held out: {line}")));
+                let line = suspicion(whole.map(|row| [row.error_mm, row.noise_mm]), 0);
+                suspected =
+                    suspected.or(line.map(|line| format!("{name} on {set}, held out: {line}")));
                 let row = describe(order, name, &set, held_out, &rows);
                 let row = StatisticsRow {
                     expected_rms_mm: expected(held_out, &rows, unmodelled),
@@ -149,7 +149,7 @@ impl Stage for Validate {
                 row.reference_max_mm = reference.max_mm;
             }
         }
-        context.warn_each(suspicion);
+        context.warn_each(suspected);
         if !statistics.0.iter().any(|row| row.held_out) {
             context
                 .warn("no held-out rows: only the training error can be stated, and it flatters");
@@ -256,7 +256,7 @@ fn describe(
             .iter()
             .map(|row| row.error_mm)
             .max_by(f64::total_cmp),
-        remarked_points: (!remarked.is_empty()).then(|| doubtful::named(&remarked)),
+        remarked_points: (!remarked.is_empty()).then(|| named(&remarked)),
         fold_mean_mm: None,
         fold_rms_mm: None,
         fold_max_mm: None,
