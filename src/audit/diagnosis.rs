@@ -3,7 +3,7 @@
 use crate::error::{Error, Result, nearest};
 use crate::pipeline::{Manifest, StageReport, StageStatus, find_run};
 use crate::shell::typed;
-use crate::stage::{Diagnose, Stage};
+use crate::stage::{DeclaredStage, Diagnose};
 use crate::store::Store;
 
 /// Stages that diagnose positions.

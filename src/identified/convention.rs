@@ -4,7 +4,7 @@ use super::load;
 use crate::error::{Error, Result};
 use crate::pipeline::Manifest;
 use crate::robot::{JointConvention, RobotModel};
-use crate::stage::Stage;
+use crate::stage::DeclaredStage;
 use crate::stage::ingest::Ingest;
 use crate::store::{Store, TableRef};
 use crate::table::{JointConventions, Robot, Table};

@@ -24,7 +24,7 @@ use crate::estimate::{Covariance, Model};
 use crate::pipeline::{Manifest, Plan, RunStatus, StageReport};
 use crate::raw::ending;
 use crate::robot::{JointConvention, Measurements, RobotModel};
-use crate::stage::{Diagnose, Stage};
+use crate::stage::{DeclaredStage, Diagnose};
 use crate::store::frame::Frame;
 use crate::store::{Store, TableRef};
 use crate::table::{

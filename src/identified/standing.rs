@@ -3,7 +3,7 @@
 use super::written::written;
 use crate::error::Result;
 use crate::pipeline::{Manifest, StageReport};
-use crate::stage::{Diagnose, Stage};
+use crate::stage::{DeclaredStage, Diagnose};
 use crate::store::{Store, TableRef};
 use crate::table::{
     Corrected, Findings, Parameters, Prediction, Standing, Step, Table, Unseen, Verdict,

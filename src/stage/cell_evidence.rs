@@ -33,11 +33,11 @@ pub struct Given {
     pub size_mm: f64,
 }
 
-crate::stage::writes! {
-    /// Output ports of [`CellEvidence`].
-    pub struct CellEvidenceWrites {
-        cell_evidence: CellEvidenceTable,
-    }
+crate::stage::stage! {
+    CellEvidence, "cell_evidence", 2, "says what every possible cause explains of one robot, for the sum over a fleet",
+        DiagnoseReads -> CellEvidenceWrites {
+            cell_evidence: CellEvidenceTable,
+        }
 }
 
 /// ln of the evidence, of whole cells with a name and of all other rows, below which a row is left out: a fleet counts it as the least that a
@@ -45,13 +45,6 @@ crate::stage::writes! {
 const LEAST: [f64; 2] = [-2.0, -1.0];
 
 impl Stage for CellEvidence {
-    const NAME: &'static str = "cell_evidence";
-    const SUMMARY: &'static str =
-        "says what every possible cause explains of one robot, for the sum over a fleet";
-    const IMPLEMENTATION: u32 = 2;
-    type Reads = DiagnoseReads;
-    type Writes = CellEvidenceWrites;
-
     fn faults(&self, at: &mut Place) {
         self.diagnose.faults(&mut at.at("diagnose"));
         for (k, given) in self.given.iter().enumerate() {

@@ -6,7 +6,7 @@ use crate::estimate::{FitOptions, Prior, align, changes};
 use crate::robot::{Measurements, NoiseBasis, RobotModel};
 use crate::stage::screened::{FittedRows, fit_rows};
 use crate::stage::settings::Repeatability;
-use crate::stage::{Context, RawFile, Stage, reads, writes};
+use crate::stage::{Context, RawFile, Stage};
 use crate::table::{ChangeRow, Changes, Parameters, Recording, Robot, Split, Table, from_parquet};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -24,29 +24,18 @@ pub struct Compare {
     pub repeatability: Repeatability,
 }
 
-reads! {
-    /// Input ports of [`Compare`].
-    pub struct CompareReads {
-        robot: Robot,
-        recording: Recording,
-        split: Split,
-    }
-}
-writes! {
-    /// Output ports of `compare`.
-    pub struct CompareWrites {
-        changes: Changes,
-    }
+crate::stage::stage! {
+    Compare, "compare", 5, "tests which parameters changed since an earlier recording of the same robot",
+        CompareReads {
+            robot: Robot,
+            recording: Recording,
+            split: Split,
+        } -> CompareWrites {
+            changes: Changes,
+        }
 }
 
 impl Stage for Compare {
-    const NAME: &'static str = "compare";
-    const SUMMARY: &'static str =
-        "tests which parameters changed since an earlier recording of the same robot";
-    const IMPLEMENTATION: u32 = 5;
-    type Reads = CompareReads;
-    type Writes = CompareWrites;
-
     fn faults(&self, at: &mut Place) {
         let both = self.previous_parameters.is_some() == self.previous_recording.is_some();
         at.at("previous_recording").must(

@@ -4,7 +4,7 @@ use crate::dynamics::{ContactEvent, DiagnosedRecording, TorqueChange, TorqueMode
 use crate::error::{Error, Result, counted};
 use crate::stage::dynamic_arm::RecordedTorques;
 use crate::stage::dynamic_arm::dynamic_arm;
-use crate::stage::{Chunks, Context, Stage, reads, writes};
+use crate::stage::{Chunks, Context, Stage};
 use crate::table::{ArmMotion, Contacts, Robot, TorqueChangeTable, TorqueParameters};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -14,33 +14,22 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields, default)]
 pub struct CompareTorques {}
 
-reads! {
-    /// Input ports of [`CompareTorques`].
-    pub struct CompareTorquesReads {
-        robot: Robot,
-        motion: Chunks<ArmMotion>,
-        parameters: TorqueParameters,
-        contacts: Contacts,
-        earlier_motion: Chunks<ArmMotion>,
-        earlier_parameters: TorqueParameters,
-        earlier_contacts: Contacts,
-    }
-}
-writes! {
-    /// Output ports of `compare_torques`.
-    pub struct CompareTorquesWrites {
-        changes: TorqueChangeTable,
-    }
+crate::stage::stage! {
+    CompareTorques, "compare_torques", 4, "tests what changed between two recordings of an arm's torques: payload, friction, offsets",
+        CompareTorquesReads {
+            robot: Robot,
+            motion: Chunks<ArmMotion>,
+            parameters: TorqueParameters,
+            contacts: Contacts,
+            earlier_motion: Chunks<ArmMotion>,
+            earlier_parameters: TorqueParameters,
+            earlier_contacts: Contacts,
+        } -> CompareTorquesWrites {
+            changes: TorqueChangeTable,
+        }
 }
 
 impl Stage for CompareTorques {
-    const NAME: &'static str = "compare_torques";
-    const SUMMARY: &'static str =
-        "tests what changed between two recordings of an arm's torques: payload, friction, offsets";
-    const IMPLEMENTATION: u32 = 4;
-    type Reads = CompareTorquesReads;
-    type Writes = CompareTorquesWrites;
-
     fn run(&self, reads: CompareTorquesReads, context: &Context) -> Result<CompareTorquesWrites> {
         if same_motion(&reads.motion, &reads.earlier_motion)? {
             let message = "both recordings are the same: name the earlier one's stages, e.g. `reads: {earlier_motion: before, \

@@ -100,41 +100,30 @@ const HEAVIEST: f64 = 10.0;
 const MOST_CLOSED: f64 = 0.001;
 const MOST_OPEN: f64 = 0.999;
 
-crate::stage::reads! {
-    /// Input ports of [`Diagnose`].
-    pub struct DiagnoseReads {
-        robot: Robot,
-        recording: Recording,
-        split: Split,
-    }
-}
-
-crate::stage::writes! {
-    /// Output ports of [`Diagnose`].
-    pub struct DiagnoseWrites {
-        verdict: Verdict,
-        sentences: VerdictSentences,
-        findings: Findings,
-        finding_numbers: FindingNumbers,
-        rivals: Rivals,
-        forms: Forms,
-        shares: Shares,
-        cells: Cells,
-        spectrum: Spectrum,
-        parameters: Parameters,
-        covariance: CovarianceTable,
-        prediction: Prediction,
-        suspects: Suspects,
-    }
+crate::stage::stage! {
+    Diagnose, "diagnose", 37, "locates where simulation and recording differ, and names the physics that the model leaves out",
+        DiagnoseReads {
+            robot: Robot,
+            recording: Recording,
+            split: Split,
+        } -> DiagnoseWrites {
+            verdict: Verdict,
+            sentences: VerdictSentences,
+            findings: Findings,
+            finding_numbers: FindingNumbers,
+            rivals: Rivals,
+            forms: Forms,
+            shares: Shares,
+            cells: Cells,
+            spectrum: Spectrum,
+            parameters: Parameters,
+            covariance: CovarianceTable,
+            prediction: Prediction,
+            suspects: Suspects,
+        }
 }
 
 impl Stage for Diagnose {
-    const NAME: &'static str = "diagnose";
-    const SUMMARY: &'static str = "locates where simulation and recording differ, and names the physics that the model leaves out";
-    const IMPLEMENTATION: u32 = 37;
-    type Reads = DiagnoseReads;
-    type Writes = DiagnoseWrites;
-
     fn faults(&self, at: &mut Place) {
         crate::stage::must_name_sets(&self.on, "fit", at);
         at.at("prior_weight").must(

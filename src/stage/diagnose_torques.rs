@@ -4,7 +4,7 @@ use crate::dynamics::{TorqueQuestion, TorqueSource, diagnose};
 use crate::error::{Error, Place, Result, counted};
 use crate::stage::dynamic_arm::{HeldOut, RecordedTorques};
 use crate::stage::dynamic_arm::{dynamic_arm, must_be_bodies};
-use crate::stage::{Chunks, Context, Stage, reads, writes};
+use crate::stage::{Chunks, Context, Stage};
 use crate::table::{
     ArmMotion, BodyConsistencies, Contacts, FrictionCurves, Inertials, JointTorques, Robot,
     TorqueCourse, TorqueCovariance, TorqueFindings, TorqueNumbers, TorqueParameters, TorqueRivals,
@@ -81,40 +81,29 @@ fn fit() -> Vec<String> {
 /// Share of the rows that is held out where nothing is said.
 const LAST: f64 = 0.3;
 
-reads! {
-    /// Input ports of [`DiagnoseTorques`].
-    pub struct DiagnoseTorquesReads {
-        robot: Robot,
-        motion: Chunks<ArmMotion>,
-    }
-}
-writes! {
-    /// Output ports of [`DiagnoseTorques`].
-    pub struct DiagnoseTorquesWrites {
-        verdict: TorqueVerdict,
-        sentences: VerdictSentences,
-        findings: TorqueFindings,
-        numbers: TorqueNumbers,
-        rivals: TorqueRivals,
-        joints: JointTorques,
-        course: TorqueCourse,
-        friction: FrictionCurves,
-        inertials: Inertials,
-        contacts: Contacts,
-        consistency: BodyConsistencies,
-        parameters: TorqueParameters,
-        covariance: TorqueCovariance,
-    }
+crate::stage::stage! {
+    DiagnoseTorques, "diagnose_torques", 14, "names the physics that the simulated torques of a moving arm lack",
+        DiagnoseTorquesReads {
+            robot: Robot,
+            motion: Chunks<ArmMotion>,
+        } -> DiagnoseTorquesWrites {
+            verdict: TorqueVerdict,
+            sentences: VerdictSentences,
+            findings: TorqueFindings,
+            numbers: TorqueNumbers,
+            rivals: TorqueRivals,
+            joints: JointTorques,
+            course: TorqueCourse,
+            friction: FrictionCurves,
+            inertials: Inertials,
+            contacts: Contacts,
+            consistency: BodyConsistencies,
+            parameters: TorqueParameters,
+            covariance: TorqueCovariance,
+        }
 }
 
 impl Stage for DiagnoseTorques {
-    const NAME: &'static str = "diagnose_torques";
-    const SUMMARY: &'static str =
-        "names the physics that the simulated torques of a moving arm lack";
-    const IMPLEMENTATION: u32 = 14;
-    type Reads = DiagnoseTorquesReads;
-    type Writes = DiagnoseTorquesWrites;
-
     fn faults(&self, at: &mut Place) {
         crate::stage::must_name_sets(&self.on, "fit", at);
         match &self.hold_out {

@@ -56,23 +56,16 @@ fn all_effects() -> Vec<String> {
     identified().map(|cause| cause.name().to_string()).collect()
 }
 
-crate::stage::reads! {
-    /// Input ports of [`Identify`].
-    pub struct IdentifyReads {
-        robot: Robot,
-        recording: Recording,
-        split: Split,
-    }
+crate::stage::stage! {
+    Identify, "identify", 18, "identifies geometry, transmission and compliance from the nominal robot in one estimation",
+        IdentifyReads {
+            robot: Robot,
+            recording: Recording,
+            split: Split,
+        } -> Identified
 }
 
 impl Stage for Identify {
-    const NAME: &'static str = "identify";
-    const SUMMARY: &'static str =
-        "identifies geometry, transmission and compliance from the nominal robot in one estimation";
-    const IMPLEMENTATION: u32 = 18;
-    type Reads = IdentifyReads;
-    type Writes = Identified;
-
     fn faults(&self, at: &mut Place) {
         self.shared_faults("fit", at);
         self.known_cell().faults(at);

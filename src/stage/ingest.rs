@@ -44,7 +44,7 @@ pub use torques::{IngestTorques, IngestTorquesReads, IngestTorquesWrites, Torque
 
 use crate::error::{Error, Place, Result};
 use crate::robot::{CountedCoupling, JointConvention};
-use crate::stage::{Context, RawFile, Stage, StreamedTable, reads, writes};
+use crate::stage::{Context, RawFile, Stage, StreamedTable};
 use crate::table::{Intake, IntakeRow, JointConventions, Recording, Rejected, Robot};
 use crate::units::Unit;
 use schemars::JsonSchema;
@@ -95,31 +95,19 @@ fn half() -> f64 {
     0.5
 }
 
-reads! {
-    /// Input ports of `ingest`.
-    pub struct IngestReads {
-        robot: Robot,
-    }
-}
-
-writes! {
-    /// Output ports of `ingest`.
-    pub struct IngestWrites {
-        recording: StreamedTable<Recording>,
-        rejected: StreamedTable<Rejected>,
-        intake: Intake,
-        convention: JointConventions,
-    }
+crate::stage::stage! {
+    Ingest, "ingest", 8, "reads raw files into a recording, and lists every rejected row with its reason",
+        IngestReads {
+            robot: Robot,
+        } -> IngestWrites {
+            recording: StreamedTable<Recording>,
+            rejected: StreamedTable<Rejected>,
+            intake: Intake,
+            convention: JointConventions,
+        }
 }
 
 impl Stage for Ingest {
-    const NAME: &'static str = "ingest";
-    const SUMMARY: &'static str =
-        "reads raw files into a recording, and lists every rejected row with its reason";
-    const IMPLEMENTATION: u32 = 8;
-    type Reads = IngestReads;
-    type Writes = IngestWrites;
-
     fn faults(&self, at: &mut Place) {
         check::faults(self, at);
     }

@@ -14,7 +14,7 @@ use crate::estimate::network::{
 };
 use crate::estimate::swarm::Algorithm;
 use crate::robot::RobotModel;
-use crate::stage::{Context, Stage, reads, writes};
+use crate::stage::{Context, Stage};
 use crate::statistics::nearest;
 use crate::table::{
     Corrections, Network, Parameters, Prediction, PredictionRow, Recording, Robot, Split, Training,
@@ -166,34 +166,23 @@ pub enum ActivationSetting {
     Tanh,
 }
 
-reads! {
-    /// Input ports of [`Learn`].
-    pub struct LearnReads {
-        robot: Option<Robot>,
-        recording: Recording,
-        split: Split,
-        parameters: Option<Parameters>,
-        prediction: Prediction,
-    }
-}
-
-writes! {
-    /// Output ports of [`Learn`].
-    pub struct LearnWrites {
-        network: Network,
-        corrections: Corrections,
-        training: Training,
-        prediction: Prediction,
-    }
+crate::stage::stage! {
+    Learn, "learn", 8, "learns the residual of the model: compares several corrections, and keeps the best only where it helps",
+        LearnReads {
+            robot: Option<Robot>,
+            recording: Recording,
+            split: Split,
+            parameters: Option<Parameters>,
+            prediction: Prediction,
+        } -> LearnWrites {
+            network: Network,
+            corrections: Corrections,
+            training: Training,
+            prediction: Prediction,
+        }
 }
 
 impl Stage for Learn {
-    const NAME: &'static str = "learn";
-    const SUMMARY: &'static str = "learns the residual of the model: compares several corrections, and keeps the best only where it helps";
-    const IMPLEMENTATION: u32 = 8;
-    type Reads = LearnReads;
-    type Writes = LearnWrites;
-
     fn faults(&self, at: &mut Place) {
         crate::stage::must_name_sets(&self.on, "learn", at);
         at.at("hidden").whole(self.hidden.unwrap_or(1), 1..=200);

@@ -4,7 +4,7 @@
 use crate::dynamics::LinkFromTorques;
 use crate::error::Result;
 use crate::stage::dynamic_arm::dynamic_arm;
-use crate::stage::{Context, Stage, reads, writes};
+use crate::stage::{Context, Stage};
 use crate::table::{Robot, TorqueParameters};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -17,27 +17,17 @@ const NOTIONAL: f64 = 10.0;
 #[serde(deny_unknown_fields, default)]
 pub struct Masses {}
 
-reads! {
-    /// Input ports of `masses`.
-    pub struct MassesReads {
-        robot: Robot,
-        parameters: TorqueParameters,
-    }
-}
-writes! {
-    /// Output ports of `masses`.
-    pub struct MassesWrites {
-        robot: Robot,
-    }
+crate::stage::stage! {
+    Masses, "masses", 3, "gives the robot of later stages the masses, centres and dry friction that its torques show",
+        MassesReads {
+            robot: Robot,
+            parameters: TorqueParameters,
+        } -> MassesWrites {
+            robot: Robot,
+        }
 }
 
 impl Stage for Masses {
-    const NAME: &'static str = "masses";
-    const SUMMARY: &'static str = "gives the robot of later stages the masses, centres and dry friction that its torques show";
-    const IMPLEMENTATION: u32 = 3;
-    type Reads = MassesReads;
-    type Writes = MassesWrites;
-
     fn run(&self, reads: MassesReads, context: &Context) -> Result<MassesWrites> {
         let mut robot = reads.robot.to_description()?;
         let (arm, _) = dynamic_arm(&robot)?;

@@ -48,7 +48,7 @@ pub use ports::{
     Arity, Chunks, InputTable, Labelled, Output, Port, PortValue, Produced, Reads, Sink,
     StoredTable, Streamed, StreamedTable, Writes,
 };
-pub(crate) use ports::{reads, writes};
+pub(crate) use ports::{reads, stage, writes};
 pub use registry::{ErasedStage, StageEntry};
 pub use report::{Accepted, Report, ReportReads};
 pub use report::{ReportTorques, ReportTorquesReads, ReportTorquesWrites};
@@ -155,8 +155,8 @@ impl Context<'_> {
     }
 }
 
-/// A step of a pipeline: settings (`with:`), typed ports and a body. The settings are the type itself.
-pub trait Stage: DeserializeOwned + Serialize + JsonSchema + Send + Sync + 'static {
+/// What a stage is called, and its ports.
+pub trait DeclaredStage {
     /// In `uses:` of the YAML.
     const NAME: &'static str;
     /// What it does, in one line.
@@ -167,6 +167,12 @@ pub trait Stage: DeserializeOwned + Serialize + JsonSchema + Send + Sync + 'stat
     type Reads: Reads;
     /// Tables that it gives.
     type Writes: Writes;
+}
+
+/// A step of a pipeline: settings (`with:`), typed ports and a body. The settings are the type itself.
+pub trait Stage:
+    DeclaredStage + DeserializeOwned + Serialize + JsonSchema + Send + Sync + 'static
+{
     /// Finds faults of the settings that types cannot express, each at its place below `with`.
     fn faults(&self, _at: &mut Place) {}
     /// All of them.

@@ -6,7 +6,7 @@
 use crate::error::{Place, Result};
 use crate::estimate::swarm::{Algorithm, Budget, Landscape, SearchStop, SwarmResult};
 use crate::estimate::threads::in_order;
-use crate::stage::{Context, Stage, reads, writes};
+use crate::stage::{Context, Stage};
 use crate::statistics::quantile;
 use crate::table::{SearchCourse, SearchCourseRow, Searches, SearchesRow};
 use schemars::JsonSchema;
@@ -76,28 +76,15 @@ impl Default for Optimise {
     }
 }
 
-reads! {
-    /// `optimise` reads nothing.
-    pub struct OptimiseReads {
-    }
-}
-
-writes! {
-    /// Output ports of [`Optimise`].
-    pub struct OptimiseWrites {
-        searches: Searches,
-        search_course: SearchCourse,
-    }
+crate::stage::stage! {
+    Optimise, "optimise", 1, "compares swarm optimisers on functions with known minima, over many seeds",
+        OptimiseReads {} -> OptimiseWrites {
+            searches: Searches,
+            search_course: SearchCourse,
+        }
 }
 
 impl Stage for Optimise {
-    const NAME: &'static str = "optimise";
-    const SUMMARY: &'static str =
-        "compares swarm optimisers on functions with known minima, over many seeds";
-    const IMPLEMENTATION: u32 = 1;
-    type Reads = OptimiseReads;
-    type Writes = OptimiseWrites;
-
     fn faults(&self, at: &mut Place) {
         at.at("population").whole(self.population, 4..=10_000);
         at.at("seeds").whole(self.seeds, 1..=100_000);

@@ -6,7 +6,7 @@ use crate::report::{
     AcceptanceLimits, PageLanguage, ReportOptions, Tables, TorqueTables, pages, torque_page,
 };
 use crate::robot::RobotModel;
-use crate::stage::{Context, Labelled, Stage, curves, reads, writes};
+use crate::stage::{Context, Labelled, Stage, curves};
 use crate::table::{
     Acceptance, BodyConsistencies, Cells, Contacts, Corrections, Curves, Document, DocumentRow,
     FindingNumbers, Findings, Fit, Forms, Frame, FrictionCurves, Inertials, Intake,
@@ -48,50 +48,39 @@ pub struct Accepted {
     pub max_mm: Option<f64>,
 }
 
-reads! {
-    /// Input ports of `report`.
-    pub struct ReportReads {
-        statistics: Statistics,
-        prediction: Vec<Labelled<Prediction>>,
-        parameters: Parameters,
-        robot: Robot,
-        recording: Recording,
-        convention: Vec<Labelled<JointConventions>>,
-        split: Split,
-        intake: Vec<Labelled<Intake>>,
-        rejected: Vec<Labelled<Rejected>>,
-        fit: Vec<Labelled<Fit>>,
-        observability: Vec<Labelled<Observability>>,
-        training: Vec<Labelled<Training>>,
-        corrections: Vec<Labelled<Corrections>>,
-        models: Vec<Labelled<Parameters>>,
-        verdict: Vec<Labelled<Verdict>>,
-        sentences: Vec<Labelled<VerdictSentences>>,
-        findings: Vec<Labelled<Findings>>,
-        finding_numbers: Vec<Labelled<FindingNumbers>>,
-        rivals: Vec<Labelled<Rivals>>,
-        forms: Vec<Labelled<Forms>>,
-        cells: Vec<Labelled<Cells>>,
-        suspects: Vec<Labelled<Suspects>>,
-    }
-}
-writes! {
-    /// Output ports of `report`.
-    pub struct ReportWrites {
-        document: Document,
-        acceptance: Acceptance,
-        curves: Curves,
-    }
+crate::stage::stage! {
+    Report, "report", 22, "writes one self-contained HTML file: errors before and after, parameters, rejected rows",
+        ReportReads {
+            statistics: Statistics,
+            prediction: Vec<Labelled<Prediction>>,
+            parameters: Parameters,
+            robot: Robot,
+            recording: Recording,
+            convention: Vec<Labelled<JointConventions>>,
+            split: Split,
+            intake: Vec<Labelled<Intake>>,
+            rejected: Vec<Labelled<Rejected>>,
+            fit: Vec<Labelled<Fit>>,
+            observability: Vec<Labelled<Observability>>,
+            training: Vec<Labelled<Training>>,
+            corrections: Vec<Labelled<Corrections>>,
+            models: Vec<Labelled<Parameters>>,
+            verdict: Vec<Labelled<Verdict>>,
+            sentences: Vec<Labelled<VerdictSentences>>,
+            findings: Vec<Labelled<Findings>>,
+            finding_numbers: Vec<Labelled<FindingNumbers>>,
+            rivals: Vec<Labelled<Rivals>>,
+            forms: Vec<Labelled<Forms>>,
+            cells: Vec<Labelled<Cells>>,
+            suspects: Vec<Labelled<Suspects>>,
+        } -> ReportWrites {
+            document: Document,
+            acceptance: Acceptance,
+            curves: Curves,
+        }
 }
 
 impl Stage for Report {
-    const NAME: &'static str = "report";
-    const SUMMARY: &'static str =
-        "writes one self-contained HTML file: errors before and after, parameters, rejected rows";
-    const IMPLEMENTATION: u32 = 22;
-    type Reads = ReportReads;
-    type Writes = ReportWrites;
-
     fn sets_named(&self) -> Vec<(String, String)> {
         self.set
             .iter()
@@ -334,38 +323,27 @@ pub struct ReportTorques {
     pub title: Option<String>,
 }
 
-reads! {
-    /// Input ports of `report_torques`.
-    pub struct ReportTorquesReads {
-        robot: Robot,
-        verdict: TorqueVerdict,
-        sentences: Vec<Labelled<VerdictSentences>>,
-        findings: TorqueFindings,
-        numbers: TorqueNumbers,
-        rivals: TorqueRivals,
-        joints: JointTorques,
-        course: TorqueCourse,
-        friction: FrictionCurves,
-        inertials: Inertials,
-        contacts: Contacts,
-        consistency: BodyConsistencies,
-    }
-}
-writes! {
-    /// Output ports of `report_torques`.
-    pub struct ReportTorquesWrites {
-        document: Document,
-    }
+crate::stage::stage! {
+    ReportTorques, "report_torques", 5, "writes one self-contained HTML file: torques before and after, friction, what was found",
+        ReportTorquesReads {
+            robot: Robot,
+            verdict: TorqueVerdict,
+            sentences: Vec<Labelled<VerdictSentences>>,
+            findings: TorqueFindings,
+            numbers: TorqueNumbers,
+            rivals: TorqueRivals,
+            joints: JointTorques,
+            course: TorqueCourse,
+            friction: FrictionCurves,
+            inertials: Inertials,
+            contacts: Contacts,
+            consistency: BodyConsistencies,
+        } -> ReportTorquesWrites {
+            document: Document,
+        }
 }
 
 impl Stage for ReportTorques {
-    const NAME: &'static str = "report_torques";
-    const SUMMARY: &'static str =
-        "writes one self-contained HTML file: torques before and after, friction, what was found";
-    const IMPLEMENTATION: u32 = 5;
-    type Reads = ReportTorquesReads;
-    type Writes = ReportTorquesWrites;
-
     fn run(&self, reads: ReportTorquesReads, _context: &Context) -> Result<ReportTorquesWrites> {
         let hash = |name: &str, frame: crate::table::Frame| {
             (name.to_string(), frame.table_hash().to_string())

@@ -1,6 +1,6 @@
 //! Stage `robot`: a robot file -> the `robot` table.
 
-use super::{Context, RawFile, Stage, reads, writes};
+use super::{Context, RawFile, Stage};
 use crate::error::{Place, Result};
 use crate::robot::import::{RobotFileText, read_calib, read_case};
 use crate::table::Robot;
@@ -36,25 +36,14 @@ pub struct ReadRobot {
     pub urdf: Option<RawFile>,
 }
 
-reads! {
-    /// Nothing.
-    pub struct RobotReads {}
-}
-writes! {
-    /// The robot.
-    pub struct RobotWrites {
-        robot: Robot,
-    }
+crate::stage::stage! {
+    ReadRobot, "robot", 2, "reads a robot file (screws, DH, modified DH, URDF, or a practice robot.json)",
+        RobotReads {} -> RobotWrites {
+            robot: Robot,
+        }
 }
 
 impl Stage for ReadRobot {
-    const NAME: &'static str = "robot";
-    const SUMMARY: &'static str =
-        "reads a robot file (screws, DH, modified DH, URDF, or a practice robot.json)";
-    const IMPLEMENTATION: u32 = 2;
-    type Reads = RobotReads;
-    type Writes = RobotWrites;
-
     fn faults(&self, at: &mut Place) {
         let possible = self.format == RobotFormat::Calib || self.urdf.is_none();
         at.at("urdf")

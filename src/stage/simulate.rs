@@ -3,7 +3,7 @@
 use crate::description::{JointKind, RobotDescription};
 use crate::error::{Error, Place, Result, counted};
 use crate::robot::{Instrument, START, SigmaSource};
-use crate::stage::{Context, Stage, reads, writes};
+use crate::stage::{Context, Stage};
 use crate::table::{Recording, Robot, Truth, TruthRow};
 use crate::twin::effect::Physical;
 use crate::twin::plan::{Block, Climate, Poses, given};
@@ -70,31 +70,20 @@ pub struct Simulate {
     pub seed: Option<u64>,
 }
 
-reads! {
-    /// Input ports of `simulate`.
-    pub struct SimulateReads {
-        robot: Robot,
-    }
-}
-
-writes! {
-    /// Output ports of `simulate`.
-    pub struct SimulateWrites {
-        recording: Recording,
-        truth: Truth,
-    }
+crate::stage::stage! {
+    Simulate, "simulate", 3, "records an experiment on a twin whose truth is known",
+        SimulateReads {
+            robot: Robot,
+        } -> SimulateWrites {
+            recording: Recording,
+            truth: Truth,
+        }
 }
 
 /// Points of a block, and candidates of a pose, at most: what fits into memory.
 const MOST: usize = 10_000_000;
 
 impl Stage for Simulate {
-    const NAME: &'static str = "simulate";
-    const SUMMARY: &'static str = "records an experiment on a twin whose truth is known";
-    const IMPLEMENTATION: u32 = 3;
-    type Reads = SimulateReads;
-    type Writes = SimulateWrites;
-
     fn faults(&self, at: &mut Place) {
         for (index, fixture) in self.fixtures.iter().enumerate() {
             let mut at = at.at(format!("fixtures[{index}]"));

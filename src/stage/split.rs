@@ -7,7 +7,7 @@
 use crate::error::{Error, Place, Result, counted, listed};
 use crate::robot::pose_groups::{NEAR, SAME, near};
 use crate::stage::remarks::{copied_rows, copies_remark};
-use crate::stage::{Context, Stage, matches, reads, writes};
+use crate::stage::{Context, Stage, matches};
 use crate::table::{Recording, Split, SplitRow};
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
@@ -109,28 +109,16 @@ fn fit() -> String {
     "fit".into()
 }
 
-reads! {
-    /// Input ports of `split`.
-    pub struct SplitReads {
-        recording: Recording,
-    }
-}
-
-writes! {
-    /// Output ports of `split`.
-    pub struct SplitWrites {
-        split: Split,
-    }
+crate::stage::stage! {
+    SplitBy, "split", 4, "deals rows out to named sets: every n-th, by name, blocks, random, by usage, by order",
+        SplitReads {
+            recording: Recording,
+        } -> SplitWrites {
+            split: Split,
+        }
 }
 
 impl Stage for SplitBy {
-    const NAME: &'static str = "split";
-    const SUMMARY: &'static str =
-        "deals rows out to named sets: every n-th, by name, blocks, random, by usage, by order";
-    const IMPLEMENTATION: u32 = 4;
-    type Reads = SplitReads;
-    type Writes = SplitWrites;
-
     fn faults(&self, at: &mut Place) {
         for name in self.names() {
             at.must(!name.trim().is_empty(), "a set without a name");

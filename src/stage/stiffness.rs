@@ -18,26 +18,19 @@ crate::stage::identified::identification! {
     }
 }
 
-crate::stage::reads! {
-    /// Input ports of [`Stiffness`].
-    pub struct StiffnessReads {
-        robot: Robot,
-        recording: Recording,
-        split: Split,
-        parameters: Parameters,
-        covariance: Option<CovarianceTable>,
-        prediction: Prediction,
-    }
+crate::stage::stage! {
+    Stiffness, "stiffness", 17, "identifies joint compliance from loaded poses; everything identified before is kept",
+        StiffnessReads {
+            robot: Robot,
+            recording: Recording,
+            split: Split,
+            parameters: Parameters,
+            covariance: Option<CovarianceTable>,
+            prediction: Prediction,
+        } -> Identified
 }
 
 impl Stage for Stiffness {
-    const NAME: &'static str = "stiffness";
-    const SUMMARY: &'static str =
-        "identifies joint compliance from loaded poses; everything identified before is kept";
-    const IMPLEMENTATION: u32 = 17;
-    type Reads = StiffnessReads;
-    type Writes = Identified;
-
     fn faults(&self, at: &mut Place) {
         self.shared_faults("loaded", at);
     }

@@ -28,27 +28,21 @@ fn fit_set() -> Vec<String> {
     vec!["fit".into()]
 }
 
-crate::stage::reads! {
-    /// Input ports of [`Transfer`]: another recording with its split, and the model to try on it; all recordings that there are.
-    pub struct TransferReads {
-        robot: Robot,
-        recording: Recording,
-        split: Split,
-        parameters: Parameters,
-        covariance: Option<CovarianceTable>,
-        recordings: Vec<Labelled<Recording>>,
-        models: Vec<Labelled<Parameters>>,
-        predictions: Vec<Labelled<Prediction>>,
-    }
+crate::stage::stage! {
+    Transfer, "transfer", 14, "tests an identified model on another recording of the robot; only its base is estimated anew",
+        TransferReads {
+            robot: Robot,
+            recording: Recording,
+            split: Split,
+            parameters: Parameters,
+            covariance: Option<CovarianceTable>,
+            recordings: Vec<Labelled<Recording>>,
+            models: Vec<Labelled<Parameters>>,
+            predictions: Vec<Labelled<Prediction>>,
+        } -> Identified
 }
 
 impl Stage for Transfer {
-    const NAME: &'static str = "transfer";
-    const SUMMARY: &'static str = "tests an identified model on another recording of the robot; only its base is estimated anew";
-    const IMPLEMENTATION: u32 = 14;
-    type Reads = TransferReads;
-    type Writes = Identified;
-
     fn faults(&self, at: &mut Place) {
         self.shared_faults("fit", at);
     }

@@ -3,7 +3,7 @@
 use crate::error::{Error, Result, counted};
 use crate::robot::NoiseBasis;
 use crate::stage::doubtful::{named, suspicion};
-use crate::stage::{Context, Labelled, Stage, reads, writes};
+use crate::stage::{Context, Labelled, Stage};
 use crate::statistics::quantile;
 use crate::table::{Observability, Prediction, PredictionRow, Statistics, StatisticsRow};
 use schemars::JsonSchema;
@@ -40,28 +40,17 @@ pub struct PublishedErrors {
     pub max_mm: Option<f64>,
 }
 
-reads! {
-    /// Input ports of `validate`.
-    pub struct ValidateReads {
-        prediction: Vec<Labelled<Prediction>>,
-        observability: Vec<Labelled<Observability>>,
-    }
-}
-writes! {
-    /// Output ports of `validate`.
-    pub struct ValidateWrites {
-        statistics: Statistics,
-    }
+crate::stage::stage! {
+    Validate, "validate", 5, "states the position error after every step, held-out and training rows apart",
+        ValidateReads {
+            prediction: Vec<Labelled<Prediction>>,
+            observability: Vec<Labelled<Observability>>,
+        } -> ValidateWrites {
+            statistics: Statistics,
+        }
 }
 
 impl Stage for Validate {
-    const NAME: &'static str = "validate";
-    const SUMMARY: &'static str =
-        "states the position error after every step, held-out and training rows apart";
-    const IMPLEMENTATION: u32 = 5;
-    type Reads = ValidateReads;
-    type Writes = ValidateWrites;
-
     fn sets_named(&self) -> Vec<(String, String)> {
         let sets = self.reference.iter().enumerate();
         sets.map(|(k, reference)| (format!("reference[{k}].set"), reference.set.clone()))

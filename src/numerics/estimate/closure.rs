@@ -6,7 +6,7 @@
 use super::factor::TriangularFactor;
 use super::model::Model;
 use super::problem::Problem;
-use crate::observation::{contacts, kinds};
+use crate::observation::{RowView, contacts, kinds};
 use crate::robot::Measurements;
 
 /// Steps towards joints that close; each squares what is left of the error.
@@ -40,14 +40,18 @@ pub(super) fn closed(model: &Model, data: &Measurements, rows: &[usize]) -> Opti
         for (kind, _) in contacts(data, *row) {
             for _ in 0..STEPS {
                 let mut placed = model.place(&out, *row, &mut scratch);
-                let error = kind
-                    .residual(&out, *row, &placed)
-                    .map(|(error, _)| error)
-                    .filter(|error| error.norm() > CLOSED);
-                let closing = kind.closing(&out, *row, &placed);
-                let Some(step) = closing.zip(error).and_then(|(closing, error)| {
-                    placed.closing_step(&closing, &error.first_three())
-                }) else {
+                let at = RowView {
+                    data: &out,
+                    row: *row,
+                    placed: &placed,
+                };
+                let error = kind.residual(at).map(|(error, _)| error);
+                let error = error.filter(|error| error.norm() > CLOSED);
+                let closing = kind.closing(at);
+                let Some(step) = closing
+                    .zip(error)
+                    .and_then(|(closing, error)| placed.closing_step(&closing, &error))
+                else {
                     break;
                 };
                 let joints = &mut out.q[row * data.joints..(row + 1) * data.joints];

@@ -8,7 +8,7 @@ use super::problem::Problem;
 use super::term::ObservationTerm;
 use super::triangle::Triangle;
 use crate::observation::KINDS;
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, DVector, SymmetricEigen, Vector3};
 use rayon::prelude::*;
 
 /// A direction in which a pose alone decides has nothing left to show its error by: its share is capped here.
@@ -44,25 +44,19 @@ pub(crate) fn clustered(
                             continue;
                         };
                         let share = term.share();
-                        let height = kind.height();
                         jacobian.clear();
-                        jacobian.resize(height * p, 0.0);
+                        jacobian.resize(p, Vector3::zeros());
                         term.derivatives(&mut placed, |parameter, derivative| {
                             if column[parameter] < p {
-                                let entries =
-                                    &mut jacobian[height * column[parameter]..][..derivative.len()];
-                                entries
-                                    .iter_mut()
-                                    .zip(derivative)
-                                    .for_each(|(sum, value)| *sum += value);
+                                jacobian[column[parameter]] += derivative;
                             }
                         });
-                        let error = term.error.times(share);
-                        for line in 0..height {
-                            errors.push(error.get(line).copied().unwrap_or_default());
+                        let error = term.error * share;
+                        for line in 0..3 {
+                            errors.push(error[line]);
                             visible.extend((0..p).map(|k| {
                                 (0..=k)
-                                    .map(|j| jacobian[height * j + line] * inverse.at(j, k))
+                                    .map(|j| jacobian[j][line] * inverse.at(j, k))
                                     .sum::<f64>()
                                     * share
                             }));

@@ -435,11 +435,7 @@ fn lasting(problem: &Problem, residuals: &[Residual]) -> f64 {
         .flat_map(|residual| {
             let error = residual.whitened(problem.data, problem.excess.length);
             // Gross errors last for one row and would hide that others last longer.
-            <[f64; 3]>::from(
-                error
-                    .times(bound(3) / error.norm().max(bound(3)))
-                    .first_three(),
-            )
+            <[f64; 3]>::from(error * (bound(3) / error.norm().max(bound(3))))
         })
         .collect();
     autocorrelation_time(&whitened, 3)

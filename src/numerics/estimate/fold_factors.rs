@@ -233,7 +233,7 @@ impl<'a> NearbyFits<'a> {
                 ObservationTerm::of(*kind, self.data, *row, &placed, self.excess)
             });
             for ((term, _), share) in terms.zip(&mut shares) {
-                square += term.error.times(*share).norm_squared();
+                square += (term.error * *share).norm_squared();
             }
             lengths.push(self.scale.of_placed(self.data, *row, &placed));
         }

@@ -4,9 +4,10 @@ use super::factor::{StackedRows, TriangularFactor};
 use super::model::Model;
 use super::term::{ObservationTerm, huber};
 use crate::effect::PlacedRow;
-use crate::observation::{Dimension, ExcessSigma, KINDS, Residual, kinds};
+use crate::observation::{Dimension, ExcessSigma, KINDS, Residual, RowView, kinds};
 use crate::robot::Measurements;
 use faer::Mat;
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
 /// Rows of the recording that one thread takes at once: fixed, so that sums do not depend on the number of threads.
@@ -117,10 +118,10 @@ impl Problem<'_> {
     /// Residuals and factor of some rows, in memory of a chunk.
     fn span(&self, model: &Model, rows: &[usize], column: &[Option<usize>], p: usize) -> Span {
         let mut scratch = model.stack.scratch(&model.robot);
-        let kinds = kinds(self.data);
-        // A block of lines for each kind, whatever a row has of it.
-        let blocks: Vec<usize> = kinds.iter().map(|kind| kind.height()).collect();
-        let lines_of_row: usize = blocks.iter().sum();
+        let data = self.data;
+        let kinds = kinds(data);
+        // Three lines for each kind, whatever a row has of it.
+        let lines_of_row = 3 * kinds.len();
         let mut tall = StackedRows::new(p + 1, lines_of_row * rows.len().min(CHUNK));
         let mut residuals = Vec::with_capacity(rows.len());
         let (mut volume, mut pull) = (0.0, vec![0.0; p]);
@@ -131,21 +132,24 @@ impl Problem<'_> {
                 let share = term.share();
                 term.derivatives(placed, |parameter, derivative| {
                     if let Some(j) = column[parameter] {
-                        add(&mut lines[j][first..], derivative, share);
+                        add(&mut lines[j][first..], &derivative, share);
                     }
                 });
                 add(&mut lines[p][first..], &term.error, share);
             };
             for (i, &row) in chunk.iter().enumerate() {
                 let mut placed = model.place(self.data, row, &mut scratch);
-                let mut first = lines_of_row * i;
-                for (kind, height) in kinds.iter().zip(&blocks) {
+                for (k, kind) in kinds.iter().enumerate() {
                     if let Some((term, residual)) =
                         ObservationTerm::of(*kind, self.data, row, &placed, self.excess)
                     {
-                        write(first, term, &mut placed);
+                        write(lines_of_row * i + 3 * k, term, &mut placed);
                         residuals.push(residual);
-                        if let Some(closing) = kind.closing(self.data, row, &placed) {
+                        if let Some(closing) = kind.closing(RowView {
+                            data,
+                            row,
+                            placed: &placed,
+                        }) {
                             let own = placed.log_volume(&closing, |parameter, change| {
                                 column[parameter]
                                     .into_iter()
@@ -154,7 +158,6 @@ impl Problem<'_> {
                             volume += own.unwrap_or_default();
                         }
                     }
-                    first += height;
                 }
             }
             tall.absorb(height);
@@ -187,9 +190,8 @@ fn rms(residuals: &[Residual]) -> f64 {
     (first.iter().sum::<f64>() / first.len().max(1) as f64).sqrt()
 }
 
-fn add(to: &mut [f64], values: &[f64], share: f64) {
-    to[..values.len()]
-        .iter_mut()
+fn add(to: &mut [f64], values: &Vector3<f64>, share: f64) {
+    to.iter_mut()
         .zip(values)
         .for_each(|(to, value)| *to += value * share);
 }

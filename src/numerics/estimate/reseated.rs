@@ -1,7 +1,7 @@
 //! A ball that was taken off and put back elsewhere: from some row on, what does not close lies the same way in the frame of the tool.
 
 use super::model::Model;
-use crate::observation::kinds;
+use crate::observation::{RowView, kinds};
 use crate::robot::Measurements;
 use nalgebra::Vector3;
 
@@ -32,8 +32,12 @@ pub fn reseated(model: &Model, data: &Measurements, rows: &[usize], sigma: f64) 
     let mut seen: Vec<(usize, Vector3<f64>)> = Vec::new();
     for row in rows {
         let placed = model.place(data, *row, &mut scratch);
-        if let Some((error, _)) = socket.residual(data, *row, &placed) {
-            let off = placed.orientation().tr_mul(&error.first_three());
+        if let Some((error, _)) = socket.residual(RowView {
+            data,
+            row: *row,
+            placed: &placed,
+        }) {
+            let off = placed.orientation().tr_mul(&error);
             seen.push((*row, off * (CUT * sigma / off.norm().max(CUT * sigma))));
         }
     }

@@ -1,8 +1,9 @@
 //! What is left of what a row measured of one kind.
 
-use super::{Dimension, MeasurementKind, ResidualNumbers, Sensitivity, Weight};
+use super::{Dimension, MeasurementKind, RowView, Sensitivity, Weight};
 use crate::effect::PlacedRow;
 use crate::robot::Measurements;
+use nalgebra::Vector3;
 
 /// Standard deviation that rows show beyond their own noise.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -30,8 +31,8 @@ pub struct Residual {
     pub kind: &'static dyn MeasurementKind,
     /// The row of the recording.
     pub row: usize,
-    /// m or rad, as many numbers as the kind has; 0 where one was not measured.
-    pub error: ResidualNumbers,
+    /// m or rad, the numbers of the kind; 0 where one was not measured, and beyond them.
+    pub error: Vector3<f64>,
     /// How many values were measured.
     pub axes: usize,
     /// Variance of each value, where the kind has one for all.
@@ -46,7 +47,7 @@ impl Residual {
         row: usize,
         placed: &PlacedRow,
     ) -> Option<Self> {
-        let (error, variance) = kind.residual(data, row, placed)?;
+        let (error, variance) = kind.residual(RowView { data, row, placed })?;
         Some(Self {
             kind,
             row,
@@ -67,8 +68,8 @@ impl Residual {
     }
 
     /// The error in standard deviations.
-    pub fn whitened(&self, data: &Measurements, excess: f64) -> ResidualNumbers {
-        self.weight(data, excess).whiten(&self.error)
+    pub fn whitened(&self, data: &Measurements, excess: f64) -> Vector3<f64> {
+        self.weight(data, excess).apply(&self.error)
     }
 
     /// What the kind sees of the target's motion, in standard deviations by `weight`.
@@ -78,6 +79,7 @@ impl Residual {
         placed: &PlacedRow,
         weight: Weight,
     ) -> Sensitivity {
-        self.kind.sensitivity(data, self.row, placed, weight)
+        let row = self.row;
+        self.kind.sensitivity(RowView { data, row, placed }, weight)
     }
 }

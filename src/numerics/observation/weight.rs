@@ -1,13 +1,12 @@
 //! A linear map of errors or derivatives, above all into standard deviations.
 
-use super::ResidualNumbers;
 use crate::robot::Measurements;
 use nalgebra::{Matrix3, Vector3};
 
 /// Turns an error or a derivative (m or rad, three axes) into standard deviations.
 #[derive(Debug, Clone, Copy)]
 pub enum Weight {
-    /// The same inverse standard deviation of all numbers, however many.
+    /// The same inverse standard deviation of all numbers.
     Uniform(f64),
     /// Inverse standard deviation per axis; zero where not measured.
     Axes(Vector3<f64>),
@@ -58,17 +57,7 @@ impl Weight {
         }
     }
 
-    /// A residual in standard deviations.
-    pub fn whiten(&self, error: &ResidualNumbers) -> ResidualNumbers {
-        match self {
-            Self::Uniform(weight) => error.times(*weight),
-            Self::Axes(_) | Self::Full(_) | Self::Along(_) => {
-                error.with_first_three(&self.apply(&error.first_three()))
-            }
-        }
-    }
-
-    /// The same of a motion along three axes.
+    /// An error or a derivative in standard deviations.
     pub fn apply(&self, error: &Vector3<f64>) -> Vector3<f64> {
         match self {
             Self::Uniform(weight) => error * *weight,

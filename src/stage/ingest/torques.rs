@@ -12,7 +12,7 @@ use super::row::RecordedRow;
 use super::scan::{RefusalCounts, tally};
 use super::stretch::Stretches;
 use crate::error::{Error, Fault, Place, Result, counted};
-use crate::stage::{Context, RawFile, Sink, Stage, StreamedTable, reads, writes};
+use crate::stage::{Context, RawFile, Sink, Stage, StreamedTable};
 use crate::table::{ArmMotion, Intake, IntakeRow, Rejected, RejectedRow, Robot, Table};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -66,29 +66,18 @@ const CHUNK: usize = 1 << 16;
 /// More labels than these are no labels: another column is mapped.
 const MOST_LABELS: usize = 100;
 
-reads! {
-    /// Input ports of `ingest_torques`.
-    pub struct IngestTorquesReads {
-        robot: Robot,
-    }
-}
-writes! {
-    /// Output ports of `ingest_torques`.
-    pub struct IngestTorquesWrites {
-        motion: StreamedTable<ArmMotion>,
-        rejected: StreamedTable<Rejected>,
-        intake: Intake,
-    }
+crate::stage::stage! {
+    IngestTorques, "ingest_torques", 2, "reads joint positions with torques or motor currents of an arm that moves",
+        IngestTorquesReads {
+            robot: Robot,
+        } -> IngestTorquesWrites {
+            motion: StreamedTable<ArmMotion>,
+            rejected: StreamedTable<Rejected>,
+            intake: Intake,
+        }
 }
 
 impl Stage for IngestTorques {
-    const NAME: &'static str = "ingest_torques";
-    const SUMMARY: &'static str =
-        "reads joint positions with torques or motor currents of an arm that moves";
-    const IMPLEMENTATION: u32 = 2;
-    type Reads = IngestTorquesReads;
-    type Writes = IngestTorquesWrites;
-
     fn faults(&self, at: &mut Place) {
         at.at("files")
             .must(!self.files.is_empty(), "no file; name at least one");

@@ -65,11 +65,11 @@ pub(super) fn leave_one_out(problem: &Problem, model: &Model, free: &[usize]) ->
                     if column[parameter] < free.len() {
                         let line = &mut lines.col_as_slice_mut(column[parameter])[first..first + 3];
                         line.iter_mut()
-                            .zip(derivative)
+                            .zip(&derivative)
                             .for_each(|(value, d)| *value += d);
                     }
                 });
-                terms.push((i, fitted[row], term.error.first_three()));
+                terms.push((i, fitted[row], term.error));
             }
             standings.push(LeaveOneOut {
                 predicted,
