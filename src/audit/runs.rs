@@ -4,7 +4,7 @@ use serde::Serialize;
 use std::collections::BTreeSet;
 
 use crate::diff::{DiffOptions, TableDiff, compare};
-use crate::error::{Error, Result, nearest};
+use crate::error::{Error, Result, did_you_mean};
 use crate::pipeline::{KeyChange, Manifest, OutputRecord, changes_of};
 use crate::store::Store;
 use crate::store::schema::{self, TableSchema};
@@ -143,11 +143,8 @@ fn known_columns(kinds: &BTreeSet<&str>, options: &DiffOptions) -> Result<()> {
                 .iter()
                 .flat_map(|schema| &schema.fields)
                 .map(|field| field.name.as_str());
-            let hint = nearest(name, columns).map(|near| format!("; did you mean `{near}`?"));
-            let message = format!(
-                "no column `{name}` in any table that both runs have{}",
-                hint.unwrap_or_default()
-            );
+            let hint = did_you_mean(name, columns);
+            let message = format!("no column `{name}` in any table that both runs have{hint}");
             return Err(Error::spec(flag, message));
         }
     }

@@ -2,7 +2,7 @@
 //! more.
 
 use crate::compensate::{IdentifiedArm, Scatter, Uncertainty, doubts};
-use crate::error::counted;
+use crate::error::{counted, first_of};
 use crate::estimate::{Covariance, Model, ParameterStatus, Remedy, Session, remedies};
 use crate::robot::Measurements;
 use crate::stage::Context;
@@ -60,23 +60,15 @@ pub fn named(rows: &[&PredictionRow]) -> String {
             names.push(&row.point_id);
         }
     }
-    let more = names.len().saturating_sub(NAMED);
-    names.truncate(NAMED);
-    let more = if more > 0 {
-        format!(" and {more} more")
-    } else {
-        String::new()
-    };
     let first = rows
         .first()
         .and_then(|row| row.remark.as_deref())
         .unwrap_or_default();
-    let of = if names.len() > 1 {
-        format!("{}: ", names[0])
-    } else {
-        String::new()
+    let point = match names.as_slice() {
+        [point, _, ..] => format!("{point}: "),
+        _ => String::new(),
     };
-    format!("{}{more} ({of}{first})", names.join(", "))
+    format!("{} ({point}{first})", first_of(&names, NAMED))
 }
 
 /// A residual that is this much smaller than the noise is no luck: chi-square of ten values is below 0.4 once in a million times.

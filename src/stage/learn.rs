@@ -54,7 +54,7 @@ pub struct Learn {
     /// Neurons of the hidden layer; chosen by cross-validation if not given.
     pub hidden: Option<usize>,
     /// Activation of the hidden layer.
-    pub activation: ActivationSetting,
+    pub activation: Activation,
     /// Networks whose mean is the correction.
     pub ensemble: usize,
     /// Beetles of the swarm that finds where the gradient training starts; other swarms may spend as much.
@@ -87,7 +87,7 @@ impl Default for Learn {
             inputs: Inputs::Joints,
             payload: false,
             hidden: None,
-            activation: ActivationSetting::Sigmoid,
+            activation: Activation::Sigmoid,
             ensemble: 8,
             beetles: 50,
             generations: 200,
@@ -154,16 +154,6 @@ pub enum Inputs {
     Joints,
     /// Sine and cosine of its angle; the position of a prismatic joint.
     SinCos,
-}
-
-/// Activation of the hidden layer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum ActivationSetting {
-    /// `1 / (1 + exp(-x))`, as in the paper.
-    Sigmoid,
-    /// `tanh(x)`.
-    Tanh,
 }
 
 crate::stage::stage! {
@@ -309,10 +299,7 @@ impl Learn {
             features: features(prismatic, self.inputs == Inputs::SinCos, self.payload),
             through: None,
             hidden: self.hidden.unwrap_or(HIDDEN[1]),
-            activation: match self.activation {
-                ActivationSetting::Sigmoid => Activation::Sigmoid,
-                ActivationSetting::Tanh => Activation::Tanh,
-            },
+            activation: self.activation,
             start: TrainingStart::Random,
             beetles: self.beetles,
             generations: self.generations,

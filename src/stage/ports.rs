@@ -193,8 +193,6 @@ pub(crate) use {reads, stage, writes};
 pub struct Streamed {
     /// The name of the schema.
     pub kind: &'static str,
-    /// How many.
-    pub rows: u64,
     /// The engine's handle to the finished file.
     pub handle: Box<dyn std::any::Any + Send>,
 }

@@ -5,8 +5,8 @@
 //! taken in as long as they explain more than chance; sigmas include what the earlier recording did not know.
 
 use super::factor::TriangularFactor;
+use super::model::Session;
 use super::problem::Problem;
-use super::session::Session;
 use crate::effect::names;
 use faer::Mat;
 

@@ -4,8 +4,8 @@
 
 use super::factor::StackedRows;
 use super::model::Model;
+use super::problem::ObservationTerm;
 use super::problem::Problem;
-use super::term::ObservationTerm;
 use super::triangle::Triangle;
 use crate::observation::KINDS;
 use nalgebra::{DMatrix, DVector, SymmetricEigen, Vector3};

@@ -1,8 +1,8 @@
 //! A model's step with what is known beforehand: priors as rows of the factor, bounds by an active set.
 
 use super::factor::TriangularFactor;
-use super::known::Known;
 use super::length::LengthTerm;
+use super::model::Known;
 use super::model::Model;
 use faer::Mat;
 

@@ -1,16 +1,16 @@
 //! One identification: choose what the data can see, fit it robustly, learn how much stays unmodelled, state the uncertainty.
 
-use super::autocorrelation::autocorrelation_time;
 use super::cluster::clustered;
 use super::covariance::Covariance;
 use super::factor::TriangularFactor;
-use super::known::PriorCheck;
 use super::levenberg::{Effort, FINE, Iteration, ROUGH_TOLERANCE, Stop, minimise};
 use super::model::Model;
+use super::model::PriorCheck;
 use super::observe::{Visibility, indices, visibility};
 use super::problem::{Evaluation, Problem};
+use super::problem::{as_of_three, bound, share};
+use super::repeats::autocorrelation_time;
 use super::repeats::{Poses, Repeated};
-use super::term::{as_of_three, bound, share};
 use crate::observation::{Dimension, ExcessSigma, Residual};
 use crate::robot::Measurements;
 use crate::statistics::{MEDIAN_CHI2, nearest};

@@ -5,12 +5,12 @@
 //! A fold's fit is the whole one less the fold's rows, one step away ([`NearbyFits`]). Where that step is not small, the fit is repeated
 //! instead.
 
+use super::contacts::without_places;
 use super::error_scale::ErrorScale;
 use super::fit::{FitOptions, ParameterStatus, fit};
 use super::fold_factors::NearbyFits;
-use super::left_out::without_places;
+use super::model::Session;
 use super::repeats::Poses;
-use super::session::Session;
 use crate::observation::contacts;
 use crate::robot::Measurements;
 use rand::SeedableRng;

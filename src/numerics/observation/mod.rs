@@ -12,7 +12,6 @@ mod point;
 mod residual;
 mod socket;
 mod sphere;
-mod weight;
 
 pub use crate::robot::{ColumnShape, Convention, Conventions, DeclaredColumn, Part};
 pub use distance::Distance;
@@ -21,10 +20,10 @@ pub use orientation::Orientation;
 pub use planar::Planar;
 pub use plane::PlaneKind;
 pub use point::PointKind;
+pub use residual::Weight;
 pub use residual::{ExcessSigma, Residual};
 pub use socket::SocketKind;
 pub use sphere::SphereKind;
-pub use weight::Weight;
 
 use crate::effect::{Closing, Direction, PlacedRow, PointMotion};
 use crate::robot::{Anchor, Measurements, Named, Reading, Readings, RobotModel, Shape};

@@ -1,9 +1,9 @@
 //! What is left of what a row measured of one kind.
 
-use super::{Dimension, MeasurementKind, RowView, Sensitivity, Weight};
+use super::{Dimension, MeasurementKind, RowView, Sensitivity};
 use crate::effect::PlacedRow;
 use crate::robot::Measurements;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 /// Standard deviation that rows show beyond their own noise.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -81,5 +81,70 @@ impl Residual {
     ) -> Sensitivity {
         let row = self.row;
         self.kind.sensitivity(RowView { data, row, placed }, weight)
+    }
+}
+
+/// Turns an error or a derivative (m or rad, three axes) into standard deviations.
+#[derive(Debug, Clone, Copy)]
+pub enum Weight {
+    /// The same inverse standard deviation of all numbers.
+    Uniform(f64),
+    /// Inverse standard deviation per axis; zero where not measured.
+    Axes(Vector3<f64>),
+    /// A matrix, e.g. the inverse of the covariance's Cholesky factor.
+    Full(Matrix3<f64>),
+    /// The share along a direction alone, on the first line.
+    Along(Vector3<f64>),
+}
+
+impl Weight {
+    /// The same standard deviation of all axes.
+    pub fn uniform(sigma: f64) -> Self {
+        Self::Uniform(1.0 / sigma)
+    }
+
+    /// The weight of a row's point with `excess` (m per axis) beside its own noise.
+    pub fn of(data: &Measurements, row: usize, excess: f64) -> Self {
+        let variance = data.points.sigma[row].map(|sigma| sigma * sigma + excess * excess);
+        let measured = |axis: usize| data.points.has(row, axis);
+        let full = data.spread.as_ref().map(|all| {
+            let covariance = all[row] + Matrix3::from_diagonal(&variance);
+            if data.has_point(row) {
+                return covariance;
+            }
+            // What was not measured stands apart, so that the others are weighted by their own covariance.
+            let apart = |i: usize, j: usize| if i == j { 1.0 } else { 0.0 };
+            Matrix3::from_fn(|i, j| {
+                if measured(i) && measured(j) {
+                    covariance[(i, j)]
+                } else {
+                    apart(i, j)
+                }
+            })
+        });
+        match full
+            .and_then(|covariance| covariance.cholesky())
+            .and_then(|factor| factor.l().try_inverse())
+        {
+            Some(inverse) if data.has_point(row) => Self::Full(inverse),
+            Some(inverse) => Self::Full(Matrix3::from_fn(|i, j| {
+                if measured(i) && measured(j) {
+                    inverse[(i, j)]
+                } else {
+                    0.0
+                }
+            })),
+            None => Self::Axes(variance.map(|value| 1.0 / value.sqrt())),
+        }
+    }
+
+    /// An error or a derivative in standard deviations.
+    pub fn apply(&self, error: &Vector3<f64>) -> Vector3<f64> {
+        match self {
+            Self::Uniform(weight) => error * *weight,
+            Self::Axes(weight) => error.component_mul(weight),
+            Self::Full(inverse) => inverse * error,
+            Self::Along(direction) => Vector3::new(direction.dot(error), 0.0, 0.0),
+        }
     }
 }

@@ -9,7 +9,7 @@ use super::site::Site;
 use super::{median, random_sets, subset};
 use crate::criteria::choose::{OFF, POSTURES};
 use crate::effect::{EffectContext, EffectStack, Load, arm_effect, names};
-use crate::estimate::closure::closed;
+use crate::estimate::contacts::closed;
 use crate::estimate::factor::TriangularFactor;
 use crate::estimate::model::Model;
 use crate::observation::{MeasurementKind, SocketKind, rank};

@@ -8,7 +8,6 @@ mod contact;
 mod exchange;
 mod point_jacobian;
 mod site;
-mod spread;
 mod t_optimal;
 mod visit_order;
 
@@ -16,8 +15,7 @@ pub use contact::{
     BallOffset, ContactProposal, ContactRequest, LeftOutPlace, PriorSigma, propose_contacts,
 };
 pub use point_jacobian::{PointJacobian, Score};
-pub use site::{Circumstances, Site};
-pub use spread::spread;
+pub use site::{Circumstances, Site, spread};
 pub use t_optimal::{
     Alternative, Discrimination, DiscriminationProblem, MIN_SEPARATION_L, Proposed, tell,
 };

@@ -6,7 +6,7 @@
 use crate::criteria::screen::SOLE;
 use crate::estimate::model::Model;
 use crate::estimate::problem::Problem;
-use crate::estimate::term::{HUBER, ObservationTerm};
+use crate::estimate::problem::{HUBER, ObservationTerm};
 use crate::observation::{KINDS, MeasurementKind, noise};
 use faer::Mat;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};

@@ -4,7 +4,6 @@
 //! Where too many rows stand out, or several in a row do, it is the model that is wrong, and the rows are kept.
 
 mod apart;
-mod corroborated;
 mod distance;
 mod kind;
 mod tail;
@@ -270,7 +269,7 @@ fn screen(
         };
         // A row that judges the model is not set aside by the model alone.
         let needs_more = residual.norm() <= 2.0 * free || asked.binary_search(&row).is_err();
-        let corroborated = corroborated::is_wrong(data, row, residual.norm());
+        let corroborated = kind::is_wrong(data, row, residual.norm());
         let among_many = crowded.contains(&set[row])
             && *distance < *BEYOND_CROWD * limit
             && !held.contains(&row);

@@ -1,16 +1,77 @@
-//! Contacts that no fitted row has: a socket, plane or sphere of rows that were left out is placed by these rows themselves, and the
-//! arm by the others. How well they close together there is what a calibration is worth at a place that it has not seen.
+//! Rows of contacts: joints at which everything closes, at which what such data show is counted; places that no fitted row has, put where the
+//! left-out rows say; a ball that was put back elsewhere on the tool.
+//!
+//! With the residuals left in, the scale of the arm and rotations of the cell look seen, by as much as the points scatter: the scatter
+//! of an arm that is a little smaller is a little smaller.
 
 use super::error_scale::ErrorScale;
+use super::factor::TriangularFactor;
 use super::fit::{FitOptions, fit};
 use super::levenberg::{FINE, minimise};
 use super::model::Model;
+use super::model::Session;
 use super::problem::Problem;
-use super::session::Session;
 use crate::effect::names;
-use crate::observation::contacts;
+use crate::observation::{RowView, contacts, kinds};
 use crate::robot::Measurements;
+use nalgebra::Vector3;
 use std::collections::{BTreeMap, BTreeSet};
+
+/// Steps towards joints that close; each squares what is left of the error.
+const STEPS: usize = 12;
+/// m; nothing is left.
+const CLOSED: f64 = 1e-14;
+
+impl Problem<'_> {
+    /// The data of all candidates from joints at which all contacts close; none where there is none.
+    pub fn shown(&self, model: &Model, candidates: &[usize]) -> Option<TriangularFactor> {
+        let data = closed(model, self.data, self.rows)?;
+        Some(
+            Problem {
+                data: &data,
+                ..*self
+            }
+            .observe(model, candidates)
+            .factor,
+        )
+    }
+}
+
+/// The measurements with joints that close in these rows; none where no row is a contact.
+pub(super) fn closed(model: &Model, data: &Measurements, rows: &[usize]) -> Option<Measurements> {
+    if !kinds(data).iter().any(|kind| kind.is_contact()) {
+        return None;
+    }
+    let mut out = data.clone();
+    let mut scratch = model.stack.scratch(&model.robot);
+    for row in rows {
+        for (kind, _) in contacts(data, *row) {
+            for _ in 0..STEPS {
+                let mut placed = model.place(&out, *row, &mut scratch);
+                let at = RowView {
+                    data: &out,
+                    row: *row,
+                    placed: &placed,
+                };
+                let error = kind.residual(at).map(|(error, _)| error);
+                let error = error.filter(|error| error.norm() > CLOSED);
+                let closing = kind.closing(at);
+                let Some(step) = closing
+                    .zip(error)
+                    .and_then(|(closing, error)| placed.closing_step(&closing, &error))
+                else {
+                    break;
+                };
+                let joints = &mut out.q[row * data.joints..(row + 1) * data.joints];
+                joints
+                    .iter_mut()
+                    .zip(step)
+                    .for_each(|(q, change)| *q += change);
+            }
+        }
+    }
+    Some(out)
+}
 
 /// Anchors that no row to fit names and others do, by their numbers, with the rows that do.
 fn unseen(
@@ -158,4 +219,62 @@ pub(super) fn without_places(
         by * scale.error(&other, data, *row, &mut scratch)
     };
     Some(part.iter().map(error).collect())
+}
+
+/// Where a ball was put back.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reseat {
+    /// The first row with it there.
+    pub row: usize,
+    /// How far it moved at least, m: the fit has taken up a part.
+    pub shift: f64,
+    /// The same in standard errors.
+    pub statistic: f64,
+}
+
+/// Beyond so many standard errors no chance among all places of a recording gets.
+const CERTAIN: f64 = 8.0;
+/// Rows on either side.
+const SIDE_FEWEST: usize = 6;
+/// Standard deviations to which single rows are cut: a slip of a plate is another matter.
+const CUT: f64 = 4.0;
+
+/// The place in the order of `rows` that parts them best, of rows that lay in sockets; `sigma` is what they scatter by, m per axis.
+pub fn reseated(model: &Model, data: &Measurements, rows: &[usize], sigma: f64) -> Option<Reseat> {
+    let socket = kinds(data)
+        .into_iter()
+        .find(|kind| kind.is_contact() && kind.about().axes == 3)?;
+    let mut scratch = model.stack.scratch(&model.robot);
+    let mut seen: Vec<(usize, Vector3<f64>)> = Vec::new();
+    for row in rows {
+        let placed = model.place(data, *row, &mut scratch);
+        if let Some((error, _)) = socket.residual(RowView {
+            data,
+            row: *row,
+            placed: &placed,
+        }) {
+            let off = placed.orientation().tr_mul(&error);
+            seen.push((*row, off * (CUT * sigma / off.norm().max(CUT * sigma))));
+        }
+    }
+    let total: Vector3<f64> = seen.iter().map(|(_, off)| off).sum();
+    let mut before = Vector3::zeros();
+    let mut best: Option<Reseat> = None;
+    for (count, (_, off)) in (1..).zip(&seen) {
+        before += off;
+        let after = seen.len() - count;
+        if count < SIDE_FEWEST || after < SIDE_FEWEST {
+            continue;
+        }
+        let apart = ((total - before) / after as f64 - before / count as f64).norm();
+        let statistic = apart / (sigma * (1.0 / count as f64 + 1.0 / after as f64).sqrt());
+        if statistic > best.map_or(CERTAIN, |best| best.statistic) {
+            best = Some(Reseat {
+                row: seen[count].0,
+                shift: apart,
+                statistic,
+            });
+        }
+    }
+    best
 }
