@@ -5,13 +5,12 @@
 //! `_s`; the position of a joint that slides is in mm. Rows count from 0 in errors, joints from 1.
 
 mod model;
-mod poses;
 mod recording;
 mod robot;
 mod run;
 
 pub use model::{Compensated, Diagnosis, Identified, Model, Options, diagnose, identify};
-pub use poses::{ProposedPoses, propose_poses};
 pub use recording::{Poses, Recording, Sigma};
 pub use robot::Robot;
 pub use run::{CalibRun, RunRequest, run};
+pub use run::{ProposedPoses, propose_poses};

@@ -4,7 +4,7 @@ use serde::Serialize;
 use std::collections::BTreeSet;
 
 use crate::diff::{DiffOptions, TableDiff, compare};
-use crate::error::{Error, Result, nearest};
+use crate::error::{Error, Result, did_you_mean};
 use crate::pipeline::{KeyChange, Manifest, OutputRecord, changes_of};
 use crate::store::Store;
 use crate::store::schema::{self, TableSchema};
@@ -102,13 +102,19 @@ pub fn compare_runs(
     };
     let mut tables = Vec::new();
     for name in order {
-        let of = |outputs: &[(String, OutputRecord)]| {
+        let record = |outputs: &[(String, OutputRecord)]| {
             outputs
                 .iter()
                 .find(|(other, _)| other == name)
                 .map(|(_, output)| output.clone())
         };
-        tables.push(table(store, name, of(&outputs_a), of(&outputs_b), options)?);
+        tables.push(table(
+            store,
+            name,
+            record(&outputs_a),
+            record(&outputs_b),
+            options,
+        )?);
     }
     Ok(RunDiff {
         a: summary_of(&left),
@@ -137,11 +143,8 @@ fn known_columns(kinds: &BTreeSet<&str>, options: &DiffOptions) -> Result<()> {
                 .iter()
                 .flat_map(|schema| &schema.fields)
                 .map(|field| field.name.as_str());
-            let hint = nearest(name, columns).map(|near| format!("; did you mean `{near}`?"));
-            let message = format!(
-                "no column `{name}` in any table that both runs have{}",
-                hint.unwrap_or_default()
-            );
+            let hint = did_you_mean(name, columns);
+            let message = format!("no column `{name}` in any table that both runs have{hint}");
             return Err(Error::spec(flag, message));
         }
     }

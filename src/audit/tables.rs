@@ -4,7 +4,7 @@ use serde::Serialize;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-use crate::error::{Error, Result, nearest};
+use crate::error::{Error, Result, did_you_mean};
 use crate::pipeline::Manifest;
 use crate::raw::parquet;
 use crate::store::schema::{self, ColumnType, TableSchema};
@@ -110,14 +110,13 @@ impl QueryTables {
             .flat_map(|table| [Some(table.name.as_str()), table.short.as_deref()])
             .flatten()
             .collect();
-        let hint = nearest(&spelled, names.iter().copied())
-            .map(|near| format!("; did you mean `{near}`?"));
+        let hint = did_you_mean(&spelled, names.iter().copied());
+        let end = if hint.is_empty() { "." } else { &hint };
         let known: Vec<&str> = self.iter().map(|table| table.name.as_str()).collect();
-        let hint = hint.unwrap_or_else(|| ".".into());
         Error::spec(
             "SQL",
             format!(
-                "run {} has no table `{name}`{hint} Its tables: {}",
+                "run {} has no table `{name}`{end} Its tables: {}",
                 self.run,
                 known.join(", ")
             ),

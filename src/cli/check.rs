@@ -6,7 +6,7 @@ use crate::error::{Error, Result, counted};
 use crate::init::{MarkedLines, marked};
 use crate::pipeline::{Plan, Purpose, Selection, look};
 use crate::progress::Verbosity;
-use crate::stage::{Identify, Stage};
+use crate::stage::{DeclaredStage, Identify};
 use crate::summary::{first_look, graph, labelled};
 use clap::Args;
 use std::ffi::OsString;

@@ -4,7 +4,7 @@ use super::emit_json;
 use super::execution_arguments::{CommandTask, ExecutionArguments, shown};
 use crate::error::{Error, Fault, Result};
 use crate::pipeline::{CompletedRun, Override, Plan, Purpose, Selection};
-use crate::stage::{Report, Stage};
+use crate::stage::{DeclaredStage, Report};
 use crate::store::Store;
 use clap::Args;
 use serde_json::json;

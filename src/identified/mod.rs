@@ -1,30 +1,26 @@
 //! The identified model of a run, or of tables that were taken out of a store: what commands are corrected with and what is exported.
 
 mod achieved;
-mod convention;
-mod robot_file;
-mod scatter;
 mod standing;
 mod torques;
-mod written;
 
 pub use achieved::{Achieved, RepeatedPose, achieved};
-pub use convention::{convention_of, counted_otherwise};
-pub use robot_file::robot_file;
+pub use standing::robot_file;
 use standing::unexplained_of;
+pub use standing::{convention_of, counted_otherwise};
 pub use standing::{standing_of, wrong_setup_of};
 pub use torques::IdentifiedTorques;
 
 use crate::compensate::{Coverage, Gate, GateLimits, IdentifiedArm, Scatter, Uncertainty};
 use crate::description::RobotDescription;
 use crate::effect::Load;
-use crate::error::{Error, Fault, Result, nearest};
+use crate::error::{Error, Fault, Result, instead};
 use crate::estimate::network::Correction;
 use crate::estimate::{Covariance, Model};
 use crate::pipeline::{Manifest, Plan, RunStatus, StageReport};
 use crate::raw::ending;
 use crate::robot::{JointConvention, Measurements, RobotModel};
-use crate::stage::{Diagnose, Stage};
+use crate::stage::{DeclaredStage, Diagnose};
 use crate::store::frame::Frame;
 use crate::store::{Store, TableRef};
 use crate::table::{
@@ -282,7 +278,7 @@ impl IdentifiedModel {
         let covariance = of_kind::<CovarianceTable>(tables)?;
         Ok(Self {
             covariance: covariance.and_then(|table| table.of_model(&own.model)),
-            scatter: scatter::of(tables, learned)?,
+            scatter: standing::of(tables, learned)?,
             ..own
         })
     }
@@ -470,7 +466,7 @@ impl IdentifiedModel {
             .clone()
             .map(|covariance| Uncertainty::new(arm, covariance, self.scatter));
         own.map(|own| match &self.data {
-            Some(data) => own.beside(arm, data),
+            Some(data) => own.with_recording(arm, data),
             None => own,
         })
     }
@@ -519,15 +515,9 @@ fn chosen<'m>(
         .copied()
         .ok_or_else(|| {
             let ids: Vec<&str> = found.iter().map(|(stage, _)| stage.id.as_str()).collect();
-            let hint = nearest(step, ids.iter().copied())
-                .map(|near| format!("did you mean `{near}`? "))
-                .unwrap_or_default();
             Error::spec(
                 "--step",
-                format!(
-                    "no stage `{step}` writes parameters; {hint}allowed: {}",
-                    ids.join(", ")
-                ),
+                format!("no stage `{step}` writes parameters{}", instead(step, &ids)),
             )
         })
 }

@@ -1,14 +1,23 @@
-//! The step that stands for a run, by what its stages wrote: what its closing line speaks of, and what is compensated and exported.
+//! What is read of a run next to its model: which step stands for it, how its controller counts its joints, how the arm scatters about the
+//! model; and a robot file by its path.
 
-use super::written::written;
-use crate::error::Result;
+use super::load;
+use crate::compensate::Scatter;
+use crate::description::RobotDescription;
+use crate::error::{Error, Result};
 use crate::pipeline::{Manifest, StageReport};
-use crate::stage::{Diagnose, Stage};
+use crate::raw;
+use crate::robot::import::{RobotFileText, read_calib, read_case};
+use crate::robot::{JointConvention, RobotModel};
+use crate::stage::ingest::Ingest;
+use crate::stage::{DeclaredStage, Diagnose};
+use crate::store::frame::Frame;
 use crate::store::{Store, TableRef};
 use crate::table::{
-    Corrected, Findings, Parameters, Prediction, Standing, Step, Table, Unseen, Verdict,
-    VerdictRow, standing,
+    Corrected, Corrections, Findings, JointConventions, Observability, Parameters, Prediction,
+    Robot, Standing, Step, Table, TablesByKind, Unseen, Verdict, VerdictRow, of_kind, standing,
 };
+use std::path::Path;
 
 /// What the last diagnosis of a run says of a wrong set-up; none where it is right. Fails where a table has left the store.
 pub fn wrong_setup_of(manifest: &Manifest, store: &Store) -> Result<Option<String>> {
@@ -48,7 +57,7 @@ fn diagnosed(manifest: &Manifest, store: &Store) -> Result<Option<(Verdict, Find
 /// The step that stands for a run; none where nothing predicts, the last diagnosis speaks of an outside simulation, or the set-up is
 /// wrong. Fails where a table has left the store.
 pub fn standing_of(manifest: &Manifest, store: &Store) -> Result<Option<Standing>> {
-    let of = |stage: &StageReport, kind: &str| -> Option<TableRef> {
+    let output = |stage: &StageReport, kind: &str| -> Option<TableRef> {
         stage
             .outputs
             .iter()
@@ -58,13 +67,13 @@ pub fn standing_of(manifest: &Manifest, store: &Store) -> Result<Option<Standing
     let steps = manifest
         .stages
         .iter()
-        .filter_map(|stage| Some((stage, of(stage, Prediction::KIND)?)));
+        .filter_map(|stage| Some((stage, output(stage, Prediction::KIND)?)));
     let diagnosed = steps
         .clone()
         .rfind(|(stage, _)| stage.uses == Diagnose::NAME);
     if let Some(table) = diagnosed
         .as_ref()
-        .and_then(|(stage, _)| of(stage, Parameters::KIND))
+        .and_then(|(stage, _)| output(stage, Parameters::KIND))
         && Parameters::from_frame(&store.load(&table)?)?.corrected() == Corrected::OutsideSimulation
     {
         return Ok(None);
@@ -76,7 +85,7 @@ pub fn standing_of(manifest: &Manifest, store: &Store) -> Result<Option<Standing
         let unseen = Unseen::of_frame(&store.load(&prediction)?)?;
         Ok(Step {
             id: stage.id.clone(),
-            own: of(stage, Parameters::KIND).is_some(),
+            own: output(stage, Parameters::KIND).is_some(),
             unseen,
         })
     };
@@ -85,4 +94,113 @@ pub fn standing_of(manifest: &Manifest, store: &Store) -> Result<Option<Standing
         &steps,
         diagnosed.map(|(stage, _)| stage.id.as_str()),
     ))
+}
+
+/// The convention of a run's recording, none where nothing was ingested: the twin logs its joints as its robot file counts them.
+/// Fails for a run of an earlier calib, which does not say.
+pub fn convention_of(manifest: &Manifest, store: &Store) -> Result<Option<JointConvention>> {
+    let convention = last::<JointConventions>(manifest, store)?
+        .map(|table| table.to_convention())
+        .transpose()?;
+    if convention.is_none()
+        && manifest
+            .stages
+            .iter()
+            .any(|stage| stage.uses == Ingest::NAME)
+    {
+        let message = format!(
+            "the run does not say how the controller counts its joints: an earlier calib made it. `calib run {}` writes it anew",
+            manifest.pipeline.file
+        );
+        return Err(Error::data(&manifest.run_id, message));
+    }
+    Ok(convention)
+}
+
+/// What differs from the robot file's counting at the controller of a run; none where nothing does, or the run does not say.
+pub fn counted_otherwise(manifest: &Manifest, store: &Store) -> Result<Option<String>> {
+    let Some(table) = last::<JointConventions>(manifest, store)? else {
+        return Ok(None);
+    };
+    let Some(robot) = last::<Robot>(manifest, store)? else {
+        return Ok(None);
+    };
+    Ok(table
+        .to_convention()?
+        .difference(&RobotModel::new(robot.to_description()?)))
+}
+
+fn last<T: Table>(manifest: &Manifest, store: &Store) -> Result<Option<T>> {
+    let mut outputs = manifest.stages.iter().flat_map(|stage| &stage.outputs);
+    let table: Option<&TableRef> = outputs
+        .rfind(|output| output.kind == T::KIND)
+        .map(|output| &output.table);
+    table
+        .map(|table| T::from_frame(&load(store, table, manifest)?))
+        .transpose()
+}
+
+/// The table of a kind that a stage wrote, if it wrote one.
+pub(super) fn written<T: Table>(
+    stage: &StageReport,
+    load: impl Fn(&TableRef) -> Result<Frame>,
+) -> Result<Option<T>> {
+    let own = stage.outputs.iter().find(|output| output.kind == T::KIND);
+    own.map(|output| T::from_frame(&load(&output.table)?))
+        .transpose()
+}
+
+/// The scatter by the stage whose model stands, and by the one that learned a correction on top of it.
+pub(super) fn of(stage: &TablesByKind, learned: Option<&TablesByKind>) -> Result<Scatter> {
+    let diagnosed: Option<Verdict> = of_kind(stage)?;
+    let fitted: Option<Observability> = of_kind(stage)?;
+    let prediction: Option<Prediction> = of_kind(stage)?;
+    let corrections: Option<Corrections> = learned.map_or(Ok(None), of_kind)?;
+    let repeatability = diagnosed
+        .and_then(|verdict| verdict.0.first().map(|row| row.repeatability_rad))
+        .or_else(|| {
+            fitted?
+                .0
+                .iter()
+                .find(|row| row.quantity == "joint_repeatability_rad")
+                .map(|row| row.value)
+        });
+    let mut unexplained = prediction.as_ref().map_or(0.0, Prediction::unexplained_mm);
+    if let (Some(rms), Some(prediction)) = (
+        corrections.as_ref().and_then(Corrections::rms_mm),
+        &prediction,
+    ) {
+        // The errors of a correction's folds hold the noise, the parameters' uncertainty and what is left.
+        let left = rms.powi(2) - prediction.mean_square_noise_mm2();
+        unexplained = unexplained.min((left / 3.0).max(0.0).sqrt());
+    }
+    Ok(Scatter {
+        unexplained: unexplained * 1e-3,
+        repeatability: repeatability.unwrap_or(0.0),
+    })
+}
+
+/// Reads a robot file by its ending: `.json` is the practice layout, all else calib's YAML, beside which a URDF may stand.
+pub fn robot_file(path: &Path, urdf: Option<&Path>) -> Result<RobotDescription> {
+    let read = |path: &Path| {
+        let label = path.display().to_string();
+        let text = raw::text(path)
+            .map_err(|error| Error::spec(&label, format!("cannot be read: {error}")))?;
+        Ok((label, text))
+    };
+    let (label, text) = read(path)?;
+    let file = RobotFileText {
+        label: &label,
+        text: &text,
+    };
+    if raw::ending(path) == "json" {
+        return Ok(read_case(file)?.robot);
+    }
+    let urdf = urdf.map(read).transpose()?;
+    Ok(read_calib(
+        file,
+        urdf.as_ref()
+            .map(|(label, text)| RobotFileText { label, text }),
+    )?
+    .robot)
 }

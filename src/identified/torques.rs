@@ -1,6 +1,6 @@
 //! What a run identified of the arm's torques: the model that motions are fed forward with and exports are made of.
 
-use super::written::written;
+use super::standing::written;
 use crate::description::RobotDescription;
 use crate::dynamics::{DynamicArm, TorqueModel};
 use crate::error::Result;

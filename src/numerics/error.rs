@@ -1,5 +1,6 @@
 //! Errors by reader: who can mend it decides the type, and the type decides the exit code.
 
+use std::ops::RangeInclusive;
 use std::{fmt, io};
 
 /// One fault with the place where it is: `stages[2].with.cycles`, `controller.csv:17`.
@@ -28,6 +29,60 @@ impl fmt::Display for Fault {
         } else {
             write!(f, "{}: {}", self.place, self.message)
         }
+    }
+}
+
+/// A place in settings, and the faults that were found so far.
+pub struct Place<'f> {
+    faults: &'f mut Vec<Fault>,
+    path: String,
+}
+
+impl Place<'_> {
+    /// What a check of all settings finds.
+    pub fn faults(check: impl FnOnce(&mut Place)) -> Vec<Fault> {
+        let mut faults = Vec::new();
+        let path = String::new();
+        check(&mut Place {
+            faults: &mut faults,
+            path,
+        });
+        faults
+    }
+    /// A key, or a path of keys, below this place.
+    pub fn at(&mut self, key: impl fmt::Display) -> Place<'_> {
+        let path = match self.path.as_str() {
+            "" => key.to_string(),
+            path => format!("{path}.{key}"),
+        };
+        let faults = &mut *self.faults;
+        Place { faults, path }
+    }
+    /// An item of the list at this place.
+    pub fn item(&mut self, index: usize) -> Place<'_> {
+        let path = format!("{}[{index}]", self.path);
+        let faults = &mut *self.faults;
+        Place { faults, path }
+    }
+    /// A fault of what stands here.
+    pub fn fault(&mut self, message: impl Into<String>) {
+        self.faults.push(Fault::new(&self.path, message));
+    }
+    /// A fault unless it holds.
+    pub fn must(&mut self, holds: bool, message: impl Into<String>) {
+        if !holds {
+            self.fault(message);
+        }
+    }
+    /// A fault unless a whole number is allowed.
+    pub fn whole(&mut self, value: usize, allowed: RangeInclusive<usize>) {
+        let (least, most) = (allowed.start(), allowed.end());
+        let message = format!("expected a whole number from {least} to {most}, not {value}");
+        self.must(allowed.contains(&value), message);
+    }
+    /// How many faults were found.
+    pub fn count(&self) -> usize {
+        self.faults.len()
     }
 }
 
@@ -69,6 +124,20 @@ impl Error {
             NotFound | NotADirectory | IsADirectory | InvalidInput => Self::data(place, message),
             _ => Self::store(place, message),
         }
+    }
+    /// Fails with faults of a specification, where there are any.
+    pub fn if_spec(faults: Vec<Fault>) -> Result<()> {
+        if faults.is_empty() {
+            return Ok(());
+        }
+        Err(Self::Spec(faults))
+    }
+    /// Fails with faults of the data, where there are any.
+    pub fn if_data(faults: Vec<Fault>) -> Result<()> {
+        if faults.is_empty() {
+            return Ok(());
+        }
+        Err(Self::Data(faults))
     }
     /// The exit code of the process that fails with this error.
     pub fn exit_code(&self) -> u8 {
@@ -143,15 +212,35 @@ pub fn nearest<'a>(given: &str, allowed: impl IntoIterator<Item = &'a str>) -> O
         .map(|(_, name)| name)
 }
 
+/// `; did you mean X?` where one of `allowed` is near to `given`; else nothing.
+pub fn did_you_mean<'a>(given: &str, allowed: impl IntoIterator<Item = &'a str>) -> String {
+    nearest(given, allowed).map_or_else(String::new, |name| format!("; did you mean `{name}`?"))
+}
+
 /// What may stand there instead: `; did you mean X? Allowed: X, Y`.
 pub fn instead(found: &str, allowed: &[&str]) -> String {
-    let hint =
-        nearest(found, allowed.iter().copied()).map(|name| format!("; did you mean `{name}`?"));
-    format!(
-        "{} Allowed: {}",
-        hint.unwrap_or_else(|| ".".into()),
-        allowed.join(", ")
-    )
+    let hint = did_you_mean(found, allowed.iter().copied());
+    let end = if hint.is_empty() { "." } else { &hint };
+    format!("{end} Allowed: {}", allowed.join(", "))
+}
+
+/// Names with commas, or `none`.
+pub fn listed<S: AsRef<str>>(names: impl IntoIterator<Item = S>) -> String {
+    let names: Vec<S> = names.into_iter().collect();
+    let names: Vec<&str> = names.iter().map(AsRef::as_ref).collect();
+    if names.is_empty() {
+        return "none".into();
+    }
+    names.join(", ")
+}
+
+/// The first `most` of some names, and how many more there are: `a, b and 3 more`.
+pub fn first_of(names: &[impl AsRef<str>], most: usize) -> String {
+    let shown: Vec<&str> = names.iter().take(most).map(AsRef::as_ref).collect();
+    match names.len().saturating_sub(most) {
+        0 => shown.join(", "),
+        more => format!("{} and {more} more", shown.join(", ")),
+    }
 }
 
 #[cfg(test)]

@@ -169,7 +169,6 @@ impl Sink for StoreSink {
         let file: FinishedFile = self.writer.finish()?;
         Ok(Streamed {
             kind: self.kind,
-            rows: file.table().rows,
             handle: Box::new(file),
         })
     }

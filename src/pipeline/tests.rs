@@ -6,8 +6,8 @@
 )]
 
 use super::*;
-use crate::error::{Error, Fault, Result};
-use crate::stage::{Context, Labelled, RawFile, Stage, StageEntry, reads, writes};
+use crate::error::{Error, Fault, Place, Result};
+use crate::stage::{Context, Labelled, RawFile, Stage, StageEntry, stage};
 use crate::store::Store;
 use crate::table::{Split, SplitRow, Truth, TruthRow};
 use schemars::JsonSchema;
@@ -28,21 +28,11 @@ struct Source {
     #[serde(default)]
     file: Option<RawFile>,
 }
-reads! { pub struct Nothing {} }
-writes! { pub struct SourceWrites { split: Split, } }
+stage! { Source, "source", 1, "makes a split", Nothing {} -> SourceWrites { split: Split, } }
 
 impl Stage for Source {
-    const NAME: &'static str = "source";
-    const SUMMARY: &'static str = "makes a split";
-    const IMPLEMENTATION: u32 = 1;
-    type Reads = Nothing;
-    type Writes = SourceWrites;
-    fn check(&self) -> Vec<Fault> {
-        if self.rows.get() > 1000 {
-            vec![Fault::new("rows", "at most 1000")]
-        } else {
-            Vec::new()
-        }
+    fn faults(&self, at: &mut Place) {
+        at.at("rows").must(self.rows.get() <= 1000, "at most 1000");
     }
     fn files(&self) -> Vec<(String, RawFile)> {
         self.file
@@ -79,15 +69,12 @@ impl Stage for Source {
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Count {}
-reads! { pub struct CountReads { last: Split, all: Vec<Labelled<Split>>, } }
-writes! { pub struct CountWrites { truth: Truth, } }
+stage! {
+    Count, "count", 3, "counts rows",
+    CountReads { last: Split, all: Vec<Labelled<Split>>, } -> CountWrites { truth: Truth, }
+}
 
 impl Stage for Count {
-    const NAME: &'static str = "count";
-    const SUMMARY: &'static str = "counts rows";
-    const IMPLEMENTATION: u32 = 3;
-    type Reads = CountReads;
-    type Writes = CountWrites;
     fn run(&self, reads: CountReads, _: &Context) -> Result<CountWrites> {
         let row = |name: &str, rows: usize| TruthRow {
             name: name.into(),

@@ -5,7 +5,7 @@ use super::site::site;
 use super::{Drive, PoseAnswer, PoseRequest, drive};
 use crate::description::RobotDescription;
 use crate::error::{Error, Fault, Result, counted};
-use crate::estimate::choose::{BroughtProposal, BroughtRequest, PriorSigma, propose_brought};
+use crate::estimate::choose::{ContactProposal, ContactRequest, PriorSigma, propose_contacts};
 use crate::robot::{JointConvention, RobotModel};
 use crate::units::Unit;
 use nalgebra::Vector3;
@@ -20,7 +20,7 @@ pub struct SocketProposal<'a> {
     places: Vec<[f64; 3]>,
     /// mm.
     sigma: f64,
-    proposal: BroughtProposal,
+    proposal: ContactProposal,
     /// No side of approach is proposed.
     direction: Vec<f64>,
 }
@@ -72,7 +72,7 @@ pub fn sockets<'a>(
         )]));
     }
     let shown = request.sigma.unwrap_or(SIGMA);
-    let wish = BroughtRequest {
+    let wish = ContactRequest {
         places: places.iter().map(|place| Vector3::from(*place)).collect(),
         count: request.count,
         candidates: request
@@ -83,7 +83,7 @@ pub fn sockets<'a>(
         priors: priors(),
         seed: request.seed,
     };
-    let proposal = propose_brought(&RobotModel::new(imported.clone()), &site, &wish)
+    let proposal = propose_contacts(&RobotModel::new(imported.clone()), &site, &wish)
         .map_err(|fault| Error::spec(place, fault))?;
     let joints = imported.joints.len();
     Ok(SocketProposal {
@@ -140,7 +140,7 @@ impl PoseAnswer for SocketProposal<'_> {
     }
 
     fn text(&self) -> String {
-        let BroughtProposal {
+        let ContactProposal {
             poses,
             sigma,
             sets,
@@ -223,7 +223,7 @@ impl PoseAnswer for SocketProposal<'_> {
     }
 
     fn document(&self) -> serde_json::Value {
-        let BroughtProposal {
+        let ContactProposal {
             sigma,
             without,
             offsets,

@@ -1,6 +1,6 @@
 //! Diagnoses held against the sealed truths: the scoreboard, and its table.
 
-use super::seal::SEALED;
+use super::set::SEALED;
 use crate::error::{Error, Result};
 use crate::raw;
 use crate::table::{Scoreboard, ScoreboardRow, Table};

@@ -2,10 +2,9 @@
 
 mod marks;
 mod recorded;
-mod seal;
 mod set;
 
 pub use marks::{LEFT_OUT, board, single_cause, write_scoreboard};
 pub use recorded::recorded;
-pub use seal::{RECORDINGS, SEAL, SEALED, Seal};
 pub use set::{ConcealedSet, conceal, vacant};
+pub use set::{RECORDINGS, SEAL, SEALED, Seal};

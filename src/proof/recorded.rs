@@ -51,7 +51,7 @@ pub fn recorded(
 fn touched(recording: &Recording) -> BTreeMap<String, String> {
     let mut files: BTreeMap<String, String> = BTreeMap::new();
     for row in 0..recording.rows() {
-        if let Some(name) = recording.brought(row) {
+        if let Some(name) = recording.contact(row) {
             let joints: Vec<String> = recording
                 .q(row)
                 .iter()

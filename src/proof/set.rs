@@ -1,12 +1,18 @@
 //! A set of concealed recordings as a folder: what a user has, and the truth of each apart.
 
-use super::seal::{RECORDINGS, SEALED, Seal};
-use crate::error::{Error, Result};
+use crate::error::{Error, Fault, Result};
 use crate::estimate::threads::in_order;
+use crate::raw;
 use crate::twin::conceal::case::Case;
 use crate::twin::conceal::design::{Content, Design};
 use crate::twin::torque::{TorqueCase, TorqueDesign};
-use std::path::Path;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
+use std::fmt::Debug;
+use std::fs;
+use std::io::ErrorKind;
+use std::path::{Component, Path, PathBuf};
 
 /// What a set is drawn from.
 #[derive(Debug, Clone, PartialEq)]
@@ -101,4 +107,116 @@ pub fn vacant(folder: &Path) -> Result<()> {
         ));
     }
     Ok(())
+}
+
+/// The format of this file.
+const FORMAT: u32 = 1;
+const HASH: &str = "SHA-256";
+/// Where what belongs to a set lies in its folder.
+pub const SEAL: &str = "seal.json";
+/// Folder of what is diagnosed.
+pub const RECORDINGS: &str = "recordings";
+/// Folder of the truths.
+pub const SEALED: &str = "sealed";
+
+/// Hashes by path below the folder of the set, with `/`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Seal {
+    calib_seal: u32,
+    hash: String,
+    /// Hash of the design that the set was drawn from: who goes on with a set can tell that it is the same, and nothing else.
+    #[serde(default)]
+    design: String,
+    files: BTreeMap<String, String>,
+}
+
+impl Seal {
+    pub(super) fn new(design: &impl Debug) -> Seal {
+        Seal {
+            calib_seal: FORMAT,
+            hash: HASH.into(),
+            design: digest(format!("{design:?}").as_bytes()),
+            files: BTreeMap::new(),
+        }
+    }
+
+    /// Whether the set was drawn from this design.
+    pub fn is_of(&self, design: &impl Debug) -> bool {
+        self.design == Seal::new(design).design
+    }
+
+    /// Writes a file of the set below `folder` and takes its hash in.
+    pub(super) fn write(&mut self, folder: &Path, name: String, text: &str) -> Result<()> {
+        let path = folder.join(&name);
+        let fault =
+            |error: std::io::Error| Error::store(path.display().to_string(), error.to_string());
+        if let Some(parent) = path.parent() {
+            fs::create_dir_all(parent).map_err(fault)?;
+        }
+        fs::write(&path, text).map_err(fault)?;
+        self.files.insert(name, digest(text.as_bytes()));
+        Ok(())
+    }
+
+    /// Reads the seal of a set.
+    pub fn read(folder: &Path) -> Result<Seal> {
+        let path = folder.join(SEAL);
+        let place = path.display().to_string();
+        let text = raw::text(&path).map_err(|error| Error::data(&place, error.to_string()))?;
+        let seal: Seal =
+            serde_json::from_str(&text).map_err(|error| Error::data(&place, error.to_string()))?;
+        if seal.calib_seal != FORMAT || seal.hash != HASH {
+            return Err(Error::data(
+                place,
+                format!("is no seal of format {FORMAT} with {HASH}"),
+            ));
+        }
+        Ok(seal)
+    }
+
+    /// Holds every file of the set in `folder` against its hash; fails with all that are missing or changed. Gives
+    /// their paths.
+    pub fn check(folder: &Path) -> Result<Vec<String>> {
+        let seal = Seal::read(folder)?;
+        let mut faults = Vec::new();
+        for (name, hash) in &seal.files {
+            // A seal comes from a file: it may not lead out of its folder.
+            let inside = Path::new(name)
+                .components()
+                .all(|part| matches!(part, Component::Normal(_)));
+            match if inside {
+                raw::bytes(&folder.join(name))
+            } else {
+                Err(ErrorKind::InvalidFilename.into())
+            } {
+                Ok(bytes) if digest(&bytes) == *hash => (),
+                Ok(_) => faults.push(Fault::new(name, "was changed since it was sealed")),
+                Err(error) => faults.push(Fault::new(
+                    name,
+                    format!("was sealed, but cannot be read: {error}"),
+                )),
+            }
+        }
+        Error::if_data(faults)?;
+        Ok(seal.files.into_keys().collect())
+    }
+
+    /// Writes the seal itself.
+    pub(super) fn close(&self, folder: &Path) -> Result<PathBuf> {
+        let path = folder.join(SEAL);
+        let text =
+            serde_json::to_string_pretty(self).map_err(|error| Error::Bug(error.to_string()))?;
+        fs::write(&path, text + "\n")
+            .map_err(|error| Error::store(path.display().to_string(), error.to_string()))?;
+        Ok(path)
+    }
+}
+
+/// SHA-256 in hexadecimal digits.
+fn digest(bytes: &[u8]) -> String {
+    Sha256::digest(bytes)
+        .iter()
+        .map(|byte| format!("{byte:02x}"))
+        .collect()
 }

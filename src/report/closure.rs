@@ -23,7 +23,7 @@ const ROW: f64 = 20.0;
 /// Fixtures in the picture; the table has all.
 const MOST: usize = 40;
 
-/// Nothing where no row was brought to a place, or nothing was predicted.
+/// Nothing where no row is a contact, or nothing was predicted.
 pub(super) fn section(tables: &Tables) -> Option<Value> {
     let all = closings(tables)?;
     let name = |table: Option<&Prediction>| {
@@ -64,7 +64,7 @@ fn closings(tables: &Tables) -> Option<Vec<FixtureFigures>> {
     let (first, last) = (tables.prediction.first()?, standing(tables)?);
     let mut rows: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
     for row in 0..tables.recording.rows() {
-        if let Some(name) = tables.recording.brought(row) {
+        if let Some(name) = tables.recording.contact(row) {
             rows.entry(name).or_default().push(row);
         }
     }

@@ -3,7 +3,7 @@
 
 use crate::diagnose::{CellAnswer, GivenCell, cell_evidence};
 use crate::effect::names;
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Place, Result};
 use crate::stage::{AskedRows, Context, Diagnose, DiagnoseReads, RawFile, Stage};
 use crate::table::{CellEvidence as CellEvidenceTable, CellEvidenceRow};
 use schemars::JsonSchema;
@@ -33,11 +33,11 @@ pub struct Given {
     pub size_mm: f64,
 }
 
-crate::stage::writes! {
-    /// Output ports of [`CellEvidence`].
-    pub struct CellEvidenceWrites {
-        cell_evidence: CellEvidenceTable,
-    }
+crate::stage::stage! {
+    CellEvidence, "cell_evidence", 2, "says what every possible cause explains of one robot, for the sum over a fleet",
+        DiagnoseReads -> CellEvidenceWrites {
+            cell_evidence: CellEvidenceTable,
+        }
 }
 
 /// ln of the evidence, of whole cells with a name and of all other rows, below which a row is left out: a fleet counts it as the least that a
@@ -45,24 +45,14 @@ crate::stage::writes! {
 const LEAST: [f64; 2] = [-2.0, -1.0];
 
 impl Stage for CellEvidence {
-    const NAME: &'static str = "cell_evidence";
-    const SUMMARY: &'static str =
-        "says what every possible cause explains of one robot, for the sum over a fleet";
-    const IMPLEMENTATION: u32 = 2;
-    type Reads = DiagnoseReads;
-    type Writes = CellEvidenceWrites;
-
-    fn check(&self) -> Vec<Fault> {
-        let below = |fault: Fault| Fault::new(format!("diagnose.{}", fault.place), fault.message);
-        let mut faults: Vec<Fault> = self.diagnose.check().into_iter().map(below).collect();
-        let wrong = |given: &Given| !(given.size_mm > 0.0 && given.size_mm < 1e3);
-        if let Some(k) = self.given.iter().position(wrong) {
-            faults.push(Fault::new(
-                format!("given[{k}].size_mm"),
+    fn faults(&self, at: &mut Place) {
+        self.diagnose.faults(&mut at.at("diagnose"));
+        for (k, given) in self.given.iter().enumerate() {
+            at.at(format!("given[{k}].size_mm")).must(
+                given.size_mm > 0.0 && given.size_mm < 1e3,
                 "expected a length above 0 and below 1000 mm",
-            ));
+            );
         }
-        faults
     }
 
     fn files(&self) -> Vec<(String, RawFile)> {

@@ -1,12 +1,12 @@
 //! `compare`: what changed on the robot since an earlier recording of it; the earlier model is the prior and the comparison.
 
 use crate::effect::{Load, names};
-use crate::error::Result;
-use crate::estimate::{FitOptions, Fitted, Model, Prior, Session, align, changes};
+use crate::error::{Place, Result};
+use crate::estimate::{FitOptions, Prior, align, changes};
 use crate::robot::{Measurements, NoiseBasis, RobotModel};
-use crate::stage::repeated::Repeatability;
-use crate::stage::screened::fit_rows;
-use crate::stage::{Context, RawFile, Stage, reads, writes};
+use crate::stage::screened::{FittedRows, fit_rows};
+use crate::stage::settings::Repeatability;
+use crate::stage::{Context, RawFile, Stage};
 use crate::table::{ChangeRow, Changes, Parameters, Recording, Robot, Split, Table, from_parquet};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -24,42 +24,25 @@ pub struct Compare {
     pub repeatability: Repeatability,
 }
 
-reads! {
-    /// Input ports of [`Compare`].
-    pub struct CompareReads {
-        robot: Robot,
-        recording: Recording,
-        split: Split,
-    }
-}
-writes! {
-    /// Output ports of `compare`.
-    pub struct CompareWrites {
-        changes: Changes,
-    }
+crate::stage::stage! {
+    Compare, "compare", 5, "tests which parameters changed since an earlier recording of the same robot",
+        CompareReads {
+            robot: Robot,
+            recording: Recording,
+            split: Split,
+        } -> CompareWrites {
+            changes: Changes,
+        }
 }
 
 impl Stage for Compare {
-    const NAME: &'static str = "compare";
-    const SUMMARY: &'static str =
-        "tests which parameters changed since an earlier recording of the same robot";
-    const IMPLEMENTATION: u32 = 5;
-    type Reads = CompareReads;
-    type Writes = CompareWrites;
-
-    fn check(&self) -> Vec<crate::error::Fault> {
-        let fault = |place: &str, message: &str| crate::error::Fault::new(place, message);
-        let one = self.previous_parameters.is_some() != self.previous_recording.is_some();
-        let missing = one.then(|| {
-            fault(
-                "previous_recording",
-                "`previous_parameters` and `previous_recording` go together",
-            )
-        });
-        missing
-            .into_iter()
-            .chain(self.repeatability.fault())
-            .collect()
+    fn faults(&self, at: &mut Place) {
+        let both = self.previous_parameters.is_some() == self.previous_recording.is_some();
+        at.at("previous_recording").must(
+            both,
+            "`previous_parameters` and `previous_recording` go together",
+        );
+        self.repeatability.faults(at);
     }
 
     fn files(&self) -> Vec<(String, RawFile)> {
@@ -77,9 +60,7 @@ impl Stage for Compare {
         let (Some(parameters), Some(recording)) =
             (&self.previous_parameters, &self.previous_recording)
         else {
-            context
-                .services
-                .note("no earlier model to compare with".into());
+            context.note("no earlier model to compare with");
             return Ok(CompareWrites {
                 changes: Changes::default(),
             });
@@ -95,6 +76,10 @@ impl Stage for Compare {
             Some(&reads.split),
             context,
         )?;
+        let (first, second) = (
+            first.fit.session(&first.data),
+            second.fit.session(&second.data),
+        );
         let (stack, specs) = (&first.model.stack, first.model.stack.specs());
         let first_causes: Vec<Vec<usize>> = ORDER
             .iter()
@@ -103,10 +88,10 @@ impl Stage for Compare {
         let precedence = |k: usize| {
             first_causes
                 .iter()
-                .position(|own| own.contains(&k))
+                .position(|parameters| parameters.contains(&k))
                 .unwrap_or(ORDER.len())
         };
-        let found = changes(&first.as_session(), &second.as_session(), precedence);
+        let found = changes(&first, &second, precedence);
         let mut rows = Vec::new();
         for change in found {
             let spec = &specs[change.parameter];
@@ -115,7 +100,7 @@ impl Stage for Compare {
             };
             let show = |value: f64| spec.unit.from_si(value);
             if let Some(rank) = change.rank {
-                context.services.note(format!(
+                context.note(format!(
                     "{rank}. {} {}: {} by {:.4e} +- {:.1e} {}",
                     effect(&before.effect),
                     spec.place,
@@ -171,7 +156,7 @@ fn table<T: Table>(context: &Context, file: &RawFile) -> Result<T> {
     let loose = from_parquet(&source.label, bytes)?;
     if !loose.vouched {
         let label = &source.label;
-        context.services.warn(format!(
+        context.warn(format!(
             "{label} carries no content hash: its content cannot be verified"
         ));
     }
@@ -181,20 +166,7 @@ fn table<T: Table>(context: &Context, file: &RawFile) -> Result<T> {
 /// A recording with its fit.
 struct FittedRecording {
     data: Measurements,
-    rows: Vec<usize>,
-    model: Model,
-    fitted: Fitted,
-}
-
-impl FittedRecording {
-    fn as_session(&self) -> Session<'_> {
-        Session {
-            data: &self.data,
-            rows: &self.rows,
-            model: &self.model,
-            fitted: &self.fitted,
-        }
-    }
+    fit: FittedRows,
 }
 
 impl Compare {
@@ -215,7 +187,7 @@ impl Compare {
             } else {
                 "the earlier"
             };
-            context.services.note(format!(
+            context.note(format!(
                 "{which} recording states no noise: rows are weighted by an assumed one"
             ));
         }
@@ -242,23 +214,13 @@ impl Compare {
             rows: &rows,
             candidates: &candidates,
         };
-        let (model, fitted, screening) = fit_rows(
+        let fit = fit_rows(
             &model,
             &data,
             &options,
             split.unwrap_or(&whole),
             split.is_some(),
         );
-        let rows = if split.is_some() {
-            screening.kept
-        } else {
-            rows
-        };
-        Ok(FittedRecording {
-            data,
-            rows,
-            model,
-            fitted,
-        })
+        Ok(FittedRecording { data, fit })
     }
 }

@@ -2,9 +2,9 @@
 
 use crate::dynamics::{ContactEvent, DiagnosedRecording, TorqueChange, TorqueModel, changes};
 use crate::error::{Error, Result, counted};
+use crate::stage::dynamic_arm::RecordedTorques;
 use crate::stage::dynamic_arm::dynamic_arm;
-use crate::stage::torque_signal::RecordedTorques;
-use crate::stage::{Chunks, Context, Stage, reads, writes};
+use crate::stage::{Chunks, Context, Stage};
 use crate::table::{ArmMotion, Contacts, Robot, TorqueChangeTable, TorqueParameters};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -14,33 +14,22 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields, default)]
 pub struct CompareTorques {}
 
-reads! {
-    /// Input ports of [`CompareTorques`].
-    pub struct CompareTorquesReads {
-        robot: Robot,
-        motion: Chunks<ArmMotion>,
-        parameters: TorqueParameters,
-        contacts: Contacts,
-        earlier_motion: Chunks<ArmMotion>,
-        earlier_parameters: TorqueParameters,
-        earlier_contacts: Contacts,
-    }
-}
-writes! {
-    /// Output ports of `compare_torques`.
-    pub struct CompareTorquesWrites {
-        changes: TorqueChangeTable,
-    }
+crate::stage::stage! {
+    CompareTorques, "compare_torques", 4, "tests what changed between two recordings of an arm's torques: payload, friction, offsets",
+        CompareTorquesReads {
+            robot: Robot,
+            motion: Chunks<ArmMotion>,
+            parameters: TorqueParameters,
+            contacts: Contacts,
+            earlier_motion: Chunks<ArmMotion>,
+            earlier_parameters: TorqueParameters,
+            earlier_contacts: Contacts,
+        } -> CompareTorquesWrites {
+            changes: TorqueChangeTable,
+        }
 }
 
 impl Stage for CompareTorques {
-    const NAME: &'static str = "compare_torques";
-    const SUMMARY: &'static str =
-        "tests what changed between two recordings of an arm's torques: payload, friction, offsets";
-    const IMPLEMENTATION: u32 = 4;
-    type Reads = CompareTorquesReads;
-    type Writes = CompareTorquesWrites;
-
     fn run(&self, reads: CompareTorquesReads, context: &Context) -> Result<CompareTorquesWrites> {
         if same_motion(&reads.motion, &reads.earlier_motion)? {
             let message = "both recordings are the same: name the earlier one's stages, e.g. `reads: {earlier_motion: before, \
@@ -75,15 +64,16 @@ impl Stage for CompareTorques {
             &diagnosed(&later, &second, &second_events),
         )?;
         let strongest = found.changes.iter().filter(|change| change.rank.is_some());
-        let told: Vec<&TorqueChange> = strongest.collect();
-        told.iter()
-            .for_each(|change| context.services.note(sentence(change)));
-        if told.is_empty() {
-            context.services.note("nothing changed beyond noise".into());
+        let ranked: Vec<&TorqueChange> = strongest.collect();
+        ranked
+            .iter()
+            .for_each(|change| context.note(sentence(change)));
+        if ranked.is_empty() {
+            context.note("nothing changed beyond noise");
         }
         for (joint, [before, after]) in (1..).zip(&found.rms) {
             let joint: usize = joint;
-            context.services.note(format!(
+            context.note(format!(
                 "joint {joint}: {before:.3} Nm rms are left where nothing changed, {after:.3} Nm with the changes"
             ));
         }
@@ -92,7 +82,7 @@ impl Stage for CompareTorques {
             .iter()
             .filter(|change| change.rank.is_none())
             .count();
-        context.services.note(format!(
+        context.note(format!(
             "{} held to be unchanged",
             counted(unchanged, "number")
         ));

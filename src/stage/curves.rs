@@ -40,7 +40,7 @@ pub(super) fn curves(
     for finding in &findings.0 {
         let forms = forms(finding)?;
         // A finding's forms are its identity: what it is called need not be any of theirs. A cause of the whole arm has none.
-        let is_own = |effect: &dyn Effect, k: usize| match effect.form() {
+        let is_of_finding = |effect: &dyn Effect, k: usize| match effect.form() {
             Some(form) => forms.contains(form),
             None => {
                 forms.is_empty()
@@ -48,13 +48,20 @@ pub(super) fn curves(
                     && specs[k].place.to_string() == finding.place
             }
         };
-        let own: Vec<usize> = model
+        let parameters_of_finding: Vec<usize> = model
             .stack
             .effects()
-            .flat_map(|(effect, range)| range.filter(move |k| is_own(effect, *k)))
+            .flat_map(|(effect, range)| range.filter(move |k| is_of_finding(effect, *k)))
             .collect();
-        if !own.is_empty() {
-            traced.push(TracedFinding::of(finding, forms, own, model, data, &whole));
+        if !parameters_of_finding.is_empty() {
+            traced.push(TracedFinding::of(
+                finding,
+                forms,
+                parameters_of_finding,
+                model,
+                data,
+                &whole,
+            ));
         }
     }
     // All derivatives of a row come at once: each row is placed once for all findings.
@@ -248,11 +255,11 @@ fn abscissa(
         )
     };
     let variables: Vec<Variable> = forms.iter().flat_map(|form| form.variables()).collect();
-    let own = joint.map(|joint| Variable::Angle { joint });
-    match own
-        .filter(|own| variables.contains(own))
+    let angle = joint.map(|joint| Variable::Angle { joint });
+    match angle
+        .filter(|angle| variables.contains(angle))
         .or(variables.first().copied())
-        .or(own)
+        .or(angle)
     {
         Some(Variable::Time) => time(),
         Some(Variable::Temperature | Variable::Lagging { .. }) => match data.temperature(row) {

@@ -1,28 +1,28 @@
 //! `diagnose`: where the recording and the robot as its user believes it differ, what physics was left out, and the gain of it.
 
-mod asked_rows;
-
-pub(super) use asked_rows::AskedRows;
-
-use crate::diagnose::{Diagnosis, KnownCell, Question, VerdictKind, diagnose, wrong_setup};
-use crate::effect::{CAUSES, names};
-use crate::error::{Error, Fault, Result, instead};
-use crate::estimate::Suspect;
-use crate::robot::Measurements;
-use crate::stage::blank_payload::blank_payload;
-use crate::stage::brought;
+use crate::diagnose::{
+    Diagnosis, KnownCell, Question, VerdictKind, against_simulation, diagnose, wrong_setup,
+};
+use crate::effect::{CAUSES, DeclaredCause, names};
+use crate::error::{Error, Place, Result, instead};
+use crate::estimate::{Session, gauge};
+use crate::observation::values;
+use crate::robot::{Measurements, RobotModel};
+use crate::stage::declared_effects::declared_effects;
 use crate::stage::doubtful::{self, KnownModel};
-use crate::stage::misplaced_tool::misplaced_tool;
-use crate::stage::own_effects::own_effects;
-use crate::stage::rounded::rounded_logs;
-use crate::stage::weightless::{WeightlessLinks, weightless_links};
-use crate::stage::{Context, RawFile, Stage};
+use crate::stage::remarks::blank_payload;
+use crate::stage::remarks::misplaced_tool;
+use crate::stage::remarks::must_move;
+use crate::stage::remarks::rounded_logs;
+use crate::stage::remarks::{WeightlessLinks, weightless_links};
+use crate::stage::{Context, RawFile, Stage, contact, screened};
 use crate::table::{
     Cells, Corrected, CovarianceTable, FindingNumbers, Findings, Forms, Parameters, Prediction,
     Recording, Rivals, Robot, Shares, Spectrum, Split, Suspects, Verdict, VerdictSentences,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// Settings of `diagnose`.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
@@ -100,97 +100,64 @@ const HEAVIEST: f64 = 10.0;
 const MOST_CLOSED: f64 = 0.001;
 const MOST_OPEN: f64 = 0.999;
 
-crate::stage::reads! {
-    /// Input ports of [`Diagnose`].
-    pub struct DiagnoseReads {
-        robot: Robot,
-        recording: Recording,
-        split: Split,
-    }
-}
-
-crate::stage::writes! {
-    /// Output ports of [`Diagnose`].
-    pub struct DiagnoseWrites {
-        verdict: Verdict,
-        sentences: VerdictSentences,
-        findings: Findings,
-        finding_numbers: FindingNumbers,
-        rivals: Rivals,
-        forms: Forms,
-        shares: Shares,
-        cells: Cells,
-        spectrum: Spectrum,
-        parameters: Parameters,
-        covariance: CovarianceTable,
-        prediction: Prediction,
-        suspects: Suspects,
-    }
+crate::stage::stage! {
+    Diagnose, "diagnose", 37, "locates where simulation and recording differ, and names the physics that the model leaves out",
+        DiagnoseReads {
+            robot: Robot,
+            recording: Recording,
+            split: Split,
+        } -> DiagnoseWrites {
+            verdict: Verdict,
+            sentences: VerdictSentences,
+            findings: Findings,
+            finding_numbers: FindingNumbers,
+            rivals: Rivals,
+            forms: Forms,
+            shares: Shares,
+            cells: Cells,
+            spectrum: Spectrum,
+            parameters: Parameters,
+            covariance: CovarianceTable,
+            prediction: Prediction,
+            suspects: Suspects,
+        }
 }
 
 impl Stage for Diagnose {
-    const NAME: &'static str = "diagnose";
-    const SUMMARY: &'static str = "locates where simulation and recording differ, and names the physics that the model leaves out";
-    const IMPLEMENTATION: u32 = 37;
-    type Reads = DiagnoseReads;
-    type Writes = DiagnoseWrites;
-
-    fn check(&self) -> Vec<Fault> {
-        let mut faults: Vec<Fault> = crate::stage::no_set(&self.on, "fit").into_iter().collect();
-        if !(0.0..=HEAVIEST).contains(&self.prior_weight) {
-            faults.push(Fault::new(
-                "prior_weight",
-                format!("expected a number from 0 to {HEAVIEST}"),
-            ));
-        }
-        if !(MOST_CLOSED..=MOST_OPEN).contains(&self.open_world) {
-            faults.push(Fault::new(
-                "open_world",
-                format!("expected a probability from {MOST_CLOSED} to {MOST_OPEN}"),
-            ));
-        }
+    fn faults(&self, at: &mut Place) {
+        crate::stage::must_name_sets(&self.on, "fit", at);
+        at.at("prior_weight").must(
+            (0.0..=HEAVIEST).contains(&self.prior_weight),
+            format!("expected a number from 0 to {HEAVIEST}"),
+        );
+        at.at("open_world").must(
+            (MOST_CLOSED..=MOST_OPEN).contains(&self.open_world),
+            format!("expected a probability from {MOST_CLOSED} to {MOST_OPEN}"),
+        );
         for (k, prior) in self.prior.iter().enumerate() {
             let sizes = [prior.size_mm, prior.size_mm + prior.spread_mm];
-            if !(0.0..=1.0).contains(&prior.share) {
-                faults.push(Fault::new(
-                    format!("prior[{k}].share"),
-                    "expected a share from 0 to 1",
-                ));
-            }
-            if !sizes.iter().all(|size| (1e-3..=30.0).contains(size)) || prior.spread_mm < 0.0 {
-                faults.push(Fault::new(
-                    format!("prior[{k}].size_mm"),
-                    "expected sizes from 0.001 to 30 mm and a spread_mm of 0 or more",
-                ));
-            }
+            let possible =
+                sizes.iter().all(|size| (1e-3..=30.0).contains(size)) && prior.spread_mm >= 0.0;
+            let mut at = at.at(format!("prior[{k}]"));
+            at.at("share").must(
+                (0.0..=1.0).contains(&prior.share),
+                "expected a share from 0 to 1",
+            );
+            at.at("size_mm").must(
+                possible,
+                "expected sizes from 0.001 to 30 mm and a spread_mm of 0 or more",
+            );
         }
-        let tried = || {
-            CAUSES
-                .iter()
-                .filter(|cause| !cause.is_nameless())
-                .map(|cause| cause.name())
-        };
-        for (k, name) in self
-            .without
-            .iter()
-            .enumerate()
-            .filter(|(_, name)| !tried().any(|other| other == name.as_str()))
-        {
-            let allowed: Vec<&str> = tried().collect();
-            faults.push(Fault::new(
-                format!("without[{k}]"),
+        let named = CAUSES.iter().filter(|cause| !cause.is_nameless());
+        let allowed: Vec<&str> = named.map(|cause| cause.name()).collect();
+        for (k, name) in self.without.iter().enumerate() {
+            let mut at = at.at(format!("without[{k}]"));
+            at.must(
+                allowed.contains(&name.as_str()),
                 format!("`{name}` is no cause{}", instead(name, &allowed)),
-            ));
+            );
+            at.must(name != names::BASE_FRAME, "`base_frame` places the robot before the instrument: without it nothing can be diagnosed");
         }
-        if let Some(k) = self
-            .without
-            .iter()
-            .position(|name| name == names::BASE_FRAME)
-        {
-            let message = "`base_frame` places the robot before the instrument: without it nothing can be diagnosed";
-            faults.push(Fault::new(format!("without[{k}]"), message));
-        }
-        faults
     }
 
     fn files(&self) -> Vec<(String, RawFile)> {
@@ -206,7 +173,7 @@ impl Stage for Diagnose {
         _reads: Option<DiagnoseReads>,
         context: &Context,
     ) -> Result<Option<DiagnoseWrites>> {
-        own_effects(&self.effects, context).map(|_| None)
+        declared_effects(&self.effects, context).map(|_| None)
     }
 
     fn sets_named(&self) -> Vec<(String, String)> {
@@ -229,14 +196,12 @@ impl Stage for Diagnose {
         let mut steps = 0;
         let tell = |line: String| {
             steps += 1;
-            context.services.note(line.clone());
+            context.note(line.clone());
             context.services.advance(steps, &line);
         };
         let diagnosis = wrong_setup(&question).unwrap_or_else(|| diagnose(&question, tell));
         let mut diagnosis = with_remarks(diagnosis, &question, context)?;
-        blank_payload(&reads.recording)
-            .into_iter()
-            .for_each(|line| context.services.warn(line));
+        context.warn_each(blank_payload(&reads.recording));
         if !matches!(
             diagnosis.verdict,
             VerdictKind::WrongSetup | VerdictKind::NotAsked
@@ -253,12 +218,6 @@ impl Stage for Diagnose {
             .folds
             .iter()
             .flat_map(|folds| kept.iter().zip(folds.random.iter().zip(&folds.blocks)));
-        let aside = diagnosis
-            .screening
-            .suspects
-            .iter()
-            .filter(|suspect| !suspect.used())
-            .map(|Suspect { row, .. }| *row);
         let unseen: Vec<usize> = (0..data.rows()).filter(|row| held_out[*row]).collect();
         let known = covariance.filter(|_| {
             corrected == Corrected::RobotFile && diagnosis.verdict != VerdictKind::WrongSetup
@@ -277,7 +236,7 @@ impl Stage for Diagnose {
             &held_out,
             covariance,
         )
-        .with_suspects(aside)
+        .with_suspects(diagnosis.screening.set_aside())
         .with_weights(&diagnosis.kept, &diagnosis.fitted)
         .with_folds(errors)
         .with_remarks(doubtful.remarks(data, &unseen));
@@ -302,7 +261,7 @@ impl Stage for Diagnose {
     }
 }
 
-/// What a diagnosed recording shows beside its findings: rounded logs and brought marks in the statement too, a tool out of place as a warning.
+/// What a diagnosed recording shows in addition to its findings: rounded logs and events at contacts in the statement too, a tool out of place as a warning.
 fn remark(
     diagnosis: &mut Diagnosis,
     data: &Measurements,
@@ -316,20 +275,18 @@ fn remark(
         .filter(|row| data.has_point(*row))
         .collect();
     let rounded = rounded_logs(&diagnosis.model, data, &points);
-    let events = brought::events(
-        &diagnosis.model,
-        &diagnosis.fitted,
+    let session = Session {
         data,
-        recording,
-        &diagnosis.kept,
-    );
+        rows: &diagnosis.kept,
+        model: &diagnosis.model,
+        fitted: &diagnosis.fitted,
+    };
+    let events = contact::events(&session, recording);
     for line in rounded.into_iter().chain(events) {
         diagnosis.statement.push_str(&format!("; {line}"));
-        context.services.warn(line);
+        context.warn(line);
     }
-    misplaced_tool(&diagnosis.model, &diagnosis.fitted)
-        .into_iter()
-        .for_each(|line| context.services.warn(line));
+    context.warn_each(misplaced_tool(&diagnosis.model, &diagnosis.fitted));
 }
 
 /// Tells a person at once what must not be read past: a wrong set-up, too few rows, and what cannot be known without masses.
@@ -339,11 +296,9 @@ fn with_remarks(
     context: &Context,
 ) -> Result<Diagnosis> {
     match diagnosis.verdict {
-        VerdictKind::NotAsked => context.services.warn(diagnosis.not_observable.join("; ")),
+        VerdictKind::NotAsked => context.warn(diagnosis.not_observable.join("; ")),
         VerdictKind::WrongSetup => match diagnosis.findings.first() {
-            Some(finding) => context
-                .services
-                .warn(format!("the set-up is wrong: {}", finding.statement)),
+            Some(finding) => context.warn(format!("the set-up is wrong: {}", finding.statement)),
             None => return Err(Error::data("table recording", diagnosis.statement)),
         },
         _ => {
@@ -351,9 +306,106 @@ fn with_remarks(
                 weightless_links(question.robot, question.data, question.fit)
             {
                 diagnosis.statement.push_str(&format!("; {missing}"));
-                context.services.warn(warning);
+                context.warn(warning);
             }
         }
     }
     Ok(diagnosis)
+}
+
+/// Fewest rows that place a robot before the tracker; what is missing takes more of them.
+const FEWEST: usize = 3;
+
+const SORTED_OTHERWISE: &str = "rows stand in another order than their times (sorted by name?): approach, lag and drift follow the times";
+
+/// The rows that a diagnosis is asked of, and the robot that they belong to.
+pub(super) struct AskedRows {
+    own: Vec<&'static DeclaredCause>,
+    known: Vec<KnownCell>,
+    pub data: Measurements,
+    pub corrected: Corrected,
+    pub fit: Vec<usize>,
+    validate: Vec<usize>,
+    robot: RobotModel,
+    set: Vec<usize>,
+}
+
+impl AskedRows {
+    /// Of the tables of a stage with these settings; fails where they do not place the robot.
+    pub fn of(settings: &Diagnose, reads: &DiagnoseReads, context: &Context) -> Result<Self> {
+        let own = declared_effects(&settings.effects, context)?;
+        let asked = reads.split.rows(&reads.recording, &settings.on)?;
+        let (data, corrected) = mismatch(reads, &asked, context)?;
+        if data.sequence.is_some() {
+            context.warn(SORTED_OTHERWISE);
+        }
+        let measured = |row: &usize| values(&data, *row) > 0;
+        let fit: Vec<usize> = asked.iter().copied().filter(measured).collect();
+        if fit.len() < FEWEST {
+            let message = format!(
+                "{} measured rows to fit do not even place the robot: at least {FEWEST} are needed",
+                fit.len()
+            );
+            return Err(Error::data("table recording", message));
+        }
+        must_move(&data, &fit)?;
+        let validate: Vec<usize> = (0..data.rows())
+            .filter(|row| asked.binary_search(row).is_err() && measured(row))
+            .collect();
+        let (robot, _) = gauge(
+            RobotModel::new(reads.robot.to_description()?),
+            &data,
+            &fit,
+            &BTreeMap::new(),
+        )
+        .map_err(|message| Error::data("table recording", message))?;
+        let set = screened::numbered(&reads.split);
+        Ok(Self {
+            own,
+            known: settings.prior.iter().map(CellPrior::known).collect(),
+            data,
+            corrected,
+            fit,
+            validate,
+            robot,
+            set,
+        })
+    }
+
+    /// What is asked of them.
+    pub fn question<'a>(&'a self, settings: &'a Diagnose, seed: u64) -> Question<'a> {
+        Question {
+            robot: &self.robot,
+            data: &self.data,
+            fit: &self.fit,
+            validate: &self.validate,
+            set: &self.set,
+            prior_weight: settings.prior_weight,
+            open_world: settings.open_world,
+            without: &settings.without,
+            own: &self.own,
+            beside_simulation: self.corrected == Corrected::OutsideSimulation,
+            known: &self.known,
+            seed,
+        }
+    }
+}
+
+/// What is diagnosed, and what its parameters correct: the measurements, or what they differ by from an outside simulation.
+fn mismatch(
+    reads: &DiagnoseReads,
+    asked: &[usize],
+    context: &Context,
+) -> Result<(Measurements, Corrected)> {
+    let data = reads.recording.measurements();
+    let Some(simulated) = &reads.recording.simulated else {
+        return Ok((data, Corrected::RobotFile));
+    };
+    let robot = RobotModel::new(reads.robot.to_description()?);
+    let message = "aligning simulation and recording needs three rows to fit with sim_x, sim_y, sim_z and a measured point";
+    let data = against_simulation(&robot, &data, simulated, asked)
+        .ok_or_else(|| Error::data("table recording", message))?;
+    context.note("the mismatch is measured minus simulated (sim_x, sim_y, sim_z)");
+    context.warn("parameters correct that simulation: they are not the robot file's");
+    Ok((data, Corrected::OutsideSimulation))
 }

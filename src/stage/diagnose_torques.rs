@@ -1,10 +1,10 @@
 //! `diagnose_torques`: which physics the rigid inverse dynamics of the robot file lacks while the arm moves.
 
 use crate::dynamics::{TorqueQuestion, TorqueSource, diagnose};
-use crate::error::{Error, Fault, Result, counted};
+use crate::error::{Error, Place, Result, counted};
+use crate::stage::dynamic_arm::{HeldOut, RecordedTorques};
 use crate::stage::dynamic_arm::{dynamic_arm, must_be_bodies};
-use crate::stage::torque_signal::{HeldOut, RecordedTorques};
-use crate::stage::{Chunks, Context, Stage, reads, writes};
+use crate::stage::{Chunks, Context, Stage};
 use crate::table::{
     ArmMotion, BodyConsistencies, Contacts, FrictionCurves, Inertials, JointTorques, Robot,
     TorqueCourse, TorqueCovariance, TorqueFindings, TorqueNumbers, TorqueParameters, TorqueRivals,
@@ -81,80 +81,58 @@ fn fit() -> Vec<String> {
 /// Share of the rows that is held out where nothing is said.
 const LAST: f64 = 0.3;
 
-reads! {
-    /// Input ports of [`DiagnoseTorques`].
-    pub struct DiagnoseTorquesReads {
-        robot: Robot,
-        motion: Chunks<ArmMotion>,
-    }
-}
-writes! {
-    /// Output ports of [`DiagnoseTorques`].
-    pub struct DiagnoseTorquesWrites {
-        verdict: TorqueVerdict,
-        sentences: VerdictSentences,
-        findings: TorqueFindings,
-        numbers: TorqueNumbers,
-        rivals: TorqueRivals,
-        joints: JointTorques,
-        course: TorqueCourse,
-        friction: FrictionCurves,
-        inertials: Inertials,
-        contacts: Contacts,
-        consistency: BodyConsistencies,
-        parameters: TorqueParameters,
-        covariance: TorqueCovariance,
-    }
+crate::stage::stage! {
+    DiagnoseTorques, "diagnose_torques", 14, "names the physics that the simulated torques of a moving arm lack",
+        DiagnoseTorquesReads {
+            robot: Robot,
+            motion: Chunks<ArmMotion>,
+        } -> DiagnoseTorquesWrites {
+            verdict: TorqueVerdict,
+            sentences: VerdictSentences,
+            findings: TorqueFindings,
+            numbers: TorqueNumbers,
+            rivals: TorqueRivals,
+            joints: JointTorques,
+            course: TorqueCourse,
+            friction: FrictionCurves,
+            inertials: Inertials,
+            contacts: Contacts,
+            consistency: BodyConsistencies,
+            parameters: TorqueParameters,
+            covariance: TorqueCovariance,
+        }
 }
 
 impl Stage for DiagnoseTorques {
-    const NAME: &'static str = "diagnose_torques";
-    const SUMMARY: &'static str =
-        "names the physics that the simulated torques of a moving arm lack";
-    const IMPLEMENTATION: u32 = 14;
-    type Reads = DiagnoseTorquesReads;
-    type Writes = DiagnoseTorquesWrites;
-
-    fn check(&self) -> Vec<Fault> {
-        let mut faults: Vec<Fault> = crate::stage::no_set(&self.on, "fit").into_iter().collect();
+    fn faults(&self, at: &mut Place) {
+        crate::stage::must_name_sets(&self.on, "fit", at);
         match &self.hold_out {
-            Some(HoldOut::Last(share)) if !(*share > 0.0 && *share < 1.0) => {
-                faults.push(Fault::new("hold_out.last", "allowed: above 0 and below 1"));
-            }
-            Some(HoldOut::Trajectories(all)) if all.is_empty() => {
-                faults.push(Fault::new(
-                    "hold_out.trajectories",
-                    "name at least one, e.g. [4]",
-                ));
-            }
-            Some(HoldOut::EverySecond(n)) if *n < 2 => {
-                faults.push(Fault::new("hold_out.every_second", "allowed: 2 and above"));
-            }
-            _ => {}
+            Some(HoldOut::Last(share)) => at
+                .at("hold_out.last")
+                .must(*share > 0.0 && *share < 1.0, "allowed: above 0 and below 1"),
+            Some(HoldOut::Trajectories(all)) => at
+                .at("hold_out.trajectories")
+                .must(!all.is_empty(), "name at least one, e.g. [4]"),
+            Some(HoldOut::EverySecond(n)) => at
+                .at("hold_out.every_second")
+                .must(*n >= 2, "allowed: 2 and above"),
+            None => {}
         }
-        if self
-            .cutoff_hz
-            .is_some_and(|hz| !(hz > 0.0 && hz.is_finite()))
-        {
-            faults.push(Fault::new("cutoff_hz", "expected a frequency above 0, Hz"));
-        }
-        if self.consistency == ConsistencySetting::Enforce
-            && self.inertials == InertialSetting::Free
-        {
-            let message = "`enforce` needs declared masses: base parameters stand for many arms, of which some are bodies; allowed with \
-                           `inertials: free`: report";
-            faults.push(Fault::new("consistency", message));
-        }
-        faults
+        let possible = self.cutoff_hz.is_none_or(|hz| hz > 0.0 && hz.is_finite());
+        at.at("cutoff_hz")
+            .must(possible, "expected a frequency above 0, Hz");
+        at.at("consistency").must(
+            self.consistency == ConsistencySetting::Report || self.inertials == InertialSetting::Declared,
+            "`enforce` needs declared masses: base parameters stand for many arms, of which some are bodies; allowed with \
+             `inertials: free`: report",
+        );
     }
 
     fn run(&self, reads: DiagnoseTorquesReads, context: &Context) -> Result<DiagnoseTorquesWrites> {
         let robot = reads.robot.to_description()?;
         must_be_bodies(&robot)?;
         let (mut arm, notes) = dynamic_arm(&robot)?;
-        notes
-            .into_iter()
-            .for_each(|note| context.services.note(note));
+        notes.into_iter().for_each(|note| context.note(note));
         let free = self.inertials == InertialSetting::Free;
         if free {
             arm.links = None;
@@ -172,13 +150,11 @@ impl Stage for DiagnoseTorques {
             without: self.without.clone(),
             enforce_bodies,
         };
-        let diagnosis = diagnose(&arm, &recording, &question, &mut |line| {
-            context.services.note(line)
-        })?;
+        let diagnosis = diagnose(&arm, &recording, &question, &mut |line| context.note(line))?;
         diagnosis
             .remarks
             .iter()
-            .for_each(|remark| context.services.note(remark.clone()));
+            .for_each(|remark| context.note(remark.clone()));
         let sequence = sequences(&reads.motion, &diagnosis.courses.row)?;
         Ok(DiagnoseTorquesWrites {
             verdict: TorqueVerdict::of(context.id, &diagnosis, recording.is_current()),
@@ -236,9 +212,9 @@ impl MotionLabels {
 fn sequences(motion: &Chunks<ArmMotion>, rows: &[usize]) -> Result<Vec<i64>> {
     let (mut first, mut sequences) = (0, Vec::with_capacity(rows.len()));
     motion.each(|chunk| {
-        let own = &rows[sequences.len()..];
-        let own = &own[..own.partition_point(|row| *row < first + chunk.rows())];
-        sequences.extend(own.iter().map(|row| chunk.sequence[row - first]));
+        let here = &rows[sequences.len()..];
+        let here = &here[..here.partition_point(|row| *row < first + chunk.rows())];
+        sequences.extend(here.iter().map(|row| chunk.sequence[row - first]));
         first += chunk.rows();
         Ok(())
     })?;
@@ -273,7 +249,7 @@ impl DiagnoseTorques {
                 !label.is_some_and(|label| self.on.contains(label))
             }),
             None => {
-                context.services.note(format!(
+                context.note(format!(
                     "no row is labelled with its use: the last {:.0} % are held out (`hold_out`)",
                     100.0 * LAST
                 ));
@@ -296,7 +272,7 @@ impl DiagnoseTorques {
             );
             return Err(Error::data("with.on", message));
         }
-        context.services.note(format!(
+        context.note(format!(
             "{} to fit, {judging} held out",
             counted((rows - judging) as u64, "row")
         ));

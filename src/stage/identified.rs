@@ -1,14 +1,17 @@
 //! What identifications share: the choice of load, and what they hand back (model, course, visibility, residuals).
 
 use crate::effect::Load;
-use crate::error::counted;
-use crate::estimate::{CONFLICT, Fitted, Model, ParameterStatus, Screening, Session, Suspect};
+use crate::error::{Result, counted};
+use crate::estimate::{CONFLICT, Covariance, ParameterStatus, Session};
 use crate::observation::noise;
 use crate::robot::{Measurements, NoiseBasis, RobotModel};
-use crate::stage::advice::advice;
+use crate::stage::Context;
 use crate::stage::doubtful::KnownModel;
-use crate::stage::folding::FoldSetting;
-use crate::stage::{Context, computed, repeated, screened};
+use crate::stage::doubtful::advice;
+use crate::stage::doubtful::suspicion;
+use crate::stage::screened::{self, FittedRows};
+use crate::stage::settings::FoldSetting;
+use crate::stage::settings::note_repeats;
 use crate::table::{
     CovarianceTable, Fit, FitContext, Observability, Parameters, Prediction, Recording, Split,
     Suspects,
@@ -54,7 +57,7 @@ macro_rules! identification {
             /// What is known of parameters beforehand, by name: `{link_geometry.*: {sigma: 0.1}}`, in the unit of the table
             /// `parameters`; of several patterns that match the longest counts.
             #[serde(default)]
-            pub prior: std::collections::BTreeMap<String, crate::stage::parameter_set::PriorSetting>,
+            pub prior: std::collections::BTreeMap<String, crate::stage::settings::PriorSetting>,
             /// Between which values parameters may change from nominal, by name: `{reduction_ratio.*: [-5e-4, 5e-4]}`, in the unit of
             /// the table `parameters`.
             #[serde(default)]
@@ -68,16 +71,16 @@ macro_rules! identification {
             /// How well joints come back to a pose: `measured` from poses that the recording returns to, `ignored`, or
             /// `{arcsec: 3}`.
             #[serde(default)]
-            pub repeatability: crate::stage::repeated::Repeatability,
+            pub repeatability: crate::stage::settings::Repeatability,
             /// Cross-validation: the fit is repeated without each of so many parts of its poses, drawn at random, and again without
             /// each contiguous stretch; 0 for none, `n` without each pose in turn.
             #[serde(default)]
-            pub folds: crate::stage::folding::FoldSetting,
+            pub folds: crate::stage::settings::FoldSetting,
         }
 
         impl $name {
-            fn parameter_set(&self) -> crate::stage::parameter_set::ParameterSet<'_> {
-                crate::stage::parameter_set::ParameterSet {
+            fn parameter_set(&self) -> crate::stage::settings::ParameterSet<'_> {
+                crate::stage::settings::ParameterSet {
                     free: self.free.as_deref(),
                     hold: &self.hold,
                     prior: &self.prior,
@@ -85,13 +88,26 @@ macro_rules! identification {
                 }
             }
 
+            /// The fit of these candidates to the rows, weighted by the joints' repeatability.
+            fn fit(
+                &self,
+                model: &crate::estimate::Model,
+                candidates: &[usize],
+                asked: &mut crate::stage::identified::RowsToFit,
+                context: &crate::stage::Context,
+            ) -> crate::stage::screened::FittedRows {
+                let crate::stage::identified::RowsToFit { data, rows, .. } = asked;
+                asked.repeatability = self.repeatability.apply(model, data, rows, context);
+                let options = crate::estimate::FitOptions { rows, candidates };
+                crate::stage::screened::fit_rows(model, data, &options, asked.split, self.screen)
+            }
+
             /// Faults of the settings that all identifications share; `example` names a set.
-            fn shared_faults(&self, example: &str) -> Vec<crate::error::Fault> {
-                let mut faults = self.parameter_set().faults();
-                faults.extend(crate::stage::no_set(&self.on, example));
-                faults.extend(self.folds.fault());
-                faults.extend(self.repeatability.fault());
-                faults
+            fn shared_faults(&self, example: &str, at: &mut crate::error::Place) {
+                self.parameter_set().faults(at);
+                crate::stage::must_name_sets(&self.on, example, at);
+                self.folds.faults(at);
+                self.repeatability.faults(at);
             }
         }
     };
@@ -114,144 +130,181 @@ crate::stage::writes! {
     }
 }
 
-/// The inputs that both kinds of identification share.
-pub struct Fitting<'a> {
-    pub data: &'a Measurements,
+/// Rows of a recording that are to be fitted.
+pub struct RowsToFit<'a> {
     pub recording: &'a Recording,
     pub split: &'a Split,
-    /// Rows to fit, before any was set aside.
-    pub asked: &'a [usize],
-    /// Rows that were fitted.
-    pub rows: &'a [usize],
-    pub screening: &'a Screening,
+    pub data: Measurements,
+    pub rows: Vec<usize>,
+    /// One standard deviation of every revolute joint that rows are weighted by, rad.
+    pub repeatability: Option<f64>,
+}
+
+impl<'a> RowsToFit<'a> {
+    /// Those of some sets.
+    pub fn of(recording: &'a Recording, split: &'a Split, sets: &[String]) -> Result<Self> {
+        Ok(Self {
+            recording,
+            split,
+            data: recording.measurements(),
+            rows: split.rows(recording, sets)?,
+            repeatability: None,
+        })
+    }
+}
+
+/// A finished fit, and what a step says of it.
+pub struct Fitting<'a> {
+    pub asked: &'a RowsToFit<'a>,
+    pub fit: &'a FittedRows,
     /// Parameters that the user holds.
     pub held: &'a [usize],
+    /// Parts of a cross-validation.
+    pub folds: FoldSetting,
     pub earlier: Option<&'a Parameters>,
     /// Covariance of the earlier parameters.
     pub earlier_covariance: Option<&'a CovarianceTable>,
     /// Rows that an earlier step was fitted to.
-    pub seen_before: &'a [bool],
+    pub seen_before: Vec<bool>,
     /// Geometric rank: found and expected.
     pub geometry: Option<(usize, usize)>,
-    /// One standard deviation of every revolute joint that rows are weighted by, rad.
-    pub repeatability: Option<f64>,
-    /// Parts of a cross-validation.
-    pub folds: FoldSetting,
     /// What the model as a whole was identified by.
     pub measured: &'a Measurements,
     /// Rows at which the model may say that it does not hold; the arm was fitted to none of them.
     pub doubtful: Vec<usize>,
     /// Rows of places that none of them was fitted to, with what their errors are to be multiplied by: each has a part in its place.
-    pub placed: &'a BTreeMap<usize, f64>,
+    pub placed: BTreeMap<usize, f64>,
+}
+
+impl<'a> Fitting<'a> {
+    /// A fit from the nominal robot.
+    pub fn of(
+        asked: &'a RowsToFit,
+        fit: &'a FittedRows,
+        held: &'a [usize],
+        folds: FoldSetting,
+    ) -> Self {
+        let all = 0..asked.data.rows();
+        Self {
+            asked,
+            fit,
+            held,
+            folds,
+            earlier: None,
+            earlier_covariance: None,
+            seen_before: vec![false; all.len()],
+            geometry: None,
+            measured: &asked.data,
+            doubtful: all
+                .filter(|row| asked.rows.binary_search(row).is_err())
+                .collect(),
+            placed: BTreeMap::new(),
+        }
+    }
+
+    /// The fitted rows with their model.
+    pub fn session(&self) -> Session<'_> {
+        self.fit.session(&self.asked.data)
+    }
 }
 
 impl Identified {
     /// Tables of a finished fit, and its notes for the person.
-    pub fn of(context: &Context, model: &Model, fitted: &Fitted, fitting: &Fitting) -> Self {
+    pub fn of(context: &Context, fitting: &Fitting) -> Self {
         let step = context.id;
+        let session = fitting.session();
+        let Session {
+            data,
+            rows,
+            model,
+            fitted,
+        } = session;
+        let RowsToFit {
+            recording, split, ..
+        } = *fitting.asked;
+        let screening = &fitting.fit.screening;
         let mut held_out: Vec<bool> = fitting.seen_before.iter().map(|seen| !seen).collect();
-        for row in fitting.asked {
-            held_out[*row] = false;
-        }
+        fitting
+            .asked
+            .rows
+            .iter()
+            .for_each(|row| held_out[*row] = false);
         let covariance = CovarianceTable::of(model, fitted, fitting.earlier_covariance);
         // Of a fit on top of another without its covariance only the last parameters' uncertainty is known, which would flatter.
         let known = fitting.earlier.is_none() || fitting.earlier_covariance.is_some();
-        let of_model = if known {
-            covariance.of_model(model)
-        } else {
-            None
-        };
-        note(context, model, fitted, fitting);
+        let of_model = known.then(|| covariance.of_model(model)).flatten();
+        note(context, fitting);
         if let Some(repeated) = &fitted.repeated {
-            repeated::note(context, repeated);
+            note_repeats(context, repeated);
         }
-        screened::note(context, fitting.screening, fitting.recording);
-        let Screening { suspects, .. } = fitting.screening;
-        let aside = suspects
-            .iter()
-            .filter(|suspect| !suspect.used())
-            .map(|Suspect { row, .. }| *row);
-        let (folds, dropped) = fitting.folds.folds(
-            &Session {
-                data: fitting.data,
-                rows: fitting.rows,
-                model,
-                fitted,
-            },
-            context,
-        );
-        let unseen = |(row, _): &(&usize, _)| !fitting.seen_before[**row];
+        screened::note(context, screening, recording);
+        let (folds, dropped) = fitting.folds.folds(&session, context);
         let errors = folds.iter().flat_map(|folds| {
-            fitting
-                .rows
-                .iter()
-                .zip(folds.random.iter().zip(&folds.blocks))
-                .filter(unseen)
+            let errors = rows.iter().zip(folds.random.iter().zip(&folds.blocks));
+            errors.filter(|(row, _)| !fitting.seen_before[**row])
         });
-        let advice = advice(context, model, fitting.data, fitting.rows, fitted);
+        let advice = advice(context, &session);
         let known = KnownModel {
             model,
             covariance: of_model.as_ref(),
             measured: fitting.measured,
         };
-        let beside = FitContext {
+        let parameters =
+            |covariance: Option<&Covariance>| covariance.map_or(0, |all| all.parameters().len());
+        let fit_context = FitContext {
             geometry: fitting.geometry,
-            repeatability: fitting.repeatability,
+            repeatability: fitting.asked.repeatability,
             folds: folds.as_ref().map(|folds| folds.count),
             unfolded: dropped,
-            earlier: of_model.as_ref().map_or(0, |all| {
-                all.parameters().len()
-                    - fitted
-                        .covariance
-                        .as_ref()
-                        .map_or(0, |own| own.parameters().len())
-            }),
+            earlier: parameters(of_model.as_ref())
+                .saturating_sub(parameters(fitted.covariance.as_ref())),
         };
         let prediction = Prediction::of(
             step,
             model,
-            fitting.data,
-            fitting.recording,
-            fitting.split,
+            data,
+            recording,
+            split,
             &held_out,
             of_model.as_ref(),
         )
-        .with_places(fitting.placed)
-        .with_suspects(aside)
-        .with_weights(fitting.rows, fitted)
+        .with_places(&fitting.placed)
+        .with_suspects(screening.set_aside())
+        .with_weights(rows, fitted)
         .with_folds(errors)
-        .with_remarks(known.remarks(fitting.data, &fitting.doubtful));
-        let fitted_points = fitting
-            .rows
+        .with_remarks(known.remarks(data, &fitting.doubtful));
+        let points = rows
             .iter()
             .map(|row| &prediction.0[*row])
             .filter(|row| row.measured.is_none());
-        let suspicion = computed::suspicion(
-            fitted_points.map(|row| [row.error_mm, row.noise_mm]),
+        context.warn_each(suspicion(
+            points.map(|row| [row.error_mm, row.noise_mm]),
             fitted.singular.len(),
-        );
-        suspicion
-            .into_iter()
-            .for_each(|line| context.services.warn(line));
+        ));
         Self {
             parameters: Parameters::of(step, model, fitted, fitting.held, fitting.earlier)
                 .with_advice(&advice),
             covariance,
             fit: Fit::of(step, fitted),
-            observability: Observability::of(step, fitted, &beside),
+            observability: Observability::of(step, fitted, &fit_context),
             prediction,
-            suspects: Suspects::of(step, fitting.screening, fitting.recording, fitting.split),
+            suspects: Suspects::of(step, screening, recording, split),
         }
     }
 }
 
-fn note(context: &Context, model: &Model, fitted: &Fitted, fitting: &Fitting) {
-    let services = context.services;
+fn note(context: &Context, fitting: &Fitting) {
+    let Session {
+        data,
+        rows,
+        model,
+        fitted,
+    } = fitting.session();
     let free = fitted.singular.len();
     let asked = fitted.singular_all.len();
-    services.note(format!(
+    context.note(format!(
         "{}, {free} of {} estimated, {} after {}",
-        counted(fitting.rows.len(), "point"),
+        counted(rows.len(), "point"),
         counted(asked, "parameter"),
         fitted.stop.name(),
         counted(fitted.course.len().saturating_sub(1), "iteration"),
@@ -259,43 +312,35 @@ fn note(context: &Context, model: &Model, fitted: &Fitted, fitting: &Fitting) {
     if let Some((rank, expected)) = fitting.geometry
         && rank < expected
     {
-        services.note(format!(
+        context.note(format!(
             "the data see {rank} of the {expected} geometric parameters of this arm: {}",
             why_not(&model.robot)
         ));
     }
     if fitted.values < 2 * free {
-        let (points, parameters) = (
-            counted(fitting.rows.len(), "point"),
-            counted(free, "parameter"),
-        );
+        let (points, parameters) = (counted(rows.len(), "point"), counted(free, "parameter"));
         let saturated = match fitted.values <= free {
             true => {
                 "; nothing is left to judge the fit by, and its standard deviations rest on the weights' noise alone"
             }
             false => "",
         };
-        services.warn(format!(
+        context.warn(format!(
             "only {points} for {parameters}: take at least {free}{saturated}"
         ));
     }
-    let noise: f64 = fitting
-        .rows
-        .iter()
-        .map(|row| noise(fitting.data, *row))
-        .sum::<f64>()
-        / fitting.rows.len() as f64;
+    let noise: f64 = rows.iter().map(|row| noise(data, *row)).sum::<f64>() / rows.len() as f64;
     let noise_axis = noise / 3f64.sqrt();
     if fitted.excess_sigma > noise_axis {
-        services.note(format!(
+        context.note(format!(
             "{:.3} mm per axis of residual beyond {} noise of {:.3} mm: this model does not explain it",
             fitted.excess_sigma * 1e3,
-            if fitting.data.noise_basis == NoiseBasis::Inferred { "the inferred" } else { "the instrument's" },
+            if data.noise_basis == NoiseBasis::Inferred { "the inferred" } else { "the instrument's" },
             noise_axis * 1e3
         ));
     }
     if let Some(turn) = fitted.excess_sigma_angle.filter(|turn| *turn > ASKEW) {
-        services.warn(format!(
+        context.warn(format!(
             "measured orientations are {:.1} deg off the model's beyond their noise: does `ingest` name the convention of the file?",
             turn.to_degrees()
         ));
@@ -305,7 +350,7 @@ fn note(context: &Context, model: &Model, fitted: &Fitted, fitting: &Fitting) {
         if let (Some((alone, sigma)), true) = (prior_check.without, prior_check.conflict > CONFLICT)
         {
             let show = |value: f64| format!("{:.4}", spec.unit.from_si(value));
-            services.warn(format!(
+            context.warn(format!(
                 "{}: the prior says {} +- {} {unit}, the data say {} +- {} {unit}, {:.1} sigma apart: one of them is wrong",
                 spec.name,
                 show(prior_check.prior.mean),
@@ -322,12 +367,12 @@ fn note(context: &Context, model: &Model, fitted: &Fitted, fitting: &Fitting) {
         .map(|k| model.stack.specs()[k].name.as_str())
         .collect();
     if !stopped.is_empty() {
-        services.note(format!("stopped by their bounds: {}", stopped.join(", ")));
+        context.note(format!("stopped by their bounds: {}", stopped.join(", ")));
     }
     if !fitted.downweighted.is_empty() {
-        services.note(downweighted(
+        context.note(downweighted(
             &fitted.downweighted,
-            &fitting.recording.point_id,
+            &fitting.asked.recording.point_id,
         ));
     }
 }

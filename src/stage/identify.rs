@@ -4,19 +4,20 @@
 
 use crate::diagnose::{Question, wrong_setup};
 use crate::effect::{Effect, EffectContext, EffectStack, arm_effect, identified, names};
-use crate::error::{Error, Fault, Result, nearest};
+use crate::error::{Error, Place, Result, instead, listed};
 use crate::estimate::{
-    FitOptions, Fitted, Model, ParameterStatus, fit, gauge, known_places, placed_by_left_out,
+    FitOptions, Fitted, Model, ParameterStatus, Session, fit, gauge, known_places,
+    placed_by_left_out,
 };
 use crate::observation;
 use crate::robot::{Measurements, RobotModel};
 use crate::spatial::Pose;
-use crate::stage::brought;
-use crate::stage::identified::{Fitting, Identified, LoadSetting};
+use crate::stage::contact;
+use crate::stage::identified::{Fitting, Identified, LoadSetting, RowsToFit};
 use crate::stage::known_cell::{self, KnownCell, KnownDistance, KnownPoint, KnownSphere};
-use crate::stage::screened::{fit_rows, numbered};
-use crate::stage::unmoved::{self, must_move};
-use crate::stage::weightless::weightless_links;
+use crate::stage::remarks::weightless_links;
+use crate::stage::remarks::{must_move, unmoved_remark};
+use crate::stage::screened::numbered;
 use crate::stage::{Context, Stage};
 use crate::table::{Recording, Robot, Split};
 use nalgebra::Vector3;
@@ -55,53 +56,34 @@ fn all_effects() -> Vec<String> {
     identified().map(|cause| cause.name().to_string()).collect()
 }
 
-crate::stage::reads! {
-    /// Input ports of [`Identify`].
-    pub struct IdentifyReads {
-        robot: Robot,
-        recording: Recording,
-        split: Split,
-    }
+crate::stage::stage! {
+    Identify, "identify", 18, "identifies geometry, transmission and compliance from the nominal robot in one estimation",
+        IdentifyReads {
+            robot: Robot,
+            recording: Recording,
+            split: Split,
+        } -> Identified
 }
 
 impl Stage for Identify {
-    const NAME: &'static str = "identify";
-    const SUMMARY: &'static str =
-        "identifies geometry, transmission and compliance from the nominal robot in one estimation";
-    const IMPLEMENTATION: u32 = 18;
-    type Reads = IdentifyReads;
-    type Writes = Identified;
-
-    fn check(&self) -> Vec<Fault> {
-        let mut faults = self.shared_faults("fit");
-        faults.extend(known_cell::faults(&self.known_cell()));
+    fn faults(&self, at: &mut Place) {
+        self.shared_faults("fit", at);
+        self.known_cell().faults(at);
         for (name, place) in &self.targets {
-            if !place
+            let near = place
                 .iter()
-                .all(|value| value.is_finite() && value.abs() < FARTHEST_TARGET)
-            {
-                faults.push(Fault::new(
-                    format!("targets.{name}"),
-                    "expected [x, y, z] in mm from the tool point, e.g. [50, 0, 20]",
-                ));
-            }
+                .all(|value| value.is_finite() && value.abs() < FARTHEST_TARGET);
+            at.at(format!("targets.{name}")).must(
+                near,
+                "expected [x, y, z] in mm from the tool point, e.g. [50, 0, 20]",
+            );
         }
+        let known: Vec<&str> = identified().map(|cause| cause.name()).collect();
         for (k, name) in self.effects.iter().enumerate() {
-            if !identified().any(|cause| cause.name() == name) {
-                let names: Vec<&str> = identified().map(|cause| cause.name()).collect();
-                let hint = nearest(name, names.iter().copied())
-                    .map(|near| format!("did you mean `{near}`? "))
-                    .unwrap_or_default();
-                faults.push(Fault::new(
-                    format!("effects[{k}]"),
-                    format!(
-                        "unknown effect `{name}`; {hint}allowed: {}",
-                        names.join(", ")
-                    ),
-                ));
-            }
+            let message = format!("unknown effect `{name}`{}", instead(name, &known));
+            at.at(format!("effects[{k}]"))
+                .must(known.contains(&name.as_str()), message);
         }
-        faults
     }
 
     fn sets_named(&self) -> Vec<(String, String)> {
@@ -109,38 +91,31 @@ impl Stage for Identify {
     }
 
     fn run(&self, reads: IdentifyReads, context: &Context) -> Result<Identified> {
-        let mut data = reads.recording.measurements();
-        let rows = reads.split.rows(&reads.recording, &self.on)?;
-        must_move(&data, &rows)?;
-        let (robot, base) = self.gauged(
-            RobotModel::new(reads.robot.to_description()?),
-            &data,
-            &rows,
-            context,
-        )?;
-        self.question_setup(&robot, &data, &rows, &reads, context);
+        let mut asked = RowsToFit::of(&reads.recording, &reads.split, &self.on)?;
+        let RowsToFit { data, rows, .. } = &asked;
+        must_move(data, rows)?;
+        let robot = RobotModel::new(reads.robot.to_description()?);
+        let (robot, base) = self.gauged(robot, data, rows, context)?;
+        self.question_setup(&robot, &asked, context);
         let setting = EffectContext {
             base,
             load: self.load.into(),
         };
         let mut effects = Vec::new();
-        let asked =
+        let wanted =
             identified().filter(|cause| self.effects.iter().any(|name| name == cause.name()));
-        for effect in asked.filter_map(|cause| cause.arm_effect(&setting)) {
+        for effect in wanted.filter_map(|cause| cause.arm_effect(&setting)) {
             if effect.name() == names::ANCHOR && robot.setup().anchors.is_empty() {
                 continue;
             }
-            match effect.missing(&robot, &data) {
-                Some(reason) => context
-                    .services
-                    .note(format!("{} is left out: {reason}", effect.name())),
+            match effect.missing(&robot, data) {
+                Some(reason) => context.note(format!("{} is left out: {reason}", effect.name())),
                 None => {
                     let by_weight = effect.name() == names::JOINT_COMPLIANCE
                         && matches!(self.load, LoadSetting::Gravity);
-                    if let Some(links) =
-                        weightless_links(&robot, &data, &rows).filter(|_| by_weight)
+                    if let Some(links) = weightless_links(&robot, data, rows).filter(|_| by_weight)
                     {
-                        context.services.warn(links.warning);
+                        context.warn(links.warning);
                     }
                     effects.push(effect);
                 }
@@ -153,44 +128,18 @@ impl Stage for Identify {
         let all: Vec<usize> = (0..model.x.len()).collect();
         let (candidates, held) = self.parameter_set().apply(&mut model, &all, context);
         known_cell::apply(&mut model, &self.known_cell(), context)?;
-        let repeatability = self.repeatability.apply(&model, &mut data, &rows, context);
-        let options = FitOptions {
-            rows: &rows,
-            candidates: &candidates,
-        };
-        let (model, fitted, screening) =
-            fit_rows(&model, &data, &options, &reads.split, self.screen);
-        let (model, placed) = placed_by_left_out(&model, &data, &rows);
+        let mut fit = self.fit(&model, &candidates, &mut asked, context);
+        let RowsToFit { data, rows, .. } = &asked;
+        let placed;
+        (fit.model, placed) = placed_by_left_out(&fit.model, data, rows);
         let fitting = Fitting {
-            data: &data,
-            recording: &reads.recording,
-            split: &reads.split,
-            asked: &rows,
-            rows: &screening.kept,
-            screening: &screening,
-            held: &held,
-            earlier: None,
-            earlier_covariance: None,
-            seen_before: &vec![false; data.rows()],
-            geometry: geometric_rank(&model, &data, &rows, &fitted),
-            repeatability,
-            folds: self.folds,
-            measured: &data,
-            doubtful: (0..data.rows())
-                .filter(|row| rows.binary_search(row).is_err())
-                .collect(),
-            placed: &placed,
+            geometry: geometric_rank(&fit.model, data, rows, &fit.fitted),
+            placed,
+            ..Fitting::of(&asked, &fit, &held, self.folds)
         };
-        brought::note(
-            context,
-            &model,
-            &fitted,
-            &data,
-            &reads.recording,
-            &screening.kept,
-        );
-        question_ratios(&model, &fitted, &fitting, &setting, context);
-        Ok(Identified::of(context, &model, &fitted, &fitting))
+        contact::note(context, &fitting.session(), &reads.recording);
+        question_ratios(&fitting, &setting, context);
+        Ok(Identified::of(context, &fitting))
     }
 }
 
@@ -199,24 +148,19 @@ const FARTHEST_TARGET: f64 = 1e4;
 
 impl Identify {
     /// A warning where robot file, joints and points do not belong together: geometry that is estimated would make up for it.
-    fn question_setup(
-        &self,
-        robot: &RobotModel,
-        data: &Measurements,
-        rows: &[usize],
-        reads: &IdentifyReads,
-        context: &Context,
-    ) {
-        if !self
-            .effects
-            .iter()
-            .any(|name| GEOMETRY[OF_THE_ARM].contains(&name.as_str()))
-        {
+    fn question_setup(&self, robot: &RobotModel, asked: &RowsToFit, context: &Context) {
+        let RowsToFit {
+            recording,
+            split,
+            data,
+            rows,
+            ..
+        } = asked;
+        let mut effects = self.effects.iter();
+        if !effects.any(|name| GEOMETRY[OF_THE_ARM].contains(&name.as_str())) {
             return;
         }
-        unmoved::remark(robot, data, rows)
-            .into_iter()
-            .for_each(|line| context.services.warn(line));
+        context.warn_each(unmoved_remark(robot, data, rows));
         let fit: Vec<usize> = rows
             .iter()
             .copied()
@@ -227,12 +171,12 @@ impl Identify {
             data,
             fit: &fit,
             validate: &[],
-            set: &numbered(&reads.split),
+            set: &numbered(split),
             prior_weight: 1.0,
             open_world: 0.3,
             without: &[],
             own: &[],
-            beside_simulation: reads.recording.simulated.is_some(),
+            beside_simulation: recording.simulated.is_some(),
             known: &[],
             seed: context.seed,
         };
@@ -243,7 +187,7 @@ impl Identify {
                     finding.statement.trim_end_matches('.')
                 )
             });
-            context.services.warn(found.unwrap_or(wrong.statement));
+            context.warn(found.unwrap_or(wrong.statement));
         }
     }
 
@@ -257,14 +201,12 @@ impl Identify {
     ) -> Result<(RobotModel, Pose)> {
         let known = data.target.as_ref().map_or(&[][..], |named| &named.names);
         if let Some(unknown) = self.targets.keys().find(|name| !known.contains(name)) {
-            let there: Vec<&str> = known
+            let named = known
                 .iter()
-                .map(|name| if name.is_empty() { "(no name)" } else { name })
-                .collect();
-            let there = if there.is_empty() {
-                "none; map a column to `target` in `ingest`".into()
-            } else {
-                there.join(", ")
+                .map(|name| if name.is_empty() { "(no name)" } else { name });
+            let there = match known {
+                [] => "none; map a column to `target` in `ingest`".into(),
+                _ => listed(named),
             };
             return Err(Error::spec(
                 format!("{}.with.targets.{unknown}", context.id),
@@ -332,7 +274,7 @@ fn geometric_rank(
         .count();
     let held = model.stack.specs().len() != fitted.singular_all.len();
     // A prior makes its parameter known whatever the data see.
-    let told = model.known.values().any(|known| known.prior.is_some());
+    let has_prior = model.known.values().any(|known| known.prior.is_some());
     let expected = observation::rank(
         &model.robot,
         data,
@@ -340,20 +282,20 @@ fn geometric_rank(
         !model.lengths.is_empty(),
         known_places(model),
     )?;
-    (asked && !held && !told).then_some((found, expected))
+    (asked && !held && !has_prior).then_some((found, expected))
 }
 
 /// A ratio is a quotient of tooth counts: errors beyond this are no manufacturing errors.
 const PLAUSIBLE_RATIO: f64 = 5e-4;
 
 /// Where ratios are implausible and compliance was not asked for, fits it too and says which explanation the data favour.
-fn question_ratios(
-    model: &Model,
-    fitted: &Fitted,
-    fitting: &Fitting,
-    setting: &EffectContext,
-    context: &Context,
-) {
+fn question_ratios(fitting: &Fitting, setting: &EffectContext, context: &Context) {
+    let Session {
+        data,
+        rows,
+        model,
+        fitted,
+    } = fitting.session();
     let implausible = |model: &Model, fitted: &Fitted| -> Vec<usize> {
         let beyond = |k: &usize| match &fitted.statuses[*k] {
             ParameterStatus::Free(sigma) => model.x[*k].abs() > PLAUSIBLE_RATIO.max(3.0 * sigma),
@@ -390,8 +332,8 @@ fn question_ratios(
         "reduction ratios are quotients of tooth counts, yet {}",
         list(model, &suspects)
     );
-    if let Some(reason) = compliance.missing(&model.robot, fitting.data) {
-        context.services.warn(format!(
+    if let Some(reason) = compliance.missing(&model.robot, data) {
+        context.warn(format!(
             "{opening}; compliance under self-weight cannot be tried as the explanation: {reason}"
         ));
         return;
@@ -414,15 +356,15 @@ fn question_ratios(
         .collect();
     let (rival, refitted) = fit(
         &rival,
-        fitting.data,
+        data,
         &FitOptions {
-            rows: fitting.rows,
+            rows,
             candidates: &candidates,
         },
     );
-    let gain = evidence(fitted, fitting) - evidence(&refitted, fitting);
+    let gain = evidence(fitted, data, rows) - evidence(&refitted, data, rows);
     if gain > DECISIVE {
-        context.services.warn(format!(
+        context.warn(format!(
             "{opening}; with `{}` {}, and {:.3} -> {:.3} mm per axis stays unexplained: the data favour compliance (BIC better \
              by {gain:.0})",
             names::JOINT_COMPLIANCE,
@@ -431,7 +373,7 @@ fn question_ratios(
             refitted.excess_sigma * 1e3
         ));
     } else {
-        context.services.note(format!(
+        context.note(format!(
             "{opening}; compliance under self-weight does not explain it better"
         ));
     }
@@ -441,15 +383,11 @@ fn question_ratios(
 const DECISIVE: f64 = 10.0;
 
 /// BIC of a fit from its robust residual scale.
-fn evidence(fitted: &Fitted, fitting: &Fitting) -> f64 {
-    let rows = fitting.rows.len() as f64;
-    let noise: f64 = fitting
-        .rows
-        .iter()
-        .map(|row| observation::noise(fitting.data, *row).powi(2) / 3.0)
-        .sum::<f64>()
-        / rows;
-    let values = 3.0 * rows;
+fn evidence(fitted: &Fitted, data: &Measurements, rows: &[usize]) -> f64 {
+    let count = rows.len() as f64;
+    let noise = |row: &usize| observation::noise(data, *row).powi(2) / 3.0;
+    let noise = rows.iter().map(noise).sum::<f64>() / count;
+    let values = 3.0 * count;
     values * (noise + fitted.excess_sigma * fitted.excess_sigma).ln()
         + fitted.singular.len() as f64 * values.ln()
 }

@@ -42,9 +42,9 @@ pub use noise::{InstrumentSetting, instruments};
 pub use reading::{TableLayout, records};
 pub use torques::{IngestTorques, IngestTorquesReads, IngestTorquesWrites, TorqueSide};
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Place, Result};
 use crate::robot::{CountedCoupling, JointConvention};
-use crate::stage::{Context, RawFile, Stage, StreamedTable, reads, writes};
+use crate::stage::{Context, RawFile, Stage, StreamedTable};
 use crate::table::{Intake, IntakeRow, JointConventions, Recording, Rejected, Robot};
 use crate::units::Unit;
 use schemars::JsonSchema;
@@ -95,33 +95,21 @@ fn half() -> f64 {
     0.5
 }
 
-reads! {
-    /// Input ports of `ingest`.
-    pub struct IngestReads {
-        robot: Robot,
-    }
-}
-
-writes! {
-    /// Output ports of `ingest`.
-    pub struct IngestWrites {
-        recording: StreamedTable<Recording>,
-        rejected: StreamedTable<Rejected>,
-        intake: Intake,
-        convention: JointConventions,
-    }
+crate::stage::stage! {
+    Ingest, "ingest", 8, "reads raw files into a recording, and lists every rejected row with its reason",
+        IngestReads {
+            robot: Robot,
+        } -> IngestWrites {
+            recording: StreamedTable<Recording>,
+            rejected: StreamedTable<Rejected>,
+            intake: Intake,
+            convention: JointConventions,
+        }
 }
 
 impl Stage for Ingest {
-    const NAME: &'static str = "ingest";
-    const SUMMARY: &'static str =
-        "reads raw files into a recording, and lists every rejected row with its reason";
-    const IMPLEMENTATION: u32 = 8;
-    type Reads = IngestReads;
-    type Writes = IngestWrites;
-
-    fn check(&self) -> Vec<crate::error::Fault> {
-        check::faults(self)
+    fn faults(&self, at: &mut Place) {
+        check::faults(self, at);
     }
     fn files(&self) -> Vec<(String, RawFile)> {
         let first = self
@@ -153,10 +141,7 @@ impl Ingest {
         reads: IngestReads,
         context: &Context,
     ) -> Result<IngestWrites> {
-        let faults = self.check();
-        if !faults.is_empty() {
-            return Err(Error::Spec(faults));
-        }
+        Error::if_spec(self.check())?;
         let arm = arm::RobotJoints::of(&reads.robot)?;
         let measurements = self.measurements();
         let mut scanned = Vec::new();
@@ -229,12 +214,12 @@ impl Ingest {
 
 /// The files' own names, made different where two are the same: a folder is no part of a table.
 fn names<'a>(labels: impl Iterator<Item = &'a str>) -> Vec<String> {
-    let own = |label: &str| {
+    let file_name = |label: &str| {
         Path::new(label)
             .file_name()
             .map_or_else(|| label.into(), |name| name.to_string_lossy().into_owned())
     };
-    let all: Vec<String> = labels.map(own).collect();
+    let all: Vec<String> = labels.map(file_name).collect();
     let mut names: Vec<String> = Vec::with_capacity(all.len());
     for name in &all {
         // Another file may be called like a numbered one.

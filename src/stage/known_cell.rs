@@ -1,9 +1,9 @@
-//! What is known of a cell from elsewhere where the target was brought to sockets, planes and spheres: lengths, sizes, places.
+//! What is known of a cell from elsewhere where sockets, planes and spheres hold the target: lengths, sizes, places.
 
 use crate::effect::AnchorShift;
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Place, Result, listed};
 use crate::estimate::{KnownLength, Model, Prior, align_points};
-use crate::observation::only_brought;
+use crate::observation::only_contacts;
 use crate::robot::{Measurements, RobotModel, Shape};
 use crate::spatial::Pose;
 use crate::stage::Context;
@@ -52,63 +52,41 @@ pub(super) struct KnownCell<'a> {
     pub points: &'a BTreeMap<String, KnownPoint>,
 }
 
-/// Faults of known distances, spheres and points.
-pub(super) fn faults(known: &KnownCell) -> Vec<Fault> {
-    let KnownCell {
-        distances,
-        spheres,
-        points,
-    } = known;
-    let mut faults = Vec::new();
-    for (name, KnownPoint { mm, sigma }) in *points {
-        if !(mm.iter().all(|value| value.is_finite()) && *sigma > 0.0 && sigma.is_finite()) {
-            faults.push(Fault::new(
-                format!("points.{name}"),
+impl KnownCell<'_> {
+    /// Faults of known distances, spheres and points.
+    pub fn faults(&self, at: &mut Place) {
+        let is_size = |value: f64| value > 0.0 && value.is_finite();
+        for (name, KnownPoint { mm, sigma }) in self.points {
+            let possible = mm.iter().all(|value| value.is_finite()) && is_size(*sigma);
+            at.at(format!("points.{name}")).must(
+                possible,
                 "expected a place and a sigma above 0, e.g. {mm: [400, 0, 50], sigma: 0.05}",
-            ));
+            );
         }
-    }
-    for (
-        index,
-        KnownDistance {
-            between: [from, to],
-            mm,
-            sigma,
-        },
-    ) in distances.iter().enumerate()
-    {
-        if from == to
-            || from.matches('*').count() > 1
-            || from.matches('*').count() != to.matches('*').count()
-        {
-            let message = "expected two different names, with one `*` in each or none, e.g. [front/0, front/1]";
-            faults.push(Fault::new(format!("distances[{index}].between"), message));
-        }
-        if !(*mm > 0.0 && mm.is_finite()) {
-            faults.push(Fault::new(
-                format!("distances[{index}].mm"),
-                "expected a distance above 0",
-            ));
-        }
-        if !(*sigma > 0.0 && sigma.is_finite()) {
-            faults.push(Fault::new(
-                format!("distances[{index}].sigma"),
+        for (index, KnownDistance { between, mm, sigma }) in self.distances.iter().enumerate() {
+            let mut at = at.at(format!("distances[{index}]"));
+            let [from, to] = between.each_ref().map(|name| name.matches('*').count());
+            at.at("between").must(
+                between[0] != between[1] && from <= 1 && from == to,
+                "expected two different names, with one `*` in each or none, e.g. [front/0, front/1]",
+            );
+            at.at("mm")
+                .must(is_size(*mm), "expected a distance above 0");
+            at.at("sigma").must(
+                is_size(*sigma),
                 "expected a standard deviation above 0, e.g. 0.1",
-            ));
+            );
         }
-    }
-    for (name, KnownSphere { diameter, sigma }) in *spheres {
-        if !(*diameter > 0.0 && diameter.is_finite() && *sigma > 0.0 && sigma.is_finite()) {
-            faults.push(Fault::new(
-                format!("spheres.{name}"),
+        for (name, KnownSphere { diameter, sigma }) in self.spheres {
+            at.at(format!("spheres.{name}")).must(
+                is_size(*diameter) && is_size(*sigma),
                 "expected both above 0, e.g. {diameter: 40, sigma: 0.01}",
-            ));
+            );
         }
     }
-    faults
 }
 
-/// The robot standing where it has known points best, with all that it was brought to; as it is where nothing is known, or a tracker
+/// The robot standing where it has known points best, with all its contacts; as it is where nothing is known, or a tracker
 /// says where it stands. One point shifts it, two turn it too, but not about their line.
 pub(super) fn standing(
     robot: RobotModel,
@@ -127,7 +105,7 @@ pub(super) fn standing(
             ))
         })
         .collect();
-    if pairs.is_empty() || !only_brought(data, rows) {
+    if pairs.is_empty() || !only_contacts(data, rows) {
         return (robot, base);
     }
     let (from, to): (Vec<Vector3<f64>>, Vec<Vector3<f64>>) = pairs.into_iter().unzip();
@@ -163,17 +141,10 @@ pub(super) fn apply(model: &mut Model, known: &KnownCell, context: &Context) -> 
         .iter()
         .map(|anchor| anchor.name.as_str())
         .collect();
-    let there = || {
-        if names.is_empty() {
-            "none".to_string()
-        } else {
-            names.join(", ")
-        }
-    };
     let wrong = |place: String, what: String| {
         Error::spec(
             format!("{}.with.{place}", context.id),
-            format!("{what}; the recording has: {}", there()),
+            format!("{what}; the recording has: {}", listed(&names)),
         )
     };
     for (index, known) in distances.iter().enumerate() {

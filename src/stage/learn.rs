@@ -4,10 +4,9 @@
 //! else the table `network` stays empty and the prediction is what it was. The table `corrections` says how all of them did.
 //! Outside the region of its training rows a correction fades to zero.
 
-mod corrected;
-mod told;
+mod tables;
 
-use crate::error::{Error, Fault, Result, counted};
+use crate::error::{Error, Place, Result, counted};
 use crate::estimate::network::correction::features;
 use crate::estimate::network::rivals::{RivalContest, fits, learn};
 use crate::estimate::network::{
@@ -15,14 +14,14 @@ use crate::estimate::network::{
 };
 use crate::estimate::swarm::Algorithm;
 use crate::robot::RobotModel;
-use crate::stage::{Context, Stage, reads, writes};
+use crate::stage::{Context, Stage};
 use crate::statistics::nearest;
 use crate::table::{
     Corrections, Network, Parameters, Prediction, PredictionRow, Recording, Robot, Split, Training,
 };
-use corrected::corrected;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use tables::{comparison_table, corrected, history, sentence};
 
 /// Fewest rows to learn from: fewer say nothing in cross-validation.
 const FEWEST: usize = 30;
@@ -55,7 +54,7 @@ pub struct Learn {
     /// Neurons of the hidden layer; chosen by cross-validation if not given.
     pub hidden: Option<usize>,
     /// Activation of the hidden layer.
-    pub activation: ActivationSetting,
+    pub activation: Activation,
     /// Networks whose mean is the correction.
     pub ensemble: usize,
     /// Beetles of the swarm that finds where the gradient training starts; other swarms may spend as much.
@@ -88,7 +87,7 @@ impl Default for Learn {
             inputs: Inputs::Joints,
             payload: false,
             hidden: None,
-            activation: ActivationSetting::Sigmoid,
+            activation: Activation::Sigmoid,
             ensemble: 8,
             beetles: 50,
             generations: 200,
@@ -157,99 +156,51 @@ pub enum Inputs {
     SinCos,
 }
 
-/// Activation of the hidden layer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum ActivationSetting {
-    /// `1 / (1 + exp(-x))`, as in the paper.
-    Sigmoid,
-    /// `tanh(x)`.
-    Tanh,
-}
-
-reads! {
-    /// Input ports of [`Learn`].
-    pub struct LearnReads {
-        robot: Option<Robot>,
-        recording: Recording,
-        split: Split,
-        parameters: Option<Parameters>,
-        prediction: Prediction,
-    }
-}
-
-writes! {
-    /// Output ports of [`Learn`].
-    pub struct LearnWrites {
-        network: Network,
-        corrections: Corrections,
-        training: Training,
-        prediction: Prediction,
-    }
+crate::stage::stage! {
+    Learn, "learn", 8, "learns the residual of the model: compares several corrections, and keeps the best only where it helps",
+        LearnReads {
+            robot: Option<Robot>,
+            recording: Recording,
+            split: Split,
+            parameters: Option<Parameters>,
+            prediction: Prediction,
+        } -> LearnWrites {
+            network: Network,
+            corrections: Corrections,
+            training: Training,
+            prediction: Prediction,
+        }
 }
 
 impl Stage for Learn {
-    const NAME: &'static str = "learn";
-    const SUMMARY: &'static str = "learns the residual of the model: compares several corrections, and keeps the best only where it helps";
-    const IMPLEMENTATION: u32 = 8;
-    type Reads = LearnReads;
-    type Writes = LearnWrites;
-
-    fn check(&self) -> Vec<Fault> {
-        let mut faults: Vec<Fault> = crate::stage::no_set(&self.on, "learn")
-            .into_iter()
-            .collect();
-        let counts = [
-            ("hidden", self.hidden.unwrap_or(1), 1, 200),
-            ("ensemble", self.ensemble, 1, 100),
-            ("beetles", self.beetles, 1, 1000),
-            ("generations", self.generations, 0, 10_000),
-            ("iterations", self.iterations, 1, 10_000),
-            ("folds", self.folds, 2, 20),
-        ];
-        for (name, value, least, most) in counts {
-            if !(least..=most).contains(&value) {
-                faults.push(Fault::new(
-                    name,
-                    format!("expected a whole number from {least} to {most}, not {value}"),
-                ));
-            }
-        }
-        if self.rivals.is_empty() {
-            faults.push(Fault::new(
-                "rivals",
-                "expected at least one of ridge, gaussian_process, curves, mlp, mlp_joints",
-            ));
-        }
-        if self.starts.is_empty()
-            && self
-                .rivals
-                .iter()
-                .any(|rival| matches!(rival, RivalSetting::Mlp | RivalSetting::MlpJoints))
-        {
-            faults.push(Fault::new(
-                "starts",
-                "expected at least one of random, bas, bso, pso, ga, abc",
-            ));
-        }
-        if !(0.0..0.5).contains(&self.keep_back) {
-            faults.push(Fault::new(
-                "keep_back",
-                format!(
-                    "expected a share from 0 to below 0.5, not {}",
-                    self.keep_back
-                ),
-            ));
-        }
-        if let Some(decay) = self.decay
-            && !(0.0..=1e6).contains(&decay)
-        {
-            faults.push(Fault::new(
-                "decay",
-                format!("expected a number from 0 to 1e6, e.g. 1, not {decay}"),
-            ));
-        }
-        faults
+    fn faults(&self, at: &mut Place) {
+        crate::stage::must_name_sets(&self.on, "learn", at);
+        at.at("hidden").whole(self.hidden.unwrap_or(1), 1..=200);
+        at.at("ensemble").whole(self.ensemble, 1..=100);
+        at.at("beetles").whole(self.beetles, 1..=1000);
+        at.at("generations").whole(self.generations, 0..=10_000);
+        at.at("iterations").whole(self.iterations, 1..=10_000);
+        at.at("folds").whole(self.folds, 2..=20);
+        at.at("rivals").must(
+            !self.rivals.is_empty(),
+            "expected at least one of ridge, gaussian_process, curves, mlp, mlp_joints",
+        );
+        let mut rivals = self.rivals.iter();
+        let trains =
+            rivals.any(|rival| matches!(rival, RivalSetting::Mlp | RivalSetting::MlpJoints));
+        at.at("starts").must(
+            !(self.starts.is_empty() && trains),
+            "expected at least one of random, bas, bso, pso, ga, abc",
+        );
+        let (share, decay) = (self.keep_back, self.decay.unwrap_or_default());
+        at.at("keep_back").must(
+            (0.0..0.5).contains(&share),
+            format!("expected a share from 0 to below 0.5, not {share}"),
+        );
+        at.at("decay").must(
+            (0.0..=1e6).contains(&decay),
+            format!("expected a number from 0 to 1e6, e.g. 1, not {decay}"),
+        );
     }
 
     fn sets_named(&self) -> Vec<(String, String)> {
@@ -348,10 +299,7 @@ impl Learn {
             features: features(prismatic, self.inputs == Inputs::SinCos, self.payload),
             through: None,
             hidden: self.hidden.unwrap_or(HIDDEN[1]),
-            activation: match self.activation {
-                ActivationSetting::Sigmoid => Activation::Sigmoid,
-                ActivationSetting::Tanh => Activation::Tanh,
-            },
+            activation: self.activation,
             start: TrainingStart::Random,
             beetles: self.beetles,
             generations: self.generations,
@@ -372,10 +320,9 @@ impl Learn {
         prismatic: &[bool],
         context: &Context,
     ) -> (Network, Corrections, Training) {
-        let services = context.services;
         let rows = samples.rows();
         if rows < FEWEST {
-            services.warn(format!(
+            context.warn(format!(
                 "only {} to learn from, at least {FEWEST} are needed: no correction",
                 counted(rows, "row")
             ));
@@ -386,25 +333,29 @@ impl Learn {
             );
         }
         let contest = self.contest(rows, arm, prismatic, context);
-        services.begin("comparing corrections", Some(fits(&contest) as u64), "fits");
+        context
+            .services
+            .begin("comparing corrections", Some(fits(&contest) as u64), "fits");
         let comparison = compare(samples, &contest, &|done, what| {
-            services.advance(done as u64, what)
+            context.services.advance(done as u64, what)
         });
         let kept = &comparison.judged[comparison.chosen];
-        services.begin("learning", Some(self.generations as u64 + 1), "generations");
+        context
+            .services
+            .begin("learning", Some(self.generations as u64 + 1), "generations");
         let learnt = learn(samples, &contest, kept, &mut |generation| {
-            services.advance(
+            context.services.advance(
                 generation.index as u64 + 1,
                 &format!("best {:.4}", generation.best),
             );
         });
-        let corrections = told::table(context.id, &contest, &comparison, learnt.is_some());
-        services.note(told::sentence(&comparison, learnt.is_some()));
+        let corrections = comparison_table(context.id, &contest, &comparison, learnt.is_some());
+        context.note(sentence(&comparison, learnt.is_some()));
         match learnt {
             Some((correction, course)) => (
                 Network::of(&correction, prismatic),
                 corrections,
-                told::history(context.id, course),
+                history(context.id, course),
             ),
             None => (Network::default(), corrections, Training::default()),
         }
@@ -475,7 +426,7 @@ fn within_reach(prediction: &Prediction, rows: &[usize], context: &Context) -> V
         .filter(|row| prediction.0[*row].error_mm <= limit && !prediction.0[*row].suspect)
         .collect();
     if near.len() < rows.len() {
-        context.services.note(format!(
+        context.note(format!(
             "{} of {} rows are not learnt from: their error is over {limit:.3} mm, {FAR} times the median, or they are suspects",
             rows.len() - near.len(),
             rows.len()

@@ -4,7 +4,7 @@
 use crate::dynamics::LinkFromTorques;
 use crate::error::Result;
 use crate::stage::dynamic_arm::dynamic_arm;
-use crate::stage::{Context, Stage, reads, writes};
+use crate::stage::{Context, Stage};
 use crate::table::{Robot, TorqueParameters};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -17,27 +17,17 @@ const NOTIONAL: f64 = 10.0;
 #[serde(deny_unknown_fields, default)]
 pub struct Masses {}
 
-reads! {
-    /// Input ports of `masses`.
-    pub struct MassesReads {
-        robot: Robot,
-        parameters: TorqueParameters,
-    }
-}
-writes! {
-    /// Output ports of `masses`.
-    pub struct MassesWrites {
-        robot: Robot,
-    }
+crate::stage::stage! {
+    Masses, "masses", 3, "gives the robot of later stages the masses, centres and dry friction that its torques show",
+        MassesReads {
+            robot: Robot,
+            parameters: TorqueParameters,
+        } -> MassesWrites {
+            robot: Robot,
+        }
 }
 
 impl Stage for Masses {
-    const NAME: &'static str = "masses";
-    const SUMMARY: &'static str = "gives the robot of later stages the masses, centres and dry friction that its torques show";
-    const IMPLEMENTATION: u32 = 3;
-    type Reads = MassesReads;
-    type Writes = MassesWrites;
-
     fn run(&self, reads: MassesReads, context: &Context) -> Result<MassesWrites> {
         let mut robot = reads.robot.to_description()?;
         let (arm, _) = dynamic_arm(&robot)?;
@@ -51,9 +41,7 @@ impl Stage for Masses {
         let links = model.links(&arm, &masses);
         robot.inertias.links.resize(links.len(), None);
         for (index, (joint, link)) in robot.joints.iter_mut().zip(&links).enumerate() {
-            context
-                .services
-                .note(change_text(index, joint.mass, joint.centre, link));
+            context.note(change_text(index, joint.mass, joint.centre, link));
             joint.mass = Some(link.mass);
             joint.centre = Some(link.centre.into());
             if let Some(i) = &link.inertia {
@@ -68,17 +56,16 @@ impl Stage for Masses {
             }
         }
         let friction = reads.parameters.dry_friction(links.len());
-        context.services.note(friction_text(&friction));
+        context.note(friction_text(&friction));
         for (joint, friction) in robot.joints.iter_mut().zip(friction) {
             joint.coulomb = friction;
         }
         if !(0..links.len()).all(|link| model.is_whole(link)) {
-            context.services.note(
-                "base parameters alone were identified: masses stay as declared, centres are where gravity needs them; inertias stay as declared"
-                    .into(),
+            context.note(
+                "base parameters alone were identified: masses stay as declared, centres are where gravity needs them; inertias stay as declared",
             );
         }
-        context.services.note("what the tool carried beyond the declared payload is part of the last link from here on".into());
+        context.note("what the tool carried beyond the declared payload is part of the last link from here on");
         Ok(MassesWrites {
             robot: Robot::from_description(&robot),
         })
@@ -87,13 +74,13 @@ impl Stage for Masses {
 
 /// Friction of the joints.
 fn friction_text(friction: &[Option<f64>]) -> String {
-    let of = |friction: &Option<f64>| {
+    let shown = |friction: &Option<f64>| {
         friction.map_or_else(
             || "none found".into(),
             |friction| format!("{friction:.3} Nm"),
         )
     };
-    let all: Vec<String> = friction.iter().map(of).collect();
+    let all: Vec<String> = friction.iter().map(shown).collect();
     format!(
         "dry friction of joints 1 to {} by the torques: {}; below it approach decides on which side a joint rests",
         all.len(),

@@ -3,10 +3,10 @@
 //! A search that found the target quickly once says little: what counts is from how many seeds it gets there, and how often it
 //! gets stuck. Times are no part of a table, which is the same whenever it is made; `cargo bench -- swarm` prints them.
 
-use crate::error::{Fault, Result};
+use crate::error::{Place, Result};
 use crate::estimate::swarm::{Algorithm, Budget, Landscape, SearchStop, SwarmResult};
 use crate::estimate::threads::in_order;
-use crate::stage::{Context, Stage, reads, writes};
+use crate::stage::{Context, Stage};
 use crate::statistics::quantile;
 use crate::table::{SearchCourse, SearchCourseRow, Searches, SearchesRow};
 use schemars::JsonSchema;
@@ -76,76 +76,43 @@ impl Default for Optimise {
     }
 }
 
-reads! {
-    /// `optimise` reads nothing.
-    pub struct OptimiseReads {
-    }
-}
-
-writes! {
-    /// Output ports of [`Optimise`].
-    pub struct OptimiseWrites {
-        searches: Searches,
-        search_course: SearchCourse,
-    }
+crate::stage::stage! {
+    Optimise, "optimise", 1, "compares swarm optimisers on functions with known minima, over many seeds",
+        OptimiseReads {} -> OptimiseWrites {
+            searches: Searches,
+            search_course: SearchCourse,
+        }
 }
 
 impl Stage for Optimise {
-    const NAME: &'static str = "optimise";
-    const SUMMARY: &'static str =
-        "compares swarm optimisers on functions with known minima, over many seeds";
-    const IMPLEMENTATION: u32 = 1;
-    type Reads = OptimiseReads;
-    type Writes = OptimiseWrites;
-
-    fn check(&self) -> Vec<Fault> {
-        let mut faults = Vec::new();
-        for (name, value, least, most) in [
-            ("population", self.population, 4, 10_000),
-            ("seeds", self.seeds, 1, 100_000),
-            ("courses", self.courses, 0, 1000),
-        ] {
-            if !(least..=most).contains(&value) {
-                faults.push(Fault::new(
-                    name,
-                    format!("expected a whole number from {least} to {most}, not {value}"),
-                ));
-            }
-        }
-        if !(1..=100_000_000).contains(&self.evaluations) {
-            faults.push(Fault::new(
-                "evaluations",
-                format!("expected 1 to 1e8, not {}", self.evaluations),
-            ));
-        }
+    fn faults(&self, at: &mut Place) {
+        at.at("population").whole(self.population, 4..=10_000);
+        at.at("seeds").whole(self.seeds, 1..=100_000);
+        at.at("courses").whole(self.courses, 0..=1000);
+        at.at("evaluations").must(
+            (1..=100_000_000).contains(&self.evaluations),
+            format!("expected 1 to 1e8, not {}", self.evaluations),
+        );
         for (i, problem) in self.problems.iter().enumerate() {
-            if problem.function.minimum(problem.dimensions).is_none()
-                || !(1..=1000).contains(&problem.dimensions)
-            {
-                let message = "the minimum is not known there: 2, 5 or 10 for michalewicz, 2 to 1000 for rosenbrock, else 1 to 1000";
-                faults.push(Fault::new(format!("problems[{i}].dimensions"), message));
-            }
-            if !(problem.tolerance > 0.0 && problem.tolerance.is_finite()) {
-                faults.push(Fault::new(
-                    format!("problems[{i}].tolerance"),
-                    "expected a number above zero, e.g. 1e-4",
-                ));
-            }
-        }
-        let twice = |i: usize| {
-            let same = |j: &BenchmarkProblem| {
-                j.function == self.problems[i].function
-                    && j.dimensions == self.problems[i].dimensions
+            let mut at = at.at(format!("problems[{i}]"));
+            let known = problem.function.minimum(problem.dimensions).is_some()
+                && (1..=1000).contains(&problem.dimensions);
+            at.at("dimensions").must(
+                known,
+                "the minimum is not known there: 2, 5 or 10 for michalewicz, 2 to 1000 for rosenbrock, else 1 to 1000",
+            );
+            at.at("tolerance").must(
+                problem.tolerance > 0.0 && problem.tolerance.is_finite(),
+                "expected a number above zero, e.g. 1e-4",
+            );
+            let same = |other: &BenchmarkProblem| {
+                (other.function, other.dimensions) == (problem.function, problem.dimensions)
             };
-            self.problems[..i].iter().any(same)
-        };
-        faults.extend((0..self.problems.len()).filter(|i| twice(*i)).map(|i| {
-            Fault::new(
-                format!("problems[{i}]"),
+            at.must(
+                !self.problems[..i].iter().any(same),
                 "the same function in as many dimensions stands above",
-            )
-        }));
-        faults
+            );
+        }
     }
 
     fn run(&self, _reads: OptimiseReads, context: &Context) -> Result<OptimiseWrites> {
@@ -243,10 +210,10 @@ impl Optimise {
         reached.sort_by(f64::total_cmp);
         errors.sort_by(f64::total_cmp);
         let stuck = outcomes.iter().filter(|outcome| stuck(outcome)).count();
-        let beside = |r: &&PublishedTime| {
+        let is_of_row = |r: &&PublishedTime| {
             (r.function, r.dimensions, r.method) == (problem.function, problem.dimensions, method)
         };
-        let reference = self.reference.iter().find(beside);
+        let reference = self.reference.iter().find(is_of_row);
         SearchesRow {
             step: step.into(),
             function: problem.function.name().into(),

@@ -1,15 +1,19 @@
 //! `report`: everything the earlier stages found, as one HTML file that a person reads, prints and files.
 
 use crate::effect::Load;
-use crate::error::{Error, Fault, Result};
-use crate::report::{AcceptanceLimits, PageLanguage, ReportOptions, Tables, pages};
+use crate::error::{Error, Fault, Place, Result};
+use crate::report::{
+    AcceptanceLimits, PageLanguage, ReportOptions, Tables, TorqueTables, pages, torque_page,
+};
 use crate::robot::RobotModel;
-use crate::stage::{Context, Labelled, Stage, curves, reads, writes};
+use crate::stage::{Context, Labelled, Stage, curves};
 use crate::table::{
-    Acceptance, Cells, Corrections, Curves, Document, DocumentRow, FindingNumbers, Findings, Fit,
-    Forms, Frame, Intake, JointConventions, Observability, Parameters, Prediction, Recording,
-    Rejected, Rivals, Robot, Split, Standing, Statistics, Step, Suspects, Table, Training, Unseen,
-    Verdict, VerdictSentences, standing,
+    Acceptance, BodyConsistencies, Cells, Contacts, Corrections, Curves, Document, DocumentRow,
+    FindingNumbers, Findings, Fit, Forms, Frame, FrictionCurves, Inertials, Intake,
+    JointConventions, JointTorques, Observability, Parameters, Prediction, Recording, Rejected,
+    Rivals, Robot, Split, Standing, Statistics, Step, Suspects, Table, TorqueCourse,
+    TorqueFindings, TorqueNumbers, TorqueRivals, TorqueVerdict, Training, Unseen, Verdict,
+    VerdictSentences, standing,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -44,50 +48,39 @@ pub struct Accepted {
     pub max_mm: Option<f64>,
 }
 
-reads! {
-    /// Input ports of `report`.
-    pub struct ReportReads {
-        statistics: Statistics,
-        prediction: Vec<Labelled<Prediction>>,
-        parameters: Parameters,
-        robot: Robot,
-        recording: Recording,
-        convention: Vec<Labelled<JointConventions>>,
-        split: Split,
-        intake: Vec<Labelled<Intake>>,
-        rejected: Vec<Labelled<Rejected>>,
-        fit: Vec<Labelled<Fit>>,
-        observability: Vec<Labelled<Observability>>,
-        training: Vec<Labelled<Training>>,
-        corrections: Vec<Labelled<Corrections>>,
-        models: Vec<Labelled<Parameters>>,
-        verdict: Vec<Labelled<Verdict>>,
-        sentences: Vec<Labelled<VerdictSentences>>,
-        findings: Vec<Labelled<Findings>>,
-        finding_numbers: Vec<Labelled<FindingNumbers>>,
-        rivals: Vec<Labelled<Rivals>>,
-        forms: Vec<Labelled<Forms>>,
-        cells: Vec<Labelled<Cells>>,
-        suspects: Vec<Labelled<Suspects>>,
-    }
-}
-writes! {
-    /// Output ports of `report`.
-    pub struct ReportWrites {
-        document: Document,
-        acceptance: Acceptance,
-        curves: Curves,
-    }
+crate::stage::stage! {
+    Report, "report", 22, "writes one self-contained HTML file: errors before and after, parameters, rejected rows",
+        ReportReads {
+            statistics: Statistics,
+            prediction: Vec<Labelled<Prediction>>,
+            parameters: Parameters,
+            robot: Robot,
+            recording: Recording,
+            convention: Vec<Labelled<JointConventions>>,
+            split: Split,
+            intake: Vec<Labelled<Intake>>,
+            rejected: Vec<Labelled<Rejected>>,
+            fit: Vec<Labelled<Fit>>,
+            observability: Vec<Labelled<Observability>>,
+            training: Vec<Labelled<Training>>,
+            corrections: Vec<Labelled<Corrections>>,
+            models: Vec<Labelled<Parameters>>,
+            verdict: Vec<Labelled<Verdict>>,
+            sentences: Vec<Labelled<VerdictSentences>>,
+            findings: Vec<Labelled<Findings>>,
+            finding_numbers: Vec<Labelled<FindingNumbers>>,
+            rivals: Vec<Labelled<Rivals>>,
+            forms: Vec<Labelled<Forms>>,
+            cells: Vec<Labelled<Cells>>,
+            suspects: Vec<Labelled<Suspects>>,
+        } -> ReportWrites {
+            document: Document,
+            acceptance: Acceptance,
+            curves: Curves,
+        }
 }
 
 impl Stage for Report {
-    const NAME: &'static str = "report";
-    const SUMMARY: &'static str =
-        "writes one self-contained HTML file: errors before and after, parameters, rejected rows";
-    const IMPLEMENTATION: u32 = 22;
-    type Reads = ReportReads;
-    type Writes = ReportWrites;
-
     fn sets_named(&self) -> Vec<(String, String)> {
         self.set
             .iter()
@@ -133,7 +126,7 @@ impl Stage for Report {
         stands
             .iter()
             .flat_map(Standing::warnings)
-            .for_each(|warning| context.services.warn(warning));
+            .for_each(|warning| context.warn(warning));
         let counting = counting(&reads)?;
         let mut standing = stands
             .as_ref()
@@ -213,18 +206,17 @@ impl Stage for Report {
         })
     }
 
-    fn check(&self) -> Vec<Fault> {
-        let limits = [
-            ("mean_mm", self.limits.mean_mm),
-            ("p95_mm", self.limits.p95_mm),
-            ("max_mm", self.limits.max_mm),
-        ];
-        let wrong = limits
-            .into_iter()
-            .filter(|(_, limit)| limit.is_some_and(|limit| !(limit.is_finite() && limit > 0.0)));
-        wrong
-            .map(|(name, _)| Fault::new(format!("limits.{name}"), "expected a length above 0, mm"))
-            .collect()
+    fn faults(&self, at: &mut Place) {
+        let Accepted {
+            mean_mm,
+            p95_mm,
+            max_mm,
+        } = self.limits;
+        for (name, limit) in [("mean_mm", mean_mm), ("p95_mm", p95_mm), ("max_mm", max_mm)] {
+            let possible = limit.is_none_or(|limit| limit.is_finite() && limit > 0.0);
+            at.at(format!("limits.{name}"))
+                .must(possible, "expected a length above 0, mm");
+        }
     }
 }
 
@@ -320,5 +312,77 @@ fn placed(error: Error, stage: &str) -> Error {
                 .collect(),
         ),
         other => other,
+    }
+}
+
+/// Writes `torques.html`.
+#[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ReportTorques {
+    /// Heading of the page; without it, the robot's name.
+    pub title: Option<String>,
+}
+
+crate::stage::stage! {
+    ReportTorques, "report_torques", 5, "writes one self-contained HTML file: torques before and after, friction, what was found",
+        ReportTorquesReads {
+            robot: Robot,
+            verdict: TorqueVerdict,
+            sentences: Vec<Labelled<VerdictSentences>>,
+            findings: TorqueFindings,
+            numbers: TorqueNumbers,
+            rivals: TorqueRivals,
+            joints: JointTorques,
+            course: TorqueCourse,
+            friction: FrictionCurves,
+            inertials: Inertials,
+            contacts: Contacts,
+            consistency: BodyConsistencies,
+        } -> ReportTorquesWrites {
+            document: Document,
+        }
+}
+
+impl Stage for ReportTorques {
+    fn run(&self, reads: ReportTorquesReads, _context: &Context) -> Result<ReportTorquesWrites> {
+        let hash = |name: &str, frame: crate::table::Frame| {
+            (name.to_string(), frame.table_hash().to_string())
+        };
+        let hashes = vec![
+            hash("robot", reads.robot.to_frame()?),
+            hash("findings", reads.findings.to_frame()?),
+            hash("course", reads.course.to_frame()?),
+        ];
+        let tables = TorqueTables {
+            robot: reads.robot,
+            verdict: reads.verdict,
+            // Other diagnoses of the pipeline have theirs: each is asked for by its step.
+            sentences: VerdictSentences(
+                reads
+                    .sentences
+                    .into_iter()
+                    .flat_map(|of| of.table.0)
+                    .collect(),
+            ),
+            findings: reads.findings,
+            numbers: reads.numbers,
+            rivals: reads.rivals,
+            joints: reads.joints,
+            course: reads.course,
+            friction: reads.friction,
+            inertials: reads.inertials,
+            contacts: reads.contacts,
+            consistency: reads.consistency,
+            hashes,
+        };
+        let content = torque_page(&tables, self.title.as_deref())?;
+        let html = DocumentRow {
+            name: "torques.html".into(),
+            media_type: "text/html".into(),
+            content,
+        };
+        Ok(ReportTorquesWrites {
+            document: Document(vec![html]),
+        })
     }
 }

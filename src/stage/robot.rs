@@ -1,8 +1,7 @@
 //! Stage `robot`: a robot file -> the `robot` table.
 
-use super::text_file::text;
-use super::{Context, RawFile, Stage, reads, writes};
-use crate::error::{Fault, Result};
+use super::{Context, RawFile, Stage};
+use crate::error::{Place, Result};
 use crate::robot::import::{RobotFileText, read_calib, read_case};
 use crate::table::Robot;
 use schemars::JsonSchema;
@@ -10,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 // Bytes; the largest URDF we know is 200 kB. A recording named here by mistake must not fill the memory.
 const MOST_BYTES: u64 = 16 << 20;
+const WHAT: &str = "a robot file";
 
 /// How the robot file is laid out.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -36,32 +36,18 @@ pub struct ReadRobot {
     pub urdf: Option<RawFile>,
 }
 
-reads! {
-    /// Nothing.
-    pub struct RobotReads {}
-}
-writes! {
-    /// The robot.
-    pub struct RobotWrites {
-        robot: Robot,
-    }
+crate::stage::stage! {
+    ReadRobot, "robot", 2, "reads a robot file (screws, DH, modified DH, URDF, or a practice robot.json)",
+        RobotReads {} -> RobotWrites {
+            robot: Robot,
+        }
 }
 
 impl Stage for ReadRobot {
-    const NAME: &'static str = "robot";
-    const SUMMARY: &'static str =
-        "reads a robot file (screws, DH, modified DH, URDF, or a practice robot.json)";
-    const IMPLEMENTATION: u32 = 2;
-    type Reads = RobotReads;
-    type Writes = RobotWrites;
-
-    fn check(&self) -> Vec<Fault> {
-        match (self.format, &self.urdf) {
-            (RobotFormat::Case, Some(_)) => {
-                vec![Fault::new("urdf", "the format `case` takes no URDF")]
-            }
-            _ => Vec::new(),
-        }
+    fn faults(&self, at: &mut Place) {
+        let possible = self.format == RobotFormat::Calib || self.urdf.is_none();
+        at.at("urdf")
+            .must(possible, "the format `case` takes no URDF");
     }
 
     fn files(&self) -> Vec<(String, RawFile)> {
@@ -79,7 +65,7 @@ impl Stage for ReadRobot {
     }
 
     fn run(&self, _reads: RobotReads, context: &Context) -> Result<RobotWrites> {
-        let (label, text) = robot_text(&self.file, context)?;
+        let (label, text) = context.text(&self.file, WHAT, MOST_BYTES)?;
         let file = RobotFileText {
             label: &label,
             text: &text,
@@ -90,7 +76,7 @@ impl Stage for ReadRobot {
                 let urdf = self
                     .urdf
                     .as_ref()
-                    .map(|file| robot_text(file, context))
+                    .map(|file| context.text(file, WHAT, MOST_BYTES))
                     .transpose()?;
                 read_calib(
                     file,
@@ -100,14 +86,10 @@ impl Stage for ReadRobot {
             }
         };
         for note in imported.notes {
-            context.services.warn(note);
+            context.warn(note);
         }
         Ok(RobotWrites {
             robot: Robot::from_description(&imported.robot),
         })
     }
-}
-
-fn robot_text(file: &RawFile, context: &Context) -> Result<(String, String)> {
-    text(file, "a robot file", MOST_BYTES, context)
 }

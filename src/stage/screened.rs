@@ -1,12 +1,31 @@
 //! What identifications do about rows that no smooth model can follow, and what they tell the person about them.
 
 use crate::estimate::{
-    FitOptions, Fitted, Model, Screening, Suspect, SuspectKind, fit, fit_screened,
+    FitOptions, Fitted, Model, Screening, Session, Suspect, SuspectKind, fit, fit_screened,
 };
 use crate::robot::Measurements;
 use crate::stage::Context;
 use crate::table::{Recording, Split, slip};
 use std::collections::BTreeMap;
+
+/// A model fitted to rows of a recording.
+pub struct FittedRows {
+    pub model: Model,
+    pub fitted: Fitted,
+    pub screening: Screening,
+}
+
+impl FittedRows {
+    /// With the recording.
+    pub fn session<'a>(&'a self, data: &'a Measurements) -> Session<'a> {
+        Session {
+            data,
+            rows: &self.screening.kept,
+            model: &self.model,
+            fitted: &self.fitted,
+        }
+    }
+}
 
 /// Fits, and with `screen` sets aside what does not belong.
 pub fn fit_rows(
@@ -15,20 +34,26 @@ pub fn fit_rows(
     options: &FitOptions,
     split: &Split,
     screen: bool,
-) -> (Model, Fitted, Screening) {
-    if !screen {
-        let kept = options.rows.to_vec();
+) -> FittedRows {
+    let (model, fitted, screening) = if screen {
+        fit_screened(start, data, options, &numbered(split))
+    } else {
         let (model, fitted) = fit(start, data, options);
-        return (
+        let kept = options.rows.to_vec();
+        (
             model,
             fitted,
             Screening {
                 kept,
                 ..Screening::default()
             },
-        );
+        )
+    };
+    FittedRows {
+        model,
+        fitted,
+        screening,
     }
-    fit_screened(start, data, options, &numbered(split))
 }
 
 /// The number of the set that each row belongs to.
@@ -50,7 +75,7 @@ const NAMED: usize = 4;
 /// Notes for the person: who was set aside and why, and what looks like mistakes and was kept.
 pub fn note(context: &Context, screening: &Screening, recording: &Recording) {
     if let Some(offset) = screening.apart {
-        context.services.warn(format!(
+        context.warn(format!(
             "most points belong to the joints {offset:+} rows away: the two logs are misaligned: join them again before anything else"
         ));
     }
@@ -107,14 +132,14 @@ pub fn note(context: &Context, screening: &Screening, recording: &Recording) {
         });
         let texts: Vec<String> = texts.collect();
         let rows = if aside.len() == 1 { "row" } else { "rows" };
-        context.services.warn(format!(
+        context.warn(format!(
             "{} {rows} set aside: {}",
             aside.len(),
             texts.join("; ")
         ));
     }
     for run in events.chunk_by(|a, b| a.row + 1 == b.row) {
-        context.services.warn(format!(
+        context.warn(format!(
             "{} to {} ({} rows) stand out together: something happened there that the model does not know; they are kept",
             id(run[0].row),
             id(run[run.len() - 1].row),
@@ -122,7 +147,7 @@ pub fn note(context: &Context, screening: &Screening, recording: &Recording) {
         ));
     }
     if screening.crowd > 0 {
-        context.services.note(format!(
+        context.note(format!(
             "{} far out without evidence beside this model that they are mistakes of the recording: it lacks something there; they are kept",
             if screening.crowd == 1 { "one row stands".into() } else { format!("{} rows stand", screening.crowd) }
         ));

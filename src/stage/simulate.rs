@@ -1,16 +1,14 @@
 //! `simulate`: a recording from a twin of the robot whose truth is known.
 
-mod fixtures;
-
 use crate::description::{JointKind, RobotDescription};
-use crate::error::{Error, Fault, Result, counted};
+use crate::error::{Error, Place, Result, counted};
 use crate::robot::{Instrument, START, SigmaSource};
-use crate::stage::{Context, Stage, reads, writes};
+use crate::stage::{Context, Stage};
 use crate::table::{Recording, Robot, Truth, TruthRow};
 use crate::twin::effect::Physical;
 use crate::twin::plan::{Block, Climate, Poses, given};
 use crate::twin::recorder::{Experiment, Motors, Shot};
-use crate::twin::touch::Fixture;
+use crate::twin::touch::{Fixture, FixtureKind, Touch};
 use crate::twin::tracker::Tracker;
 use crate::twin::true_value::TrueValue;
 use crate::twin::truth::TrueRobot;
@@ -72,164 +70,114 @@ pub struct Simulate {
     pub seed: Option<u64>,
 }
 
-reads! {
-    /// Input ports of `simulate`.
-    pub struct SimulateReads {
-        robot: Robot,
-    }
-}
-
-writes! {
-    /// Output ports of `simulate`.
-    pub struct SimulateWrites {
-        recording: Recording,
-        truth: Truth,
-    }
+crate::stage::stage! {
+    Simulate, "simulate", 3, "records an experiment on a twin whose truth is known",
+        SimulateReads {
+            robot: Robot,
+        } -> SimulateWrites {
+            recording: Recording,
+            truth: Truth,
+        }
 }
 
 /// Points of a block, and candidates of a pose, at most: what fits into memory.
 const MOST: usize = 10_000_000;
 
 impl Stage for Simulate {
-    const NAME: &'static str = "simulate";
-    const SUMMARY: &'static str = "records an experiment on a twin whose truth is known";
-    const IMPLEMENTATION: u32 = 3;
-    type Reads = SimulateReads;
-    type Writes = SimulateWrites;
-
-    fn check(&self) -> Vec<Fault> {
-        let mut faults = Vec::new();
-        let mut fault = |place: &str, message: &str| faults.push(Fault::new(place, message));
+    fn faults(&self, at: &mut Place) {
         for (index, fixture) in self.fixtures.iter().enumerate() {
+            let mut at = at.at(format!("fixtures[{index}]"));
             fixture
                 .faults()
-                .iter()
-                .for_each(|(at, message)| fault(&format!("fixtures[{index}].{at}"), message));
-            if self.fixtures[..index]
-                .iter()
-                .any(|other| other.name == fixture.name)
-            {
-                fault(
-                    &format!("fixtures[{index}].name"),
-                    "another one has this name",
-                );
-            }
+                .into_iter()
+                .for_each(|(key, message)| at.at(key).fault(message));
+            let mut others = self.fixtures[..index].iter();
+            at.at("name").must(
+                others.all(|other| other.name != fixture.name),
+                "another one has this name",
+            );
         }
         let measured = !self.blocks.is_empty() || self.motion.is_some();
-        if !self.fixtures.is_empty() && measured {
-            fault(
-                "fixtures",
-                "nothing but joints is recorded at fixtures; leave out `blocks` and `motion`",
-            );
-        }
-        if self.fixtures.is_empty() && self.blocks.iter().all(|block| block.count() == 0) {
-            fault(
-                "blocks",
-                "expected at least one block with points, e.g. [{usage: fit, points: 50}]",
-            );
+        at.at("fixtures").must(
+            self.fixtures.is_empty() || !measured,
+            "nothing but joints is recorded at fixtures; leave out `blocks` and `motion`",
+        );
+        at.at("blocks").must(
+            !self.fixtures.is_empty() || self.blocks.iter().any(|block| block.count() > 0),
+            "expected at least one block with points, e.g. [{usage: fit, points: 50}]",
+        );
+        at.at("poses.candidates").must(
+            self.poses.candidates <= MOST,
+            format!("expected {MOST} candidates at most"),
+        );
+        for (place, pose) in given(&self.blocks) {
+            let mut at = at.at(place);
+            pose.faults()
+                .into_iter()
+                .for_each(|(key, message)| at.at(key).fault(message));
         }
         for (index, block) in self.blocks.iter().enumerate() {
-            if block.points > MOST {
-                fault(
-                    &format!("blocks[{index}].points"),
-                    &format!("expected {MOST} points at most"),
-                );
-            }
-        }
-        if self.poses.candidates > MOST {
-            fault(
-                "poses.candidates",
-                &format!("expected {MOST} candidates at most"),
+            let mut at = at.at(format!("blocks[{index}]"));
+            at.at("points").must(
+                block.points <= MOST,
+                format!("expected {MOST} points at most"),
             );
-        }
-        for (place, pose) in given(&self.blocks) {
-            pose.faults()
-                .iter()
-                .for_each(|(at, message)| fault(&format!("{place}.{at}"), message));
-        }
-        for (index, _) in self
-            .blocks
-            .iter()
-            .enumerate()
-            .filter(|(_, block)| self.motion.is_some() && !block.given.is_empty())
-        {
-            fault(
-                &format!("blocks[{index}].given"),
+            at.at("given").must(
+                self.motion.is_none() || block.given.is_empty(),
                 "given poses need an arm at rest; leave out `given` or `motion`",
             );
-        }
-        for (index, block) in self.blocks.iter().enumerate() {
-            if !(block.payload_kg.is_finite() && block.payload_kg >= 0.0) {
-                fault(
-                    &format!("blocks[{index}].payload_kg"),
-                    "expected a mass, 0 or more",
-                );
-            }
-        }
-        for (index, range) in self.poses.range_deg.iter().enumerate() {
-            if !(range[0].is_finite() && range[1].is_finite() && range[0] <= range[1]) {
-                fault(
-                    &format!("poses.range_deg[{index}]"),
-                    "expected [lower, upper], lower first",
-                );
-            }
-        }
-        if !(self.tracker.coverage > 0.0
-            && self.tracker.noise_um >= 0.0
-            && self.tracker.noise_um_per_m >= 0.0)
-        {
-            fault(
-                "tracker",
-                "expected noise_um and noise_um_per_m of 0 or more, and a coverage above 0, e.g. 2",
+            let mass = block.payload_kg;
+            at.at("payload_kg").must(
+                mass.is_finite() && mass >= 0.0,
+                "expected a mass, 0 or more",
             );
         }
+        for (index, [low, high]) in self.poses.range_deg.iter().enumerate() {
+            let possible = low.is_finite() && high.is_finite() && low <= high;
+            at.at(format!("poses.range_deg[{index}]"))
+                .must(possible, "expected [lower, upper], lower first");
+        }
+        let Tracker {
+            noise_um,
+            noise_um_per_m,
+            coverage,
+            ..
+        } = self.tracker;
+        at.at("tracker").must(
+            coverage > 0.0 && noise_um >= 0.0 && noise_um_per_m >= 0.0,
+            "expected noise_um and noise_um_per_m of 0 or more, and a coverage above 0, e.g. 2",
+        );
         let Climate {
-            pace_s: pace,
+            pace_s: [shortest, longest],
             begin_s,
             warm_up_h,
             swing_h,
             ..
         } = self.climate;
-        if !(begin_s >= 0.0 && begin_s.is_finite()) {
-            fault("climate.begin_s", "expected a time of 0 or more, s");
-        }
-        if !(pace[0] > 0.0
-            && pace[0] <= pace[1]
-            && pace[1].is_finite()
-            && warm_up_h > 0.0
-            && swing_h > 0.0)
-        {
-            fault(
-                "climate",
-                "expected pace_s as [shortest, longest] above 0, and warm_up_h and swing_h above 0",
+        at.at("climate.begin_s").must(
+            begin_s >= 0.0 && begin_s.is_finite(),
+            "expected a time of 0 or more, s",
+        );
+        let paced = shortest > 0.0 && shortest <= longest && longest.is_finite();
+        at.at("climate").must(
+            paced && warm_up_h > 0.0 && swing_h > 0.0,
+            "expected pace_s as [shortest, longest] above 0, and warm_up_h and swing_h above 0",
+        );
+        if let Some(way) = &self.motion {
+            let mut positive = [way.rate_hz, way.speed_deg_s].into_iter();
+            let mut more = [way.dwell_s, way.wander_s].into_iter();
+            at.at("motion").must(
+                positive.all(|value| value > 0.0 && value.is_finite())
+                    && more.all(|value| value >= 0.0 && value.is_finite()),
+                "expected rate_hz and speed_deg_s above 0, dwell_s and wander_s of 0 or more",
             );
         }
-        if let Some(way) = &self.motion {
-            let positive = [way.rate_hz, way.speed_deg_s]
-                .iter()
-                .all(|value| *value > 0.0 && value.is_finite());
-            let more = [way.dwell_s, way.wander_s]
-                .iter()
-                .all(|value| *value >= 0.0 && value.is_finite());
-            if !(positive && more) {
-                fault(
-                    "motion",
-                    "expected rate_hz and speed_deg_s above 0, dwell_s and wander_s of 0 or more",
-                );
-            }
-        }
-        faults
     }
 
     fn run(&self, reads: SimulateReads, context: &Context) -> Result<SimulateWrites> {
         let robot = reads.robot.to_description()?;
         let place = format!("{}.with", context.id);
-        let faults = self.against(&robot);
-        if !faults.is_empty() {
-            let named =
-                |fault: Fault| Fault::new(format!("{place}.{}", fault.place), fault.message);
-            return Err(Error::Spec(faults.into_iter().map(named).collect()));
-        }
+        Error::if_spec(Place::faults(|at| self.against(&robot, &mut at.at(&place))))?;
         let effects = self.acting();
         let tick = |done: &mut u64| {
             *done += 1;
@@ -255,16 +203,12 @@ impl Stage for Simulate {
                 counted(touches.len(), "row"),
                 counted(self.fixtures.len(), "fixture"),
             );
-            context
-                .services
-                .note(format!("{rows} of joints at {things} of a twin"));
+            context.note(format!("{rows} of joints at {things} of a twin"));
             let mut truth = truth(&robot, &self.truth, &self.tracker, effects);
-            truth
-                .0
-                .extend(self.fixtures.iter().flat_map(fixtures::truth));
+            truth.0.extend(self.fixtures.iter().flat_map(fixture_truth));
             truth.0.sort_by(|a, b| a.name.cmp(&b.name));
             return Ok(SimulateWrites {
-                recording: fixtures::recording(&robot, &self.fixtures, &touches),
+                recording: contact_recording(&robot, &self.fixtures, &touches),
                 truth,
             });
         }
@@ -278,7 +222,7 @@ impl Stage for Simulate {
             None => experiment.record(|| tick(&mut done)),
         };
         let shots = shots.map_err(|message| Error::spec(place, message))?;
-        context.services.note(format!(
+        context.note(format!(
             "{} measured on a twin with {} besides its truth",
             counted(points, "point"),
             counted(effects.len(), "effect")
@@ -300,44 +244,37 @@ impl Simulate {
     }
 
     /// Settings that this robot cannot have.
-    fn against(&self, robot: &RobotDescription) -> Vec<Fault> {
+    fn against(&self, robot: &RobotDescription, at: &mut Place) {
         let joints = robot.joints.len();
-        let of_truth = self
-            .truth
-            .faults(robot)
-            .into_iter()
-            .map(|(at, what)| Fault::new(format!("truth.{at}"), what));
-        let of_poses = given(&self.blocks).flat_map(|(place, pose)| {
+        for (key, what) in self.truth.faults(robot) {
+            at.at("truth").at(key).fault(what);
+        }
+        for (place, pose) in given(&self.blocks) {
+            let mut at = at.at(place);
             pose.against(robot)
                 .into_iter()
-                .map(move |(at, what)| Fault::new(format!("{place}.{at}"), what))
-        });
-        let mut faults: Vec<Fault> = of_truth.chain(of_poses).collect();
+                .for_each(|(key, what)| at.at(key).fault(what));
+        }
         for (index, effect) in self.effects.iter().enumerate() {
-            faults.extend(
-                effect
-                    .fault(joints)
-                    .map(|what| Fault::new(format!("effects[{index}]"), what)),
+            let mut at = at.at(format!("effects[{index}]"));
+            effect
+                .fault(joints)
+                .into_iter()
+                .for_each(|what| at.fault(what));
+            at.must(
+                self.motion.is_some() || !effect.moves_only(),
+                "shows on a moving arm only; say `motion`, e.g. motion: {rate_hz: 100}",
             );
-            if self.motion.is_none() && effect.moves_only() {
-                let what = "shows on a moving arm only; say `motion`, e.g. motion: {rate_hz: 100}";
-                faults.push(Fault::new(format!("effects[{index}]"), what));
-            }
         }
         for (name, list) in [
             ("motors.sign", &self.motors.sign),
             ("repeatability_arcsec", &self.repeatability_arcsec),
         ] {
-            if !list.is_empty() && list.len() != joints {
-                faults.push(Fault::new(
-                    name,
-                    format!(
-                        "has {}, the robot {}",
-                        counted(list.len(), "number"),
-                        counted(joints, "joint")
-                    ),
-                ));
-            }
+            let (numbers, all) = (counted(list.len(), "number"), counted(joints, "joint"));
+            at.at(name).must(
+                list.is_empty() || list.len() == joints,
+                format!("has {numbers}, the robot {all}"),
+            );
         }
         for (joint, factor) in self
             .truth
@@ -346,24 +283,21 @@ impl Simulate {
             .enumerate()
             .filter(|(_, factor)| **factor != 0.0)
         {
-            let at = format!("truth.compliance_rad_a[{joint}]");
+            let mut at = at.at(format!("truth.compliance_rad_a[{joint}]"));
             let known = robot
                 .joints
                 .get(joint)
                 .is_some_and(|j| j.reduction_ratio.is_some() && j.motor_constant.is_some());
-            if !known {
-                faults.push(Fault::new(
-                    at,
-                    "needs reduction_ratio and motor_constant of this joint in the robot file",
-                ));
-            } else if factor.signum()
-                == self.motors.sign.get(joint).copied().unwrap_or(1.0).signum()
-            {
-                let why = "has the sign of motors.sign: the gear would wind up against its load; the signs must differ";
-                faults.push(Fault::new(at, why));
-            }
+            let sign = self.motors.sign.get(joint).copied().unwrap_or(1.0);
+            at.must(
+                known,
+                "needs reduction_ratio and motor_constant of this joint in the robot file",
+            );
+            at.must(
+                !known || factor.signum() != sign.signum(),
+                "has the sign of motors.sign: the gear would wind up against its load; the signs must differ",
+            );
         }
-        faults
     }
 
     /// What the tracker states of its noise; nothing where it has none, since no fit can weigh by zero.
@@ -491,4 +425,94 @@ fn truth(
     let mut rows: Vec<TruthRow> = rows.collect();
     rows.sort_by(|a, b| a.name.cmp(&b.name));
     Truth(rows)
+}
+
+/// m; what is stated where the ball comes back exactly: no fit can weigh by zero.
+const LEAST_SIGMA: f64 = 1e-6;
+
+const FIXTURES: [(FixtureKind, &str, &str); 3] = [
+    (FixtureKind::Socket, "socket", "sigma_socket"),
+    (FixtureKind::Plane, "plane", "sigma_plane"),
+    (FixtureKind::Sphere, "sphere", "sigma_sphere"),
+];
+
+/// Joints with the names of what holds the ball.
+pub(super) fn contact_recording(
+    robot: &RobotDescription,
+    fixtures: &[Fixture],
+    touches: &[Touch],
+) -> Recording {
+    let fixture_of = |touch: &Touch| &fixtures[touch.fixture];
+    let (mut readings, mut names) = (BTreeMap::new(), BTreeMap::new());
+    for (kind, setting, sigma) in FIXTURES
+        .into_iter()
+        .filter(|(kind, ..)| fixtures.iter().any(|fixture| fixture.kind == *kind))
+    {
+        let touched =
+            |touch: &Touch| Some(fixture_of(touch)).filter(|fixture| fixture.kind == kind);
+        names.insert(
+            setting,
+            touches
+                .iter()
+                .map(|touch| touched(touch).map(|fixture| fixture.name.clone()))
+                .collect(),
+        );
+        let noise = |touch: &Touch| {
+            touched(touch).map_or(f64::NAN, |fixture| {
+                (1e-6 * fixture.sigma_um).max(LEAST_SIGMA)
+            })
+        };
+        readings.insert(sigma, touches.iter().map(noise).collect());
+    }
+    let mut counts = vec![0; fixtures.len()];
+    let mut name = |touch: &Touch| {
+        counts[touch.fixture] += 1;
+        format!("{}-{:04}", fixture_of(touch).name, counts[touch.fixture])
+    };
+    Recording {
+        joints: robot.joints.len(),
+        prismatic: robot
+            .joints
+            .iter()
+            .map(|joint| joint.kind == JointKind::Prismatic)
+            .collect(),
+        sequence: (0..touches.len() as i64).collect(),
+        point_id: touches.iter().map(&mut name).collect(),
+        usage: touches
+            .iter()
+            .map(|touch| Some(fixture_of(touch).usage.clone()))
+            .collect(),
+        q: touches
+            .iter()
+            .flat_map(|touch| touch.q.iter().copied())
+            .collect(),
+        position: vec![[f64::NAN; 3]; touches.len()],
+        time: Some(touches.iter().map(|touch| touch.time_s).collect()),
+        temperature: Some(touches.iter().map(|touch| touch.temperature_c).collect()),
+        readings,
+        names,
+        ..Recording::default()
+    }
+}
+
+/// Where a fixture truly is, under the names that identified parameters have.
+pub(super) fn fixture_truth(fixture: &Fixture) -> Vec<TruthRow> {
+    let row = |ending: &str, value: f64| TruthRow {
+        name: format!("anchor.{}.{ending}", fixture.name),
+        effect: "anchor".into(),
+        place: "anchor".into(),
+        unit: "mm".into(),
+        value,
+    };
+    let [x, y, z] = fixture.centre_mm;
+    let centre = [row("x", x), row("y", y), row("z", z)];
+    let radius = fixture
+        .radius_mm
+        .filter(|_| fixture.kind == FixtureKind::Sphere)
+        .map(|radius| row("radius", radius));
+    centre
+        .into_iter()
+        .filter(|_| fixture.kind != FixtureKind::Plane)
+        .chain(radius)
+        .collect()
 }

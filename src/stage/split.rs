@@ -4,13 +4,10 @@
 //! that was seen in training is no test. Targets that are measured one after the other in a pose are never parted. Copies of a row under
 //! other ids go wherever they stand to the set of that row.
 
-mod stops;
-
-use crate::error::{Error, Fault, Result, counted};
-use crate::stage::copied::{self, copied_rows};
-use crate::stage::matches;
-use crate::stage::named_column::NamedColumn;
-use crate::stage::{Context, Stage, reads, writes};
+use crate::error::{Error, Place, Result, counted, listed};
+use crate::robot::pose_groups::{NEAR, SAME, near};
+use crate::stage::remarks::{copied_rows, copies_remark};
+use crate::stage::{Context, Stage, matches};
 use crate::table::{Recording, Split, SplitRow};
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
@@ -18,7 +15,7 @@ use rand::seq::SliceRandom;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
-use stops::{poses, stops};
+use std::ops::Range;
 
 /// How rows are dealt out to sets.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -112,114 +109,81 @@ fn fit() -> String {
     "fit".into()
 }
 
-reads! {
-    /// Input ports of `split`.
-    pub struct SplitReads {
-        recording: Recording,
-    }
-}
-
-writes! {
-    /// Output ports of `split`.
-    pub struct SplitWrites {
-        split: Split,
-    }
+crate::stage::stage! {
+    SplitBy, "split", 4, "deals rows out to named sets: every n-th, by name, blocks, random, by usage, by order",
+        SplitReads {
+            recording: Recording,
+        } -> SplitWrites {
+            split: Split,
+        }
 }
 
 impl Stage for SplitBy {
-    const NAME: &'static str = "split";
-    const SUMMARY: &'static str =
-        "deals rows out to named sets: every n-th, by name, blocks, random, by usage, by order";
-    const IMPLEMENTATION: u32 = 4;
-    type Reads = SplitReads;
-    type Writes = SplitWrites;
-
-    fn check(&self) -> Vec<Fault> {
-        let mut faults = Vec::new();
+    fn faults(&self, at: &mut Place) {
         for name in self.names() {
-            if name.trim().is_empty() {
-                faults.push(Fault::new("", "a set without a name"));
-            }
+            at.must(!name.trim().is_empty(), "a set without a name");
         }
         match self {
-            Self::Every {
-                n,
-                offset,
-                set,
-                rest,
-                ..
-            } => {
-                if *n < 2 {
-                    faults.push(Fault::new("n", "allowed: 2 and above"));
-                }
-                if offset.is_some_and(|offset| offset >= *n) {
-                    faults.push(Fault::new(
-                        "offset",
-                        format!("allowed: 0 to {}", n.saturating_sub(1)),
-                    ));
-                }
-                two(set, rest, &mut faults);
+            Self::Every { n, offset, .. } => {
+                at.at("n").must(*n >= 2, "allowed: 2 and above");
+                let possible = offset.is_none_or(|offset| offset < *n);
+                at.at("offset")
+                    .must(possible, format!("allowed: 0 to {}", n.saturating_sub(1)));
             }
-            Self::Named {
-                names, set, rest, ..
-            } => {
-                if names.is_empty() {
-                    faults.push(Fault::new("names", "name at least one, e.g. [front/*]"));
-                }
-                two(set, rest, &mut faults);
+            Self::Named { names, .. } => {
+                at.at("names")
+                    .must(!names.is_empty(), "name at least one, e.g. [front/*]");
             }
             Self::Blocks {
                 count,
                 length,
                 sets,
             } => {
-                if count.is_some() == length.is_some() {
-                    faults.push(Fault::new("", "say `count` or `length`, one of them"));
-                }
-                if *count == Some(0) || *length == Some(0) {
-                    faults.push(Fault::new(
-                        if count.is_some() { "count" } else { "length" },
-                        "allowed: 1 and above",
-                    ));
-                }
-                if sets.is_empty() {
-                    faults.push(Fault::new("sets", "name at least one set"));
-                }
+                at.must(
+                    count.is_some() != length.is_some(),
+                    "say `count` or `length`, one of them",
+                );
+                let key = if count.is_some() { "count" } else { "length" };
+                at.at(key).must(
+                    *count != Some(0) && *length != Some(0),
+                    "allowed: 1 and above",
+                );
+                at.at("sets")
+                    .must(!sets.is_empty(), "name at least one set");
             }
-            Self::Random {
-                fraction,
-                set,
-                rest,
-            } => {
-                if !(*fraction > 0.0 && *fraction < 1.0) {
-                    faults.push(Fault::new("fraction", "allowed: above 0 and below 1"));
-                }
-                two(set, rest, &mut faults);
+            Self::Random { fraction, .. } => {
+                at.at("fraction").must(
+                    *fraction > 0.0 && *fraction < 1.0,
+                    "allowed: above 0 and below 1",
+                );
             }
             Self::Usage { sets, .. } => {
-                if sets.as_ref().is_some_and(BTreeMap::is_empty) {
-                    faults.push(Fault::new(
-                        "sets",
-                        "map at least one label, or leave it out",
-                    ));
-                }
+                let none = sets.as_ref().is_some_and(BTreeMap::is_empty);
+                at.at("sets")
+                    .must(!none, "map at least one label, or leave it out");
             }
             Self::Order { sets } => {
-                let last = sets.len().saturating_sub(1);
-                if sets.is_empty() {
-                    faults.push(Fault::new("sets", "name at least one set"));
-                }
+                at.at("sets")
+                    .must(!sets.is_empty(), "name at least one set");
                 for (index, stretch) in sets.iter().enumerate() {
-                    if stretch.rows == Some(0) || (stretch.rows.is_none() && index < last) {
-                        faults.push(Fault::new(
-                            format!("sets[{index}].rows"),
-                            "allowed: 1 and above; only the last may leave it out",
-                        ));
-                    }
+                    let possible = match stretch.rows {
+                        Some(rows) => rows > 0,
+                        None => index + 1 == sets.len(),
+                    };
+                    at.at(format!("sets[{index}].rows")).must(
+                        possible,
+                        "allowed: 1 and above; only the last may leave it out",
+                    );
                 }
             }
         }
-        faults
+        if let Self::Every { set, rest, .. }
+        | Self::Named { set, rest, .. }
+        | Self::Random { set, rest, .. } = self
+        {
+            at.at("rest")
+                .must(set != rest, format!("both sets are called `{set}`"));
+        }
     }
 
     fn sets_dealt(&self) -> Option<Vec<String>> {
@@ -235,19 +199,14 @@ impl Stage for SplitBy {
     }
 
     fn run(&self, reads: SplitReads, context: &Context) -> Result<SplitWrites> {
-        let faults = self.check();
-        if !faults.is_empty() {
-            return Err(Error::Spec(faults));
-        }
+        Error::if_spec(self.check())?;
         let recording = &reads.recording;
         let mut sets = self.deal(recording, context.seed)?;
         let copies = copied_rows(recording);
         copies
             .iter()
             .for_each(|(row, copy)| sets[*copy] = sets[*row].clone());
-        copied::remark(&copies, recording)
-            .into_iter()
-            .for_each(|line| context.services.warn(line));
+        context.warn_each(copies_remark(&copies, recording));
         let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
         for set in &sets {
             *counts.entry(set).or_default() += 1;
@@ -261,9 +220,7 @@ impl Stage for SplitBy {
             .iter()
             .map(|(set, rows)| format!("{set} {rows}"))
             .collect();
-        context
-            .services
-            .note(format!("rows: {}", listed.join(", ")));
+        context.note(format!("rows: {}", listed.join(", ")));
         let rows = sets
             .into_iter()
             .zip(&recording.sequence)
@@ -276,12 +233,6 @@ impl Stage for SplitBy {
         Ok(SplitWrites {
             split: Split(rows.map(row).collect()),
         })
-    }
-}
-
-fn two(set: &str, rest: &str, faults: &mut Vec<Fault>) {
-    if set == rest {
-        faults.push(Fault::new("rest", format!("both sets are called `{set}`")));
     }
 }
 
@@ -443,11 +394,7 @@ fn by_usage(
         .flatten()
         .map(String::as_str)
         .collect();
-    let found = if labels.is_empty() {
-        "none".to_string()
-    } else {
-        labels.iter().copied().collect::<Vec<_>>().join(", ")
-    };
+    let found = listed(&labels);
     let set = |(usage, row): (&Option<String>, usize)| {
         let point = || recording.point_id.get(row).map_or("", String::as_str);
         match (usage, sets) {
@@ -497,4 +444,93 @@ fn by_order(rows: usize, sets: &[Stretch]) -> Result<Vec<String>> {
         return Err(Error::data("with.sets", message));
     }
     Ok(dealt)
+}
+
+/// Rows one by one, or where targets are named, all that were measured one after the other in a pose.
+pub(super) fn stops(recording: &Recording) -> Vec<Range<usize>> {
+    let mut stops: Vec<Range<usize>> = Vec::new();
+    for row in 0..recording.rows() {
+        let joins = |stop: &Range<usize>| {
+            let Some(targets) = &recording.target else {
+                return false;
+            };
+            let new = stop.clone().all(|other| targets[other] != targets[row]);
+            new && near(recording.q(stop.start), recording.q(row), NEAR)
+        };
+        match stops.last_mut() {
+            Some(last) if joins(last) => last.end = row + 1,
+            _ => stops.push(row..row + 1),
+        }
+    }
+    stops
+}
+
+/// Stretches of neighbouring rows with the same joints, the targets of a pose together.
+pub(super) fn poses(recording: &Recording) -> Vec<Range<usize>> {
+    let mut poses: Vec<Range<usize>> = Vec::new();
+    for stop in stops(recording) {
+        let (named, joints) = (stop.len() > 1, recording.q(stop.start));
+        let limit = if named { NEAR } else { SAME };
+        match poses.last_mut() {
+            Some(last) if near(recording.q(last.start), joints, limit) => last.end = stop.end,
+            _ => poses.push(stop),
+        }
+    }
+    poses
+}
+
+/// A column of names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum NamedColumn {
+    /// What sockets the target lay in.
+    Socket,
+    /// Planes that it touched.
+    Plane,
+    /// Spheres that it touched.
+    Sphere,
+    /// Ends of distances.
+    Anchor,
+    /// Targets on the tool.
+    Target,
+}
+
+impl NamedColumn {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Socket => "socket",
+            Self::Plane => "plane",
+            Self::Sphere => "sphere",
+            Self::Anchor => "anchor",
+            Self::Target => "target",
+        }
+    }
+
+    /// The names of the rows; blank where a row has none. Fails where the recording has no such column.
+    pub(super) fn of<'a>(self, recording: &'a Recording, place: &str) -> Result<Vec<&'a str>> {
+        let column = if self == Self::Target {
+            recording.target.as_ref()
+        } else {
+            recording.names.get(self.name())
+        };
+        let column = column.ok_or_else(|| {
+            let there = recording
+                .names
+                .keys()
+                .copied()
+                .chain(recording.target.as_ref().map(|_| "target"));
+            Error::data(
+                format!("with.{place}"),
+                format!(
+                    "the recording has no names of `{}`; it has: {}",
+                    self.name(),
+                    listed(there)
+                ),
+            )
+        })?;
+        Ok(column
+            .iter()
+            .map(|name| name.as_deref().unwrap_or_default())
+            .collect())
+    }
 }

@@ -1,11 +1,9 @@
 //! Joint stiffness on top of an identified geometry, which is kept: the second step of the paper's sequence (Sec. 4, Eqs. 24-30).
 
 use crate::effect::names;
-use crate::error::{Error, Fault, Result};
-use crate::estimate::FitOptions;
+use crate::error::{Error, Place, Result};
 use crate::robot::RobotModel;
-use crate::stage::identified::{Fitting, Identified};
-use crate::stage::screened::fit_rows;
+use crate::stage::identified::{Fitting, Identified, RowsToFit};
 use crate::stage::{Context, Stage};
 use crate::table::{CovarianceTable, Parameters, Prediction, Recording, Robot, Split};
 
@@ -20,28 +18,21 @@ crate::stage::identified::identification! {
     }
 }
 
-crate::stage::reads! {
-    /// Input ports of [`Stiffness`].
-    pub struct StiffnessReads {
-        robot: Robot,
-        recording: Recording,
-        split: Split,
-        parameters: Parameters,
-        covariance: Option<CovarianceTable>,
-        prediction: Prediction,
-    }
+crate::stage::stage! {
+    Stiffness, "stiffness", 17, "identifies joint compliance from loaded poses; everything identified before is kept",
+        StiffnessReads {
+            robot: Robot,
+            recording: Recording,
+            split: Split,
+            parameters: Parameters,
+            covariance: Option<CovarianceTable>,
+            prediction: Prediction,
+        } -> Identified
 }
 
 impl Stage for Stiffness {
-    const NAME: &'static str = "stiffness";
-    const SUMMARY: &'static str =
-        "identifies joint compliance from loaded poses; everything identified before is kept";
-    const IMPLEMENTATION: u32 = 17;
-    type Reads = StiffnessReads;
-    type Writes = Identified;
-
-    fn check(&self) -> Vec<Fault> {
-        self.shared_faults("loaded")
+    fn faults(&self, at: &mut Place) {
+        self.shared_faults("loaded", at);
     }
 
     fn sets_named(&self) -> Vec<(String, String)> {
@@ -50,8 +41,7 @@ impl Stage for Stiffness {
 
     fn run(&self, reads: StiffnessReads, context: &Context) -> Result<Identified> {
         let robot = RobotModel::new(reads.robot.to_description()?);
-        let mut data = reads.recording.measurements();
-        let rows = reads.split.rows(&reads.recording, &self.on)?;
+        let mut asked = RowsToFit::of(&reads.recording, &reads.split, &self.on)?;
         let mut model =
             reads
                 .parameters
@@ -60,7 +50,8 @@ impl Stage for Stiffness {
             .stack
             .effects()
             .find(|(effect, _)| effect.name() == names::JOINT_COMPLIANCE);
-        if let Some(reason) = compliance.and_then(|(effect, _)| effect.missing(&model.robot, &data))
+        if let Some(reason) =
+            compliance.and_then(|(effect, _)| effect.missing(&model.robot, &asked.data))
         {
             return Err(Error::data(
                 "with.load",
@@ -83,41 +74,22 @@ impl Stage for Stiffness {
             ));
         }
         let chosen = |k: &usize| wanted.is_empty() || wanted.contains(&specs[*k].name);
-        let own: Vec<usize> = model.stack.parameters_of(names::JOINT_COMPLIANCE).collect();
-        let open: Vec<usize> = own.iter().copied().filter(chosen).collect();
+        let all: Vec<usize> = model.stack.parameters_of(names::JOINT_COMPLIANCE).collect();
+        let open: Vec<usize> = all.iter().copied().filter(chosen).collect();
         let (candidates, _) = self.parameter_set().apply(&mut model, &open, context);
-        let repeatability = self.repeatability.apply(&model, &mut data, &rows, context);
-        let options = FitOptions {
-            rows: &rows,
-            candidates: &candidates,
-        };
-        let (model, fitted, screening) =
-            fit_rows(&model, &data, &options, &reads.split, self.screen);
-        let held: Vec<usize> = own
+        let fit = self.fit(&model, &candidates, &mut asked, context);
+        let held: Vec<usize> = all
             .into_iter()
             .filter(|k| !candidates.contains(k))
             .collect();
         let seen_before: Vec<bool> = reads.prediction.0.iter().map(|row| !row.held_out).collect();
-        let fitting = Fitting {
-            data: &data,
-            recording: &reads.recording,
-            split: &reads.split,
-            asked: &rows,
-            rows: &screening.kept,
-            screening: &screening,
-            held: &held,
+        let mut fitting = Fitting {
             earlier: Some(&reads.parameters),
             earlier_covariance: reads.covariance.as_ref(),
-            seen_before: &seen_before,
-            geometry: None,
-            repeatability,
-            folds: self.folds,
-            measured: &data,
-            doubtful: (0..data.rows())
-                .filter(|row| !seen_before[*row] && rows.binary_search(row).is_err())
-                .collect(),
-            placed: &std::collections::BTreeMap::new(),
+            ..Fitting::of(&asked, &fit, &held, self.folds)
         };
-        Ok(Identified::of(context, &model, &fitted, &fitting))
+        fitting.doubtful.retain(|row| !seen_before[*row]);
+        fitting.seen_before = seen_before;
+        Ok(Identified::of(context, &fitting))
     }
 }

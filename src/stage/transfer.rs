@@ -1,23 +1,19 @@
 //! `transfer`: an identified model on another recording of the same robot. The arm is held; only where its base stands is found anew.
 
-mod cells;
-mod comparison;
-mod source;
-
 use crate::diagnose::BASE;
-use crate::effect::names;
-use crate::error::{Fault, Result, counted};
-use crate::estimate::{FitOptions, Fitted, Model, Screening, align_points};
+use crate::effect::{Load, names};
+use crate::error::{Place, Result, counted};
+use crate::estimate::{FitOptions, Model, Screening, align_points, fit};
 use crate::robot::{Measurements, RobotModel};
-use crate::stage::identified::{Fitting, Identified};
-use crate::stage::screened::fit_rows;
+use crate::stage::identified::{Fitting, Identified, RowsToFit};
+use crate::stage::screened::{FittedRows, fit_rows};
 use crate::stage::{Context, Labelled, Stage};
 use crate::table::{
     CovarianceTable, ParameterRow, Parameters, Prediction, Recording, Robot, Split,
 };
-use cells::VisitedCells;
-use comparison::{ComparedRows, Comparison};
-use source::{CarriedFrom, stripped};
+use comparison::{ComparedRows, Comparison, VisitedCells};
+
+mod comparison;
 
 crate::stage::identified::identification! {
     /// Settings of `transfer`.
@@ -32,29 +28,23 @@ fn fit_set() -> Vec<String> {
     vec!["fit".into()]
 }
 
-crate::stage::reads! {
-    /// Input ports of [`Transfer`]: another recording with its split, and the model to try on it; all recordings that there are.
-    pub struct TransferReads {
-        robot: Robot,
-        recording: Recording,
-        split: Split,
-        parameters: Parameters,
-        covariance: Option<CovarianceTable>,
-        recordings: Vec<Labelled<Recording>>,
-        models: Vec<Labelled<Parameters>>,
-        predictions: Vec<Labelled<Prediction>>,
-    }
+crate::stage::stage! {
+    Transfer, "transfer", 14, "tests an identified model on another recording of the robot; only its base is estimated anew",
+        TransferReads {
+            robot: Robot,
+            recording: Recording,
+            split: Split,
+            parameters: Parameters,
+            covariance: Option<CovarianceTable>,
+            recordings: Vec<Labelled<Recording>>,
+            models: Vec<Labelled<Parameters>>,
+            predictions: Vec<Labelled<Prediction>>,
+        } -> Identified
 }
 
 impl Stage for Transfer {
-    const NAME: &'static str = "transfer";
-    const SUMMARY: &'static str = "tests an identified model on another recording of the robot; only its base is estimated anew";
-    const IMPLEMENTATION: u32 = 14;
-    type Reads = TransferReads;
-    type Writes = Identified;
-
-    fn check(&self) -> Vec<Fault> {
-        self.shared_faults("fit")
+    fn faults(&self, at: &mut Place) {
+        self.shared_faults("fit", at);
     }
 
     fn sets_named(&self) -> Vec<(String, String)> {
@@ -62,83 +52,51 @@ impl Stage for Transfer {
     }
 
     fn run(&self, reads: TransferReads, context: &Context) -> Result<Identified> {
-        let mut data = reads.recording.measurements();
-        let rows = reads.split.rows(&reads.recording, &self.on)?;
+        let mut asked = RowsToFit::of(&reads.recording, &reads.split, &self.on)?;
         let earlier = reads.parameters.of_the_arm()?;
         let left = reads.parameters.0.len() - earlier.0.len();
         if left > 0 {
-            context.services.note(format!(
+            context.note(format!(
                 "not carried over, since they belong to the first measurement only: {}",
                 counted(left, "parameter")
             ));
         }
         // Another recording has another clock: steps have happened, and the arm is warm. What lags follows the time between rows.
-        data.long_after = true;
+        asked.data.long_after = true;
         let source = CarriedFrom::of(&reads);
-        let mut model = self.placed(&earlier, &reads, &data, &rows)?;
+        let mut model = self.placed(&earlier, &reads, &asked)?;
         let open: Vec<usize> = match self.free {
             Some(_) => (0..model.x.len()).collect(),
             None => model.stack.parameters_of(names::BASE_FRAME).collect(),
         };
         let (candidates, held) = self.parameter_set().apply(&mut model, &open, context);
-        let repeatability = self.repeatability.apply(&model, &mut data, &rows, context);
-        let options = FitOptions {
-            rows: &rows,
-            candidates: &candidates,
-        };
-        let (model, fitted, screening) =
-            fit_rows(&model, &data, &options, &reads.split, self.screen);
-        let mut carried = CarriedModel {
-            earlier,
-            model,
-            fitted,
-            screening,
-            held,
-        };
+        let fit = self.fit(&model, &candidates, &mut asked, context);
+        let mut carried = CarriedModel { earlier, fit, held };
         let mut covariance = reads.covariance.as_ref();
         if let Some(geometry) =
-            self.better_alone(&carried, source.as_ref(), &reads, (&data, &rows), context)?
+            self.better_alone(&carried, source.as_ref(), &reads, &asked, context)?
         {
             (carried, covariance) = (geometry, None);
         }
-        let CarriedModel {
-            earlier,
-            model,
-            fitted,
-            screening,
-            held,
-        } = &carried;
         let source_data = source
             .as_ref()
             .map(|source| source.recording.measurements());
         let fitting = Fitting {
-            data: &data,
-            recording: &reads.recording,
-            split: &reads.split,
-            asked: &rows,
-            rows: &screening.kept,
-            screening,
-            held,
-            earlier: Some(earlier),
+            earlier: Some(&carried.earlier),
             earlier_covariance: covariance,
-            seen_before: &vec![false; data.rows()],
-            geometry: None,
-            repeatability,
-            folds: self.folds,
-            measured: source_data.as_ref().unwrap_or(&data),
-            doubtful: (0..data.rows()).collect(),
-            placed: &std::collections::BTreeMap::new(),
+            measured: source_data.as_ref().unwrap_or(&asked.data),
+            doubtful: (0..asked.data.rows()).collect(),
+            ..Fitting::of(&asked, &carried.fit, &carried.held, self.folds)
         };
-        let identified = Identified::of(context, model, fitted, &fitting);
-        let doubtful = identified
+        let identified = Identified::of(context, &fitting);
+        let remarked = identified
             .prediction
             .0
             .iter()
-            .filter(|row| row.remark.is_some())
-            .count();
+            .filter(|row| row.remark.is_some());
+        let (doubtful, rows) = (remarked.count(), counted(asked.data.rows(), "row"));
         if doubtful > 0 {
-            let rows = counted(data.rows(), "row");
-            context.services.note(format!(
+            context.note(format!(
                 "{doubtful} of {rows}: the correction is uncertain by more than half of itself, see the remarks of `prediction`"
             ));
         }
@@ -149,9 +107,7 @@ impl Stage for Transfer {
 /// A model on another recording, its base found anew there.
 struct CarriedModel {
     earlier: Parameters,
-    model: Model,
-    fitted: Fitted,
-    screening: Screening,
+    fit: FittedRows,
     held: Vec<usize>,
 }
 
@@ -161,15 +117,15 @@ impl Transfer {
         &self,
         earlier: &Parameters,
         reads: &TransferReads,
-        data: &Measurements,
-        rows: &[usize],
+        asked: &RowsToFit,
     ) -> Result<Model> {
         let robot = RobotModel::new(reads.robot.to_description()?);
         let there = earlier.model(robot.clone(), &[], self.load.into())?;
-        let predicted = there.predict(data);
-        let points = rows
+        let predicted = there.predict(&asked.data);
+        let points = asked
+            .rows
             .iter()
-            .filter_map(|row| Some((predicted[*row], data.point(*row)?)));
+            .filter_map(|row| Some((predicted[*row], asked.data.point(*row)?)));
         let (carried, measured): (Vec<_>, Vec<_>) = points.unzip();
         let base = align_points(&carried, &measured) * there.base();
         earlier.model_standing(base, robot, &[], self.load.into())
@@ -181,7 +137,7 @@ impl Transfer {
         carried: &CarriedModel,
         source: Option<&CarriedFrom>,
         reads: &TransferReads,
-        (data, rows): (&Measurements, &[usize]),
+        asked: &RowsToFit,
         context: &Context,
     ) -> Result<Option<CarriedModel>> {
         if carried.earlier.0.iter().all(is_geometry) {
@@ -191,40 +147,40 @@ impl Transfer {
             Some(source) => source.geometry(reads, self.load.into())?.of_the_arm()?,
             None => stripped(&carried.earlier),
         };
-        let start = self.placed(&geometry, reads, data, rows)?;
+        let RowsToFit {
+            data, rows, split, ..
+        } = asked;
+        let start = self.placed(&geometry, reads, asked)?;
         let candidates: Vec<usize> = start.stack.parameters_of(names::BASE_FRAME).collect();
         let options = FitOptions {
             rows,
             candidates: &candidates,
         };
-        let (model, fitted, screening) =
-            fit_rows(&start, data, &options, &reads.split, self.screen);
-        let sides = sides(data, rows, [&carried.screening, &screening]);
+        let fit = fit_rows(&start, data, &options, split, self.screen);
+        let sides = sides(data, rows, [&carried.fit.screening, &fit.screening]);
         let visited =
             source.map(|source| VisitedCells::of(&source.recording.measurements(), &source.rows));
-        let both = [&carried.model.predict(data)[..], &model.predict(data)];
+        let both = [
+            &carried.fit.model.predict(data)[..],
+            &fit.model.predict(data),
+        ];
         let comparison = Comparison::of(data, &sides, both, visited.as_ref());
         let words = comparison.words();
         if comparison.is_worse() {
-            context.services.warn(format!(
+            context.warn(format!(
                 "{words}: what was identified besides it does not hold here and is not used"
             ));
-            return Ok(Some(CarriedModel {
-                earlier: geometry,
-                model,
-                fitted,
-                screening,
-                held: Vec::new(),
-            }));
+            let (earlier, held) = (geometry, Vec::new());
+            return Ok(Some(CarriedModel { earlier, fit, held }));
         }
         match (comparison.is_worse_where_judged(), comparison.is_worse_outside()) {
-            (true, _) => context.services.warn(format!(
+            (true, _) => context.warn(format!(
                 "{words}: what was identified besides the geometry makes these points worse, though not those that placed the base, by which it was chosen"
             )),
-            (false, true) => context
-                .services
-                .warn(format!("{words}: in unvisited cells what was identified besides the geometry makes it worse")),
-            (false, false) => context.services.note(words),
+            (false, true) => {
+                context.warn(format!("{words}: in unvisited cells what was identified besides the geometry makes it worse"))
+            }
+            (false, false) => context.note(words),
         }
         Ok(None)
     }
@@ -239,11 +195,9 @@ fn is_geometry(row: &ParameterRow) -> bool {
 /// where there are none the same; without those that neither can follow.
 fn sides(data: &Measurements, asked: &[usize], screenings: [&Screening; 2]) -> ComparedRows {
     let aside = |row: usize| {
-        screenings.iter().all(|one| {
-            one.suspects
-                .iter()
-                .any(|suspect| suspect.row == row && !suspect.used())
-        })
+        screenings
+            .iter()
+            .all(|one| one.set_aside().any(|other| other == row))
     };
     let whole: Vec<usize> = (0..data.rows())
         .filter(|row| data.has_point(*row) && !aside(*row))
@@ -258,4 +212,92 @@ fn sides(data: &Measurements, asked: &[usize], screenings: [&Screening; 2]) -> C
         },
         choose,
     }
+}
+
+/// A recording that a model was fitted to.
+pub(super) struct CarriedFrom<'a> {
+    stage: String,
+    pub recording: &'a Recording,
+    /// Rows that it was fitted to.
+    pub rows: Vec<usize>,
+}
+
+impl<'a> CarriedFrom<'a> {
+    /// The recording of the carried model; none where the tables do not tell.
+    pub fn of(reads: &'a TransferReads) -> Option<Self> {
+        let carried = reads
+            .models
+            .iter()
+            .rfind(|model| model.table == reads.parameters)?;
+        Self::of_stage(reads, &carried.stage)
+    }
+
+    fn of_stage(reads: &'a TransferReads, stage: &str) -> Option<Self> {
+        let prediction = &reads
+            .predictions
+            .iter()
+            .find(|one| one.stage == stage)?
+            .table;
+        let recording = reads
+            .recordings
+            .iter()
+            .map(|one| &one.table)
+            .find(|table| prediction.is_of(table))?;
+        let rows = (0..)
+            .zip(&prediction.0)
+            .filter(|(_, row)| !row.held_out && !row.suspect)
+            .map(|(at, _)| at)
+            .collect();
+        Some(Self {
+            stage: stage.into(),
+            recording,
+            rows,
+        })
+    }
+
+    /// The geometry that an earlier stage identified by itself from the same recording, else the carried model's, fitted anew to the
+    /// same rows without what else was found.
+    pub fn geometry(&self, reads: &TransferReads, load: Load) -> Result<Parameters> {
+        let of_the_arm = |row: &ParameterRow| {
+            row.status == "free"
+                && ![names::BASE_FRAME, names::TOOL_OFFSET].contains(&row.effect.as_str())
+        };
+        let alone = |parameters: &Parameters| {
+            parameters.0.iter().all(is_geometry) && parameters.0.iter().any(of_the_arm)
+        };
+        let here = |stage: &str| {
+            CarriedFrom::of_stage(reads, stage).is_some_and(|one| one.recording == self.recording)
+        };
+        let identified = reads
+            .models
+            .iter()
+            .rfind(|model| model.stage != self.stage && alone(&model.table) && here(&model.stage));
+        if let Some(identified) = identified {
+            return Ok(identified.table.clone());
+        }
+        let start = stripped(&reads.parameters).model(
+            RobotModel::new(reads.robot.to_description()?),
+            &[],
+            load,
+        )?;
+        let candidates: Vec<usize> = (0..start.x.len()).collect();
+        let options = FitOptions {
+            rows: &self.rows,
+            candidates: &candidates,
+        };
+        let (model, fitted) = fit(&start, &self.recording.measurements(), &options);
+        Ok(Parameters::of(&self.stage, &model, &fitted, &[], None))
+    }
+}
+
+/// The geometry as it stands among what else was found, which it makes up for in part.
+pub(super) fn stripped(parameters: &Parameters) -> Parameters {
+    Parameters(
+        parameters
+            .0
+            .iter()
+            .filter(|row| is_geometry(row))
+            .cloned()
+            .collect(),
+    )
 }

@@ -2,7 +2,8 @@
 
 use crate::error::{Error, Result, counted};
 use crate::robot::NoiseBasis;
-use crate::stage::{Context, Labelled, Stage, computed, doubtful, reads, writes};
+use crate::stage::doubtful::{named, suspicion};
+use crate::stage::{Context, Labelled, Stage};
 use crate::statistics::quantile;
 use crate::table::{Observability, Prediction, PredictionRow, Statistics, StatisticsRow};
 use schemars::JsonSchema;
@@ -39,28 +40,17 @@ pub struct PublishedErrors {
     pub max_mm: Option<f64>,
 }
 
-reads! {
-    /// Input ports of `validate`.
-    pub struct ValidateReads {
-        prediction: Vec<Labelled<Prediction>>,
-        observability: Vec<Labelled<Observability>>,
-    }
-}
-writes! {
-    /// Output ports of `validate`.
-    pub struct ValidateWrites {
-        statistics: Statistics,
-    }
+crate::stage::stage! {
+    Validate, "validate", 5, "states the position error after every step, held-out and training rows apart",
+        ValidateReads {
+            prediction: Vec<Labelled<Prediction>>,
+            observability: Vec<Labelled<Observability>>,
+        } -> ValidateWrites {
+            statistics: Statistics,
+        }
 }
 
 impl Stage for Validate {
-    const NAME: &'static str = "validate";
-    const SUMMARY: &'static str =
-        "states the position error after every step, held-out and training rows apart";
-    const IMPLEMENTATION: u32 = 5;
-    type Reads = ValidateReads;
-    type Writes = ValidateWrites;
-
     fn sets_named(&self) -> Vec<(String, String)> {
         let sets = self.reference.iter().enumerate();
         sets.map(|(k, reference)| (format!("reference[{k}].set"), reference.set.clone()))
@@ -75,7 +65,7 @@ impl Stage for Validate {
             ));
         }
         let mut statistics = Statistics::default();
-        let mut suspicion = None;
+        let mut suspected = None;
         for (order, step) in (0..).zip(&reads.prediction) {
             let fit = reads
                 .observability
@@ -102,10 +92,9 @@ impl Stage for Validate {
                 let whole = rows
                     .iter()
                     .filter(|row| held_out && row.measured.is_none() && !row.suspect);
-                let suspected =
-                    computed::suspicion(whole.map(|row| [row.error_mm, row.noise_mm]), 0);
-                suspicion = suspicion
-                    .or(suspected.map(|line| format!("{name} on {set}, held out: {line}")));
+                let line = suspicion(whole.map(|row| [row.error_mm, row.noise_mm]), 0);
+                suspected =
+                    suspected.or(line.map(|line| format!("{name} on {set}, held out: {line}")));
                 let row = describe(order, name, &set, held_out, &rows);
                 let row = StatisticsRow {
                     expected_rms_mm: expected(held_out, &rows, unmodelled),
@@ -120,44 +109,39 @@ impl Stage for Validate {
                     counted(row.suspects, "suspect"),
                     if row.suspects == 1 { "it" } else { "them" },
                 );
-                context.services.note(format!(
+                context.note(format!(
                     "{} on {}: the held-out mean of {:.3} mm includes {suspects}; without {them} {without:.3} mm",
                     row.step, row.set, row.mean_mm
                 ));
             }
             if let Some(line) = row.doubts() {
-                context
-                    .services
-                    .note(format!("{} on {}: {line}", row.step, row.set));
+                context.note(format!("{} on {}: {line}", row.step, row.set));
             }
         }
         for reference in &self.reference {
-            let mut beside = statistics
+            let mut matching = statistics
                 .0
                 .iter_mut()
                 .filter(|row| row.step == reference.step && row.set == reference.set)
                 .peekable();
-            if beside.peek().is_none() {
+            if matching.peek().is_none() {
                 let message = format!(
                     "reference: no statistics of step `{}` on set `{}`",
                     reference.step, reference.set
                 );
                 return Err(Error::spec(context.id, message));
             }
-            for row in beside {
+            for row in matching {
                 row.reference = Some(reference.label.clone());
                 row.reference_mean_mm = Some(reference.mean_mm);
                 row.reference_std_mm = reference.std_mm;
                 row.reference_max_mm = reference.max_mm;
             }
         }
-        suspicion
-            .into_iter()
-            .for_each(|line| context.services.warn(line));
+        context.warn_each(suspected);
         if !statistics.0.iter().any(|row| row.held_out) {
-            context.services.warn(
-                "no held-out rows: only the training error can be stated, and it flatters".into(),
-            );
+            context
+                .warn("no held-out rows: only the training error can be stated, and it flatters");
         }
         Ok(ValidateWrites { statistics })
     }
@@ -261,7 +245,7 @@ fn describe(
             .iter()
             .map(|row| row.error_mm)
             .max_by(f64::total_cmp),
-        remarked_points: (!remarked.is_empty()).then(|| doubtful::named(&remarked)),
+        remarked_points: (!remarked.is_empty()).then(|| named(&remarked)),
         fold_mean_mm: None,
         fold_rms_mm: None,
         fold_max_mm: None,

@@ -5,7 +5,7 @@ use super::statistics::statistics_rows;
 use super::{DiagnosisSummary, labelled, screen, tables};
 use crate::error::{Result, counted};
 use crate::pipeline::CompletedRun;
-use crate::stage::{DIAGNOSES, Stage, Transfer};
+use crate::stage::{DIAGNOSES, DeclaredStage, Transfer};
 use crate::store::Store;
 use crate::table::{Contradicted, Robot, Standing, StatisticsRow, Withdrawn};
 use screen::NextStep;

@@ -3,7 +3,7 @@
 use super::labelled;
 use crate::error::{Error, Result};
 use crate::pipeline::{CompletedRun, Manifest};
-use crate::stage::{Report, Stage};
+use crate::stage::{DeclaredStage, Report};
 use crate::store::Store;
 use crate::table::{Acceptance, AcceptanceRow, Table};
 use serde::Serialize;

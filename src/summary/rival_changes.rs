@@ -3,7 +3,7 @@
 use crate::audit::{RunAddress, RunDiff};
 use crate::error::Result;
 use crate::pipeline::{Manifest, StageReport};
-use crate::stage::{Diagnose, Stage};
+use crate::stage::{DeclaredStage, Diagnose};
 use crate::store::Store;
 use crate::table::{FindingRow, Findings, Rivals, Table};
 use serde::Serialize;

@@ -131,8 +131,8 @@ impl Recording {
         data
     }
 
-    /// The name of what a row's target was brought to, where that is what was measured.
-    pub fn brought(&self, row: usize) -> Option<&str> {
+    /// The name of what holds a row's target, where that contact is what was measured.
+    pub fn contact(&self, row: usize) -> Option<&str> {
         let settings = KINDS
             .iter()
             .filter(|kind| kind.is_contact())

@@ -89,7 +89,6 @@ pub fn table<T: Table>(tables: &BTreeMap<&'static str, Vec<Frame>>) -> Vec<T> {
 
 struct Keep {
     kind: &'static str,
-    rows: u64,
     frames: Vec<Frame>,
     chunks: Chunks,
 }
@@ -97,7 +96,6 @@ struct Keep {
 impl Sink for Keep {
     fn push(&mut self, chunk: Frame) -> Result<()> {
         assert_eq!(chunk.kind(), self.kind);
-        self.rows += chunk.rows() as u64;
         self.frames.push(chunk);
         Ok(())
     }
@@ -105,7 +103,6 @@ impl Sink for Keep {
         self.chunks.lock().unwrap().insert(self.kind, self.frames);
         Ok(Streamed {
             kind: self.kind,
-            rows: self.rows,
             handle: Box::new(()),
         })
     }
@@ -134,7 +131,6 @@ impl Services for Desk {
     fn sink(&self, kind: &'static str) -> Result<Box<dyn Sink>> {
         Ok(Box::new(Keep {
             kind,
-            rows: 0,
             frames: Vec::new(),
             chunks: self.chunks.clone(),
         }))

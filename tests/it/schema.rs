@@ -3,7 +3,7 @@
 use calib::pipeline::json_schema;
 use calib::stage::STAGES;
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 #[test]
 fn the_schema_in_the_repository_is_that_of_the_code() {
@@ -37,7 +37,7 @@ fn every_stage_is_registered_once_and_documented() {
 }
 
 #[test]
-fn every_file_with_a_stage_is_in_the_list() {
+fn every_stage_is_in_the_list() {
     let folders = ["src/stage", "src/stage/ingest"]
         .map(|folder| Path::new(env!("CARGO_MANIFEST_DIR")).join(folder));
     let entries = folders
@@ -46,13 +46,11 @@ fn every_file_with_a_stage_is_in_the_list() {
     let files = entries
         .map(|entry| entry.unwrap().path())
         .filter(|path| path.is_file());
-    let stages = files
-        .filter(|path| {
-            std::fs::read_to_string(path)
-                .unwrap()
-                .contains("\nimpl Stage for ")
-        })
-        .count();
+    let declared = |path: PathBuf| {
+        let text = std::fs::read_to_string(path).unwrap();
+        text.matches("\nimpl Stage for ").count()
+    };
+    let stages: usize = files.map(declared).sum();
     assert_eq!(
         stages,
         STAGES.len(),

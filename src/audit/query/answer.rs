@@ -1,6 +1,7 @@
 //! What a query gave: columns of values.
 
-use polars::prelude::{AnyValue, Column, DataFrame};
+use crate::error::{Error, did_you_mean};
+use polars::prelude::{AnyValue, Column, DataFrame, PolarsError};
 use std::borrow::Cow;
 
 /// The rows that a query gave.
@@ -78,4 +79,62 @@ fn value(column: &Column, row: usize) -> QueryValue<'_> {
         // Dates, lists and what else a query may make: as polars writes them.
         other => QueryValue::Text(other.to_string().into()),
     }
+}
+
+/// The fault of a query over `tables`, each a name with its columns.
+pub(super) fn fault_of(error: &PolarsError, tables: &[(&str, Vec<String>)]) -> Error {
+    match error {
+        PolarsError::Context { error, .. } | PolarsError::ExprContext { error, .. } => {
+            fault_of(error, tables)
+        }
+        _ => {
+            let text = error.to_string();
+            let message = missing(&text)
+                .and_then(|name| unknown(name, tables))
+                .unwrap_or_else(|| first(&text));
+            Error::spec("SQL", message)
+        }
+    }
+}
+
+/// The column that polars did not find, if that is what it says.
+fn missing(text: &str) -> Option<&str> {
+    let after = [
+        "unable to find column \"",
+        "no column named '",
+        "no table or struct column named '",
+    ];
+    let rest = after
+        .into_iter()
+        .find_map(|words| text.split_once(words))?
+        .1;
+    rest.split(['"', '\'']).next()
+}
+
+/// Nothing where a table has the column: then it is lost on the way, and polars says where.
+fn unknown(name: &str, tables: &[(&str, Vec<String>)]) -> Option<String> {
+    let all = || {
+        tables
+            .iter()
+            .flat_map(|(_, columns)| columns)
+            .map(String::as_str)
+    };
+    if tables.is_empty() || all().any(|column| column == name) {
+        return None;
+    }
+    let hint = did_you_mean(name, all());
+    let hint = if hint.is_empty() { "." } else { &hint };
+    let known: Vec<String> = tables
+        .iter()
+        .map(|(table, columns)| format!("{table}: {}", columns.join(", ")))
+        .collect();
+    Some(format!(
+        "no column `{name}`{hint} Columns of {}",
+        known.join("; of ")
+    ))
+}
+
+/// Without the plan that polars prints below.
+fn first(text: &str) -> String {
+    text.split("\n\n").next().unwrap_or(text).trim().to_string()
 }

@@ -4,7 +4,6 @@
 //! their tables unless `ORDER BY` says otherwise.
 
 mod answer;
-mod fault;
 mod order;
 mod size;
 mod statement;
@@ -18,6 +17,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use super::tables::{QueryTable, QueryTables};
 use crate::error::{Error, Result};
 use crate::store::Store;
+use answer::fault_of;
 use statement::Statement;
 
 /// Answers one SELECT over the tables of a run; whatever is wrong with it is the asker's to mend.
@@ -29,7 +29,7 @@ pub fn query(store: &Store, tables: &QueryTables, sql: &str) -> Result<QueryResu
         let mut frame = scan(store, table)?;
         columns.push((
             name.as_str(),
-            names(&mut frame).map_err(|error| fault::of(&error, &[]))?,
+            names(&mut frame).map_err(|error| fault_of(&error, &[]))?,
         ));
         context.register(name, frame);
     }
@@ -38,7 +38,7 @@ pub fn query(store: &Store, tables: &QueryTables, sql: &str) -> Result<QueryResu
     let frame = answer
         .map_err(|_| Error::spec("SQL", "polars cannot answer this; put it in other words"))?;
     Ok(QueryResult::new(
-        frame.map_err(|error| fault::of(&error, &columns))?,
+        frame.map_err(|error| fault_of(&error, &columns))?,
     ))
 }
 

@@ -6,7 +6,7 @@ use crate::error::{Error, Result, counted};
 use crate::pipeline::{CompletedRun, Override, Plan, Purpose, RunOptions, Selection, run};
 use crate::progress::{Progress, Verbosity};
 use crate::proof::{recorded, vacant};
-use crate::stage::{STAGES, Simulate, Stage};
+use crate::stage::{DeclaredStage, STAGES, Simulate};
 use crate::store::Store;
 use crate::table::{Recording, Robot, Table, Truth};
 use clap::Args;

@@ -3,6 +3,7 @@
 use super::solve::Chain;
 use crate::effect::{Form, PlacementBuffers, Variable};
 use crate::estimate::Model;
+use crate::estimate::choose::spread;
 use crate::estimate::network::Correction;
 use crate::robot::{Measurements, Memories, RowTime};
 use crate::spatial::{Pose, Twist};
@@ -305,5 +306,102 @@ impl Chain for Reach<'_> {
 
     fn velocities(&self) -> &[Twist] {
         &self.velocities
+    }
+}
+
+/// Poses over which it is seen.
+const POSES: usize = 30;
+
+/// m: a smaller displacement by the load is of no account.
+const MATTERS: f64 = 1e-6;
+
+/// Whether a load of `heaviest` kg moves the tool of the arm, or turns it away, from where it is without one.
+pub fn load_matters(arm: &IdentifiedArm, heaviest: f64) -> bool {
+    let robot = &arm.model().robot;
+    let poses = spread(robot, POSES);
+    let bare = Circumstance::unknown(robot.joints());
+    let loaded = Circumstance {
+        payload: heaviest,
+        ..bare.clone()
+    };
+    let mut reach = arm.reach();
+    (0..poses.rows()).any(|row| {
+        reach.under(&bare);
+        let without = reach.place(poses.q(row));
+        reach.under(&loaded);
+        (reach.place(poses.q(row)).translation - without.translation).norm() > MATTERS
+    })
+}
+
+/// Why targets without a payload are refused; `load`: the largest that was measured, kg.
+pub fn unstated_payload(load: f64) -> String {
+    format!(
+        "states no payload, and the identified arm depends on it (measured up to {load} kg): give --payload KG, 0 where nothing is carried; a table may have a column payload_kg, a program tooldata or $LOAD"
+    )
+}
+
+/// A circumstance that a person states.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stated {
+    /// Mass at the tool, kg.
+    Payload,
+    /// C.
+    Temperature,
+    /// Side from which a joint comes to rest.
+    Direction,
+}
+
+/// C.
+const ABSOLUTE_ZERO: f64 = -273.15;
+
+impl Stated {
+    /// What is wrong with a number of it, and what is allowed.
+    pub fn fault(self, value: f64) -> Option<String> {
+        let (holds, allowed) = match self {
+            Self::Payload => (value >= 0.0, "a mass of 0 or more, kg"),
+            Self::Temperature => (value > ABSOLUTE_ZERO, "a temperature above -273.15 C"),
+            Self::Direction => (
+                [-1.0, 0.0, 1.0].contains(&value),
+                "a direction: 1, -1, or 0 where it is not known",
+            ),
+        };
+        (!(holds && value.is_finite())).then(|| format!("expected {allowed}, found {value}"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Stated;
+
+    #[test]
+    fn what_no_circumstance_can_be_is_told_with_what_is_allowed() {
+        assert_eq!(
+            Stated::Payload.fault(-5.0).as_deref(),
+            Some("expected a mass of 0 or more, kg, found -5")
+        );
+        assert_eq!(
+            Stated::Temperature.fault(-500.0).as_deref(),
+            Some("expected a temperature above -273.15 C, found -500")
+        );
+        assert!(
+            Stated::Direction
+                .fault(7.0)
+                .is_some_and(|said| said.ends_with(", found 7"))
+        );
+        assert!(
+            Stated::Payload.fault(f64::INFINITY).is_some()
+                && Stated::Temperature.fault(f64::NAN).is_some()
+        );
+        let sound = [
+            (Stated::Payload, 0.0),
+            (Stated::Temperature, -273.0),
+            (Stated::Direction, -1.0),
+            (Stated::Direction, 0.0),
+        ];
+        assert!(
+            sound
+                .into_iter()
+                .all(|(stated, value)| stated.fault(value).is_none())
+        );
     }
 }

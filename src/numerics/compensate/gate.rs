@@ -152,13 +152,13 @@ impl Gate {
 
     fn too_far(&self, what: &str, shift: f64, tilt: f64) -> Option<String> {
         let far = |by: f64, most: f64, unit: &str, option: &str| {
-            let said = || {
+            let message = || {
                 format!(
                     "{what} is {by:.1} {unit} from the robot file's, at most {} {unit} allowed ({option})",
                     round(most)
                 )
             };
-            (by.is_nan() || by > most).then(said)
+            (by.is_nan() || by > most).then(message)
         };
         let GateLimits {
             shift: most,

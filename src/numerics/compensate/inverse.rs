@@ -58,7 +58,7 @@ fn limits(robot: &RobotModel, joint: usize) -> [f64; 2] {
 /// Halton's sequence over the limits: the same postures everywhere.
 pub(super) fn spread(robot: &RobotModel, number: u32) -> Vec<f64> {
     const PRIMES: [u32; 12] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37];
-    let of = |joint: usize| {
+    let position = |joint: usize| {
         let base = PRIMES[joint % PRIMES.len()];
         let (mut rest, mut digit, mut share) = (number, 1.0, 0.0);
         while rest > 0 {
@@ -69,7 +69,7 @@ pub(super) fn spread(robot: &RobotModel, number: u32) -> Vec<f64> {
         let [lower, upper] = limits(robot, joint);
         lower + share * (upper - lower)
     };
-    (0..robot.joints()).map(of).collect()
+    (0..robot.joints()).map(position).collect()
 }
 
 /// A revolute joint turned by whole turns into its limits, where they are left.

@@ -6,36 +6,31 @@
 //! every step gains about three digits. Frames: targets are in the robot's base frame, as identified.
 
 mod arm;
-mod command;
 mod correct;
 mod correction_uncertainty;
-mod coverage;
-mod doubts;
 mod gate;
 mod inverse;
-mod load;
 mod posture;
 mod remark;
 mod rigid;
 mod sides;
 mod solve;
-mod stated;
 mod uncertainty;
 
+pub use arm::Stated;
 pub use arm::{Circumstance, IdentifiedArm, Reach};
-pub use command::CorrectedCommand;
+pub use arm::{load_matters, unstated_payload};
 pub use correct::{CommandTarget, CorrectionOptions, CorrectionTotals, Corrector, turns};
 pub use correction_uncertainty::CorrectionUncertainty;
-pub use coverage::Coverage;
-use coverage::beyond_limits;
-pub use doubts::doubts;
 pub use gate::{Gate, GateLimits};
 pub use inverse::inverse;
-pub use load::{load_matters, unstated_payload};
 pub use posture::StatedPosture;
+pub use remark::CorrectedCommand;
+pub use remark::Coverage;
 pub use remark::Remark;
+use remark::beyond_limits;
+pub use remark::doubts;
 pub use rigid::{LeftOut, distance, left_out, rigid};
 pub use sides::{ArmSides, SideShares, StatedSides};
 pub use solve::{Chain, CommandSolution, Nominal, SETTLED, ToolGoal, least_change, one_step};
-pub use stated::Stated;
 pub use uncertainty::{PositionUncertainty, Scatter, Uncertainty};

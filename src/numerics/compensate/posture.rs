@@ -173,9 +173,9 @@ impl StatedPosture {
             0 => self.start(arm, from),
             number => self.start(arm, &spread(arm.robot, number)),
         });
-        let beside =
+        let on_sides =
             others.filter(move |start| self.is_on_sides(arm, start, &[shoulder, elbow, None]));
-        std::iter::once(from.to_vec()).chain(beside.take(STARTS))
+        std::iter::once(from.to_vec()).chain(on_sides.take(STARTS))
     }
 }
 

@@ -1,7 +1,12 @@
-//! What is wrong with a command, and how people are told.
+//! The answer to a target: a command, what is known of it, and what is wrong with it.
 
-use super::CorrectionUncertainty;
-use crate::robot::{Unmeasured, numbered};
+use super::{
+    Chain, Circumstance, CorrectionUncertainty, IdentifiedArm, Nominal, PositionUncertainty,
+    Uncertainty,
+};
+use crate::description::RobotDescription;
+use crate::robot::{Measurements, Unmeasured, Visited, numbered};
+use rayon::prelude::*;
 use std::fmt;
 
 /// What is wrong with a command.
@@ -88,4 +93,87 @@ impl fmt::Display for Remark {
             Self::Insisted(reason) => write!(f, "written because of --force: {reason}"),
         }
     }
+}
+
+/// A command and what is known of it, SI.
+#[derive(Debug, Clone)]
+pub struct CorrectedCommand {
+    /// As the controller counts its joints, rad or m. None where the target is not reached: no joints are better than wrong ones.
+    pub q: Option<Vec<f64>>,
+    /// How far the uncorrected command would be off by the model.
+    pub uncorrected: f64,
+    /// How far the uncorrected command would turn the tool away by the model, rad.
+    pub turn: f64,
+    /// Distance from the wanted point that the model leaves, m.
+    pub residual: f64,
+    /// Steps of the solution.
+    pub iterations: usize,
+    /// Uncertainty of the point that is reached; none where the model has no covariance.
+    pub uncertainty: Option<PositionUncertainty>,
+    /// How certain its correction is along its own direction; none where the model has no covariance.
+    pub certainty: Option<CorrectionUncertainty>,
+    /// What is wrong with it.
+    pub remarks: Vec<Remark>,
+}
+
+impl CorrectedCommand {
+    /// What is wrong with it, in words; empty if nothing.
+    pub fn remark(&self) -> String {
+        self.remarks
+            .iter()
+            .map(Remark::to_string)
+            .collect::<Vec<_>>()
+            .join("; ")
+    }
+}
+
+/// What was measured.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Coverage(Visited);
+
+impl Coverage {
+    /// The coverage of a recording.
+    pub fn of(data: &Measurements) -> Self {
+        Self(Visited::of(data, &(0..data.rows()).collect::<Vec<_>>()))
+    }
+
+    /// What of a command was never measured; empty inside.
+    pub fn beyond(&self, q: &[f64], circumstance: &Circumstance) -> Vec<Unmeasured> {
+        self.0
+            .beyond(q, circumstance.payload, circumstance.temperature)
+    }
+}
+
+/// The joints, from 0, that a command takes out of their limits.
+pub(crate) fn beyond_limits(robot: &RobotDescription, q: &[f64]) -> Vec<usize> {
+    let limits = robot.joints.iter().map(|joint| joint.limits);
+    let outside = |q: f64, limits: Option<[f64; 2]>| {
+        limits.is_some_and(|[lower, upper]| q < lower || q > upper)
+    };
+    (0..)
+        .zip(q.iter().zip(limits))
+        .filter(|(_, (q, limits))| outside(**q, *limits))
+        .map(|(joint, _)| joint)
+        .collect()
+}
+
+/// A remark for each of `rows`, in their order; none where the model holds.
+pub fn doubts(
+    arm: &IdentifiedArm,
+    uncertainty: &Uncertainty,
+    data: &Measurements,
+    rows: &[usize],
+) -> Vec<Option<Remark>> {
+    let asked = rows.par_iter().map_init(
+        || (arm.reach(), Nominal::new(&arm.model().robot)),
+        |(reach, nominal), row| {
+            reach.under(&Circumstance::of_row(data, *row));
+            let q = data.q(*row);
+            let off =
+                arm.base().rotation * (reach.place(q).translation - nominal.place(q).translation);
+            let certainty = uncertainty.of_correction(reach, q, &off);
+            Remark::of_certainty(&certainty)
+        },
+    );
+    asked.collect()
 }

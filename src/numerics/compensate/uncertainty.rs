@@ -86,8 +86,8 @@ impl Uncertainty {
         }
     }
 
-    /// The same, beside what is usual at the poses of a recording and what its instrument leaves open.
-    pub fn beside(mut self, arm: &IdentifiedArm, data: &Measurements) -> Self {
+    /// The same with what is usual at the poses of a recording, and what its instrument leaves open.
+    pub fn with_recording(mut self, arm: &IdentifiedArm, data: &Measurements) -> Self {
         self.usual = self.usual(arm, data);
         self.instrument = Self::instrument(data);
         self

@@ -6,7 +6,7 @@ use crate::criteria::noise::{MAX_CHI_SQUARE, MAX_CHI_SQUARE_OF_STRUCTURE};
 use crate::criteria::search::SIGNIFICANT;
 use crate::effect::PlacementBuffers;
 use crate::estimate::{Model, Screening, noise, tail};
-use crate::observation::{Dimension, KINDS, Residual, dimension, kinds, only_brought};
+use crate::observation::{Dimension, KINDS, Residual, dimension, kinds, only_contacts};
 use crate::robot::{Measurements, NoiseBasis};
 use rayon::prelude::*;
 
@@ -175,7 +175,7 @@ impl Misfit {
             instrument: (data.noise_basis != NoiseBasis::Inferred).then_some(self.instrument),
             left: self.leftover_rms,
             in_motion: data.in_motion(&self.rows),
-            brought: only_brought(data, &self.rows),
+            brought: only_contacts(data, &self.rows),
         }
     }
 }

@@ -5,8 +5,8 @@
 //! taken in as long as they explain more than chance; sigmas include what the earlier recording did not know.
 
 use super::factor::TriangularFactor;
+use super::model::Session;
 use super::problem::Problem;
-use super::session::Session;
 use crate::effect::names;
 use faer::Mat;
 
@@ -67,7 +67,7 @@ pub fn changes(
         ranks[chosen] = Some(rank);
         reduced.take(chosen);
     }
-    let told = (0..shared.len()).filter_map(|j| {
+    let found = (0..shared.len()).filter_map(|j| {
         // Those taken in are judged beside each other.
         let others = ranks
             .iter()
@@ -88,7 +88,7 @@ pub fn changes(
             rank: ranks[j],
         })
     });
-    told.collect()
+    found.collect()
 }
 
 /// Two-sided chance of a normal variable so many standard deviations off.
@@ -156,7 +156,7 @@ impl Reduced {
         let right: Vec<f64> = (0..s).map(|i| whole.entry(start + i, width - 1)).collect();
         let values = 3 * (before.rows.len() + after.rows.len());
         let freedom = values.saturating_sub(2 * s + 2 * b).max(1) as f64;
-        let rest = whole.entry(width - 1, width - 1).powi(2);
+        let unexplained = whole.entry(width - 1, width - 1).powi(2);
         let lengths = (0..s)
             .map(|j| {
                 (0..s + b + 1)
@@ -171,7 +171,7 @@ impl Reduced {
             right,
             original,
             lengths,
-            scale: (rest / freedom).sqrt().max(1.0),
+            scale: (unexplained / freedom).sqrt().max(1.0),
         }
     }
 
@@ -198,12 +198,12 @@ impl Reduced {
         if square <= 0.0 {
             return;
         }
-        let own = self.columns[j].clone();
+        let taken = self.columns[j].clone();
         let project = |column: &mut Vec<f64>| {
-            let share = column.iter().zip(&own).map(|(a, b)| a * b).sum::<f64>() / square;
+            let share = column.iter().zip(&taken).map(|(a, b)| a * b).sum::<f64>() / square;
             column
                 .iter_mut()
-                .zip(&own)
+                .zip(&taken)
                 .for_each(|(a, b)| *a -= share * b);
         };
         project(&mut self.right);

@@ -4,11 +4,11 @@
 
 use super::factor::StackedRows;
 use super::model::Model;
+use super::problem::ObservationTerm;
 use super::problem::Problem;
-use super::term::ObservationTerm;
 use super::triangle::Triangle;
 use crate::observation::KINDS;
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, DVector, SymmetricEigen, Vector3};
 use rayon::prelude::*;
 
 /// A direction in which a pose alone decides has nothing left to show its error by: its share is capped here.
@@ -44,24 +44,19 @@ pub(crate) fn clustered(
                             continue;
                         };
                         let share = term.share();
-                        let height = kind.height();
                         jacobian.clear();
-                        jacobian.resize(height * p, 0.0);
+                        jacobian.resize(p, Vector3::zeros());
                         term.derivatives(&mut placed, |parameter, derivative| {
                             if column[parameter] < p {
-                                let own =
-                                    &mut jacobian[height * column[parameter]..][..derivative.len()];
-                                own.iter_mut()
-                                    .zip(derivative)
-                                    .for_each(|(sum, value)| *sum += value);
+                                jacobian[column[parameter]] += derivative;
                             }
                         });
-                        let error = term.error.times(share);
-                        for line in 0..height {
-                            errors.push(error.get(line).copied().unwrap_or_default());
+                        let error = term.error * share;
+                        for line in 0..3 {
+                            errors.push(error[line]);
                             visible.extend((0..p).map(|k| {
                                 (0..=k)
-                                    .map(|j| jacobian[height * j + line] * inverse.at(j, k))
+                                    .map(|j| jacobian[j][line] * inverse.at(j, k))
                                     .sum::<f64>()
                                     * share
                             }));
@@ -77,7 +72,7 @@ pub(crate) fn clustered(
         .iter()
         .enumerate()
         .filter_map(|(j, k)| model.known(*k).prior.map(|prior| (j, 1.0 / prior.sigma)));
-    let told = priors.map(|(j, weight)| {
+    let prior_lines = priors.map(|(j, weight)| {
         upwards(inverse, |k| {
             if k < j {
                 0.0
@@ -86,7 +81,7 @@ pub(crate) fn clustered(
             }
         })
     });
-    triangle(p, lines.into_iter().chain(told))
+    triangle(p, lines.into_iter().chain(prior_lines))
 }
 
 /// What one pose does to the parameters: R^-1 G' (1 - G G')^-1/2 e.

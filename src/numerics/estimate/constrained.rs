@@ -1,14 +1,14 @@
 //! A model's step with what is known beforehand: priors as rows of the factor, bounds by an active set.
 
 use super::factor::TriangularFactor;
-use super::known::Known;
 use super::length::LengthTerm;
+use super::model::Known;
 use super::model::Model;
 use faer::Mat;
 
 impl Model {
     /// Where a parameter stands that nothing estimates: its prior's mean or nominal, within its bounds.
-    pub(crate) fn rest(&self, parameter: usize) -> f64 {
+    pub(crate) fn prior_value(&self, parameter: usize) -> f64 {
         let known = self.known(parameter);
         self.within(parameter, known.prior.map_or(0.0, |prior| prior.mean))
     }

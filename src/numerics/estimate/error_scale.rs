@@ -2,9 +2,9 @@
 //! have no common size.
 
 use super::model::Model;
-use super::row_error::placed_row_error;
+use super::model::placed_row_error;
 use crate::effect::{PlacedRow, PlacementBuffers};
-use crate::observation::{Dimension, KINDS, Residual, dimension, kinds, values};
+use crate::observation::{Dimension, KINDS, Residual, dimension, kinds};
 use crate::robot::Measurements;
 use rayon::prelude::*;
 
@@ -19,8 +19,6 @@ pub enum ErrorScale {
         dimension: Dimension,
         /// Length of one sigma, root mean square over the rows, m or rad.
         size: f64,
-        /// Numbers of a row, in the mean.
-        values: f64,
     },
 }
 
@@ -38,12 +36,7 @@ impl ErrorScale {
         let size = (noise.iter().map(|sigma| sigma * sigma).sum::<f64>()
             / noise.len().max(1) as f64)
             .sqrt();
-        let numbers: usize = rows.iter().map(|row| values(data, *row)).sum();
-        Self::Noise {
-            dimension,
-            size,
-            values: numbers as f64 / rows.len().max(1) as f64,
-        }
+        Self::Noise { dimension, size }
     }
 
     /// What errors are sizes of: m, or rad where no length was measured.
@@ -51,14 +44,6 @@ impl ErrorScale {
         match self {
             Self::Lengths => Dimension::Length,
             Self::Noise { dimension, .. } => *dimension,
-        }
-    }
-
-    /// Numbers of a row, in the mean.
-    pub fn values(&self) -> f64 {
-        match self {
-            Self::Lengths => 3.0,
-            Self::Noise { values, .. } => *values,
         }
     }
 

@@ -1,16 +1,16 @@
 //! One identification: choose what the data can see, fit it robustly, learn how much stays unmodelled, state the uncertainty.
 
-use super::autocorrelation::autocorrelation_time;
 use super::cluster::clustered;
 use super::covariance::Covariance;
 use super::factor::TriangularFactor;
-use super::known::PriorCheck;
 use super::levenberg::{Effort, FINE, Iteration, ROUGH_TOLERANCE, Stop, minimise};
 use super::model::Model;
+use super::model::PriorCheck;
 use super::observe::{Visibility, indices, visibility};
 use super::problem::{Evaluation, Problem};
+use super::problem::{as_of_three, bound, share};
+use super::repeats::autocorrelation_time;
 use super::repeats::{Poses, Repeated};
-use super::term::{as_of_three, bound, share};
 use crate::observation::{Dimension, ExcessSigma, Residual};
 use crate::robot::Measurements;
 use crate::statistics::{MEDIAN_CHI2, nearest};
@@ -379,7 +379,7 @@ impl Minimisation {
                 .collect();
             // What is dropped goes back to what was known beforehand and stays there.
             for k in candidates.iter().filter(|k| !free.contains(k)) {
-                model.x[*k] = model.rest(*k);
+                model.x[*k] = model.prior_value(*k);
             }
             let weighted_so = !first || round > 0 || problem.excess == ExcessSigma::default();
             let start = if weighted_so && free == candidates {
@@ -435,11 +435,7 @@ fn lasting(problem: &Problem, residuals: &[Residual]) -> f64 {
         .flat_map(|residual| {
             let error = residual.whitened(problem.data, problem.excess.length);
             // Gross errors last for one row and would hide that others last longer.
-            <[f64; 3]>::from(
-                error
-                    .times(bound(3) / error.norm().max(bound(3)))
-                    .first_three(),
-            )
+            <[f64; 3]>::from(error * (bound(3) / error.norm().max(bound(3))))
         })
         .collect();
     autocorrelation_time(&whitened, 3)
@@ -512,9 +508,9 @@ fn excess_sigma(problem: &Problem, at: &Evaluation, parameters: usize) -> Excess
     let all: usize = at.residuals.iter().map(|residual| residual.axes).sum();
     let freedom = all.saturating_sub(parameters).max(1) as f64 / all.max(1) as f64;
     let mut errors = Vec::with_capacity(at.residuals.len());
-    let mut of = |dimension: Dimension| {
+    let mut excess_of = |dimension: Dimension| {
         excess(|extra| {
-            let own = at
+            let residuals = at
                 .residuals
                 .iter()
                 .filter(|residual| residual.dimension() == dimension);
@@ -522,7 +518,7 @@ fn excess_sigma(problem: &Problem, at: &Evaluation, parameters: usize) -> Excess
                 residual.whitened(problem.data, extra).norm_squared() * as_of_three(residual.axes)
             };
             errors.clear();
-            errors.extend(own.map(square));
+            errors.extend(residuals.map(square));
             (
                 nearest(&mut errors, 0.5).unwrap_or(0.0) / freedom,
                 errors.len(),
@@ -530,16 +526,16 @@ fn excess_sigma(problem: &Problem, at: &Evaluation, parameters: usize) -> Excess
         })
     };
     ExcessSigma {
-        length: of(Dimension::Length),
-        angle: of(Dimension::Angle),
+        length: excess_of(Dimension::Length),
+        angle: excess_of(Dimension::Angle),
     }
 }
 
 /// The extra standard deviation with which the median squared error (of so many) is that of three unit normals.
 fn excess(mut median: impl FnMut(f64) -> (f64, usize)) -> f64 {
     // One sigma of the median's own scatter is no evidence of anything unmodelled.
-    let (own, count) = median(0.0);
-    if own <= MEDIAN_CHI2[3] * (1.0 + 1.6 / (count.max(1) as f64).sqrt()) {
+    let (stated, count) = median(0.0);
+    if stated <= MEDIAN_CHI2[3] * (1.0 + 1.6 / (count.max(1) as f64).sqrt()) {
         return 0.0;
     }
     let (mut low, mut high) = (0.0, 1e-6);

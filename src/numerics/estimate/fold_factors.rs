@@ -6,9 +6,9 @@
 use super::error_scale::ErrorScale;
 use super::factor::TriangularFactor;
 use super::model::Model;
+use super::model::Session;
 use super::problem::Problem;
-use super::session::Session;
-use super::term::{ObservationTerm, share};
+use super::problem::{ObservationTerm, share};
 use crate::observation::{ExcessSigma, KINDS};
 use crate::robot::Measurements;
 use faer::linalg::matmul::triangular::{BlockStructure, matmul};
@@ -118,7 +118,7 @@ impl<'a> NearbyFits<'a> {
             .filter(|(_, step)| step.is_none())
             .map(|(parameter, _)| *parameter)
             .collect();
-        let beside = FitOfAll {
+        let whole_fit = FitOfAll {
             whole,
             inverse,
             model,
@@ -127,7 +127,7 @@ impl<'a> NearbyFits<'a> {
         Some(
             self.parts
                 .par_iter()
-                .map(|part| self.without(part, &beside, &part.factor.given(steps)))
+                .map(|part| self.without(part, &whole_fit, &part.factor.given(steps)))
                 .collect(),
         )
     }
@@ -152,7 +152,7 @@ impl<'a> NearbyFits<'a> {
     fn without(
         &self,
         part: &LeftOutRows,
-        beside: &FitOfAll,
+        whole_fit: &FitOfAll,
         factor: &TriangularFactor,
     ) -> Option<Vec<f64>> {
         let FitOfAll {
@@ -160,9 +160,9 @@ impl<'a> NearbyFits<'a> {
             inverse,
             model,
             open,
-        } = beside;
+        } = whole_fit;
         let p = open.len();
-        let own = Mat::from_fn(p, p, |i, j| if i <= j { factor.entry(i, j) } else { 0.0 });
+        let upper_factor = Mat::from_fn(p, p, |i, j| if i <= j { factor.entry(i, j) } else { 0.0 });
         let (mut seen, mut left) = (Mat::zeros(p, p), Mat::identity(p, p));
         let (upper, lower) = (
             BlockStructure::TriangularUpper,
@@ -172,7 +172,7 @@ impl<'a> NearbyFits<'a> {
             seen.as_mut(),
             upper,
             Accum::Replace,
-            own.as_ref(),
+            upper_factor.as_ref(),
             upper,
             inverse.as_ref(),
             upper,
@@ -233,7 +233,7 @@ impl<'a> NearbyFits<'a> {
                 ObservationTerm::of(*kind, self.data, *row, &placed, self.excess)
             });
             for ((term, _), share) in terms.zip(&mut shares) {
-                square += term.error.times(*share).norm_squared();
+                square += (term.error * *share).norm_squared();
             }
             lengths.push(self.scale.of_placed(self.data, *row, &placed));
         }

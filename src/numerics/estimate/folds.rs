@@ -1,17 +1,17 @@
 //! Cross-validation: every fitted row predicted by a fit that has not seen its pose, in folds drawn at random and in contiguous
-//! blocks. Rows of one pose stay together: a pose that was seen is no test; of a moving arm stretches of rows do. Where the target was only
-//! brought to places, a block is a place: sockets of one plate, which names with one beginning (`front/0`, `front/1`) are.
+//! blocks. Rows of one pose stay together: a pose that was seen is no test; of a moving arm stretches of rows do. Where rows are
+//! contacts, a block is a place: sockets of one plate, which names with one beginning (`front/0`, `front/1`) are.
 //!
 //! A fold's fit is the whole one less the fold's rows, one step away ([`NearbyFits`]). Where that step is not small, the fit is repeated
 //! instead.
 
+use super::contacts::without_places;
 use super::error_scale::ErrorScale;
 use super::fit::{FitOptions, ParameterStatus, fit};
 use super::fold_factors::NearbyFits;
-use super::left_out::without_places;
+use super::model::Session;
 use super::repeats::Poses;
-use super::session::Session;
-use crate::observation::kinds;
+use crate::observation::contacts;
 use crate::robot::Measurements;
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
@@ -29,8 +29,8 @@ pub struct Folds {
     pub count: usize,
     /// Folds drawn at random: new poses among those that were measured.
     pub random: Vec<f64>,
-    /// Contiguous stretches of the recording: poses of another time and, often, another region. Of a target that was only brought to
-    /// places, each of these in turn.
+    /// Contiguous stretches of the recording: poses of another time and, often, another region. Of contacts each
+    /// place in turn.
     pub blocks: Vec<f64>,
 }
 
@@ -149,7 +149,7 @@ fn parts(data: &Measurements, rows: &[usize]) -> Vec<Vec<usize>> {
         .collect()
 }
 
-/// Every place that the target was brought to with its rows and, of the other poses, contiguous stretches; where there is but one place,
+/// Every place with contacts with its rows and, of the other poses, contiguous stretches; where there is but one place,
 /// stretches of all.
 fn blocks(
     data: &Measurements,
@@ -157,15 +157,8 @@ fn blocks(
     order: &[&Vec<usize>],
     count: usize,
 ) -> Vec<Vec<usize>> {
-    let brought: Vec<_> = kinds(data)
-        .into_iter()
-        .filter(|kind| kind.is_contact())
-        .collect();
     let place = |row: usize| {
-        let name = brought
-            .iter()
-            .find_map(|kind| kind.reading(data, row))
-            .map(|reading| reading.anchor)?;
+        let name = contacts(data, row).next()?.1.anchor;
         Some(name.rsplit_once('/').map_or(name, |(place, _)| place))
     };
     let mut places: BTreeMap<&str, Vec<usize>> = BTreeMap::new();

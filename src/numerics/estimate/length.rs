@@ -1,6 +1,6 @@
 //! Lengths between anchors that are known from elsewhere: of a print, a gauge block, a ball bar; each with its standard deviation.
 
-use super::known::KnownLength;
+use super::model::KnownLength;
 use super::model::Model;
 use crate::effect::names;
 use crate::robot::{Anchor, Shape};

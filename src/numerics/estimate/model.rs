@@ -1,7 +1,8 @@
 //! A robot with effects and the values of their parameters: what is identified, predicts, and is compensated by.
 
-use super::known::{Known, KnownLength};
+use super::fit::Fitted;
 use crate::effect::{BasePlacement, EffectStack, PlacedRow, PlacementBuffers, names};
+use crate::observation::{Dimension, KINDS, Residual};
 use crate::robot::{Measurements, RobotModel};
 use crate::spatial::Pose;
 use nalgebra::Vector3;
@@ -74,6 +75,150 @@ impl Model {
                 || self.stack.scratch(&self.robot),
                 |scratch, row| self.stack.point(&self.robot, data, row, &self.x, scratch),
             )
+            .collect()
+    }
+}
+
+/// A recording with the model fitted to some of its rows.
+#[derive(Clone, Copy)]
+pub struct Session<'a> {
+    /// The recording.
+    pub data: &'a Measurements,
+    /// Rows that are fitted.
+    pub rows: &'a [usize],
+    /// As it was fitted.
+    pub model: &'a Model,
+    /// How the fit went.
+    pub fitted: &'a Fitted,
+}
+
+/// Beforehand about one parameter, SI.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Known {
+    /// A normal distribution, if any.
+    pub prior: Option<Prior>,
+    /// A range, if any.
+    pub bounds: Option<Bounds>,
+}
+
+/// A normal distribution.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Prior {
+    /// SI.
+    pub mean: f64,
+    /// Above zero.
+    pub sigma: f64,
+}
+
+/// Both ends belong to what is allowed; `low < high`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bounds {
+    /// SI.
+    pub low: f64,
+    /// SI.
+    pub high: f64,
+}
+
+/// A distance between two sockets, planes, spheres (their centres) or ends of distances.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct KnownLength {
+    /// By their numbers in the robot's setup, two different ones.
+    pub between: [usize; 2],
+    /// m
+    pub length: f64,
+    /// m, above zero.
+    pub sigma: f64,
+}
+
+/// What a prior and the data say of one parameter, after a fit with both.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PriorCheck {
+    /// As it was stated.
+    pub prior: Prior,
+    /// Estimate and standard deviation without this prior, SI; `None` where the data alone say nothing.
+    pub without: Option<(f64, f64)>,
+    /// Distance of the two in standard deviations of their difference.
+    pub conflict: f64,
+}
+
+/// A prior and data farther apart than this many standard deviations contradict each other.
+pub const CONFLICT: f64 = 3.0;
+
+impl PriorCheck {
+    /// From the estimate and its variance with the prior: the prior's information taken off again.
+    pub(crate) fn of(prior: Prior, estimate: f64, variance: f64) -> Self {
+        let (prior_variance, off) = (prior.sigma * prior.sigma, estimate - prior.mean);
+        let gained = prior_variance - variance;
+        // The data's share of the information is rest / own: smaller, it is rounding.
+        if gained <= 1e-6 * prior_variance {
+            return Self {
+                prior,
+                without: None,
+                conflict: 0.0,
+            };
+        }
+        let without = (
+            prior.mean + off * prior_variance / gained,
+            (variance * prior_variance / gained).sqrt(),
+        );
+        Self {
+            prior,
+            without: Some(without),
+            conflict: off.abs() / gained.sqrt(),
+        }
+    }
+}
+
+/// How far off a row is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RowError {
+    /// Measured - predicted along the axes that were measured, m.
+    pub point: Vector3<f64>,
+    /// Its length, or that of another kind where no axis was measured, m.
+    pub length: f64,
+    /// Angle between what was measured and predicted of the orientation, rad.
+    pub angle: Option<f64>,
+}
+
+/// How far off a row is under a model.
+pub(crate) fn row_error(
+    model: &Model,
+    data: &Measurements,
+    row: usize,
+    scratch: &mut PlacementBuffers,
+) -> RowError {
+    placed_row_error(data, row, &model.place(data, row, scratch))
+}
+
+/// The same of a row whose arm was placed.
+pub(crate) fn placed_row_error(data: &Measurements, row: usize, placed: &PlacedRow) -> RowError {
+    let (mut length, mut angle) = (None, None);
+    for residual in KINDS
+        .iter()
+        .filter_map(|kind| Residual::of(*kind, data, row, placed))
+    {
+        let first = match residual.dimension() {
+            Dimension::Length => &mut length,
+            Dimension::Angle => &mut angle,
+        };
+        first.get_or_insert_with(|| residual.error.norm());
+    }
+    RowError {
+        point: data.points.residual(row, &placed.point),
+        length: length.unwrap_or(0.0),
+        angle,
+    }
+}
+
+impl Model {
+    /// What is left of every row, where some row measured other than a whole point; empty where all measured just that.
+    pub fn row_errors(&self, data: &Measurements) -> Vec<RowError> {
+        let plain = data.readings.is_empty() && (0..data.rows()).all(|row| data.has_point(row));
+        let rows = if plain { 0 } else { data.rows() };
+        let scratch = || self.stack.scratch(&self.robot);
+        (0..rows)
+            .into_par_iter()
+            .map_init(scratch, |scratch, row| row_error(self, data, row, scratch))
             .collect()
     }
 }

@@ -34,28 +34,28 @@ pub(crate) fn visibility(factor: &TriangularFactor, prior_sigma: &[f64]) -> Vec<
             out.push(Visibility::Unseen);
             continue;
         }
-        let mut rest = column.to_vec();
+        let mut residual = column.to_vec();
         let mut shares = vec![0.0; basis.len()];
         // Twice is enough: classical result on Gram-Schmidt with one reorthogonalisation.
         for _ in 0..2 {
             for (share, direction) in shares.iter_mut().zip(&basis) {
                 // Columns are as long as they are far from the first.
-                let along = dot(&rest, direction);
+                let along = dot(&residual, direction);
                 *share += along;
-                axpy(-along, direction, &mut rest);
+                axpy(-along, direction, &mut residual);
             }
         }
-        let left = length(&rest);
+        let left = length(&residual);
         if left < RANK_TOLERANCE * norm || left * prior < 1.0 {
             out.push(Visibility::Redundant(combination(
                 &triangle, &kept, &shares, factor, norm,
             )));
             continue;
         }
-        for value in &mut rest {
+        for value in &mut residual {
             *value /= left;
         }
-        basis.push(rest);
+        basis.push(residual);
         shares.push(left);
         triangle.push(shares);
         kept.push(j);

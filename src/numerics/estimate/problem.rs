@@ -2,11 +2,14 @@
 
 use super::factor::{StackedRows, TriangularFactor};
 use super::model::Model;
-use super::term::{ObservationTerm, huber};
 use crate::effect::PlacedRow;
-use crate::observation::{Dimension, ExcessSigma, KINDS, Residual, kinds};
+use crate::observation::{
+    Dimension, ExcessSigma, KINDS, MeasurementKind, Residual, RowView, Sensitivity, kinds,
+};
 use crate::robot::Measurements;
+use crate::statistics::MEDIAN_CHI2;
 use faer::Mat;
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
 /// Rows of the recording that one thread takes at once: fixed, so that sums do not depend on the number of threads.
@@ -29,7 +32,7 @@ pub(crate) struct Evaluation {
     pub residuals: Vec<Residual>,
     /// Sum of Huber's losses, of the priors' and of known lengths', dimensionless.
     pub cost: f64,
-    /// Sum over what was brought to a place of the logarithm of the volume that joint noise is spread over, and its derivatives by the
+    /// Sum over contacts of the logarithm of the volume that joint noise is spread over, and its derivatives by the
     /// parameters.
     pub volume: f64,
     pub pull: Vec<f64>,
@@ -117,10 +120,10 @@ impl Problem<'_> {
     /// Residuals and factor of some rows, in memory of a chunk.
     fn span(&self, model: &Model, rows: &[usize], column: &[Option<usize>], p: usize) -> Span {
         let mut scratch = model.stack.scratch(&model.robot);
-        let kinds = kinds(self.data);
-        // A block of lines for each kind, whatever a row has of it.
-        let blocks: Vec<usize> = kinds.iter().map(|kind| kind.height()).collect();
-        let lines_of_row: usize = blocks.iter().sum();
+        let data = self.data;
+        let kinds = kinds(data);
+        // Three lines for each kind, whatever a row has of it.
+        let lines_of_row = 3 * kinds.len();
         let mut tall = StackedRows::new(p + 1, lines_of_row * rows.len().min(CHUNK));
         let mut residuals = Vec::with_capacity(rows.len());
         let (mut volume, mut pull) = (0.0, vec![0.0; p]);
@@ -131,21 +134,24 @@ impl Problem<'_> {
                 let share = term.share();
                 term.derivatives(placed, |parameter, derivative| {
                     if let Some(j) = column[parameter] {
-                        add(&mut lines[j][first..], derivative, share);
+                        add(&mut lines[j][first..], &derivative, share);
                     }
                 });
                 add(&mut lines[p][first..], &term.error, share);
             };
             for (i, &row) in chunk.iter().enumerate() {
                 let mut placed = model.place(self.data, row, &mut scratch);
-                let mut first = lines_of_row * i;
-                for (kind, height) in kinds.iter().zip(&blocks) {
+                for (k, kind) in kinds.iter().enumerate() {
                     if let Some((term, residual)) =
                         ObservationTerm::of(*kind, self.data, row, &placed, self.excess)
                     {
-                        write(first, term, &mut placed);
+                        write(lines_of_row * i + 3 * k, term, &mut placed);
                         residuals.push(residual);
-                        if let Some(closing) = kind.closing(self.data, row, &placed) {
+                        if let Some(closing) = kind.closing(RowView {
+                            data,
+                            row,
+                            placed: &placed,
+                        }) {
                             let own = placed.log_volume(&closing, |parameter, change| {
                                 column[parameter]
                                     .into_iter()
@@ -154,7 +160,6 @@ impl Problem<'_> {
                             volume += own.unwrap_or_default();
                         }
                     }
-                    first += height;
                 }
             }
             tall.absorb(height);
@@ -187,9 +192,8 @@ fn rms(residuals: &[Residual]) -> f64 {
     (first.iter().sum::<f64>() / first.len().max(1) as f64).sqrt()
 }
 
-fn add(to: &mut [f64], values: &[f64], share: f64) {
-    to[..values.len()]
-        .iter_mut()
+fn add(to: &mut [f64], values: &Vector3<f64>, share: f64) {
+    to.iter_mut()
         .zip(values)
         .for_each(|(to, value)| *to += value * share);
 }
@@ -200,4 +204,79 @@ struct Span {
     factor: TriangularFactor,
     volume: f64,
     pull: Vec<f64>,
+}
+
+/// Beyond this whitened error length (99.3 % of good terms of one, two, three numbers are below) a term pulls with constant force.
+const HUBER_BY_AXES: [f64; 4] = [f64::INFINITY, 2.7, 3.15, HUBER];
+pub(crate) const HUBER: f64 = 3.5;
+
+/// Weighted residual and derivatives of one kind in one row.
+pub(crate) struct ObservationTerm {
+    /// Measured - predicted in standard deviations.
+    pub error: Vector3<f64>,
+    pub axes: usize,
+    sensitivity: Sensitivity,
+}
+
+impl ObservationTerm {
+    /// With `excess` beside the measurement's own noise. `None` where the row measured none.
+    pub fn of(
+        kind: &'static dyn MeasurementKind,
+        data: &Measurements,
+        row: usize,
+        placed: &PlacedRow,
+        excess: ExcessSigma,
+    ) -> Option<(Self, Residual)> {
+        let residual = Residual::of(kind, data, row, placed)?;
+        let weight = residual.weight(data, excess.of(residual.dimension()));
+        let error = weight.apply(&residual.error);
+        let sensitivity = residual.sensitivity(data, placed, weight);
+        Some((
+            Self {
+                error,
+                axes: residual.axes,
+                sensitivity,
+            },
+            residual,
+        ))
+    }
+
+    /// Root of Huber's weight: the share by which errors and derivatives count.
+    pub fn share(&self) -> f64 {
+        share(self.error.norm(), self.axes)
+    }
+
+    /// Derivatives of what was predicted, in standard deviations per unit of the parameter.
+    pub fn derivatives(&self, placed: &mut PlacedRow, emit: impl FnMut(usize, Vector3<f64>)) {
+        self.sensitivity.derivatives(placed, emit);
+    }
+}
+
+/// Root of Huber's weight of an error of so many axes, in standard deviations.
+pub(crate) fn share(error: f64, axes: usize) -> f64 {
+    let bound = bound(axes);
+    if error > bound {
+        (bound / error).sqrt()
+    } else {
+        1.0
+    }
+}
+
+/// Where Huber's loss turns linear for a term of so many axes.
+pub(crate) fn bound(axes: usize) -> f64 {
+    HUBER_BY_AXES[axes]
+}
+
+pub(crate) fn huber(error: f64, axes: usize) -> f64 {
+    let bound = bound(axes);
+    if error <= bound {
+        0.5 * error * error
+    } else {
+        bound * (error - 0.5 * bound)
+    }
+}
+
+/// By what a squared error of so many axes is to be multiplied to have the median of three.
+pub(crate) fn as_of_three(axes: usize) -> f64 {
+    MEDIAN_CHI2[3] / MEDIAN_CHI2[axes]
 }

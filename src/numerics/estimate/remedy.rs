@@ -1,7 +1,7 @@
 //! What would show a parameter that the data do not: each possible measurement is tried on the model, no rule is written down.
 //!
 //! To the factor of the recording come poses all over the joints' ranges, the same with another payload, or with a second target
-//! beside the last axis whose place on the tool is unknown too. What is estimated stays first in precedence.
+//! off the last axis whose place on the tool is unknown too. What is estimated stays first in precedence.
 
 use super::factor::TriangularFactor;
 use super::fit::{Fitted, ParameterStatus};
@@ -21,7 +21,7 @@ pub enum Remedy {
     Move(Vec<usize>),
     /// Poses with and without the declared payload.
     Payload,
-    /// A second target beside the axis of the last joint.
+    /// A second target off the axis of the last joint.
     SecondTarget,
     /// Nothing of these: every measured point is the same whichever of the parameters is off.
     Nothing,
@@ -34,8 +34,8 @@ const MOST: usize = 300;
 const HARDLY: f64 = 0.25;
 /// A remedy has to show a parameter this many times better than its prior sigma.
 const CLEARLY: f64 = 3.0;
-/// The second target beside the last axis, m.
-const BESIDE: f64 = 0.1;
+/// Distance of the second target from the last axis, m.
+const OFF_AXIS: f64 = 0.1;
 /// Where a target sits on a tool is known to this before any measurement, m.
 const TARGET_PRIOR: f64 = 0.1;
 
@@ -83,7 +83,7 @@ pub fn remedies(
     let usual = data.payload[rows[0]];
     let spread = at(model, &poses(model, data, rows, &[usual]));
     let loaded = (declared > 0.0).then(|| at(model, &poses(model, data, rows, &[0.0, declared])));
-    let target = at(&beside(model), &poses(model, data, rows, &[usual]));
+    let target = at(&off_axis(model), &poses(model, data, rows, &[usual]));
     let specs = model.stack.specs();
     let of_tool: Vec<usize> = model.stack.parameters_of(names::TOOL_OFFSET).collect();
     let tool: Vec<bool> = candidates.iter().map(|k| of_tool.contains(k)).collect();
@@ -212,8 +212,8 @@ fn lazy(model: &Model, data: &Measurements, rows: &[usize]) -> Vec<usize> {
     (0..data.joints).filter(hardly).collect()
 }
 
-/// The same robot with its target moved beside the last axis.
-fn beside(model: &Model) -> Model {
+/// The same robot with its target moved off the last axis.
+fn off_axis(model: &Model) -> Model {
     let last = model.robot.joints() - 1;
     let axis = model.robot.axis(last);
     let across = if axis.x.abs() < 0.6 {
@@ -222,7 +222,7 @@ fn beside(model: &Model) -> Model {
         axis.cross(&Vector3::y())
     };
     let mut description = model.robot.description().clone();
-    let moved = Vector3::from(description.tool) + across.normalize() * BESIDE;
+    let moved = Vector3::from(description.tool) + across.normalize() * OFF_AXIS;
     description.tool = moved.into();
     Model {
         robot: RobotModel::new(description),

@@ -3,7 +3,7 @@
 use super::covariance::Covariance;
 use super::model::Model;
 use crate::effect::names;
-use crate::observation::only_brought;
+use crate::observation::only_contacts;
 use crate::robot::{Measurements, RobotModel};
 use crate::units::Unit;
 use nalgebra::{DVector, Vector3};
@@ -11,7 +11,7 @@ use nalgebra::{DVector, Vector3};
 /// m; places that are no farther apart say nothing of scale.
 const APART: f64 = 0.02;
 
-/// What is known of the scale of an arm that was brought to places, where nothing else was measured.
+/// What is known of the scale of an arm by contacts, where nothing else was measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ArmScale {
     /// Relative standard deviation of the distances between the places; none where all rows close at one. What priors of link lengths
@@ -29,8 +29,8 @@ pub struct ArmScale {
     pub reach: f64,
 }
 
-/// The scale of an arm by rows that were fitted; none where links stay at nominal, or where some measured other than that the target was
-/// brought to a place.
+/// The scale of an arm by rows that were fitted; none where links stay at nominal, or where some
+/// measured other than contacts.
 pub fn scale(
     model: &Model,
     data: &Measurements,
@@ -43,7 +43,7 @@ pub fn scale(
         .stack
         .parameters_of(names::LINK_GEOMETRY)
         .any(|k| free.contains(&k));
-    if rows.is_empty() || !linked || !only_brought(data, rows) {
+    if rows.is_empty() || !linked || !only_contacts(data, rows) {
         return None;
     }
     let mut scratch = model.stack.scratch(&model.robot);
@@ -82,7 +82,7 @@ pub fn scale(
                 DVector::from_iterator(parameters.len(), parameters.iter().map(|k| along[*k]));
             let along = covariance.block(parameters)? * &weights;
             let whole = weights.dot(&along);
-            // How the scale follows the mean of each prior, in standard deviations of that; and the errors along axes beside it.
+            // How the scale follows the mean of each prior, in standard deviations of that; and the errors along axes with it.
             let lengths = parameters
                 .iter()
                 .enumerate()
@@ -96,9 +96,9 @@ pub fn scale(
                 ))
             };
             let parts: Vec<(f64, f64)> = lengths.filter_map(part).collect();
-            let own: f64 = parts.iter().map(|(part, _)| part * part).sum();
-            let together =
-                (whole - own).max(0.0) + parts.iter().map(|(part, _)| part).sum::<f64>().powi(2);
+            let squares: f64 = parts.iter().map(|(part, _)| part * part).sum();
+            let together = (whole - squares).max(0.0)
+                + parts.iter().map(|(part, _)| part).sum::<f64>().powi(2);
             let whole = whole
                 + parts
                     .iter()
@@ -107,14 +107,14 @@ pub fn scale(
             let together = together.max(whole);
             Some([together, whole].map(|variance| beyond * variance.max(0.0).sqrt()))
         });
-    let is_told = |k: usize| {
+    let has_prior = |k: usize| {
         model
             .known
             .get(&k)
             .is_some_and(|known| known.prior.is_some())
     };
     let is_radius = |k: usize| model.stack.specs()[k].name.ends_with(".radius");
-    let told = |name: &'static str| model.stack.parameters_of(name).any(is_told);
+    let any_prior = |name: &'static str| model.stack.parameters_of(name).any(has_prior);
     Some(ArmScale {
         sigma: sigmas.map(|[together, _]| together),
         independent: sigmas.map(|[_, independent]| independent),
@@ -125,7 +125,7 @@ pub fn scale(
                 .known
                 .iter()
                 .any(|(k, known)| is_radius(*k) && known.prior.is_some()),
-        by_priors: told(names::LINK_GEOMETRY) || told(names::TOOL_OFFSET),
+        by_priors: any_prior(names::LINK_GEOMETRY) || any_prior(names::TOOL_OFFSET),
         reach: points
             .iter()
             .map(|point| (point - model.base().translation).norm())
@@ -133,16 +133,16 @@ pub fn scale(
     })
 }
 
-/// How many errors of earlier links a shift of a link stands for beside its own: a link's error along the axis of its joint is none of its
+/// How many errors of earlier links a shift of a link stands for besides its own: a link's error along the axis of its joint is none of its
 /// parameters, since a shift of the next link that is not along its own joint's axis does the same.
 fn carried(robot: &RobotModel, name: &str) -> usize {
     let parts = name
         .strip_prefix("link_geometry.l")
-        .and_then(|own| own.split_once('.'));
+        .and_then(|rest| rest.split_once('.'));
     let Some((Ok(link), axis)) = parts.map(|(link, axis)| (link.parse::<usize>(), axis)) else {
         return 0;
     };
-    let Some(axis) = ["x", "y", "z"].iter().position(|own| *own == axis) else {
+    let Some(axis) = ["x", "y", "z"].iter().position(|name| *name == axis) else {
         return 0;
     };
     let along = |joint: &usize| robot.is_revolute(*joint) && robot.axis(*joint)[axis].abs() > ALONG;
@@ -158,11 +158,11 @@ const ALONG: f64 = 0.999;
 /// Sockets whose places are known beforehand.
 pub fn known_places(model: &Model) -> usize {
     let specs = model.stack.specs();
-    let told = |k: &usize| specs[*k].name.ends_with(".x") && model.known(*k).prior.is_some();
+    let is_known = |k: &usize| specs[*k].name.ends_with(".x") && model.known(*k).prior.is_some();
     model
         .stack
         .parameters_of(names::ANCHOR)
-        .filter(told)
+        .filter(is_known)
         .count()
 }
 

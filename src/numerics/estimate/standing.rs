@@ -33,12 +33,12 @@ impl Model {
     /// along its normal, or a tilt of that.
     fn anchored(&self, number: usize) -> Option<(f64, f64)> {
         let setup = self.robot.setup();
-        let of = (0..setup.anchors.len())
+        let anchor_number = (0..setup.anchors.len())
             .rev()
-            .find(|of| setup.first_of_anchor(*of) <= number)?;
-        let axis = number - setup.first_of_anchor(of);
-        let anchor = setup.anchors.get(of)?;
-        let now = self.standing_anchor(of)?;
+            .find(|anchor_number| setup.first_of_anchor(*anchor_number) <= number)?;
+        let axis = number - setup.first_of_anchor(anchor_number);
+        let anchor = setup.anchors.get(anchor_number)?;
+        let now = self.standing_anchor(anchor_number)?;
         match (anchor.shape, now.shape) {
             (Shape::Plane(before), Shape::Plane(normal)) if axis == 0 => {
                 Some((before.dot(&anchor.place), normal.dot(&now.place)))

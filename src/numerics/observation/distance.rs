@@ -1,10 +1,9 @@
 //! Distances of a target from an anchor (draw-wire, ballbar) whose place is estimated too.
 
 use super::{
-    DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank, ResidualNumbers,
-    Sensitivity, Weight,
+    DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank, RowView, Sensitivity,
+    Weight,
 };
-use crate::effect::PlacedRow;
 use crate::robot::{Anchor, Measurements, RobotModel};
 use crate::spatial::Pose;
 use crate::units::Quantity::Length;
@@ -53,13 +52,10 @@ static ABOUT: KindDescription = KindDescription {
 
 impl Distance {
     /// The unit vector from the row's anchor.
-    fn along(
-        &self,
-        data: &Measurements,
-        row: usize,
-        placed: &PlacedRow,
-    ) -> Option<(Vector3<f64>, f64)> {
-        let reach = placed.from_anchor(self.reading(data, row)?.anchor)?;
+    fn along(&self, at: RowView) -> Option<(Vector3<f64>, f64)> {
+        let reach = at
+            .placed
+            .from_anchor(self.reading(at.data, at.row)?.anchor)?;
         Some((reach.try_normalize(0.0)?, reach.norm()))
     }
 }
@@ -69,37 +65,22 @@ impl MeasurementKind for Distance {
         &ABOUT
     }
 
-    fn residual(
-        &self,
-        data: &Measurements,
-        row: usize,
-        placed: &PlacedRow,
-    ) -> Option<(ResidualNumbers, f64)> {
+    fn residual(&self, at: RowView) -> Option<(Vector3<f64>, f64)> {
+        let RowView { data, row, .. } = at;
         let reading = self.reading(data, row)?;
-        let (along, length) = self.along(data, row, placed)?;
-        let joints = data
-            .spread
-            .as_ref()
-            .map_or(0.0, |all| along.dot(&(all[row] * along)));
-        Some((
-            ResidualNumbers::new([reading.values[0] - length]),
-            reading.sigma * reading.sigma + joints,
-        ))
+        let (along, length) = self.along(at)?;
+        let variance = reading.sigma * reading.sigma + at.joint_variance_along(&along);
+        Some((Vector3::new(reading.values[0] - length, 0.0, 0.0), variance))
     }
 
-    fn sensitivity(
-        &self,
-        data: &Measurements,
-        row: usize,
-        placed: &PlacedRow,
-        weight: Weight,
-    ) -> Sensitivity {
+    fn sensitivity(&self, at: RowView, weight: Weight) -> Sensitivity {
         let along = self
-            .along(data, row, placed)
+            .along(at)
             .map_or_else(Vector3::zeros, |(along, _)| along);
-        let reach = placed
-            .from_anchor(self.reading(data, row).map_or("", |reading| reading.anchor))
-            .unwrap_or_else(Vector3::zeros);
+        let anchor = self
+            .reading(at.data, at.row)
+            .map_or("", |reading| reading.anchor);
+        let reach = at.placed.from_anchor(anchor).unwrap_or_else(Vector3::zeros);
         Sensitivity::FromAnchor(Weight::Along(weight.apply(&along)), reach)
     }
 

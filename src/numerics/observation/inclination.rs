@@ -4,10 +4,8 @@
 //! where the level is the only instrument defines it. The target's z axis points above the horizon: such instruments work upright.
 
 use super::{
-    DeclaredColumn, Dimension, KindDescription, MeasurementKind, Rank, ResidualNumbers,
-    Sensitivity, Weight,
+    DeclaredColumn, Dimension, KindDescription, MeasurementKind, Rank, RowView, Sensitivity, Weight,
 };
-use crate::effect::PlacedRow;
 use crate::robot::Measurements;
 use crate::units::Quantity::Angle;
 use nalgebra::{Matrix3, Vector3};
@@ -61,30 +59,20 @@ impl MeasurementKind for Inclination {
         &ABOUT
     }
 
-    fn residual(
-        &self,
-        data: &Measurements,
-        row: usize,
-        placed: &PlacedRow,
-    ) -> Option<(ResidualNumbers, f64)> {
+    fn residual(&self, at: RowView) -> Option<(Vector3<f64>, f64)> {
+        let RowView { data, row, placed } = at;
         let reading = self.reading(data, row)?;
         let rotation = placed.orientation();
         let left = |axis: usize| reading.values[axis] - rotation[(2, axis)].clamp(-1.0, 1.0).asin();
         Some((
-            ResidualNumbers::new([left(0), left(1)]),
+            Vector3::new(left(0), left(1), 0.0),
             reading.sigma * reading.sigma,
         ))
     }
 
     /// A rotation w changes up . R e by w . (R e x up), and the angle by as much over its cosine, the length of R e x up.
-    fn sensitivity(
-        &self,
-        _data: &Measurements,
-        _row: usize,
-        placed: &PlacedRow,
-        weight: Weight,
-    ) -> Sensitivity {
-        let rotation = placed.orientation();
+    fn sensitivity(&self, at: RowView, weight: Weight) -> Sensitivity {
+        let rotation = at.placed.orientation();
         let line = |axis: usize| {
             rotation
                 .column(axis)

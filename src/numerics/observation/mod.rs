@@ -5,7 +5,6 @@
 
 mod distance;
 mod inclination;
-mod numbers;
 mod orientation;
 mod planar;
 mod plane;
@@ -13,20 +12,18 @@ mod point;
 mod residual;
 mod socket;
 mod sphere;
-mod weight;
 
 pub use crate::robot::{ColumnShape, Convention, Conventions, DeclaredColumn, Part};
 pub use distance::Distance;
 pub use inclination::Inclination;
-pub use numbers::{ResidualNumbers, WIDEST};
 pub use orientation::Orientation;
 pub use planar::Planar;
 pub use plane::PlaneKind;
 pub use point::PointKind;
+pub use residual::Weight;
 pub use residual::{ExcessSigma, Residual};
 pub use socket::SocketKind;
 pub use sphere::SphereKind;
-pub use weight::Weight;
 
 use crate::effect::{Closing, Direction, PlacedRow, PointMotion};
 use crate::robot::{Anchor, Measurements, Named, Reading, Readings, RobotModel, Shape};
@@ -75,7 +72,7 @@ pub struct KindDescription {
     pub word: &'static str,
     /// Whether it measures lengths or angles.
     pub dimension: Dimension,
-    /// Numbers of a row, [`WIDEST`] at most.
+    /// Numbers of a row, three at most: more are two kinds.
     pub axes: usize,
     /// In the recording.
     pub columns: &'static [DeclaredColumn],
@@ -105,8 +102,6 @@ pub struct Rank {
 pub enum Sensitivity {
     /// Derivatives are those of the point.
     Point(Weight),
-    /// Derivatives are those of the point along a vector for each number, of which there may be more than three.
-    Lines(Vec<Vector3<f64>>),
     /// Derivatives are those of the rotation of the target.
     Rotation(Weight),
     /// Derivatives are those of the vector from the anchor, which stands here.
@@ -114,59 +109,46 @@ pub enum Sensitivity {
 }
 
 impl Sensitivity {
-    /// Hands `take` the derivative of each number by a parameter that acts along a direction, in standard deviations: as many as the
-    /// kind has, or three of narrower ones, zero beyond.
-    pub fn along<T>(
-        &self,
-        motion: &PointMotion,
-        direction: &Direction,
-        take: impl FnOnce(&[f64]) -> T,
-    ) -> T {
+    /// The derivative of each number by a parameter that acts along a direction, in standard deviations; zero beyond those of the kind.
+    pub fn along(&self, motion: &PointMotion, direction: &Direction) -> Vector3<f64> {
         match self {
-            Self::Point(weight) => take(weight.apply(&motion.point_along(direction)).as_slice()),
-            Self::Lines(lines) => {
-                let velocity = motion.point_along(direction);
-                take(
-                    &lines
-                        .iter()
-                        .map(|line| line.dot(&velocity))
-                        .collect::<Vec<f64>>(),
-                )
+            Self::Point(weight) => weight.apply(&motion.point_along(direction)),
+            Self::Rotation(weight) => weight.apply(&motion.turn_along(direction)),
+            Self::FromAnchor(weight, reach) => {
+                weight.apply(&motion.from_anchor_along(direction, reach))
             }
-            Self::Rotation(weight) => take(weight.apply(&motion.turn_along(direction)).as_slice()),
-            Self::FromAnchor(weight, reach) => take(
-                weight
-                    .apply(&motion.from_anchor_along(direction, reach))
-                    .as_slice(),
-            ),
         }
     }
 
     /// Derivatives of what was measured by every parameter, in standard deviations, through `emit(parameter, derivatives)`, of each
     /// number as [`Sensitivity::along`] has them.
-    pub fn derivatives(&self, placed: &mut PlacedRow, mut emit: impl FnMut(usize, &[f64])) {
+    pub fn derivatives(&self, placed: &mut PlacedRow, mut emit: impl FnMut(usize, Vector3<f64>)) {
         match self {
-            Self::Point(weight) => {
-                placed.partials(|k, velocity| emit(k, weight.apply(&velocity).as_slice()))
-            }
-            Self::Lines(lines) => {
-                let mut seen = vec![0.0; lines.len()];
-                placed.partials(|k, velocity| {
-                    seen.iter_mut()
-                        .zip(lines)
-                        .for_each(|(seen, line)| *seen = line.dot(&velocity));
-                    emit(k, &seen);
-                });
-            }
-            Self::Rotation(weight) => {
-                placed.rotations(|k, rotation| emit(k, weight.apply(&rotation).as_slice()))
-            }
+            Self::Point(weight) => placed.partials(|k, velocity| emit(k, weight.apply(&velocity))),
+            Self::Rotation(weight) => placed.rotations(|k, turn| emit(k, weight.apply(&turn))),
             Self::FromAnchor(weight, reach) => {
-                placed.partials_from_anchor(reach, |k, velocity| {
-                    emit(k, weight.apply(&velocity).as_slice())
-                });
+                placed.partials_from_anchor(reach, |k, velocity| emit(k, weight.apply(&velocity)))
             }
         }
+    }
+}
+
+/// A row of a recording, and the arm placed in it.
+#[derive(Clone, Copy)]
+pub struct RowView<'a, 'p> {
+    /// The recording.
+    pub data: &'a Measurements,
+    /// The row.
+    pub row: usize,
+    /// The arm.
+    pub placed: &'a PlacedRow<'p>,
+}
+
+impl RowView<'_, '_> {
+    /// Variance (m2) that the joints' repeatability makes of the point along a unit vector.
+    fn joint_variance_along(&self, along: &Vector3<f64>) -> f64 {
+        let spread = self.data.spread.as_ref();
+        spread.map_or(0.0, |all| along.dot(&(all[self.row] * along)))
     }
 }
 
@@ -175,26 +157,15 @@ pub trait MeasurementKind: Sync {
     /// What it is, in words and numbers.
     fn about(&self) -> &'static KindDescription;
 
-    /// Measured - predicted (m or rad, zero where a number was not measured) and the variance of each number; `None` where the row
+    /// Measured - predicted (m or rad, zero where a number was not measured, and beyond those of the kind) and the variance of each number; `None` where the row
     /// measured none, or the robot lacks what it was measured from.
-    fn residual(
-        &self,
-        data: &Measurements,
-        row: usize,
-        placed: &PlacedRow,
-    ) -> Option<(ResidualNumbers, f64)>;
+    fn residual(&self, at: RowView) -> Option<(Vector3<f64>, f64)>;
 
     /// What it sees of the target's motion, its residual being turned into standard deviations by `weight`.
-    fn sensitivity(
-        &self,
-        data: &Measurements,
-        row: usize,
-        placed: &PlacedRow,
-        weight: Weight,
-    ) -> Sensitivity;
+    fn sensitivity(&self, at: RowView, weight: Weight) -> Sensitivity;
 
-    /// In which directions the target was brought to something, where that is the measurement: nothing was read but the joints.
-    fn closing(&self, _data: &Measurements, _row: usize, _placed: &PlacedRow) -> Option<Closing> {
+    /// In which directions a contact holds the target, where that is the measurement: nothing was read but the joints.
+    fn closing(&self, _at: RowView) -> Option<Closing> {
         None
     }
 
@@ -221,13 +192,7 @@ pub trait MeasurementKind: Sync {
 
     /// Numbers of its residual, from 0, that a row measured, ascending.
     fn lines(&self, data: &Measurements, row: usize) -> &'static [usize] {
-        const ALL: [usize; WIDEST] = [0, 1, 2, 3, 4, 5, 6, 7];
-        &ALL[..self.axes(data, row)]
-    }
-
-    /// Lines that it has in a block of rows: of narrow kinds three, as a motion has.
-    fn height(&self) -> usize {
-        self.about().axes.max(3)
+        &[0, 1, 2][..self.axes(data, row)]
     }
 
     /// Length of one sigma of what a row measured, m or rad.
@@ -249,7 +214,7 @@ pub trait MeasurementKind: Sync {
     }
 
     /// The error (m or rad) in standard deviations of the instrument alone, squared and summed.
-    fn stated(&self, data: &Measurements, row: usize, error: &ResidualNumbers) -> f64 {
+    fn stated(&self, data: &Measurements, row: usize, error: &Vector3<f64>) -> f64 {
         self.reading(data, row).map_or(0.0, |reading| {
             error.norm_squared() / (reading.sigma * reading.sigma)
         })
@@ -318,7 +283,7 @@ impl dyn MeasurementKind + '_ {
             .filter(move |column| column.part == part)
     }
 
-    /// Columns that say that a row measured it: its values or, of a kind that reads none, the name of what the target was brought to.
+    /// Columns that say that a row measured it: its values or, of a kind that reads none, the name of what holds the target.
     pub fn telling(&self) -> impl Iterator<Item = &'static DeclaredColumn> {
         let part = if self.is_contact() {
             Part::Anchor
@@ -331,7 +296,7 @@ impl dyn MeasurementKind + '_ {
             .filter(move |column| column.part == part)
     }
 
-    /// Whether the target is brought to something, and nothing is read but the joints.
+    /// Whether a contact holds the target, and nothing is read but the joints.
     pub fn is_contact(&self) -> bool {
         self.columns(Part::Value).next().is_none()
     }
@@ -382,8 +347,17 @@ pub fn kinds(data: &Measurements) -> Vec<&'static dyn MeasurementKind> {
         .collect()
 }
 
-/// Whether all that these rows measured is that the target was brought to places: nothing was read but the joints.
-pub fn only_brought(data: &Measurements, rows: &[usize]) -> bool {
+/// The contacts that hold the target in a row: their kinds, and what holds it.
+pub fn contacts(
+    data: &Measurements,
+    row: usize,
+) -> impl Iterator<Item = (&'static dyn MeasurementKind, Reading<'_>)> {
+    let kinds = KINDS.iter().filter(|kind| kind.is_contact());
+    kinds.filter_map(move |kind| Some((*kind, kind.reading(data, row)?)))
+}
+
+/// Whether contacts are all that these rows measured: nothing was read but the joints.
+pub fn only_contacts(data: &Measurements, rows: &[usize]) -> bool {
     let kinds = kinds(data);
     let is_contact = |row: &usize| {
         kinds

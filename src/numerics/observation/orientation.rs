@@ -2,9 +2,8 @@
 
 use super::{
     ColumnShape, Convention, Conventions, DeclaredColumn, Dimension, KindDescription,
-    MeasurementKind, Part, Rank, ResidualNumbers, Sensitivity, Weight,
+    MeasurementKind, Part, Rank, RowView, Sensitivity, Weight,
 };
-use crate::effect::PlacedRow;
 use crate::robot::{Measurements, ONE_AND_A_HALF_TURNS};
 use crate::spatial::Pose;
 use crate::units::Quantity::Angle;
@@ -125,27 +124,17 @@ impl MeasurementKind for Orientation {
         &ABOUT
     }
 
-    fn residual(
-        &self,
-        data: &Measurements,
-        row: usize,
-        placed: &PlacedRow,
-    ) -> Option<(ResidualNumbers, f64)> {
+    fn residual(&self, at: RowView) -> Option<(Vector3<f64>, f64)> {
+        let RowView { data, row, placed } = at;
         let (measured, sigma) = self.measured(data, row)?;
         let off = measured * placed.orientation().transpose();
         Some((
-            Pose::new(off, Vector3::zeros()).rotation_vector().into(),
+            Pose::new(off, Vector3::zeros()).rotation_vector(),
             sigma * sigma,
         ))
     }
 
-    fn sensitivity(
-        &self,
-        _data: &Measurements,
-        _row: usize,
-        _placed: &PlacedRow,
-        weight: Weight,
-    ) -> Sensitivity {
+    fn sensitivity(&self, _at: RowView, weight: Weight) -> Sensitivity {
         Sensitivity::Rotation(weight)
     }
 

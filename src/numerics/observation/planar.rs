@@ -4,10 +4,8 @@
 //! over the focal length, lens distortion taken off. One view sees neither depth nor how large the arm is.
 
 use super::{
-    DeclaredColumn, Dimension, KindDescription, MeasurementKind, Rank, ResidualNumbers,
-    Sensitivity, Weight,
+    DeclaredColumn, Dimension, KindDescription, MeasurementKind, Rank, RowView, Sensitivity, Weight,
 };
-use crate::effect::PlacedRow;
 use crate::robot::{Measurements, RobotModel};
 use crate::spatial::Pose;
 use crate::units::Quantity::Number;
@@ -53,29 +51,19 @@ impl MeasurementKind for Planar {
         &ABOUT
     }
 
-    fn residual(
-        &self,
-        data: &Measurements,
-        row: usize,
-        placed: &PlacedRow,
-    ) -> Option<(ResidualNumbers, f64)> {
+    fn residual(&self, at: RowView) -> Option<(Vector3<f64>, f64)> {
+        let RowView { data, row, placed } = at;
         let (reading, point) = (self.reading(data, row)?, CAMERA * placed.point);
         let left = |axis: usize| reading.values[axis] - point[axis] / point.z.max(NEAREST);
         Some((
-            ResidualNumbers::new([left(0), left(1)]),
+            Vector3::new(left(0), left(1), 0.0),
             reading.sigma * reading.sigma,
         ))
     }
 
     /// The derivative of a quotient: d(a / c) = (da - a / c dc) / c.
-    fn sensitivity(
-        &self,
-        _data: &Measurements,
-        _row: usize,
-        placed: &PlacedRow,
-        weight: Weight,
-    ) -> Sensitivity {
-        let point = CAMERA * placed.point;
+    fn sensitivity(&self, at: RowView, weight: Weight) -> Sensitivity {
+        let point = CAMERA * at.placed.point;
         let depth = point.z.max(NEAREST);
         let line = |axis: usize| {
             let mut line = RowVector3::new(0.0, 0.0, -point[axis] / (depth * depth));

@@ -2,10 +2,10 @@
 
 use super::socket::touches;
 use super::{
-    DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank, ResidualNumbers,
-    Sensitivity, Weight,
+    DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank, RowView, Sensitivity,
+    Weight,
 };
-use crate::effect::{Closing, PlacedRow};
+use crate::effect::Closing;
 use crate::robot::{Anchor, Measurements, RobotModel, Shape};
 use crate::spatial::Pose;
 use crate::units::Quantity::Length;
@@ -47,17 +47,12 @@ static ABOUT: KindDescription = KindDescription {
 
 impl PlaneKind {
     /// The vector from the row's plane, and the plane's normal.
-    fn touch(
-        &self,
-        data: &Measurements,
-        row: usize,
-        placed: &PlacedRow,
-    ) -> Option<(Vector3<f64>, Vector3<f64>)> {
-        let anchor = self.reading(data, row)?.anchor;
-        let Shape::Plane(normal) = placed.anchor_shape(anchor)? else {
+    fn touch(&self, at: RowView) -> Option<(Vector3<f64>, Vector3<f64>)> {
+        let anchor = self.reading(at.data, at.row)?.anchor;
+        let Shape::Plane(normal) = at.placed.anchor_shape(anchor)? else {
             return None;
         };
-        Some((placed.from_anchor(anchor)?, normal))
+        Some((at.placed.from_anchor(anchor)?, normal))
     }
 }
 
@@ -66,38 +61,20 @@ impl MeasurementKind for PlaneKind {
         &ABOUT
     }
 
-    fn residual(
-        &self,
-        data: &Measurements,
-        row: usize,
-        placed: &PlacedRow,
-    ) -> Option<(ResidualNumbers, f64)> {
-        let (reach, normal) = self.touch(data, row, placed)?;
-        let sigma = self.reading(data, row)?.sigma;
-        let joints = data
-            .spread
-            .as_ref()
-            .map_or(0.0, |all| normal.dot(&(all[row] * normal)));
-        Some((
-            ResidualNumbers::new([-normal.dot(&reach)]),
-            sigma * sigma + joints,
-        ))
+    fn residual(&self, at: RowView) -> Option<(Vector3<f64>, f64)> {
+        let (reach, normal) = self.touch(at)?;
+        let sigma = self.reading(at.data, at.row)?.sigma;
+        let variance = sigma * sigma + at.joint_variance_along(&normal);
+        Some((Vector3::new(-normal.dot(&reach), 0.0, 0.0), variance))
     }
 
-    fn sensitivity(
-        &self,
-        data: &Measurements,
-        row: usize,
-        placed: &PlacedRow,
-        weight: Weight,
-    ) -> Sensitivity {
-        let (reach, normal) = self.touch(data, row, placed).unwrap_or_default();
+    fn sensitivity(&self, at: RowView, weight: Weight) -> Sensitivity {
+        let (reach, normal) = self.touch(at).unwrap_or_default();
         Sensitivity::FromAnchor(Weight::Along(weight.apply(&normal)), reach)
     }
 
-    fn closing(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<Closing> {
-        self.touch(data, row, placed)
-            .map(|(_, normal)| Closing::Plane(normal))
+    fn closing(&self, at: RowView) -> Option<Closing> {
+        self.touch(at).map(|(_, normal)| Closing::Plane(normal))
     }
 
     /// Through the middle of the touches, across the direction in which they scatter least.

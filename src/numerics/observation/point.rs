@@ -1,12 +1,12 @@
 //! Points: where a target is in the tracker's frame, all of its axes or some of them.
 
 use super::{
-    DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank, ResidualNumbers,
-    Sensitivity, Weight,
+    DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank, RowView, Sensitivity,
+    Weight,
 };
-use crate::effect::PlacedRow;
 use crate::robot::Measurements;
 use crate::units::Quantity::Length;
+use nalgebra::Vector3;
 
 /// The kind `point`.
 #[derive(Debug, Clone, Copy)]
@@ -106,24 +106,13 @@ impl MeasurementKind for PointKind {
         &ABOUT
     }
 
-    fn residual(
-        &self,
-        data: &Measurements,
-        row: usize,
-        placed: &PlacedRow,
-    ) -> Option<(ResidualNumbers, f64)> {
+    fn residual(&self, at: RowView) -> Option<(Vector3<f64>, f64)> {
+        let RowView { data, row, placed } = at;
         // Each axis has a variance of its own: see `weight`.
-        (data.points.axes(row) > 0)
-            .then(|| (data.points.residual(row, &placed.point).into(), f64::NAN))
+        (data.points.axes(row) > 0).then(|| (data.points.residual(row, &placed.point), f64::NAN))
     }
 
-    fn sensitivity(
-        &self,
-        _data: &Measurements,
-        _row: usize,
-        _placed: &PlacedRow,
-        weight: Weight,
-    ) -> Sensitivity {
+    fn sensitivity(&self, _at: RowView, weight: Weight) -> Sensitivity {
         Sensitivity::Point(weight)
     }
 
@@ -157,7 +146,7 @@ impl MeasurementKind for PointKind {
         (data.points.axes(row) > 0).then(|| data.points.sigma[row].map(finite).norm())
     }
 
-    fn stated(&self, data: &Measurements, row: usize, error: &ResidualNumbers) -> f64 {
+    fn stated(&self, data: &Measurements, row: usize, error: &Vector3<f64>) -> f64 {
         error
             .iter()
             .zip(&data.points.sigma[row])

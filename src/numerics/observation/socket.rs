@@ -1,10 +1,10 @@
 //! Sockets: a ball on the tool lies in one, whose centre is estimated too; nothing is read but the joints.
 
 use super::{
-    DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank, ResidualNumbers,
-    Sensitivity, Weight,
+    DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank, RowView, Sensitivity,
+    Weight,
 };
-use crate::effect::{Closing, PlacedRow};
+use crate::effect::Closing;
 use crate::robot::{Anchor, Measurements, RobotModel, Shape};
 use crate::spatial::Pose;
 use crate::units::Quantity::Length;
@@ -77,29 +77,19 @@ impl MeasurementKind for SocketKind {
         &ABOUT
     }
 
-    fn residual(
-        &self,
-        data: &Measurements,
-        row: usize,
-        placed: &PlacedRow,
-    ) -> Option<(ResidualNumbers, f64)> {
+    fn residual(&self, at: RowView) -> Option<(Vector3<f64>, f64)> {
+        let RowView { data, row, placed } = at;
         let reading = self.reading(data, row)?;
         placed
             .anchor_shape(reading.anchor)
             .filter(|shape| *shape == Shape::Point)?;
         Some((
-            (-placed.from_anchor(reading.anchor)?).into(),
+            -placed.from_anchor(reading.anchor)?,
             reading.sigma * reading.sigma,
         ))
     }
 
-    fn sensitivity(
-        &self,
-        _data: &Measurements,
-        _row: usize,
-        _placed: &PlacedRow,
-        weight: Weight,
-    ) -> Sensitivity {
+    fn sensitivity(&self, _at: RowView, weight: Weight) -> Sensitivity {
         Sensitivity::FromAnchor(weight, Vector3::zeros())
     }
 
@@ -121,8 +111,8 @@ impl MeasurementKind for SocketKind {
             .map(|reading| (3.0 * reading.sigma * reading.sigma + joints).sqrt())
     }
 
-    fn closing(&self, data: &Measurements, row: usize, _placed: &PlacedRow) -> Option<Closing> {
-        self.reading(data, row).map(|_| Closing::Point)
+    fn closing(&self, at: RowView) -> Option<Closing> {
+        self.reading(at.data, at.row).map(|_| Closing::Point)
     }
 
     /// The middle of where the nominal robot puts the ball.

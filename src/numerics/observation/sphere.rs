@@ -3,10 +3,10 @@
 
 use super::socket::touches;
 use super::{
-    DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank, ResidualNumbers,
-    Sensitivity, Weight,
+    DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank, RowView, Sensitivity,
+    Weight,
 };
-use crate::effect::{Closing, PlacedRow};
+use crate::effect::Closing;
 use crate::robot::{Anchor, Measurements, RobotModel, Shape};
 use crate::spatial::Pose;
 use crate::units::Quantity::Length;
@@ -39,17 +39,12 @@ static ABOUT: KindDescription = KindDescription {
 
 impl SphereKind {
     /// The vector from the centre of the row's sphere, and the sphere's radius.
-    fn touch(
-        &self,
-        data: &Measurements,
-        row: usize,
-        placed: &PlacedRow,
-    ) -> Option<(Vector3<f64>, f64)> {
-        let anchor = self.reading(data, row)?.anchor;
-        let Shape::Sphere(radius) = placed.anchor_shape(anchor)? else {
+    fn touch(&self, at: RowView) -> Option<(Vector3<f64>, f64)> {
+        let anchor = self.reading(at.data, at.row)?.anchor;
+        let Shape::Sphere(radius) = at.placed.anchor_shape(anchor)? else {
             return None;
         };
-        placed
+        at.placed
             .from_anchor(anchor)
             .filter(|reach| reach.norm() > 0.0)
             .map(|reach| (reach, radius))
@@ -61,41 +56,23 @@ impl MeasurementKind for SphereKind {
         &ABOUT
     }
 
-    fn residual(
-        &self,
-        data: &Measurements,
-        row: usize,
-        placed: &PlacedRow,
-    ) -> Option<(ResidualNumbers, f64)> {
-        let (reach, radius) = self.touch(data, row, placed)?;
-        let (sigma, along) = (self.reading(data, row)?.sigma, reach.normalize());
-        let joints = data
-            .spread
-            .as_ref()
-            .map_or(0.0, |all| along.dot(&(all[row] * along)));
-        Some((
-            ResidualNumbers::new([radius - reach.norm()]),
-            sigma * sigma + joints,
-        ))
+    fn residual(&self, at: RowView) -> Option<(Vector3<f64>, f64)> {
+        let (reach, radius) = self.touch(at)?;
+        let sigma = self.reading(at.data, at.row)?.sigma;
+        let variance = sigma * sigma + at.joint_variance_along(&reach.normalize());
+        Some((Vector3::new(radius - reach.norm(), 0.0, 0.0), variance))
     }
 
-    fn sensitivity(
-        &self,
-        data: &Measurements,
-        row: usize,
-        placed: &PlacedRow,
-        weight: Weight,
-    ) -> Sensitivity {
+    fn sensitivity(&self, at: RowView, weight: Weight) -> Sensitivity {
         let reach = self
-            .touch(data, row, placed)
+            .touch(at)
             .map_or_else(Vector3::zeros, |(reach, _)| reach);
         let along = reach.try_normalize(0.0).unwrap_or_else(Vector3::zeros);
         Sensitivity::FromAnchor(Weight::Along(weight.apply(&along)), reach)
     }
 
-    fn closing(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<Closing> {
-        self.touch(data, row, placed)
-            .map(|(reach, _)| Closing::Sphere(reach))
+    fn closing(&self, at: RowView) -> Option<Closing> {
+        self.touch(at).map(|(reach, _)| Closing::Sphere(reach))
     }
 
     /// Centre and radius from p2 = 2 c p + (r2 - c2), linear in both.

@@ -2,7 +2,7 @@
 //! maker or a public model states them. Each file names its sources and what it leaves out.
 
 use super::import::{Imported, RobotFileText, read_calib};
-use crate::error::{Error, Result, nearest};
+use crate::error::{Error, Result, did_you_mean};
 
 /// An arm of the library.
 #[derive(Debug, PartialEq, Eq)]
@@ -28,9 +28,7 @@ impl LibraryArm {
     /// The same, or which name is near.
     pub fn named(name: &str) -> Result<&'static Self> {
         Self::find(name).ok_or_else(|| {
-            let near = nearest(name, LIBRARY.iter().map(|arm| arm.name))
-                .map(|near| format!("; did you mean `{near}`?"))
-                .unwrap_or_default();
+            let near = did_you_mean(name, LIBRARY.iter().map(|arm| arm.name));
             Error::spec(
                 "NAME",
                 format!("no arm `{name}` in the library{near} (`calib robots` lists all)"),

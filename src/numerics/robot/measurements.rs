@@ -1,11 +1,11 @@
 //! Measurements as the numerics see them: rows with their joints and circumstances, and what was read in them by kind.
 
 use crate::robot::instrument::NoiseBasis;
-use crate::robot::memories::Memories;
-use crate::robot::point::PointReadings;
+use crate::robot::memory::Memories;
+use crate::robot::pose_groups::Sequence;
 use crate::robot::pose_groups::{NEAR, SAME, near};
+use crate::robot::readings::PointReadings;
 use crate::robot::readings::{Named, Reading, Readings};
-use crate::robot::sequence::Sequence;
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
 

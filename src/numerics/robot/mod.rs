@@ -8,17 +8,13 @@ mod instrument;
 mod joint_convention;
 mod library;
 mod measurements;
-mod memories;
 mod memory;
 mod model;
-mod point;
 pub mod pose_groups;
 mod posture;
 mod readings;
 mod rows;
-mod sequence;
 mod setup;
-mod travel;
 mod visited;
 
 pub use bound::{Bound, ONE_AND_A_HALF_TURNS, too_far};
@@ -30,16 +26,16 @@ pub use instrument::{
 pub use joint_convention::{CountedCoupling, JointConvention};
 pub use library::{LIBRARY, LibraryArm};
 pub use measurements::{Measurements, RowTime};
-pub use memories::Memories;
+pub use memory::Memories;
 pub use memory::Memory;
 pub use model::RobotModel;
-pub use point::PointReadings;
+pub use model::Travel;
+pub use pose_groups::Sequence;
 pub use posture::{Carried, LoadCorrection, Posture};
+pub use readings::PointReadings;
 pub use readings::{Named, Reading, Readings};
 pub use rows::{DhRow, DhTable};
-pub use sequence::Sequence;
 pub use setup::{Anchor, MeasurementSetup, Shape, Target};
-pub use travel::Travel;
 pub use visited::numbered;
 pub use visited::{Unmeasured, Visited};
 

@@ -1,7 +1,7 @@
 //! The arm as it hangs: frames of all stations, what each joint carries, and gravity's torques (static part of Eq. 24).
 
 use crate::robot::model::RobotModel;
-use crate::robot::travel::Travel;
+use crate::robot::model::Travel;
 use crate::spatial::Pose;
 use nalgebra::Vector3;
 

@@ -15,7 +15,7 @@ pub struct Target {
     pub oriented: bool,
 }
 
-/// The far end of a draw-wire or ballbar, or what the target was brought to: a socket, a plane, a sphere.
+/// The far end of a draw-wire or ballbar, or what holds the target: a socket, a plane, a sphere.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Anchor {
     /// As the recording calls it; empty where it has no name.

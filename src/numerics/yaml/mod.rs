@@ -3,12 +3,11 @@
 //! The only file that knows the YAML crate. Booleans are `true` and `false` alone; a key given twice is a fault.
 
 mod node;
-mod path;
 mod trouble;
 mod typed;
 
+pub(crate) use node::join;
 pub use node::{Mark, Node, YamlValue};
-pub(crate) use path::join;
 pub use trouble::Trouble;
 pub use typed::typed;
 

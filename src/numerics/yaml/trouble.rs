@@ -1,7 +1,7 @@
 //! One fault of a YAML value: path, place and message; built from the inside out while serde unwinds.
 
 use super::Mark;
-use super::path::join;
+use super::node::join;
 use crate::error::{Fault, counted, instead};
 use serde::de::{self, Expected, Unexpected};
 use std::fmt;

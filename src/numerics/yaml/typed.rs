@@ -22,7 +22,7 @@ pub fn typed<T: DeserializeOwned>(node: &Node) -> Result<T, Vec<Trouble>> {
             Err(trouble) => {
                 let trouble = locate::<T>(trouble, &rest);
                 if let Some(field) = trouble.missing {
-                    let path = super::path::join(&trouble.path, field);
+                    let path = super::node::join(&trouble.path, field);
                     if !removed.iter().any(|gone: &String| gone.starts_with(&path)) {
                         troubles.push(trouble);
                     }
@@ -53,7 +53,7 @@ fn locate<T: DeserializeOwned>(trouble: Trouble, root: &Node) -> Trouble {
         }
         Clue::Key(key) => {
             let entry = node.entries().iter().find(|(name, _, _)| name == key);
-            candidates.extend(entry.map(|(name, mark, _)| (super::path::join(path, name), *mark)));
+            candidates.extend(entry.map(|(name, mark, _)| (super::node::join(path, name), *mark)));
         }
         Clue::Word(_) => {}
     });

@@ -5,7 +5,7 @@ use super::clock::CLOCK;
 use super::columns::Columns;
 use super::layout::{FileLayout, WideTargets};
 use super::mapped::{ColumnRef, JointColumns, NameRule, ScalarColumn};
-use crate::error::{Error, Fault, Result, counted, nearest};
+use crate::error::{Error, Fault, Result, counted, did_you_mean, first_of};
 use crate::observation::{Convention, DeclaredColumn};
 use crate::table::recording_columns;
 use crate::units::{Quantity, Unit};
@@ -97,7 +97,7 @@ impl Binding {
         self.worded = (0..self.texts.len())
             .filter(|place| self.texts[*place].is_some())
             .collect();
-        let brought = |kind: &KindSlots| {
+        let is_named = |kind: &KindSlots| {
             kind.name
                 .is_some_and(|name| self.texts.get(name).is_some_and(Option::is_some))
         };
@@ -108,9 +108,9 @@ impl Binding {
                 .any(|place| self.cells.iter().any(|cell| cell.index == *place))
         };
         let kinds = &arm.slots.kinds;
-        self.measures = is_wide || kinds.iter().any(|kind| brought(kind) || is_read(kind));
+        self.measures = is_wide || kinds.iter().any(|kind| is_named(kind) || is_read(kind));
         let is_bound = |kind: &KindSlots| {
-            brought(kind) || kind.values.iter().chain(&kind.sigma).any(is_filled)
+            is_named(kind) || kind.values.iter().chain(&kind.sigma).any(is_filled)
         };
         self.kinds = (0..kinds.len())
             .filter(|index| is_bound(&kinds[*index]))
@@ -340,9 +340,9 @@ impl Binder<'_> {
     }
     fn hint(&self, reference: &ColumnRef) -> String {
         match (reference, &self.head.names) {
-            (ColumnRef::Name(name), Some(names)) => nearest(name, names.iter().map(String::as_str))
-                .map(|near| format!("; did you mean `{near}`?"))
-                .unwrap_or_default(),
+            (ColumnRef::Name(name), Some(names)) => {
+                did_you_mean(name, names.iter().map(String::as_str))
+            }
             _ => format!("; the file has {}", counted(self.head.width, "column")),
         }
     }
@@ -351,13 +351,7 @@ impl Binder<'_> {
         let Some(names) = &self.head.names else {
             return String::new();
         };
-        let shown: Vec<&str> = names.iter().take(SHOWN).map(String::as_str).collect();
-        let more = if names.len() > SHOWN {
-            format!(" and {} more", names.len() - SHOWN)
-        } else {
-            String::new()
-        };
-        let mut text = format!("; found: {}{more}", shown.join(", "));
+        let mut text = format!("; found: {}", first_of(names, SHOWN));
         if let [only] = names.as_slice()
             && let Some(mark) = [";", "\t", ",", "|"]
                 .into_iter()

@@ -130,7 +130,7 @@ impl Columns {
 
     /// The same with another target in every row, where one is mapped.
     pub(super) fn of_target(&self, name: &str) -> Self {
-        let of = |(column, mapped): &(&'static DeclaredColumn, Mapped)| match mapped {
+        let with_target = |(column, mapped): &(&'static DeclaredColumn, Mapped)| match mapped {
             Mapped::Text(text) if column.setting == "target" => (
                 *column,
                 Mapped::Text(TextColumn {
@@ -142,7 +142,7 @@ impl Columns {
             ),
             other => (*column, other.clone()),
         };
-        Self(self.0.iter().map(of).collect())
+        Self(self.0.iter().map(with_target).collect())
     }
 
     /// What does not depend on the robot's joints.
@@ -157,11 +157,11 @@ impl Columns {
 
 impl PartialEq for Columns {
     fn eq(&self, other: &Self) -> bool {
-        let own = self
+        let pairs = self
             .0
             .iter()
             .map(|(column, mapped)| (column.setting, mapped));
-        own.eq(other
+        pairs.eq(other
             .0
             .iter()
             .map(|(column, mapped)| (column.setting, mapped)))

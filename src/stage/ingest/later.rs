@@ -2,7 +2,7 @@
 
 use super::Ingest;
 use super::layout::FileLayout;
-use crate::error::{Fault, counted};
+use crate::error::{Place, counted};
 use crate::stage::RawFile;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -65,12 +65,12 @@ impl Ingest {
     /// Where the files of the later measurement `index` already stand, all of them.
     fn earlier_of_the_same_files(&self, index: usize) -> Option<String> {
         let later = |k: usize| self.later.get(k).map(|later| paths(later.files.iter()));
-        let own = later(index)?;
-        if paths(self.files.iter().map(|layout| &layout.file)) == own {
+        let here = later(index)?;
+        if paths(self.files.iter().map(|layout| &layout.file)) == here {
             return Some("files".into());
         }
         (0..index)
-            .find(|k| later(*k).as_ref() == Some(&own))
+            .find(|k| later(*k).as_ref() == Some(&here))
             .map(|k| format!("later[{k}].files"))
     }
 }
@@ -87,32 +87,38 @@ fn paths<'a>(files: impl Iterator<Item = &'a RawFile>) -> Vec<PathBuf> {
         .collect()
 }
 
-pub(super) fn faults(settings: &Ingest) -> impl Iterator<Item = Fault> + '_ {
-    settings.later.iter().enumerate().flat_map(|(index, later)| {
-        let place = format!("later[{index}]");
-        let expected = settings.files.len();
-        let files = (later.files.len() != expected).then(|| {
-            let message = format!(
+pub(super) fn faults(settings: &Ingest, at: &mut Place) {
+    let expected = settings.files.len();
+    let named = |layout: &FileLayout| {
+        layout
+            .columns
+            .text("target")
+            .is_some_and(|text| text.value.is_some())
+    };
+    for (index, later) in settings.later.iter().enumerate() {
+        let mut at = at.at(format!("later[{index}]"));
+        at.at("files").must(
+            later.files.len() == expected,
+            format!(
                 "{} here; allowed: one for each of the {expected} under `files`",
-                counted(later.files.len() as u64, "file")
-            );
-            Fault::new(format!("{place}.files"), message)
-        });
-        let again = (expected > 0).then(|| settings.earlier_of_the_same_files(index)).flatten().map(|earlier| {
-            let message = format!(
+                counted(later.files.len(), "file")
+            ),
+        );
+        if let Some(earlier) = settings.earlier_of_the_same_files(index) {
+            at.at("files").fault(format!(
                 "the files of `{earlier}` again: every row would be used twice, and copies look like perfect repeatability; name the files \
                  of another measurement, or take these out"
-            );
-            Fault::new(format!("{place}.files"), message)
-        });
-        let gap = !(later.gap_s >= 0.0 && later.gap_s.is_finite());
-        let named = |layout: &FileLayout| layout.columns.text("target").is_some_and(|text| text.value.is_some());
-        let target = (later.target.is_some() && !settings.files.iter().any(named)).then(|| {
-            let message = "the reflector of `files` has no name; say it there, e.g. `columns: {target: {value: A}, ..}`";
-            Fault::new(format!("{place}.target"), message)
-        });
-        files.into_iter().chain(again).chain(target).chain(gap.then(|| Fault::new(format!("{place}.gap_s"), "allowed: 0 or more, s")))
-    })
+            ));
+        }
+        at.at("target").must(
+            later.target.is_none() || settings.files.iter().any(named),
+            "the reflector of `files` has no name; say it there, e.g. `columns: {target: {value: A}, ..}`",
+        );
+        at.at("gap_s").must(
+            later.gap_s >= 0.0 && later.gap_s.is_finite(),
+            "allowed: 0 or more, s",
+        );
+    }
 }
 
 /// Numbers rows through and lets their time go on where files start again.

@@ -70,7 +70,7 @@ impl ListedRows {
             let joints = row.joints.iter().map(|joint| Some(*joint));
             let numbers = joints.chain(external);
             let cells =
-                numbers.map(|number| number.map_or_else(String::new, |own| own.to_string()));
+                numbers.map(|number| number.map_or_else(String::new, |number| number.to_string()));
             let cells = std::iter::once(row.name.clone()).chain(cells);
             (row.line as u64, cells.collect())
         });

@@ -98,15 +98,15 @@ pub(super) struct NameRule {
 impl NameRule {
     /// The name that counts; none where it has no number, and one is asked for.
     pub(super) fn applied<'a>(&self, name: &'a str) -> Option<&'a str> {
-        let rest = self
+        let stripped = self
             .strip
             .as_deref()
             .and_then(|prefix| name.strip_prefix(prefix))
             .unwrap_or(name);
         if self.matching.is_none() {
-            Some(rest)
+            Some(stripped)
         } else {
-            last_number(rest)
+            last_number(stripped)
         }
     }
 }

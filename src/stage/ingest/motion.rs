@@ -177,7 +177,7 @@ impl JointSamples {
         let fastest = |sums: &[f64]| sums.iter().copied().fold(0.0, f64::max);
         // The joint that moves most of each kind speaks for the others.
         let rough = |prismatic: bool| {
-            let own = |sums: &[f64]| -> Vec<f64> {
+            let of_kind = |sums: &[f64]| -> Vec<f64> {
                 sums.iter()
                     .zip(&arm.prismatic)
                     .filter(|(_, slides)| **slides == prismatic)
@@ -185,8 +185,8 @@ impl JointSamples {
                     .collect()
             };
             let (all, wrong) = (
-                own(&squares).iter().sum::<f64>(),
-                own(&errors).iter().sum::<f64>(),
+                of_kind(&squares).iter().sum::<f64>(),
+                of_kind(&errors).iter().sum::<f64>(),
             );
             if all > 0.0 { (wrong / all).sqrt() } else { 0.0 }
         };
@@ -228,12 +228,12 @@ impl JointSamples {
         } else {
             String::new()
         };
-        context.services.note(format!(
+        context.note(format!(
             "{label}: joint velocities by parabolas through neighbouring rows, {ms:.1} ms apart, never across gaps above {gap:.0} ms; right to about {:.2} %{alone}",
             100.0 * rough
         ));
         if rough > ROUGH {
-            context.services.warn(format!(
+            context.warn(format!(
                 "{label}: the velocities are right to {:.0} % only: log more often, or try `motion: {{over_s: ...}}` where joints are logged coarsely",
                 100.0 * rough
             ));
@@ -274,15 +274,15 @@ impl Track {
 
     /// Velocities of a data row (from 1) into those of `velocity` that are not known.
     pub(super) fn fill(&self, number: u64, velocity: &mut [f64]) {
-        let Some((own, _)) = self.of(number) else {
+        let Some((derived, _)) = self.of(number) else {
             return;
         };
-        for (known, own) in velocity
+        for (known, derived) in velocity
             .iter_mut()
-            .zip(own)
+            .zip(derived)
             .filter(|(known, _)| known.is_nan())
         {
-            *known = *own;
+            *known = *derived;
         }
     }
 

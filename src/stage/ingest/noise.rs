@@ -3,7 +3,7 @@
 use super::Ingest;
 use super::arm::Slots;
 use super::layout::Join;
-use crate::error::Fault;
+use crate::error::{Place, did_you_mean};
 use crate::observation::Part;
 use crate::robot::{INSTRUMENTS, Instrument, START, SigmaSource};
 use nalgebra::Vector3;
@@ -57,8 +57,7 @@ impl<'de> Visitor<'de> for NameOrFigures {
         let known = INSTRUMENTS.iter().find(|known| known.name == name);
         known.map(|known| InstrumentSetting::Named(known.name)).ok_or_else(|| {
             let names = instruments();
-            let near = crate::error::nearest(name, names.iter().copied());
-            let hint = near.map(|near| format!("; did you mean `{near}`?")).unwrap_or_default();
+            let hint = did_you_mean(name, names.iter().copied());
             let names = names.join(", ");
             E::custom(format!(
                 "unknown instrument `{name}`{hint}; allowed: {names}, or figures, e.g. {{constant_um: 10, per_metre_um: 2.5, coverage: 2}}"
@@ -89,10 +88,12 @@ impl JsonSchema for InstrumentSetting {
 
 /// What is wrong with how noise is stated: a standard deviation is stated once, as such or by an uncertainty; in files that are
 /// joined by one of them.
-pub(super) fn faults(settings: &Ingest) -> Vec<Fault> {
-    let mut faults = Vec::new();
+pub(super) fn faults(settings: &Ingest, at: &mut Place) {
     if let Some(InstrumentSetting::Figures(figures)) = &settings.instrument {
-        faults.extend(figures.fault().map(|fault| Fault::new("instrument", fault)));
+        figures
+            .fault()
+            .into_iter()
+            .for_each(|fault| at.at("instrument").fault(fault));
     }
     let appended = settings.join == Some(Join::Append {});
     let mut stated: BTreeMap<&str, &str> = BTreeMap::new();
@@ -100,31 +101,30 @@ pub(super) fn faults(settings: &Ingest) -> Vec<Fault> {
         if appended {
             stated.clear();
         }
-        let own = file
+        let direct = file
             .columns
             .numbers()
             .filter(|(declared, _)| declared.part == Part::Sigma);
-        let own = own.map(|(declared, _)| (declared.setting, declared.setting));
+        let direct = direct.map(|(declared, _)| (declared.setting, declared.setting));
         let by = file.columns.uncertainties();
-        let by = by
-            .flat_map(|(declared, _, of, _)| of.iter().map(|setting| (*setting, declared.setting)));
-        for (sigma, setting) in own.chain(by) {
-            if let Some(other) = stated
+        let by = by.flat_map(|(declared, _, sigmas, _)| {
+            sigmas.iter().map(|sigma| (*sigma, declared.setting))
+        });
+        let mut twice: Vec<(&str, &str)> = Vec::new();
+        for (sigma, setting) in direct.chain(by) {
+            let other = stated
                 .insert(sigma, setting)
-                .filter(|other| *other != setting)
-            {
-                let message = format!(
+                .filter(|other| *other != setting);
+            twice.extend(other.map(|other| (setting, other)));
+        }
+        twice.dedup();
+        for (setting, other) in twice {
+            at.at(format!("files[{index}].columns.{setting}"))
+                .fault(format!(
                     "states the standard deviation that `{other}` states already; map one of them"
-                );
-                faults.push(Fault::new(
-                    format!("files[{index}].columns.{setting}"),
-                    message,
                 ));
-            }
         }
     }
-    faults.dedup();
-    faults
 }
 
 /// Where a row's point and its standard deviations are.

@@ -245,11 +245,7 @@ pub(super) fn headers<'l>(
             Err(other) => return Err(other),
         }
     }
-    if faults.is_empty() {
-        Ok(())
-    } else {
-        Err(Error::Data(faults))
-    }
+    Error::if_data(faults)
 }
 
 /// What became of the rows of a file, for the table and for the person.
@@ -260,7 +256,7 @@ pub(super) fn intake(
     context: &Context,
 ) -> IntakeRow {
     let rejected = read - accepted;
-    context.services.note(format!(
+    context.note(format!(
         "{file}: {} read, {accepted} used, {rejected} rejected",
         counted(read, "row")
     ));

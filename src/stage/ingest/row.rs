@@ -162,12 +162,12 @@ impl<'a> RowReader<'a> {
 
     fn numbers(&mut self, record: &Record, row: &mut RecordedRow) -> Result<(), RowRefusal> {
         for cell in &self.binding.cells {
-            let own = match cell.is_clock {
+            let number = match cell.is_clock {
                 true => Self::moment(&mut self.clock, record, cell)?,
                 false => self.number(record, cell.column, &cell.name, cell.optional)?,
             };
-            let Some(own) = own else { continue };
-            let mut value = cell.unit.to_si(own);
+            let Some(number) = number else { continue };
+            let mut value = cell.unit.to_si(number);
             if let Some(other) = &cell.difference {
                 let Some(added) = self.number(record, other.column, &other.name, cell.optional)?
                 else {
@@ -227,10 +227,10 @@ impl<'a> RowReader<'a> {
         for (target, cells) in &self.binding.points {
             let mut point = [f64::NAN; 3];
             for (value, cell) in point.iter_mut().zip(cells) {
-                let Some(own) = self.number(record, cell.column, &cell.name, true)? else {
+                let Some(number) = self.number(record, cell.column, &cell.name, true)? else {
                     continue;
                 };
-                *value = cell.unit.to_si(own);
+                *value = cell.unit.to_si(number);
                 let [lower, upper] = cell.range;
                 if !(lower..=upper).contains(value) {
                     let [lower, upper] =
@@ -307,17 +307,17 @@ impl<'a> RowReader<'a> {
             let Some(numbers) = row.values.get_mut(places.clone()) else {
                 continue;
             };
-            let own = &numbers[..convention.numbers];
-            if own.iter().all(|number| number.is_nan()) {
+            let given = &numbers[..convention.numbers];
+            if given.iter().all(|number| number.is_nan()) {
                 continue;
             }
-            if own.iter().any(|number| number.is_nan()) {
+            if given.iter().any(|number| number.is_nan()) {
                 return refuse(
                     Reason::OutOfRange,
                     format!("the {} is incomplete", declared.setting),
                 );
             }
-            match (convention.read)(own) {
+            match (convention.read)(given) {
                 Ok(kept) => {
                     numbers.fill(f64::NAN);
                     numbers[..kept.len()].copy_from_slice(&kept);
@@ -337,7 +337,7 @@ impl<'a> RowReader<'a> {
                 .iter()
                 .map(|kind| &self.arm.slots.kinds[*kind])
         };
-        let brought = |kind: &KindSlots| {
+        let is_named = |kind: &KindSlots| {
             kind.name
                 .and_then(|name| row.texts.get(name))
                 .is_some_and(|name| !name.is_empty())
@@ -345,23 +345,23 @@ impl<'a> RowReader<'a> {
         let seen = row.points.iter().any(|point| !point[0].is_nan());
         if self.binding.measures
             && !seen
-            && !kinds().any(|kind| kind.values.iter().any(there) || brought(kind))
+            && !kinds().any(|kind| kind.values.iter().any(there) || is_named(kind))
         {
             return refuse(Reason::Blank, "nothing was measured in this row".into());
         }
-        for own in kinds().filter(|own| own.own_sigma) {
+        for slots in kinds().filter(|slots| slots.own_sigma) {
             let KindSlots {
                 kind,
                 values,
                 sigma,
                 ..
-            } = own;
+            } = slots;
             let measured = values.iter().filter(|index| there(index)).count();
             let name = || kind.about().name;
             if measured > 0 && measured < values.len() {
                 return refuse(Reason::Blank, format!("the {} is incomplete", name()));
             }
-            if (measured > 0 || brought(own)) && !sigma.iter().all(there) {
+            if (measured > 0 || is_named(slots)) && !sigma.iter().all(there) {
                 return refuse(
                     Reason::Blank,
                     format!("a measured {} without its standard deviation", name()),

@@ -123,7 +123,7 @@ pub(super) fn files(
         let open = OpenedFile::open(source, layout, arm, settings.limits)?;
         open.remarks()
             .iter()
-            .for_each(|remark| context.services.note(format!("{}: {remark}", open.label)));
+            .for_each(|remark| context.note(format!("{}: {remark}", open.label)));
         opened.push(open);
     }
     let labels: Vec<&str> = opened.iter().map(|open| open.label.as_str()).collect();
@@ -144,10 +144,7 @@ pub(super) fn files(
     // Of several faults that of the first file.
     let mut scans = scans.into_iter().collect::<Result<Vec<_>>>()?;
     for scan in &mut scans {
-        scan.loss
-            .take()
-            .into_iter()
-            .for_each(|loss| context.services.warn(loss));
+        context.warn_each(scan.loss.take());
         let track = |samples: JointSamples| {
             samples.track(
                 settings.motion.as_ref(),
@@ -184,8 +181,9 @@ fn file(
     scan.samples = is_track(settings, layout).then(JointSamples::default);
     let keyed = layout.columns.has("point_id") && settings.duplicates != Duplicates::Keep;
     let by_time = matches!(settings.join, Some(Join::Time { .. }));
-    let (mut hasher, mut told) = (RowHasher::default(), 0);
-    let mut tell = |bytes: u64| advance(bytes.saturating_sub(std::mem::replace(&mut told, bytes)));
+    let (mut hasher, mut reported) = (RowHasher::default(), 0);
+    let mut tell =
+        |bytes: u64| advance(bytes.saturating_sub(std::mem::replace(&mut reported, bytes)));
     while let Some(judged) = open.next()? {
         let row = &open.row;
         if let Some((joint, angle)) = row.turned {

@@ -11,8 +11,8 @@ use super::refusal::{Reason, Rejections, RowRefusal};
 use super::row::RecordedRow;
 use super::scan::{RefusalCounts, tally};
 use super::stretch::Stretches;
-use crate::error::{Error, Fault, Result, counted};
-use crate::stage::{Context, RawFile, Sink, Stage, StreamedTable, reads, writes};
+use crate::error::{Error, Fault, Place, Result, counted};
+use crate::stage::{Context, RawFile, Sink, Stage, StreamedTable};
 use crate::table::{ArmMotion, Intake, IntakeRow, Rejected, RejectedRow, Robot, Table};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -66,38 +66,24 @@ const CHUNK: usize = 1 << 16;
 /// More labels than these are no labels: another column is mapped.
 const MOST_LABELS: usize = 100;
 
-reads! {
-    /// Input ports of `ingest_torques`.
-    pub struct IngestTorquesReads {
-        robot: Robot,
-    }
-}
-writes! {
-    /// Output ports of `ingest_torques`.
-    pub struct IngestTorquesWrites {
-        motion: StreamedTable<ArmMotion>,
-        rejected: StreamedTable<Rejected>,
-        intake: Intake,
-    }
+crate::stage::stage! {
+    IngestTorques, "ingest_torques", 2, "reads joint positions with torques or motor currents of an arm that moves",
+        IngestTorquesReads {
+            robot: Robot,
+        } -> IngestTorquesWrites {
+            motion: StreamedTable<ArmMotion>,
+            rejected: StreamedTable<Rejected>,
+            intake: Intake,
+        }
 }
 
 impl Stage for IngestTorques {
-    const NAME: &'static str = "ingest_torques";
-    const SUMMARY: &'static str =
-        "reads joint positions with torques or motor currents of an arm that moves";
-    const IMPLEMENTATION: u32 = 2;
-    type Reads = IngestTorquesReads;
-    type Writes = IngestTorquesWrites;
-
-    fn check(&self) -> Vec<Fault> {
-        let mut faults = Vec::new();
-        let at = &mut check::Place::root(&mut faults);
-        if self.files.is_empty() {
-            at.at("files").fault("no file; name at least one");
-        }
-        if !(0.0..=1.0).contains(&self.max_rejected_fraction) {
-            at.at("max_rejected_fraction").fault("allowed: 0 to 1");
-        }
+    fn faults(&self, at: &mut Place) {
+        at.at("files")
+            .must(!self.files.is_empty(), "no file; name at least one");
+        let possible = (0.0..=1.0).contains(&self.max_rejected_fraction);
+        at.at("max_rejected_fraction")
+            .must(possible, "allowed: 0 to 1");
         for (index, file) in self.files.iter().enumerate() {
             let at = &mut at.at(format!("files[{index}]"));
             check::file(file, at);
@@ -121,7 +107,6 @@ impl Stage for IngestTorques {
                 at.fault(format!("not mapped: {}", missing.join(", ")));
             }
         }
-        faults
     }
 
     fn files(&self) -> Vec<(String, RawFile)> {
@@ -142,10 +127,7 @@ impl Stage for IngestTorques {
     }
 
     fn run(&self, reads: IngestTorquesReads, context: &Context) -> Result<IngestTorquesWrites> {
-        let faults = self.check();
-        if !faults.is_empty() {
-            return Err(Error::Spec(faults));
-        }
+        Error::if_spec(self.check())?;
         let arm = RobotJoints::of(&reads.robot)?;
         let labels: Vec<String> = self
             .files
@@ -241,7 +223,7 @@ impl<'a> MotionRows<'a> {
         let label = open.label.clone();
         open.remarks()
             .iter()
-            .for_each(|remark| context.services.note(format!("{label}: {remark}")));
+            .for_each(|remark| context.note(format!("{label}: {remark}")));
         context
             .services
             .begin(&format!("reading {label}"), size, "bytes");
@@ -271,9 +253,7 @@ impl<'a> MotionRows<'a> {
             }
         }
         let read = open.row.number;
-        open.loss()
-            .into_iter()
-            .for_each(|loss| context.services.warn(loss));
+        context.warn_each(open.loss());
         self.few_rejected(&label, read, accepted, &refused)?;
         let counts = [read, accepted];
         Ok(reading::intake(name, open.lines(), counts, context))
@@ -283,7 +263,7 @@ impl<'a> MotionRows<'a> {
     fn signal_of(&mut self, open: &OpenedFile, label: &str) -> Result<()> {
         let given = open.binding().slots();
         let has = |setting: &str| given.contains(&self.arm.slots.of(setting).start);
-        let own = match (has("torque"), has("current")) {
+        let signal = match (has("torque"), has("current")) {
             (true, false) => "torque",
             (false, true) => "current",
             (true, true) => {
@@ -300,10 +280,12 @@ impl<'a> MotionRows<'a> {
                 ));
             }
         };
-        match self.signal.replace(own) {
-            Some(first) if first != own => Err(Error::data(
+        match self.signal.replace(signal) {
+            Some(first) if first != signal => Err(Error::data(
                 label,
-                format!("holds {own}s, the files before hold {first}s; allowed: the same in each"),
+                format!(
+                    "holds {signal}s, the files before hold {first}s; allowed: the same in each"
+                ),
             )),
             _ => Ok(()),
         }
@@ -315,12 +297,12 @@ impl<'a> MotionRows<'a> {
             self.chunk.velocity = velocity.then(Vec::new);
             self.chunk.temperature = temperature.then(Vec::new);
         }
-        for (name, first, own) in [
+        for (name, first, has) in [
             ("velocity", self.chunk.velocity.is_some(), velocity),
             ("temperature", self.chunk.temperature.is_some(), temperature),
         ] {
-            if first != own {
-                let which = if own { "has" } else { "lacks" };
+            if first != has {
+                let which = if has { "has" } else { "lacks" };
                 return Err(Error::data(
                     label,
                     format!("{which} the quantity `{name}`, other than the files before"),
@@ -380,7 +362,7 @@ impl<'a> MotionRows<'a> {
             .next(trajectory, time, q, row.line)
             .map_err(|message| Error::data(format!("{label}:{}", row.line), message))?;
         if let Some(warning) = self.stretches.warning(label) {
-            context.services.warn(warning);
+            context.warn(warning);
         }
         let signal = values(self.signal.unwrap_or("torque"));
         self.channels
@@ -489,12 +471,10 @@ impl<'a> MotionRows<'a> {
                 Fault::new(format!("table motion, {signal} of joint {joint}"), message)
             })
             .collect();
-        if !dead.is_empty() {
-            return Err(Error::Data(dead));
-        }
+        Error::if_data(dead)?;
         for (joint, channel) in (1..).zip(&self.channels) {
             if let Some(clipped) = channel.clipped() {
-                context.services.warn(format!(
+                context.warn(format!(
                     "the {signal} of joint {joint} {clipped}: saturated?"
                 ));
             }
@@ -502,7 +482,7 @@ impl<'a> MotionRows<'a> {
         if self.chunk.rows() > 0 || self.written == 0 {
             self.flush()?;
         }
-        context.services.note(format!(
+        context.note(format!(
             "{} of {signal}s, {}",
             counted(self.written as u64, "row"),
             counted(self.stretches.count() as u64, "stretch").replace("stretchs", "stretches")

@@ -58,11 +58,7 @@ pub(super) fn judge(
             true
         }
     });
-    if faults.is_empty() {
-        Ok(())
-    } else {
-        Err(Error::Data(faults))
-    }
+    Error::if_data(faults)
 }
 
 /// Rows that belong together by their order alone are as many in each file, whatever became of them.
@@ -280,7 +276,7 @@ fn unlike(scans: &[Scan], decisions: &[FileDecision], files: [usize; 2]) -> Opti
     };
     let [here, there] = [without_partner(files[0])?, without_partner(files[1])?];
     // Of three files a row may lack its partner in the third.
-    let (own, known): (BTreeSet<&str>, BTreeSet<&str>) = (
+    let (ours, known): (BTreeSet<&str>, BTreeSet<&str>) = (
         here.iter().copied().collect(),
         there.iter().copied().collect(),
     );
@@ -296,7 +292,7 @@ fn unlike(scans: &[Scan], decisions: &[FileDecision], files: [usize; 2]) -> Opti
     }
     let (one, other) = (
         strangers.next()?,
-        there.iter().find(|id| !own.contains(*id))?,
+        there.iter().find(|id| !ours.contains(*id))?,
     );
     Some(format!(
         ", e.g. `{one}` here and `{other}` there: ids must be the same in both files"
@@ -307,7 +303,7 @@ fn warn(scan: &Scan, columns: &Columns, limits: LimitPolicy, arm: &RobotJoints, 
     if limits == LimitPolicy::Warn
         && let Some((line, joint, value)) = scan.beyond.first
     {
-        context.services.warn(format!(
+        context.warn(format!(
             "{}: {} with a joint beyond the robot's limits, used all the same; first line {line}, {}{}",
             scan.label,
             counted(scan.beyond.rows, "row"),
@@ -323,7 +319,7 @@ fn warn(scan: &Scan, columns: &Columns, limits: LimitPolicy, arm: &RobotJoints, 
         && scan.largest.to_degrees() < SMALL_IN_DEGREES
         && scan.used() >= 10
     {
-        context.services.warn(format!(
+        context.warn(format!(
             "{}: no joint is ever beyond {:.2} deg; if the file holds rad, say `unit: rad`",
             scan.label,
             scan.largest.to_degrees()
@@ -349,14 +345,14 @@ pub(super) fn no_copies(scanned: &[(Vec<Scan>, Vec<FileDecision>)]) -> Result<()
                 None => format!("files[{index}].file"),
                 Some(later) => format!("later[{later}].files[{index}]"),
             };
-            let own = ReadFile {
+            let this = ReadFile {
                 place,
                 scan,
                 decision,
             };
             let found = read
                 .iter()
-                .find_map(|other| Some((other, shared(other, &own).filter(|rows| *rows > 0)?)));
+                .find_map(|other| Some((other, shared(other, &this).filter(|rows| *rows > 0)?)));
             if let Some((other, rows)) = found {
                 let message = format!(
                     "`{}` measured what `{}` of `{}` did, and {} would be used twice: copies look like perfect repeatability; name the \
@@ -366,16 +362,12 @@ pub(super) fn no_copies(scanned: &[(Vec<Scan>, Vec<FileDecision>)]) -> Result<()
                     other.place,
                     counted(rows, "row")
                 );
-                faults.push(Fault::new(format!("with.{}", own.place), message));
+                faults.push(Fault::new(format!("with.{}", this.place), message));
             }
-            read.push(own);
+            read.push(this);
         }
     }
-    if faults.is_empty() {
-        Ok(())
-    } else {
-        Err(Error::Data(faults))
-    }
+    Error::if_data(faults)
 }
 
 /// Rows that are used of both files; none where what they measured differs.

@@ -420,13 +420,11 @@ impl<'a> RecordingChunks<'a> {
         }
         if self.carried > 0.0 {
             let ms = 1e3 * self.carried;
-            context
-                .services
-                .note(format!("joints were extrapolated by their velocity to the time of their point, over {ms:.2} ms at most"));
+            context.note(format!("joints were extrapolated by their velocity to the time of their point, over {ms:.2} ms at most"));
         }
         if self.inferred > 0 {
             let (rows, least) = (counted(self.inferred, "row"), START);
-            context.services.note(format!(
+            context.note(format!(
                 "{rows} without a stated noise: weighted as {} um + {} um/m ({} sigma) to start from, which is assumed, not \
                  known; say `instrument`, or map sigma_x or u95",
                 least.constant_um, least.per_metre_um, least.coverage

@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::pipeline::StageReport;
 use crate::report::{DiagnosedTables, diagnosed_page};
 use crate::shell::typed;
-use crate::stage::{Diagnose, DiagnoseTorques, Stage};
+use crate::stage::{DeclaredStage, Diagnose, DiagnoseTorques};
 use crate::store::Store;
 use crate::summary::estimate::length;
 use crate::table::{

@@ -131,7 +131,7 @@ pub fn outcomes_at(
         ..CorrectionOptions::counted_by(JointConvention::of_the_robot_file(robot.joints.len()))
     };
     let uncertainty = covariance
-        .map(|covariance| Uncertainty::new(&arm, covariance, scatter).beside(&arm, &data));
+        .map(|covariance| Uncertainty::new(&arm, covariance, scatter).with_recording(&arm, &data));
     let mut corrector = Corrector::new(&arm, Some(Coverage::of(&data)), uncertainty, options());
     let commands = corrector.batch(targets.iter().map(|target| command(case, target)).collect());
     let geometry = Corrector::new(&plain, None, None, options())

@@ -5,7 +5,7 @@ use crate::fixture;
 use crate::identify::{GEOMETRY, model, normal};
 use calib::description::RobotDescription;
 use calib::estimate::{FitOptions, Fitted, Model, ParameterStatus, fit, gauge};
-use calib::observation::{KINDS, MeasurementKind, Weight, rank};
+use calib::observation::{KINDS, MeasurementKind, RowView, Weight, rank};
 use calib::robot::{
     Anchor, MeasurementSetup, Measurements, PointReadings, Readings, RobotModel, Target,
 };
@@ -192,10 +192,12 @@ fn residual(
 ) -> Vector3<f64> {
     let mut scratch = truth.stack.scratch(&truth.robot);
     let placed = truth.stack.place(&truth.robot, data, row, x, &mut scratch);
-    kind.residual(data, row, &placed)
-        .expect("measured")
-        .0
-        .first_three()
+    let at = RowView {
+        data,
+        row,
+        placed: &placed,
+    };
+    kind.residual(at).expect("measured").0
 }
 
 #[test]
@@ -215,10 +217,15 @@ fn every_kind_leaves_nothing_at_the_truth_and_its_derivatives_are_central_differ
                 .stack
                 .place(&model.robot, &data, row, &model.x, &mut scratch);
             let mut partials = vec![Vector3::zeros(); model.x.len()];
-            let sensitivity = kind.sensitivity(&data, row, &placed, Weight::uniform(1.0));
-            sensitivity.derivatives(&mut placed, |k, own| {
-                partials[k] += Vector3::from_column_slice(own)
-            });
+            let sensitivity = kind.sensitivity(
+                RowView {
+                    data: &data,
+                    row,
+                    placed: &placed,
+                },
+                Weight::uniform(1.0),
+            );
+            sensitivity.derivatives(&mut placed, |k, own| partials[k] += own);
             for (k, partial) in partials.iter().enumerate() {
                 let moved = |step: f64| {
                     let mut x = model.x.clone();

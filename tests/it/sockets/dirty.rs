@@ -3,7 +3,7 @@
 use super::{fixture, plane, socket, sphere, touched, truth};
 use crate::desk::{self, Desk};
 use calib::description::RobotDescription;
-use calib::observation::{KINDS, Weight};
+use calib::observation::{KINDS, RowView, Weight};
 use calib::stage::{Identify, IdentifyReads};
 use calib::table::{Parameters, Recording, Robot, Split, SplitRow};
 use nalgebra::Vector3;
@@ -190,15 +190,18 @@ fn derivatives_of_sockets_planes_and_spheres_are_central_differences() {
             let mut placed = model
                 .stack
                 .place(&model.robot, &data, row, &model.x, &mut scratch);
-            if kind.residual(&data, row, &placed).is_none() {
+            let at = RowView {
+                data: &data,
+                row,
+                placed: &placed,
+            };
+            if kind.residual(at).is_none() {
                 continue;
             }
             checked += 1;
             let mut partials = vec![Vector3::zeros(); model.x.len()];
-            let sensitivity = kind.sensitivity(&data, row, &placed, Weight::uniform(1.0));
-            sensitivity.derivatives(&mut placed, |k, own| {
-                partials[k] += Vector3::from_column_slice(own)
-            });
+            let sensitivity = kind.sensitivity(at, Weight::uniform(1.0));
+            sensitivity.derivatives(&mut placed, |k, own| partials[k] += own);
             for (k, partial) in partials.iter().enumerate() {
                 let moved = |step: f64| {
                     let mut x = model.x.clone();
@@ -207,10 +210,12 @@ fn derivatives_of_sockets_planes_and_spheres_are_central_differences() {
                     let placed = model
                         .stack
                         .place(&model.robot, &data, row, &x, &mut scratch);
-                    kind.residual(&data, row, &placed)
-                        .expect("measured")
-                        .0
-                        .first_three()
+                    let at = RowView {
+                        data: &data,
+                        row,
+                        placed: &placed,
+                    };
+                    kind.residual(at).expect("measured").0
                 };
                 let central = (moved(-1e-6) - moved(1e-6)) / 2e-6;
                 let (name, off) = (&model.stack.specs()[k].name, (central - partial).norm());

@@ -3,7 +3,7 @@
 use super::{calibrated, fixture, free, socket, touched, truth};
 use crate::identify::normal;
 use calib::estimate::scale;
-use calib::observation::{only_brought, rank};
+use calib::observation::{only_contacts, rank};
 use calib::robot::{Measurements, Named, PointReadings, Readings};
 use calib::twin::arm::Arm;
 use calib::twin::motion::Motion;
@@ -81,7 +81,7 @@ fn points_of_a_tracker_tell_the_scale_of_sockets() {
             robot.name
         );
         assert!(
-            !only_brought(&data, &rows)
+            !only_contacts(&data, &rows)
                 && scale(&model, &data, &rows, fitted.covariance.as_ref()).is_none()
         );
         let predicted = model.predict(&data);

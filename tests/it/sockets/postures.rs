@@ -2,7 +2,7 @@
 
 use super::fixture;
 use super::mukca::panda;
-use calib::estimate::choose::{BroughtRequest, PriorSigma, Site, propose_brought};
+use calib::estimate::choose::{ContactRequest, PriorSigma, Site, propose_contacts};
 use calib::poses::places;
 use calib::robot::RobotModel;
 use nalgebra::Vector3;
@@ -20,8 +20,8 @@ fn site(robot: &calib::description::RobotDescription) -> Site {
     }
 }
 
-fn request(places: &[[f64; 3]]) -> BroughtRequest {
-    BroughtRequest {
+fn request(places: &[[f64; 3]]) -> ContactRequest {
+    ContactRequest {
         places: places.iter().map(|place| Vector3::from(*place)).collect(),
         count: 40,
         candidates: 80,
@@ -42,7 +42,7 @@ fn the_ball_lies_in_a_socket_at_every_posture_and_limits_hold() {
         RobotModel::new(robot.clone()),
         [[0.4, 0.1, 0.05], [0.4, 0.15, 0.05]],
     );
-    let found = propose_brought(&own, &site(&robot), &request(&sockets)).expect("in reach");
+    let found = propose_contacts(&own, &site(&robot), &request(&sockets)).expect("in reach");
     assert_eq!(found.poses.rows(), 40);
     for (row, socket) in found.socket.iter().enumerate() {
         let q = found.poses.q(row);
@@ -68,14 +68,14 @@ fn the_ball_lies_in_a_socket_at_every_posture_and_limits_hold() {
         .map(|(_, _, own, random)| (random / own).ln())
         .sum();
     assert!(gain > 0.0, "{gain}");
-    let again = propose_brought(&own, &site(&robot), &request(&sockets)).expect("in reach");
+    let again = propose_contacts(&own, &site(&robot), &request(&sockets)).expect("in reach");
     assert_eq!(again.poses.q, found.poses.q);
 }
 
 #[test]
 fn a_ball_on_the_last_axis_hides_two_directions_that_one_beside_it_shows() {
     let robot = panda();
-    let found = propose_brought(
+    let found = propose_contacts(
         &RobotModel::new(robot.clone()),
         &site(&robot),
         &request(&[[0.4, 0.1, 0.05]]),
@@ -97,7 +97,7 @@ fn a_ball_on_the_last_axis_hides_two_directions_that_one_beside_it_shows() {
 #[test]
 fn sockets_out_of_reach_and_other_texts_are_refused() {
     let robot = fixture::seven();
-    let far = propose_brought(
+    let far = propose_contacts(
         &RobotModel::new(robot.clone()),
         &site(&robot),
         &request(&[[3.0, 0.0, 0.5]]),

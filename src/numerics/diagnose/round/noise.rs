@@ -100,7 +100,7 @@ impl JointSpread {
                 let seen = Residual::of(*kind, data, *row, &placed).zip(kind.reading(data, *row));
                 left.extend(seen.map(|(residual, reading)| LeftBySpread {
                     kind: kind.about().name,
-                    error: residual.error.first_three(),
+                    error: residual.error,
                     fixed: Matrix3::from_fn(|i, j| match (i == j, i < residual.axes) {
                         (true, true) => reading.sigma * reading.sigma,
                         (true, false) => 1.0,

@@ -6,7 +6,7 @@ use super::frame::SearchRows;
 use crate::criteria::cells::{FADING, LIMITS, PAIR, PRODUCT};
 use crate::diagnose::types::Question;
 use crate::effect::{Axes, AxisPoint, Motion, Place, Polar, Survey, Variable, names};
-use crate::observation::only_brought;
+use crate::observation::only_contacts;
 use nalgebra::Vector3;
 
 /// Directions in which the position of the tool is a variable: axes, diagonals of faces and of the cube.
@@ -62,7 +62,7 @@ pub(super) fn cells(
             .is_some_and(|values| super::cell::line(&values).is_some())
     };
     // Where nothing but joints was recorded, an arm that is smaller closes as well, and whatever follows the place of the tool looks so.
-    let closed = only_brought(survey.data, survey.rows) || !is_open;
+    let closed = only_contacts(survey.data, survey.rows) || !is_open;
     let places = if closed { Vec::new() } else { places(survey) };
     for place in places {
         let families = families(place, survey);

@@ -30,7 +30,7 @@ use super::types::Located;
 use crate::criteria::cells::{IDLE, OPEN, ROUNDS, UNEXPLAINED};
 use crate::effect::{Basis, Form, Law, Motion, Place, Survey, Variable, names};
 use crate::estimate::Prior;
-use crate::observation::only_brought;
+use crate::observation::only_contacts;
 use cell::FreeShape;
 use frame::{NoiseShape, SearchRows};
 use scan::CauseTable;
@@ -84,7 +84,7 @@ impl Rounds {
         };
         let mut frame = SearchRows::of(view, now, fitter, noise);
         let question = fitter.question;
-        let brought = only_brought(&fitter.data, question.fit);
+        let brought = only_contacts(&fitter.data, question.fit);
         let keeps = |cell: &cell::CauseCell| is_kept(cell, view, &survey, fitter);
         let all_pairs = if self.pairs.is_none() {
             generated::pairs(&survey, &mut frame)
@@ -173,7 +173,7 @@ impl Rounds {
 fn is_kept(cell: &cell::CauseCell, view: &RoundView, survey: &Survey, fitter: &Fitter) -> bool {
     let slow = |form: &Form| form.variables().contains(&Variable::Time);
     // Where nothing but joints was recorded, base and first joint move with all places that the target was laid into.
-    let unseen = only_brought(&fitter.data, fitter.question.fit)
+    let unseen = only_contacts(&fitter.data, fitter.question.fit)
         && (cell.place == Place::Base
             || cell.place == Place::Joint(0) && cell.name == names::ZERO_SHIFT);
     let values = |of| view.problem.values(of);

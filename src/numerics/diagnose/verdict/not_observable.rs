@@ -4,7 +4,7 @@ use crate::criteria::words::STILL;
 use crate::diagnose::types::Finding;
 use crate::diagnose::words::small;
 use crate::effect::{Clock, DeclaredCause, DeclaredForm, Measure, Survey, cause};
-use crate::observation::{Dimension, noise, only_brought};
+use crate::observation::{Dimension, noise, only_contacts};
 use crate::robot::Measurements;
 
 /// What these data cannot show, whatever the truth; `reach` is the largest motion of the point by each joint, m/rad.
@@ -64,7 +64,7 @@ pub(super) fn not_observable(survey: &Survey, reach: &[f64]) -> Vec<String> {
         out.push(format!("direction of approach: taken from the {order}"));
     }
     let rows: Vec<usize> = (0..survey.data.rows()).collect();
-    if only_brought(survey.data, &rows) {
+    if only_contacts(survey.data, &rows) {
         out.push(format!(
             "anything below the repeatability of closing, {}: nothing but joints was recorded",
             small(closing(survey.data, &rows), Dimension::Length)

@@ -13,7 +13,7 @@ use crate::effect::{
     Term, Unknown, Variable,
 };
 use crate::estimate::{Model, Prior};
-use crate::observation::{MeasurementKind, Residual, ResidualNumbers, kinds};
+use crate::observation::{MeasurementKind, Residual, kinds};
 use crate::robot::{Measurements, RobotModel};
 pub(crate) use autocorrelated::AutocorrelatedNoise;
 use autocorrelated::Innovations;
@@ -57,7 +57,7 @@ impl<'a> WhitenedProblem<'a> {
             let seen = |kind: &&'static dyn MeasurementKind| {
                 let residual = Residual::of(*kind, data, *row, &placed)?;
                 let weight = residual.weight(data, 0.0);
-                let (error, lines) = (weight.whiten(&residual.error), kind.lines(data, *row));
+                let (error, lines) = (weight.apply(&residual.error), kind.lines(data, *row));
                 Some((
                     SeenReading {
                         kind: *kind,
@@ -67,7 +67,7 @@ impl<'a> WhitenedProblem<'a> {
                     error,
                 ))
             };
-            let seen: Vec<(SeenReading, ResidualNumbers)> = kinds.iter().filter_map(seen).collect();
+            let seen: Vec<(SeenReading, Vector3<f64>)> = kinds.iter().filter_map(seen).collect();
             let motion = if turns {
                 EffectStack::target_motion
             } else {
@@ -205,14 +205,9 @@ impl<'a> WhitenedProblem<'a> {
             .readings
             .seen(place)
             .find(|(_, reading)| reading.kind.about().name == kind)?;
-        let first_three =
-            |own: &[f64]| Vector3::from_fn(|k, _| own.get(k).copied().unwrap_or_default());
         let along = |joint| {
-            reading.sensitivity.along(
-                &self.motions[place],
-                &Direction::Joint(joint, 1.0),
-                first_three,
-            )
+            let direction = Direction::Joint(joint, 1.0);
+            reading.sensitivity.along(&self.motions[place], &direction)
         };
         Some((0..self.robot.joints()).map(along).collect())
     }
@@ -257,11 +252,10 @@ impl<'a> WhitenedProblem<'a> {
             motion.deflect(self.robot, self.data, form, &zeros, &mut buffer);
             for (first, reading) in self.readings.seen(i) {
                 for (parameter, direction) in &buffer.partials {
-                    reading.sensitivity.along(motion, direction, |derivative| {
-                        for (k, line) in reading.lines.iter().enumerate() {
-                            out[parameter * rows + first + k] += derivative[*line];
-                        }
-                    });
+                    let derivative = reading.sensitivity.along(motion, direction);
+                    for (k, line) in reading.lines.iter().enumerate() {
+                        out[parameter * rows + first + k] += derivative[*line];
+                    }
                 }
             }
             let Some(currents) = &self.currents else {

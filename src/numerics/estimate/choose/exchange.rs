@@ -49,8 +49,8 @@ impl DesignTerm {
         })
     }
 
-    /// Beside what is known before: the factor of its rows. `None` where that leaves a direction free.
-    pub fn beside(weight: f64, jacobian: PointJacobian, known: &TriangularFactor) -> Option<Self> {
+    /// Given what is known before: the factor of its rows. `None` where that leaves a direction free.
+    pub fn given(weight: f64, jacobian: PointJacobian, known: &TriangularFactor) -> Option<Self> {
         let inverse = known.inverse()?;
         let round = Mat::from_fn(inverse.size(), inverse.size(), |i, j| inverse.at(i, j));
         Some(Self {

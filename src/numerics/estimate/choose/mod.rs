@@ -4,20 +4,18 @@
 //! are sums of log determinants: ln |M| for D; for T, what is left of either effect's columns once the rival and all else were
 //! fitted, ln |M| - ln |M without the effect|. Only seen parameters count, so redundant ones change nothing.
 
-mod brought;
+mod contact;
 mod exchange;
 mod point_jacobian;
 mod site;
-mod spread;
 mod t_optimal;
 mod visit_order;
 
-pub use brought::{
-    BallOffset, BroughtProposal, BroughtRequest, LeftOutPlace, PriorSigma, propose_brought,
+pub use contact::{
+    BallOffset, ContactProposal, ContactRequest, LeftOutPlace, PriorSigma, propose_contacts,
 };
 pub use point_jacobian::{PointJacobian, Score};
-pub use site::{Circumstances, Site};
-pub use spread::spread;
+pub use site::{Circumstances, Site, spread};
 pub use t_optimal::{
     Alternative, Discrimination, DiscriminationProblem, MIN_SEPARATION_L, Proposed, tell,
 };
@@ -113,14 +111,14 @@ pub fn propose(model: Model, site: &Site, wish: &DesignRequest) -> Result<Propos
         Aim::Information => vec![(1.0, all)],
         Aim::Separation([a, b]) => {
             let (a, b) = (parameters(&model, a)?, parameters(&model, b)?);
-            let rest: Vec<usize> = all
+            let others: Vec<usize> = all
                 .into_iter()
                 .filter(|k| !a.contains(k) && !b.contains(k))
                 .collect();
             vec![
-                (2.0, [&rest[..], &b, &a].concat()),
-                (-1.0, [&rest[..], &b].concat()),
-                (-1.0, [&rest[..], &a].concat()),
+                (2.0, [&others[..], &b, &a].concat()),
+                (-1.0, [&others[..], &b].concat()),
+                (-1.0, [&others[..], &a].concat()),
             ]
         }
     };
@@ -228,25 +226,30 @@ fn separations(
 ) -> Result<Vec<Separation>, String> {
     let mut out = Vec::new();
     for (effect, rival) in [(a, b), (b, a)] {
-        let (own, other) = (parameters(model, effect)?, parameters(model, rival)?);
-        let rest: Vec<usize> = (0..model.stack.specs().len())
-            .filter(|k| !own.contains(k) && !other.contains(k))
+        let (parameters_of_effect, parameters_of_rival) =
+            (parameters(model, effect)?, parameters(model, rival)?);
+        let others: Vec<usize> = (0..model.stack.specs().len())
+            .filter(|k| !parameters_of_effect.contains(k) && !parameters_of_rival.contains(k))
             .collect();
-        let jacobian = PointJacobian::of(model, drawn, &[&rest[..], &other, &own].concat());
-        let told: Vec<usize> = jacobian
+        let jacobian = PointJacobian::of(
+            model,
+            drawn,
+            &[&others[..], &parameters_of_rival, &parameters_of_effect].concat(),
+        );
+        let separated: Vec<usize> = jacobian
             .free()
             .iter()
             .copied()
-            .filter(|k| own.contains(k))
+            .filter(|k| parameters_of_effect.contains(k))
             .collect();
-        let (log, sigma) = jacobian.remainder(&jacobian.rows(model, poses), told.len());
+        let (log, sigma) = jacobian.remainder(&jacobian.rows(model, poses), separated.len());
         let rows = jacobian.rows(model, drawn);
         let random: Vec<(f64, Vec<f64>)> = sets
             .par_iter()
-            .map(|set| jacobian.remainder(&gather(&rows, set), told.len()))
+            .map(|set| jacobian.remainder(&gather(&rows, set), separated.len()))
             .collect();
         let usual = median(random.iter().map(|(log, _)| *log).collect());
-        let sigma = told
+        let sigma = separated
             .iter()
             .zip(&sigma)
             .enumerate()
@@ -261,8 +264,12 @@ fn separations(
             effect: effect.clone(),
             rival: rival.clone(),
             sigma: sigma.collect(),
-            imitated: own.iter().copied().filter(|k| !told.contains(k)).collect(),
-            gain: ((log - usual) / told.len().max(1) as f64).exp(),
+            imitated: parameters_of_effect
+                .iter()
+                .copied()
+                .filter(|k| !separated.contains(k))
+                .collect(),
+            gain: ((log - usual) / separated.len().max(1) as f64).exp(),
         });
     }
     Ok(out)

@@ -85,8 +85,8 @@ impl PointJacobian {
         &self.free
     }
 
-    /// Three rows a pose: derivatives by the free parameters in units of prior sigma, over the point's sigma. Of a target that is brought to
-    /// a socket they are those of what closes there.
+    /// Three rows a pose: derivatives by the free parameters in units of prior sigma, over the point's sigma. Of a target that a
+    /// socket holds they are those of what closes there.
     pub(super) fn rows(&self, model: &Model, data: &Measurements) -> Mat<f64> {
         let count = model.stack.specs().len();
         let (mut column, mut size) = (vec![usize::MAX; count], vec![0.0; count]);

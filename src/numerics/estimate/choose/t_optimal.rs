@@ -119,8 +119,8 @@ impl View {
         let all: Vec<usize> = (0..self.known.parameters() - 1).collect();
         let rest = self.known.select(&all);
         Some([
-            DesignTerm::beside(1.0, self.jacobian.clone(), &self.known)?,
-            DesignTerm::beside(-1.0, self.rest.clone(), &rest)?,
+            DesignTerm::given(1.0, self.jacobian.clone(), &self.known)?,
+            DesignTerm::given(-1.0, self.rest.clone(), &rest)?,
         ])
     }
 }

@@ -122,8 +122,8 @@ pub(super) fn approach(
                     .zip(&parts[row])
                     .map(|(sum, part)| sum * part)
                     .sum();
-                let own: f64 = parts[row].iter().map(|part| part * part).sum();
-                if side[row] * cross > own + 1e-12 * own.abs() {
+                let square: f64 = parts[row].iter().map(|part| part * part).sum();
+                if side[row] * cross > square + 1e-12 * square.abs() {
                     sums.iter_mut()
                         .zip(&parts[row])
                         .for_each(|(sum, part)| *sum -= 2.0 * side[row] * part);
@@ -132,18 +132,18 @@ pub(super) fn approach(
                 }
             }
         }
-        let mut rest: Vec<f64> = (0..3 * rows).map(|i| side[i / 3] * turn(i)).collect();
-        let whole = length(&rest);
+        let mut residual: Vec<f64> = (0..3 * rows).map(|i| side[i / 3] * turn(i)).collect();
+        let whole = length(&residual);
         for (along, sum) in basis.iter().zip(&sums) {
-            axpy(-sum, along, &mut rest);
+            axpy(-sum, along, &mut residual);
         }
-        let visible = length(&rest);
+        let visible = length(&residual);
         // A joint that does not move the measured point has nothing to show.
         if whole > 0.0 {
             least = least.min(visible / whole);
             if visible > 1e-9 * whole {
-                rest.iter_mut().for_each(|value| *value /= visible);
-                basis.push(rest);
+                residual.iter_mut().for_each(|value| *value /= visible);
+                basis.push(residual);
             }
         }
         for (row, side) in side.into_iter().enumerate() {

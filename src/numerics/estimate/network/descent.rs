@@ -27,17 +27,6 @@ pub struct DescentIteration {
     pub evaluations: u64,
 }
 
-/// Why the training ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum DescentStop {
-    /// The limit of iterations.
-    Iterations,
-    /// The loss no longer falls.
-    Flat,
-    /// The rows kept back got worse: what came before is kept.
-    Early,
-}
-
 /// A trained network.
 #[derive(Debug, Clone)]
 pub struct Descent {
@@ -45,8 +34,6 @@ pub struct Descent {
     pub parameters: Vec<f64>,
     /// Iteration by iteration.
     pub history: Vec<DescentIteration>,
-    /// Why it ended.
-    pub stop: DescentStop,
 }
 
 /// Minimises a loss from `start` in at most `iterations` iterations.
@@ -70,7 +57,7 @@ pub fn descend(
     let mut next = x.clone();
     let mut next_gradient = gradient.clone();
     let mut index = 0;
-    let stop = loop {
+    loop {
         let checked = check(&x);
         history.push(DescentIteration {
             index,
@@ -87,10 +74,10 @@ pub fn descend(
             since += 1;
         }
         if since >= PATIENCE {
-            break DescentStop::Early;
+            break;
         }
         if index >= iterations {
-            break DescentStop::Iterations;
+            break;
         }
         let mut direction = quasi_newton(&gradient, &memory);
         let mut slope = dot(&direction, &gradient);
@@ -122,7 +109,7 @@ pub fn descend(
             }
         };
         let Some((value, at_next)) = found else {
-            break DescentStop::Flat;
+            break;
         };
         let s: Vec<f64> = next.iter().zip(&x).map(|(n, x)| n - x).collect();
         let y: Vec<f64> = next_gradient
@@ -144,13 +131,12 @@ pub fn descend(
         (loss, squares) = (value, at_next);
         index += 1;
         if flat {
-            break DescentStop::Flat;
+            break;
         }
-    };
+    }
     Descent {
         parameters: kept.1,
         history,
-        stop,
     }
 }
 

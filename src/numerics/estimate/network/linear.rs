@@ -6,7 +6,7 @@
 
 use super::arm::ScrewArm;
 use super::basis::{BasisFunctions, BasisTerm};
-use super::samples::TrainingSamples;
+use super::training::TrainingSamples;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::solvers::{Llt, Solve};
 use faer::linalg::triangular_inverse::invert_lower_triangular;
@@ -111,7 +111,7 @@ impl Linear {
         groups: &[Vec<BasisTerm>],
     ) -> ((Vec<BasisTerm>, Vec<f64>), Vec<usize>) {
         let all: Vec<BasisTerm> = groups.iter().flatten().cloned().collect();
-        let of: Vec<usize> = groups
+        let group_of: Vec<usize> = groups
             .iter()
             .enumerate()
             .flat_map(|(g, terms)| terms.iter().map(move |_| g))
@@ -132,7 +132,7 @@ impl Linear {
         let terms = kept.iter().map(|t| all[*t].clone()).collect();
         (
             (terms, kept.iter().map(|t| scale[*t]).collect()),
-            kept.iter().map(|t| of[*t]).collect(),
+            kept.iter().map(|t| group_of[*t]).collect(),
         )
     }
 

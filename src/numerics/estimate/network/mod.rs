@@ -5,25 +5,22 @@
 //! [`loss`] from random starts or from a swarm's by [`descent`]. [`Correction`] is the result: the one function by which any of them is ever
 //! applied, with the [`region`] in which it may be.
 
-pub mod activation;
 pub mod arm;
 pub mod basis;
 pub mod correction;
 pub mod descent;
-mod lanes;
 pub mod linear;
 pub mod loss;
 pub mod perceptron;
 pub mod process;
 pub mod region;
 pub mod rivals;
-pub mod samples;
 pub mod training;
 
-pub use activation::Activation;
 pub use arm::ScrewArm;
 pub use correction::{AppliedCorrection, Body, Correction, Feature, Map};
+pub use perceptron::Activation;
 pub use perceptron::{LayerSizes, OUTPUTS};
 pub use rivals::{JudgedRival, Rival, compare};
-pub use samples::TrainingSamples;
+pub use training::TrainingSamples;
 pub use training::{Phase, Recipe, TrainingStart, TrainingStep, train};

@@ -127,8 +127,11 @@ impl Process {
         }
         let mut known = Mat::from_fn(near.len(), 1, |r, _| near[r]);
         solve_lower_triangular_in_place(self.factor.as_ref(), known.as_mut(), Par::Seq);
-        let told: f64 = (0..near.len()).map(|r| known[(r, 0)] * known[(r, 0)]).sum();
-        (mean, (self.signal * self.signal - told).max(0.0).sqrt())
+        let explained: f64 = (0..near.len()).map(|r| known[(r, 0)] * known[(r, 0)]).sum();
+        (
+            mean,
+            (self.signal * self.signal - explained).max(0.0).sqrt(),
+        )
     }
 }
 

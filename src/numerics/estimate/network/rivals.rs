@@ -9,7 +9,7 @@ use super::correction::{Body, Correction};
 use super::linear::Linear;
 use super::process::Process;
 use super::region::Region;
-use super::samples::TrainingSamples;
+use super::training::TrainingSamples;
 use super::training::{Recipe, TrainingStart, TrainingStep, dressed, train};
 use crate::estimate::swarm::{Algorithm, Generation};
 use crate::estimate::threads::in_order;

@@ -2,18 +2,18 @@
 //!
 //! All swarms may spend what a beetle swarm of the recipe's size does. Work is capped: the swarm judges beetles on at most [`SWARM_ROWS`] rows, so its cost does not grow with the recording.
 
-use super::activation::Activation;
 use super::arm::ScrewArm;
 use super::correction::{
     Body, Correction, Feature, JointMotion, NetworkScaling, Networks, Scaling,
 };
 use super::descent::{DescentIteration, descend};
 use super::loss::{Batch, Loss, LossBuffers};
+use super::perceptron::Activation;
 use super::perceptron::{LayerSizes, OUTPUTS};
 use super::region::Region;
-use super::samples::TrainingSamples;
 use crate::estimate::swarm::{Algorithm, Budget, Generation, SearchBox};
 use crate::estimate::threads::in_order;
+use crate::robot::pose_groups::{NEAR, grouped};
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 
@@ -29,16 +29,6 @@ pub enum TrainingStart {
     Random,
     /// By a swarm of networks.
     Swarm(Algorithm),
-}
-
-impl TrainingStart {
-    /// As tables hold it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Random => "random",
-            Self::Swarm(algorithm) => algorithm.name(),
-        }
-    }
 }
 
 /// How to train.
@@ -423,8 +413,43 @@ fn draw(rng: &mut ChaCha8Rng, rows: usize, count: usize) -> (Vec<usize>, Vec<usi
         let j = rng.random_range(i..rows);
         order.swap(i, j);
     }
-    let mut rest = order.split_off(count);
+    let mut others = order.split_off(count);
     order.sort_unstable();
-    rest.sort_unstable();
-    (order, rest)
+    others.sort_unstable();
+    (order, others)
+}
+
+/// Rows to learn from: sources (joints, payload) and the residual to be explained, m.
+#[derive(Debug, Clone, Default)]
+pub struct TrainingSamples {
+    /// Inputs of each row: joints (rad or m), then payload (kg).
+    pub sources: Vec<Vec<f64>>,
+    /// Measured minus predicted of each row, m.
+    pub residual: Vec<[f64; OUTPUTS]>,
+}
+
+impl TrainingSamples {
+    /// How many rows.
+    pub fn rows(&self) -> usize {
+        self.residual.len()
+    }
+    /// The pose of each row, numbered in the order of their first rows: several targets measured in one pose share it.
+    pub fn poses(&self) -> Vec<usize> {
+        let rows: Vec<usize> = (0..self.rows()).collect();
+        let mut number = vec![0; self.rows()];
+        // A payload (kg) as near as joints (rad, m) are is the same one.
+        let poses = grouped(&rows, |row| &self.sources[row], NEAR, |_, _| true);
+        for (pose, rows) in poses.iter().enumerate() {
+            rows.iter().for_each(|row| number[*row] = pose);
+        }
+        number
+    }
+
+    /// Some of the rows.
+    pub fn pick(&self, rows: &[usize]) -> Self {
+        Self {
+            sources: rows.iter().map(|r| self.sources[*r].clone()).collect(),
+            residual: rows.iter().map(|r| self.residual[*r]).collect(),
+        }
+    }
 }

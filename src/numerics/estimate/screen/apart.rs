@@ -102,7 +102,7 @@ fn beyond_the_log(apart: &mut [i64]) {
     }
 }
 
-/// Points of some rows brought onto the measured ones.
+/// Points of some rows moved onto the measured ones.
 struct AlignedStretch {
     motion: Pose,
     /// Rms distance that remains, as a share of the stretch's size.

@@ -6,7 +6,7 @@
 use crate::criteria::screen::SOLE;
 use crate::estimate::model::Model;
 use crate::estimate::problem::Problem;
-use crate::estimate::term::{HUBER, ObservationTerm};
+use crate::estimate::problem::{HUBER, ObservationTerm};
 use crate::observation::{KINDS, MeasurementKind, noise};
 use faer::Mat;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
@@ -65,11 +65,11 @@ pub(super) fn leave_one_out(problem: &Problem, model: &Model, free: &[usize]) ->
                     if column[parameter] < free.len() {
                         let line = &mut lines.col_as_slice_mut(column[parameter])[first..first + 3];
                         line.iter_mut()
-                            .zip(derivative)
+                            .zip(&derivative)
                             .for_each(|(value, d)| *value += d);
                     }
                 });
-                terms.push((i, fitted[row], term.error.first_three()));
+                terms.push((i, fitted[row], term.error));
             }
             standings.push(LeaveOneOut {
                 predicted,

@@ -1,7 +1,9 @@
 //! What a row that stands out is: exchanged, mislabelled, shifted, in another unit, a zero, part of an event, or none of these.
 
 use super::distance::LeaveOneOut;
-use crate::criteria::screen::{ALIKE, BETTER, CANDIDATES, LONG_RUN, RUN, SLIP_TOLERANCE, ZERO};
+use crate::criteria::screen::{
+    ALIKE, BETTER, CANDIDATES, DISAGREES, IMPOSSIBLE, JOINTS, LONG_RUN, RUN, SLIP_TOLERANCE, ZERO,
+};
 use crate::robot::Measurements;
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, BTreeSet};
@@ -272,4 +274,26 @@ fn is_event(data: &Measurements, run: &[usize], standings: &[LeaveOneOut]) -> bo
     });
     let stops = stops(data, run);
     stops >= *LONG_RUN || stops >= *RUN && most <= *ALIKE * least
+}
+
+/// Whether more than the model speaks against a row that is `off` by so much, m.
+pub(super) fn is_wrong(data: &Measurements, row: usize, off: f64) -> bool {
+    if off > *IMPOSSIBLE {
+        return true;
+    }
+    let Some(point) = data.point(row) else {
+        return false;
+    };
+    let again = |other: &usize| {
+        *other != row && data.target(*other) == data.target(row) && data.same_pose(row, *other)
+    };
+    let mut repeats = (0..data.rows())
+        .filter(again)
+        .filter_map(|other| Some((other, data.point(other)?)))
+        .peekable();
+    let apart = |(other, measured): (usize, Vector3<f64>)| {
+        let noise = data.noise(row).hypot(data.noise(other));
+        (point - measured).norm() > (*DISAGREES * noise).max(*JOINTS)
+    };
+    repeats.peek().is_some() && repeats.all(apart)
 }

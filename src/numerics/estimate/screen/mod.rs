@@ -4,7 +4,6 @@
 //! Where too many rows stand out, or several in a row do, it is the model that is wrong, and the rows are kept.
 
 mod apart;
-mod corroborated;
 mod distance;
 mod kind;
 mod tail;
@@ -60,6 +59,14 @@ pub struct Screening {
     pub reach: f64,
     /// How many rows further on the joints of most points are, where the nominal robot shows it: such a recording cannot be fitted.
     pub apart: Option<i64>,
+}
+
+impl Screening {
+    /// Rows that were set aside, ascending.
+    pub fn set_aside(&self) -> impl Iterator<Item = usize> {
+        let aside = self.suspects.iter().filter(|suspect| !suspect.used());
+        aside.map(|suspect| suspect.row)
+    }
 }
 
 /// Fits as [`fit`] does, sets aside what no smooth model can follow among the rows to fit, and fits again until nothing changes.
@@ -238,7 +245,7 @@ fn screen(
         .filter(|row| standings[*row].distance > limit || held.contains(row))
         .collect();
     let mut named = kind::name(data, &standings, &flagged, limit, data.in_motion(kept));
-    named.extend(beside(data, &named));
+    named.extend(at_the_same_stops(data, &named));
     let crowded = crowded(data, &named, set);
     // What a free form does not follow is its own fault before it is a row's, but where the row is off by more than such forms move any.
     let free = if named.is_empty() {
@@ -262,7 +269,7 @@ fn screen(
         };
         // A row that judges the model is not set aside by the model alone.
         let needs_more = residual.norm() <= 2.0 * free || asked.binary_search(&row).is_err();
-        let corroborated = corroborated::is_wrong(data, row, residual.norm());
+        let corroborated = kind::is_wrong(data, row, residual.norm());
         let among_many = crowded.contains(&set[row])
             && *distance < *BEYOND_CROWD * limit
             && !held.contains(&row);
@@ -365,7 +372,7 @@ fn bulk(standings: &[LeaveOneOut], rows: &[usize]) -> Vec<f64> {
 }
 
 /// The other targets of stops at which most are off without a reason of their own: it is the joints of the stop that are wrong.
-fn beside(data: &Measurements, named: &[ClassedRow]) -> Vec<ClassedRow> {
+fn at_the_same_stops(data: &Measurements, named: &[ClassedRow]) -> Vec<ClassedRow> {
     let off: Vec<usize> = named
         .iter()
         .filter(|(_, kind, _)| *kind == SuspectKind::Outlier)

@@ -57,7 +57,7 @@ pub fn read_case(file: RobotFileText) -> Result<Imported> {
     case::read(file)
 }
 
-/// What every kinematic format is brought to: joints and frames at the zero pose in the base frame, SI.
+/// What every kinematic format is converted to: joints and frames at the zero pose in the base frame, SI.
 struct FrameChain {
     joints: Vec<ChainJoint>,
     /// The frame in which the file's `tool` is given: the base for screws, the last link or tip otherwise.

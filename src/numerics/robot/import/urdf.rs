@@ -5,7 +5,7 @@
 use super::screws::unit;
 use super::{ChainBody, ChainJoint, FrameChain, RobotFileText, inertia};
 use crate::description::JointKind;
-use crate::error::{Error, Fault, Result, nearest};
+use crate::error::{Error, Fault, Result, did_you_mean};
 use crate::robot::Bound;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use roxmltree::{Document, Node};
@@ -141,9 +141,7 @@ impl<'a> Reader<'a> {
         }
         for name in [base].into_iter().chain((tip != base).then_some(tip)) {
             if !links.contains_key(name) {
-                let hint = nearest(name, links.keys().copied())
-                    .map(|near| format!("; did you mean `{near}`?"))
-                    .unwrap_or_default();
+                let hint = did_you_mean(name, links.keys().copied());
                 let all = links.keys().copied().collect::<Vec<_>>().join(", ");
                 self.fault(root, format!("no link `{name}`{hint} (links: {all})"));
             }
@@ -177,13 +175,11 @@ impl<'a> Reader<'a> {
                 .and_then(|end| self.attribute(end, "link"))?;
             for end in [parent, child] {
                 if !links.contains_key(end) {
-                    let hint = nearest(end, links.keys().copied())
-                        .map(|near| format!("; did you mean `{near}`?"));
+                    let hint = did_you_mean(end, links.keys().copied());
                     self.fault(
                         node,
                         format!(
-                            "joint `{name}` refers to link `{end}`, which does not exist{}",
-                            hint.unwrap_or_default()
+                            "joint `{name}` refers to link `{end}`, which does not exist{hint}"
                         ),
                     );
                 }

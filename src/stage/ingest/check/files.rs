@@ -1,6 +1,6 @@
 //! Faults of the files of a recording together: what is mapped in none of them, how they are joined, what a moving arm needs.
 
-use super::Place;
+use crate::error::Place;
 use crate::observation::{KINDS, MeasurementKind, Part};
 use crate::stage::ingest::Ingest;
 use crate::stage::ingest::columns::Columns;

@@ -9,69 +9,27 @@ use super::later;
 use super::layout::{FileLayout, HELD, SIMULATED, WideTargets};
 use super::mapped::{ColumnRef, ConventionColumns, JointColumns, ScalarColumn, TextColumn};
 use super::noise;
-use crate::error::{Fault, counted, nearest};
+use crate::error::{Place, counted, did_you_mean};
 use crate::observation::{Conventions, DeclaredColumn, KINDS, MeasurementKind, Part};
 use crate::raw::Delimiter;
 use crate::table::recording_columns;
 use crate::units::{Quantity, Unit};
 use std::collections::BTreeMap;
-use std::fmt::Display;
-
-/// A place in the settings, and the faults that were found so far.
-pub(super) struct Place<'f> {
-    faults: &'f mut Vec<Fault>,
-    path: String,
-}
-
-impl<'f> Place<'f> {
-    /// All settings.
-    pub(super) fn root(faults: &'f mut Vec<Fault>) -> Self {
-        let path = String::new();
-        Self { faults, path }
-    }
-    /// A key, or a path of keys, below this place.
-    pub(super) fn at(&mut self, key: impl Display) -> Place<'_> {
-        let path = match self.path.as_str() {
-            "" => key.to_string(),
-            path => format!("{path}.{key}"),
-        };
-        Place {
-            faults: self.faults,
-            path,
-        }
-    }
-    /// An item of the list at this place.
-    fn item(&mut self, index: usize) -> Place<'_> {
-        let path = format!("{}[{index}]", self.path);
-        Place {
-            faults: self.faults,
-            path,
-        }
-    }
-    pub(super) fn fault(&mut self, message: impl Into<String>) {
-        self.faults.push(Fault::new(&self.path, message));
-    }
-}
 
 /// All faults at once.
-pub(super) fn faults(settings: &Ingest) -> Vec<Fault> {
-    let mut faults = Vec::new();
-    let at = &mut Place::root(&mut faults);
+pub(super) fn faults(settings: &Ingest, at: &mut Place) {
     if settings.files.is_empty() {
-        at.at("files").fault("no file; name at least one");
-        return faults;
+        return at.at("files").fault("no file; name at least one");
     }
-    if !(settings.max_rejected_fraction > 0.0 && settings.max_rejected_fraction <= 1.0) {
-        at.at("max_rejected_fraction")
-            .fault("allowed: above 0 and up to 1");
-    }
+    let share = settings.max_rejected_fraction;
+    at.at("max_rejected_fraction")
+        .must(share > 0.0 && share <= 1.0, "allowed: above 0 and up to 1");
     for (index, layout) in settings.files.iter().enumerate() {
         file(layout, &mut at.at("files").item(index));
     }
-    at.faults.extend(later::faults(settings));
+    later::faults(settings, at);
     files::faults(settings, at);
-    faults.extend(noise::faults(settings));
-    faults
+    noise::faults(settings, at);
 }
 
 /// Faults of one file's settings.
@@ -439,9 +397,7 @@ fn unit(symbol: Option<&str>, quantity: Quantity, at: &mut Place) {
                 "`{symbol}` is the unit of another quantity; allowed: {list}"
             )),
             None => {
-                let hint = nearest(symbol, allowed)
-                    .map(|name| format!("; did you mean `{name}`?"))
-                    .unwrap_or_default();
+                let hint = did_you_mean(symbol, allowed);
                 at.fault(format!("unknown unit `{symbol}`; allowed: {list}{hint}"));
             }
         },

@@ -1,11 +1,11 @@
-//! What identifications and diagnoses say of rows in which the target was only brought to something: how well it closes, which rows stand
-//! out, and what such data tell of the scale of the arm.
+//! What identifications and diagnoses say of rows in which a socket, plane or sphere holds the target: how well they close, which rows stand
+//! out, and what such data say of the scale of the arm.
 
 use crate::effect::names;
-use crate::error::counted;
-use crate::estimate::{Fitted, Model, ParameterStatus, reseated, scale};
-use crate::observation::{MeasurementKind, kinds};
-use crate::robot::{Measurements, Shape};
+use crate::error::{counted, first_of};
+use crate::estimate::{Model, ParameterStatus, Session, reseated, scale};
+use crate::observation::contacts;
+use crate::robot::Shape;
 use crate::stage::Context;
 use crate::table::Recording;
 use nalgebra::Vector3;
@@ -16,40 +16,28 @@ const FAR: f64 = 4.0;
 const MORE: f64 = 0.25;
 /// Rows of one name that stand off together in a row are an event from so many on.
 const TOGETHER: usize = 3;
-/// Links that differ by so much more than their priors say are spoken of.
-const TOLD_BEYOND: f64 = 1.05;
-/// A scale that is known so much better where links err independently is told too.
+/// Links that differ by so much more than their priors say are named.
+const NAMED_BEYOND: f64 = 1.05;
+/// A scale that is known so much better where links err independently is stated too.
 const LEANING: f64 = 0.95;
 /// Weak directions that are named.
 const NAMED: usize = 4;
 /// What the data know hardly better than the prior.
 const CARRIED: f64 = 0.7;
 
-/// Tells the person what a fit to such rows shows; nothing where no row was brought to a place.
-pub(super) fn note(
-    context: &Context,
-    model: &Model,
-    fitted: &Fitted,
-    data: &Measurements,
-    recording: &Recording,
-    rows: &[usize],
-) {
-    let brought: Vec<&dyn MeasurementKind> = kinds(data)
-        .into_iter()
-        .filter(|kind| kind.is_contact())
-        .collect();
-    let own: Vec<usize> = rows
-        .iter()
-        .copied()
-        .filter(|row| brought.iter().any(|kind| kind.axes(data, *row) > 0))
-        .collect();
-    if own.is_empty() {
+/// Notes what a fit to such rows shows; nothing where no row is held by a contact.
+pub(super) fn note(context: &Context, session: &Session, recording: &Recording) {
+    let Session {
+        data,
+        rows,
+        model,
+        fitted,
+    } = *session;
+    if !rows.iter().any(|row| contacts(data, *row).next().is_some()) {
         return;
     }
-    note_scale(context, model, fitted, data, rows);
-    events(model, fitted, data, recording, rows)
-        .into_iter()
-        .for_each(|line| context.services.warn(line));
+    note_scale(context, session);
+    context.warn_each(events(session, recording));
     let weak: Vec<&str> = fitted
         .prior_checks
         .iter()
@@ -57,26 +45,20 @@ pub(super) fn note(
         .map(|(k, _)| model.stack.specs()[*k].name.as_str())
         .collect();
     if !weak.is_empty() {
-        let more = weak.len().saturating_sub(NAMED);
-        let tail = if more > 0 {
-            format!(" and {more} more")
-        } else {
-            String::new()
-        };
-        let shown = weak[..weak.len().min(NAMED)].join(", ");
-        context.services.note(format!(
-            "carried by their priors, hardly by the data: {shown}{tail} (table parameters)"
+        let shown = first_of(&weak, NAMED);
+        context.note(format!(
+            "carried by their priors, hardly by the data: {shown} (table parameters)"
         ));
     }
 }
 
-fn note_scale(
-    context: &Context,
-    model: &Model,
-    fitted: &Fitted,
-    data: &Measurements,
-    rows: &[usize],
-) {
+fn note_scale(context: &Context, session: &Session) {
+    let Session {
+        data,
+        rows,
+        model,
+        fitted,
+    } = *session;
     let Some(scale) = scale(model, data, rows, fitted.covariance.as_ref()) else {
         return;
     };
@@ -85,17 +67,16 @@ fn note_scale(
         (true, true) => "by the lengths that were given and the priors of the links",
         (false, true) => "by the priors of the links alone: no length was given",
         (false, false) => {
-            context.services.warn(
+            context.warn(
                 "the scale of the arm is not observable: no length was given, so that arm, ball and fixtures may all be larger or \
-                 smaller together. Say `distances: [{between: [.., ..], mm: .., sigma: ..}]` or the size of a sphere"
-                    .into(),
+                 smaller together. Say `distances: [{between: [.., ..], mm: .., sigma: ..}]` or the size of a sphere",
             );
             return;
         }
     };
     match scale.sigma {
         Some(sigma) => {
-            let beyond = match scale.beyond > TOLD_BEYOND {
+            let beyond = match scale.beyond > NAMED_BEYOND {
                 true => format!(
                     "; links differ {:.1} times as much as their priors say, and so much wider it is stated",
                     scale.beyond
@@ -106,64 +87,49 @@ fn note_scale(
                 Some(independent) => format!(", or to {independent:.1e} if no two links lean the same way"),
                 None => String::new(),
             };
-            context.services.note(format!(
+            context.note(format!(
                 "the scale of the arm is known to {:.1e} (one sigma) {known}: {:.2} mm at {:.0} mm from the base{apart}{beyond}",
                 sigma,
                 1e3 * sigma * scale.reach,
                 1e3 * scale.reach
             ));
         }
-        None => context
-            .services
-            .note(format!("all rows close at one place: what is known of the scale of the arm, {known}, cannot be stated")),
+        None => context.note(format!("all rows close at one place: what is known of the scale of the arm, {known}, cannot be stated")),
     }
 }
 
-/// What befell ball and fixtures by the rows of a recording, a sentence each: the ball was put back elsewhere, rows do not close.
-pub(super) fn events(
-    model: &Model,
-    fitted: &Fitted,
-    data: &Measurements,
-    recording: &Recording,
-    rows: &[usize],
-) -> Vec<String> {
-    let brought: Vec<&dyn MeasurementKind> = kinds(data)
-        .into_iter()
-        .filter(|kind| kind.is_contact())
+/// Events at ball and fixtures in the rows of a recording, a sentence each: the ball was put back elsewhere, rows do not close.
+pub(super) fn events(session: &Session, recording: &Recording) -> Vec<String> {
+    let rows = session.rows.iter().copied();
+    let held: Vec<usize> = rows
+        .filter(|row| contacts(session.data, *row).next().is_some())
         .collect();
-    let own: Vec<usize> = rows
-        .iter()
-        .copied()
-        .filter(|row| brought.iter().any(|kind| kind.axes(data, *row) > 0))
-        .collect();
-    if own.is_empty() {
+    if held.is_empty() {
         return Vec::new();
     }
-    let put_back = put_back(model, fitted, data, recording, &own, &brought);
+    let put_back = put_back(session, recording, &held);
     put_back
         .into_iter()
-        .chain(far(model, fitted, data, recording, &brought))
+        .chain(far(session, recording))
         .collect()
 }
 
-fn put_back(
-    model: &Model,
-    fitted: &Fitted,
-    data: &Measurements,
-    recording: &Recording,
-    own: &[usize],
-    brought: &[&'static dyn MeasurementKind],
-) -> Option<String> {
+fn put_back(session: &Session, recording: &Recording, held: &[usize]) -> Option<String> {
+    let Session {
+        data,
+        model,
+        fitted,
+        ..
+    } = *session;
     let stated = |row: &usize| {
-        brought
-            .iter()
-            .find_map(|kind| kind.reading(data, *row))
-            .map_or(0.0, |reading| reading.sigma)
+        contacts(data, *row)
+            .next()
+            .map_or(0.0, |(_, reading)| reading.sigma)
     };
-    let sigma = (own.iter().map(|row| stated(row).powi(2)).sum::<f64>() / own.len() as f64)
+    let sigma = (held.iter().map(|row| stated(row).powi(2)).sum::<f64>() / held.len() as f64)
         .sqrt()
         .hypot(fitted.excess_sigma);
-    let found = reseated(model, data, own, sigma)?;
+    let found = reseated(model, data, held, sigma)?;
     Some(format!(
         "from {} on the ball sits elsewhere on the tool, by {:.2} mm or more ({:.0} standard errors): was it taken off? Name it there as \
          another `target`, and each is placed on its own",
@@ -182,22 +148,19 @@ struct Far {
 }
 
 /// Names the rows that the model does not explain; they are down-weighted where they were fitted.
-fn far(
-    model: &Model,
-    fitted: &Fitted,
-    data: &Measurements,
-    recording: &Recording,
-    brought: &[&'static dyn MeasurementKind],
-) -> Option<String> {
+fn far(session: &Session, recording: &Recording) -> Option<String> {
+    let Session {
+        data,
+        model,
+        fitted,
+        ..
+    } = *session;
     let predicted = model.predict(data);
     let errors = model.row_errors(data);
     let places = places(model);
     let mut far: Vec<Far> = Vec::new();
     for (row, error) in errors.iter().enumerate() {
-        let Some((kind, reading)) = brought
-            .iter()
-            .find_map(|kind| Some((kind, kind.reading(data, row)?)))
-        else {
+        let Some((kind, reading)) = contacts(data, row).next() else {
             continue;
         };
         let axes = kind.about().axes as f64;
@@ -221,20 +184,17 @@ fn far(
     if far.is_empty() {
         return None;
     }
-    let count = far.len();
     let texts: Vec<String> = far
         .chunk_by(|a, b| a.row + 1 == b.row && a.fixture == b.fixture && a.other == b.other)
         .map(|run| run_text(run, recording))
         .collect();
+    let (rows, they_are) = match far.len() {
+        1 => ("1 row does".to_string(), "is"),
+        count => (format!("{count} rows do"), "are"),
+    };
+    let texts = texts.join("; ");
     Some(format!(
-        "{} not close within their noise, and {} down-weighted: {}",
-        if count == 1 {
-            "1 row does".to_string()
-        } else {
-            format!("{count} rows do")
-        },
-        if count == 1 { "is" } else { "are" },
-        texts.join("; ")
+        "{rows} not close within their noise, and {they_are} down-weighted: {texts}"
     ))
 }
 

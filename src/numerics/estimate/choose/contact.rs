@@ -1,4 +1,4 @@
-//! In which postures a ball is to be brought to sockets, so that joints alone tell the arm: D-optimal beside what is known beforehand.
+//! Postures in which sockets are to hold a ball, so that joints alone determine the arm: D-optimal, given the priors.
 //!
 //! Candidates are random postures whose joints were moved until the ball lies in the socket: turns of the wrist about the ball, flips, and the
 //! motions of a redundant arm that leave the ball where it is.
@@ -9,7 +9,7 @@ use super::site::Site;
 use super::{median, random_sets, subset};
 use crate::criteria::choose::{OFF, POSTURES};
 use crate::effect::{EffectContext, EffectStack, Load, arm_effect, names};
-use crate::estimate::closure::closed;
+use crate::estimate::contacts::closed;
 use crate::estimate::factor::TriangularFactor;
 use crate::estimate::model::Model;
 use crate::observation::{MeasurementKind, SocketKind, rank};
@@ -35,7 +35,7 @@ pub struct PriorSigma {
 
 /// What is asked for.
 #[derive(Debug, Clone)]
-pub struct BroughtRequest {
+pub struct ContactRequest {
     /// Sockets in the base frame, m.
     pub places: Vec<Vector3<f64>>,
     /// Postures to propose, of all sockets together.
@@ -73,7 +73,7 @@ pub struct BallOffset {
 }
 
 /// Postures and what they promise.
-pub struct BroughtProposal {
+pub struct ContactProposal {
     /// The joints at which the ball lies in the sockets; positions are these.
     pub poses: Measurements,
     /// The socket of each row, from 0.
@@ -101,7 +101,7 @@ const UNSEEN: f64 = 1e-9;
 /// Beginnings of the names of what belongs to the geometry of arm and ball.
 const GEOMETRY: [&str; 3] = ["tool_offset.", "joint_offset.", "link_geometry."];
 
-/// The nominal arm with sockets, and what is to be told of it.
+/// The nominal arm with sockets, and what is to be identified of it.
 fn model(robot: &RobotModel, places: &[Vector3<f64>], ball: Option<Vector3<f64>>) -> Model {
     let anchors = places
         .iter()
@@ -173,18 +173,18 @@ fn socketed(sockets: Vec<usize>, sigma: f64) -> Measurements {
 fn candidates(
     model: &Model,
     site: &Site,
-    request: &BroughtRequest,
+    request: &ContactRequest,
 ) -> Result<(Measurements, Vec<usize>), String> {
     let mut draw = ChaCha8Rng::seed_from_u64(request.seed);
     let payload = site.payloads.first().copied().unwrap_or_default();
     let mut found: Vec<(usize, Vec<f64>)> = Vec::new();
     for (socket, place) in request.places.iter().enumerate() {
-        let (mut own, mut tried) = (0, 0);
-        while own < request.candidates {
-            if tried > *POSTURES * (own + BATCH) {
+        let (mut found_here, mut tried) = (0, 0);
+        while found_here < request.candidates {
+            if tried > *POSTURES * (found_here + BATCH) {
                 let [x, y, z] = [place.x, place.y, place.z];
                 return Err(format!(
-                    "socket [{x}, {y}, {z}] m is reached by {own} of {tried} random postures within the joints' limits: it is out of reach, \
+                    "socket [{x}, {y}, {z}] m is reached by {found_here} of {tried} random postures within the joints' limits: it is out of reach, \
                      or the ball lies too near the base"
                 ));
             }
@@ -207,13 +207,13 @@ fn candidates(
                     .iter()
                     .zip(&site.ranges)
                     .all(|(q, [lower, upper])| (lower..=upper).contains(&q));
-                if own < request.candidates
+                if found_here < request.candidates
                     && within
                     && (points[row] - place).norm() < THERE
                     && site.allows(&model.robot, q)
                 {
                     found.push((socket, q.to_vec()));
-                    own += 1;
+                    found_here += 1;
                 }
             }
         }
@@ -235,12 +235,12 @@ fn candidates(
 /// What is known of each parameter beforehand, in units of its stack's prior sigma: wide where the request says nothing.
 fn known(model: &Model, priors: &[PriorSigma]) -> Vec<f64> {
     let sigma = |name: &str| {
-        let own = priors.iter().find(|prior| name.starts_with(prior.begins))?;
+        let stated = priors.iter().find(|prior| name.starts_with(prior.begins))?;
         let turns = name
             .rsplit('.')
             .next()
             .is_some_and(|ending| matches!(ending, "rx" | "ry" | "rz"));
-        Some(if turns { own.turns } else { own.others })
+        Some(if turns { stated.turns } else { stated.others })
     };
     model
         .stack
@@ -273,25 +273,25 @@ fn sigmas(rows: &Mat<f64>, known: &TriangularFactor) -> Vec<f64> {
         .collect()
 }
 
-/// Proposes postures. Fails with a sentence where a socket is out of reach or nothing can be told.
-pub fn propose_brought(
+/// Proposes postures. Fails with a sentence where a socket is out of reach or nothing can be identified.
+pub fn propose_contacts(
     robot: &RobotModel,
     site: &Site,
-    request: &BroughtRequest,
-) -> Result<BroughtProposal, String> {
+    request: &ContactRequest,
+) -> Result<ContactProposal, String> {
     let model = model(robot, &request.places, None);
     let (drawn, sockets) = candidates(&model, site, request)?;
     let specs = model.stack.specs();
     let jacobian = PointJacobian::given(&model, (0..specs.len()).collect(), Vec::new());
     let known = known(&model, &request.priors);
     let before = factor_of(&known);
-    let term = DesignTerm::beside(1.0, jacobian.clone(), &before)
+    let term = DesignTerm::given(1.0, jacobian.clone(), &before)
         .ok_or("nothing is known of some direction beforehand")?;
     let mut chosen = Criterion { terms: vec![term] }.exchange(&model, &drawn, &[], request.count);
     chosen.sort_by_key(|row| (sockets[*row], *row));
     let rows = jacobian.rows(&model, &drawn);
-    let own = gather(&rows, &chosen);
-    let proposed = sigmas(&own, &before);
+    let proposed_rows = gather(&rows, &chosen);
+    let proposed = sigmas(&proposed_rows, &before);
     let sets = random_sets(&drawn, chosen.len(), request.seed);
     let random: Vec<Vec<f64>> = sets
         .iter()
@@ -329,7 +329,7 @@ pub fn propose_brought(
     let (sets, without) = (random.len(), without.collect());
     let poses = subset(&drawn, &chosen);
     let offsets = offsets(robot, request, &poses);
-    Ok(BroughtProposal {
+    Ok(ContactProposal {
         socket: chosen.iter().map(|row| sockets[*row]).collect(),
         poses,
         model,
@@ -340,9 +340,9 @@ pub fn propose_brought(
     })
 }
 
-/// How well the postures alone tell the geometry with the ball farther and farther off the last axis: of last joint and ball nothing is seen
+/// How well the postures alone determine the geometry with the ball farther and farther off the last axis: of last joint and ball nothing is seen
 /// where it lies on that. The postures are moved until the ball lies in the socket.
-fn offsets(robot: &RobotModel, request: &BroughtRequest, poses: &Measurements) -> Vec<BallOffset> {
+fn offsets(robot: &RobotModel, request: &ContactRequest, poses: &Measurements) -> Vec<BallOffset> {
     let last = robot.joints() - 1;
     let (axis, home) = (robot.axis(last), robot.home().translation);
     let arm = home - robot.point(last);
@@ -374,23 +374,25 @@ fn offsets(robot: &RobotModel, request: &BroughtRequest, poses: &Measurements) -
 /// Standard deviations (m or rad, ascending) of the `count` directions of the geometry that are seen best, without any prior.
 fn geometry(model: &Model, data: &Measurements, count: usize) -> Vec<f64> {
     let specs = model.stack.specs();
-    let own = |name: &str| GEOMETRY.iter().any(|begins| name.starts_with(begins));
-    // Sockets come first: what is left of the others is beside them.
-    let last: Vec<usize> = (0..specs.len()).filter(|k| own(&specs[*k].name)).collect();
+    let is_geometry = |name: &str| GEOMETRY.iter().any(|begins| name.starts_with(begins));
+    // Sockets come first: what is left of the others is given them.
+    let last: Vec<usize> = (0..specs.len())
+        .filter(|k| is_geometry(&specs[*k].name))
+        .collect();
     let mut order: Vec<usize> = model.stack.parameters_of(names::ANCHOR).collect();
     let first = order.len();
     order.extend(&last);
     let scale: Vec<f64> = last.iter().map(|k| UNIT / specs[*k].prior_sigma).collect();
     let all = factor(&PointJacobian::given(model, order, Vec::new()).rows(model, data));
     let p = last.len();
-    let rest = Mat::from_fn(p, p + 1, |i, j| {
+    let reduced = Mat::from_fn(p, p + 1, |i, j| {
         if j < p && i <= j {
             all.entry(first + i, first + j)
         } else {
             0.0
         }
     });
-    let seen = TriangularFactor::of(&rest).singular_values(&scale);
+    let seen = TriangularFactor::of(&reduced).singular_values(&scale);
     let largest = seen.first().copied().unwrap_or_default();
     let sigma = |value: &f64| {
         if *value > UNSEEN * largest {

@@ -12,7 +12,6 @@
 //! sentence: "{place} is worn near {centre} rad, by {value}"
 //! ```
 
-use super::text_file::text;
 use super::{Context, RawFile};
 use crate::effect::{DeclaredCause, EffectDeclaration};
 use crate::error::{Error, Result};
@@ -26,14 +25,14 @@ const VERSION: &str = "calib_effect";
 const LIST: &str = "effects";
 
 /// The declared effects of some files, in their order. Fails with every fault of all files.
-pub(super) fn own_effects(
+pub(super) fn declared_effects(
     files: &[RawFile],
     context: &Context,
 ) -> Result<Vec<&'static DeclaredCause>> {
     let (mut causes, mut faults) = (Vec::new(), Vec::new());
     let mut names: BTreeMap<String, String> = BTreeMap::new();
     for file in files {
-        let (label, content) = text(file, "effects declared in YAML", MOST_BYTES, context)?;
+        let (label, content) = context.text(file, "effects declared in YAML", MOST_BYTES)?;
         let mut troubles = Vec::new();
         for (path, node, cause) in read(&content, &mut troubles) {
             let name = cause.declaration().name.clone();
@@ -52,11 +51,8 @@ pub(super) fn own_effects(
         }
         faults.extend(troubles.into_iter().map(|trouble| trouble.fault(&label)));
     }
-    if faults.is_empty() {
-        Ok(causes)
-    } else {
-        Err(Error::Spec(faults))
-    }
+    Error::if_spec(faults)?;
+    Ok(causes)
 }
 
 /// The effects of a text that are right, with their paths and places; what is wrong goes to `troubles`.
