@@ -2,6 +2,7 @@
 
 use super::ledger::{Ledger, RobotRecord};
 use super::{Fleet, FleetRobot};
+use crate::criteria::fleet::LEAST_EVIDENCE;
 use crate::error::Result;
 use crate::stage::Given;
 use crate::table::{CellEvidence, CellEvidenceRow, Table};
@@ -12,8 +13,6 @@ use std::collections::BTreeMap;
 const CHUNK: usize = 64;
 /// Shares of a group's robots that may have a cause, all alike probable.
 const SHARES: usize = 20;
-/// ln of the least evidence of a cell: its amplitude may be one that no row shows, one of the 28 that are weighed.
-const LEAST: f64 = -3.3;
 
 /// ln of what a robot contributes where a share of all has a cause: it may have it or lack it.
 fn mixed(log: f64, share: f64) -> f64 {
@@ -58,7 +57,7 @@ impl Sum {
             follows: row.follows.clone(),
             log_prior: row.log_prior,
             logs: [0.0; SHARES],
-            strongest: LEAST,
+            strongest: *LEAST_EVIDENCE,
             sized: (0.0, 0.0),
             less: [0.0; 3],
             owner: [0.0; 2],
@@ -66,7 +65,7 @@ impl Sum {
     }
 
     fn add(&mut self, row: &CellEvidenceRow, owner: f64) {
-        let log = row.log_evidence.max(LEAST);
+        let log = row.log_evidence.max(*LEAST_EVIDENCE);
         let less = owner - log;
         for (sum, value) in self.less.iter_mut().zip([1.0, less, less * less]) {
             *sum += value;
@@ -74,7 +73,7 @@ impl Sum {
         self.owner[0] += owner;
         self.owner[1] += owner * owner;
         for (sum, share) in self.logs.iter_mut().zip(shares()) {
-            *sum += mixed(log, share) - mixed(LEAST, share);
+            *sum += mixed(log, share) - mixed(*LEAST_EVIDENCE, share);
         }
         self.strongest = self.strongest.max(log);
         let weight = 1.0 / (1.0 + (-log).exp());
@@ -84,14 +83,14 @@ impl Sum {
 
     /// ln of the evidence for it over that of nothing, of so many robots.
     pub fn total(&self, robots: usize) -> f64 {
-        let at = |(log, share): (&f64, f64)| log + robots as f64 * mixed(LEAST, share);
+        let at = |(log, share): (&f64, f64)| log + robots as f64 * mixed(*LEAST_EVIDENCE, share);
         log_mean(self.logs.iter().zip(shares()).map(at))
     }
 
     /// The same without the robot in which it is plainest.
     pub fn of_the_others(&self, robots: usize) -> f64 {
         let at = |(log, share): (&f64, f64)| {
-            log + robots as f64 * mixed(LEAST, share) - mixed(self.strongest, share)
+            log + robots as f64 * mixed(*LEAST_EVIDENCE, share) - mixed(self.strongest, share)
         };
         log_mean(self.logs.iter().zip(shares()).map(at))
     }
@@ -101,8 +100,9 @@ impl Sum {
         // Robots without a row say the least.
         let (count, missing) = (robots as f64, robots as f64 - self.less[0]);
         let [absent, square] = [0, 1].map(|k| owner[k] - self.owner[k]);
-        let sum = self.less[1] + absent - missing * LEAST;
-        let square = self.less[2] + square - 2.0 * LEAST * absent + missing * LEAST * LEAST;
+        let sum = self.less[1] + absent - missing * *LEAST_EVIDENCE;
+        let square = self.less[2] + square - 2.0 * *LEAST_EVIDENCE * absent
+            + missing * *LEAST_EVIDENCE * *LEAST_EVIDENCE;
         (square - sum * sum / count.max(1.0)).max(0.0)
     }
 
@@ -150,14 +150,17 @@ impl GroupSums {
                 row.given == one.cell && row.cell == one.cell && row.shape == shape
             };
             let present = rows.iter().find(is_own);
-            let log = present.map_or(LEAST, |row| row.log_evidence.max(LEAST));
+            let log = present.map_or(*LEAST_EVIDENCE, |row| row.log_evidence.max(*LEAST_EVIDENCE));
             logs.insert(&one.cell, log);
             let sums = self.owners.entry(one.cell.clone()).or_default();
             (sums[0], sums[1]) = (sums[0] + log, sums[1] + log * log);
         }
         for row in rows {
             let key = (row.given.clone(), row.cell.clone(), row.shape.clone());
-            let owner = logs.get(row.given.as_str()).copied().unwrap_or(LEAST);
+            let owner = logs
+                .get(row.given.as_str())
+                .copied()
+                .unwrap_or(*LEAST_EVIDENCE);
             self.sums
                 .entry(key)
                 .or_insert_with(|| Sum::new(row))

@@ -1,6 +1,7 @@
 //! `cell_evidence`: what every cell of the table of causes says of a robot given cells that its fleet has accepted. `calib fleet diagnose` puts
 //! it in the place of a stage `diagnose`, with that stage's settings.
 
+use crate::criteria::fleet::WRITTEN;
 use crate::diagnose::{CellAnswer, GivenCell, cell_evidence};
 use crate::effect::names;
 use crate::error::{Error, Place, Result};
@@ -39,10 +40,6 @@ crate::stage::stage! {
             cell_evidence: CellEvidenceTable,
         }
 }
-
-/// ln of the evidence, of whole cells with a name and of all other rows, below which a row is left out: a fleet counts it as the least that a
-/// cell can say.
-const LEAST: [f64; 2] = [-2.0, -1.0];
 
 impl Stage for CellEvidence {
     fn faults(&self, at: &mut Place) {
@@ -91,7 +88,7 @@ impl Stage for CellEvidence {
 fn table(answers: Vec<CellAnswer>) -> CellEvidenceTable {
     let kept = |answer: &CellAnswer| {
         let is_plain = answer.shape.is_none() && answer.effect != names::UNKNOWN;
-        let least = if is_plain { LEAST[0] } else { LEAST[1] };
+        let least = WRITTEN[usize::from(!is_plain)];
         answer.log >= least || answer.sigma.is_some()
     };
     // So many digits decide nothing, and they would fill the store.

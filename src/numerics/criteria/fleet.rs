@@ -17,6 +17,10 @@ criteria! {
     LEAST_SPREAD: f64 = 0.1, "share of the usual size", "physics: parts of one drawing differ by a tenth", "";
     /// Probability of a name from which it is stated by itself; below it the cause is the name or its rival.
     DECIDED: f64 = 0.9, "probability", "judgement: a technician opens the joint that is named", "";
+    /// ln of the least evidence of a cell: its amplitude may be one that no row shows, one of the 28 that are weighed.
+    LEAST_EVIDENCE: f64 = -3.3, "ln of evidence", "count: ln of 1 in 28", "";
+    /// ln of the evidence below which no row is written of a cell with a name, and of anything else.
+    WRITTEN: [f64; 2] = [-2.0, -1.0], "ln of evidence", "judgement: bounds files; a sum takes the least evidence for what is missing", "";
     /// Causes of a single robot that its group does not have, at most.
     ALONE: usize = 3, "causes", "judgement: bounds time", "";
     /// By how much ln of the odds of a rival must be larger to take the place of a cause.
