@@ -462,8 +462,28 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         })
     }
 
-    /// The odds of every cell given a state, closely those of the best and of some more. A cell that has a component already has no price for
-    /// another one.
+    /// ln of the prior odds of a cell next to others. One that is there already has no price for another component, nor has another motion of
+    /// a place that is known to move with a variable: what moves does not keep to one axis.
+    pub fn log_prior(&self, cell: usize, mut others: impl Iterator<Item = usize>) -> f64 {
+        let moves = |cell: usize| match &self.cells[cell].shapes {
+            Shapes::Free(free) if matches!(free.over, Over::Curve { .. }) => {
+                Some((free.motion.place(), free.of))
+            }
+            _ => None,
+        };
+        let this = moves(cell);
+        let is_same = |other: usize| {
+            let both = this.zip(moves(other));
+            other == cell || both.is_some_and(|(a, b)| a.0 == b.0 && a.1.is_alike(b.1))
+        };
+        if others.any(is_same) {
+            0.0
+        } else {
+            self.cells[cell].log_prior
+        }
+    }
+
+    /// The odds of every cell given a state, closely those of the best and of some more.
     pub fn scan(
         &self,
         state: &KnownState,
@@ -497,11 +517,8 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         also: &[usize],
     ) -> CellScan {
         let prior = |cell: usize| {
-            if components.iter().any(|component| component.cell == cell) {
-                0.0
-            } else {
-                self.cells[cell].log_prior
-            }
+            let there = components.iter().map(|component| component.cell);
+            self.log_prior(cell, there)
         };
         let (across, first) = self.across_cells(cells, state);
         let bound =

@@ -70,13 +70,7 @@ impl ComponentSearch for CauseTable<'_, '_> {
         let others = without(components, &[i]);
         let others: Vec<&Component> = others.iter().collect();
         let state = self.state(&others, Some(kappa));
-        let cell = components[i].cell;
-        let again = others.iter().any(|other| other.cell == cell);
-        let prior = if again {
-            0.0
-        } else {
-            self.cells[cell].log_prior
-        };
+        let prior = self.log_prior(components[i].cell, others.iter().map(|other| other.cell));
         Some(prior + self.log_evidence(&components[i], &state, &others))
     }
 
@@ -292,12 +286,7 @@ impl CauseTable<'_, '_> {
                     .collect();
                 let scan = self.scan_some(&alike, &state, &rest, 5, &near);
                 let Some(best) = scan.best() else { continue };
-                let again = rest.iter().any(|other| other.cell == cell);
-                let prior = if again {
-                    0.0
-                } else {
-                    self.cells[cell].log_prior
-                };
+                let prior = self.log_prior(cell, rest.iter().map(|other| other.cell));
                 let stays = prior + self.log_evidence(&components[i], &state, &rest);
                 if best == cell || scan.log_odds[best] <= stays + *SWAPS {
                     continue;
@@ -322,14 +311,8 @@ impl CauseTable<'_, '_> {
         let state = self.state(&components.iter().collect::<Vec<_>>(), Some(kappa));
         let mut prior = 0.0;
         for (i, component) in components.iter().enumerate() {
-            let first = !components[..i]
-                .iter()
-                .any(|other| other.cell == component.cell);
-            prior += if first {
-                self.cells[component.cell].log_prior
-            } else {
-                0.0
-            };
+            let before = components[..i].iter().map(|other| other.cell);
+            prior += self.log_prior(component.cell, before);
             prior += component.shape.log_weight - (AMPLITUDES as f64).ln();
         }
         let half = 0.5 * (state.rows.freedom + *NU);
