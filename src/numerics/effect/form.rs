@@ -231,6 +231,16 @@ impl Form {
             .map_or("constant", |of| of.kind(place))
     }
 
+    /// Whether it changes slowly from row to row, whatever the arm does.
+    pub fn follows_time(&self) -> bool {
+        self.variables().into_iter().any(|of| {
+            matches!(
+                of,
+                Variable::Time | Variable::Temperature | Variable::Lagging { .. }
+            )
+        })
+    }
+
     /// The name of its cause.
     pub fn name(&self) -> &'static str {
         self.cause().name()

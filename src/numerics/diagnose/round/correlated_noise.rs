@@ -8,12 +8,11 @@
 use super::along_path::CorrelationChange;
 use super::fit_state::{FitState, Fitter};
 use super::stretches::{first_of_pose, thinned};
-use crate::criteria::cells::{COMMON, SETTLED};
-use crate::criteria::noise::{AS_GOOD, CLEARER, PLAIN};
+use crate::criteria::cells::COMMON;
+use crate::criteria::noise::{AS_GOOD, PLAIN};
 use crate::diagnose::linear::{orthonormal, project};
 use crate::diagnose::table::{Answer, FoundCell};
 use crate::diagnose::whitened::{AutocorrelatedNoise, WhitenedProblem};
-use crate::effect::{Form, Variable};
 use faer::linalg::matmul::triangular::{BlockStructure, matmul};
 use faer::{Accum, Mat, MatRef, Par, Side};
 use rayon::prelude::*;
@@ -42,7 +41,7 @@ pub(crate) fn correlation_left_by(
     let slow: Vec<bool> = settled
         .causes
         .iter()
-        .map(|cause| follows_time(&cause.form))
+        .map(|cause| cause.form.follows_time())
         .collect();
     let with_all = Regression::of((&problem, width), settled, fitter, &vec![true; slow.len()]);
     let price = price_of(&answer.found, &|i| slow[i]);
@@ -64,28 +63,20 @@ pub(crate) fn correlation_left_by(
     if slow.contains(&true) {
         let kept: Vec<bool> = slow.iter().map(|slow| !slow).collect();
         let (cost, other) = Regression::of((&problem, width), settled, fitter, &kept).likeliest();
-        // What such noise explains as well is noise; as long as more is there, causes that were not found yet look like it, too.
-        let is_settled = answer.nothing_last > *SETTLED;
-        let margin = if is_settled {
-            -*AS_GOOD
-        } else {
-            10.0 * *CLEARER
-        };
-        let likelier = cost - best.min(believed);
-        if likelier < -margin && other.is_some() {
+        // What such noise explains as well is noise. Causes that were not found yet look like it, too: it has to be as much likelier as it is
+        // likely that there are some.
+        let some_left = -2.0 * answer.nothing_last.max(f64::MIN_POSITIVE).ln();
+        let unlikelier = cost - best.min(believed) + some_left;
+        if unlikelier < *AS_GOOD && other.is_some() {
             return (other != fitter.correlated).then(|| change(other));
         }
-        let noise_instead = 1.0 / (1.0 + (likelier / 2.0).exp());
-        let of_time = |found: &&mut FoundCell| is_settled && found.members.iter().any(|i| slow[*i]);
+        let noise_instead = 1.0 / (1.0 + (unlikelier / 2.0).exp());
+        let of_time = |found: &&mut FoundCell| found.members.iter().any(|i| slow[*i]);
         for found in answer.found.iter_mut().filter(of_time) {
             found.or_nothing(noise_instead);
         }
     }
     (best < believed - *PLAIN && noise != fitter.correlated).then(|| change(noise))
-}
-
-fn follows_time(form: &Form) -> bool {
-    form.variables().contains(&Variable::Time)
 }
 
 /// -2 ln of the prior odds of some findings.

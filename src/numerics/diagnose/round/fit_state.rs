@@ -7,7 +7,7 @@ use super::stretches::lasts;
 use crate::criteria::noise::{ESTIMATES, REPEATS, SETTLED};
 use crate::diagnose::types::{JointRepeatability, Question};
 use crate::diagnose::whitened::AutocorrelatedNoise;
-use crate::effect::{Effect, EffectContext, EffectStack, Form, Load, Variable, arm_effect, names};
+use crate::effect::{Effect, EffectContext, EffectStack, Form, Load, arm_effect, names};
 use crate::estimate::{
     CLEARLY, ErrorScale, FitOptions, Fitted, Known, Model, ParameterStatus, Prior, Screening,
     Session, fit_screened, seen,
@@ -38,9 +38,7 @@ impl FitState {
 
     /// Whether any of its causes follows time.
     pub fn follows_time(&self) -> bool {
-        self.causes
-            .iter()
-            .any(|cause| cause.form.variables().contains(&Variable::Time))
+        self.causes.iter().any(|cause| cause.form.follows_time())
     }
 
     /// The squared size of some causes together in their uncertainty, a mean over as many numbers as the rows show of them; 0 where none of
@@ -260,7 +258,7 @@ impl<'a> Fitter<'a> {
             settled
                 .causes
                 .iter()
-                .filter(|cause| !cause.form.variables().contains(&Variable::Time))
+                .filter(|cause| !cause.form.follows_time())
                 .cloned()
                 .collect()
         };

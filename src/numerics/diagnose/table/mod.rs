@@ -28,7 +28,7 @@ pub use state::KnownState;
 use super::round::{EstimatedCause, FitState, Fitter, RoundView};
 use super::types::Located;
 use crate::criteria::cells::{IDLE, OPEN, ROUNDS, UNEXPLAINED};
-use crate::effect::{Basis, Form, Law, Motion, Place, Survey, Variable, names};
+use crate::effect::{Basis, Form, Law, Motion, Place, Survey, names};
 use crate::estimate::Prior;
 use crate::observation::only_contacts;
 use cell::FreeShape;
@@ -171,7 +171,6 @@ impl Rounds {
 
 /// Whether a cell may be asked of a recording.
 fn is_kept(cell: &cell::CauseCell, view: &RoundView, survey: &Survey, fitter: &Fitter) -> bool {
-    let slow = |form: &Form| form.variables().contains(&Variable::Time);
     // Where nothing but joints was recorded, base and first joint move with all places that the target was laid into.
     let unseen = only_contacts(&fitter.data, fitter.question.fit)
         && (cell.place == Place::Base
@@ -180,7 +179,7 @@ fn is_kept(cell: &cell::CauseCell, view: &RoundView, survey: &Survey, fitter: &F
     let is_slow = || {
         cell.groups(survey, &values, false)
             .iter()
-            .any(|group| group.forms.iter().any(slow))
+            .any(|group| group.forms.iter().any(Form::follows_time))
     };
     !(unseen || fitter.causes_of_the_arm_first() && is_slow())
 }
