@@ -37,7 +37,7 @@ impl Stage for CompareTorques {
     const NAME: &'static str = "compare_torques";
     const SUMMARY: &'static str =
         "tests what changed between two recordings of an arm's torques: payload, friction, offsets";
-    const IMPLEMENTATION: u32 = 4;
+    const IMPLEMENTATION: u32 = 5;
     type Reads = CompareTorquesReads;
     type Writes = CompareTorquesWrites;
 

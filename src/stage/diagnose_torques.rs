@@ -111,7 +111,7 @@ impl Stage for DiagnoseTorques {
     const NAME: &'static str = "diagnose_torques";
     const SUMMARY: &'static str =
         "names the physics that the simulated torques of a moving arm lack";
-    const IMPLEMENTATION: u32 = 14;
+    const IMPLEMENTATION: u32 = 15;
     type Reads = DiagnoseTorquesReads;
     type Writes = DiagnoseTorquesWrites;
 
