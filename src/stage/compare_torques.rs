@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 pub struct CompareTorques {}
 
 crate::stage::stage! {
-    CompareTorques, "compare_torques", 4, "tests what changed between two recordings of an arm's torques: payload, friction, offsets",
+    CompareTorques, "compare_torques", 5, "tests what changed between two recordings of an arm's torques: payload, friction, offsets",
         CompareTorquesReads {
             robot: Robot,
             motion: Chunks<ArmMotion>,

@@ -175,7 +175,7 @@ pub(super) fn found(diagnosis: &TorqueDiagnosis) -> Vec<String> {
     names
 }
 
-fn diagnosed(recording: &TorqueRecording) -> TorqueDiagnosis {
+pub(super) fn diagnosed(recording: &TorqueRecording) -> TorqueDiagnosis {
     diagnose(&arm(), recording, &TorqueQuestion::default(), &mut |_| ()).unwrap()
 }
 
@@ -315,7 +315,7 @@ fn a_payload_that_was_not_declared_is_found_with_its_mass() {
 }
 
 #[test]
-fn rows_that_are_lost_now_and_then_change_no_finding_and_are_told() {
+fn rows_that_are_lost_now_and_then_change_no_finding_and_a_remark_counts_them() {
     let mut holed = record(&arm(), 0.0, &|row| {
         if row.0 == 2 {
             4.0 * (row.3 / 0.003).tanh()
@@ -423,7 +423,7 @@ fn a_push_is_found_with_its_time_and_costs_no_friction() {
 }
 
 #[test]
-fn masses_that_are_not_declared_are_identified_and_it_is_said() {
+fn masses_that_are_not_declared_are_identified_and_a_sentence_states_it() {
     let recording = record(&arm(), 0.0, &|row| 5.0 * (row.3 / 0.003).tanh());
     let bare = DynamicArm {
         links: None,

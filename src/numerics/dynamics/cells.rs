@@ -260,6 +260,13 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
         may_be.then_some((found.log, found.amplitude))
     }
 
+    /// ln of the number of shapes of a cell that may be chosen.
+    fn log_count(&self, cell: usize) -> f64 {
+        let forms = self.cells[cell].forms.iter();
+        let open = forms.filter(|form| **form < self.choice.open).count();
+        (open.max(1) as f64).ln()
+    }
+
     /// The posterior of a cell given a state.
     fn cell(&self, cell: usize, state: &TorqueState) -> Option<CellPosterior> {
         let own = &self.cells[cell];
@@ -282,8 +289,8 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
             })
             .collect();
         let best = all.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
-        let count = own.forms.iter().filter(|form| **form < open).count().max(1) as f64;
-        let log = log_sum(&all.iter().map(|(log, _)| *log).collect::<Vec<_>>()) - count.ln();
+        let log =
+            log_sum(&all.iter().map(|(log, _)| *log).collect::<Vec<_>>()) - self.log_count(cell);
         Some(CellPosterior {
             log_odds: own.log_prior + log,
             best: best.1,
@@ -305,12 +312,6 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
         let state = self.state(&without(components, place), Some(kappa));
         let own = components[place];
         let cell = self.cell_of[&own.form];
-        let count = self.cells[cell]
-            .forms
-            .iter()
-            .filter(|form| **form < self.choice.open)
-            .count()
-            .max(1) as f64;
         let grid = self.cell(cell, &state);
         let prior = self.cells[cell].log_prior;
         let of_itself = self.form(own.form, &state);
@@ -321,7 +322,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
                 best: own,
             };
         };
-        let log = prior + log - count.ln();
+        let log = prior + log - self.log_count(cell);
         CellPosterior {
             log_odds: grid.map_or(log, |grid| grid.log_odds.max(log)),
             best: TorqueComponent { amplitude, ..own },
@@ -352,14 +353,8 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
         let state = self.state(components, Some(1.0)).known;
         let mut log = -state.log_determinant();
         for own in components {
-            let cell = &self.cells[self.cell_of[&own.form]];
-            let count = cell
-                .forms
-                .iter()
-                .filter(|form| **form < self.choice.open)
-                .count()
-                .max(1) as f64;
-            log += cell.log_prior - count.ln() - (AMPLITUDES as f64).ln();
+            let cell = self.cell_of[&own.form];
+            log += self.cells[cell].log_prior - self.log_count(cell) - (AMPLITUDES as f64).ln();
         }
         log - 0.5 * (self.rows.freedom + *NU) * (*NU + state.rows.square).ln()
     }

@@ -6,7 +6,7 @@ use super::cause::{COULOMB, OFFSET, TORQUE_CAUSES, TorqueForm, VISCOUS};
 use super::model::TorqueModel;
 use super::newton_euler::INERTIAL_NUMBERS;
 use super::noise::NoiseMemory;
-use super::noise::noise_beside;
+use super::noise::noise_of_fit;
 use super::problem::TorqueProblem;
 use super::recording::TorqueSource;
 use super::stacked::StackedColumns;
@@ -221,7 +221,7 @@ fn take_columns(
     problem.theta.clone_from(&own.inertials);
     problem.shift(own.latency);
     let forms: Vec<usize> = (0..candidates.len()).collect();
-    problem.noise = noise_beside(problem, &forms, NoiseMemory::Short).0;
+    problem.noise = noise_of_fit(problem, &forms, NoiseMemory::Short).0;
     problem.theta.clone_from(&about.inertials);
     problem.shift(own.latency);
 }

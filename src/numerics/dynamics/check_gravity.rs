@@ -1,4 +1,4 @@
-//! A recording beside the gravity of the declared arm: torques in a wrong unit, with another sign or of another joint, and angles in a wrong
+//! A recording against the gravity of the declared arm: torques in a wrong unit, with another sign or of another joint, and angles in a wrong
 //! unit or of another joint.
 
 use super::arm::DeclaredInertials;
@@ -34,7 +34,7 @@ pub(super) fn gravity_faults(arm: &DynamicArm, recording: &TorqueRecording) -> V
     }
 }
 
-/// Torques beside those of the declared arm standing still: units, signs, joints.
+/// Torques against those of the declared arm standing still: units, signs, joints.
 fn torque_faults(arm: &DynamicArm, recording: &TorqueRecording, theta: &[f64]) -> Vec<Fault> {
     let n = recording.joints;
     let mut dynamics = InverseDynamics::new(arm);
@@ -190,7 +190,7 @@ fn angle_fault(arm: &DynamicArm, recording: &TorqueRecording, theta: &[f64]) -> 
     let (best, left) = left.min_by(|a, b| a.1.total_cmp(&b.1))?;
     (left < EXCHANGED * straight).then(|| {
         let better = (straight / left.max(f64::MIN_POSITIVE)).sqrt();
-        let said = match best {
+        let reading = match best {
             AngleReading::Scaled(factor) if factor > 1.0 => {
                 "angles were radians already and were converted from degrees once more".into()
             }
@@ -210,7 +210,9 @@ fn angle_fault(arm: &DynamicArm, recording: &TorqueRecording, theta: &[f64]) -> 
         };
         Fault::new(
             "position",
-            format!("{said}: the declared masses explain the torques {better:.0} times better so"),
+            format!(
+                "{reading}: the declared masses explain the torques {better:.0} times better so"
+            ),
         )
     })
 }

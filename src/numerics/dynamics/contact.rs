@@ -15,7 +15,7 @@ use std::f64::consts::PI;
 const DURATIONS: [f64; 6] = [0.6, 0.9, 1.2, 1.6, 2.0, 2.6];
 /// Share of a push in which it rises and falls: all of it, or one that is held between.
 const TAPERS: [f64; 3] = [1.0, 0.4, 0.1];
-/// s beside the highest point that are tried as middles: steps on either side, and their length.
+/// s about the highest point that are tried as middles: steps on either side, and their length.
 const STEPS: i32 = 6;
 const STEP: f64 = 0.1;
 /// s by which start and end are then moved, so many steps on either side.
@@ -47,7 +47,7 @@ pub(super) fn contacts(
     problem: &TorqueProblem,
     residual: &[Vec<f64>],
     noise: &[JointNoise],
-    beside: ContactModel,
+    model: ContactModel,
 ) -> Vec<ContactEvent> {
     let lasting: Vec<f64> = noise
         .iter()
@@ -73,7 +73,7 @@ pub(super) fn contacts(
         })
         .collect();
     let shown: Vec<usize> = (0..rows)
-        .filter(|row| beside == ContactModel::Judged || !problem.is_held_out(*row))
+        .filter(|row| model == ContactModel::Judged || !problem.is_held_out(*row))
         .collect();
     let energy: Vec<f64> = shown.iter().map(|row| energy[*row]).collect();
     let average = averaged(
@@ -83,7 +83,7 @@ pub(super) fn contacts(
     let median = nearest(&mut average.clone(), 0.5).unwrap_or(0.0);
     let mut apart: Vec<f64> = average.iter().map(|value| (value - median).abs()).collect();
     let spread = 1.4826 * nearest(&mut apart, 0.5).unwrap_or(0.0);
-    let least_share = if beside == ContactModel::Rich {
+    let least_share = if model == ContactModel::Rich {
         *PUSH_BENT_SHARE
     } else {
         *PUSH_SHARE

@@ -112,7 +112,7 @@ fn projected(start: &DVector<f64>, metric: &DMatrix<f64>, maps: &[ConeMap]) -> D
     on
 }
 
-/// A link's ten numbers as a scaled pseudo-inertia: ten entries, those beside the diagonal times the root of 2, so that their length is that of
+/// A link's ten numbers as a scaled pseudo-inertia: ten entries, those off the diagonal times the root of 2, so that their length is that of
 /// the matrix.
 struct ConeMap {
     matrix: DMatrix<f64>,

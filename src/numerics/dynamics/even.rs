@@ -210,7 +210,7 @@ fn is_sound(block: &TorqueRecording, joints: usize) -> bool {
         && row_faults(block, 0, None).is_empty()
 }
 
-/// Adds, joint by joint, squares of steps and of what the straight line between the rows beside leaves of a row, by stamps and by rows.
+/// Adds, joint by joint, squares of steps and of what the straight line between the neighbouring rows leaves of a row, by stamps and by rows.
 fn gather(block: &TorqueRecording, apart: &mut [Vec<f64>; 2], moved: &mut Vec<f64>) {
     let n = block.joints;
     apart.iter_mut().for_each(|all| all.resize(n, 0.0));

@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn a_course_is_filtered_alike_alone_and_beside_others() {
+    fn a_course_is_filtered_alike_alone_and_with_others() {
         let filter = ZeroPhase::new(100.0, 10.0);
         let courses: Vec<Vec<f64>> = (1..=6)
             .map(|hertz| sine(100.0, f64::from(hertz), 400))

@@ -16,8 +16,6 @@ mod bridge;
 mod cases;
 #[cfg(test)]
 mod cases_names;
-#[cfg(test)]
-mod cases_shapes;
 mod cause;
 mod cells;
 mod changes;
@@ -36,7 +34,6 @@ mod feed_gate;
 mod filter;
 mod findings;
 mod friction_curve;
-mod friction_lead;
 mod judge;
 mod latency;
 mod masses;

@@ -49,7 +49,7 @@ pub struct TorqueModel {
     pub inertials: Vec<f64>,
     /// 10 n: all where masses were declared, else the base parameters, which stand for others too.
     pub identified: Vec<bool>,
-    /// All causes that add torque at joints: findings, and of viscous and Coulomb friction the one that is too small to be named beside the
+    /// All causes that add torque at joints: findings, and of viscous and Coulomb friction the one that is too small to be named next to the
     /// other.
     pub terms: Vec<TorqueTerm>,
     /// Covariance of identified inertials, of all coefficients, of the numbers of shapes that were found, term after term, and of the width of a

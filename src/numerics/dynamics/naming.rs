@@ -110,7 +110,7 @@ fn next(choice: &CauseChoice, judged: &JudgedSet, slopes: &ShapeSlopes) -> Optio
     let set = &judged.set;
     let sweep = choice.base.with(set);
     let solution = sweep.solution();
-    let uncertain = slopes.beside(&sweep);
+    let uncertain = slopes.with_slopes(&sweep);
     let named = |place: &usize| {
         let form = choice.form(set[*place]);
         form.cause.name != UNKNOWN

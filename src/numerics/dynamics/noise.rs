@@ -141,7 +141,7 @@ pub(super) fn basic_forms(problem: &TorqueProblem) -> Vec<usize> {
 }
 
 /// Noise of each joint and the residual of a fit of the base and some forms to the fitted rows.
-pub(super) fn noise_beside(
+pub(super) fn noise_of_fit(
     problem: &TorqueProblem,
     forms: &[usize],
     memory: NoiseMemory,
@@ -183,7 +183,7 @@ pub(super) fn noise_beside(
 /// Noise by which what is found is weighed in the end: what the rich model leaves has lost its slow part with what is slow in that model, so
 /// that its course is that of what a set leaves.
 pub(super) fn noise_left(problem: &TorqueProblem, set: &[usize]) -> Vec<JointNoise> {
-    let left = noise_beside(problem, set, NoiseMemory::Long).0;
+    let left = noise_of_fit(problem, set, NoiseMemory::Long).0;
     let rich = problem.noise.iter();
     rich.zip(left)
         .map(|(rich, left)| JointNoise {
@@ -229,7 +229,7 @@ mod tests {
     use rand::{RngExt, SeedableRng};
 
     #[test]
-    fn a_course_that_remembers_is_told_with_its_memory_and_whitened() {
+    fn a_course_that_remembers_is_found_with_its_memory_and_whitened() {
         let mut dice = ChaCha8Rng::seed_from_u64(1);
         let mut now = 0.0;
         let course: Vec<f64> = (0..20_000)
@@ -258,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_that_lasts_beside_what_is_quick_is_seen_at_its_full_density_by_the_long_memory() {
+    fn slow_noise_in_quick_noise_is_seen_at_its_full_density_by_the_long_memory() {
         let mut dice = ChaCha8Rng::seed_from_u64(2);
         let mut normal = || (0..12).map(|_| dice.random::<f64>() - 0.5).sum::<f64>();
         // 25 rows a second: white, and with a quarter of its variance what lasts a fifth of a second.

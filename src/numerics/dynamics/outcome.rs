@@ -35,7 +35,7 @@ pub(super) fn outcome(
     let set = &solved.judged.set;
     let sweep = choice.base.with(set);
     let free = sweep.solution();
-    let uncertain = solved.slopes.beside(&sweep);
+    let uncertain = solved.slopes.with_slopes(&sweep);
     let bodies = if question.enforce_bodies {
         with_bodies(problem, set, &sweep, &free)
     } else {
@@ -70,7 +70,7 @@ pub(super) fn outcome(
         errors(problem, &last, &judging),
     );
     if let Some(enforced) = &enforced {
-        remarks.push(said_of_bodies(
+        remarks.push(bodies_remark(
             enforced,
             &errors(problem, &problem.residual(&free), &judging),
             &after,
@@ -104,7 +104,7 @@ pub(super) fn outcome(
         statement: statement(verdict, &found, [before.nrmse_mean, after.nrmse_mean], over),
         remarks: remarks
             .into_iter()
-            .chain([said_of_filters(problem)])
+            .chain([filters_remark(problem)])
             .collect(),
         basis: match problem.scene.declared {
             Some(_) => InertialBasis::Declared,
@@ -137,11 +137,7 @@ pub(super) fn outcome(
 }
 
 /// What it costs that links are bodies.
-fn said_of_bodies(
-    enforced: &EnforcedBodies,
-    before: &TorqueErrors,
-    after: &TorqueErrors,
-) -> String {
+fn bodies_remark(enforced: &EnforcedBodies, before: &TorqueErrors, after: &TorqueErrors) -> String {
     let links: Vec<String> = enforced
         .links
         .iter()
@@ -158,7 +154,7 @@ fn said_of_bodies(
 }
 
 /// How rows came about.
-fn said_of_filters(problem: &TorqueProblem) -> String {
+fn filters_remark(problem: &TorqueProblem) -> String {
     let lead = 1e3 * problem.scene.friction_lead;
     let turns = match lead {
         0.0 => String::new(),
@@ -180,7 +176,7 @@ fn late(latency: &super::latency::Latency) -> TorqueFinding {
         sigma: Some(1e3 * latency.sigma),
     };
     let statement =
-        format!("torques come {milliseconds:.1} ms later than the positions beside them");
+        format!("torques come {milliseconds:.1} ms later than the positions of their rows");
     plain_finding(
         super::LATENCY,
         Place::Recording,

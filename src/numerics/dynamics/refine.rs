@@ -199,7 +199,7 @@ fn step(problem: &mut TorqueProblem, weighted: &mut WeightedColumns, set: &mut [
     let slopes = ShapeSlopes::of(problem, weighted, set);
     let (square, solution) = {
         let sweep = SweptColumns::base(&problem.all, weighted).with(set);
-        (sweep.square, slopes.beside(&sweep).solution())
+        (sweep.square, slopes.with_slopes(&sweep).solution())
     };
     let width = problem.scene.sign_width;
     for (number, column) in &slopes.0 {

@@ -111,7 +111,7 @@ impl Resampler {
         self.made += 1;
     }
 
-    /// A row between a held one and the next: cubic, with the slopes of parabolas through the rows beside.
+    /// A row between a held one and the next: cubic, with the slopes of parabolas through the neighbouring rows.
     fn interpolate(&mut self, row: usize, time: f64) {
         let stamps = &self.held.time;
         let (from, step) = (stamps[row], stamps[row + 1] - stamps[row]);
@@ -127,14 +127,14 @@ impl Resampler {
         let [leaving, arriving] = [share - 2.0 * left + left * share, left * share - left];
         // Weights of the rows before, here, next and after it.
         let mut weights = [0.0, start, end, 0.0];
-        // Slopes times the step: of what this step alone has, and of what the one beside it has.
-        let mut slope = |weight: f64, own: [usize; 2], beside: Option<(f64, [usize; 2])>| {
-            let (mine, other) = beside.map_or((1.0, 0.0), |(length, _)| {
+        // Slopes times the step: of what this step alone has, and of what the neighbouring one has.
+        let mut slope = |weight: f64, own: [usize; 2], neighbour: Option<(f64, [usize; 2])>| {
+            let (mine, other) = neighbour.map_or((1.0, 0.0), |(length, _)| {
                 (length / (step + length), step / (step + length))
             });
             weights[own[0]] -= weight * mine;
             weights[own[1]] += weight * mine;
-            if let Some((length, places)) = beside {
+            if let Some((length, places)) = neighbour {
                 weights[places[0]] -= weight * other * step / length;
                 weights[places[1]] += weight * other * step / length;
             }

@@ -72,7 +72,7 @@ impl ShapeSlopes {
     }
 
     /// A fit that knows nothing of its shapes beforehand: for covariances.
-    pub fn beside<'a>(&self, sweep: &SweptColumns<'a>) -> SweptColumns<'a> {
+    pub fn with_slopes<'a>(&self, sweep: &SweptColumns<'a>) -> SweptColumns<'a> {
         let mut all = sweep.clone();
         self.0.iter().for_each(|(_, column)| all.take(*column));
         all

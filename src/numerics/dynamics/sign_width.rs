@@ -21,7 +21,7 @@ pub(super) fn sign_width(problem: &mut TorqueProblem) -> f64 {
 }
 
 /// The best of each joint by itself, rad/s.
-pub(super) fn own_sign_widths(problem: &mut TorqueProblem) -> Vec<f64> {
+pub(super) fn joint_sign_widths(problem: &mut TorqueProblem) -> Vec<f64> {
     let fit = FrictionFit::new(problem);
     let of = |joint: usize| {
         best_width(&mut |width| {

@@ -6,12 +6,12 @@ use super::cells::{OtherInertials, faint, from_common, search, settle, settle_wi
 use super::choice::CauseChoice;
 use super::clock::RecordingClock;
 use super::contact::{ContactModel, contacts};
-use super::friction_lead::take_friction_lead;
 use super::judge::judge;
+use super::latency::take_friction_lead;
 use super::latency::{Latency, latency};
 use super::naming::{JudgedSet, settle_names, take_out_ends};
 use super::noise::NoiseMemory;
-use super::noise::{basic_forms, noise_apart, noise_beside, noise_left, rich_forms};
+use super::noise::{basic_forms, noise_apart, noise_left, noise_of_fit, rich_forms};
 use super::problem::TorqueProblem;
 use super::recording::TorqueRecording;
 use super::refine::polish;
@@ -80,7 +80,7 @@ pub(super) fn solve<'a>(
         weighted = problem.weighted(&[]);
         (set, other) = from_common(&CauseChoice::named(&problem, &weighted));
     }
-    tell(told(&problem, &set));
+    tell(explained_by(&problem, &set));
     refine(&mut problem, &mut weighted, &mut set);
     set = again(&mut problem, &mut weighted, set);
     if touched {
@@ -168,13 +168,13 @@ fn clocked(
 /// Candidates for pushes before anything else is known: in what the common causes leave, as a rich model bends around a push that comes early;
 /// where there are none, in what a rich model leaves. What only looks like one is dropped with the first set.
 fn first_contacts(problem: &TorqueProblem) -> Vec<ContactEvent> {
-    let (_, residual) = noise_beside(problem, &basic_forms(problem), NoiseMemory::Short);
+    let (_, residual) = noise_of_fit(problem, &basic_forms(problem), NoiseMemory::Short);
     let noise = noise_apart(problem, &residual);
     let events = contacts(problem, &residual, &noise, ContactModel::Present);
     if !events.is_empty() {
         return events;
     }
-    let (noise, residual) = noise_beside(problem, &rich_forms(problem, &[]), NoiseMemory::Short);
+    let (noise, residual) = noise_of_fit(problem, &rich_forms(problem, &[]), NoiseMemory::Short);
     contacts(problem, &residual, &noise, ContactModel::Rich)
 }
 
@@ -183,17 +183,12 @@ fn look_for_contacts(
     problem: &mut TorqueProblem,
     weighted: &WeightedColumns,
     set: &[usize],
-    beside: ContactModel,
+    model: ContactModel,
 ) {
     let solution = SweptColumns::base(&problem.all, weighted)
         .with(set)
         .solution();
-    problem.events = contacts(
-        problem,
-        &problem.residual(&solution),
-        &problem.noise,
-        beside,
-    );
+    problem.events = contacts(problem, &problem.residual(&solution), &problem.noise, model);
 }
 
 /// Whether the same rows are set aside, to a tenth of a second.
@@ -230,11 +225,11 @@ fn again(
 
 /// Takes noise from what the rich model and a set leave.
 fn learn(problem: &mut TorqueProblem, set: &[usize]) {
-    problem.noise = noise_beside(problem, &rich_forms(problem, set), NoiseMemory::Short).0;
+    problem.noise = noise_of_fit(problem, &rich_forms(problem, set), NoiseMemory::Short).0;
 }
 
 /// A set as a line.
-fn told(problem: &TorqueProblem, set: &[usize]) -> String {
+fn explained_by(problem: &TorqueProblem, set: &[usize]) -> String {
     let names = set.iter().map(|number| {
         let form = &problem.all.forms[*number];
         format!("{} {}", form.cause.name, form.place)

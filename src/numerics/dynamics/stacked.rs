@@ -1,4 +1,4 @@
-//! Two recordings in one least squares: what is common to both, and forms that only the second one has besides. Joints of the second count
+//! Two recordings in one least squares: what is common to both, and forms that only the second one has. Joints of the second count
 //! on from those of the first.
 
 use super::cause::{TORQUE_CAUSES, TorqueForm};
@@ -10,7 +10,7 @@ use super::sweep::SweptColumns;
 use super::weighted::WeightedColumns;
 use crate::effect::Place;
 
-/// -2 ln of how common a change is beside none.
+/// -2 ln of how common a change is against none.
 const PRICE: f64 = 6.0;
 /// What is known of a number beforehand, as a share of its own information.
 const UNKNOWN: f64 = 2e-9;

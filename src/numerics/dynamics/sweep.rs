@@ -168,7 +168,7 @@ impl<'a> SweptColumns<'a> {
         self.all.of(form).all(|column| self.right[column] > 0.0)
     }
 
-    /// What a form of the set gains beside the others.
+    /// What a form of the set gains in addition to the others.
     pub fn loss(&self, form: usize, solution: &[(usize, f64)]) -> Gain {
         let of = |column: usize| solution.iter().find(|(pivot, _)| *pivot == column).copied();
         let (columns, values): (Vec<usize>, Vec<f64>) = self.all.of(form).filter_map(of).unzip();

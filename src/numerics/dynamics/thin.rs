@@ -113,7 +113,7 @@ struct Thinner {
     plan: ThinningPlan,
     pace: ClockPace,
     filter: ZeroPhase,
-    /// Rows beyond which the filter does not feel what is beside.
+    /// Rows beyond which the filter does not feel its neighbours.
     margin: usize,
     /// The last rows as they were recorded, of which the first `passed` have gone on.
     recorded: TorqueRecording,
@@ -208,7 +208,7 @@ impl Thinner {
             }
             now = until;
         }
-        // What is kept of the recorded rows: some to tell what is lost beside, those that wait, and none that was made up.
+        // What is kept of the recorded rows: some that show what is lost next to them, those that wait, and none that was made up.
         let from = end.saturating_sub(CONTEXT);
         let mut tail = TorqueRecording::like(&bridged.recording);
         let recorded = |at: &usize| *at == 0 || bridged.origin[*at] != bridged.origin[*at - 1];

@@ -105,7 +105,12 @@ impl UsedRecording {
             tears,
         } = ThinnedRecording::of(source, &survey, &plan)?;
         check::check(arm, &recording)?;
-        let mut remarks = vec![said(source.rows(), &recording, &plan, clock.rate)];
+        let mut remarks = vec![thinning_remark(
+            source.rows(),
+            &recording,
+            &plan,
+            clock.rate,
+        )];
         let (rows, lasted): (Vec<usize>, Vec<f64>) = tears.into_iter().unzip();
         let tears = source.recorded(&rows)?.into_iter().zip(lasted);
         remarks.extend(check::few(
@@ -124,7 +129,7 @@ impl UsedRecording {
 }
 
 /// What was kept of a long recording.
-fn said(rows: usize, kept: &TorqueRecording, plan: &ThinningPlan, rate: f64) -> String {
+fn thinning_remark(rows: usize, kept: &TorqueRecording, plan: &ThinningPlan, rate: f64) -> String {
     let [all, used] = plan.spans;
     let spans = if used < all {
         format!(" of {used} of {all} equal spans")
