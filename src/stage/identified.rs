@@ -42,12 +42,12 @@ impl From<LoadSetting> for Load {
 
 /// Declares the settings of an identification: the stage's own, and those that all share.
 macro_rules! identification {
-    ($(#[$doc:meta])* pub struct $name:ident { $($own:tt)* }) => {
+    ($(#[$doc:meta])* pub struct $name:ident { $($field:tt)* }) => {
         $(#[$doc])*
         #[derive(Debug, Clone, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
         #[serde(deny_unknown_fields)]
         pub struct $name {
-            $($own)*
+            $($field)*
             /// Parameters to estimate, by name, and only these; `*` stands for anything, e.g. `[base_frame.*, reduction_ratio.j2]`.
             #[serde(default)]
             pub free: Option<Vec<String>>,

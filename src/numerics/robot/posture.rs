@@ -122,10 +122,10 @@ impl Posture {
         };
         self.carried[n] = carried;
         for j in (0..n).rev() {
-            if let (Some(own), Some(centre)) =
+            if let (Some(stated), Some(centre)) =
                 (description.joints[j].mass, description.joints[j].centre)
             {
-                let mass = own + load_correction.body[j];
+                let mass = stated + load_correction.body[j];
                 carried.mass += mass;
                 carried.moment += self.body[j].point(&Vector3::from(centre)) * mass;
             }

@@ -76,12 +76,15 @@ impl Method for ParticleSwarm {
             velocities,
             best,
         } = swarm;
-        for ((position, velocity), own) in positions.iter_mut().zip(velocities).zip(best.iter()) {
+        for ((position, velocity), towards_own_best) in
+            positions.iter_mut().zip(velocities).zip(best.iter())
+        {
             for (s, v) in velocity.iter_mut().enumerate() {
-                let own = self.c1 * search.rng.random::<f64>() * (own.1[s] - position[s]);
+                let towards_own_best =
+                    self.c1 * search.rng.random::<f64>() * (towards_own_best.1[s] - position[s]);
                 let group = self.c2 * search.rng.random::<f64>() * (search.best.1[s] - position[s]);
                 let limit = self.fastest * search.bounds.width(s);
-                *v = (inertia * *v + own + group).clamp(-limit, limit);
+                *v = (inertia * *v + towards_own_best + group).clamp(-limit, limit);
                 position[s] += *v;
             }
             search.bounds.clamp(position);
