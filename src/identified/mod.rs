@@ -5,10 +5,8 @@ mod standing;
 mod torques;
 
 pub use achieved::{Achieved, RepeatedPose, achieved};
-pub use standing::robot_file;
 use standing::unexplained_of;
-pub use standing::{convention_of, counted_otherwise};
-pub use standing::{standing_of, wrong_setup_of};
+pub use standing::{convention_of, counted_otherwise, robot_file, standing_of, wrong_setup_of};
 pub use torques::IdentifiedTorques;
 
 use crate::compensate::{Coverage, Gate, GateLimits, IdentifiedArm, Scatter, Uncertainty};

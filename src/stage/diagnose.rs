@@ -10,11 +10,9 @@ use crate::observation::values;
 use crate::robot::{Measurements, RobotModel};
 use crate::stage::declared_effects::declared_effects;
 use crate::stage::doubtful::{self, KnownModel};
-use crate::stage::remarks::blank_payload;
-use crate::stage::remarks::misplaced_tool;
-use crate::stage::remarks::must_move;
-use crate::stage::remarks::rounded_logs;
-use crate::stage::remarks::{WeightlessLinks, weightless_links};
+use crate::stage::remarks::{
+    WeightlessLinks, blank_payload, misplaced_tool, must_move, rounded_logs, weightless_links,
+};
 use crate::stage::{Context, RawFile, Stage, contact, screened};
 use crate::table::{
     Cells, Corrected, CovarianceTable, FindingNumbers, Findings, Forms, Parameters, Prediction,

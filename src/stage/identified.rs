@@ -6,12 +6,9 @@ use crate::estimate::{CONFLICT, Covariance, ParameterStatus, Session};
 use crate::observation::noise;
 use crate::robot::{Measurements, NoiseBasis, RobotModel};
 use crate::stage::Context;
-use crate::stage::doubtful::KnownModel;
-use crate::stage::doubtful::advice;
-use crate::stage::doubtful::suspicion;
+use crate::stage::doubtful::{KnownModel, advice, suspicion};
 use crate::stage::screened::{self, FittedRows};
-use crate::stage::settings::FoldSetting;
-use crate::stage::settings::note_repeats;
+use crate::stage::settings::{FoldSetting, note_repeats};
 use crate::table::{
     CovarianceTable, Fit, FitContext, Observability, Parameters, Prediction, Recording, Split,
     Suspects,

@@ -2,8 +2,7 @@
 //! shoulder, elbow and wrist.
 
 use super::sides::{ArmSides, StatedSides};
-use super::solve::{Nominal, ToolGoal, least_change};
-use super::solve::{REACHED, excess, into_limits, spread};
+use super::solve::{Nominal, REACHED, ToolGoal, excess, into_limits, least_change, spread};
 use crate::robot::{JointConvention, RobotModel};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 

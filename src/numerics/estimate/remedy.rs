@@ -4,8 +4,8 @@
 //! off the last axis whose place on the tool is unknown too. What is estimated stays first in precedence.
 
 use super::factor::TriangularFactor;
-use super::fit::ParameterStatus;
-use super::model::{Model, Session};
+use super::fit::{ParameterStatus, Session};
+use super::model::Model;
 use super::observe::{Visibility, visibility};
 use super::problem::Problem;
 use crate::effect::names;

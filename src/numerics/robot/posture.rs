@@ -1,7 +1,6 @@
 //! The arm as it hangs: frames of all stations, what each joint carries, and gravity's torques (static part of Eq. 24).
 
-use crate::robot::model::RobotModel;
-use crate::robot::model::Travel;
+use crate::robot::model::{RobotModel, Travel};
 use crate::spatial::Pose;
 use nalgebra::Vector3;
 

@@ -6,7 +6,7 @@
 
 use super::arm::ScrewArm;
 use super::basis::{BasisFunctions, BasisTerm};
-use super::training::TrainingSamples;
+use super::region::TrainingSamples;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::solvers::{Llt, Solve};
 use faer::linalg::triangular_inverse::invert_lower_triangular;

@@ -76,15 +76,12 @@ impl Method for ParticleSwarm {
             velocities,
             best,
         } = swarm;
-        for ((position, velocity), towards_own_best) in
-            positions.iter_mut().zip(velocities).zip(best.iter())
-        {
+        for ((position, velocity), best) in positions.iter_mut().zip(velocities).zip(best.iter()) {
             for (s, v) in velocity.iter_mut().enumerate() {
-                let towards_own_best =
-                    self.c1 * search.rng.random::<f64>() * (towards_own_best.1[s] - position[s]);
+                let individual = self.c1 * search.rng.random::<f64>() * (best.1[s] - position[s]);
                 let group = self.c2 * search.rng.random::<f64>() * (search.best.1[s] - position[s]);
                 let limit = self.fastest * search.bounds.width(s);
-                *v = (inertia * *v + towards_own_best + group).clamp(-limit, limit);
+                *v = (inertia * *v + individual + group).clamp(-limit, limit);
                 position[s] += *v;
             }
             search.bounds.clamp(position);
