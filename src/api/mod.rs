@@ -12,5 +12,4 @@ mod run;
 pub use model::{Compensated, Diagnosis, Identified, Model, Options, diagnose, identify};
 pub use recording::{Poses, Recording, Sigma};
 pub use robot::Robot;
-pub use run::{CalibRun, RunRequest, run};
-pub use run::{ProposedPoses, propose_poses};
+pub use run::{CalibRun, ProposedPoses, RunRequest, propose_poses, run};

@@ -151,8 +151,8 @@ impl Model {
     }
 
     fn convention(&self) -> JointConvention {
-        let own = self.identified.convention.clone();
-        own.unwrap_or_else(|| JointConvention::of_the_robot_file(self.robot().joints()))
+        let convention = self.identified.convention.clone();
+        convention.unwrap_or_else(|| JointConvention::of_the_robot_file(self.robot().joints()))
     }
 
     /// Measured points of poses, mm in the frame of the instrument, with the learned correction where there is one.

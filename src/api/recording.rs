@@ -99,7 +99,7 @@ impl Poses {
                 faults.push(Fault::new(format!("joints, row {row}"), message + advice));
             }
         }
-        sound(rows, faults)
+        Error::if_data(faults).map(|()| rows)
     }
 
     /// As the numerics take them; where no time is stated, long after whatever was recorded.
@@ -150,7 +150,7 @@ impl Recording {
             let message = format!("{value} mm; expected a number above 0");
             faults.push(Fault::new("sigma", message));
         }
-        sound((), faults)?;
+        Error::if_data(faults)?;
         self.frame(robot, rows)
     }
 
@@ -169,21 +169,21 @@ impl Recording {
             same(name, values.len(), rows * width)?;
             for (joint, slides) in robot.prismatic().into_iter().enumerate().take(width) {
                 // Of `q_rad` and `dq_rad_s` a joint that slides has `q_mm` and `dq_mm_s`.
-                let own = named(&name.replace("_rad", "_mm")).filter(|_| slides);
-                let field = own.unwrap_or(field);
+                let field_of_kind = named(&name.replace("_rad", "_mm")).filter(|_| slides);
+                let field = field_of_kind.unwrap_or(field);
                 let unit = field.unit.as_deref().and_then(Unit::parse);
                 let stored = |value| unit.map_or(value, |unit| unit.from_si(unit.to_si(value)));
                 let name = field.column(field.per_joint.then_some(joint + 1));
-                let own = values.iter().skip(joint).step_by(width);
-                frame.push_numbers(name, own.copied().map(stored));
+                let field_of_kind = values.iter().skip(joint).step_by(width);
+                frame.push_numbers(name, field_of_kind.copied().map(stored));
             }
         }
         let sigma = self.sigmas(rows)?;
         for (axis, name) in ["x_mm", "y_mm", "z_mm"].into_iter().enumerate() {
             let points = self.points_mm.iter();
             frame.push_numbers(name, points.map(|point| as_read(point[axis])));
-            let own = sigma.iter().copied().skip(axis).step_by(3);
-            frame.push_numbers(format!("sigma_{name}"), own);
+            let field_of_kind = sigma.iter().copied().skip(axis).step_by(3);
+            frame.push_numbers(format!("sigma_{name}"), field_of_kind);
         }
         let source = match self.sigma {
             Sigma::Inferred => SigmaSource::Inferred,
@@ -247,13 +247,6 @@ impl Recording {
             [Unit::Millimetre.from_si(figures.sigma(&metres)); 3]
         };
         Ok(self.points_mm.iter().flat_map(sigma).collect())
-    }
-}
-
-fn sound<T>(value: T, faults: Vec<Fault>) -> Result<T> {
-    match faults.is_empty() {
-        true => Ok(value),
-        false => Err(Error::Data(faults)),
     }
 }
 

@@ -57,14 +57,14 @@ impl Robot {
         let name = path.file_stem().unwrap_or_default().to_string_lossy();
         let kinematics = json!({ "urdf": { "base": base, "tip": tip } });
         let units = json!({ "length": "mm", "angle": "rad" });
-        let own =
+        let text =
             json!({ "calib_robot": 1, "name": name, "units": units, "kinematics": kinematics });
-        let own = own.to_string();
-        let own = RobotFileText {
+        let text = text.to_string();
+        let text = RobotFileText {
             label: &label,
-            text: &own,
+            text: &text,
         };
-        Ok(read_calib(own, Some(urdf))?.into())
+        Ok(read_calib(text, Some(urdf))?.into())
     }
 
     /// An arm of the library, as `calib robots` lists them.

@@ -97,10 +97,10 @@ impl CalibRun {
 
     /// The model of a step, else of the step that stands for the run, with its refusals.
     pub fn model(&self, step: Option<&str>) -> Result<Model> {
-        let mut own = IdentifiedModel::of_run(&self.store, &self.manifest, step)?;
+        let mut model = IdentifiedModel::of_run(&self.store, &self.manifest, step)?;
         let exceeded = LimitsSummary::of(&self.manifest, &self.store)?.exceeded();
-        own.refusals.extend(exceeded);
-        Ok(Model::new(own))
+        model.refusals.extend(exceeded);
+        Ok(Model::new(model))
     }
 
     /// The stage that diagnosed, `step` where there are several, and what it said.

@@ -1,6 +1,6 @@
 //! Why a stage ran, or did not: its key in a run against its key in the run before.
 
-use crate::error::{Error, Result, did_you_mean};
+use crate::error::{Error, Result, suggestion};
 use crate::pipeline::{KeyChange, Manifest, StageReport, StageStatus, changes_of, find_run};
 use crate::shell::typed;
 use crate::stage::{DeclaredStage, Diagnose};
@@ -32,10 +32,9 @@ pub fn explain(store: &Store, run: &str, stage: &str) -> Result<Explanation> {
             .iter()
             .map(|stage| stage.id.as_str())
             .collect();
-        let hint = did_you_mean(stage, ids.iter().copied());
-        let end = if hint.is_empty() { "." } else { &hint };
+        let hint = suggestion(stage, ids.iter().copied());
         let message = format!(
-            "run {run} has no such stage{end} Its stages: {}",
+            "run {run} has no such stage{hint} Its stages: {}",
             ids.join(", ")
         );
         return Err(Error::spec(format!("stage {stage}"), message));
@@ -96,18 +95,19 @@ pub fn diagnosis(
 ) -> Result<(Manifest, StageReport)> {
     let manifest = Manifest::of(store, &find_run(store, run)?)?;
     let place = format!("run {}", manifest.run_id);
-    let own = manifest
+    let diagnosed = manifest
         .stages
         .iter()
         .filter(|stage| uses.contains(&stage.uses.as_str()));
-    let own: Vec<(&StageReport, &str)> = own.map(|stage| (stage, stage.id.as_str())).collect();
+    let diagnosed: Vec<(&StageReport, &str)> =
+        diagnosed.map(|stage| (stage, stage.id.as_str())).collect();
     let sets: String = manifest
         .overrides
         .iter()
         .map(|set| format!(" --set {}", typed(&format!("{}={}", set.target, set.value))))
         .collect();
     let again = format!("calib diagnose {}{sets}", typed(&manifest.pipeline.file));
-    let Some((stage, id)) = the_stage(&place, &own, step)? else {
+    let Some((stage, id)) = the_stage(&place, &diagnosed, step)? else {
         let message = format!(
             "diagnosed nothing, its pipeline has no stage `diagnose`: put `- uses: diagnose` after the split of {}, then type\n  {again}",
             manifest.pipeline.file
@@ -115,7 +115,7 @@ pub fn diagnosis(
         return Err(Error::spec(place, message));
     };
     if !matches!(stage.status, StageStatus::Cached | StageStatus::Executed) {
-        let step = if own.len() > 1 {
+        let step = if diagnosed.len() > 1 {
             format!(" --step {}", typed(id))
         } else {
             String::new()
@@ -132,23 +132,27 @@ pub fn diagnosis(
 /// The stage that is meant among several with their ids; nothing where there are none.
 pub fn the_stage<'a, T: Copy>(
     place: &str,
-    own: &[(T, &'a str)],
+    diagnosed: &[(T, &'a str)],
     step: Option<&str>,
 ) -> Result<Option<(T, &'a str)>> {
-    let list = || own.iter().map(|(_, id)| *id).collect::<Vec<_>>().join(", ");
-    match (own, step) {
+    let list = || {
+        diagnosed
+            .iter()
+            .map(|(_, id)| *id)
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
+    match (diagnosed, step) {
         ([], _) => Ok(None),
-        (_, Some(step)) => own
+        (_, Some(step)) => diagnosed
             .iter()
             .find(|(_, id)| *id == step)
             .copied()
             .map(Some)
             .ok_or_else(|| {
-                let hint = did_you_mean(step, own.iter().map(|(_, id)| *id));
-                Error::spec(
-                    place,
-                    format!("no stage `{step}` diagnoses{hint}; allowed: {}", list()),
-                )
+                let hint = suggestion(step, diagnosed.iter().map(|(_, id)| *id));
+                let message = format!("no stage `{step}` diagnoses{hint} Allowed: {}", list());
+                Error::spec(place, message)
             }),
         ([only], None) => Ok(Some(*only)),
         _ => Err(Error::spec(

@@ -7,10 +7,8 @@ mod query;
 mod runs;
 mod tables;
 
-pub use explain::{Explanation, explain};
-pub use explain::{POSITIONS, diagnosis, the_stage};
-pub use lineage::kept_actions;
-pub use lineage::{LineageNode, Provenance, lineage};
+pub use explain::{Explanation, POSITIONS, diagnosis, explain, the_stage};
+pub use lineage::{LineageNode, Provenance, kept_actions, lineage};
 #[cfg(feature = "query")]
 pub use query::{QueryResult, QueryValue, query};
 pub use runs::{RunAddress, RunDiff, RunSummary, SettingChange, TableChange, compare_runs};

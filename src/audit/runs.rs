@@ -205,8 +205,8 @@ fn causes(a: &Manifest, b: &Manifest) -> Vec<SettingChange> {
         };
         let keys = before.key.as_ref().zip(stage.key.as_ref());
         let changes = keys.map_or_else(Vec::new, |(old, new)| changes_of(old, new));
-        let own = changes.into_iter().filter(|change| change.what != "input");
-        causes.extend(own.map(|change| SettingChange {
+        let others = changes.into_iter().filter(|change| change.what != "input");
+        causes.extend(others.map(|change| SettingChange {
             stage: stage.id.clone(),
             change,
         }));

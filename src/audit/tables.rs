@@ -4,7 +4,7 @@ use serde::Serialize;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-use crate::error::{Error, Result, did_you_mean};
+use crate::error::{Error, Result, suggestion};
 use crate::pipeline::Manifest;
 use crate::raw::parquet;
 use crate::store::schema::{self, ColumnType, TableSchema};
@@ -110,13 +110,12 @@ impl QueryTables {
             .flat_map(|table| [Some(table.name.as_str()), table.short.as_deref()])
             .flatten()
             .collect();
-        let hint = did_you_mean(&spelled, names.iter().copied());
-        let end = if hint.is_empty() { "." } else { &hint };
+        let hint = suggestion(&spelled, names.iter().copied());
         let known: Vec<&str> = self.iter().map(|table| table.name.as_str()).collect();
         Error::spec(
             "SQL",
             format!(
-                "run {} has no table `{name}`{end} Its tables: {}",
+                "run {} has no table `{name}`{hint} Its tables: {}",
                 self.run,
                 known.join(", ")
             ),

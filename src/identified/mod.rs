@@ -5,10 +5,8 @@ mod standing;
 mod torques;
 
 pub use achieved::{Achieved, RepeatedPose, achieved};
-pub use standing::robot_file;
 use standing::unexplained_of;
-pub use standing::{convention_of, counted_otherwise};
-pub use standing::{standing_of, wrong_setup_of};
+pub use standing::{convention_of, counted_otherwise, robot_file, standing_of, wrong_setup_of};
 pub use torques::IdentifiedTorques;
 
 use crate::compensate::{Coverage, Gate, GateLimits, IdentifiedArm, Scatter, Uncertainty};
@@ -274,12 +272,12 @@ impl IdentifiedModel {
         tables: &TablesByKind,
         learned: Option<&TablesByKind>,
     ) -> Result<Self> {
-        let own = Self::of(robot, of_kind(tables)?.unwrap_or_default(), origin)?;
+        let model = Self::of(robot, of_kind(tables)?.unwrap_or_default(), origin)?;
         let covariance = of_kind::<CovarianceTable>(tables)?;
         Ok(Self {
-            covariance: covariance.and_then(|table| table.of_model(&own.model)),
+            covariance: covariance.and_then(|table| table.of_model(&model.model)),
             scatter: standing::of(tables, learned)?,
-            ..own
+            ..model
         })
     }
 
@@ -461,13 +459,13 @@ impl IdentifiedModel {
 
     /// How far a commanded position may be off, from the rows that the model was fitted to; none for a table of parameters alone.
     pub fn uncertainty(&self, arm: &IdentifiedArm) -> Option<Uncertainty> {
-        let own = self
+        let uncertainty = self
             .covariance
             .clone()
             .map(|covariance| Uncertainty::new(arm, covariance, self.scatter));
-        own.map(|own| match &self.data {
-            Some(data) => own.with_recording(arm, data),
-            None => own,
+        uncertainty.map(|uncertainty| match &self.data {
+            Some(data) => uncertainty.with_recording(arm, data),
+            None => uncertainty,
         })
     }
 }

@@ -145,8 +145,9 @@ pub(super) fn written<T: Table>(
     stage: &StageReport,
     load: impl Fn(&TableRef) -> Result<Frame>,
 ) -> Result<Option<T>> {
-    let own = stage.outputs.iter().find(|output| output.kind == T::KIND);
-    own.map(|output| T::from_frame(&load(&output.table)?))
+    let output = stage.outputs.iter().find(|output| output.kind == T::KIND);
+    output
+        .map(|output| T::from_frame(&load(&output.table)?))
         .transpose()
 }
 

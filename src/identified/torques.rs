@@ -115,34 +115,34 @@ impl IdentifiedTorques {
             .map(|output| Robot::from_frame(&load(&output.table)?)?.to_description())
             .transpose()?;
         let robot = read.as_ref().unwrap_or(robot);
-        let mut own = Self::of(
+        let mut torques = Self::of(
             robot,
             parameters,
             format!("run {}, stage {}", manifest.run_id, stage.id),
         )?;
         if let Some(covariance) = written::<TorqueCovariance>(stage, &load)? {
-            own.model.covariance = covariance.of_model(&own.model)?;
+            torques.model.covariance = covariance.of_model(&torques.model)?;
         }
         let findings = written::<TorqueFindings>(stage, &load)?.unwrap_or_default();
         let outside = findings
             .0
             .into_iter()
             .filter(|row| OF_THE_RECORDING.contains(&row.effect.as_str()));
-        own.of_the_recording = outside.map(|row| row.statement).collect();
+        torques.of_the_recording = outside.map(|row| row.statement).collect();
         for row in written::<TorqueVerdict>(stage, &load)?
             .unwrap_or_default()
             .0
         {
             match row.verdict.as_str() {
-                "unexplained" => own
+                "unexplained" => torques
                     .warnings
                     .push(format!("the verdict is `unexplained`: {}", row.statement)),
-                _ if row.is_wrong_setup() => own
+                _ if row.is_wrong_setup() => torques
                     .refusals
                     .push(format!("the set-up is wrong: {}", row.statement)),
                 _ => (),
             }
         }
-        Ok(Some(own))
+        Ok(Some(torques))
     }
 }

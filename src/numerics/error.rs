@@ -217,11 +217,15 @@ pub fn did_you_mean<'a>(given: &str, allowed: impl IntoIterator<Item = &'a str>)
     nearest(given, allowed).map_or_else(String::new, |name| format!("; did you mean `{name}`?"))
 }
 
+/// The same with a full stop where none is near.
+pub fn suggestion<'a>(given: &str, allowed: impl IntoIterator<Item = &'a str>) -> String {
+    nearest(given, allowed).map_or_else(|| ".".into(), |name| format!("; did you mean `{name}`?"))
+}
+
 /// What may stand there instead: `; did you mean X? Allowed: X, Y`.
 pub fn instead(found: &str, allowed: &[&str]) -> String {
-    let hint = did_you_mean(found, allowed.iter().copied());
-    let end = if hint.is_empty() { "." } else { &hint };
-    format!("{end} Allowed: {}", allowed.join(", "))
+    let hint = suggestion(found, allowed.iter().copied());
+    format!("{hint} Allowed: {}", allowed.join(", "))
 }
 
 /// Names with commas, or `none`.

@@ -2,8 +2,7 @@
 
 use crate::dynamics::{ContactEvent, DiagnosedRecording, TorqueChange, TorqueModel, changes};
 use crate::error::{Error, Result, counted};
-use crate::stage::dynamic_arm::RecordedTorques;
-use crate::stage::dynamic_arm::dynamic_arm;
+use crate::stage::dynamic_arm::{RecordedTorques, dynamic_arm};
 use crate::stage::{Chunks, Context, Stage};
 use crate::table::{ArmMotion, Contacts, Robot, TorqueChangeTable, TorqueParameters};
 use schemars::JsonSchema;

@@ -94,7 +94,7 @@ pub(super) fn curves(
                 continue;
             };
             let along = |v: &Vector3<f64>| direction.dot(v) * scale;
-            let variance: Option<f64> = (finding.own.iter())
+            let variance: Option<f64> = (finding.parameters.iter())
                 .map(|k| Some((sigma[*k]? * along(&derivatives[*k])).powi(2)))
                 .sum();
             let (over, x_unit, x) = abscissa(
@@ -132,7 +132,7 @@ struct TracedFinding {
     rank: i64,
     forms: Vec<Form>,
     /// Positions of its parameters in the stack.
-    own: Vec<usize>,
+    parameters: Vec<usize>,
     /// The joint at which it acts.
     joint: Option<usize>,
     /// What it moves the point of every row by, m.
@@ -146,18 +146,20 @@ impl TracedFinding {
     fn of(
         finding: &FindingRow,
         forms: Vec<Form>,
-        own: Vec<usize>,
+        parameters: Vec<usize>,
         model: &Model,
         data: &Measurements,
         whole: &[Vector3<f64>],
     ) -> Self {
         let mut without = model.clone();
-        own.iter().for_each(|k| without.x[*k] = 0.0);
+        parameters.iter().for_each(|k| without.x[*k] = 0.0);
         let bare = without.predict(data);
         let shift: Vec<Vector3<f64>> = whole.iter().zip(&bare).map(|(a, b)| a - b).collect();
         let place = forms
             .first()
-            .map_or(model.stack.specs()[own[0]].place, |form| form.place());
+            .map_or(model.stack.specs()[parameters[0]].place, |form| {
+                form.place()
+            });
         let joint = match place {
             Place::Joint(joint) if joint < data.joints => Some(joint),
             _ => None,
@@ -167,7 +169,7 @@ impl TracedFinding {
             rank: finding.rank,
             principal: principal(&shift),
             forms,
-            own,
+            parameters,
             joint,
             shift,
             largest,

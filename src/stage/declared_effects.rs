@@ -60,7 +60,7 @@ fn read(text: &str, troubles: &mut Vec<Trouble>) -> Vec<(String, Node, &'static 
     let (root, found) = yaml::parse(text);
     troubles.extend(found);
     let Some(root) = root else { return Vec::new() };
-    let mut rest = Vec::new();
+    let mut listed = Vec::new();
     let YamlValue::Map(entries) = &root.value else {
         troubles.push(
             Trouble::new(format!(
@@ -102,7 +102,7 @@ fn read(text: &str, troubles: &mut Vec<Trouble>) -> Vec<(String, Node, &'static 
                         .below(LIST),
                 );
             }
-            rest.extend(
+            listed.extend(
                 list.items()
                     .iter()
                     .enumerate()
@@ -111,16 +111,19 @@ fn read(text: &str, troubles: &mut Vec<Trouble>) -> Vec<(String, Node, &'static 
             None
         }
         None => {
-            let own = entries
+            let settings = entries
                 .iter()
                 .filter(|(key, ..)| key != VERSION)
                 .cloned()
                 .collect();
-            Some((String::new(), Node::new(YamlValue::Map(own), root.mark)))
+            Some((
+                String::new(),
+                Node::new(YamlValue::Map(settings), root.mark),
+            ))
         }
     };
     one.into_iter()
-        .chain(rest)
+        .chain(listed)
         .filter_map(|(path, node)| declared(path, node, troubles))
         .collect()
 }

@@ -10,11 +10,9 @@ use crate::observation::values;
 use crate::robot::{Measurements, RobotModel};
 use crate::stage::declared_effects::declared_effects;
 use crate::stage::doubtful::{self, KnownModel};
-use crate::stage::remarks::blank_payload;
-use crate::stage::remarks::misplaced_tool;
-use crate::stage::remarks::must_move;
-use crate::stage::remarks::rounded_logs;
-use crate::stage::remarks::{WeightlessLinks, weightless_links};
+use crate::stage::remarks::{
+    WeightlessLinks, blank_payload, misplaced_tool, must_move, rounded_logs, weightless_links,
+};
 use crate::stage::{Context, RawFile, Stage, contact, screened};
 use crate::table::{
     Cells, Corrected, CovarianceTable, FindingNumbers, Findings, Forms, Parameters, Prediction,
@@ -320,7 +318,7 @@ const SORTED_OTHERWISE: &str = "rows stand in another order than their times (so
 
 /// The rows that a diagnosis is asked of, and the robot that they belong to.
 pub(super) struct AskedRows {
-    own: Vec<&'static DeclaredCause>,
+    declared: Vec<&'static DeclaredCause>,
     known: Vec<KnownCell>,
     pub data: Measurements,
     pub corrected: Corrected,
@@ -333,7 +331,7 @@ pub(super) struct AskedRows {
 impl AskedRows {
     /// Of the tables of a stage with these settings; fails where they do not place the robot.
     pub fn of(settings: &Diagnose, reads: &DiagnoseReads, context: &Context) -> Result<Self> {
-        let own = declared_effects(&settings.effects, context)?;
+        let declared = declared_effects(&settings.effects, context)?;
         let asked = reads.split.rows(&reads.recording, &settings.on)?;
         let (data, corrected) = mismatch(reads, &asked, context)?;
         if data.sequence.is_some() {
@@ -361,7 +359,7 @@ impl AskedRows {
         .map_err(|message| Error::data("table recording", message))?;
         let set = screened::numbered(&reads.split);
         Ok(Self {
-            own,
+            declared,
             known: settings.prior.iter().map(CellPrior::known).collect(),
             data,
             corrected,
@@ -383,7 +381,7 @@ impl AskedRows {
             prior_weight: settings.prior_weight,
             open_world: settings.open_world,
             without: &settings.without,
-            own: &self.own,
+            own: &self.declared,
             beside_simulation: self.corrected == Corrected::OutsideSimulation,
             known: &self.known,
             seed,

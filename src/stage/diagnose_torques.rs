@@ -2,8 +2,7 @@
 
 use crate::dynamics::{TorqueQuestion, TorqueSource, diagnose};
 use crate::error::{Error, Place, Result, counted};
-use crate::stage::dynamic_arm::{HeldOut, RecordedTorques};
-use crate::stage::dynamic_arm::{dynamic_arm, must_be_bodies};
+use crate::stage::dynamic_arm::{HeldOut, RecordedTorques, dynamic_arm, must_be_bodies};
 use crate::stage::{Chunks, Context, Stage};
 use crate::table::{
     ArmMotion, BodyConsistencies, Contacts, FrictionCurves, Inertials, JointTorques, Robot,

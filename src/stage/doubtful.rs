@@ -114,13 +114,8 @@ fn plain(mm: f64) -> String {
 
 /// Sentences for the remarks of redundant and unseen parameters, by name; the measurements that would show most are noted.
 pub fn advice(context: &Context, session: &Session) -> BTreeMap<String, String> {
-    let Session {
-        data,
-        rows,
-        model,
-        fitted,
-    } = *session;
-    let found = remedies(model, data, rows, fitted);
+    let Session { model, fitted, .. } = *session;
+    let found = remedies(session);
     let last = model.robot.joints();
     let mut counts: BTreeMap<&Remedy, usize> = BTreeMap::new();
     let mut sentences = BTreeMap::new();

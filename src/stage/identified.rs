@@ -6,12 +6,9 @@ use crate::estimate::{CONFLICT, Covariance, ParameterStatus, Session};
 use crate::observation::noise;
 use crate::robot::{Measurements, NoiseBasis, RobotModel};
 use crate::stage::Context;
-use crate::stage::doubtful::KnownModel;
-use crate::stage::doubtful::advice;
-use crate::stage::doubtful::suspicion;
+use crate::stage::doubtful::{KnownModel, advice, suspicion};
 use crate::stage::screened::{self, FittedRows};
-use crate::stage::settings::FoldSetting;
-use crate::stage::settings::note_repeats;
+use crate::stage::settings::{FoldSetting, note_repeats};
 use crate::table::{
     CovarianceTable, Fit, FitContext, Observability, Parameters, Prediction, Recording, Split,
     Suspects,
@@ -42,12 +39,12 @@ impl From<LoadSetting> for Load {
 
 /// Declares the settings of an identification: the stage's own, and those that all share.
 macro_rules! identification {
-    ($(#[$doc:meta])* pub struct $name:ident { $($own:tt)* }) => {
+    ($(#[$doc:meta])* pub struct $name:ident { $($field:tt)* }) => {
         $(#[$doc])*
         #[derive(Debug, Clone, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
         #[serde(deny_unknown_fields)]
         pub struct $name {
-            $($own)*
+            $($field)*
             /// Parameters to estimate, by name, and only these; `*` stands for anything, e.g. `[base_frame.*, reduction_ratio.j2]`.
             #[serde(default)]
             pub free: Option<Vec<String>>,

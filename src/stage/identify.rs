@@ -12,13 +12,11 @@ use crate::estimate::{
 use crate::observation;
 use crate::robot::{Measurements, RobotModel};
 use crate::spatial::Pose;
-use crate::stage::contact;
 use crate::stage::identified::{Fitting, Identified, LoadSetting, RowsToFit};
 use crate::stage::known_cell::{self, KnownCell, KnownDistance, KnownPoint, KnownSphere};
-use crate::stage::remarks::weightless_links;
-use crate::stage::remarks::{must_move, unmoved_remark};
+use crate::stage::remarks::{must_move, unmoved_remark, weightless_links};
 use crate::stage::screened::numbered;
-use crate::stage::{Context, Stage};
+use crate::stage::{Context, Stage, contact};
 use crate::table::{Recording, Robot, Split};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;

@@ -50,8 +50,9 @@ pub use ports::{
 };
 pub(crate) use ports::{reads, stage, writes};
 pub use registry::{ErasedStage, StageEntry};
-pub use report::{Accepted, Report, ReportReads};
-pub use report::{ReportTorques, ReportTorquesReads, ReportTorquesWrites};
+pub use report::{
+    Accepted, Report, ReportReads, ReportTorques, ReportTorquesReads, ReportTorquesWrites,
+};
 pub use robot::{ReadRobot, RobotFormat, RobotReads, RobotWrites};
 pub use settings::FoldSetting;
 pub(crate) use settings::matches;

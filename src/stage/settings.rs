@@ -5,7 +5,7 @@
 
 use super::Context;
 use crate::effect::{identified, names};
-use crate::error::{Place, counted, did_you_mean};
+use crate::error::{Place, counted, did_you_mean, suggestion};
 use crate::estimate::{
     Bounds, Folds, Known, Model, Poses, Prior, Repeated, Session, cross_validate, fold_poses,
     leave_one_out, spread,
@@ -64,9 +64,9 @@ impl ParameterSet<'_> {
                 at.at(format!("{setting}.{pattern}")).fault(message);
             } else if !names.iter().any(|name| matches(effect, name)) {
                 at.at(setting).fault(format!(
-                    "`{pattern}` names no effect{}; allowed are names as in the table parameters, e.g. reduction_ratio.j2, \
+                    "`{pattern}` names no effect{} Allowed are names as in the table parameters, e.g. reduction_ratio.j2, \
                      link_geometry.l3.x, or with `*` for anything; effects: {}",
-                    did_you_mean(effect, names.iter().copied()),
+                    suggestion(effect, names.iter().copied()),
                     names.join(", ")
                 ));
             }

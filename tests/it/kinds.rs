@@ -7,6 +7,7 @@ use std::path::Path;
 /// Where points, and positions of joints that move, are arrays.
 fn may_index(file: &str) -> bool {
     file.ends_with("/point.rs")
+        || file == "numerics/robot/readings.rs"
         || file.starts_with("twin/")
         || file.starts_with("numerics/dynamics/")
 }

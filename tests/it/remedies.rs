@@ -3,7 +3,9 @@
 use crate::fixture;
 use crate::identify::{GEOMETRY, model, recording};
 use calib::description::RobotDescription;
-use calib::estimate::{FitOptions, Fitted, Model, ParameterStatus, Remedy, align, fit, remedies};
+use calib::estimate::{
+    FitOptions, Fitted, Model, ParameterStatus, Remedy, Session, align, fit, remedies,
+};
 use calib::robot::{Measurements, RobotModel};
 
 fn identify(
@@ -44,9 +46,14 @@ fn remedy(
         !matches!(fitted.statuses[k], ParameterStatus::Free(_)),
         "{name} is seen"
     );
-    remedies(&model, data, &rows, &fitted)
-        .remove(&k)
-        .expect("hidden parameters have one")
+    remedies(&Session {
+        data,
+        rows: &rows,
+        model: &model,
+        fitted: &fitted,
+    })
+    .remove(&k)
+    .expect("hidden parameters have one")
 }
 
 /// A recording of the nominal robot with joints and payload bent.
@@ -101,5 +108,11 @@ fn without_hidden_parameters_there_is_nothing_to_advise() {
     let description = fixture::offset_wrist();
     let data = nominal(&description, |_| {});
     let (model, fitted) = identify(&description, &data, &["base_frame", "reduction_ratio"]);
-    assert!(remedies(&model, &data, &(0..120).collect::<Vec<_>>(), &fitted).is_empty());
+    let session = Session {
+        data: &data,
+        rows: &(0..120).collect::<Vec<_>>(),
+        model: &model,
+        fitted: &fitted,
+    };
+    assert!(remedies(&session).is_empty());
 }

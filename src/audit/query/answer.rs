@@ -1,6 +1,6 @@
 //! What a query gave: columns of values.
 
-use crate::error::{Error, did_you_mean};
+use crate::error::{Error, suggestion};
 use polars::prelude::{AnyValue, Column, DataFrame, PolarsError};
 use std::borrow::Cow;
 
@@ -122,8 +122,7 @@ fn unknown(name: &str, tables: &[(&str, Vec<String>)]) -> Option<String> {
     if tables.is_empty() || all().any(|column| column == name) {
         return None;
     }
-    let hint = did_you_mean(name, all());
-    let hint = if hint.is_empty() { "." } else { &hint };
+    let hint = suggestion(name, all());
     let known: Vec<String> = tables
         .iter()
         .map(|(table, columns)| format!("{table}: {}", columns.join(", ")))

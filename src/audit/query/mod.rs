@@ -5,7 +5,6 @@
 
 mod answer;
 mod order;
-mod size;
 mod statement;
 
 pub use answer::{QueryResult, QueryValue};

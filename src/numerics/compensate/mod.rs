@@ -9,7 +9,6 @@ mod arm;
 mod correct;
 mod correction_uncertainty;
 mod gate;
-mod inverse;
 mod posture;
 mod remark;
 mod rigid;
@@ -17,20 +16,16 @@ mod sides;
 mod solve;
 mod uncertainty;
 
-pub use arm::Stated;
-pub use arm::{Circumstance, IdentifiedArm, Reach};
-pub use arm::{load_matters, unstated_payload};
+pub use arm::{Circumstance, IdentifiedArm, Reach, Stated, load_matters, unstated_payload};
 pub use correct::{CommandTarget, CorrectionOptions, CorrectionTotals, Corrector, turns};
 pub use correction_uncertainty::CorrectionUncertainty;
 pub use gate::{Gate, GateLimits};
-pub use inverse::inverse;
 pub use posture::StatedPosture;
-pub use remark::CorrectedCommand;
-pub use remark::Coverage;
-pub use remark::Remark;
 use remark::beyond_limits;
-pub use remark::doubts;
+pub use remark::{CorrectedCommand, Coverage, Remark, doubts};
 pub use rigid::{LeftOut, distance, left_out, rigid};
 pub use sides::{ArmSides, SideShares, StatedSides};
-pub use solve::{Chain, CommandSolution, Nominal, SETTLED, ToolGoal, least_change, one_step};
+pub use solve::{
+    Chain, CommandSolution, Nominal, SETTLED, ToolGoal, inverse, least_change, one_step,
+};
 pub use uncertainty::{PositionUncertainty, Scatter, Uncertainty};

@@ -1,9 +1,8 @@
 //! The posture in which a Cartesian target is to be reached, as controllers state it: ranges of joints, as they count them, and sides of
 //! shoulder, elbow and wrist.
 
-use super::inverse::{REACHED, excess, into_limits, spread};
 use super::sides::{ArmSides, StatedSides};
-use super::solve::{Nominal, ToolGoal, least_change};
+use super::solve::{Nominal, REACHED, ToolGoal, excess, into_limits, least_change, spread};
 use crate::robot::{JointConvention, RobotModel};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 

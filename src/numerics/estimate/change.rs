@@ -5,7 +5,7 @@
 //! taken in as long as they explain more than chance; sigmas include what the earlier recording did not know.
 
 use super::factor::TriangularFactor;
-use super::model::Session;
+use super::fit::Session;
 use super::problem::Problem;
 use crate::effect::names;
 use faer::Mat;

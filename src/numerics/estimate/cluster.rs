@@ -4,8 +4,7 @@
 
 use super::factor::StackedRows;
 use super::model::Model;
-use super::problem::ObservationTerm;
-use super::problem::Problem;
+use super::problem::{ObservationTerm, Problem};
 use super::triangle::Triangle;
 use crate::observation::KINDS;
 use nalgebra::{DMatrix, DVector, SymmetricEigen, Vector3};

@@ -2,8 +2,7 @@
 
 use super::factor::TriangularFactor;
 use super::length::LengthTerm;
-use super::model::Known;
-use super::model::Model;
+use super::model::{Known, Model};
 use faer::Mat;
 
 impl Model {

@@ -6,10 +6,9 @@
 
 use super::error_scale::ErrorScale;
 use super::factor::TriangularFactor;
-use super::fit::{FitOptions, fit};
+use super::fit::{FitOptions, Session, fit};
 use super::levenberg::{FINE, minimise};
 use super::model::Model;
-use super::model::Session;
 use super::problem::Problem;
 use crate::effect::names;
 use crate::observation::{RowView, contacts, kinds};

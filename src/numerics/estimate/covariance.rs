@@ -160,13 +160,13 @@ impl Covariance {
     /// The other free parameter that a parameter of the stack is most correlated with, and the correlation.
     pub fn closest(&self, parameter: usize) -> Option<(usize, f64)> {
         let row = self.free.iter().position(|k| *k == parameter)?;
-        let own = self.sigma(row);
+        let sigma = self.sigma(row);
         (0..self.free.len())
             .filter(|other| *other != row)
             .map(|other| {
                 (
                     self.free[other],
-                    self.product(row, other) / (own * self.sigma(other)),
+                    self.product(row, other) / (sigma * self.sigma(other)),
                 )
             })
             .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))

@@ -1,8 +1,7 @@
 //! In what errors of rows are compared: lengths where whole points alone were measured, else standard deviations, since lengths and angles
 //! have no common size.
 
-use super::model::Model;
-use super::model::placed_row_error;
+use super::model::{Model, placed_row_error};
 use crate::effect::{PlacedRow, PlacementBuffers};
 use crate::observation::{Dimension, KINDS, Residual, dimension, kinds};
 use crate::robot::Measurements;

@@ -4,13 +4,10 @@ use super::cluster::clustered;
 use super::covariance::Covariance;
 use super::factor::TriangularFactor;
 use super::levenberg::{Effort, FINE, Iteration, ROUGH_TOLERANCE, Stop, minimise};
-use super::model::Model;
-use super::model::PriorCheck;
+use super::model::{Model, PriorCheck};
 use super::observe::{Visibility, indices, visibility};
-use super::problem::{Evaluation, Problem};
-use super::problem::{as_of_three, bound, share};
-use super::repeats::autocorrelation_time;
-use super::repeats::{Poses, Repeated};
+use super::problem::{Evaluation, Problem, as_of_three, bound, share};
+use super::repeats::{Poses, Repeated, autocorrelation_time};
 use crate::observation::{Dimension, ExcessSigma, Residual};
 use crate::robot::Measurements;
 use crate::statistics::{MEDIAN_CHI2, nearest};
@@ -73,6 +70,19 @@ pub struct Fitted {
     pub covariance: Option<Covariance>,
     /// (name, value, meaning).
     pub indices: Vec<(&'static str, f64, &'static str)>,
+}
+
+/// A recording with the model fitted to some of its rows.
+#[derive(Clone, Copy)]
+pub struct Session<'a> {
+    /// The recording.
+    pub data: &'a Measurements,
+    /// Rows that are fitted.
+    pub rows: &'a [usize],
+    /// As it was fitted.
+    pub model: &'a Model,
+    /// How the fit went.
+    pub fitted: &'a Fitted,
 }
 
 impl Fitted {

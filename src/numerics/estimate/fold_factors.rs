@@ -5,10 +5,9 @@
 
 use super::error_scale::ErrorScale;
 use super::factor::TriangularFactor;
+use super::fit::Session;
 use super::model::Model;
-use super::model::Session;
-use super::problem::Problem;
-use super::problem::{ObservationTerm, share};
+use super::problem::{ObservationTerm, Problem, share};
 use crate::observation::{ExcessSigma, KINDS};
 use crate::robot::Measurements;
 use faer::linalg::matmul::triangular::{BlockStructure, matmul};

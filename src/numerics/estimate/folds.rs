@@ -7,9 +7,8 @@
 
 use super::contacts::without_places;
 use super::error_scale::ErrorScale;
-use super::fit::{FitOptions, ParameterStatus, fit};
+use super::fit::{FitOptions, ParameterStatus, Session, fit};
 use super::fold_factors::NearbyFits;
-use super::model::Session;
 use super::repeats::Poses;
 use crate::observation::contacts;
 use crate::robot::Measurements;

@@ -99,8 +99,8 @@ fn seen_at(
     base: &Pose,
     target: &Target,
 ) -> Option<Vector3<f64>> {
-    let own = rows.iter().filter(|row| data.target(**row) == target.name);
-    let points: Vec<Vector3<f64>> = own
+    let rows_of_target = rows.iter().filter(|row| data.target(**row) == target.name);
+    let points: Vec<Vector3<f64>> = rows_of_target
         .filter_map(|row| {
             Some((*base * robot.last_body(data.q(*row))).inverse_point(&data.point(*row)?))
         })
@@ -120,8 +120,8 @@ fn rotation_of(
     base: &Pose,
     target: &Target,
 ) -> Option<Matrix3<f64>> {
-    let own = rows.iter().filter(|row| data.target(**row) == target.name);
-    let attitudes = own.flat_map(|row| {
+    let rows_of_target = rows.iter().filter(|row| data.target(**row) == target.name);
+    let attitudes = rows_of_target.flat_map(|row| {
         let body = base.rotation * robot.last_body(data.q(*row)).rotation;
         KINDS
             .iter()

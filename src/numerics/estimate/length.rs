@@ -1,7 +1,6 @@
 //! Lengths between anchors that are known from elsewhere: of a print, a gauge block, a ball bar; each with its standard deviation.
 
-use super::model::KnownLength;
-use super::model::Model;
+use super::model::{KnownLength, Model};
 use crate::effect::names;
 use crate::robot::{Anchor, Shape};
 use nalgebra::Vector3;

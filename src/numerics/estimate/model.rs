@@ -1,6 +1,5 @@
 //! A robot with effects and the values of their parameters: what is identified, predicts, and is compensated by.
 
-use super::fit::Fitted;
 use crate::effect::{BasePlacement, EffectStack, PlacedRow, PlacementBuffers, names};
 use crate::observation::{Dimension, KINDS, Residual};
 use crate::robot::{Measurements, RobotModel};
@@ -79,19 +78,6 @@ impl Model {
     }
 }
 
-/// A recording with the model fitted to some of its rows.
-#[derive(Clone, Copy)]
-pub struct Session<'a> {
-    /// The recording.
-    pub data: &'a Measurements,
-    /// Rows that are fitted.
-    pub rows: &'a [usize],
-    /// As it was fitted.
-    pub model: &'a Model,
-    /// How the fit went.
-    pub fitted: &'a Fitted,
-}
-
 /// Beforehand about one parameter, SI.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Known {
@@ -149,7 +135,7 @@ impl PriorCheck {
     pub(crate) fn of(prior: Prior, estimate: f64, variance: f64) -> Self {
         let (prior_variance, off) = (prior.sigma * prior.sigma, estimate - prior.mean);
         let gained = prior_variance - variance;
-        // The data's share of the information is rest / own: smaller, it is rounding.
+        // The data's share of the information is gained / prior variance: smaller, it is rounding.
         if gained <= 1e-6 * prior_variance {
             return Self {
                 prior,

@@ -152,12 +152,12 @@ impl Problem<'_> {
                             row,
                             placed: &placed,
                         }) {
-                            let own = placed.log_volume(&closing, |parameter, change| {
+                            let log_volume = placed.log_volume(&closing, |parameter, change| {
                                 column[parameter]
                                     .into_iter()
                                     .for_each(|j| pull[j] += change);
                             });
-                            volume += own.unwrap_or_default();
+                            volume += log_volume.unwrap_or_default();
                         }
                     }
                 }
@@ -180,10 +180,12 @@ fn rms(residuals: &[Residual]) -> f64 {
         .map(|kind| kind.about())
         .filter(|kind| kind.dimension == Dimension::Length);
     let squares = |name: &str| -> Vec<f64> {
-        let own = residuals
+        let of_kind = residuals
             .iter()
             .filter(|residual| residual.kind.about().name == name);
-        own.map(|residual| residual.error.norm_squared()).collect()
+        of_kind
+            .map(|residual| residual.error.norm_squared())
+            .collect()
     };
     let first = lengths
         .map(|kind| squares(kind.name))

@@ -4,7 +4,7 @@
 //! off the last axis whose place on the tool is unknown too. What is estimated stays first in precedence.
 
 use super::factor::TriangularFactor;
-use super::fit::{Fitted, ParameterStatus};
+use super::fit::{ParameterStatus, Session};
 use super::model::Model;
 use super::observe::{Visibility, visibility};
 use super::problem::Problem;
@@ -40,12 +40,13 @@ const OFF_AXIS: f64 = 0.1;
 const TARGET_PRIOR: f64 = 0.1;
 
 /// What would show each redundant or unseen parameter of a fit to `rows`.
-pub fn remedies(
-    model: &Model,
-    data: &Measurements,
-    rows: &[usize],
-    fitted: &Fitted,
-) -> BTreeMap<usize, Remedy> {
+pub fn remedies(session: &Session) -> BTreeMap<usize, Remedy> {
+    let Session {
+        data,
+        rows,
+        model,
+        fitted,
+    } = *session;
     let estimated = |k: &usize| {
         matches!(
             fitted.statuses[*k],
@@ -76,7 +77,7 @@ pub fn remedies(
         .observe(model, &candidates)
         .factor
     };
-    let own = Problem { data, rows, excess }
+    let recorded = Problem { data, rows, excess }
         .observe(model, &candidates)
         .factor;
     let declared = model.robot.description().payload_mass;
@@ -92,15 +93,15 @@ pub fn remedies(
     let tried = [
         (
             Remedy::Move(lazy(model, data, rows)),
-            Some(shown(&own, &spread, &none, &prior, known)),
+            Some(shown(&recorded, &spread, &none, &prior, known)),
         ),
         (
             Remedy::Payload,
-            loaded.map(|loaded| shown(&own, &loaded, &none, &prior, known)),
+            loaded.map(|loaded| shown(&recorded, &loaded, &none, &prior, known)),
         ),
         (
             Remedy::SecondTarget,
-            Some(shown(&own, &target, &tool, &prior, known)),
+            Some(shown(&recorded, &target, &tool, &prior, known)),
         ),
     ];
     let mut out = BTreeMap::new();
@@ -118,7 +119,7 @@ pub fn remedies(
 
 /// Which of the candidates behind the first `known` are seen with `more` rows, in which the columns `apart` are new unknowns.
 fn shown(
-    own: &TriangularFactor,
+    recorded: &TriangularFactor,
     more: &TriangularFactor,
     apart: &[bool],
     prior: &[f64],
@@ -134,7 +135,7 @@ fn shown(
             .iter()
             .position(|other| *other == j)
             .map_or(place(j), |extra| known + extra);
-        rows.col_as_slice_mut(place(j))[..=j].copy_from_slice(own.column(j));
+        rows.col_as_slice_mut(place(j))[..=j].copy_from_slice(recorded.column(j));
         rows.col_as_slice_mut(second)[p..=p + j].copy_from_slice(more.column(j));
     }
     let mut sigma = vec![TARGET_PRIOR; p + new.len()];

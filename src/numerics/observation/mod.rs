@@ -20,8 +20,7 @@ pub use orientation::Orientation;
 pub use planar::Planar;
 pub use plane::PlaneKind;
 pub use point::PointKind;
-pub use residual::Weight;
-pub use residual::{ExcessSigma, Residual};
+pub use residual::{ExcessSigma, Residual, Weight};
 pub use socket::SocketKind;
 pub use sphere::SphereKind;
 

@@ -98,12 +98,13 @@ impl MeasurementKind for Planar {
             .fold(f64::MIN_POSITIVE, f64::max);
         let mut normal = DMatrix::zeros(12, 12);
         for (point, image) in &pairs {
-            let own =
+            let homogeneous =
                 Vector4::from_iterator(((point - centre) / size).iter().copied().chain([1.0]));
             for (axis, seen) in image.iter().enumerate() {
                 let mut line = DMatrix::zeros(12, 1);
-                line.view_mut((4 * axis, 0), (4, 1)).copy_from(&own);
-                line.view_mut((8, 0), (4, 1)).copy_from(&(-own * *seen));
+                line.view_mut((4 * axis, 0), (4, 1)).copy_from(&homogeneous);
+                line.view_mut((8, 0), (4, 1))
+                    .copy_from(&(-homogeneous * *seen));
                 normal += &line * line.transpose();
             }
         }

@@ -1,13 +1,11 @@
 //! Measurements as the numerics see them: rows with their joints and circumstances, and what was read in them by kind.
 
 use crate::robot::instrument::NoiseBasis;
-use crate::robot::memory::Memories;
-use crate::robot::pose_groups::Sequence;
-use crate::robot::pose_groups::{NEAR, SAME, near};
-use crate::robot::readings::PointReadings;
-use crate::robot::readings::{Named, Reading, Readings};
+use crate::robot::pose_groups::{NEAR, SAME, Sequence, near};
+use crate::robot::readings::{Named, PointReadings, Reading, Readings};
 use nalgebra::{Matrix3, Vector3};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
+use std::sync::{Arc, PoisonError, RwLock};
 
 /// When a row is for a model: by the clock of the recording from which it was identified, or after all that this recording saw.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,6 +14,52 @@ pub enum RowTime {
     At(f64),
     /// Long after that recording: what steps has stepped, and the arm is warm.
     LongAfter,
+}
+
+/// Numbers that are kept: before more, all are forgotten.
+const KEPT: usize = 1 << 22;
+
+/// Which state: its kind, a joint, the bits of its constant.
+pub(super) type Key = (u8, usize, u64);
+
+/// States of a recording, one of each row. A copy begins with none, since its rows may be changed.
+#[derive(Default)]
+pub struct Memories {
+    known: RwLock<HashMap<Key, Arc<[f64]>>>,
+}
+
+impl Clone for Memories {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+impl std::fmt::Debug for Memories {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Memories")
+    }
+}
+
+impl Memories {
+    /// A state at a row, computed for every row where it was not asked for before.
+    pub(super) fn of(&self, key: Key, row: usize, along: impl FnOnce() -> Arc<[f64]>) -> f64 {
+        let known = self
+            .known
+            .read()
+            .unwrap_or_else(PoisonError::into_inner)
+            .get(&key)
+            .map(|states| states[row]);
+        known.unwrap_or_else(|| {
+            let states = along();
+            let value = states[row];
+            let mut known = self.known.write().unwrap_or_else(PoisonError::into_inner);
+            if known.len() * states.len() > KEPT {
+                known.clear();
+            }
+            known.insert(key, states);
+            value
+        })
+    }
 }
 
 /// Measured rows, struct of arrays; per-joint quantities row-major (`row * joints + joint`). SI; NaN where a row lacks a quantity.

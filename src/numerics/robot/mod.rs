@@ -25,19 +25,15 @@ pub use instrument::{
 };
 pub use joint_convention::{CountedCoupling, JointConvention};
 pub use library::{LIBRARY, LibraryArm};
-pub use measurements::{Measurements, RowTime};
-pub use memory::Memories;
+pub use measurements::{Measurements, Memories, RowTime};
 pub use memory::Memory;
-pub use model::RobotModel;
-pub use model::Travel;
+pub use model::{RobotModel, Travel};
 pub use pose_groups::Sequence;
 pub use posture::{Carried, LoadCorrection, Posture};
-pub use readings::PointReadings;
-pub use readings::{Named, Reading, Readings};
+pub use readings::{Named, PointReadings, Reading, Readings};
 pub use rows::{DhRow, DhTable};
 pub use setup::{Anchor, MeasurementSetup, Shape, Target};
-pub use visited::numbered;
-pub use visited::{Unmeasured, Visited};
+pub use visited::{Unmeasured, Visited, numbered};
 
 #[cfg(test)]
 pub(crate) use tests::small_arm;

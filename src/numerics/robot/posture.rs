@@ -1,7 +1,6 @@
 //! The arm as it hangs: frames of all stations, what each joint carries, and gravity's torques (static part of Eq. 24).
 
-use crate::robot::model::RobotModel;
-use crate::robot::model::Travel;
+use crate::robot::model::{RobotModel, Travel};
 use crate::spatial::Pose;
 use nalgebra::Vector3;
 
@@ -122,10 +121,10 @@ impl Posture {
         };
         self.carried[n] = carried;
         for j in (0..n).rev() {
-            if let (Some(own), Some(centre)) =
+            if let (Some(stated), Some(centre)) =
                 (description.joints[j].mass, description.joints[j].centre)
             {
-                let mass = own + load_correction.body[j];
+                let mass = stated + load_correction.body[j];
                 carried.mass += mass;
                 carried.moment += self.body[j].point(&Vector3::from(centre)) * mass;
             }

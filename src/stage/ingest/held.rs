@@ -50,8 +50,8 @@ pub(super) struct HeldRows {
     pub ids: Texts,
     /// Places of a row's texts that the file has, and the texts of each.
     texts: Vec<(usize, Texts)>,
-    /// What only the file's own rows need; given up where it is too much.
-    own: Option<OwnRows>,
+    /// What only writing its rows needs; given up where it is too much.
+    written: Option<WrittenRows>,
     /// Whether rows of another file look for partners here.
     has_partners: bool,
     /// Bytes of memory that may be taken.
@@ -59,7 +59,7 @@ pub(super) struct HeldRows {
 }
 
 #[derive(Default)]
-struct OwnRows {
+struct WrittenRows {
     lines: Vec<u64>,
     /// Where the file says it.
     sequence: Vec<i64>,
@@ -79,7 +79,7 @@ impl HeldRows {
             places: binding.filled.clone(),
             texts: texts.collect(),
             targets: binding.points.len(),
-            own: Some(OwnRows::default()),
+            written: Some(WrittenRows::default()),
             has_partners,
             most,
             ..Self::default()
@@ -88,7 +88,7 @@ impl HeldRows {
 
     /// Takes the present row of a file.
     pub(super) fn push(&mut self, open: &OpenedFile, judged: &Result<(), RowRefusal>) {
-        if self.own.is_none() && !self.has_partners {
+        if self.written.is_none() && !self.has_partners {
             return;
         }
         let row = &open.row;
@@ -100,21 +100,26 @@ impl HeldRows {
         self.texts
             .iter_mut()
             .for_each(|(place, texts)| texts.push(row.texts[*place].as_bytes()));
-        let Some(own) = &mut self.own else { return };
-        own.lines.push(row.line);
+        let Some(written) = &mut self.written else {
+            return;
+        };
+        written.lines.push(row.line);
         if open.binding().sequence.is_some() {
-            own.sequence.push(row.sequence.unwrap_or(i64::MIN));
+            written.sequence.push(row.sequence.unwrap_or(i64::MIN));
         }
-        own.records.push(open.text());
+        written.records.push(open.text());
         if let Err(refusal) = judged {
-            own.refused.insert(own.lines.len() - 1, refusal.clone());
+            written
+                .refused
+                .insert(written.lines.len() - 1, refusal.clone());
         }
         let texts: usize = self.texts.iter().map(|(_, texts)| texts.size()).sum();
-        let refused = own.refused.len() * 128 + own.records.size() + 16 * own.lines.len();
+        let refused =
+            written.refused.len() * 128 + written.records.size() + 16 * written.lines.len();
         if 8 * self.values.len() + 24 * self.points.len() + self.ids.size() + texts + refused
             > self.most
         {
-            self.own = None;
+            self.written = None;
             if !self.has_partners {
                 *self = Self::default();
             }
@@ -123,14 +128,18 @@ impl HeldRows {
 
     /// The text of a row in this place of its texts.
     pub(super) fn text(&self, place: usize, at: usize) -> Option<&str> {
-        self.texts.iter().find(|(own, _)| *own == place)?.1.get(at)
+        self.texts
+            .iter()
+            .find(|(of_text, _)| *of_text == place)?
+            .1
+            .get(at)
     }
 
     /// The rows; none where the file must be read again.
     pub(super) fn rows(&self, row: RecordedRow) -> Option<HeldReading<'_>> {
         Some(HeldReading {
             held: self,
-            own: self.own.as_ref()?,
+            written: self.written.as_ref()?,
             row,
         })
     }
@@ -139,7 +148,7 @@ impl HeldRows {
 /// Hands out the rows of a file.
 pub(super) struct HeldReading<'a> {
     held: &'a HeldRows,
-    own: &'a OwnRows,
+    written: &'a WrittenRows,
     row: RecordedRow,
 }
 
@@ -160,7 +169,7 @@ impl RowSource<'_> {
     pub(super) fn text(&self) -> &[u8] {
         match self {
             Self::Held(held) => held
-                .own
+                .written
                 .records
                 .bytes(held.row.number as usize - 1)
                 .unwrap_or_default(),
@@ -180,7 +189,7 @@ impl HeldReading<'_> {
     fn next(&mut self) -> Option<Result<(), RowRefusal>> {
         let (held, row) = (self.held, &mut self.row);
         let at = row.number as usize;
-        row.line = *self.own.lines.get(at)?;
+        row.line = *self.written.lines.get(at)?;
         row.number += 1;
         let width = held.places.len();
         for (place, value) in held.places.iter().zip(&held.values[at * width..]) {
@@ -198,12 +207,12 @@ impl HeldReading<'_> {
             .iter()
             .for_each(|(place, texts)| put(&mut row.texts[*place], texts));
         row.sequence = self
-            .own
+            .written
             .sequence
             .get(at)
             .copied()
             .filter(|number| *number != i64::MIN);
-        let refusal = self.own.refused.get(&at).cloned();
+        let refusal = self.written.refused.get(&at).cloned();
         Some(refusal.map_or(Ok(()), Err))
     }
 }

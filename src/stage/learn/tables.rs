@@ -4,8 +4,9 @@ use crate::error::Result;
 use crate::estimate::network::rivals::{RivalComparison, RivalContest};
 use crate::estimate::network::{JudgedRival, Phase, Rival, TrainingStep};
 use crate::stage::Context;
-use crate::table::{Corrections, CorrectionsRow, Training, TrainingRow};
-use crate::table::{Network, Prediction, Recording};
+use crate::table::{
+    Corrections, CorrectionsRow, Network, Prediction, Recording, Training, TrainingRow,
+};
 
 /// What the comparison comes to, for the person who waits.
 pub(super) fn sentence(comparison: &RivalComparison, learnt: bool) -> String {

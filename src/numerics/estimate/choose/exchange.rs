@@ -4,7 +4,8 @@
 //! round: determinants change by a constant only, and no digits are lost to ill-scaled parameters.
 
 use super::point_jacobian::{PointJacobian, factor, product};
-use crate::criteria::choose::{PASSES, RIDGE, WORTH};
+use super::subset;
+use crate::criteria::choose::{PASSES, RIDGE, STEPS, WORTH};
 use crate::estimate::factor::TriangularFactor;
 use crate::estimate::model::Model;
 use crate::estimate::triangle::axpy;
@@ -144,8 +145,8 @@ impl State {
     /// Takes a pose in (`sign` 1) or out (-1).
     fn update(&mut self, candidate: usize, sign: f64) {
         let wide = product(self.cover.as_ref(), self.block(candidate).transpose());
-        let own = Matrix3::from_fn(|a, c| self.spread[candidate][PLACE[a][c]]);
-        let Some(small) = (Matrix3::identity() * sign + own).try_inverse() else {
+        let seen = Matrix3::from_fn(|a, c| self.spread[candidate][PLACE[a][c]]);
+        let Some(small) = (Matrix3::identity() * sign + seen).try_inverse() else {
             return;
         };
         let small = Mat::from_fn(3, 3, |a, c| small[(a, c)]);
@@ -188,6 +189,23 @@ impl State {
 }
 
 impl Criterion {
+    /// The best poses of those drawn, then of their neighbours (`around`, within a step) until the steps are small.
+    pub fn choose(
+        &self,
+        model: &Model,
+        drawn: &Measurements,
+        count: usize,
+        mut around: impl FnMut(&Measurements, f64) -> Measurements,
+    ) -> Measurements {
+        let mut poses = subset(drawn, &self.exchange(model, drawn, &[], count));
+        let start: Vec<usize> = (0..count).collect();
+        for step in *STEPS {
+            let pool = around(&poses, step);
+            poses = subset(&pool, &self.exchange(model, &pool, &start, count));
+        }
+        poses
+    }
+
     /// `count` rows of the pool, from `start` or, where that is shorter, filled up greedily.
     pub fn exchange(
         &self,

@@ -21,7 +21,7 @@ pub use t_optimal::{
 };
 
 use super::model::Model;
-use crate::criteria::choose::{RANDOM_SETS, STEPS, WORKSPACE};
+use crate::criteria::choose::{RANDOM_SETS, WORKSPACE};
 use crate::robot::{Measurements, Named};
 use crate::statistics::nearest;
 use exchange::{Criterion, DesignTerm};
@@ -97,14 +97,7 @@ pub fn propose(model: Model, site: &Site, wish: &DesignRequest) -> Result<Propos
         wish.sigma,
         wish.seed ^ *WORKSPACE as u64,
     )?;
-    if drawn.rows() < 2 * wish.count {
-        return Err(format!(
-            "{} candidates are few for {} poses: take at least {}",
-            drawn.rows(),
-            wish.count,
-            20 * wish.count
-        ));
-    }
+    enough(&drawn, wish)?;
     drawn.points.position = model.predict(&drawn);
     let all: Vec<usize> = (0..model.stack.specs().len()).collect();
     let orders: Vec<(f64, Vec<usize>)> = match &wish.aim {
@@ -139,18 +132,10 @@ pub fn propose(model: Model, site: &Site, wish: &DesignRequest) -> Result<Propos
             .ok_or("the candidate poses do not separate the parameters")?,
     };
 
-    let chosen = criterion.exchange(&model, &drawn, &[], wish.count);
-    let mut poses = subset(&drawn, &chosen);
     let mut draw = ChaCha8Rng::seed_from_u64(wish.seed.wrapping_add(1));
-    for step in *STEPS {
-        let pool = site.around(&model.robot, &poses, step, &mut draw);
-        let start: Vec<usize> = (0..wish.count).collect();
-        poses = subset(
-            &pool,
-            &criterion.exchange(&model, &pool, &start, wish.count),
-        );
-    }
-    let mut poses = subset(&poses, &visit_order::order(&poses, &site.ranges));
+    let around = |poses: &Measurements, step| site.around(&model.robot, poses, step, &mut draw);
+    let mut poses = criterion.choose(&model, &drawn, wish.count, around);
+    poses = subset(&poses, &visit_order::order(&poses, &site.ranges));
     poses.points.position = model.predict(&poses);
     let whole = whole.clone();
     let (direction, approach_seen) = visit_order::approach(&model, &whole, &poses, wish.seed);
@@ -176,6 +161,19 @@ pub fn propose(model: Model, site: &Site, wish: &DesignRequest) -> Result<Propos
         separation,
         workspace,
     })
+}
+
+/// Fails where the candidates are few.
+fn enough(drawn: &Measurements, wish: &DesignRequest) -> Result<(), String> {
+    if drawn.rows() >= 2 * wish.count {
+        return Ok(());
+    }
+    Err(format!(
+        "{} candidates are few for {} poses: take at least {}",
+        drawn.rows(),
+        wish.count,
+        20 * wish.count
+    ))
 }
 
 /// Positions in the stack of an effect's parameters.

@@ -7,8 +7,7 @@
 use super::exchange::{Criterion, DesignTerm};
 use super::point_jacobian::{PointJacobian, factor, gather};
 use super::site::{Circumstances, Site};
-use super::{DesignRequest, median, random_sets, subset, visit_order};
-use crate::criteria::choose::STEPS;
+use super::{DesignRequest, enough, median, random_sets, subset, visit_order};
 use crate::estimate::factor::TriangularFactor;
 use crate::estimate::model::Model;
 use crate::robot::Measurements;
@@ -136,14 +135,7 @@ pub fn tell(
     let model = &problem.model;
     let mut draw = ChaCha8Rng::seed_from_u64(wish.seed.wrapping_add(1));
     let mut drawn = site.draw(&model.robot, wish.candidates, wish.sigma, wish.seed)?;
-    if drawn.rows() < 2 * wish.count {
-        return Err(format!(
-            "{} candidates are few for {} poses: take at least {}",
-            drawn.rows(),
-            wish.count,
-            20 * wish.count
-        ));
-    }
+    enough(&drawn, wish)?;
     circumstances.complete(&mut drawn, &mut draw);
     let views = [0, 1].map(|truth| View::of(problem, truth, data, rows));
     let all: Vec<Mat<f64>> = views
@@ -174,14 +166,13 @@ pub fn tell(
     let criterion = Criterion {
         terms: terms.into_iter().flatten().collect(),
     };
-    let mut poses = subset(&drawn, &criterion.exchange(model, &drawn, &[], wish.count));
-    for step in *STEPS {
-        let mut pool = site.around(&model.robot, &poses, step, &mut draw);
+    let around = |poses: &Measurements, step| {
+        let mut pool = site.around(&model.robot, poses, step, &mut draw);
         circumstances.complete(&mut pool, &mut draw);
-        let start: Vec<usize> = (0..wish.count).collect();
-        poses = subset(&pool, &criterion.exchange(model, &pool, &start, wish.count));
-    }
-    let mut poses = subset(&poses, &visit_order::order(&poses, &site.ranges));
+        pool
+    };
+    let mut poses = criterion.choose(model, &drawn, wish.count, around);
+    poses = subset(&poses, &visit_order::order(&poses, &site.ranges));
     let separations = |poses: &Measurements| {
         [0, 1].map(|k: usize| views[k].separation(&views[k].jacobian.rows(model, poses)))
     };

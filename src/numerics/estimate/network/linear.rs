@@ -6,7 +6,7 @@
 
 use super::arm::ScrewArm;
 use super::basis::{BasisFunctions, BasisTerm};
-use super::training::TrainingSamples;
+use super::region::TrainingSamples;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::solvers::{Llt, Solve};
 use faer::linalg::triangular_inverse::invert_lower_triangular;
@@ -73,8 +73,8 @@ impl Linear {
                 let variances = variances(&llt);
                 let mut determined = 0.0;
                 for (g, alpha) in alpha.iter_mut().enumerate() {
-                    let own = (0..p).filter(|i| group[*i] == g);
-                    let (trace, squares) = own.fold((0.0, 0.0), |sum, i| {
+                    let terms = (0..p).filter(|i| group[*i] == g);
+                    let (trace, squares) = terms.fold((0.0, 0.0), |sum, i| {
                         (sum.0 + variances[i], sum.1 + x[i] * x[i])
                     });
                     let gamma = (counts[g] - *alpha * trace).clamp(1e-3, counts[g].max(1e-3));

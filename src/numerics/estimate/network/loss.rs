@@ -4,9 +4,9 @@
 //! joint motions: then `e = J y - target` with `J` of each row (Fig. 2 of Wang et al. 2020). Rows are evaluated in blocks, by the
 //! widest instructions of those that the machine and the compiler know; the result is the same with any.
 
-use super::perceptron::FARTHEST;
-use super::perceptron::{BLOCK, BlockColumn, LANES, LaneProduct, dot, sum};
-use super::perceptron::{LayerSizes, OUTPUTS};
+use super::perceptron::{
+    BLOCK, BlockColumn, FARTHEST, LANES, LaneProduct, LayerSizes, OUTPUTS, dot, sum,
+};
 use crate::estimate::swarm::Objective;
 use pulp::{Arch, Simd, WithSimd};
 

@@ -19,8 +19,7 @@ pub mod training;
 
 pub use arm::ScrewArm;
 pub use correction::{AppliedCorrection, Body, Correction, Feature, Map};
-pub use perceptron::Activation;
-pub use perceptron::{LayerSizes, OUTPUTS};
+pub use perceptron::{Activation, LayerSizes, OUTPUTS};
+pub use region::TrainingSamples;
 pub use rivals::{JudgedRival, Rival, compare};
-pub use training::TrainingSamples;
 pub use training::{Phase, Recipe, TrainingStart, TrainingStep, train};

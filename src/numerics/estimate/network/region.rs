@@ -1,14 +1,51 @@
-//! Where a correction is valid: the range of every source that it saw, and of all joints together.
+//! What a correction is learnt from, and where it is valid: the range of every source that it saw, and of all joints together.
 //!
 //! Outside it fades by the smoothstep `s^2 (3 - 2 s)`, `s = 1 - distance/margin`, per source and for Mahalanobis' distance of the
 //! joints, all multiplied: nothing is left one margin beyond any of them.
 
+use super::perceptron::OUTPUTS;
+use crate::robot::pose_groups::{NEAR, grouped};
 use nalgebra::DMatrix;
 
 /// The margin as a share of the range that was seen.
 const MARGIN: f64 = 0.1;
 /// The margin where a joint hardly moved, rad or m.
 const LEAST_MARGIN: f64 = 0.01;
+
+/// Rows to learn from: sources (joints, payload) and the residual to be explained, m.
+#[derive(Debug, Clone, Default)]
+pub struct TrainingSamples {
+    /// Inputs of each row: joints (rad or m), then payload (kg).
+    pub sources: Vec<Vec<f64>>,
+    /// Measured minus predicted of each row, m.
+    pub residual: Vec<[f64; OUTPUTS]>,
+}
+
+impl TrainingSamples {
+    /// How many rows.
+    pub fn rows(&self) -> usize {
+        self.residual.len()
+    }
+    /// The pose of each row, numbered in the order of their first rows: several targets measured in one pose share it.
+    pub fn poses(&self) -> Vec<usize> {
+        let rows: Vec<usize> = (0..self.rows()).collect();
+        let mut number = vec![0; self.rows()];
+        // A payload (kg) as near as joints (rad, m) are is the same one.
+        let poses = grouped(&rows, |row| &self.sources[row], NEAR, |_, _| true);
+        for (pose, rows) in poses.iter().enumerate() {
+            rows.iter().for_each(|row| number[*row] = pose);
+        }
+        number
+    }
+
+    /// Some of the rows.
+    pub fn pick(&self, rows: &[usize]) -> Self {
+        Self {
+            sources: rows.iter().map(|r| self.sources[*r].clone()).collect(),
+            residual: rows.iter().map(|r| self.residual[*r]).collect(),
+        }
+    }
+}
 
 /// The range of a source that the training saw, and how far beyond it the correction is gone.
 #[derive(Debug, Clone, Copy, PartialEq)]

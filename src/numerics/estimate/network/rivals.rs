@@ -8,8 +8,7 @@ use super::basis::{curves, harmonics};
 use super::correction::{Body, Correction};
 use super::linear::Linear;
 use super::process::Process;
-use super::region::Region;
-use super::training::TrainingSamples;
+use super::region::{Region, TrainingSamples};
 use super::training::{Recipe, TrainingStart, TrainingStep, dressed, train};
 use crate::estimate::swarm::{Algorithm, Generation};
 use crate::estimate::threads::in_order;
@@ -259,10 +258,10 @@ pub fn compare(
             .map(|folds| together(folds, &before, &poses).map_or(f64::NAN, |j| j.mean()))
             .collect();
         if let Some(best) = (0..grid.len()).min_by(|a, b| errors[*a].total_cmp(&errors[*b])) {
-            let own = entered
+            let of_network = entered
                 .iter_mut()
                 .filter(|(rival, _)| rival.start().is_some_and(|start| kind(start) == *rival));
-            own.for_each(|(_, recipe)| *recipe = grid[best].1.clone());
+            of_network.for_each(|(_, recipe)| *recipe = grid[best].1.clone());
         }
     }
     let results = run(&tasks(&entered));
@@ -437,7 +436,7 @@ fn together(folds: &[Option<Done>], before: &[f64], poses: &[usize]) -> Option<J
     poses
         .iter()
         .zip(&gains)
-        .for_each(|(pose, own)| off[*pose] += own - gain);
+        .for_each(|(pose, error)| off[*pose] += error - gain);
     let (count, rows) = (off.len() as f64, gains.len() as f64);
     let sigma = (off.iter().map(|off| off * off).sum::<f64>() * count / (count - 1.0).max(1.0))
         .sqrt()

@@ -21,8 +21,8 @@ pub(super) fn apart(data: &Measurements, predicted: &[Vector3<f64>]) -> Vec<i64>
     for first in (0..predicted.len()).step_by(*STEP) {
         let last = (first + *STRETCH).min(predicted.len());
         let rows = last.saturating_sub(*STRETCH)..last;
-        let Some(own) =
-            AlignedStretch::fit(data, predicted, rows.clone(), 0).filter(|own| own.left > *NOMINAL)
+        let Some(unshifted) = AlignedStretch::fit(data, predicted, rows.clone(), 0)
+            .filter(|unshifted| unshifted.left > *NOMINAL)
         else {
             continue;
         };
@@ -32,7 +32,7 @@ pub(super) fn apart(data: &Measurements, predicted: &[Vector3<f64>]) -> Vec<i64>
         });
         if let Some((stretch, offset)) = tried.min_by(|a, b| a.0.left.total_cmp(&b.0.left))
             && stretch.left < *NOMINAL
-            && *SLIPPED_BETTER * stretch.left < own.left
+            && *SLIPPED_BETTER * stretch.left < unshifted.left
         {
             // Rows beside the slip may fit either way, since their joints stand in both places: those are right.
             let nearer = |row: &usize| stretch.nearer(data, predicted, *row, offset);

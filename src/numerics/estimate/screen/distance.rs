@@ -5,8 +5,7 @@
 
 use crate::criteria::screen::SOLE;
 use crate::estimate::model::Model;
-use crate::estimate::problem::Problem;
-use crate::estimate::problem::{HUBER, ObservationTerm};
+use crate::estimate::problem::{HUBER, ObservationTerm, Problem};
 use crate::observation::{KINDS, MeasurementKind, noise};
 use faer::Mat;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};

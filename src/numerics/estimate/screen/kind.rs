@@ -138,9 +138,9 @@ impl Index {
         let Some(point) = data.point(row) else {
             return Vec::new();
         };
-        let own = &standings[row];
+        let standing = &standings[row];
         let typical = median_sigma(standings, row);
-        let reach = (limit * typical * 3f64.sqrt()).min(own.residual.norm() / *BETTER);
+        let reach = (limit * typical * 3f64.sqrt()).min(standing.residual.norm() / *BETTER);
         let start = self.by_x.partition_point(|(x, _)| *x < point.x - reach);
         let slab = self.by_x[start..]
             .iter()

@@ -2,9 +2,8 @@
 
 use super::{
     BeeColony, BeetleAntennae, BeetleSwarm, Budget, Generation, Genetic, Method, Objective,
-    SearchBox, SwarmResult,
+    ParticleSwarm, SearchBox, SwarmResult, minimise,
 };
-use super::{ParticleSwarm, minimise};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -97,19 +97,19 @@ impl Method for BeetleSwarm {
         let limits: Vec<f64> = (0..search.bounds.dimensions())
             .map(|s| self.fastest * search.bounds.width(s))
             .collect();
-        for ((velocity, position), own) in swarm
+        for ((velocity, position), best) in swarm
             .velocities
             .iter_mut()
             .zip(&swarm.positions)
             .zip(&swarm.best)
         {
-            let goals = own.1.iter().zip(&search.best.1);
-            for (((v, x), (own, group)), limit) in
+            let goals = best.1.iter().zip(&search.best.1);
+            for (((v, x), (best, group)), limit) in
                 velocity.iter_mut().zip(position).zip(goals).zip(&limits)
             {
-                let own = self.c1 * search.rng.random::<f64>() * (own - x);
+                let individual = self.c1 * search.rng.random::<f64>() * (best - x);
                 let group = self.c2 * search.rng.random::<f64>() * (group - x);
-                *v = (inertia * *v + own + group).clamp(-limit, *limit);
+                *v = (inertia * *v + individual + group).clamp(-limit, *limit);
             }
         }
         let half = swarm.antenna / 2.0;

@@ -76,12 +76,12 @@ impl Method for ParticleSwarm {
             velocities,
             best,
         } = swarm;
-        for ((position, velocity), own) in positions.iter_mut().zip(velocities).zip(best.iter()) {
+        for ((position, velocity), best) in positions.iter_mut().zip(velocities).zip(best.iter()) {
             for (s, v) in velocity.iter_mut().enumerate() {
-                let own = self.c1 * search.rng.random::<f64>() * (own.1[s] - position[s]);
+                let individual = self.c1 * search.rng.random::<f64>() * (best.1[s] - position[s]);
                 let group = self.c2 * search.rng.random::<f64>() * (search.best.1[s] - position[s]);
                 let limit = self.fastest * search.bounds.width(s);
-                *v = (inertia * *v + own + group).clamp(-limit, limit);
+                *v = (inertia * *v + individual + group).clamp(-limit, limit);
                 position[s] += *v;
             }
             search.bounds.clamp(position);

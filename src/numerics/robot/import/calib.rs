@@ -24,7 +24,8 @@ struct FileUnits {
     angle: Unit,
 }
 
-pub(super) fn read(file: RobotFileText, urdf: Option<RobotFileText>) -> Result<Imported> {
+/// Reads calib's robot file; `urdf` is the file that `kinematics.urdf` refers to. Fails with every fault of the file.
+pub fn read(file: RobotFileText, urdf: Option<RobotFileText>) -> Result<Imported> {
     let (node, faults) = Faults::parse(file)?;
     let root = DocumentNode::root(&node, &faults).map(&[
         "calib_robot",
@@ -353,14 +354,14 @@ fn distinct(root: &DocumentNode, joints: &[JointDescription]) {
                 .get("joints")
                 .given()
                 .map_or_else(Vec::new, DocumentNode::items);
-            let own = |k: usize| {
+            let column = |k: usize| {
                 places
                     .get(k)
                     .map(|value| value.get("name"))
                     .filter(|name| name.given().is_some())
             };
             // A name that was not given is `J` and the joint's number: the other one has taken it.
-            let (at, other) = own(k).map_or_else(|| (own(other), k), |at| (Some(at), other));
+            let (at, other) = column(k).map_or_else(|| (column(other), k), |at| (Some(at), other));
             let message = format!(
                 "joint {} is called `{}` too; expected a name of its own",
                 other + 1,

@@ -35,7 +35,8 @@ const KEYS: [&str; 19] = [
 ];
 const TOLERANCE: [&str; 3] = ["mass_rel", "com_mm", "inertia_rel"];
 
-pub(super) fn read(file: RobotFileText) -> Result<Imported> {
+/// Reads a practice `robot.json` (mm, kg, Nm/A; couplings as pairs from 0). Fails with every fault of the file.
+pub fn read(file: RobotFileText) -> Result<Imported> {
     let (node, faults) = Faults::parse(file)?;
     let root = DocumentNode::root(&node, &faults).open_map(&KEYS);
     let axes = root.get("axes").items();

@@ -4,11 +4,12 @@
 //! its line and its path (`robot.yaml:12:5: joints[2].limits`, counted from 0 as in the YAML), a URDF with its line alone.
 
 pub use about::About;
+pub use calib::read as read_calib;
+pub use case::read as read_case;
 pub use inertia::impossible_inertia;
-pub use urdf::UrdfOutline;
+pub use urdf::{UrdfOutline, outline as urdf_outline};
 
 use crate::description::{InertiaMoments, JointKind, RobotDescription};
-use crate::error::Result;
 use nalgebra::{Isometry3, Point3, Vector3};
 
 mod about;
@@ -40,21 +41,6 @@ pub struct Imported {
     pub notes: Vec<String>,
     /// What the file says of itself.
     pub about: About,
-}
-
-/// Reads calib's robot file; `urdf` is the file that `kinematics.urdf` refers to. Fails with every fault of the file.
-pub fn read_calib(file: RobotFileText, urdf: Option<RobotFileText>) -> Result<Imported> {
-    calib::read(file, urdf)
-}
-
-/// Where the chain of a URDF begins that ends at the link `tip`, and which of its joints slide. Fails with every fault of the file.
-pub fn urdf_outline(file: RobotFileText, tip: &str) -> Result<UrdfOutline> {
-    urdf::outline(file, tip)
-}
-
-/// Reads a practice `robot.json` (mm, kg, Nm/A; couplings as pairs from 0). Fails with every fault of the file.
-pub fn read_case(file: RobotFileText) -> Result<Imported> {
-    case::read(file)
 }
 
 /// What every kinematic format is converted to: joints and frames at the zero pose in the base frame, SI.

@@ -54,9 +54,9 @@ pub(super) fn read(file: RobotFileText, base: &str, tip: &str) -> Result<FrameCh
     }
 }
 
-/// The first link of the chain that ends at `tip`, and which of its joints slide: the link `base_link` where it stands on the way, else the
-/// one that nothing carries. Fails as [`read`] does.
-pub(super) fn outline(file: RobotFileText, tip: &str) -> Result<UrdfOutline> {
+/// The first link of the chain of a URDF that ends at `tip`, and which of its joints slide: the link `base_link` where it stands on the way,
+/// else the one that nothing carries. Fails with every fault of the file.
+pub fn outline(file: RobotFileText, tip: &str) -> Result<UrdfOutline> {
     let document = Document::parse(file.text)
         .map_err(|e| Error::spec(file.label, format!("not readable as XML: {e}")))?;
     let joints = document

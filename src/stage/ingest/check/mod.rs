@@ -2,13 +2,11 @@
 
 mod files;
 
-use super::Ingest;
 use super::clock::CLOCK;
 use super::columns::Columns;
-use super::later;
 use super::layout::{FileLayout, HELD, SIMULATED, WideTargets};
 use super::mapped::{ColumnRef, ConventionColumns, JointColumns, ScalarColumn, TextColumn};
-use super::noise;
+use super::{Ingest, later, noise};
 use crate::error::{Place, counted, did_you_mean};
 use crate::observation::{Conventions, DeclaredColumn, KINDS, MeasurementKind, Part};
 use crate::raw::Delimiter;
