@@ -239,11 +239,11 @@ fn next(input: &mut dyn BufRead, place: &str) -> Result<Option<String>> {
 /// Where a field stands in its line, and its text without quotes.
 pub(super) type TextField<'t> = (Range<usize>, Cow<'t, str>);
 
-/// The fields of a line. Fails where a quote is not closed.
+/// The fields of a line. Fails where its quotes are not well formed.
 pub(super) fn fields(line: &str, delimiter: char) -> Result<Vec<TextField<'_>>, String> {
-    let (places, open) = raw::fields(line, Delimiter::Byte(delimiter as u8));
-    match open {
-        Some(at) => Err(format!("column {}: `\"` is not closed on its line", at + 1)),
+    let (places, fault) = raw::fields(line, Delimiter::Byte(delimiter as u8));
+    match fault {
+        Some((at, why)) => Err(format!("column {}: {why}", at + 1)),
         None => Ok(places
             .into_iter()
             .map(|place| (place.clone(), unquoted_text(&line[place])))
