@@ -1,13 +1,23 @@
 //! What can be seen of a plan's input files without running it: the robot, the headers of the data. All faults at once.
+//!
+//! What a run would do, without doing it.
+//!
+//! Sets that a stage names and no split deals rows to, as far as the settings alone say it.
 
-use super::plan::{InputFile, PlannedStage};
-use super::{Override, Plan, services, spec};
-use crate::error::{Error, Fault, Result};
+use super::plan::{InputFile, PlannedStage, Selection};
+use super::run_state::{KeyState, RunState};
+use super::spec::{self, StageDraft};
+use super::wiring::Input;
+use super::{Override, Plan, reason, services};
+use crate::error::{Error, Fault, Result, instead};
 use crate::raw;
 use crate::stage::{
     Context, InputTable, OpenedInput, Output, RawFile, STAGES, Services, Sink, StageEntry,
 };
 use crate::store::frame::Frame;
+use crate::store::{Lookup, Store};
+use crate::yaml::Trouble;
+use serde::Serialize;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
@@ -175,4 +185,124 @@ impl Services for Onlooker<'_> {
             .unwrap_or_else(PoisonError::into_inner)
             .push(line);
     }
+}
+
+/// What would become of a stage.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case", tag = "status")]
+pub enum Prospect {
+    /// Its tables are there.
+    Cached,
+    /// It would run.
+    Run {
+        /// Why.
+        reason: String,
+    },
+    /// Not known before another stage has run.
+    Pending {
+        /// Ids of stages.
+        on: String,
+    },
+    /// Outside of `--only`, `--from`, `--until`, and not cached.
+    NotSelected,
+}
+
+/// What a run would do with a stage.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Forecast {
+    /// In the pipeline.
+    pub id: String,
+    /// Its kind.
+    pub uses: String,
+    /// Whether it would run.
+    #[serde(flatten)]
+    pub prospect: Prospect,
+}
+
+/// What a run would do, stage by stage. Fails where files cannot be read.
+pub fn preview(plan: &Plan, store: &Store, selection: &Selection) -> Result<Vec<Forecast>> {
+    let selected = selection.of(plan)?;
+    let mut state = RunState::new(plan);
+    let mut forecasts = Vec::new();
+    for (index, stage) in plan.stages.iter().enumerate() {
+        let inside = selected.stages.contains(&index);
+        let prospect = match state.key(index)? {
+            KeyState::Pending(on) if inside => Prospect::Pending {
+                on: plan.stages[on].id.clone(),
+            },
+            KeyState::Pending(_) => Prospect::NotSelected,
+            KeyState::Known(key) => match store.action(&key)? {
+                Lookup::Done(record) if !selected.forces(index) => {
+                    state.tables[index] = Some(record.tables);
+                    Prospect::Cached
+                }
+                _ if !inside => Prospect::NotSelected,
+                found => Prospect::Run {
+                    reason: reason::why(store, plan, &key, &found, selected.forces(index))?,
+                },
+            },
+        };
+        forecasts.push(Forecast {
+            id: stage.id.clone(),
+            uses: stage.entry.name.into(),
+            prospect,
+        });
+    }
+    Ok(forecasts)
+}
+
+/// The kind of the tables that deal rows to sets.
+const KIND: &str = "split";
+
+/// The names of sets in the settings of a stage that is wired to `inputs` which cannot be right.
+pub(super) fn unknown(stages: &[StageDraft], index: usize, inputs: &[Input]) -> Vec<Trouble> {
+    let stage = &stages[index];
+    let Some(dealt) = dealt(&stages[..index], inputs) else {
+        return Vec::new();
+    };
+    let names: Vec<&str> = dealt.iter().map(String::as_str).collect();
+    let wrong = stage
+        .sets
+        .iter()
+        .filter(|set| !names.contains(&set.name.as_str()));
+    let troubles = wrong.map(|set| {
+        let allowed = instead(&set.name, &names);
+        let message = if set.given {
+            format!("no set `{}` in the split{allowed}", set.name)
+        } else {
+            format!(
+                "not given, which means `{}`: no set of the split{allowed}",
+                set.name
+            )
+        };
+        Trouble::new(message).at(set.mark).below(&set.place)
+    });
+    troubles.collect()
+}
+
+/// The sets of the split that a stage reads, of one that reads none those of all splits before it; none where only the data say them.
+fn dealt(earlier: &[StageDraft], inputs: &[Input]) -> Option<Vec<String>> {
+    let splits: Vec<usize> = match inputs.iter().find(|input| input.port.kind == KIND) {
+        Some(input) => input.from.iter().map(|origin| origin.stage).collect(),
+        None => (0..earlier.len())
+            .filter(|stage| deals(&earlier[*stage]))
+            .collect(),
+    };
+    // Without a split the wiring has its say, and a stage that is not known may be one.
+    if splits.is_empty() || earlier.iter().any(|stage| stage.entry.is_none()) {
+        return None;
+    }
+    let mut sets = Vec::new();
+    for split in splits {
+        sets.extend(earlier.get(split)?.stage.as_ref()?.sets_dealt()?);
+    }
+    sets.sort_unstable();
+    sets.dedup();
+    Some(sets)
+}
+
+fn deals(stage: &StageDraft) -> bool {
+    stage
+        .entry
+        .is_some_and(|entry| (entry.writes)().iter().any(|port| port.kind == KIND))
 }

@@ -5,13 +5,9 @@
 //! visible by half, and what a power cut tears is told by its hash.
 
 pub mod actions;
-mod bucket;
-mod cell;
 mod check;
 pub mod content;
-mod decode;
 mod disk;
-mod durable;
 pub mod frame;
 pub mod key;
 mod notes;
@@ -21,38 +17,29 @@ pub mod runs;
 #[cfg(feature = "s3")]
 mod s3;
 pub mod schema;
-mod seal;
 mod sweep;
-mod table_ref;
-mod tags;
 mod verify;
-mod view;
-mod workspace;
 pub mod writer;
 
 pub use actions::{Account, ActionRecord, Lookup, PendingTable, Published};
-pub use bucket::Bucket;
-pub use content::TableHash;
+pub use content::{TableHash, TableRef};
 pub use key::{ActionId, FileHash, FileKey, KEY_FORMAT, ReadKey, StageKey};
 pub(crate) use reader::table_of_bytes;
 pub use reader::{Loose, PublishedTable, read_table};
+pub use remote::Bucket;
 pub use runs::{Link, Run, Sealed};
 pub use sweep::Sweep;
-pub use table_ref::TableRef;
 pub use verify::Verification;
 pub use writer::{FinishedFile, TableWriter};
 
+use crate::error::{Error, Result};
+use disk::{Durability, Workspace, make_dir, put_if_absent, refused, sync_dir, write_synced};
+use remote::Remote;
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
-
-use crate::error::{Error, Result};
-use disk::{make_dir, put_if_absent, refused, sync_dir, write_synced};
-use durable::Durability;
-use remote::Remote;
-use workspace::Workspace;
 
 /// The layout described above.
 const STORE_FORMAT: u32 = 1;

@@ -4,21 +4,22 @@
 //! So a killed machine leaves nothing visible by half, and another one goes on where it stopped. Runs and tags are fetched when the
 //! store is opened, records when they are looked up, tables when they are needed; what does not have the hash of its name is not taken.
 //! What is for people (`tables/`, `documents/`) lies in the folder alone, where every run puts it.
+//!
+//! What a store asks of object storage.
 
+use super::Store;
+use super::content::{TableRef, same_bytes};
+use super::disk::{
+    component, make_dir, make_read_only, place, put_if_absent, refused, together, write,
+};
+use crate::error::{Error, Result};
 use std::collections::BTreeSet;
-use std::fs;
+use std::fmt::Debug;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread;
 use std::time::Duration;
-
-use super::Store;
-use super::bucket::Bucket;
-use super::disk::{component, make_dir, make_read_only, place, put_if_absent, refused, write};
-use super::durable::together;
-use super::table_ref::{TableRef, same_bytes};
-use crate::error::{Error, Result};
+use std::{fs, thread};
 
 /// How often and at which distance a record is asked for that was there and is not: another machine's is being decided just now.
 const TRIES: u32 = 5;
@@ -319,4 +320,20 @@ fn below(folder: &Path, key: &str) -> Option<PathBuf> {
     key.split('/').try_fold(folder.to_path_buf(), |path, part| {
         Some(path.join(component(part).ok()?))
     })
+}
+
+/// Whole files under keys with slashes, as S3 has them; what is written is seen by all at once.
+pub trait Bucket: Debug + Send + Sync {
+    /// As a person writes it: `s3://bucket/prefix`.
+    fn name(&self) -> &str;
+    /// Fetches into a new file; false where there is nothing.
+    fn fetch(&self, key: &str, to: &Path) -> Result<bool>;
+    /// Writes a file over what may be there.
+    fn send(&self, from: &Path, key: &str) -> Result<()>;
+    /// Writes a small file where nothing is, decided once for all who try; false where something is.
+    fn create(&self, from: &Path, key: &str) -> Result<bool>;
+    /// Takes away; nothing where there is nothing.
+    fn remove(&self, key: &str) -> Result<()>;
+    /// Keys below a folder (all where it is empty) with their bytes, in order, `most` at most.
+    fn list(&self, folder: &str, most: usize) -> Result<Vec<(String, u64)>>;
 }

@@ -1,7 +1,12 @@
 //! A run as its manifest has it, and a stage of it.
+//!
+//! Why a stage ran, or did not.
+//!
+//! A pipeline as it was understood: its stages, what they read and write.
 
+use crate::audit::Explanation;
 use crate::error::counted;
-use crate::pipeline::{Manifest, RunStatus, StageReport};
+use crate::pipeline::{Manifest, Plan, RunStatus, StageReport, StageStatus};
 use crate::store::TableRef;
 
 /// A whole run.
@@ -169,4 +174,111 @@ pub fn status(manifest: &Manifest) -> &'static str {
         RunStatus::Done => "done",
         RunStatus::Failed => "failed",
     }
+}
+
+/// Why a stage ran, as text.
+pub fn explanation(explanation: &Explanation) -> String {
+    let stage = &explanation.stage;
+    let mut text = format!("{} in run {}: {}", stage.id, explanation.run, word(stage));
+    match (stage.status, &stage.reason) {
+        (StageStatus::Cached, _) => {
+            text.push_str(", all that it depends on was the same as in an earlier run\n")
+        }
+        (_, Some(reason)) => text.push_str(&format!(", because: {reason}\n")),
+        (_, None) => text.push('\n'),
+    }
+    let Some(before) = &explanation.before else {
+        return text + "no earlier run of this pipeline had this stage\n";
+    };
+    if explanation.changes.is_empty() {
+        return text + &format!("nothing that it depends on changed since run {before}\n");
+    }
+    text.push_str(&format!("since run {before}:\n"));
+    for change in &explanation.changes {
+        let writer = explanation
+            .writers
+            .iter()
+            .find(|(port, _)| change.what == "input" && *port == change.name);
+        let writer = writer.map_or_else(String::new, |(_, from)| format!(", written by {from}"));
+        let value = |value: &str| {
+            let cut: String = value.chars().take(60).collect();
+            // Of hashes the beginning says enough.
+            let hash = value.len() == 64 && value.chars().all(|c| c.is_ascii_hexdigit());
+            if hash {
+                value[..12].to_string()
+            } else if cut.len() < value.len() {
+                format!("{cut}…")
+            } else {
+                cut
+            }
+        };
+        text.push_str(&format!(
+            "  {} {}: {} -> {}{writer}\n",
+            change.what,
+            change.name,
+            value(&change.before),
+            value(&change.now)
+        ));
+    }
+    text
+}
+
+/// Stages with their tables and files, as `calib check` prints them.
+pub fn graph(plan: &Plan) -> String {
+    let mut text = format!(
+        "pipeline {}, seed {}, {}\n",
+        plan.name,
+        plan.seed,
+        counted(plan.stages.len(), "stage")
+    );
+    for stage in &plan.stages {
+        let uses = if stage.id == stage.entry.name {
+            String::new()
+        } else {
+            format!(" (uses {})", stage.entry.name)
+        };
+        text.push_str(&format!("\n{}{uses}: {}\n", stage.id, stage.entry.summary));
+        let width = stage
+            .inputs
+            .iter()
+            .map(|input| input.port.name.len())
+            .max()
+            .unwrap_or(0);
+        for input in &stage.inputs {
+            let from = input.from.iter().map(|origin| {
+                let writer = &plan.stages[origin.stage];
+                format!("{}.{}", writer.id, writer.outputs[origin.port].name)
+            });
+            let from: Vec<String> = from.collect();
+            let from = if from.is_empty() {
+                "(none)".into()
+            } else {
+                from.join(", ")
+            };
+            text.push_str(&format!(
+                "  reads   {:width$}  <- {from}\n",
+                input.port.name
+            ));
+        }
+        for file in &stage.files {
+            text.push_str(&format!(
+                "  file    {} = {}\n",
+                file.place,
+                file.path.display()
+            ));
+        }
+        let outputs: Vec<String> = stage
+            .outputs
+            .iter()
+            .map(|port| {
+                if port.name == port.kind {
+                    port.name.into()
+                } else {
+                    format!("{} ({})", port.name, port.kind)
+                }
+            })
+            .collect();
+        text.push_str(&format!("  writes  {}\n", outputs.join(", ")));
+    }
+    text
 }

@@ -78,16 +78,12 @@ const EXAMPLES: &str = "Examples:
   calib fleet run FLEET.yaml --robot 'cell 4' --robot r7 -j 1
   calib fleet run FLEET.yaml --engine slurm --partition main --robots-per-task 4 --store /shared/store";
 
-pub(super) fn main(arguments: &FleetRunArguments, command_line: &[OsString]) -> Result<()> {
-    let store = arguments.place.store()?;
-    let fleet = Fleet::load(&arguments.place.fleet, &store)?;
-    run(
-        &fleet,
-        &store,
-        &arguments.place,
-        &arguments.how,
-        command_line,
-    )
+impl FleetRunArguments {
+    pub fn run(&self, command_line: &[OsString]) -> Result<()> {
+        let store = self.place.store()?;
+        let fleet = Fleet::load(&self.place.fleet, &store)?;
+        run(&fleet, &store, &self.place, &self.how, command_line)
+    }
 }
 
 pub(super) fn retry(arguments: &RetryArguments, command_line: &[OsString]) -> Result<()> {
