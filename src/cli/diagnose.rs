@@ -3,7 +3,7 @@
 use super::pipeline_arguments::{CommandTask, ExecutionArguments, reported_as, shown};
 use super::run::WRONG_SETUP;
 use super::surroundings::columns;
-use super::{complain, emit_json, emit_lines};
+use super::{emit_json, emit_lines};
 use crate::audit::{diagnosis, the_stage};
 use crate::error::{Error, Result};
 use crate::pipeline::{Purpose, Selection};
@@ -62,11 +62,8 @@ const EXAMPLES: &str = "Examples:
 
 impl DiagnoseArguments {
     /// Gives the exit code: 10 where the set-up is wrong, whatever else was asked for.
-    pub fn run(&self, command_line: &[OsString]) -> u8 {
-        match reported_as(self.json, execute(self, command_line)) {
-            Ok(code) => code,
-            Err(error) => complain(&error),
-        }
+    pub fn run(&self, command_line: &[OsString]) -> Result<u8> {
+        reported_as(self.json, execute(self, command_line))
     }
 }
 
@@ -127,7 +124,7 @@ fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<u
         emit_json(&diagnosis.document(&store))?;
     } else {
         let text = if arguments.details {
-            diagnosis.text(&store)
+            diagnosis.text(&store)?
         } else {
             diagnosis.short(&store, columns())
         };

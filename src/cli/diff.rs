@@ -81,14 +81,13 @@ const EXAMPLES: &str = "Examples:
 Exit codes: 0 same; 1 different beyond tolerance; 2 could not compare, or keys that occur twice.";
 
 impl DiffArguments {
-    pub fn run(&self) -> u8 {
+    pub fn run(&self) -> Result<u8> {
         match execute(self) {
-            Ok(code) => code,
-            Err(error @ Error::Bug(_)) => complain(&error),
-            Err(error) => {
+            Err(error) if !matches!(error, Error::Bug(_)) => {
                 complain(&error);
-                2
+                Ok(2)
             }
+            other => other,
         }
     }
 }

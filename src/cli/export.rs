@@ -2,8 +2,8 @@
 //!
 //! `calib check-export`: whether a file in the field belongs to this robot and this model.
 
+use super::emit;
 use super::pipeline_arguments::ModelArguments;
-use super::{complain, emit};
 use crate::error::{Error, Result};
 use crate::export::{Belonging, CarriedTorques, Export, FORMATS, Format};
 use crate::pipeline::Purpose;
@@ -116,52 +116,49 @@ const CHECK_EXAMPLES: &str = "Examples:
 Exit codes: 0 it is; 1 it is that of another robot or model, or was edited; 10 it is no export.";
 
 impl CheckExportArguments {
-    pub fn run(&self, command_line: &[OsString]) -> u8 {
-        execute(self, command_line).unwrap_or_else(|error| complain(&error))
+    pub fn run(&self, command_line: &[OsString]) -> Result<u8> {
+        let label = self.file.display().to_string();
+        let text = raw::text(&self.file).map_err(|error| Error::unreadable(&label, &error))?;
+        let identified = self.model.load(Purpose::Export, command_line)?;
+        let origin = identified.origin.clone();
+        // Nothing is written here: a format that holds the arm badly may have been insisted on.
+        let export = Export::of(identified, true);
+        let serial =
+            |serial: &Option<String>| serial.clone().unwrap_or_else(|| "not stated".into());
+        let (statement, code) = match export.check(&label, &text)? {
+            Belonging::Same(mark) => (
+                format!(
+                    "is the export of {origin}: {}, model {}, robot serial {}",
+                    mark.format,
+                    mark.model,
+                    serial(&mark.serial)
+                ),
+                0,
+            ),
+            Belonging::Edited(mark, line) => (
+                format!(
+                    "line {line} is not as {origin} (model {}) exports it: the file was edited, or another version wrote it",
+                    mark.model
+                ),
+                1,
+            ),
+            Belonging::Other(file, own) if file.serial != own.serial => (
+                format!(
+                    "is of the robot with serial {}; that of {origin} is {}",
+                    serial(&file.serial),
+                    serial(&own.serial)
+                ),
+                1,
+            ),
+            Belonging::Other(file, own) => (
+                format!(
+                    "is of the model {}; that of {origin} is {}",
+                    file.model, own.model
+                ),
+                1,
+            ),
+        };
+        emit(&format!("{label}: {statement}\n"))?;
+        Ok(code)
     }
-}
-
-fn execute(arguments: &CheckExportArguments, command_line: &[OsString]) -> Result<u8> {
-    let label = arguments.file.display().to_string();
-    let text = raw::text(&arguments.file).map_err(|error| Error::unreadable(&label, &error))?;
-    let identified = arguments.model.load(Purpose::Export, command_line)?;
-    let origin = identified.origin.clone();
-    // Nothing is written here: a format that holds the arm badly may have been insisted on.
-    let export = Export::of(identified, true);
-    let serial = |serial: &Option<String>| serial.clone().unwrap_or_else(|| "not stated".into());
-    let (statement, code) = match export.check(&label, &text)? {
-        Belonging::Same(mark) => (
-            format!(
-                "is the export of {origin}: {}, model {}, robot serial {}",
-                mark.format,
-                mark.model,
-                serial(&mark.serial)
-            ),
-            0,
-        ),
-        Belonging::Edited(mark, line) => (
-            format!(
-                "line {line} is not as {origin} (model {}) exports it: the file was edited, or another version wrote it",
-                mark.model
-            ),
-            1,
-        ),
-        Belonging::Other(file, own) if file.serial != own.serial => (
-            format!(
-                "is of the robot with serial {}; that of {origin} is {}",
-                serial(&file.serial),
-                serial(&own.serial)
-            ),
-            1,
-        ),
-        Belonging::Other(file, own) => (
-            format!(
-                "is of the model {}; that of {origin} is {}",
-                file.model, own.model
-            ),
-            1,
-        ),
-    };
-    emit(&format!("{label}: {statement}\n"))?;
-    Ok(code)
 }

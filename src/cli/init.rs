@@ -1,6 +1,6 @@
 //! `calib init`: a commented robot file and pipeline to start from, made for the columns of one's own files.
 
-use super::{complain, emit};
+use super::emit;
 use crate::error::{Error, Result};
 use crate::init::{InitRequest, KINDS, RobotFileKind, StarterFiles, start};
 use crate::robot::LIBRARY;
@@ -55,24 +55,22 @@ fn kinds() -> impl TypedValueParser<Value = RobotFileKind> {
 
 impl InitArguments {
     /// Gives the exit code: 1 where nothing was understood of the recordings.
-    pub fn run(&self) -> u8 {
-        match execute(self) {
-            Ok(start) if start.understood_nothing() => {
-                let files: Vec<String> = start
-                    .accounts
-                    .iter()
-                    .map(|(path, _)| path.display().to_string())
-                    .collect();
-                let message = format!(
-                    "neither joints nor a measured point were recognised in {}: name the columns where it says REPLACE",
-                    files.join(" and ")
-                );
-                let _ = writeln!(std::io::stderr(), "error: {message}");
-                1
-            }
-            Ok(_) => 0,
-            Err(error) => complain(&error),
+    pub fn run(&self) -> Result<u8> {
+        let start = execute(self)?;
+        if !start.understood_nothing() {
+            return Ok(0);
         }
+        let files: Vec<String> = start
+            .accounts
+            .iter()
+            .map(|(path, _)| path.display().to_string())
+            .collect();
+        let message = format!(
+            "neither joints nor a measured point were recognised in {}: name the columns where it says REPLACE",
+            files.join(" and ")
+        );
+        let _ = writeln!(std::io::stderr(), "error: {message}");
+        Ok(1)
     }
 }
 

@@ -2,7 +2,7 @@
 //! was written), `calib gc` takes away tables that no kept run needs.
 
 use super::surroundings::{bucket, default_store, now, open_store};
-use super::{complain, emit, emit_json};
+use super::{emit, emit_json};
 use crate::audit::kept_actions;
 use crate::error::{Error, Result, counted};
 use crate::pipeline::find_run;
@@ -134,34 +134,30 @@ pub(super) struct VerifyArguments {
 }
 
 impl VerifyArguments {
-    pub fn run(&self) -> u8 {
-        execute(self).unwrap_or_else(|error| complain(&error))
+    pub fn run(&self) -> Result<u8> {
+        let root = self.store.clone().unwrap_or_else(default_store);
+        if bucket(&root).is_none() && !root.is_dir() {
+            return Err(Error::spec(
+                root.display().to_string(),
+                "no store here; name one with --store DIR",
+            ));
+        }
+        let found = match open_store(Some(&root)) {
+            Ok(store) => store.verify()?,
+            // The format file itself may be what was damaged.
+            Err(Error::Store(fault)) => Verification {
+                faults: vec![fault],
+                ..Verification::default()
+            },
+            Err(other) => return Err(other),
+        };
+        if self.json {
+            emit_json(&found)?;
+        } else {
+            emit(&text(&found))?;
+        }
+        Ok(u8::from(!found.faults.is_empty()))
     }
-}
-
-fn execute(arguments: &VerifyArguments) -> Result<u8> {
-    let root = arguments.store.clone().unwrap_or_else(default_store);
-    if bucket(&root).is_none() && !root.is_dir() {
-        return Err(Error::spec(
-            root.display().to_string(),
-            "no store here; name one with --store DIR",
-        ));
-    }
-    let found = match open_store(Some(&root)) {
-        Ok(store) => store.verify()?,
-        // The format file itself may be what was damaged.
-        Err(Error::Store(fault)) => Verification {
-            faults: vec![fault],
-            ..Verification::default()
-        },
-        Err(other) => return Err(other),
-    };
-    if arguments.json {
-        emit_json(&found)?;
-    } else {
-        emit(&text(&found))?;
-    }
-    Ok(u8::from(!found.faults.is_empty()))
 }
 
 fn text(found: &Verification) -> String {

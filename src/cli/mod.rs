@@ -126,16 +126,16 @@ fn with_nearest_verb(mut error: clap::Error) -> clap::Error {
 
 fn done(verb: Verb, arguments: &[OsString]) -> u8 {
     let result = match verb {
-        Verb::Run(verb) => return verb.run(arguments),
-        Verb::CheckExport(verb) => return verb.run(arguments),
+        Verb::Run(verb) => return coded(verb.run(arguments)),
+        Verb::CheckExport(verb) => return coded(verb.run(arguments)),
         Verb::Check(verb) => verb.run(arguments),
         Verb::Compensate(verb) => verb.run(arguments),
         Verb::Effects(verb) => verb.run(),
-        Verb::Diagnose(verb) => return verb.run(arguments),
-        Verb::Diff(verb) => return verb.run(),
+        Verb::Diagnose(verb) => return coded(verb.run(arguments)),
+        Verb::Diff(verb) => return coded(verb.run()),
         Verb::Fleet(verb) => verb.run(arguments),
         Verb::Export(verb) => verb.run(arguments),
-        Verb::Init(verb) => return verb.run(),
+        Verb::Init(verb) => return coded(verb.run()),
         Verb::Excite(verb) => verb.run(),
         Verb::Explain(verb) => verb.run(),
         Verb::Gc(verb) => verb.run(),
@@ -151,13 +151,15 @@ fn done(verb: Verb, arguments: &[OsString]) -> u8 {
         Verb::Show(verb) => verb.run(),
         Verb::Simulate(verb) => verb.run(arguments),
         Verb::Tag(verb) => verb.run(),
-        Verb::Verify(verb) => return verb.run(),
+        Verb::Verify(verb) => return coded(verb.run()),
         Verb::VerifyRobot(verb) => verb.run(arguments),
     };
-    match result {
-        Ok(()) => 0,
-        Err(error) => complain(&error),
-    }
+    coded(result.map(|()| 0))
+}
+
+/// The exit code of what a verb did.
+fn coded(result: Result<u8>) -> u8 {
+    result.unwrap_or_else(|error| complain(&error))
 }
 
 /// Says what went wrong, and with which exit code.

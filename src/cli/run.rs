@@ -4,7 +4,7 @@
 
 use super::pipeline_arguments::{CommandTask, ExecutionArguments, PipelineArguments};
 use super::surroundings::columns;
-use super::{complain, emit, emit_json, emit_lines};
+use super::{emit, emit_json, emit_lines};
 use crate::error::{Error, Result, counted};
 use crate::identified::{standing_of, wrong_setup_of};
 use crate::init::{MarkedLines, marked};
@@ -67,11 +67,8 @@ const EXAMPLES: &str = "Examples:
   calib run pipeline.yaml --json --quiet > result.json";
 
 impl RunArguments {
-    pub fn run(&self, command_line: &[OsString]) -> u8 {
-        match self.shared.reported(execute(self, command_line)) {
-            Ok(code) => code,
-            Err(error) => complain(&error),
-        }
+    pub fn run(&self, command_line: &[OsString]) -> Result<u8> {
+        self.shared.reported(execute(self, command_line))
     }
 }
 

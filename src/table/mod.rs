@@ -79,7 +79,7 @@ pub fn picked_of<'a, R: serde::Serialize + 'a>(
 macro_rules! rows {
     ($kind:literal, $(#[$doc:meta])* pub struct $table:ident of $row:ident { $( $(#[$fdoc:meta])* $field:ident: $ty:ty, )+ }) => {
         #[doc = concat!("A row of the table `", $kind, "`.")]
-        #[derive(Debug, Clone, PartialEq, serde::Serialize)]
+        #[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
         pub struct $row { $( $(#[$fdoc])* pub $field: $ty, )+ }
         $(#[$doc])*
         #[derive(Debug, Clone, Default, PartialEq)]

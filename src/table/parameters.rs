@@ -133,9 +133,7 @@ impl Parameters {
                     step: step.into(),
                     remark,
                     form: form.clone(),
-                    corrects: None,
-                    robot: None,
-                    kinematics: None,
+                    ..ParameterRow::default()
                 });
             }
         }
@@ -485,10 +483,7 @@ mod tests {
             status: "free".into(),
             step: "diagnose".into(),
             remark: remark.map(String::from),
-            form: None,
-            corrects: None,
-            robot: None,
-            kinematics: None,
+            ..ParameterRow::default()
         };
         let advice = BTreeMap::from([("joint_offset.j2".to_string(), "measure more".to_string())]);
         for remark in [None, Some("moves with another")] {

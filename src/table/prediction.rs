@@ -59,12 +59,9 @@ impl Prediction {
                 noise_mm: noise(data, row) * 1e3,
                 noise_basis: Some(data.noise_basis.name().into()),
                 sigma_mm: sigma.as_ref().map(|all| all[row] * 1e3),
-                fold_error_mm: None,
-                block_error_mm: None,
-                weight: None,
                 measured: (!whole).then(|| measured(data, row)),
                 turn_rad: error.and_then(|error| error.angle),
-                remark: None,
+                ..PredictionRow::default()
             }
         });
         Self(rows.collect())

@@ -7,8 +7,6 @@
 //!
 //! The positions by axes that a file declares, by their names.
 
-use self::aggregate::{Aggregate, Type};
-use self::line::{declared, variable};
 use super::settle::{Reached, Words, settle};
 use super::token::{ProgramText, Token, TokenKind, brackets_match, closing, lines, tokens};
 use super::{Companion, Declared, Gathered, Language, quoted};

@@ -7,7 +7,6 @@
 //!
 //! The jointtargets that a program declares, by their names.
 
-use self::list::{List, Want};
 use super::token::{self, BRACKETS, ProgramText, Token, TokenKind, arguments, tokens};
 use super::{Companion, Declared, Gathered, Language, quoted};
 use list::{List, Want, depths};

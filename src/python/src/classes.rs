@@ -154,7 +154,11 @@ impl Robot {
             document: remarks
                 .as_ref()
                 .map(|remarks| remarks.document("").to_string()),
-            text: remarks.as_ref().map(|remarks| remarks.text("")),
+            text: remarks
+                .as_ref()
+                .map(|remarks| remarks.text(""))
+                .transpose()
+                .map_err(raised)?,
             page: remarks.and_then(|remarks| remarks.page("").ok()),
             model: Py::new(py, Model::new(model))?,
             notes: given.notes.clone(),
@@ -306,7 +310,7 @@ impl Run {
         Ok((
             stage,
             summary.document("").to_string(),
-            summary.text(""),
+            summary.text("").map_err(raised)?,
             summary.page("").ok(),
         ))
     }
