@@ -511,11 +511,11 @@ fn rewritten(
         .tool
         .as_deref()
         .and_then(|tool| RobotTool::parse(tool).ok());
-    let told = companions
+    let note = companions
         .summary_line()
         .filter(|_| !arguments.model.quiet)
         .unwrap_or_default();
-    let _ = std::io::stderr().write_all(told.as_bytes());
+    let _ = std::io::stderr().write_all(note.as_bytes());
     let mut rewritten = program::corrected(
         &source,
         ProgramRules {

@@ -124,7 +124,7 @@ fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<u
         emit_json(&diagnosis.document(&store))?;
     } else {
         let text = if arguments.details {
-            diagnosis.text(&store)?
+            diagnosis.text(&store)
         } else {
             diagnosis.short(&store, columns())
         };

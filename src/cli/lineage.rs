@@ -134,6 +134,6 @@ impl ExplainArguments {
         if self.json {
             return emit_json(&explanation);
         }
-        emit(&summary::explanation(&explanation)?)
+        emit(&summary::explanation(&explanation))
     }
 }

@@ -167,7 +167,7 @@ impl ShowArguments {
             return match (self.yaml, self.json) {
                 (true, _) => emit(&manifest.pipeline.text),
                 (_, true) => emit_json(&store.manifest(&run)?),
-                _ => emit(&summary::run(&manifest)?),
+                _ => emit(&summary::run(&manifest)),
             };
         };
         let Some(stage) = manifest.stage(id) else {
@@ -187,6 +187,6 @@ impl ShowArguments {
         if self.json {
             return emit_json(stage);
         }
-        emit(&summary::stage(stage)?)
+        emit(&summary::stage(stage))
     }
 }

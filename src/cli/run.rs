@@ -212,15 +212,15 @@ fn document(
         .map(|path| path.display().to_string())
         .collect();
     let stages = manifest.stages.iter().map(|stage| {
-        let mut told = picked(stage, "id uses status reason notes warnings wall_seconds");
+        let mut document = picked(stage, "id uses status reason notes warnings wall_seconds");
         let outputs = stage.outputs.iter().map(|output| {
             json!({
                 "port": output.port, "kind": output.kind, "rows": output.table.rows,
                 "table_hash": output.table.table_hash, "path": output.path,
             })
         });
-        told["outputs"] = outputs.collect();
-        told
+        document["outputs"] = outputs.collect();
+        document
     });
     Ok(json!({
         "status": "done",

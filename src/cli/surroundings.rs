@@ -149,13 +149,14 @@ pub fn open_store(given: Option<&Path>) -> Result<Store> {
 
 /// `CALIB_CACHE`, or where the user's caches are.
 fn cache() -> PathBuf {
-    let told = |name: &str| {
+    let variable = |name: &str| {
         std::env::var_os(name)
             .filter(|value| !value.is_empty())
             .map(PathBuf::from)
     };
-    let usual = || told("XDG_CACHE_HOME").or_else(|| told("HOME").map(|home| home.join(".cache")));
-    told("CALIB_CACHE")
+    let usual =
+        || variable("XDG_CACHE_HOME").or_else(|| variable("HOME").map(|home| home.join(".cache")));
+    variable("CALIB_CACHE")
         .or_else(|| usual().map(|folder| folder.join("calib")))
         .unwrap_or_else(|| PathBuf::from(".calib-cache"))
 }

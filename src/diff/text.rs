@@ -89,12 +89,12 @@ pub fn text(diff: &TableDiff, detail: Detail) -> String {
 
 /// The cell of a row that changed most; one that has a number before one that appeared or vanished.
 pub fn headline(row: &super::WorstRow) -> String {
-    let told = row
+    let first = row
         .cells
         .iter()
         .find(|cell| cell.difference.is_some())
         .or(row.cells.first());
-    told.map(cell).unwrap_or_default()
+    first.map(cell).unwrap_or_default()
 }
 
 /// `x_mm 1.25 -> 1.5 mm (+0.25, 3.1 sigma)`.

@@ -5,17 +5,22 @@
 //! A pipeline as it was understood: its stages, what they read and write.
 
 use crate::audit::Explanation;
-use crate::error::{Error, Result, counted};
+use crate::error::counted;
 use crate::pipeline::{Manifest, Plan, RunStatus, StageReport};
+use minijinja::syntax::SyntaxConfig;
 use minijinja::value::Serde;
 use minijinja::{Environment, UndefinedBehavior, context};
 
 /// A template of this folder, filled.
-pub(super) fn filled(template: &'static str, about: minijinja::Value) -> Result<String> {
+pub(super) fn filled(template: &'static str, about: minijinja::Value) -> String {
     let mut environment = Environment::new();
-    environment.set_trim_blocks(true);
-    environment.set_lstrip_blocks(true);
-    environment.set_keep_trailing_newline(true);
+    // Lines of tags alone leave no line.
+    let syntax = SyntaxConfig::builder()
+        .trim_blocks(true)
+        .lstrip_blocks(true)
+        .keep_trailing_newline(true)
+        .build();
+    environment.set_syntax(syntax.expect("the usual delimiters"));
     environment.set_undefined_behavior(UndefinedBehavior::Strict);
     environment.add_filter("counted", |count: u64, what: &str| counted(count, what));
     environment.add_filter("words", |name: &str| name.replace('_', " "));
@@ -32,11 +37,11 @@ pub(super) fn filled(template: &'static str, about: minijinja::Value) -> Result<
     environment.add_filter("brief", brief);
     environment
         .render_str(template, about)
-        .map_err(|error| Error::Bug(format!("a template of a summary: {error:#}")))
+        .expect("a template that names what it is given")
 }
 
 /// A whole run.
-pub fn run(manifest: &Manifest) -> Result<String> {
+pub fn run(manifest: &Manifest) -> String {
     let ids = manifest.stages.iter().map(|stage| stage.id.len());
     filled(
         include_str!("text/run.txt"),
@@ -48,7 +53,7 @@ pub fn run(manifest: &Manifest) -> Result<String> {
 }
 
 /// One stage with its inputs and tables.
-pub fn stage(stage: &StageReport) -> Result<String> {
+pub fn stage(stage: &StageReport) -> String {
     let settings = stage.key.as_ref().map(|key| &key.settings);
     let settings = serde_json::to_string_pretty(&settings).unwrap_or_default();
     let about = context! { stage => Serde(stage), settings };
@@ -65,7 +70,7 @@ pub fn status(manifest: &Manifest) -> &'static str {
 }
 
 /// Why a stage ran, as text.
-pub fn explanation(explanation: &Explanation) -> Result<String> {
+pub fn explanation(explanation: &Explanation) -> String {
     let about = context! { of => Serde(explanation) };
     filled(include_str!("text/explanation.txt"), about)
 }

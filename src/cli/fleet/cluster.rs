@@ -204,9 +204,9 @@ impl ExecArguments {
             .collect();
         let fresh = || surroundings(command_line);
         let mut workshop = workshop(&fleet, &store, &fresh);
-        let told = |name: &str| std::env::var(name).ok();
-        workshop.name = told("SLURMD_NODENAME").unwrap_or(workshop.name);
-        let task = told("SLURM_ARRAY_JOB_ID").zip(told("SLURM_ARRAY_TASK_ID"));
+        let variable = |name: &str| std::env::var(name).ok();
+        workshop.name = variable("SLURMD_NODENAME").unwrap_or(workshop.name);
+        let task = variable("SLURM_ARRAY_JOB_ID").zip(variable("SLURM_ARRAY_TASK_ID"));
         workshop.round.clone_from(&note.round);
         workshop.log = task.map(|(job, task)| format!("{job}_{task}.out"));
         let progress = FleetProgress::new(Verbosity::Normal, 1, chosen.len());

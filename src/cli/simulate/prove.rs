@@ -95,7 +95,7 @@ impl ProveArguments {
             pipeline: &pipeline,
             folder,
         };
-        let told = in_order(
+        let diagnosed = in_order(
             self.conceal.threads(),
             names.len(),
             |number| -> Result<()> {
@@ -120,7 +120,7 @@ impl ProveArguments {
                 Ok(())
             },
         );
-        told.into_iter().collect::<Result<()>>()?;
+        diagnosed.into_iter().collect::<Result<()>>()?;
         let sealed = Seal::check(folder)?;
         let board = proof::board(folder, &sealed, &verdicts)?;
         if self.conceal.json {

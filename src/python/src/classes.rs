@@ -154,11 +154,7 @@ impl Robot {
             document: remarks
                 .as_ref()
                 .map(|remarks| remarks.document("").to_string()),
-            text: remarks
-                .as_ref()
-                .map(|remarks| remarks.text(""))
-                .transpose()
-                .map_err(raised)?,
+            text: remarks.as_ref().map(|remarks| remarks.text("")),
             page: remarks.and_then(|remarks| remarks.page("").ok()),
             model: Py::new(py, Model::new(model))?,
             notes: given.notes.clone(),
@@ -310,7 +306,7 @@ impl Run {
         Ok((
             stage,
             summary.document("").to_string(),
-            summary.text("").map_err(raised)?,
+            summary.text(""),
             summary.page("").ok(),
         ))
     }

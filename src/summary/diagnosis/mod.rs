@@ -256,10 +256,10 @@ impl DiagnosisSummary {
     }
 
     /// All of the diagnosis, as `calib diagnose --details` prints it; `store` is the `--store` of the commands that it proposes.
-    pub fn text(&self, store: &str) -> Result<String> {
+    pub fn text(&self, store: &str) -> String {
         let mut text = match &self.kind {
-            Kind::Positions(diagnosis) => diagnosis.text()?,
-            Kind::Torques(diagnosis) => diagnosis.text()?,
+            Kind::Positions(diagnosis) => diagnosis.text(),
+            Kind::Torques(diagnosis) => diagnosis.text(),
         };
         text.extend(self.found.iter().map(|found| match &self.kind {
             Kind::Positions(diagnosis) => {
@@ -294,7 +294,7 @@ impl DiagnosisSummary {
             }
             Kind::Torques(diagnosis) => text += &diagnosis.left(),
         }
-        Ok(text + &lines("", &self.statements(VerdictTopic::Remark)))
+        text + &lines("", &self.statements(VerdictTopic::Remark))
     }
 
     /// What was measured, and the errors before and after.

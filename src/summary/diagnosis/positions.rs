@@ -234,7 +234,7 @@ impl Positions {
     }
 
     /// Verdict, errors and where they are, as `calib diagnose --details` prints them before the findings.
-    pub fn text(&self) -> Result<String> {
+    pub fn text(&self) -> String {
         let located = [("place", "where"), ("variable", "depends on")]
             .map(|(by, what)| (what, self.located(by)));
         let about = context! {

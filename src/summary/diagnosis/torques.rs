@@ -146,7 +146,7 @@ impl Torques {
     }
 
     /// Verdict and errors, as `calib diagnose --details` prints them before the findings.
-    pub fn text(&self) -> Result<String> {
+    pub fn text(&self) -> String {
         let about = context! { v => Serde(&self.verdict), joints => Serde(&self.joints) };
         filled(include_str!("../text/torques.txt"), about)
     }
