@@ -1,6 +1,8 @@
 //! Who runs calib, where and when: the only file that reads the environment and the clock.
 //!
 //! A panic is a bug in calib: one line that says where, and exit code 70.
+//!
+//! Panics that somebody catches, as of a decoder at a damaged file, are told by whoever catches them, and by nobody else.
 
 use crate::error::{Error, Result};
 use crate::pipeline::{Host, Surroundings, Tool};

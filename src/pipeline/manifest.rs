@@ -1,19 +1,14 @@
 //! The audit record of one run, written when it starts, between stages where a second of work went into them, and at the end.
 //!
-//! What a plan computes, as one hash: stages, settings, wiring and the content of the files; no paths, no dates.
-//!
 //! Runs by the names that people give them. `HEAD` is the last complete run: the tables of every stage, for the sake of the run itself.
+//!
+//! How a plan is run, and what for.
 
 use super::overrides::Override;
-use super::plan::Plan;
-use super::run::{Purpose, RunOptions};
-use super::run_state::RunState;
-use super::services::label;
+use super::plan::Selection;
 use crate::error::{Error, Result, counted, nearest};
-use crate::store::key::canonical;
 use crate::store::{ActionId, FileHash, Link, StageKey, Store, TableRef};
 use serde::{Deserialize, Serialize};
-use serde_json::json;
 use std::collections::BTreeMap;
 
 /// Bumped when older readers can no longer understand a manifest.
@@ -324,41 +319,6 @@ impl StageReport {
     }
 }
 
-impl Plan {
-    /// The hash of everything that the plan's tables depend on, as 64 hex digits. Reads every input file; fails where one cannot
-    /// be read.
-    pub fn identity(&self) -> Result<String> {
-        let mut state = RunState::new(self);
-        let mut stages = Vec::new();
-        for stage in &self.stages {
-            let mut files = Vec::new();
-            for file in &stage.files {
-                files.push(json!([
-                    file.place,
-                    label(&file.path),
-                    state.hash(&file.path)?
-                ]));
-            }
-            let origins = stage.inputs.iter().map(|input| {
-                let from: Vec<_> = input
-                    .from
-                    .iter()
-                    .map(|origin| (origin.stage, origin.port))
-                    .collect();
-                (input.port.name, from)
-            });
-            stages.push(json!({
-                "id": stage.id, "stage": stage.entry.name, "implementation": stage.entry.implementation,
-                "settings": stage.stage.settings(), "files": files, "reads": origins.collect::<Vec<_>>(),
-            }));
-        }
-        let whole = json!({ "seed": self.seed, "stages": stages });
-        Ok(blake3::hash(canonical(&whole).as_bytes())
-            .to_hex()
-            .to_string())
-    }
-}
-
 /// The run that a person means: an id, the beginning or end of one, a tag, `HEAD` for the last complete one, `HEAD~2` for the complete
 /// one two before it.
 pub fn find_run(store: &Store, text: &str) -> Result<String> {
@@ -434,4 +394,34 @@ fn complete(store: &Store, runs: &[String], back: usize) -> Result<Result<String
         }
     }
     Ok(Err(count))
+}
+
+/// What a run was made for. The manifests of older versions do not say; theirs count as runs of their own.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Purpose {
+    /// `calib run`: for the sake of all its tables.
+    #[default]
+    Run,
+    /// For what the verb needs of the pipeline, which may be a part.
+    Compensate,
+    /// `calib diagnose`.
+    Diagnose,
+    /// `calib export`.
+    Export,
+    /// `calib simulate`.
+    Simulate,
+    /// One robot of a fleet.
+    Fleet,
+}
+
+/// How to run a plan.
+#[derive(Debug, Clone)]
+pub struct RunOptions {
+    /// Which stages.
+    pub selection: Selection,
+    /// Worker threads; no result depends on it.
+    pub jobs: usize,
+    /// For the log.
+    pub purpose: Purpose,
 }

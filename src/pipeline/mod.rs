@@ -1,6 +1,7 @@
 //! The YAML, the plan, the run: `spec` reads and types, `wiring` and `plan` connect, `run` does what is not already done.
 
 mod globs;
+mod in_memory;
 mod look;
 mod manifest;
 mod overrides;
@@ -15,14 +16,16 @@ mod spec;
 mod tests;
 mod wiring;
 
+pub use in_memory::{StageCall, StageTables, run_in_memory};
 pub use look::{Forecast, Prospect, checked_plan, look, preview};
 pub use manifest::{
-    Host, Manifest, OutputRecord, RunStatus, StageReport, StageStatus, Surroundings, Tool, find_run,
+    Host, Manifest, OutputRecord, Purpose, RunOptions, RunStatus, StageReport, StageStatus,
+    Surroundings, Tool, find_run,
 };
 pub use overrides::Override;
 pub use plan::{Plan, Selection};
 pub use reason::{KeyChange, changes_of};
-pub use run::{CompletedRun, Purpose, RunOptions, run};
+pub use run::{CompletedRun, run};
 pub use schema::json_schema;
-pub use services::{Interrupted, Observer, StageCall, StageTables, Unwatched, run_in_memory};
+pub use services::{Interrupted, Observer, Unwatched};
 pub(crate) use spec::misnamed;

@@ -5,7 +5,7 @@
 use super::overrides::Override;
 pub use super::spec::InputFile;
 pub use super::wiring::{Input, Origin};
-use super::{look, spec, wiring};
+use super::{spec, wiring};
 use crate::error::{Error, Fault, Result};
 use crate::raw;
 use crate::stage::{ErasedStage, Port, StageEntry};
@@ -81,7 +81,7 @@ impl Plan {
         let mut inputs = Vec::new();
         for index in 0..draft.stages.len() {
             let (wired, mut troubles) = wiring::wire(&draft.stages, index, registry);
-            troubles.extend(look::unknown(&draft.stages, index, &wired));
+            troubles.extend(wiring::unknown(&draft.stages, index, &wired));
             inputs.push(wired);
             draft.troubles.extend(
                 troubles

@@ -1,24 +1,29 @@
 //! The run: every stage in order; what is already done is taken as it is, the rest is executed and published.
 //!
-//! How a plan is run, and what for.
-//!
 //! One stage executed: its tables loaded, its body run on the worker threads, its products handed back.
+//!
+//! Where in the YAML the setting stands of which a running stage complains.
+//!
+//! What a plan computes, as one hash: stages, settings, wiring and the content of the files; no paths, no dates.
 
 use super::manifest::{
-    FileRecord, InputRecord, Manifest, OutputRecord, RunStatus, StageStatus, Surroundings,
+    FileRecord, InputRecord, Manifest, OutputRecord, RunOptions, RunStatus, StageStatus,
+    Surroundings,
 };
-use super::plan::{Plan, Selected, Selection};
+use super::plan::{Plan, Selected};
 use super::run_state::{self, ActionLock, KeyState, RunState};
-use super::services::{Interrupted, Observer, StageServices};
-use super::{reason, spec};
-use crate::error::{Error, Result};
+use super::services::{Interrupted, Observer, StageServices, label};
+use super::{overrides, reason};
+use crate::error::{Error, Fault, Result};
 use crate::stage::{Context, InputTable, Output, StoredTable};
 use crate::store::frame::Frame;
+use crate::store::key::canonical;
 use crate::store::{
     Account, ActionRecord, FinishedFile, Lookup, PendingTable, PublishedTable, Run, StageKey,
     Store, TableRef,
 };
-use serde::{Deserialize, Serialize};
+use crate::yaml::{self, Node, Trouble};
+use serde_json::json;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
@@ -305,36 +310,6 @@ fn seconds(from: SystemTime, to: SystemTime) -> f64 {
     to.duration_since(from).unwrap_or_default().as_secs_f64()
 }
 
-/// What a run was made for. The manifests of older versions do not say; theirs count as runs of their own.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Purpose {
-    /// `calib run`: for the sake of all its tables.
-    #[default]
-    Run,
-    /// For what the verb needs of the pipeline, which may be a part.
-    Compensate,
-    /// `calib diagnose`.
-    Diagnose,
-    /// `calib export`.
-    Export,
-    /// `calib simulate`.
-    Simulate,
-    /// One robot of a fleet.
-    Fleet,
-}
-
-/// How to run a plan.
-#[derive(Debug, Clone)]
-pub struct RunOptions {
-    /// Which stages.
-    pub selection: Selection,
-    /// Worker threads; no result depends on it.
-    pub jobs: usize,
-    /// For the log.
-    pub purpose: Purpose,
-}
-
 /// Where a stage is executed.
 pub(super) struct ExecutionSite<'a> {
     pub store: &'a Store,
@@ -372,7 +347,7 @@ pub(super) fn products(
     });
     let lines = services.lines();
     (account.notes, account.warnings) = (lines.notes, lines.warnings);
-    let outputs = outputs.map_err(|error| spec::placed(error, state.plan, &stage.id))?;
+    let outputs = outputs.map_err(|error| placed(error, state.plan, &stage.id))?;
     if outputs.len() != stage.outputs.len() {
         return Err(Error::Bug(format!(
             "stage {} gave {} tables for {} ports",
@@ -480,4 +455,85 @@ fn panic_message(panic: &(dyn Any + Send)) -> &str {
     let text = panic.downcast_ref::<&str>().copied();
     text.or_else(|| panic.downcast_ref::<String>().map(String::as_str))
         .unwrap_or("without a message")
+}
+
+/// The same error with line, path and stage of each setting: `with.n` of `split` becomes `p.yaml:36:26: stages[2].with.n`.
+pub(super) fn placed(error: Error, plan: &Plan, id: &str) -> Error {
+    match error {
+        Error::Spec(faults) => Error::Spec(all(faults, plan, id)),
+        Error::Data(faults) => Error::Data(all(faults, plan, id)),
+        other => other,
+    }
+}
+
+fn all(faults: Vec<Fault>, plan: &Plan, id: &str) -> Vec<Fault> {
+    faults
+        .into_iter()
+        .map(|fault| one(&fault, plan, id).unwrap_or(fault))
+        .collect()
+}
+
+/// None where the fault is not in a setting.
+fn one(fault: &Fault, plan: &Plan, id: &str) -> Option<Fault> {
+    let own = fault
+        .place
+        .strip_prefix(id)
+        .and_then(|rest| rest.strip_prefix('.'))
+        .unwrap_or(&fault.place);
+    if own != "with" && !own.starts_with("with.") {
+        return None;
+    }
+    let mut tree = yaml::parse(&plan.text).0?;
+    overrides::apply(&mut tree, &plan.overrides);
+    let named = |stage: &Node| {
+        stage
+            .get("id")
+            .or_else(|| stage.get("uses"))
+            .and_then(Node::text)
+            .is_some_and(|name| name == id)
+    };
+    let index = tree.get("stages")?.items().iter().position(named)?;
+    let path = format!("stages[{index}].{own}");
+    let message = format!("stage `{id}`: {}", fault.message);
+    Some(
+        Trouble::new(message)
+            .at(tree.nearest_mark(&path))
+            .below(&path)
+            .fault(&plan.file.display().to_string()),
+    )
+}
+
+impl Plan {
+    /// The hash of everything that the plan's tables depend on, as 64 hex digits. Reads every input file; fails where one cannot
+    /// be read.
+    pub fn identity(&self) -> Result<String> {
+        let mut state = RunState::new(self);
+        let mut stages = Vec::new();
+        for stage in &self.stages {
+            let mut files = Vec::new();
+            for file in &stage.files {
+                files.push(json!([
+                    file.place,
+                    label(&file.path),
+                    state.hash(&file.path)?
+                ]));
+            }
+            let origins = stage.inputs.iter().map(|input| {
+                let from: Vec<_> = input
+                    .from
+                    .iter()
+                    .map(|origin| (origin.stage, origin.port))
+                    .collect();
+                (input.port.name, from)
+            });
+            stages.push(json!({
+                "id": stage.id, "stage": stage.entry.name, "implementation": stage.entry.implementation,
+                "settings": stage.stage.settings(), "files": files, "reads": origins.collect::<Vec<_>>(),
+            }));
+        }
+        let whole = json!({ "seed": self.seed, "stages": stages });
+        Ok(blake3::hash(canonical(&whole).as_bytes())
+            .to_hex()
+            .to_string())
+    }
 }

@@ -1,10 +1,10 @@
 //! A target as a program states it: its numbers, where they stand, and how corrected ones are written there.
 //!
-//! Joint positions that a program declares under names: `CONST jointtarget` of RAPID, `DECL E6AXIS` and `DECL AXIS` of KRL, positions in joints of
+//! What is in force where a target is reached: the frame in which it stands, the tool that goes there, the load that is carried.
 
-use super::pose::{self, PostureStatement};
-use super::settle::ToolInForce;
-use super::{Declared, Language, Note, SolvedLiteral, fanuc, krl, placed, rapid, urscript};
+use super::SolvedLiteral;
+use super::flow::JoinedState;
+use super::stated::{self, PostureStatement};
 use crate::robot::Bound;
 use crate::spatial::Pose;
 use std::ops::Range;
@@ -144,7 +144,7 @@ impl Literal {
         let changed = numbers.filter(|((old, new), _)| old != new);
         out.extend(
             changed
-                .map(|((_, new), span)| (span.clone(), pose::written(&bytes[span.clone()], new))),
+                .map(|((_, new), span)| (span.clone(), stated::written(&bytes[span.clone()], new))),
         );
         out.sort_by_key(|(span, _)| span.start);
         out
@@ -160,116 +160,99 @@ fn fixed(value: f64, decimals: usize) -> String {
     }
 }
 
-/// Bytes of a program that lists joints, at most.
-pub const MOST_BYTES: usize = 64 << 20;
+/// What a program makes of a frame, a tool or a load.
+#[derive(Debug, Clone)]
+pub(super) enum Setting<T> {
+    /// It sets none.
+    Unset,
+    /// The value, and how people find where it is set.
+    Known(T, String),
+    /// Why the text does not say.
+    Open(String),
+}
 
-/// A joint position under a name.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ListedJoints {
-    /// Line at which its first number stands, from 1.
-    pub line: usize,
-    /// As the program calls it.
+/// A tool by its name and, where that is declared, its frame at the flange (m).
+#[derive(Debug, Clone)]
+pub(super) struct ToolInForce {
     pub name: String,
-    /// Six joints, deg.
-    pub joints: Vec<f64>,
-    /// Six external axes, deg or mm; none where one is not connected or not given.
-    pub external: Vec<Option<f64>>,
+    pub frame: Option<Pose>,
 }
 
-/// All joint positions that a program declares, in its order.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct JointList {
-    /// In the order of the program.
-    pub rows: Vec<ListedJoints>,
-    /// How many poses it declares, whose joints it does not say.
-    pub poses: usize,
+/// At a motion.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct InForce {
+    /// In the robot's base, m.
+    pub base: Setting<Pose>,
+    pub tool: Setting<ToolInForce>,
+    /// kg; none where its declaration does not say.
+    pub load: Setting<Option<f64>>,
 }
 
-/// The language of a file that declares positions, by the ending of its name and by how it begins: tables of text end in `.dat`, too.
-pub fn listing(ending: &str, head: &[u8]) -> Option<Language> {
-    let language = Language::of_ending(ending)?;
-    let words: &[&str] = match language {
-        Language::Krl => &[
-            "DEFDAT",
-            "DEF ",
-            "E6AXIS",
-            "E3AXIS",
-            "DECL AXIS",
-            "E6POS",
-            "&ACCESS",
-        ],
-        Language::Rapid => &["JOINTTARGET", "ROBTARGET", "MODULE"],
-        Language::Fanuc => &["/PROG"],
-        Language::UrScript => &["DEF ", "MOVEJ", "MOVEL"],
-    };
-    let head = String::from_utf8_lossy(head).to_ascii_uppercase();
-    words
-        .iter()
-        .any(|word| head.contains(word))
-        .then_some(language)
-}
-
-/// Reads what a program declares; fails with every fault of that.
-pub fn joint_list(bytes: &[u8], language: Language) -> Result<JointList, Vec<Note>> {
-    if bytes.len() > MOST_BYTES {
-        let message = format!(
-            "a program of more than {} MB; allowed: shorter ones",
-            MOST_BYTES >> 20
-        );
-        return Err(vec![Note {
-            line: 1,
-            column: 1,
-            message,
-        }]);
+impl PartialEq for ToolInForce {
+    /// Two tools of one frame are one, whatever their names.
+    fn eq(&self, other: &Self) -> bool {
+        match (&self.frame, &other.frame) {
+            (Some(own), Some(others)) => own == others,
+            _ => self.name == other.name,
+        }
     }
-    let Declared {
-        mut found,
-        names,
-        poses,
-    } = match language {
-        Language::Krl => krl::listed(bytes),
-        Language::Rapid => rapid::listed(bytes),
-        Language::Fanuc => fanuc::listed(bytes),
-        Language::UrScript => urscript::listed(bytes),
-    };
-    found.faults.append(&mut found.partial);
-    found
-        .faults
-        .extend(found.literals.iter().flat_map(Literal::beyond_any_robot));
-    let faults = placed(bytes, found.faults);
-    if !faults.is_empty() {
-        return Err(faults);
+}
+
+impl<T: PartialEq> PartialEq for Setting<T> {
+    /// By value: where it is set makes no difference.
+    fn eq(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Unset, Self::Unset) => true,
+            (Self::Known(own, _), Self::Known(others, _)) => own == others,
+            (Self::Open(own), Self::Open(others)) => own == others,
+            _ => false,
+        }
     }
-    // By the line at which each stands; positions are declared one after the other.
-    let lines = placed(
-        bytes,
-        found
-            .literals
-            .iter()
-            .zip(names)
-            .map(|(literal, name)| (literal.at(), name))
-            .collect(),
-    );
-    found.literals.sort_by_key(Literal::at);
-    let rows = found.literals.into_iter().zip(lines);
-    let row = |(
-        literal,
-        Note {
-            line,
-            message: name,
-            ..
-        },
-    ): (Literal, Note)| ListedJoints {
-        line,
-        name,
-        joints: match literal.kind {
-            TargetKind::Radians => literal.values.iter().map(|rad| rad.to_degrees()).collect(),
-            _ => literal.values,
-        },
-        external: literal.external,
+}
+
+impl<T: Clone + PartialEq> JoinedState for Setting<T> {
+    fn joined(&self, other: &Self) -> Self {
+        match (self, other) {
+            (Self::Open(_), _) => self.clone(),
+            (_, Self::Open(_)) => other.clone(),
+            (Self::Known(own, at), Self::Known(others, also)) if own != others => Self::Open(
+                format!("differs between the ways to this target: {at} and {also}; expected one"),
+            ),
+            (Self::Known(_, at), Self::Unset) | (Self::Unset, Self::Known(_, at)) => {
+                Self::Open(format!(
+                    "is set on some of the ways to this target alone, by {at}; expected on all"
+                ))
+            }
+            _ => self.clone(),
+        }
+    }
+}
+
+impl JoinedState for InForce {
+    fn joined(&self, other: &Self) -> Self {
+        Self {
+            base: self.base.joined(&other.base),
+            tool: self.tool.joined(&other.tool),
+            load: self.load.joined(&other.load),
+        }
+    }
+}
+
+impl InForce {
+    /// Where nothing is set.
+    pub const NOTHING: Self = Self {
+        base: Setting::Unset,
+        tool: Setting::Unset,
+        load: Setting::Unset,
     };
-    Ok(JointList {
-        rows: rows.map(row).collect(),
-        poses,
-    })
+
+    /// Where nothing is known, for one reason.
+    pub fn open(why: &str) -> Self {
+        let why = || why.to_string();
+        Self {
+            base: Setting::Open(why()),
+            tool: Setting::Open(why()),
+            load: Setting::Open(why()),
+        }
+    }
 }

@@ -9,21 +9,25 @@ mod correct;
 mod fanuc;
 mod flow;
 mod krl;
+mod list;
 mod literal;
 mod pose;
 mod rapid;
 mod settle;
+mod stated;
 mod token;
 mod tools;
 mod urscript;
 
 pub use correct::{ProgramFile, ProgramLoad, ProgramRules, corrected, has_mark, with_mark};
-pub use literal::{JointList, ListedJoints, Literal, MOST_BYTES, TargetKind, joint_list, listing};
-pub use pose::{PostureStatement, solve};
+pub use list::{JointList, ListedJoints, MOST_BYTES, joint_list, listing};
+pub use literal::{Literal, TargetKind};
+pub use pose::solve;
+pub use stated::PostureStatement;
 pub use tools::RobotTool;
 
 use crate::robot::RobotModel;
-use settle::ToolInForce;
+use literal::ToolInForce;
 use std::ops::Range;
 use token::ProgramText;
 

@@ -4,7 +4,7 @@
 //! Whether a list of six numbers is a target follows from its use. What a program computes from literals (`pose_trans(frame, p[...])`) is
 //! refused, and so is every literal that is handed to a function of the program's own; what it computes from elsewhere stays, with a word.
 
-use super::settle::ToolInForce;
+use super::literal::ToolInForce;
 use super::token::{ProgramText, Token, TokenKind, arguments, closing, lines, tokens};
 use super::{DEPTH, Declared, Gathered, Language, Literal, PostureStatement, TargetKind, quoted};
 use crate::spatial::Pose;

@@ -2,17 +2,12 @@
 //!
 //! One blake3 stream per column over its cells (a presence byte, then 8 little-endian bytes, 1 byte, or length and text), then
 //! one hash over kind, major version, row count and every column's name, type, unit and stream.
-//!
-//! What a record says of a published table: enough to find its file and to know whether it is whole.
 
 use super::frame::Frame;
-use super::key::FileHash;
 use arrow::array::{Array, ArrayRef, ArrowPrimitiveType, AsArray, PrimitiveArray, RecordBatch};
 use arrow::datatypes::{DataType, Float64Type, Int64Type};
 use serde::{Deserialize, Serialize};
 use std::fmt;
-use std::fs::File;
-use std::path::Path;
 
 /// Hash of a table's logical content, as 64 hex digits.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -178,26 +173,4 @@ fn feed<T>(
         }
     }
     hasher.update(&block);
-}
-
-/// A published table.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct TableRef {
-    /// `name/version`.
-    pub schema: String,
-    /// Identity of the content.
-    pub table_hash: TableHash,
-    /// Name of the object that holds it.
-    pub file_hash: FileHash,
-    /// How many.
-    pub rows: u64,
-    /// Size of the file, bytes.
-    pub bytes: u64,
-}
-
-/// Whether a file is the one that was published, byte for byte.
-pub(super) fn same_bytes(path: &Path, table: &TableRef) -> bool {
-    File::open(path)
-        .and_then(FileHash::of_reader)
-        .is_ok_and(|found| found == table.file_hash)
 }

@@ -1,7 +1,10 @@
-//! Files that survive a crash: write aside, move into place, and make durable: at once here, or later with others in `durable`. And what
+//! Files that survive a crash: write aside, move into place, and make durable: at once, or later with others. And what
 //! to do when the disk refuses.
 //!
 //! Group commit: what is moved into place can be seen at once and is owed to the disk; `sync` pays everything, many at a time.
+//!
+//! One after another, syncs cost a round trip to the disk each; together they cost about one. A crash of the process loses nothing;
+//! a power cut may tear what was still owed, which its hash or seal shows: as good as absent.
 //!
 //! The folder of one process below `tmp/`, locked while the process lives, swept by others when it is dead.
 

@@ -5,10 +5,10 @@
 //! The stable human paths: the latest table of every port, and the latest documents, under names that people can open.
 
 use super::Store;
-use super::content::TableRef;
 use super::disk::{
     component, make_dir, place, put_if_absent, refused, replace, write, write_synced,
 };
+use super::key::TableRef;
 use crate::error::{Error, Result};
 use serde::Serialize;
 use serde_json::Value;

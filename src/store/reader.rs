@@ -2,10 +2,11 @@
 //!
 //! A table's Parquet file decoded: what it says of itself, its columns, and the hash of what they hold.
 
-use super::content::{TableHash, TableRef, hash_of_columns};
+use super::content::{TableHash, hash_of_columns};
 use super::disk::refused;
 use super::frame::{Frame, FrameBuilder};
 use super::key::FileHash;
+use super::key::TableRef;
 use super::schema::{self, Version};
 use super::writer::{CONTENT_HASH, SCHEMA, UNITS};
 use crate::error::{Error, Fault, Result};

@@ -4,14 +4,13 @@
 //! So a killed machine leaves nothing visible by half, and another one goes on where it stopped. Runs and tags are fetched when the
 //! store is opened, records when they are looked up, tables when they are needed; what does not have the hash of its name is not taken.
 //! What is for people (`tables/`, `documents/`) lies in the folder alone, where every run puts it.
-//!
-//! What a store asks of object storage.
 
+use super::Bucket;
 use super::Store;
-use super::content::{TableRef, same_bytes};
 use super::disk::{
     component, make_dir, make_read_only, place, put_if_absent, refused, together, write,
 };
+use super::key::{TableRef, same_bytes};
 use crate::error::{Error, Result};
 use std::collections::BTreeSet;
 use std::fmt::Debug;
@@ -320,20 +319,4 @@ fn below(folder: &Path, key: &str) -> Option<PathBuf> {
     key.split('/').try_fold(folder.to_path_buf(), |path, part| {
         Some(path.join(component(part).ok()?))
     })
-}
-
-/// Whole files under keys with slashes, as S3 has them; what is written is seen by all at once.
-pub trait Bucket: Debug + Send + Sync {
-    /// As a person writes it: `s3://bucket/prefix`.
-    fn name(&self) -> &str;
-    /// Fetches into a new file; false where there is nothing.
-    fn fetch(&self, key: &str, to: &Path) -> Result<bool>;
-    /// Writes a file over what may be there.
-    fn send(&self, from: &Path, key: &str) -> Result<()>;
-    /// Writes a small file where nothing is, decided once for all who try; false where something is.
-    fn create(&self, from: &Path, key: &str) -> Result<bool>;
-    /// Takes away; nothing where there is nothing.
-    fn remove(&self, key: &str) -> Result<()>;
-    /// Keys below a folder (all where it is empty) with their bytes, in order, `most` at most.
-    fn list(&self, folder: &str, most: usize) -> Result<Vec<(String, u64)>>;
 }

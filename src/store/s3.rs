@@ -15,8 +15,8 @@ use std::path::Path;
 use std::time::Duration;
 use tokio::runtime::Runtime;
 
+use super::Bucket;
 use super::disk::refused;
-use super::remote::Bucket;
 use crate::error::{Error, Result};
 
 /// Files up to this are sent in one request, bytes; larger ones in parts of this size, a few at a time.

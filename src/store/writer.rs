@@ -1,10 +1,11 @@
 //! Tables to Parquet files: chunks in, one file out, in bounded memory and with bytes that do not depend on the chunks.
 
 use super::check;
-use super::content::{ContentHasher, TableRef};
+use super::content::ContentHasher;
 use super::disk::{Workspace, refused};
 use super::frame::Frame;
 use super::key::FileHash;
+use super::key::TableRef;
 use super::schema::TableSchema;
 use crate::error::{Error, Result};
 use arrow::array::{Array, ArrayRef, AsArray, RecordBatch};

@@ -31,7 +31,7 @@ enum FleetVerb {
     Cancel(status::CancelArguments),
     Render(status::RenderArguments),
     #[command(hide = true)]
-    Exec(cluster::ExecArguments),
+    Exec(run::ExecArguments),
 }
 
 /// What all verbs need.

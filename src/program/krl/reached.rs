@@ -1,7 +1,8 @@
 //! What is in force where a file of KRL moves to its targets.
 
 use super::super::flow::{Flow, FlowStep};
-use super::super::settle::{InForce, Reached};
+use super::super::literal::InForce;
+use super::super::settle::Reached;
 use super::super::token::{ProgramText, Token, TokenKind, arguments};
 use super::MOTIONS;
 use super::line::{declared, step, steps};

@@ -5,7 +5,7 @@
 //! form names: `FDAT_ACT=FP1` with `BAS(#PTP_PARAMS, ..)`, or `WITH $BASE=SBASE(FP1.BASE_NO), $TOOL=STOOL2(FP1)` for one motion.
 
 use super::super::flow::{FlowStep, JoinedState};
-use super::super::settle::{InForce, Setting, ToolInForce};
+use super::super::literal::{InForce, Setting, ToolInForce};
 use super::super::token::{ProgramText, Token, TokenKind, arguments, closing};
 use super::aggregate::Aggregate;
 use super::line::{declared, member, step};

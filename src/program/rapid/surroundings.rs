@@ -7,7 +7,8 @@
 //!
 //! What is in force where the files of a program in RAPID move to its targets.
 
-use super::super::settle::{InForce, Reached, Setting, ToolInForce, Words, settle};
+use super::super::literal::{InForce, Setting, ToolInForce};
+use super::super::settle::{Reached, Words, settle};
 use super::super::token::{ProgramText, Token, TokenKind, arguments, tokens};
 use super::super::{Companion, Gathered, Language, quoted};
 use super::list::List;
