@@ -9,21 +9,17 @@ mod arrays;
 mod bag;
 mod columns;
 mod delimited;
-mod not_read;
 mod number;
 mod record;
-mod source;
 mod text;
 mod workbook;
 
 pub use bag::{BagContent, BagRows, BagTopic, bag_content, is_bag};
 pub use columns::{ColumnRows, has_columns};
 pub use delimited::{Delimiter, TextLayout, TextRows, fields, unquoted_text};
-pub use not_read::not_read;
 pub use number::{DecimalMark, NumberFault, number, number_of_any_mark};
-pub use record::{Record, RecordFault, RecordReader, failed};
-pub use source::{InputSource, source};
-pub use text::{decoded_text, is_utf16, shown, without_utf16};
+pub use record::{InputSource, Record, RecordFault, RecordReader, failed, source};
+pub use text::{decoded_text, is_utf16, not_read, shown, without_utf16};
 pub use workbook::{Workbook, is_workbook};
 
 use arrow::array::RecordBatch;

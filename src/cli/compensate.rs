@@ -2,7 +2,7 @@
 
 use super::companions::Companions;
 use super::feed_forward::{FeedForward, feed_forward};
-use super::model_arguments::ModelArguments;
+use super::pipeline_arguments::ModelArguments;
 use crate::compensate::{
     CorrectionOptions, Corrector, Gate, GateLimits, IdentifiedArm, Stated, load_matters,
 };
@@ -10,7 +10,8 @@ use crate::error::{Error, Fault, Result, counted};
 use crate::identified::IdentifiedModel;
 use crate::pipeline::Purpose;
 use crate::program::{
-    self, Frames, Language, Partial, ProgramFile, ProgramLoad, ProgramRules, RobotTool, mark,
+    self, Frames, Language, Partial, ProgramFile, ProgramLoad, ProgramRules, RobotTool, has_mark,
+    with_mark,
 };
 use crate::raw;
 use crate::robot::{JointConvention, Measurements};
@@ -163,93 +164,94 @@ const EXAMPLES: &str = "Examples:
   calib compensate pipelines/dynamics/pipeline.yaml motion.csv --torque --out feed_forward.csv
   calib compensate parameters.parquet --robot robot.yaml --angle deg < program.csv";
 
-pub(super) fn main(arguments: &CompensateArguments, command_line: &[OsString]) -> Result<()> {
-    check(arguments)?;
-    let identified = arguments.model.load(Purpose::Compensate, command_line)?;
-    identified.spare(arguments.out.as_deref())?;
-    if arguments.torque {
-        let (motion, out) = (arguments.targets.as_path(), arguments.out.as_deref());
-        let asked = FeedForward {
-            motion,
-            out,
-            since_start: arguments.since_start,
-            temperature: arguments.temperature,
-            max_uncertainty: arguments.max_uncertainty,
-            sigma: !arguments.no_sigma,
-            force: arguments.model.force,
-            quiet: arguments.model.quiet,
+impl CompensateArguments {
+    pub fn run(&self, command_line: &[OsString]) -> Result<()> {
+        check(self)?;
+        let identified = self.model.load(Purpose::Compensate, command_line)?;
+        identified.spare(self.out.as_deref())?;
+        if self.torque {
+            let (motion, out) = (self.targets.as_path(), self.out.as_deref());
+            let asked = FeedForward {
+                motion,
+                out,
+                since_start: self.since_start,
+                temperature: self.temperature,
+                max_uncertainty: self.max_uncertainty,
+                sigma: !self.no_sigma,
+                force: self.model.force,
+                quiet: self.model.quiet,
+            };
+            return feed_forward(&asked, &identified);
+        }
+        if identified.is_of_torques_alone() {
+            let message = "torques were identified, no positions: there is nothing to correct targets with; --torque gives the torques of a motion";
+            return Err(Error::spec(&identified.origin, message));
+        }
+        let arm = IdentifiedArm::new(identified.model.clone(), identified.correction.clone());
+        let coverage = identified.coverage();
+        let uncertainty = identified.uncertainty(&arm);
+        let mut corrector = Corrector::new(&arm, coverage, uncertainty, manner(self, &identified)?);
+        let threads = rayon::ThreadPoolBuilder::new()
+            .num_threads(self.model.jobs())
+            .build()
+            .map_err(|error| Error::store("--jobs", error.to_string()))?;
+        let place = if self.targets.as_os_str() == "-" {
+            "stdin".into()
+        } else {
+            self.targets.display().to_string()
         };
-        return feed_forward(&asked, &identified);
-    }
-    if identified.is_of_torques_alone() {
-        let message = "torques were identified, no positions: there is nothing to correct targets with; --torque gives the torques of a motion";
-        return Err(Error::spec(&identified.origin, message));
-    }
-    let arm = IdentifiedArm::new(identified.model.clone(), identified.correction.clone());
-    let coverage = identified.coverage();
-    let uncertainty = identified.uncertainty(&arm);
-    let mut corrector =
-        Corrector::new(&arm, coverage, uncertainty, manner(arguments, &identified)?);
-    let threads = rayon::ThreadPoolBuilder::new()
-        .num_threads(arguments.model.jobs())
-        .build()
-        .map_err(|error| Error::store("--jobs", error.to_string()))?;
-    let place = if arguments.targets.as_os_str() == "-" {
-        "stdin".into()
-    } else {
-        arguments.targets.display().to_string()
-    };
-    let load = if arguments.payload.is_some() {
-        None
-    } else {
-        identified
-            .heaviest()
-            .filter(|load| load_matters(&arm, *load))
-    };
-    let units = Units {
-        angle: unit(arguments.angle.as_deref()),
-        length: unit(arguments.length.as_deref()),
-    };
-    let cartesian = arguments.target == What::Pose;
-    let layout = Layout {
-        place: &place,
-        robot: &identified.robot,
-        units,
-        plain: arguments.plain,
-        cartesian,
-        load,
-        force: arguments.model.force,
-    };
-    let remarks = remarks(arguments, &identified);
-    let unreached = threads.install(|| corrected(arguments, &layout, &remarks, &mut corrector))?;
-    let mut text = String::new();
-    if !arguments.model.quiet {
-        let counting = identified
-            .counting()
-            .map(|line| format!("{line}\n"))
-            .unwrap_or_default();
-        text = format!(
-            "model: {}\n{counting}{}",
-            identified.origin,
-            corrector.tally.summary()
+        let load = if self.payload.is_some() {
+            None
+        } else {
+            identified
+                .heaviest()
+                .filter(|load| load_matters(&arm, *load))
+        };
+        let units = Units {
+            angle: unit(self.angle.as_deref()),
+            length: unit(self.length.as_deref()),
+        };
+        let cartesian = self.target == What::Pose;
+        let layout = Layout {
+            place: &place,
+            robot: &identified.robot,
+            units,
+            plain: self.plain,
+            cartesian,
+            load,
+            force: self.model.force,
+        };
+        let remarks = remarks(self, &identified);
+        let unreached = threads.install(|| corrected(self, &layout, &remarks, &mut corrector))?;
+        let mut text = String::new();
+        if !self.model.quiet {
+            let counting = identified
+                .counting()
+                .map(|line| format!("{line}\n"))
+                .unwrap_or_default();
+            text = format!(
+                "model: {}\n{counting}{}",
+                identified.origin,
+                corrector.tally.summary()
+            );
+        }
+        let column = if language(&self.targets).is_some() || self.plain {
+            ""
+        } else {
+            " (column `remark`)"
+        };
+        text.extend(
+            corrector
+                .tally
+                .warnings()
+                .map(|line| format!("warning: {line}{column}\n")),
         );
-    }
-    let column = if language(&arguments.targets).is_some() || arguments.plain {
-        ""
-    } else {
-        " (column `remark`)"
-    };
-    text.extend(
-        corrector
-            .tally
-            .warnings()
-            .map(|line| format!("warning: {line}{column}\n")),
-    );
-    let _ = std::io::stderr().write_all(text.as_bytes());
-    if unreached.faults.is_empty() {
-        Ok(())
-    } else {
-        Err(Error::Data(unreached.faults))
+        let _ = std::io::stderr().write_all(text.as_bytes());
+        if unreached.faults.is_empty() {
+            Ok(())
+        } else {
+            Err(Error::Data(unreached.faults))
+        }
     }
 }
 
@@ -491,7 +493,7 @@ fn rewritten(
         language,
         companions: &companions.files(),
     };
-    if mark::stands_in(&text, language) && !arguments.model.force {
+    if has_mark(&text, language) && !arguments.model.force {
         let message = "was compensated by calib already: a second correction would move the robot twice as far. Take the program of before, or insist with --force";
         return Err(Error::data(layout.place, message));
     }
@@ -509,11 +511,11 @@ fn rewritten(
         .tool
         .as_deref()
         .and_then(|tool| RobotTool::parse(tool).ok());
-    let told = companions
+    let note = companions
         .summary_line()
         .filter(|_| !arguments.model.quiet)
         .unwrap_or_default();
-    let _ = std::io::stderr().write_all(told.as_bytes());
+    let _ = std::io::stderr().write_all(note.as_bytes());
     let mut rewritten = program::corrected(
         &source,
         ProgramRules {
@@ -525,7 +527,7 @@ fn rewritten(
         layout.robot,
         corrector,
     )?;
-    rewritten.bytes = mark::written(&rewritten.bytes, &text, language, remarks);
+    rewritten.bytes = with_mark(&rewritten.bytes, &text, language, remarks);
     let warnings = rewritten
         .warnings
         .iter()

@@ -1,10 +1,9 @@
 //! `calib diagnose`: where simulation and recording differ, what physics is missing, the fit before and after.
 
-use super::execution_arguments::{CommandTask, ExecutionArguments, shown};
-use super::pipeline_arguments::reported_as;
+use super::pipeline_arguments::{CommandTask, ExecutionArguments, reported_as, shown};
 use super::run::WRONG_SETUP;
 use super::surroundings::columns;
-use super::{complain, emit_json, emit_lines};
+use super::{emit_json, emit_lines};
 use crate::audit::{diagnosis, the_stage};
 use crate::error::{Error, Result};
 use crate::pipeline::{Purpose, Selection};
@@ -61,11 +60,10 @@ const EXAMPLES: &str = "Examples:
   calib diagnose HEAD --export-effect worn_tooth.yaml
   calib diagnose HEAD~1/second --json";
 
-/// Gives the exit code: 10 where the set-up is wrong, whatever else was asked for.
-pub(super) fn main(arguments: &DiagnoseArguments, command_line: &[OsString]) -> u8 {
-    match reported_as(arguments.json, execute(arguments, command_line)) {
-        Ok(code) => code,
-        Err(error) => complain(&error),
+impl DiagnoseArguments {
+    /// Gives the exit code: 10 where the set-up is wrong, whatever else was asked for.
+    pub fn run(&self, command_line: &[OsString]) -> Result<u8> {
+        reported_as(self.json, execute(self, command_line))
     }
 }
 

@@ -80,13 +80,14 @@ const EXAMPLES: &str = "Examples:
 
 Exit codes: 0 same; 1 different beyond tolerance; 2 could not compare, or keys that occur twice.";
 
-pub(super) fn main(arguments: &DiffArguments) -> u8 {
-    match execute(arguments) {
-        Ok(code) => code,
-        Err(error @ Error::Bug(_)) => complain(&error),
-        Err(error) => {
-            complain(&error);
-            2
+impl DiffArguments {
+    pub fn run(&self) -> Result<u8> {
+        match execute(self) {
+            Err(error) if !matches!(error, Error::Bug(_)) => {
+                complain(&error);
+                Ok(2)
+            }
+            other => other,
         }
     }
 }

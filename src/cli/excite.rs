@@ -83,35 +83,37 @@ const EXAMPLES: &str = "Examples:
   calib excite robot.json --seconds 40 --rate 250 --noise 2,4,3,0.8,0.6,0.4 --seed 7 --out motion.csv
   calib excite robot.yaml --limits -90:90,-60:60,-60:60,-90:90,-90:90,-90:90 --json";
 
-pub(super) fn main(arguments: &ExciteArguments) -> Result<()> {
-    if !(0.0..=45.0).contains(&arguments.margin) {
-        let message = format!("expected 0 to 45 percent, found {}", arguments.margin);
-        return Err(Error::Spec(vec![Fault::new("--margin", message)]));
-    }
-    let proposal = exciting_motion(&MotionRequest {
-        robot: arguments.robot.clone(),
-        urdf: arguments.urdf.clone(),
-        seconds: arguments.seconds,
-        rate: arguments.rate,
-        harmonics: usize::from(arguments.harmonics),
-        limits: arguments.limits.as_ref().map(|limits| limits.0.clone()),
-        margin: arguments.margin,
-        speed: arguments.speed.clone(),
-        acceleration: arguments.acceleration.clone(),
-        noise: arguments.noise.clone(),
-        generations: usize::from(arguments.generations),
-        seed: arguments.seed,
-        jobs: arguments.jobs.map_or_else(cores, usize::from),
-    })?;
-    if let Some(out) = &arguments.out {
-        whole(out, |mut file| {
-            file.write_all(proposal.csv().as_bytes())
-                .map_err(|error| unwritten(out, &error))
+impl ExciteArguments {
+    pub fn run(&self) -> Result<()> {
+        if !(0.0..=45.0).contains(&self.margin) {
+            let message = format!("expected 0 to 45 percent, found {}", self.margin);
+            return Err(Error::Spec(vec![Fault::new("--margin", message)]));
+        }
+        let proposal = exciting_motion(&MotionRequest {
+            robot: self.robot.clone(),
+            urdf: self.urdf.clone(),
+            seconds: self.seconds,
+            rate: self.rate,
+            harmonics: usize::from(self.harmonics),
+            limits: self.limits.as_ref().map(|limits| limits.0.clone()),
+            margin: self.margin,
+            speed: self.speed.clone(),
+            acceleration: self.acceleration.clone(),
+            noise: self.noise.clone(),
+            generations: usize::from(self.generations),
+            seed: self.seed,
+            jobs: self.jobs.map_or_else(cores, usize::from),
         })?;
-    }
-    if arguments.json {
-        emit_json(&proposal.document())
-    } else {
-        emit(&proposal.text())
+        if let Some(out) = &self.out {
+            whole(out, |mut file| {
+                file.write_all(proposal.csv().as_bytes())
+                    .map_err(|error| unwritten(out, &error))
+            })?;
+        }
+        if self.json {
+            emit_json(&proposal.document())
+        } else {
+            emit(&proposal.text())
+        }
     }
 }

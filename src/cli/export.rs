@@ -1,10 +1,13 @@
 //! `calib export`: the identified model for other programs, and what they cannot carry.
+//!
+//! `calib check-export`: whether a file in the field belongs to this robot and this model.
 
 use super::emit;
-use super::model_arguments::ModelArguments;
+use super::pipeline_arguments::ModelArguments;
 use crate::error::{Error, Result};
-use crate::export::{CarriedTorques, Export, FORMATS, Format};
+use crate::export::{Belonging, CarriedTorques, Export, FORMATS, Format};
 use crate::pipeline::Purpose;
+use crate::raw;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use std::ffi::OsString;
@@ -54,39 +57,108 @@ const EXAMPLES: &str = "Examples:
   calib export pipelines/dynamics/pipeline.yaml --format mjcf --out arm.xml
   calib export parameters.parquet --robot robot.yaml --format controller";
 
-pub(super) fn main(arguments: &ExportArguments, command_line: &[OsString]) -> Result<()> {
-    let identified = arguments.model.load(Purpose::Export, command_line)?;
-    identified.spare(arguments.out.as_deref())?;
-    if identified.is_of_torques_alone() && arguments.format.0.carries == CarriedTorques::Nothing {
-        let allowed: Vec<&str> = FORMATS
-            .iter()
-            .filter(|format| format.carries != CarriedTorques::Nothing)
-            .map(|format| format.name)
-            .collect();
-        let message = format!(
-            "torques were identified, no geometry, and it holds none; allowed: {}",
-            allowed.join(", ")
-        );
-        return Err(Error::spec("--format", message));
+impl ExportArguments {
+    pub fn run(&self, command_line: &[OsString]) -> Result<()> {
+        let identified = self.model.load(Purpose::Export, command_line)?;
+        identified.spare(self.out.as_deref())?;
+        if identified.is_of_torques_alone() && self.format.0.carries == CarriedTorques::Nothing {
+            let allowed: Vec<&str> = FORMATS
+                .iter()
+                .filter(|format| format.carries != CarriedTorques::Nothing)
+                .map(|format| format.name)
+                .collect();
+            let message = format!(
+                "torques were identified, no geometry, and it holds none; allowed: {}",
+                allowed.join(", ")
+            );
+            return Err(Error::spec("--format", message));
+        }
+        let export = Export::of(identified, self.model.force);
+        let text = (self.format.0.text)(&export)?;
+        match &self.out {
+            Some(path) => std::fs::write(path, text).map_err(|error| {
+                Error::store(
+                    path.display().to_string(),
+                    format!("cannot be written: {error}"),
+                )
+            })?,
+            None => emit(&text)?,
+        }
+        if !self.model.quiet {
+            let said: String = export
+                .remarks_in(self.format.0)
+                .iter()
+                .map(|line| format!("{line}\n"))
+                .collect();
+            let _ = std::io::stderr().write_all(said.as_bytes());
+        }
+        Ok(())
     }
-    let export = Export::of(identified, arguments.model.force);
-    let text = (arguments.format.0.text)(&export)?;
-    match &arguments.out {
-        Some(path) => std::fs::write(path, text).map_err(|error| {
-            Error::store(
-                path.display().to_string(),
-                format!("cannot be written: {error}"),
-            )
-        })?,
-        None => emit(&text)?,
+}
+
+/// Check whether an exported file belongs to a robot and its model, unchanged.
+///
+/// Every export carries its format, the hash of the model and the robot's serial number (`identity: {robot serial: ...}` of the stage
+/// `report`). The file is compared with these, then written anew and compared line by line; comments do not count.
+#[derive(Args)]
+#[command(after_help = CHECK_EXAMPLES)]
+pub(super) struct CheckExportArguments {
+    /// The exported file
+    file: PathBuf,
+    #[command(flatten)]
+    model: ModelArguments,
+}
+
+const CHECK_EXAMPLES: &str = "Examples:
+  calib check-export corrected.urdf --against latest
+  calib check-export ur10e_calibration.yaml --against pipeline.yaml
+
+Exit codes: 0 it is; 1 it is that of another robot or model, or was edited; 10 it is no export.";
+
+impl CheckExportArguments {
+    pub fn run(&self, command_line: &[OsString]) -> Result<u8> {
+        let label = self.file.display().to_string();
+        let text = raw::text(&self.file).map_err(|error| Error::unreadable(&label, &error))?;
+        let identified = self.model.load(Purpose::Export, command_line)?;
+        let origin = identified.origin.clone();
+        // Nothing is written here: a format that holds the arm badly may have been insisted on.
+        let export = Export::of(identified, true);
+        let serial =
+            |serial: &Option<String>| serial.clone().unwrap_or_else(|| "not stated".into());
+        let (statement, code) = match export.check(&label, &text)? {
+            Belonging::Same(mark) => (
+                format!(
+                    "is the export of {origin}: {}, model {}, robot serial {}",
+                    mark.format,
+                    mark.model,
+                    serial(&mark.serial)
+                ),
+                0,
+            ),
+            Belonging::Edited(mark, line) => (
+                format!(
+                    "line {line} is not as {origin} (model {}) exports it: the file was edited, or another version wrote it",
+                    mark.model
+                ),
+                1,
+            ),
+            Belonging::Other(file, own) if file.serial != own.serial => (
+                format!(
+                    "is of the robot with serial {}; that of {origin} is {}",
+                    serial(&file.serial),
+                    serial(&own.serial)
+                ),
+                1,
+            ),
+            Belonging::Other(file, own) => (
+                format!(
+                    "is of the model {}; that of {origin} is {}",
+                    file.model, own.model
+                ),
+                1,
+            ),
+        };
+        emit(&format!("{label}: {statement}\n"))?;
+        Ok(code)
     }
-    if !arguments.model.quiet {
-        let said: String = export
-            .remarks_in(arguments.format.0)
-            .iter()
-            .map(|line| format!("{line}\n"))
-            .collect();
-        let _ = std::io::stderr().write_all(said.as_bytes());
-    }
-    Ok(())
 }

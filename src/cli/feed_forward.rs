@@ -9,7 +9,7 @@ use crate::targets::{Trajectory, unwritten, whole};
 use std::io::{Read, Write};
 use std::path::Path;
 
-/// Rows that are told of one file.
+/// Faults of rows named of one file.
 const MOST: usize = 20;
 
 /// What is asked.
@@ -66,16 +66,16 @@ pub(super) fn feed_forward(asked: &FeedForward, identified: &IdentifiedModel) ->
         })?,
         None => emit(&written)?,
     }
-    let mut told = if asked.quiet {
+    let mut notes = if asked.quiet {
         String::new()
     } else {
         remarks_on(torques, &trajectory, judged.len())
     };
     if asked.sigma && needed.u95.is_none() {
-        told.push_str("warning: a table of parameters alone does not say how certain torques are: nothing is refused for it\n");
+        notes.push_str("warning: a table of parameters alone does not say how certain torques are: nothing is refused for it\n");
     }
-    told.push_str(&warnings(&judged));
-    let _ = std::io::stderr().write_all(told.as_bytes());
+    notes.push_str(&warnings(&judged));
+    let _ = std::io::stderr().write_all(notes.as_bytes());
     refused(&judged, &trajectory, &place)
 }
 

@@ -1,6 +1,11 @@
 //! The help of calib itself: its verbs in groups, by what one is about to do.
+//!
+//! `calib completions` and `calib man`: what a shell and a reader of manuals need, from the same declarations as `--help`.
 
-use clap::Command;
+use super::{Arguments, emit};
+use crate::error::{Error, Result};
+use clap::{Args, Command, CommandFactory};
+use clap_complete::Shell;
 
 /// What one is about to do, and the verbs for it.
 const GROUPS: &[(&str, &[&str])] = &[
@@ -61,6 +66,71 @@ pub(super) fn grouped(command: Command) -> Command {
          {header}Options:{header:#}\n{{options}}{{after-help}}"
     );
     command.help_template(template)
+}
+
+/// Print completions for a shell.
+#[derive(Args)]
+#[command(after_help = "Examples:
+  calib completions bash > ~/.local/share/bash-completion/completions/calib
+  calib completions zsh > ~/.zfunc/_calib
+  calib completions fish > ~/.config/fish/completions/calib.fish")]
+pub(super) struct CompletionsArguments {
+    /// The shell
+    shell: Shell,
+}
+
+/// Print the manual page, of calib or of one of its verbs.
+#[derive(Args)]
+#[command(after_help = "Examples:
+  calib man | man -l -
+  calib man compensate > calib-compensate.1")]
+pub(super) struct ManArguments {
+    /// The verb [default: calib itself]
+    verb: Option<String>,
+}
+
+impl CompletionsArguments {
+    pub fn run(&self) -> Result<()> {
+        let mut text = Vec::new();
+        clap_complete::generate(self.shell, &mut Arguments::command(), "calib", &mut text);
+        emit(&String::from_utf8_lossy(&text))
+    }
+}
+
+impl ManArguments {
+    pub fn run(&self) -> Result<()> {
+        let mut whole = Arguments::command();
+        whole.build();
+        let page = match &self.verb {
+            None => whole,
+            Some(verb) => {
+                let verbs: Vec<String> = whole
+                    .get_subcommands()
+                    .map(|verb| verb.get_name().to_string())
+                    .collect();
+                let found = whole
+                    .get_subcommands()
+                    .find(|known| known.get_name() == verb);
+                let unknown = || {
+                    Error::spec(
+                        "man",
+                        format!("no command `{verb}`; allowed: {}", verbs.join(", ")),
+                    )
+                };
+                found.ok_or_else(unknown)?.clone()
+            }
+        };
+        let title = self
+            .verb
+            .as_ref()
+            .map_or_else(|| "calib".into(), |verb| format!("calib-{verb}"));
+        let mut text = Vec::new();
+        clap_mangen::Man::new(page)
+            .title(title)
+            .render(&mut text)
+            .map_err(|error| Error::Bug(error.to_string()))?;
+        emit(&String::from_utf8_lossy(&text))
+    }
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! `calib init`: a commented robot file and pipeline to start from, made for the columns of one's own files.
 
-use super::{complain, emit};
+use super::emit;
 use crate::error::{Error, Result};
 use crate::init::{InitRequest, KINDS, RobotFileKind, StarterFiles, start};
 use crate::robot::LIBRARY;
@@ -53,24 +53,24 @@ fn kinds() -> impl TypedValueParser<Value = RobotFileKind> {
         .try_map(|name| RobotFileKind::find(&name).ok_or("no such arm"))
 }
 
-/// Gives the exit code: 1 where nothing was understood of the recordings.
-pub(super) fn main(arguments: &InitArguments) -> u8 {
-    match execute(arguments) {
-        Ok(start) if start.understood_nothing() => {
-            let files: Vec<String> = start
-                .accounts
-                .iter()
-                .map(|(path, _)| path.display().to_string())
-                .collect();
-            let message = format!(
-                "neither joints nor a measured point were recognised in {}: name the columns where it says REPLACE",
-                files.join(" and ")
-            );
-            let _ = writeln!(std::io::stderr(), "error: {message}");
-            1
+impl InitArguments {
+    /// Gives the exit code: 1 where nothing was understood of the recordings.
+    pub fn run(&self) -> Result<u8> {
+        let start = execute(self)?;
+        if !start.understood_nothing() {
+            return Ok(0);
         }
-        Ok(_) => 0,
-        Err(error) => complain(&error),
+        let files: Vec<String> = start
+            .accounts
+            .iter()
+            .map(|(path, _)| path.display().to_string())
+            .collect();
+        let message = format!(
+            "neither joints nor a measured point were recognised in {}: name the columns where it says REPLACE",
+            files.join(" and ")
+        );
+        let _ = writeln!(std::io::stderr(), "error: {message}");
+        Ok(1)
     }
 }
 

@@ -1,12 +1,15 @@
 //! `calib lineage`: where a table comes from, down to the raw files.
+//!
+//! `calib explain`: why a stage ran, or did not.
 
 use super::surroundings::open_store;
 use super::{emit, emit_json};
-use crate::audit::{LineageNode, lineage};
+use crate::audit::{LineageNode, explain, lineage};
 use crate::diff::table_hash;
 use crate::error::{Error, Result, counted};
 use crate::pipeline::{Manifest, find_run};
 use crate::store::Store;
+use crate::summary;
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -28,15 +31,17 @@ pub(super) struct LineageArguments {
     json: bool,
 }
 
-pub(super) fn main(arguments: &LineageArguments) -> Result<()> {
-    let store = open_store(arguments.store.as_deref())?;
-    let node = lineage(&store, &hash(&store, &arguments.table)?)?;
-    if arguments.json {
-        return emit_json(&node);
+impl LineageArguments {
+    pub fn run(&self) -> Result<()> {
+        let store = open_store(self.store.as_deref())?;
+        let node = lineage(&store, &hash(&store, &self.table)?)?;
+        if self.json {
+            return emit_json(&node);
+        }
+        let mut text = String::new();
+        lines(&node, "", 0, &mut text);
+        emit(&text)
     }
-    let mut text = String::new();
-    lines(&node, "", 0, &mut text);
-    emit(&text)
 }
 
 fn hash(store: &Store, table: &str) -> Result<String> {
@@ -98,5 +103,37 @@ fn lines(node: &LineageNode, port: &str, depth: usize, text: &mut String) {
     }
     for (port, node) in &made.reads {
         lines(node, port, depth + 1, text);
+    }
+}
+
+/// Explain why a stage ran, or did not: which part of what it depends on changed since the run before.
+#[derive(Args)]
+#[command(after_help = "Examples:
+  calib explain stiffness
+  calib explain stiffness --run HEAD~3
+
+Whether a stage would run now, and why: calib run PIPELINE --dry-run")]
+pub(super) struct ExplainArguments {
+    /// The stage's id
+    stage: String,
+    /// The run to explain
+    #[arg(long, value_name = "RUN", default_value = "HEAD")]
+    run: String,
+    /// Where tables and records are kept [default: .calib in the working directory]
+    #[arg(long, value_name = "DIR")]
+    store: Option<PathBuf>,
+    /// Prints one JSON document on stdout
+    #[arg(long)]
+    json: bool,
+}
+
+impl ExplainArguments {
+    pub fn run(&self) -> Result<()> {
+        let store = open_store(self.store.as_deref())?;
+        let explanation = explain(&store, &find_run(&store, &self.run)?, &self.stage)?;
+        if self.json {
+            return emit_json(&explanation);
+        }
+        emit(&summary::explanation(&explanation))
     }
 }

@@ -1,39 +1,27 @@
 //! The command line: one file per verb. Results go to stdout, progress and messages to stderr; nothing below here prints.
 
-mod check;
-mod check_export;
 mod companions;
 mod compensate;
 mod diagnose;
 mod diff;
-mod effects;
 mod excite;
-mod execution_arguments;
-mod explain;
 mod export;
 mod feed_forward;
 mod fleet;
-mod gc;
 mod help;
 mod init;
+mod keep;
 mod lineage;
 mod log;
-mod model_arguments;
 mod paint;
-mod panics;
 mod pipeline_arguments;
 mod poses;
 mod query;
-mod robots;
 mod run;
 mod schema;
 mod serve_model;
-mod shell;
-mod show;
 mod simulate;
 mod surroundings;
-mod tag;
-mod verify;
 mod verify_robot;
 
 pub use surroundings::{cores, open_store, surroundings};
@@ -57,32 +45,32 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Verb {
     Init(init::InitArguments),
-    Check(check::CheckArguments),
+    Check(run::CheckArguments),
     Run(run::RunArguments),
     Diagnose(diagnose::DiagnoseArguments),
     Compensate(Box<compensate::CompensateArguments>),
     ServeModel(Box<serve_model::ServeModelArguments>),
     VerifyRobot(verify_robot::VerifyRobotArguments),
     Export(export::ExportArguments),
-    CheckExport(Box<check_export::CheckExportArguments>),
-    Show(show::ShowArguments),
+    CheckExport(Box<export::CheckExportArguments>),
+    Show(log::ShowArguments),
     Log(log::LogArguments),
     Diff(diff::DiffArguments),
-    Explain(explain::ExplainArguments),
+    Explain(lineage::ExplainArguments),
     Query(query::QueryArguments),
     Lineage(lineage::LineageArguments),
     Schema(schema::SchemaArguments),
     Poses(poses::PosesArguments),
     Excite(excite::ExciteArguments),
     Fleet(fleet::FleetArguments),
-    Tag(tag::TagArguments),
-    Verify(verify::VerifyArguments),
-    Gc(gc::GcArguments),
+    Tag(keep::TagArguments),
+    Verify(keep::VerifyArguments),
+    Gc(keep::GcArguments),
     Simulate(simulate::SimulateArguments),
-    Effects(effects::EffectsArguments),
-    Robots(robots::RobotsArguments),
-    Completions(shell::CompletionsArguments),
-    Man(shell::ManArguments),
+    Effects(schema::EffectsArguments),
+    Robots(schema::RobotsArguments),
+    Completions(help::CompletionsArguments),
+    Man(help::ManArguments),
 }
 
 const EXIT_CODES: &str = "Exit codes: 0 done; 1 diff or verify found a difference, init understood nothing of the recordings, or a run is beyond its report's limits; 2 wrong usage or a faulty YAML; 10 the data were rejected, or the set-up is wrong (do not retry); \
@@ -110,7 +98,7 @@ pub fn main(arguments: Vec<OsString>) -> u8 {
             return code;
         }
     };
-    panics::guarded(|| done(parsed.verb, &arguments))
+    surroundings::guarded(|| done(parsed.verb, &arguments))
 }
 
 /// Names the verb that a misspelt one is nearest to, also where letters changed places (`rnu`), which clap's own measure does not see.
@@ -138,38 +126,40 @@ fn with_nearest_verb(mut error: clap::Error) -> clap::Error {
 
 fn done(verb: Verb, arguments: &[OsString]) -> u8 {
     let result = match verb {
-        Verb::Run(verb) => return run::main(&verb, arguments),
-        Verb::CheckExport(verb) => return check_export::main(&verb, arguments),
-        Verb::Check(verb) => check::main(&verb, arguments),
-        Verb::Compensate(verb) => compensate::main(&verb, arguments),
-        Verb::Effects(verb) => effects::main(&verb),
-        Verb::Diagnose(verb) => return diagnose::main(&verb, arguments),
-        Verb::Diff(verb) => return diff::main(&verb),
-        Verb::Fleet(verb) => fleet::main(&verb, arguments),
-        Verb::Export(verb) => export::main(&verb, arguments),
-        Verb::Init(verb) => return init::main(&verb),
-        Verb::Excite(verb) => excite::main(&verb),
-        Verb::Explain(verb) => explain::main(&verb),
-        Verb::Gc(verb) => gc::main(&verb),
-        Verb::Lineage(verb) => lineage::main(&verb),
-        Verb::Log(verb) => log::main(&verb),
-        Verb::Poses(verb) => poses::main(&verb),
-        Verb::Query(verb) => query::main(&verb),
-        Verb::Robots(verb) => robots::main(&verb),
-        Verb::Completions(verb) => shell::completions(&verb),
-        Verb::Man(verb) => shell::man(&verb),
-        Verb::Schema(verb) => schema::main(&verb),
-        Verb::ServeModel(verb) => serve_model::main(&verb, arguments),
-        Verb::Show(verb) => show::main(&verb),
-        Verb::Simulate(verb) => simulate::main(&verb, arguments),
-        Verb::Tag(verb) => tag::main(&verb),
-        Verb::Verify(verb) => return verify::main(&verb),
-        Verb::VerifyRobot(verb) => verify_robot::main(&verb, arguments),
+        Verb::Run(verb) => return coded(verb.run(arguments)),
+        Verb::CheckExport(verb) => return coded(verb.run(arguments)),
+        Verb::Check(verb) => verb.run(arguments),
+        Verb::Compensate(verb) => verb.run(arguments),
+        Verb::Effects(verb) => verb.run(),
+        Verb::Diagnose(verb) => return coded(verb.run(arguments)),
+        Verb::Diff(verb) => return coded(verb.run()),
+        Verb::Fleet(verb) => verb.run(arguments),
+        Verb::Export(verb) => verb.run(arguments),
+        Verb::Init(verb) => return coded(verb.run()),
+        Verb::Excite(verb) => verb.run(),
+        Verb::Explain(verb) => verb.run(),
+        Verb::Gc(verb) => verb.run(),
+        Verb::Lineage(verb) => verb.run(),
+        Verb::Log(verb) => verb.run(),
+        Verb::Poses(verb) => verb.run(),
+        Verb::Query(verb) => verb.run(),
+        Verb::Robots(verb) => verb.run(),
+        Verb::Completions(verb) => verb.run(),
+        Verb::Man(verb) => verb.run(),
+        Verb::Schema(verb) => verb.run(),
+        Verb::ServeModel(verb) => verb.run(arguments),
+        Verb::Show(verb) => verb.run(),
+        Verb::Simulate(verb) => verb.run(arguments),
+        Verb::Tag(verb) => verb.run(),
+        Verb::Verify(verb) => return coded(verb.run()),
+        Verb::VerifyRobot(verb) => verb.run(arguments),
     };
-    match result {
-        Ok(()) => 0,
-        Err(error) => complain(&error),
-    }
+    coded(result.map(|()| 0))
+}
+
+/// The exit code of what a verb did.
+fn coded(result: Result<u8>) -> u8 {
+    result.unwrap_or_else(|error| complain(&error))
 }
 
 /// Says what went wrong, and with which exit code.

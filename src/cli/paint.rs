@@ -73,9 +73,9 @@ mod tests {
 
     #[test]
     fn a_verdict_has_its_colour_and_text_stays_as_it_is() {
-        let told = painted("verdict   explained: all of it\n          calib poses --run HEAD\n");
+        let screen = painted("verdict   explained: all of it\n          calib poses --run HEAD\n");
         assert_eq!(
-            told,
+            screen,
             "\u{1b}[1mverdict   \u{1b}[0m\u{1b}[1m\u{1b}[32mexplained\u{1b}[0m: all of it\n          calib poses --run HEAD\n"
         );
         assert!(

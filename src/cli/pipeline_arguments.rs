@@ -1,15 +1,29 @@
 //! What every verb that runs a pipeline takes, and how it fails under `--json`.
+//!
+//! What every verb that runs a pipeline, or takes its result, may be told: overrides, the store, worker threads.
+//!
+//! The identified model that a verb works with: from a pipeline, a run in the store, or a table of parameters.
 
 use super::emit_json;
-use super::execution_arguments::{CommandTask, ExecutionArguments, shown};
+use super::surroundings::{cores, open_store, surroundings};
+use crate::compensate::GateLimits;
 use crate::error::{Error, Fault, Result};
-use crate::pipeline::{CompletedRun, Override, Plan, Purpose, Selection};
+use crate::identified::{Files, IdentifiedModel, judges_of, steps_of};
+use crate::pipeline::{
+    CompletedRun, Manifest, Override, Plan, Purpose, RunOptions, Selection, checked_plan, find_run,
+    run,
+};
+use crate::progress::{Progress, Verbosity};
+use crate::raw::ending;
+use crate::shell::typed;
 use crate::stage::{DeclaredStage, Report};
 use crate::store::Store;
+use crate::summary::LimitsSummary;
 use clap::Args;
 use serde_json::json;
 use std::ffi::OsString;
-use std::path::PathBuf;
+use std::io::Write;
+use std::path::{Path, PathBuf};
 
 #[derive(Args)]
 pub(super) struct PipelineArguments {
@@ -104,4 +118,254 @@ fn failure(error: &Error) -> serde_json::Value {
         Error::Bug(message) => vec![json!({ "place": "", "message": message })],
     };
     json!({ "status": "failed", "exit_code": error.exit_code(), "faults": faults })
+}
+
+#[derive(Args)]
+pub(super) struct ExecutionArguments {
+    /// Overrides a variable, the seed, or a setting of a stage; may be given several times
+    #[arg(long, value_name = "TARGET=VALUE", value_parser = Override::parse)]
+    set: Vec<Override>,
+    /// Where tables and records are kept: a folder or s3://BUCKET/PREFIX [default: .calib in the working directory]
+    #[arg(long, value_name = "DIR")]
+    store: Option<PathBuf>,
+    /// Worker threads; no result depends on it [default: all cores]
+    #[arg(long, short = 'j', value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    jobs: Option<u16>,
+}
+
+/// What a pipeline is run for, how much of it, and how much of its progress is shown.
+pub(super) struct CommandTask {
+    pub purpose: Purpose,
+    pub selection: Selection,
+    pub shown: Verbosity,
+}
+
+/// As much as `--quiet` and `--details` ask for.
+pub(super) fn shown(quiet: bool, details: bool) -> Verbosity {
+    match (quiet, details) {
+        (true, _) => Verbosity::Quiet,
+        (_, true) => Verbosity::Detailed,
+        _ => Verbosity::Normal,
+    }
+}
+
+impl ExecutionArguments {
+    /// Reads a pipeline. Fails with every fault of its YAML and of the robot file at once.
+    pub fn plan(&self, pipeline: &Path) -> Result<Plan> {
+        self.plan_with(pipeline, &[])
+    }
+
+    /// The same with more overrides, behind those of the command line.
+    pub fn plan_with(&self, pipeline: &Path, more: &[Override]) -> Result<Plan> {
+        checked_plan(pipeline, &[&self.set, more].concat())
+    }
+
+    pub fn store(&self) -> Result<Store> {
+        open_store(self.store.as_deref())
+    }
+
+    /// Whether anything is to be set on the command line.
+    pub fn overrides(&self) -> bool {
+        !self.set.is_empty()
+    }
+
+    /// `--store` as it was given, to be typed again; empty for the usual place.
+    pub fn store_again(&self) -> String {
+        self.store.as_ref().map_or_else(String::new, |store| {
+            format!(" --store {}", typed(&store.display().to_string()))
+        })
+    }
+
+    pub fn jobs(&self) -> usize {
+        self.jobs.map_or_else(cores, usize::from)
+    }
+
+    /// Runs the selected stages; with as much progress as is to be shown.
+    pub fn run(
+        &self,
+        plan: &Plan,
+        store: &Store,
+        task: CommandTask,
+        command_line: &[OsString],
+    ) -> Result<CompletedRun> {
+        let CommandTask {
+            purpose,
+            selection,
+            shown,
+        } = task;
+        let progress = Progress::new(
+            shown,
+            plan.stages
+                .iter()
+                .map(|stage| stage.id.len())
+                .max()
+                .unwrap_or(0),
+        );
+        let options = RunOptions {
+            selection,
+            jobs: self.jobs(),
+            purpose,
+        };
+        let result = run(
+            plan,
+            store,
+            &options,
+            &surroundings(command_line),
+            &progress,
+        );
+        progress.finish();
+        result
+    }
+}
+
+/// Where the model comes from.
+#[derive(Args)]
+pub(super) struct ModelArguments {
+    /// A pipeline (its stages run as far as they are not done), a run as `calib log` names it (`latest` is HEAD, the last complete one), or a
+    /// table `parameters` (Parquet)
+    #[arg(value_name = "MODEL")]
+    model: PathBuf,
+    /// The stage whose parameters to take [default: the last `diagnose`, else the last that writes some; the one before it where
+    /// held-out points are worse after it]
+    #[arg(long, value_name = "STAGE")]
+    step: Option<String>,
+    /// The robot, where MODEL is a table: calib's YAML, a practice robot.json, or a table `robot` (Parquet)
+    #[arg(long, value_name = "FILE")]
+    robot: Option<PathBuf>,
+    /// Takes tables without a content hash, which another program wrote, and tables of an earlier calib, which do not say which robot they
+    /// are the model of, as they are; a hash that does not hold is refused all the same
+    #[arg(long)]
+    unchecked: bool,
+    /// Largest distance of the model's tool, or of a link or a joint's zero in mm, from the robot file's: a model beyond is refused
+    #[arg(long, value_name = "MM", default_value_t = 50.0)]
+    max_shift: f64,
+    /// Largest turn of the model's tool, of a link or of a joint's zero from the robot file's, deg
+    #[arg(long, value_name = "DEG", default_value_t = 5.0)]
+    max_tilt: f64,
+    /// Insists on a model that is refused (set-up wrong, limits of the report exceeded, further from the robot file than --max-shift or
+    /// --max-tilt), and on commands and files that are refused; what is written says so
+    #[arg(long)]
+    pub force: bool,
+    #[command(flatten)]
+    means: ExecutionArguments,
+    /// Prints no progress and no summary; warnings and errors remain
+    #[arg(long, short)]
+    pub quiet: bool,
+}
+
+impl ModelArguments {
+    pub fn jobs(&self) -> usize {
+        self.means.jobs()
+    }
+
+    /// Loads the model and says what is to be known of it; runs the pipeline's stages that are not done.
+    pub fn load(&self, purpose: Purpose, command_line: &[OsString]) -> Result<IdentifiedModel> {
+        let wrong = [
+            ("--max-shift", self.max_shift),
+            ("--max-tilt", self.max_tilt),
+        ]
+        .into_iter()
+        .filter(|(_, given)| !(given.is_finite() && *given > 0.0))
+        .map(|(option, given)| {
+            Fault::new(option, format!("expected a number above 0, found {given}"))
+        });
+        let wrong: Vec<Fault> = wrong.collect();
+        if !wrong.is_empty() {
+            return Err(Error::Spec(wrong));
+        }
+        let identified = self.identified(purpose, command_line)?;
+        for warning in &identified.warnings {
+            let _ = writeln!(std::io::stderr(), "warning: {warning}");
+        }
+        self.judged(identified)
+    }
+
+    /// A model that no commands are to be made of is refused, or insisted on.
+    fn judged(&self, mut identified: IdentifiedModel) -> Result<IdentifiedModel> {
+        let limits = GateLimits {
+            shift: self.max_shift * 1e-3,
+            tilt: self.max_tilt.to_radians(),
+            ..GateLimits::default()
+        };
+        let gate = identified.gate(limits, self.force);
+        if !self.force {
+            identified.accepted(&gate, "--force")?;
+        }
+        identified.refusals = gate.model;
+        for reason in &identified.refusals {
+            let _ = writeln!(
+                std::io::stderr(),
+                "warning: used because of --force: {reason}"
+            );
+        }
+        Ok(identified)
+    }
+
+    fn identified(&self, purpose: Purpose, command_line: &[OsString]) -> Result<IdentifiedModel> {
+        let ending = ending(&self.model);
+        if ending == "parquet" {
+            let Some(robot) = self.robot.clone() else {
+                let message = "say which robot the parameters are of: --robot robot.yaml, or the table `robot` of the same run";
+                return Err(Error::spec(self.model.display().to_string(), message));
+            };
+            return IdentifiedModel::of_files(&Files {
+                parameters: self.model.clone(),
+                robot,
+                unchecked: self.unchecked,
+            });
+        }
+        if self.robot.is_some() {
+            return Err(Error::spec(
+                "--robot",
+                "is of tables of parameters alone; a run or a pipeline knows its robot: leave it out",
+            ));
+        }
+        let (store, step) = (self.means.store()?, self.step.as_deref());
+        if !matches!(ending.as_str(), "yaml" | "yml") {
+            let manifest = Manifest::of(&store, &self.run(&store)?)?;
+            let mut identified = IdentifiedModel::of_run(&store, &manifest, step)?;
+            identified
+                .refusals
+                .extend(LimitsSummary::of(&manifest, &store)?.exceeded());
+            // A pipeline's stages say it themselves.
+            identified.warnings.append(&mut identified.stage_warnings);
+            return Ok(identified);
+        }
+        let plan = self.means.plan(&self.model)?;
+        // A report with limits says whether the model is accepted.
+        let wanted = [steps_of(&plan)?, judges_of(&plan)].concat();
+        let task = CommandTask {
+            purpose,
+            selection: Selection::default(),
+            shown: shown(self.quiet, false),
+        };
+        let outcome = self
+            .means
+            .run(&plan.needed_for_all(&wanted), &store, task, command_line)?;
+        let mut identified = IdentifiedModel::of_run(&store, &outcome.manifest, step)?;
+        identified
+            .refusals
+            .extend(LimitsSummary::of(&outcome.manifest, &store)?.exceeded());
+        Ok(identified)
+    }
+
+    /// The id of a run by its name.
+    fn run(&self, store: &Store) -> Result<String> {
+        let name = self.model.to_string_lossy();
+        let asked = if name == "latest" { "HEAD" } else { &*name };
+        find_run(store, asked).map_err(|error| match error {
+            Error::Spec(faults) => {
+                let why = faults
+                    .into_iter()
+                    .next()
+                    .map(|fault| fault.message)
+                    .unwrap_or_default();
+                Error::spec(
+                    &*name,
+                    format!("neither a pipeline (.yaml), a table (.parquet) nor a run: {why}"),
+                )
+            }
+            other => other,
+        })
+    }
 }

@@ -99,39 +99,38 @@ const EXAMPLES: &str = "Examples:
   calib poses --run HEAD --separate 1 'link_compliance@link 2' --payload 0,10
   calib poses robot.json --limits -170:170,-60:75,-80:75,-180:180,-120:120,-180:180 --json";
 
-pub(super) fn main(arguments: &PosesArguments) -> Result<()> {
-    let request = request(arguments);
-    let pair = arguments.separate.as_deref().unwrap_or_default();
-    check(arguments, &request, pair)?;
-    match (&arguments.run, &arguments.robot) {
-        (Some(run), _) => {
-            let store = open_store(arguments.store.as_deref())?;
-            show(
-                arguments,
-                &apart(
-                    &request,
-                    &store,
-                    &RunStage {
-                        run,
-                        step: arguments.step.as_deref(),
-                    },
-                    pair,
-                )?,
-            )
-        }
-        (None, Some(file)) => {
-            let robot = robot_file(file, arguments.urdf.as_deref())?;
-            let place = file.display().to_string();
-            if let Some(places) = &arguments.sockets {
-                return show(arguments, &sockets(&request, robot, &place, &places.0)?);
+impl PosesArguments {
+    pub fn run(&self) -> Result<()> {
+        let request = request(self);
+        let pair = self.separate.as_deref().unwrap_or_default();
+        check(self, &request, pair)?;
+        match (&self.run, &self.robot) {
+            (Some(run), _) => {
+                let store = open_store(self.store.as_deref())?;
+                show(
+                    self,
+                    &apart(
+                        &request,
+                        &store,
+                        &RunStage {
+                            run,
+                            step: self.step.as_deref(),
+                        },
+                        pair,
+                    )?,
+                )
             }
-            let against = arguments.against.as_deref();
-            show(
-                arguments,
-                &proposal(&request, robot, &place, pair, against)?,
-            )
+            (None, Some(file)) => {
+                let robot = robot_file(file, self.urdf.as_deref())?;
+                let place = file.display().to_string();
+                if let Some(places) = &self.sockets {
+                    return show(self, &sockets(&request, robot, &place, &places.0)?);
+                }
+                let against = self.against.as_deref();
+                show(self, &proposal(&request, robot, &place, pair, against)?)
+            }
+            (None, None) => Err(Error::spec("ROBOT", "expected a robot file, or --run")),
         }
-        (None, None) => Err(Error::spec("ROBOT", "expected a robot file, or --run")),
     }
 }
 

@@ -47,8 +47,10 @@ pub(super) struct QueryArguments {
     store: Option<PathBuf>,
 }
 
-pub(super) fn main(arguments: &QueryArguments) -> Result<()> {
-    reported_as(arguments.json, execute(arguments))
+impl QueryArguments {
+    pub fn run(&self) -> Result<()> {
+        reported_as(self.json, execute(self))
+    }
 }
 
 fn execute(arguments: &QueryArguments) -> Result<()> {

@@ -1,11 +1,19 @@
 //! `calib schema`: the tables with their columns and units, and the JSON Schema of the pipeline's YAML.
+//!
+//! `calib effects`: the library of effects, in words.
+//!
+//! `calib robots`: the library of common arms.
 
-use super::emit;
+use super::{emit, emit_json};
+use crate::effect::{CAUSES, Cause, cause};
 use crate::error::{Error, Result, counted, nearest};
 use crate::pipeline;
+use crate::robot::{LIBRARY, LibraryArm};
 use crate::stage::STAGES;
 use crate::store::schema::{self, TableSchema};
 use crate::store::{Loose, read_table};
+use crate::summary::effects_json;
+use crate::units::Unit;
 use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
 
@@ -45,13 +53,15 @@ enum SchemaVerb {
     Fleet,
 }
 
-pub(super) fn main(arguments: &SchemaArguments) -> Result<()> {
-    match &arguments.verb {
-        SchemaVerb::List => emit(&list()),
-        SchemaVerb::Show { kind } => emit(&show(find(kind)?)),
-        SchemaVerb::Fleet => emit(&crate::fleet::file::json_schema()),
-        SchemaVerb::Check { file, kind } => check(file, kind.as_deref()),
-        SchemaVerb::Pipeline => emit(&pipeline::json_schema(STAGES)),
+impl SchemaArguments {
+    pub fn run(&self) -> Result<()> {
+        match &self.verb {
+            SchemaVerb::List => emit(&list()),
+            SchemaVerb::Show { kind } => emit(&show(find(kind)?)),
+            SchemaVerb::Fleet => emit(&crate::fleet::file::json_schema()),
+            SchemaVerb::Check { file, kind } => check(file, kind.as_deref()),
+            SchemaVerb::Pipeline => emit(&pipeline::json_schema(STAGES)),
+        }
     }
 }
 
@@ -133,4 +143,106 @@ fn show(schema: &TableSchema) -> String {
         ));
     }
     text
+}
+
+/// List the effects that calib knows: formula, usual size, what each is confounded with, and what a recording needs to show it.
+#[derive(Args)]
+#[command(after_help = "Examples:
+  calib effects
+  calib effects backlash
+  calib effects --json")]
+pub(super) struct EffectsArguments {
+    /// One effect by its name
+    #[arg(value_name = "EFFECT")]
+    name: Option<String>,
+    /// Prints one JSON document on stdout
+    #[arg(long)]
+    json: bool,
+}
+
+impl EffectsArguments {
+    pub fn run(&self) -> Result<()> {
+        let chosen: Vec<&Cause> = match &self.name {
+            None => CAUSES.to_vec(),
+            Some(name) => vec![cause(name).ok_or_else(|| unknown(name))?],
+        };
+        if self.json {
+            return emit_json(&effects_json(&chosen));
+        }
+        let text: Vec<String> = chosen.iter().map(|about| entry(about)).collect();
+        emit(&text.join("\n"))
+    }
+}
+
+fn entry(about: &Cause) -> String {
+    let measure = about.measure.map_or_else(String::new, |measure| {
+        format!("  measure     {}\n", measure.advice)
+    });
+    format!(
+        "{} ({})\n  formula     {}\n  usual size  {}\n  confounded  {}\n  needs       {}\n{measure}",
+        about.name, about.place, about.formula, about.size, about.confounded, about.needs
+    )
+}
+
+fn unknown(name: &str) -> Error {
+    let names: Vec<&str> = CAUSES.iter().map(|cause| cause.name()).collect();
+    Error::spec(
+        "EFFECT",
+        format!("no effect `{name}`; allowed: {}", names.join(", ")),
+    )
+}
+
+/// List the arms that `calib init` starts from, or print the robot file of one.
+#[derive(Args)]
+#[command(after_help = "Examples:
+  calib robots
+  calib robots ur10e
+  calib init cell7 --data measurements.csv --robot ur10e")]
+pub(super) struct RobotsArguments {
+    /// One arm by its name: its robot file, with sources
+    #[arg(value_name = "NAME")]
+    name: Option<String>,
+}
+
+impl RobotsArguments {
+    pub fn run(&self) -> Result<()> {
+        let Some(name) = &self.name else {
+            return emit(&library()?);
+        };
+        emit(LibraryArm::named(name)?.text)
+    }
+}
+
+/// One line an arm.
+fn library() -> Result<String> {
+    let mut out = format!(
+        "{:<16} {:<40} {:>6} {:>9}  {}\n",
+        "name", "arm", "joints", "reach mm", "in the file"
+    );
+    for arm in LIBRARY {
+        let read = arm.read()?;
+        let reach = read.about.reach.map_or_else(
+            || "-".into(),
+            |reach| Unit::Millimetre.from_si(reach).round().to_string(),
+        );
+        let mut holds = Vec::new();
+        if read.robot.joints.iter().any(|joint| joint.mass.is_some()) {
+            holds.push("masses");
+        }
+        if read.about.counting().is_some() {
+            holds.push("coupled counting");
+        }
+        let joints = read.robot.joints.len();
+        out.push_str(
+            format!(
+                "{:<16} {:<40} {joints:>6} {reach:>9}  {}",
+                arm.name,
+                read.robot.name,
+                holds.join(", ")
+            )
+            .trim_end(),
+        );
+        out.push('\n');
+    }
+    Ok(out)
 }

@@ -1,7 +1,7 @@
 //! `calib serve-model`: JSON lines in, JSON lines out, for programs in other languages.
 
 use super::emit;
-use super::model_arguments::ModelArguments;
+use super::pipeline_arguments::ModelArguments;
 use crate::api::{Model, Robot};
 use crate::compensate::{Circumstance, CommandTarget, Corrector, Stated, unstated_payload};
 use crate::error::{Error, Result, counted};
@@ -58,53 +58,55 @@ struct Asked {
     id: Option<Value>,
 }
 
-pub(super) fn main(arguments: &ServeModelArguments, command_line: &[OsString]) -> Result<()> {
-    let payload = arguments.payload;
-    if let Some(message) = payload.and_then(|payload| Stated::Payload.fault(payload)) {
-        return Err(Error::spec("--payload", message));
-    }
-    let model = Model::new(arguments.model.load(Purpose::Compensate, command_line)?);
-    let reader = LineReader {
-        robot: model.robot(),
-        needed: model.needed_load().filter(|_| payload.is_none()),
-        payload,
-    };
-    let mut lines = BufReader::with_capacity(AHEAD, opened(&arguments.lines)?);
-    let mut corrector = match arguments.predict {
-        true => None,
-        false => Some(model.corrector(arguments.model.force, "--force")?),
-    };
-    let threads = rayon::ThreadPoolBuilder::new()
-        .num_threads(arguments.model.jobs())
-        .build()
-        .map_err(|error| Error::store("--jobs", error.to_string()))?;
-    let mut number = 0;
-    loop {
-        let batch = waiting(&mut lines)?;
-        if batch.is_empty() {
-            return Ok(());
+impl ServeModelArguments {
+    pub fn run(&self, command_line: &[OsString]) -> Result<()> {
+        let payload = self.payload;
+        if let Some(message) = payload.and_then(|payload| Stated::Payload.fault(payload)) {
+            return Err(Error::spec("--payload", message));
         }
-        let text: String = threads.install(|| {
-            let asked = batch.par_iter().enumerate().map(|(k, line)| {
-                let place = |message| format!("line {}: {message}", number + k + 1);
-                reader.read(line).map_err(place)
+        let model = Model::new(self.model.load(Purpose::Compensate, command_line)?);
+        let reader = LineReader {
+            robot: model.robot(),
+            needed: model.needed_load().filter(|_| payload.is_none()),
+            payload,
+        };
+        let mut lines = BufReader::with_capacity(AHEAD, opened(&self.lines)?);
+        let mut corrector = match self.predict {
+            true => None,
+            false => Some(model.corrector(self.model.force, "--force")?),
+        };
+        let threads = rayon::ThreadPoolBuilder::new()
+            .num_threads(self.model.jobs())
+            .build()
+            .map_err(|error| Error::store("--jobs", error.to_string()))?;
+        let mut number = 0;
+        loop {
+            let batch = waiting(&mut lines)?;
+            if batch.is_empty() {
+                return Ok(());
+            }
+            let text: String = threads.install(|| {
+                let asked = batch.par_iter().enumerate().map(|(k, line)| {
+                    let place = |message| format!("line {}: {message}", number + k + 1);
+                    reader.read(line).map_err(place)
+                });
+                let asked: Vec<Result<Asked, String>> = asked.collect();
+                let answers = match &mut corrector {
+                    Some(corrector) => corrected(&reader.robot, &asked, corrector),
+                    None => predicted(&reader.robot, &asked, &model),
+                };
+                let lines = answers.into_par_iter().zip(asked);
+                let lines = lines.map(|(mut answer, asked)| {
+                    if let Some(id) = asked.ok().and_then(|asked| asked.id) {
+                        answer["id"] = id;
+                    }
+                    format!("{answer}\n")
+                });
+                lines.collect()
             });
-            let asked: Vec<Result<Asked, String>> = asked.collect();
-            let answers = match &mut corrector {
-                Some(corrector) => corrected(&reader.robot, &asked, corrector),
-                None => predicted(&reader.robot, &asked, &model),
-            };
-            let lines = answers.into_par_iter().zip(asked);
-            let lines = lines.map(|(mut answer, asked)| {
-                if let Some(id) = asked.ok().and_then(|asked| asked.id) {
-                    answer["id"] = id;
-                }
-                format!("{answer}\n")
-            });
-            lines.collect()
-        });
-        number += batch.len();
-        emit(&text)?;
+            number += batch.len();
+            emit(&text)?;
+        }
     }
 }
 

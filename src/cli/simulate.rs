@@ -3,7 +3,6 @@
 mod conceal;
 mod prove;
 mod record;
-mod reveal;
 
 use crate::error::Result;
 use clap::{Args, Subcommand};
@@ -20,15 +19,17 @@ pub(super) struct SimulateArguments {
 enum SimulateVerb {
     Record(record::RecordArguments),
     Conceal(conceal::ConcealArguments),
-    Reveal(reveal::RevealArguments),
+    Reveal(prove::RevealArguments),
     Prove(prove::ProveArguments),
 }
 
-pub(super) fn main(arguments: &SimulateArguments, command_line: &[OsString]) -> Result<()> {
-    match &arguments.verb {
-        SimulateVerb::Record(verb) => record::main(verb, command_line),
-        SimulateVerb::Conceal(verb) => conceal::main(verb),
-        SimulateVerb::Reveal(verb) => reveal::main(verb),
-        SimulateVerb::Prove(verb) => prove::main(verb),
+impl SimulateArguments {
+    pub fn run(&self, command_line: &[OsString]) -> Result<()> {
+        match &self.verb {
+            SimulateVerb::Record(verb) => verb.run(command_line),
+            SimulateVerb::Conceal(verb) => verb.run(),
+            SimulateVerb::Reveal(verb) => verb.run(),
+            SimulateVerb::Prove(verb) => verb.run(),
+        }
     }
 }

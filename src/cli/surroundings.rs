@@ -1,11 +1,17 @@
 //! Who runs calib, where and when: the only file that reads the environment and the clock.
+//!
+//! A panic is a bug in calib: one line that says where, and exit code 70.
+//!
+//! Panics that somebody catches, as of a decoder at a damaged file, are told by whoever catches them, and by nobody else.
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::pipeline::{Host, Surroundings, Tool};
 use crate::store::Store;
 use std::collections::BTreeMap;
 use std::ffi::OsString;
+use std::panic::{AssertUnwindSafe, PanicHookInfo, catch_unwind};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 use std::time::SystemTime;
 
 /// Who runs calib, where and when.
@@ -145,13 +151,70 @@ pub fn open_store(given: Option<&Path>) -> Result<Store> {
 
 /// `CALIB_CACHE`, or where the user's caches are.
 fn cache() -> PathBuf {
-    let told = |name: &str| {
+    let variable = |name: &str| {
         std::env::var_os(name)
             .filter(|value| !value.is_empty())
             .map(PathBuf::from)
     };
-    let usual = || told("XDG_CACHE_HOME").or_else(|| told("HOME").map(|home| home.join(".cache")));
-    told("CALIB_CACHE")
+    let usual =
+        || variable("XDG_CACHE_HOME").or_else(|| variable("HOME").map(|home| home.join(".cache")));
+    variable("CALIB_CACHE")
         .or_else(|| usual().map(|folder| folder.join("calib")))
         .unwrap_or_else(|| PathBuf::from(".calib-cache"))
+}
+
+/// The last panic of any thread: what it said, and where.
+static LAST: Mutex<String> = Mutex::new(String::new());
+
+/// Runs a verb; its panic becomes a bug, told on stderr.
+pub(super) fn guarded(verb: impl FnOnce() -> u8) -> u8 {
+    std::panic::set_hook(Box::new(keep));
+    caught(verb).unwrap_or_else(|bug| super::complain(&bug))
+}
+
+/// What a verb gives, or the bug that its panic is.
+fn caught(verb: impl FnOnce() -> u8) -> Result<u8> {
+    catch_unwind(AssertUnwindSafe(verb))
+        .map_err(|_| Error::Bug(LAST.lock().unwrap_or_else(PoisonError::into_inner).clone()))
+}
+
+fn keep(panic: &PanicHookInfo) {
+    let said = panic.payload_as_str().unwrap_or("stopped without a word");
+    let place = panic.location().map_or_else(String::new, |place| {
+        format!(", at {}:{}", place.file(), place.line())
+    });
+    *LAST.lock().unwrap_or_else(PoisonError::into_inner) =
+        format!("{}{place}", said.replace('\n', " "));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A verb with an index that is out of bounds, in a thread of its own.
+    fn faulty(rows: &[u8]) -> u8 {
+        let found = std::thread::scope(|scope| scope.spawn(|| rows[rows.len()]).join());
+        found.unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+    }
+
+    #[test]
+    fn a_panic_of_a_verb_is_a_bug_with_its_place_and_exit_code_70() {
+        let hook = std::panic::take_hook();
+        let code = guarded(|| faulty(&[1, 2, 3]));
+        let bug = caught(|| faulty(&[1, 2, 3]));
+        let sound = guarded(|| 10);
+        std::panic::set_hook(hook);
+        assert_eq!((code, sound), (70, 10));
+        let said = super::super::message(&bug.unwrap_err());
+        assert!(
+            said.starts_with(
+                "error: index out of bounds: the len is 3 but the index is 3, at src/cli/surroundings.rs:"
+            ),
+            "{said}"
+        );
+        assert!(
+            said.ends_with("(this is a bug in calib)") && said.lines().count() == 1,
+            "{said}"
+        );
+    }
 }

@@ -1,6 +1,6 @@
 //! `calib verify-robot`: what compensation achieved, from points that were measured at corrected targets.
 
-use super::model_arguments::ModelArguments;
+use super::pipeline_arguments::ModelArguments;
 use super::{emit_json, emit_lines, write};
 use crate::compensate::{CorrectionOptions, Corrector, IdentifiedArm, load_matters};
 use crate::error::{Error, Result, counted};
@@ -47,59 +47,61 @@ pub(super) struct VerifyRobotArguments {
     json: bool,
 }
 
-pub(super) fn main(arguments: &VerifyRobotArguments, command_line: &[OsString]) -> Result<()> {
-    let place = arguments.second.display().to_string();
-    let text = raw::text(&arguments.second)
-        .map_err(|error| Error::spec(&place, format!("cannot be read: {error}")))?;
-    let identified = arguments.model.load(Purpose::Compensate, command_line)?;
-    let arm = IdentifiedArm::new(identified.model.clone(), identified.correction.clone());
-    // As `compensate`: what depends on load is not predicted without one.
-    let load = if arguments.payload.is_some() {
-        None
-    } else {
-        identified
-            .heaviest()
-            .filter(|load| load_matters(&arm, *load))
-    };
-    let layout = Layout {
-        place: &place,
-        robot: &identified.robot,
-        units: Units::default(),
-        plain: false,
-        cartesian: false,
-        load,
-        force: true,
-    };
-    let rows = measured(&text, &layout)?;
-    if rows.is_empty() {
-        return Err(Error::data(&place, "has no row below its header"));
+impl VerifyRobotArguments {
+    pub fn run(&self, command_line: &[OsString]) -> Result<()> {
+        let place = self.second.display().to_string();
+        let text = raw::text(&self.second)
+            .map_err(|error| Error::spec(&place, format!("cannot be read: {error}")))?;
+        let identified = self.model.load(Purpose::Compensate, command_line)?;
+        let arm = IdentifiedArm::new(identified.model.clone(), identified.correction.clone());
+        // As `compensate`: what depends on load is not predicted without one.
+        let load = if self.payload.is_some() {
+            None
+        } else {
+            identified
+                .heaviest()
+                .filter(|load| load_matters(&arm, *load))
+        };
+        let layout = Layout {
+            place: &place,
+            robot: &identified.robot,
+            units: Units::default(),
+            plain: false,
+            cartesian: false,
+            load,
+            force: true,
+        };
+        let rows = measured(&text, &layout)?;
+        if rows.is_empty() {
+            return Err(Error::data(&place, "has no row below its header"));
+        }
+        let nominal = RobotModel::new(identified.robot.clone());
+        let convention = identified
+            .convention
+            .clone()
+            .unwrap_or_else(|| JointConvention::of_the_robot_file(nominal.joints()));
+        let clock = identified.data.as_ref().is_none_or(Measurements::has_clock);
+        let payload = self.payload.unwrap_or(0.0);
+        let options = CorrectionOptions {
+            payload,
+            clock,
+            ..CorrectionOptions::counted_by(convention)
+        };
+        let mut corrector = Corrector::new(
+            &arm,
+            identified.coverage(),
+            identified.uncertainty(&arm),
+            options,
+        );
+        let found = achieved(&arm, &nominal, &mut corrector, &rows, self.new_base)?;
+        if let Some(path) = &self.html {
+            write(path, &page(&identified.origin, &found, self.new_base)?)?;
+        }
+        if self.json {
+            return emit_json(&document(&identified.origin, &found));
+        }
+        emit_lines(&report_text(&identified.origin, &found, self.new_base))
     }
-    let nominal = RobotModel::new(identified.robot.clone());
-    let convention = identified
-        .convention
-        .clone()
-        .unwrap_or_else(|| JointConvention::of_the_robot_file(nominal.joints()));
-    let clock = identified.data.as_ref().is_none_or(Measurements::has_clock);
-    let payload = arguments.payload.unwrap_or(0.0);
-    let options = CorrectionOptions {
-        payload,
-        clock,
-        ..CorrectionOptions::counted_by(convention)
-    };
-    let mut corrector = Corrector::new(
-        &arm,
-        identified.coverage(),
-        identified.uncertainty(&arm),
-        options,
-    );
-    let found = achieved(&arm, &nominal, &mut corrector, &rows, arguments.new_base)?;
-    if let Some(path) = &arguments.html {
-        write(path, &page(&identified.origin, &found, arguments.new_base)?)?;
-    }
-    if arguments.json {
-        return emit_json(&document(&identified.origin, &found));
-    }
-    emit_lines(&report_text(&identified.origin, &found, arguments.new_base))
 }
 
 /// Mean, 95th percentile and largest, mm.

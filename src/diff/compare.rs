@@ -1,16 +1,16 @@
 //! Two tables compared from end to end: hashes, keys, columns side by side, the worst rows.
 
+use arrow::array::AsArray;
 use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::atomic::{AtomicU8, Ordering};
 
-use super::bytes::same_bytes;
 use super::cells::CellWriter;
 use super::columns::{self, ColumnPair};
 use super::key::{self, Keys, Pairing};
 use super::measure::{self, CHANGED, CellDifference, CellValue, ComparedTables, SAME, WITHIN};
-use super::source::TableFile;
+use super::source::{TableColumn, TableFile, same_bytes};
 use super::{
     ColumnDiff, DiffOptions, DiffedTable, Discrepancy, Equal, Examples, RowCounts, TableDiff,
     WorstCell, WorstRow,
@@ -55,20 +55,21 @@ pub fn compare(a: &Path, b: &Path, options: &DiffOptions) -> Result<TableDiff> {
         }
         return Ok(diff);
     }
-    let (keys, keys_b) = key::read(&a, &b, &diff.key)?;
+    let (keys, keys_b) = Keys::read(&a, &b, &diff.key)?;
     let pairing = key::pair(&keys, &keys_b, options.by_occurrence);
-    diff.examples = examples(&keys, &keys_b, &pairing);
-    // Only A's keys are needed from here on, and they are large.
-    let only_b = pairing
-        .only_b
-        .iter()
-        .chain(&pairing.twice_b)
-        .map(|&row| keys_b.cells(row as usize).collect::<Vec<_>>());
-    let only_b: Vec<Vec<key::KeyCell>> = if options.out.is_some() {
-        only_b.collect()
-    } else {
-        Vec::new()
+    diff.examples = examples(&keys, &keys_b, &pairing)?;
+    let mut writer = match &options.out {
+        Some(path) => {
+            let mut writer = CellWriter::create(path, &a, &diff.key)?;
+            writer.unpaired(&keys, &pairing.only_a, "only_a")?;
+            writer.unpaired(&keys, &pairing.twice_a, "duplicate_a")?;
+            writer.unpaired(&keys_b, &pairing.only_b, "only_b")?;
+            writer.unpaired(&keys_b, &pairing.twice_b, "duplicate_b")?;
+            Some(writer)
+        }
+        None => None,
     };
+    // Only A's keys are needed from here on, and they are large.
     drop(keys_b);
     let rows: Vec<AtomicU8> = (0..a.rows).map(|_| AtomicU8::new(SAME)).collect();
     let files = ComparedTables {
@@ -77,7 +78,7 @@ pub fn compare(a: &Path, b: &Path, options: &DiffOptions) -> Result<TableDiff> {
         pairing: &pairing,
         rows: &rows,
     };
-    let measured = match &options.out {
+    let measured = match &mut writer {
         None => {
             let one = |comparison: &ColumnPair| judge(files, comparison, options, None);
             comparisons
@@ -85,22 +86,21 @@ pub fn compare(a: &Path, b: &Path, options: &DiffOptions) -> Result<TableDiff> {
                 .map(one)
                 .collect::<Result<Vec<_>>>()?
         }
-        Some(path) => {
-            let mut writer = CellWriter::create(path, &a, &diff.key)?;
-            writer.unpaired(&keys, &pairing, &only_b)?;
-            let one = |comparison: &ColumnPair| {
-                judge(files, comparison, options, Some((&mut writer, &keys)))
-            };
-            let measured = comparisons.iter().map(one).collect::<Result<Vec<_>>>()?;
-            writer.close()?;
-            measured
+        Some(writer) => {
+            let one =
+                |comparison: &ColumnPair| judge(files, comparison, options, Some((writer, &keys)));
+            comparisons.iter().map(one).collect::<Result<Vec<_>>>()?
         }
     };
+    if let Some(mut writer) = writer {
+        writer.flush(&keys)?;
+        writer.close()?;
+    }
     diff.rows = count(&rows, &pairing);
     drop(rows);
     let mut cells: Vec<(usize, CellDifference)> = Vec::new();
     for (at, (column, worst)) in measured.into_iter().enumerate() {
-        let worst_key = column.worst_row.map(|row| keys.text(row as usize));
+        let worst_key = keys.texts(column.worst_row.as_slice())?.pop();
         diff.columns.push(ColumnDiff {
             worst_key,
             ..column
@@ -214,30 +214,18 @@ fn key_columns(
     Ok(key.clone())
 }
 
-fn examples(a: &Keys, b: &Keys, pairing: &Pairing) -> Examples {
-    let some = |keys: &Keys, rows: &[u32]| -> Vec<String> {
-        let mut texts: Vec<String> = Vec::new();
-        for &row in rows {
-            let text = keys.text(row as usize);
-            if texts.last() != Some(&text) {
-                texts.push(text);
-            }
-            if texts.len() == EXAMPLES {
-                break;
-            }
-        }
-        texts
-    };
-    let mut duplicate = some(a, &pairing.twice_a);
-    duplicate.extend(some(b, &pairing.twice_b));
+fn examples(a: &Keys, b: &Keys, pairing: &Pairing) -> Result<Examples> {
+    let some = |keys: &Keys, rows: &[u32]| keys.texts(&keys.distinct(rows, EXAMPLES));
+    let mut duplicate = some(a, &pairing.twice_a)?;
+    duplicate.extend(some(b, &pairing.twice_b)?);
     duplicate.sort();
     duplicate.dedup();
     duplicate.truncate(EXAMPLES);
-    Examples {
-        only_a: some(a, &pairing.only_a),
-        only_b: some(b, &pairing.only_b),
+    Ok(Examples {
+        only_a: some(a, &pairing.only_a)?,
+        only_b: some(b, &pairing.only_b)?,
         duplicate,
-    }
+    })
 }
 
 /// Measures a column and keeps its worst cells.
@@ -307,7 +295,8 @@ fn worst_rows(
     }
     order.truncate(limit);
     let units = row_units(a, comparisons, &order)?;
-    let rows = order.into_iter().map(|row| {
+    let texts = keys.texts(&order)?;
+    let rows = order.into_iter().zip(texts).map(|(row, key)| {
         let own = cells.iter().filter(|(_, cell)| cell.row == row);
         let cells = own.map(|(at, cell)| {
             let comparison = &comparisons[*at];
@@ -326,7 +315,7 @@ fn worst_rows(
             }
         });
         WorstRow {
-            key: keys.text(row as usize),
+            key,
             cells: cells.collect(),
         }
     });
@@ -347,27 +336,15 @@ fn row_units(
     comparisons: &[ColumnPair],
     rows: &[u32],
 ) -> Result<BTreeMap<u32, String>> {
-    let mut units = BTreeMap::new();
-    let column = a
-        .columns
+    let by_row = comparisons
         .iter()
-        .position(|column| column.semantic.as_deref() == Some("unit"));
-    let Some(column) = column.filter(|_| {
-        comparisons
-            .iter()
-            .any(|comparison| comparison.unit == "row")
-    }) else {
-        return Ok(units);
+        .any(|comparison| comparison.unit == "row");
+    let semantic = |column: &TableColumn| column.semantic.as_deref() == Some("unit");
+    let Some(column) = a.columns.iter().position(semantic).filter(|_| by_row) else {
+        return Ok(BTreeMap::new());
     };
-    let mut start = 0;
-    for batch in a.stream(&[column])? {
-        let array = &batch?[0];
-        let end = start + arrow::array::Array::len(array) as u32;
-        for &row in rows.iter().filter(|row| (start..end).contains(row)) {
-            let texts = arrow::array::AsArray::as_string::<i32>(array);
-            units.insert(row, texts.value((row - start) as usize).to_string());
-        }
-        start = end;
-    }
-    Ok(units)
+    let texts = a.whole_text(column)?;
+    let texts = texts.as_string::<i64>();
+    let unit = |row: &u32| (*row, texts.value(*row as usize).to_string());
+    Ok(rows.iter().map(unit).collect())
 }

@@ -1,12 +1,13 @@
 //! One comparison carried through: every pair of cells judged, the statistics of the differences, the worst rows.
 
-use arrow::array::{Array, ArrayRef, AsArray};
-use arrow::datatypes::Int64Type;
+use arrow::array::{Array, ArrayRef, AsArray, Float64Array, Int64Array, LargeStringArray};
+use arrow::compute::cast;
+use arrow::datatypes::{DataType, Float64Type, Int64Type};
 use std::sync::atomic::{AtomicU8, Ordering};
 
 use super::columns::{ColumnPair, Comparator};
 use super::key::{NONE, Pairing};
-use super::source::{CellKind, TableFile, push_numbers};
+use super::source::{TableFile, bug, texts_of};
 use super::{ColumnDiff, DifferenceStatistics};
 use crate::error::Result;
 
@@ -46,6 +47,14 @@ pub(super) struct ComparedTables<'d> {
     pub rows: &'d [AtomicU8],
 }
 
+impl ComparedTables<'_> {
+    /// Places of the rows of a batch of A that have a partner.
+    fn paired(&self, start: usize, count: usize) -> impl Iterator<Item = usize> {
+        let partners = &self.pairing.partner[start..start + count];
+        (0..count).filter(move |at| partners[*at] != NONE)
+    }
+}
+
 /// Judges a comparison; `sees` is told of every pair of cells that are not the same, in the order of A.
 pub(super) fn measure(
     files: ComparedTables,
@@ -69,136 +78,93 @@ fn numbers(
     tally: &mut DifferenceSums,
     sees: &mut Seer,
 ) -> Result<()> {
-    let ComparedTables {
-        a,
-        b,
-        pairing,
-        rows,
-    } = files;
-    let size = comparison.a.len();
-    let theirs = Theirs::read(a, b, comparison)?;
-    let mut wanted = comparison.a.clone();
-    wanted.extend(comparison.sigma.map(|(column, _)| column));
+    let (sigma_a, sigma_b) = comparison.sigma.unzip();
+    let columns = |of: &[usize], sigma: Option<usize>| -> Vec<usize> {
+        of.iter().copied().chain(sigma).collect()
+    };
+    let theirs = columns(&comparison.b, sigma_b)
+        .into_iter()
+        .map(|column| files.b.whole(column))
+        .collect::<Result<Vec<_>>>()?;
     let mut start = 0;
-    let mut ours: Vec<Vec<f64>> = vec![Vec::new(); wanted.len()];
-    let mut beside: Vec<Vec<f64>> = vec![Vec::new(); size];
-    let no_null_there = theirs.columns.iter().all(|(_, nulls)| nulls.is_empty());
-    for batch in a.stream(&wanted)? {
+    for batch in files.a.stream(&columns(&comparison.a, sigma_a))? {
         let batch = batch?;
-        for (values, array) in ours.iter_mut().zip(&batch) {
-            values.clear();
-            push_numbers(array, values);
-        }
-        for (values, (theirs, _)) in beside.iter_mut().zip(&theirs.columns) {
-            pairing.beside(theirs, start, batch[0].len(), values);
-        }
-        let plain =
-            size == 1 && theirs.integers.is_none() && no_null_there && batch[0].null_count() == 0;
-        for at in 0..batch[0].len() {
-            let partner = pairing.partner(start + at);
-            if partner == NONE {
-                continue;
-            }
-            if plain && ours[0][at] == beside[0][at] {
-                tally.pairs += 1;
-                continue;
-            }
-            let pair = Pair {
-                batch: &batch,
-                ours: &ours,
-                beside: &beside,
-                at,
-                partner: partner as usize,
-            };
-            if let Some(cell) = theirs.cell(comparison, &pair, start + at, tally) {
-                judge(&cell, rows, tally);
+        let rows = batch[0].len();
+        let theirs = theirs
+            .iter()
+            .map(|cells| files.pairing.aligned(cells, start, rows))
+            .collect::<Result<Vec<_>>>()?;
+        let pairs = NumberPairs {
+            comparison,
+            a: Numbers::of(batch, (1.0, 0.0), comparison.a.len())?,
+            b: Numbers::of(theirs, comparison.conversion, comparison.a.len())?,
+        };
+        for at in files.paired(start, rows) {
+            if let Some(cell) = pairs.cell(start, at, tally) {
+                judge(&cell, files.rows, tally);
                 sees(&cell)?;
             }
         }
-        start += batch[0].len();
+        start += rows;
     }
     Ok(())
 }
 
-/// B's columns of a comparison, in A's unit, each with its nulls (empty where there are none).
-struct Theirs {
-    columns: Vec<(Vec<f64>, Vec<bool>)>,
-    /// Where both are whole numbers: beyond 2^53 these differ where their nearest f64 does not.
-    integers: Option<Vec<i64>>,
-    sigma: Option<(Vec<f64>, Vec<bool>)>,
+/// Columns of one file: those of the comparison, and last that of sigmas, where there is one.
+struct Numbers {
+    numbers: Vec<Float64Array>,
+    /// The first column, of whole numbers: beyond 2^53 these differ where their nearest f64 does not.
+    whole: Option<Int64Array>,
 }
 
-/// A row of A and its partner.
-struct Pair<'p> {
-    /// The columns of A, and their numbers, with the column of sigmas last where there is one.
-    batch: &'p [ArrayRef],
-    ours: &'p [Vec<f64>],
-    /// B's numbers, in the order of A.
-    beside: &'p [Vec<f64>],
-    /// In the batch.
-    at: usize,
-    /// In B.
-    partner: usize,
-}
-
-fn is_null(nulls: &[bool], row: usize) -> bool {
-    nulls.get(row).copied().unwrap_or(false)
-}
-
-impl Theirs {
-    fn read(a: &TableFile, b: &TableFile, comparison: &ColumnPair) -> Result<Self> {
-        let mut columns = comparison
-            .b
-            .iter()
-            .map(|&column| b.numbers(column))
-            .collect::<Result<Vec<_>>>()?;
-        let (scale, shift) = comparison.conversion;
-        if comparison.conversion != (1.0, 0.0) {
-            columns
-                .iter_mut()
-                .flat_map(|(values, _)| values)
-                .for_each(|value| *value = *value * scale + shift);
-        }
-        let whole = comparison.a.len() == 1
-            && a.columns[comparison.a[0]].kind == CellKind::Int
-            && b.columns[comparison.b[0]].kind == CellKind::Int;
-        let integers = whole.then(|| b.integers(comparison.b[0])).transpose()?;
-        let sigma = comparison
-            .sigma
-            .map(|(_, column)| b.numbers(column))
-            .transpose()?;
+impl Numbers {
+    /// The first `size` columns are converted.
+    fn of(cells: Vec<ArrayRef>, (scale, shift): (f64, f64), size: usize) -> Result<Self> {
+        let number = |(column, cells): (usize, &ArrayRef)| {
+            let numbers = cast(cells, &DataType::Float64).map_err(bug)?;
+            let numbers = numbers.as_primitive::<Float64Type>();
+            Ok(if column < size && (scale, shift) != (1.0, 0.0) {
+                numbers.unary(|number| number * scale + shift)
+            } else {
+                numbers.clone()
+            })
+        };
         Ok(Self {
-            columns,
-            integers,
-            sigma,
+            numbers: cells
+                .iter()
+                .enumerate()
+                .map(number)
+                .collect::<Result<Vec<_>>>()?,
+            whole: cells[0].as_primitive_opt::<Int64Type>().cloned(),
         })
     }
 
+    fn is_null(&self, size: usize, at: usize) -> bool {
+        self.numbers[..size].iter().any(|cells| cells.is_null(at))
+    }
+}
+
+/// Rows of A, and their partners in the same places.
+struct NumberPairs<'c> {
+    comparison: &'c ColumnPair,
+    a: Numbers,
+    b: Numbers,
+}
+
+impl NumberPairs<'_> {
     /// What a pair shows; none where both are the same.
-    fn cell(
-        &self,
-        comparison: &ColumnPair,
-        pair: &Pair,
-        row: usize,
-        tally: &mut DifferenceSums,
-    ) -> Option<CellDifference> {
-        let size = comparison.a.len();
-        let null_a = pair.batch[..size]
-            .iter()
-            .any(|array| array.is_null(pair.at));
-        let null_b = self
-            .columns
-            .iter()
-            .any(|(_, nulls)| is_null(nulls, pair.partner));
+    fn cell(&self, start: usize, at: usize, tally: &mut DifferenceSums) -> Option<CellDifference> {
+        let (comparison, size) = (self.comparison, self.comparison.a.len());
+        let (null_a, null_b) = (self.a.is_null(size, at), self.b.is_null(size, at));
         let difference = match (null_a, null_b) {
             (true, true) => return None,
             (false, false) => {
                 tally.pairs += 1;
-                self.difference(comparison, pair)?
+                self.difference(at)?
             }
             _ => f64::NAN,
         };
-        let (left, right) = (pair.ours[0][pair.at], pair.beside[0][pair.at]);
+        let (left, right) = (self.a.numbers[0].value(at), self.b.numbers[0].value(at));
         let value = |null: bool, value: f64| {
             if null {
                 CellValue::Null
@@ -214,11 +180,11 @@ impl Theirs {
         let allowed = comparison.atol + comparison.rtol * largest;
         let finite = difference.is_finite();
         let sigmas = self
-            .sigma(size, pair)
+            .sigma(size, at)
             .filter(|_| finite)
             .map(|sigma| difference.abs() / sigma);
         Some(CellDifference {
-            row: row as u32,
+            row: (start + at) as u32,
             changed: !(finite && difference.abs() <= allowed),
             a: value(null_a, left),
             b: value(null_b, right),
@@ -228,14 +194,19 @@ impl Theirs {
         })
     }
 
-    /// Theirs minus ours; none where both are the same, as rotations are whose quaternions differ in sign.
-    fn difference(&self, comparison: &ColumnPair, pair: &Pair) -> Option<f64> {
+    /// B minus A; none where both are the same, as rotations are whose quaternions differ in sign.
+    fn difference(&self, at: usize) -> Option<f64> {
+        let comparison = self.comparison;
+        let cells = |of: &Numbers| -> Vec<f64> {
+            let numbers = &of.numbers[..comparison.a.len()];
+            numbers.iter().map(|cells| cells.value(at)).collect()
+        };
         let difference = if comparison.a.len() == 1 {
-            let (left, right) = (pair.ours[0][pair.at], pair.beside[0][pair.at]);
-            let whole = self
-                .integers
-                .as_ref()
-                .map(|theirs| apart(&pair.batch[0], pair.at, theirs[pair.partner]));
+            let (left, right) = (self.a.numbers[0].value(at), self.b.numbers[0].value(at));
+            let whole = self.a.whole.as_ref().zip(self.b.whole.as_ref());
+            let whole = whole.map(|(left, right)| {
+                (i128::from(right.value(at)) - i128::from(left.value(at))) as f64
+            });
             if (left == right && whole.unwrap_or(0.0) == 0.0) || (left.is_nan() && right.is_nan()) {
                 return None;
             }
@@ -243,11 +214,7 @@ impl Theirs {
                 .filter(|_| comparison.conversion == (1.0, 0.0))
                 .unwrap_or_else(|| one(comparison.how, right - left))
         } else {
-            let left: Vec<f64> = pair.ours[..comparison.a.len()]
-                .iter()
-                .map(|values| values[pair.at])
-                .collect();
-            let right: Vec<f64> = pair.beside.iter().map(|values| values[pair.at]).collect();
+            let (left, right) = (cells(&self.a), cells(&self.b));
             if left == right {
                 return None;
             }
@@ -257,11 +224,10 @@ impl Theirs {
     }
 
     /// The sigma of both, where both have one above zero.
-    fn sigma(&self, size: usize, pair: &Pair) -> Option<f64> {
-        let (values, nulls) = self.sigma.as_ref()?;
-        let (ours, theirs) = (pair.ours[size][pair.at], values[pair.partner]);
-        let null = pair.batch[size].is_null(pair.at) || is_null(nulls, pair.partner);
-        let both = ((ours * ours + theirs * theirs) / 2.0).sqrt();
+    fn sigma(&self, size: usize, at: usize) -> Option<f64> {
+        let (ours, theirs) = (self.a.numbers.get(size)?, self.b.numbers.get(size)?);
+        let null = ours.is_null(at) || theirs.is_null(at);
+        let both = ((ours.value(at).powi(2) + theirs.value(at).powi(2)) / 2.0).sqrt();
         (!null && both > 0.0).then_some(both)
     }
 }
@@ -274,11 +240,6 @@ fn score(difference: f64, allowed: f64, sigmas: Option<f64>, largest: f64) -> f6
         None if allowed > 0.0 => difference.abs() / allowed,
         None => difference.abs() / (1e-9 * largest).max(f64::MIN_POSITIVE),
     }
-}
-
-/// Theirs minus ours, of whole numbers.
-fn apart(ours: &ArrayRef, at: usize, theirs: i64) -> f64 {
-    (i128::from(theirs) - i128::from(ours.as_primitive::<Int64Type>().value(at))) as f64
 }
 
 fn one(how: Comparator, difference: f64) -> f64 {
@@ -331,76 +292,42 @@ fn texts(
     tally: &mut DifferenceSums,
     sees: &mut Seer,
 ) -> Result<()> {
-    let ComparedTables {
-        a,
-        b,
-        pairing,
-        rows,
-    } = files;
-    let (column_a, column_b) = (comparison.a[0], comparison.b[0]);
-    let mut bytes = String::new();
-    let mut ends: Vec<(usize, bool)> = Vec::with_capacity(b.rows);
-    for batch in b.stream(&[column_b])? {
-        let array = batch?.swap_remove(0);
-        for row in 0..array.len() {
-            text(&array, b.columns[column_b].kind, row).inspect(|text| bytes.push_str(text));
-            ends.push((bytes.len(), array.is_null(row)));
-        }
-    }
+    let theirs = files.b.whole_text(comparison.b[0])?;
     let mut start = 0;
-    for batch in a.stream(&[column_a])? {
-        let array = batch?.swap_remove(0);
-        for at in 0..array.len() {
-            let partner = pairing.partner(start + at);
-            if partner == NONE {
-                continue;
-            }
-            let partner = partner as usize;
-            let (end, null) = ends[partner];
-            let begin = if partner == 0 { 0 } else { ends[partner - 1].0 };
-            let left = text(&array, a.columns[column_a].kind, at);
-            let right = (!null).then(|| &bytes[begin..end]);
-            tally.pairs += u64::from(left.is_some() && right.is_some());
-            if left.as_deref() == right {
-                continue;
-            }
-            let value = |text: Option<&str>| {
-                text.map_or(CellValue::Null, |text| CellValue::Text(text.into()))
+    for batch in files.a.stream(&comparison.a)? {
+        let ours = texts_of(&batch?[0])?;
+        let theirs = files.pairing.aligned(&theirs, start, ours.len())?;
+        let theirs = theirs.as_string::<i64>();
+        for at in files.paired(start, ours.len()) {
+            let text = |cells: &LargeStringArray| {
+                (!cells.is_null(at)).then(|| CellValue::Text(cells.value(at).into()))
             };
+            let null = ours.is_null(at) || theirs.is_null(at);
+            tally.pairs += u64::from(!null);
+            let same = if null {
+                ours.is_null(at) == theirs.is_null(at)
+            } else {
+                ours.value(at) == theirs.value(at)
+            };
+            if same {
+                continue;
+            }
             let cell = CellDifference {
                 row: (start + at) as u32,
                 changed: true,
-                a: value(left.as_deref()),
-                b: value(right),
+                a: text(&ours).unwrap_or(CellValue::Null),
+                b: text(theirs).unwrap_or(CellValue::Null),
                 difference: None,
                 sigmas: None,
                 // Below every number beyond its tolerance: those say by how much.
                 score: 1.0,
             };
-            judge(&cell, rows, tally);
+            judge(&cell, files.rows, tally);
             sees(&cell)?;
         }
-        start += array.len();
+        start += ours.len();
     }
     Ok(())
-}
-
-fn text(array: &ArrayRef, kind: CellKind, row: usize) -> Option<std::borrow::Cow<'_, str>> {
-    if array.is_null(row) {
-        return None;
-    }
-    if kind == CellKind::Text {
-        return Some(array.as_string::<i32>().value(row).into());
-    }
-    let mut numbers = Vec::with_capacity(1);
-    push_numbers(&array.slice(row, 1), &mut numbers);
-    Some(
-        numbers
-            .first()
-            .map(f64::to_string)
-            .unwrap_or_default()
-            .into(),
-    )
 }
 
 fn judge(cell: &CellDifference, rows: &[AtomicU8], tally: &mut DifferenceSums) {

@@ -3,20 +3,16 @@
 //! One column at a time over rows paired by key, so that memory is a few columns whatever the table; tolerances and semantics come
 //! from the schema. Equal content hashes answer at once, equal bytes as fast as they can be read.
 
-mod bytes;
 mod cells;
 mod columns;
 mod compare;
-mod html;
 mod key;
 mod measure;
-mod order;
 mod source;
 mod text;
 
 pub use compare::{compare, table_hash};
-pub use html::html;
-pub use text::{Detail, headline, short, text};
+pub use text::{Detail, headline, html, short, text};
 
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};

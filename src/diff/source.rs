@@ -1,16 +1,19 @@
 //! One side of a comparison: a Parquet file opened by its footer, whose columns are read one at a time.
 
-use arrow::array::{Array, ArrayRef, AsArray, BooleanArray, RecordBatch};
-use arrow::compute::cast;
-use arrow::datatypes::{DataType, Float64Type, Int64Type, Schema};
+use arrow::array::{Array, ArrayRef, AsArray, LargeStringArray, RecordBatch, new_empty_array};
+use arrow::compute::{cast, concat};
+use arrow::datatypes::{DataType, Float64Type, Schema};
 use parquet::arrow::arrow_reader::{
     ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder,
 };
 use parquet::arrow::{ProjectionMask, parquet_to_arrow_schema};
 use parquet::errors::ParquetError;
+use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use std::collections::BTreeMap;
 use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use crate::error::{Error, Result, counted};
 use crate::raw;
@@ -209,52 +212,49 @@ impl TableFile {
         )
     }
 
-    /// A whole column of whole numbers; null cells are 0.
-    pub fn integers(&self, column: usize) -> Result<Vec<i64>> {
-        let mut values = Vec::with_capacity(self.rows);
-        for batch in self.stream(&[column])? {
-            values.extend_from_slice(batch?[0].as_primitive::<Int64Type>().values());
-        }
-        Ok(values)
+    /// A whole column.
+    pub fn whole(&self, column: usize) -> Result<ArrayRef> {
+        let batches = self
+            .stream(&[column])?
+            .map(|batch| Ok(batch?.swap_remove(0)));
+        joined(batches.collect::<Result<Vec<_>>>()?, || {
+            plain_type(self.columns[column].kind)
+        })
     }
 
-    /// A whole column of numbers or flags; null cells are set in the mask, which is empty where there are none.
-    pub fn numbers(&self, column: usize) -> Result<(Vec<f64>, Vec<bool>)> {
-        let mut values = Vec::with_capacity(self.rows);
-        let mut nulls: Vec<bool> = Vec::new();
-        for batch in self.stream(&[column])? {
-            let array = &batch?[0];
-            if array.null_count() > 0 {
-                nulls.resize(values.len(), false);
-                nulls.extend((0..array.len()).map(|row| array.is_null(row)));
-            }
-            push_numbers(array, &mut values);
-            if !nulls.is_empty() {
-                nulls.resize(values.len(), false);
-            }
-        }
-        Ok((values, nulls))
+    /// A whole column as texts.
+    pub fn whole_text(&self, column: usize) -> Result<ArrayRef> {
+        let batches = self
+            .stream(&[column])?
+            .map(|batch| -> Result<ArrayRef> { Ok(Arc::new(texts_of(&batch?[0])?)) });
+        joined(batches.collect::<Result<Vec<_>>>()?, || DataType::LargeUtf8)
     }
 }
 
-/// The numbers of a batch; flags are 0 and 1, whole numbers beyond 2^53 are rounded.
-pub(super) fn push_numbers(array: &ArrayRef, values: &mut Vec<f64>) {
-    match array.data_type() {
-        DataType::Float64 => values.extend_from_slice(array.as_primitive::<Float64Type>().values()),
-        DataType::Int64 => values.extend(
-            array
-                .as_primitive::<Int64Type>()
-                .values()
-                .iter()
-                .map(|&value| value as f64),
-        ),
-        DataType::Boolean => {
-            let flags: &BooleanArray = array.as_boolean();
-            values.extend(flags.values().iter().map(|flag| f64::from(u8::from(flag))));
-        }
-        // Texts have no number; nobody asks for it.
-        _ => values.resize(values.len() + array.len(), f64::NAN),
+fn joined(batches: Vec<ArrayRef>, kind: impl FnOnce() -> DataType) -> Result<ArrayRef> {
+    let all: Vec<&dyn Array> = batches.iter().map(AsRef::as_ref).collect();
+    if all.is_empty() {
+        return Ok(new_empty_array(&kind()));
     }
+    concat(&all).map_err(bug)
+}
+
+/// The cells of a batch as texts; flags are 0 and 1.
+pub(super) fn texts_of(cells: &ArrayRef) -> Result<LargeStringArray> {
+    if cells.data_type() == &DataType::Utf8 {
+        let texts = cast(cells, &DataType::LargeUtf8).map_err(bug)?;
+        return Ok(texts.as_string::<i64>().clone());
+    }
+    let numbers = cast(cells, &DataType::Float64).map_err(bug)?;
+    let numbers = numbers.as_primitive::<Float64Type>().iter();
+    Ok(numbers
+        .map(|number| number.map(|number| number.to_string()))
+        .collect())
+}
+
+/// What cannot fail, of columns that were read.
+pub(super) fn bug(error: impl std::fmt::Display) -> Error {
+    Error::Bug(error.to_string())
 }
 
 fn metadata_of(schema: Option<&Schema>, column: &str, key: &str) -> Option<String> {
@@ -297,15 +297,35 @@ fn plain(
     array: &ArrayRef,
     kind: CellKind,
 ) -> std::result::Result<ArrayRef, arrow::error::ArrowError> {
-    let wanted = match kind {
+    cast(array, &plain_type(kind))
+}
+
+fn plain_type(kind: CellKind) -> DataType {
+    match kind {
         CellKind::Float => DataType::Float64,
         CellKind::Int => DataType::Int64,
         CellKind::Flag => DataType::Boolean,
         CellKind::Text => DataType::Utf8,
-    };
-    if array.data_type() == &wanted {
-        Ok(array.clone())
-    } else {
-        cast(array, &wanted)
     }
+}
+
+/// Pieces of files that are compared byte by byte: large enough to stream, small enough that a difference ends the reading early.
+const PIECE: u64 = 1 << 20;
+
+/// Whether both files can be read and hold the same bytes.
+pub(super) fn same_bytes(a: &Path, b: &Path) -> bool {
+    let length = |path: &Path| std::fs::metadata(path).ok().map(|metadata| metadata.len());
+    let Some(bytes) = length(a).filter(|bytes| length(b) == Some(*bytes)) else {
+        return false;
+    };
+    let piece = |path: &Path, at: u64| -> io::Result<Vec<u8>> {
+        let (mut file, mut bytes) = (raw::open(path)?, Vec::with_capacity(PIECE as usize));
+        file.seek(SeekFrom::Start(at * PIECE))?;
+        file.take(PIECE).read_to_end(&mut bytes)?;
+        Ok(bytes)
+    };
+    let same = |at: u64| matches!((piece(a, at), piece(b, at)), (Ok(a), Ok(b)) if a == b);
+    // The end first: there lie the statistics of a Parquet file's columns, which hardly ever agree where the columns do not.
+    let last = bytes.saturating_sub(1) / PIECE;
+    same(last) && (0..last).into_par_iter().all(same)
 }

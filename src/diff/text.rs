@@ -1,7 +1,9 @@
 //! A comparison as a short text: counts, columns that differ, the worst rows; never a dump.
 
 use super::{ColumnDiff, TableDiff, WorstCell};
-use crate::error::counted;
+use crate::error::{Error, Result, counted};
+use minijinja::value::Serde;
+use minijinja::{AutoEscape, Environment, context};
 
 /// How much a text shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -87,16 +89,16 @@ pub fn text(diff: &TableDiff, detail: Detail) -> String {
 
 /// The cell of a row that changed most; one that has a number before one that appeared or vanished.
 pub fn headline(row: &super::WorstRow) -> String {
-    let told = row
+    let first = row
         .cells
         .iter()
         .find(|cell| cell.difference.is_some())
         .or(row.cells.first());
-    told.map(cell).unwrap_or_default()
+    first.map(cell).unwrap_or_default()
 }
 
 /// `x_mm 1.25 -> 1.5 mm (+0.25, 3.1 sigma)`.
-pub(super) fn cell(cell: &WorstCell) -> String {
+fn cell(cell: &WorstCell) -> String {
     let show = |value: &serde_json::Value| match value {
         serde_json::Value::String(text) => {
             format!("{:?}", text.chars().take(40).collect::<String>())
@@ -209,4 +211,31 @@ fn exact(value: f64) -> String {
     } else {
         text
     }
+}
+
+/// Tables compared, each under its name, as one self-contained page with a title. Names and texts come from files: the template escapes
+/// all of them.
+pub fn html(title: &str, notes: &[String], tables: &[(String, TableDiff)]) -> Result<String> {
+    let bug = |e: minijinja::Error| Error::Bug(format!("diff page: {e}"));
+    let mut environment = Environment::new();
+    environment.set_auto_escape_callback(|_| AutoEscape::Html);
+    environment.add_filter("short", short);
+    environment
+        .add_template("page", include_str!("page.html"))
+        .map_err(bug)?;
+    let cells = |diff: &TableDiff| -> Vec<Vec<String>> {
+        let rows = diff.worst.iter();
+        rows.map(|row| row.cells.iter().map(cell).collect())
+            .collect()
+    };
+    let tables: Vec<minijinja::Value> = tables
+        .iter()
+        .map(|(name, diff)| {
+            context! { name, cells => cells(diff), same => diff.is_same(), diff => minijinja::Value::from(Serde(diff)) }
+        })
+        .collect();
+    let template = environment.get_template("page").map_err(bug)?;
+    template
+        .render(context! { title, notes => minijinja::Value::from(Serde(notes)), tables })
+        .map_err(bug)
 }

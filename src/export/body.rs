@@ -1,8 +1,19 @@
 //! Mass, centre and inertia of a link as formats of rigid bodies write them: identified where torques show them, else as declared.
+//!
+//! Frames of links as others chose them, moved as little as the corrected axes demand: meshes and origins stay where they were.
+//!
+//! XML as exports write it: two blanks a level, and at the head, as comments, what the reader must know of the model.
 
 use super::Export;
 use super::model::{PLACEHOLDER, placeholder_inertia};
+use crate::description::{JointDescription, JointKind};
 use crate::dynamics::Inertial;
+use crate::error::{Error, Result};
+use crate::spatial::Pose;
+use nalgebra::{Matrix3, Rotation3, Vector3};
+use quick_xml::Writer;
+use quick_xml::events::{BytesDecl, BytesText, Event};
+use std::io;
 
 /// A body in a frame at its joint's point, parallel to the base at the zero pose.
 pub(super) struct LinkBody {
@@ -77,5 +88,116 @@ fn identified(body: &Inertial, own: bool, last: bool) -> LinkBody {
         centre: body.centre.into(),
         inertia,
         remark: Some(remark),
+    }
+}
+
+/// A joint's frame, whose axis is `nominal` in the base frame, on the corrected axis: turned from the one axis to the other, its origin at
+/// the point nearest to where it was.
+pub(super) fn moved(frame: &Pose, nominal: &Vector3<f64>, corrected: &JointDescription) -> Pose {
+    let axis = Vector3::from(corrected.axis);
+    // By the arc tangent: an arc cosine near 1 loses half of the digits.
+    let normal = nominal.cross(&axis);
+    let sine = normal.norm();
+    let turn = if sine > 0.0 {
+        Rotation3::new(normal * (sine.atan2(nominal.dot(&axis)) / sine))
+    } else {
+        Rotation3::identity()
+    };
+    let point = Vector3::from(corrected.point);
+    let origin = match corrected.kind {
+        JointKind::Revolute => point + axis * axis.dot(&(frame.translation - point)),
+        JointKind::Prismatic => frame.translation,
+    };
+    Pose::new(turn.into_inner() * frame.rotation, origin)
+}
+
+/// Place and turn of a frame seen from another as URDF writes them: m, and roll, pitch and yaw, rad.
+pub(super) fn origin(from: &Pose, to: &Pose) -> ([f64; 3], [f64; 3]) {
+    let between = from.inverse() * *to;
+    let (roll, pitch, yaw) = Rotation3::from_matrix_unchecked(between.rotation).euler_angles();
+    (between.translation.into(), [roll, pitch, yaw])
+}
+
+/// The pose of a tool: its rotation by rows, and its point.
+pub(super) fn tool(point: [f64; 3], rows: &[[f64; 3]; 3]) -> Pose {
+    Pose::new(Matrix3::from_fn(|i, k| rows[i][k]), point.into())
+}
+
+/// What elements are written to.
+pub(super) type Xml = Writer<Vec<u8>>;
+
+/// A document: the remarks, then what `root` writes.
+pub(super) fn document(
+    remarks: &[String],
+    root: impl FnOnce(&mut Xml) -> io::Result<()>,
+) -> Result<String> {
+    let mut xml = Writer::new_with_indent(Vec::new(), b' ', 2);
+    let written = || -> io::Result<Vec<u8>> {
+        xml.write_event(Event::Decl(BytesDecl::new("1.0", None, None)))?;
+        remarks
+            .iter()
+            .try_for_each(|line| comment(&mut xml, line))?;
+        root(&mut xml)?;
+        Ok(xml.into_inner())
+    };
+    let text = written().map_err(|error| Error::Bug(error.to_string()))?;
+    String::from_utf8(text)
+        .map(|text| text + "\n")
+        .map_err(|error| Error::Bug(error.to_string()))
+}
+
+pub(super) fn comment(xml: &mut Xml, text: &str) -> io::Result<()> {
+    // Two hyphens would end the comment; of three, the first pass leaves two.
+    let text = text.replace("--", "- -").replace("--", "- -");
+    xml.write_event(Event::Comment(BytesText::from_escaped(format!(" {text} "))))
+}
+
+/// An element without content.
+pub(super) fn empty(xml: &mut Xml, name: &str, attributes: &[(&str, &str)]) -> io::Result<()> {
+    xml.create_element(name)
+        .with_attributes(attributes.iter().copied())
+        .write_empty()?;
+    Ok(())
+}
+
+/// A point as seen from another.
+pub(super) fn offset(point: [f64; 3], from: [f64; 3]) -> String {
+    numbers(point.iter().zip(from).map(|(now, then)| now - then))
+}
+
+/// Numbers with blanks between them, each the shortest text that reads as the same number.
+pub(super) fn numbers(values: impl IntoIterator<Item = f64>) -> String {
+    values
+        .into_iter()
+        .map(|value| format!("{value:?}"))
+        .collect::<Vec<_>>()
+        .join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hyphens_of_a_name_end_no_comment() {
+        for name in ["a--b", "---", "-----", "-", "<!-- -->"] {
+            let text = document(&[name.to_string()], |xml| {
+                xml.create_element("robot").write_empty().map(drop)
+            })
+            .unwrap();
+            let read = roxmltree::Document::parse(&text)
+                .unwrap_or_else(|error| panic!("{error} in {text}"));
+            assert_eq!(read.root_element().tag_name().name(), "robot");
+        }
+    }
+
+    #[test]
+    fn numbers_read_back_as_they_are() {
+        let values = [0.1 + 0.2, -0.0, 1e-300, 1594.0];
+        let read = numbers(values)
+            .split(' ')
+            .map(|number| number.parse::<f64>().unwrap().to_bits())
+            .collect::<Vec<_>>();
+        assert_eq!(read, values.map(f64::to_bits));
     }
 }

@@ -1,8 +1,8 @@
 //! MJCF, MuJoCo's own format: every body's frame parallel to the base at the zero pose and on its joint's axis, so that no angle is
 //! converted and a joint at 0 is the robot at 0. The measured point is a site.
 
+use super::body::{self, Xml, empty, numbers, offset};
 use super::friction::{ARMATURE, DAMPING, DRIVE, FRICTION, SPRINGS, gear, positive, spring};
-use super::xml::{self, Xml, empty, numbers, offset};
 use super::{CarriedTorques, Export, Format};
 use crate::description::JointKind;
 use crate::error::{Result, one_line};
@@ -34,7 +34,7 @@ fn text(export: &Export) -> Result<String> {
         ));
     }
     let name = one_line(&robot.name);
-    xml::document(&remarks, |xml| {
+    body::document(&remarks, |xml| {
         xml.create_element("mujoco")
             .with_attribute(("model", name.as_str()))
             .write_inner_content(|xml| {
@@ -85,7 +85,7 @@ fn beyond(xml: &mut Xml, export: &Export, index: usize) -> io::Result<()> {
     body.write_inner_content(|xml| {
         if let Some(body) = export.body(index) {
             body.remark
-                .map_or(Ok(()), |remark| xml::comment(xml, remark))?;
+                .map_or(Ok(()), |remark| body::comment(xml, remark))?;
             let [xx, xy, xz, yy, yz, zz] = body.inertia;
             let inertia = match body.is_placeholder() {
                 true => ("diaginertia", numbers([xx, yy, zz])),
@@ -169,7 +169,7 @@ fn drives(xml: &mut Xml, export: &Export) -> io::Result<()> {
         return Ok(());
     }
     xml.create_element("actuator").write_inner_content(|xml| {
-        xml::comment(xml, "controls are motor currents, A")?;
+        body::comment(xml, "controls are motor currents, A")?;
         gears.iter().try_for_each(|(joint, gear)| {
             empty(
                 xml,

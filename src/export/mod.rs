@@ -2,10 +2,8 @@
 
 mod body;
 mod controller;
-mod deviation;
 mod dh;
 mod dynamics;
-mod frames;
 mod friction;
 mod json;
 mod mark;
@@ -15,7 +13,6 @@ mod sdf;
 mod ur_kinematics;
 mod urdf;
 mod xacro;
-mod xml;
 
 pub use mark::{Belonging, ExportMark};
 pub use model::Export;

@@ -1,9 +1,8 @@
 //! SDFormat, as Gazebo and Drake read it: every joint's frame parallel to the base at the zero pose and on its axis, as in URDF, but with
 //! limits only where they are known.
 
-use super::frames::{origin, tool};
+use super::body::{self, Xml, empty, numbers, offset, origin, tool};
 use super::friction::{DAMPING, FRICTION, positive};
-use super::xml::{self, Xml, empty, numbers, offset};
 use super::{CarriedTorques, Export, Format};
 use crate::description::JointKind;
 use crate::error::{Result, one_line};
@@ -26,7 +25,7 @@ fn text(export: &Export) -> Result<String> {
         );
     }
     let name = one_line(&export.corrected.name);
-    xml::document(&remarks, |xml| {
+    body::document(&remarks, |xml| {
         xml.create_element("sdf")
             .with_attribute(("version", "1.9"))
             .write_inner_content(|xml| {
@@ -106,7 +105,7 @@ fn link(xml: &mut Xml, export: &Export, index: usize, [name, joint]: [&str; 2]) 
             return Ok(());
         };
         body.remark
-            .map_or(Ok(()), |remark| xml::comment(xml, remark))?;
+            .map_or(Ok(()), |remark| body::comment(xml, remark))?;
         xml.create_element("inertial").write_inner_content(|xml| {
             leaf(xml, "pose", &format!("{} 0 0 0", numbers(body.centre)))?;
             leaf(xml, "mass", &numbers([body.mass]))?;

@@ -1,7 +1,7 @@
 //! The file `kinematics_params_file` of Universal Robots' ROS drivers and descriptions: the origin of each joint in the frame of the one
 //! before, whose z is the joint's axis. Frames stay as near as axes allow to those of the model's meshes.
 
-use super::frames::{moved, origin, tool};
+use super::body::{moved, origin, tool};
 use super::{CarriedTorques, Export, Format};
 use crate::description::RobotDescription;
 use crate::error::{Error, Result};

@@ -1,7 +1,7 @@
 //! URDF: every joint frame parallel to the base at the zero pose and on its axis, so that no angle is converted.
 
+use super::body::{self, Xml, empty, numbers, offset};
 use super::friction::{DAMPING, FRICTION, positive};
-use super::xml::{self, Xml, empty, numbers, offset};
 use super::{CarriedTorques, Export, Format};
 use crate::description::JointKind;
 use crate::error::{Result, one_line};
@@ -30,7 +30,7 @@ fn text(export: &Export) -> Result<String> {
             "largest torques and speeds of the joints are not known: {UNKNOWN} stands for none, which URDF does not have"
         ));
     }
-    xml::document(&remarks, |xml| {
+    body::document(&remarks, |xml| {
         let name = one_line(&export.corrected.name);
         xml.create_element("robot")
             .with_attribute(("name", name.as_str()))
@@ -80,7 +80,7 @@ fn link(xml: &mut Xml, export: &Export, index: usize, name: &str) -> io::Result<
         .with_attribute(("name", name))
         .write_inner_content(|xml| {
             body.remark
-                .map_or(Ok(()), |remark| xml::comment(xml, remark))?;
+                .map_or(Ok(()), |remark| body::comment(xml, remark))?;
             xml.create_element("inertial").write_inner_content(|xml| {
                 empty(xml, "origin", &[("xyz", &numbers(body.centre))])?;
                 empty(xml, "mass", &[("value", &numbers([body.mass]))])?;

@@ -1,8 +1,7 @@
 //! An include for the arm's own description: corrected origins of its joints, in its own frames, and nothing else; meshes, limits and
 //! inertials stay where they are.
 
-use super::frames::{moved, origin, tool};
-use super::xml::{self, numbers};
+use super::body::{self, moved, numbers, origin, tool};
 use super::{CarriedTorques, Export, Format};
 use crate::error::{Error, Result, one_line};
 use crate::raw::{self, ending};
@@ -79,13 +78,13 @@ fn text(export: &Export) -> Result<String> {
         .iter()
         .map(|(name, origin)| format!("('{name}', {})", quoted(origin)))
         .collect();
-    xml::document(&remarks, |xml| {
+    body::document(&remarks, |xml| {
         xml.create_element("robot")
             .with_attribute(("xmlns:xacro", "http://www.ros.org/wiki/xacro"))
             .write_inner_content(|xml| {
                 // xacro ends an expression at the first brace.
                 let value = format!("${{dict([{}])}}", all.join(", "));
-                xml::empty(
+                body::empty(
                     xml,
                     "xacro:property",
                     &[("name", "calib_origins"), ("value", &value)],
@@ -94,7 +93,7 @@ fn text(export: &Export) -> Result<String> {
                     .create_element("xacro:macro")
                     .with_attributes([("name", "calib_origin"), ("params", "joint")]);
                 makes.write_inner_content(|xml| {
-                    xml::empty(
+                    body::empty(
                         xml,
                         "origin",
                         &[

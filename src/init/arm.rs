@@ -1,11 +1,16 @@
 //! The arm that a recording is of: a file that is there already, a URDF, or a kind to start from.
+//!
+//! What drives say of joints while the arm moves: torques or motor currents, velocities; and whether recordings are of them.
 
+use super::columns::{Choice, ExaminedFile};
+use super::names::{CURRENTS, NAMED_JOINTS, TORQUES, TRAJECTORIES, VELOCITIES, WANTED, lists};
 use super::robots::{self, RobotFileKind};
 use super::{InitRequest, KINDS};
 use crate::description::JointKind;
 use crate::error::{Error, Result, counted};
 use crate::raw;
 use crate::robot::import::{RobotFileText, UrdfOutline, read_calib, urdf_outline};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// What recordings and pipeline must know of the arm.
@@ -143,4 +148,150 @@ fn read(path: &Path) -> Result<(String, String)> {
     let text =
         raw::text(path).map_err(|error| Error::spec(&label, format!("cannot be read: {error}")))?;
     Ok((label, text))
+}
+
+/// What a recording of torques is read of, besides torques, currents and velocities.
+const BESIDE: [&str; 4] = ["time", "q", "usage", "temperature"];
+const OF_MOTORS: &str =
+    "is it the torque at the joint? if at the motor: `torque_side: motor` next to `files`";
+const EFFORT: &str = "drivers of ROS state torques or motor currents as effort";
+
+/// Whether the recordings are of torques: each has times, joints, and what drives them, and none has points. Then they are mapped as such.
+pub(super) fn of_torques(found: &mut [ExaminedFile]) -> bool {
+    let driven = |file: &ExaminedFile| {
+        !file.by_joint(TORQUES).is_empty() || !file.by_joint(CURRENTS).is_empty()
+    };
+    let moves = |file: &ExaminedFile| {
+        file.get("x").is_none() && file.get("q").is_some() && file.get("time").is_some()
+    };
+    let all = !found.is_empty() && found.iter().all(|file| moves(file) && driven(file));
+    if all {
+        found.iter_mut().for_each(ExaminedFile::drives);
+    }
+    all
+}
+
+impl ExaminedFile {
+    /// Columns of so many numbers as there are joints, under a name with one of these words; those that were measured first.
+    fn by_joint(&self, listed: &str) -> Vec<Vec<usize>> {
+        let Some(count) = self.get("q").map(|joints| joints.choices[0].columns.len()) else {
+            return Vec::new();
+        };
+        let others = [TORQUES, CURRENTS, VELOCITIES];
+        let mut runs: BTreeMap<String, BTreeMap<usize, usize>> = BTreeMap::new();
+        for (column, name) in self
+            .said
+            .iter()
+            .enumerate()
+            .filter(|(column, _)| self.sheet.is_numeric(*column))
+        {
+            let named = || {
+                let (stem, joints) = (name.stem(), NAMED_JOINTS[2]);
+                let joint = joints.iter().position(|joint| stem.contains(joint))?;
+                Some((stem.replace(joints[joint], "#"), joint))
+            };
+            let Some((key, number)) = named().or_else(|| name.joint()) else {
+                continue;
+            };
+            let has = |list| key.split(['_', '#']).any(|word| lists(list, word));
+            if has(listed) && !others.iter().any(|other| *other != listed && has(other)) {
+                runs.entry(key).or_default().entry(number).or_insert(column);
+            }
+        }
+        let mut rows: Vec<(bool, Vec<usize>)> = Vec::new();
+        for (key, columns) in runs {
+            let first = usize::from(!columns.contains_key(&0));
+            let run: Vec<usize> = (first..)
+                .map_while(|number| columns.get(&number).copied())
+                .take(count)
+                .collect();
+            if run.len() == count {
+                rows.push((key.split(['_', '#']).any(|word| lists(WANTED, word)), run));
+            }
+        }
+        rows.sort();
+        rows.into_iter().map(|(_, run)| run).collect()
+    }
+
+    fn drives(&mut self) {
+        self.mappings
+            .retain(|mapping| BESIDE.contains(&mapping.quantity));
+        let [torques, currents, velocities] =
+            [TORQUES, CURRENTS, VELOCITIES].map(|listed| self.by_joint(listed));
+        let degrees = self
+            .get("q")
+            .is_some_and(|joints| joints.choices[0].lines[0].contains("unit: deg"));
+        if let Some(best) = torques.first() {
+            let unit = self.said[best[0]].unit_of(&["Nm"]);
+            let effort = self.said[best[0]]
+                .words
+                .iter()
+                .any(|word| word.starts_with("effort"));
+            let check = [
+                unit.is_none().then_some("the unit"),
+                Some(if effort { EFFORT } else { OF_MOTORS }),
+            ];
+            self.drive(
+                "torque",
+                &torques,
+                "Nm",
+                check.into_iter().flatten().collect(),
+            );
+            if let (true, Some(mapping)) = (effort, self.mappings.last_mut()) {
+                let as_current = |line: &String| {
+                    line.replacen("torque:", "current:", 1)
+                        .replace("unit: Nm", "unit: A")
+                };
+                let lines = mapping.choices[0].lines.iter().map(as_current).collect();
+                mapping.choices.push(Choice::of(lines, best.clone()));
+            }
+        }
+        if let Some(best) = currents.first() {
+            let unit = self.said[best[0]].unit_of(&["A", "mA"]);
+            self.drive(
+                "current",
+                &currents,
+                unit.unwrap_or("A"),
+                unit.is_none().then_some("the unit").into_iter().collect(),
+            );
+            if !torques.is_empty() {
+                self.drop("current", "torques are mapped; one of the two is used");
+            }
+        }
+        if let Some(best) = velocities.first() {
+            let said = |unit: &str| self.said[best[0]].words.iter().any(|word| word == unit);
+            let named = said("deg") || said("rad");
+            let unit = if said("deg") || (degrees && !named) {
+                "deg/s"
+            } else {
+                "rad/s"
+            };
+            self.drive(
+                "velocity",
+                &velocities,
+                unit,
+                (!named).then_some("the unit").into_iter().collect(),
+            );
+        }
+        let trajectories = |column: &usize| lists(TRAJECTORIES, &self.said[*column].stem());
+        let trajectories: Vec<usize> = (0..self.said.len()).filter(trajectories).collect();
+        self.map("trajectory", &trajectories, None, None);
+    }
+
+    fn drive(&mut self, quantity: &'static str, rows: &[Vec<usize>], unit: &str, check: Vec<&str>) {
+        let choice = |columns: &Vec<usize>| {
+            Choice::of(
+                vec![self.joints_line(quantity, columns, Some(unit))],
+                columns.clone(),
+            )
+        };
+        let (first, last) = (rows[0][0], rows[0][rows[0].len() - 1]);
+        let account = format!(
+            "{quantity} ({} to {})",
+            self.sheet.names[first], self.sheet.names[last]
+        );
+        let choices: Vec<Choice> = rows.iter().map(choice).collect();
+        let check = check.into_iter().map(String::from);
+        self.propose(quantity, choices, check, account);
+    }
 }

@@ -1,8 +1,8 @@
 //! A file of a recording with what its columns are taken to hold, as lines of a pipeline.
 
+use super::names;
 use super::names::{Name, pattern};
 use super::sheet::{Sheet, number};
-use super::words;
 use crate::yaml::quoted;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -301,7 +301,7 @@ impl ExaminedFile {
                 || ["#", "n\u{b0}", "n\u{ba}"].contains(&name);
             let whole = self.sheet.texts(*column).count() == rows;
             let first = !self.sheet.header && *column == 0 && self.may_be_names(0);
-            (words::lists(words::IDS, &stem) || ends || first) && whole && !self.is_taken(*column)
+            (names::lists(names::IDS, &stem) || ends || first) && whole && !self.is_taken(*column)
         };
         let mut columns: Vec<usize> = (0..self.said.len()).filter(named).collect();
         let rank = |column: usize| (self.distinct(column) < rows, self.sheet.is_numeric(column));

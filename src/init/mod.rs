@@ -3,8 +3,6 @@
 
 mod arm;
 mod columns;
-mod drives;
-mod marks;
 mod names;
 mod pipeline;
 mod points;
@@ -13,9 +11,8 @@ mod reading;
 mod robots;
 mod sheet;
 mod together;
-mod words;
 
-pub use marks::{MarkedLines, marked};
+pub use pipeline::{MarkedLines, marked};
 pub use robots::{KINDS, RobotFileKind};
 
 use crate::error::{Error, Result};
@@ -71,7 +68,7 @@ pub fn start(request: &InitRequest) -> Result<StarterFiles> {
         .map(|path| examine(path, places, arm.joints))
         .collect::<Result<Vec<_>>>()?;
     let mut found: Vec<ExaminedFile> = tables.into_iter().flatten().collect();
-    let of_torques = drives::of_torques(&mut found);
+    let of_torques = arm::of_torques(&mut found);
     let more = together::other_reflectors(&mut found);
     if found.len() > 2 && !of_torques && !found.iter().all(together::is_whole) {
         let message = format!(

@@ -1,6 +1,7 @@
 //! What the name of a column says: words, a unit, the number of a joint, an axis of a point.
+//!
+//! The words that people use in headers, in small letters, with blanks between them: English, German, French, Spanish, Italian.
 
-use super::words;
 use crate::units::{Header, Unit};
 use std::collections::BTreeMap;
 
@@ -42,7 +43,7 @@ impl Name {
 
     /// Whether the name is one of these, or one of them begins or ends it as a word of its own.
     pub fn is(&self, list: &str) -> bool {
-        let listed = |text: &str| words::lists(list, text);
+        let listed = |text: &str| lists(list, text);
         // A letter alone says little beside other words: `x_t` is no time.
         let mut ends = [self.words.first(), self.words.last()]
             .into_iter()
@@ -61,9 +62,7 @@ impl Name {
         let number: usize = self.words[at][stem.len()..].parse().ok()?;
         let before = self.words[..at].iter().map(String::as_str);
         // Yaskawa's URDFs say both: `joint_1_s`, `joint_2_l`.
-        let letter = number
-            .checked_sub(1)
-            .and_then(|k| words::NAMED_JOINTS[0].get(k));
+        let letter = number.checked_sub(1).and_then(|k| NAMED_JOINTS[0].get(k));
         let after = self.words[at + 1..]
             .iter()
             .map(String::as_str)
@@ -117,16 +116,10 @@ pub(super) const LENGTHS: [&str; 4] = ["mm", "m", "um", "in"];
 /// The axis that a word names, and what it says besides: `x`, `dx`, `xist`, `x2`.
 fn axis(word: &str) -> Option<(usize, &str)> {
     let known = |more: &str| {
-        let lists = [
-            words::MEASURED,
-            words::WANTED,
-            words::DIFFERENCE,
-            words::SIGMA,
-            "pos p coord tcp t",
-        ];
+        let groups = [MEASURED, WANTED, DIFFERENCE, SIGMA, "pos p coord tcp t"];
         more.is_empty()
             || more.bytes().all(|byte| byte.is_ascii_digit())
-            || lists.iter().any(|list| words::lists(list, more))
+            || groups.iter().any(|list| lists(list, more))
     };
     let named = ["x", "y", "z"]
         .iter()
@@ -143,14 +136,9 @@ fn axis(word: &str) -> Option<(usize, &str)> {
 
 /// Whether a word says that a numbered column is no joint position.
 fn is_other(word: &str) -> bool {
-    [
-        words::NO_JOINTS,
-        words::TORQUES,
-        words::CURRENTS,
-        words::VELOCITIES,
-    ]
-    .iter()
-    .any(|list| words::lists(list, word))
+    [NO_JOINTS, TORQUES, CURRENTS, VELOCITIES]
+        .iter()
+        .any(|list| lists(list, word))
 }
 
 /// Rows of columns that may be the joints, best first: those of usual names, else those of an arm's `count` that `angle` takes for angles.
@@ -159,7 +147,7 @@ pub(super) fn joints(
     count: usize,
     angle: impl Fn(usize) -> bool,
 ) -> Vec<Vec<usize>> {
-    let mut found: Vec<Vec<usize>> = words::NAMED_JOINTS
+    let mut found: Vec<Vec<usize>> = NAMED_JOINTS
         .iter()
         .filter_map(|listed| named(names, listed))
         .collect();
@@ -229,22 +217,20 @@ fn usual_name(key: &str) -> Option<usize> {
     const OTHERS: &str = "pos position positions angle angles ang winkel value deg rad data";
     let mut pieces: Vec<&str> = key
         .split(['_', '#'])
-        .filter(|word| !word.is_empty() && !words::lists(OTHERS, word))
+        .filter(|word| !word.is_empty() && !lists(OTHERS, word))
         .collect();
     let before = pieces.len();
-    pieces.retain(|word| !words::lists(words::MEASURED, word));
+    pieces.retain(|word| !lists(MEASURED, word));
     let measured = pieces.len() < before;
     let before = pieces.len();
-    pieces.retain(|word| !words::lists(words::WANTED, word));
+    pieces.retain(|word| !lists(WANTED, word));
     let wanted = pieces.len() < before;
     let joined = pieces.join("_");
-    (words::lists(words::JOINTS, &joined) && key.contains('#')).then_some(
-        match (measured, wanted) {
-            (_, true) => 2,
-            (true, false) => 1,
-            _ => 0,
-        },
-    )
+    (lists(JOINTS, &joined) && key.contains('#')).then_some(match (measured, wanted) {
+        (_, true) => 2,
+        (true, false) => 1,
+        _ => 0,
+    })
 }
 
 /// The names of all joints in one: the 1 that becomes a 2 in the next name, and so on, is the joint's number.
@@ -261,6 +247,77 @@ pub(super) fn pattern(names: &[&str]) -> Option<String> {
     };
     ones.into_iter().find(fits)
 }
+
+/// Whether a word is one of a list.
+pub(super) fn lists(list: &str, word: &str) -> bool {
+    list.split(' ').any(|listed| listed == word)
+}
+
+/// What the joints' columns are usually called; the number of the joint follows.
+pub(super) const JOINTS: &str = "q a rax j joint axis theta achse gelenk axe asse eje jnt joint_angle joint_state joint_states \
+    observation_state qpos observation_qpos articulación";
+
+/// Names of joints without numbers.
+pub(super) const NAMED_JOINTS: [&[&str]; 3] = [
+    &["s", "l", "u", "r", "b", "t"],
+    &["s", "l", "e", "u", "r", "b", "t"],
+    &[
+        "shoulder_pan",
+        "shoulder_lift",
+        "elbow",
+        "wrist_1",
+        "wrist_2",
+        "wrist_3",
+    ],
+];
+
+/// What joint torques, motor currents and joint velocities are called beside the number or name of a joint.
+pub(super) const TORQUES: &str = "tau torque torques trq effort efforts moment moments drehmoment drehmomente couple coppia momento \
+    momente";
+pub(super) const CURRENTS: &str =
+    "i iq cur curr current currents strom courant corriente corrente amps";
+pub(super) const VELOCITIES: &str = "dq qd qdot vel vels velocity velocities speed speeds geschwindigkeit vitesse velocidad velocità rate";
+/// Which of several movements a row belongs to.
+pub(super) const TRAJECTORIES: &str =
+    "traj trajectory trajectory_id episode episode_index run segment";
+
+/// What else a numbered column that is no joint position is called.
+pub(super) const NO_JOINTS: &str = "dir temp motor load err error sigma std acc accel e ddq qdd force forces ft wrench strain gauge \
+    sensor channel ch ai di do io input output volt voltage power pressure tcp pose cartesian marker dist \
+    distance";
+
+/// What the parts of a quaternion are called before `w`, `x`, `y`, `z`.
+pub(super) const QUATERNIONS: [&str; 6] =
+    ["q", "q_", "quat_", "quaternion_", "rot_", "orientation_"];
+
+/// What stands beside the name of an axis where several points are in one table.
+pub(super) const MEASURED: &str = "ist actual act meas measured measurement mess gemessen real tracker laser lt mes mesure mesuré \
+    mesurée medido medida misurato";
+pub(super) const WANTED: &str = "soll nom nominal cmd command commanded target wanted ref reference programmed goal desired setpoint \
+    planned plan cad theo theoretical théorique teórico teorico consigne robot controller steuerung sim \
+    simulated model";
+pub(super) const DIFFERENCE: &str = "dif diff difference differenz d delta dev deviation abw abweichung err error fehler écart ecart desv \
+    desviación erreur";
+/// Differences that are usually target less measured point; others are measured point less target.
+pub(super) const TARGET_LESS_MEASURED: &str = "dif diff difference differenz";
+pub(super) const SIGMA: &str =
+    "std stdev stddev sigma sd u unc uncertainty unsicherheit rms σ s u95";
+/// What columns of uncertainties with 95 % coverage are called.
+pub(super) const U95: &str = "u95";
+
+/// What columns of points' names are called.
+pub(super) const IDS: &str = "point point_id pointid point_name pointname id name pose pose_id nr no number nummer num punkt \
+    punktname punktnummer punkt_nr messpunkt bezeichnung index label target measurement pt pts p nom \
+    nombre nome punto point_no row sample messung repere repère n";
+pub(super) const PAYLOADS: &str = "payload payload_mass load mass weight last traglast nutzlast zuladung gewicht masse lastmasse charge \
+    charge_utile poids carga carga_util carga_útil peso masa carico load_mass tool_load";
+pub(super) const TEMPERATURES: &str =
+    "temp temperature temperatur température temperatura temps_c raumtemperatur";
+pub(super) const TIMES: &str = "time t timestamp stamp zeit zeitstempel messzeit uhrzeit temps horodatage heure tiempo hora tempo \
+    clock";
+pub(super) const USAGES: &str = "use usage set verwendung split";
+/// Which of several reflectors was measured.
+pub(super) const REFLECTORS: &str = "target smr reflector reflektor retro prism";
 
 #[cfg(test)]
 mod tests {

@@ -1,7 +1,7 @@
 //! Which columns are the measured point: of a target, its difference, a nominal point and a measured one only the last is.
 
+use super::names;
 use super::names::Name;
-use super::words;
 use std::collections::BTreeMap;
 
 /// Columns of x, y and z under one name, and what the name says of them.
@@ -70,12 +70,12 @@ pub(super) fn families(names: &[Name]) -> Vec<Family> {
 }
 
 fn role(rest: &[String]) -> PointRole {
-    let has = |list| rest.iter().any(|word| words::lists(list, word));
+    let has = |list| rest.iter().any(|word| names::lists(list, word));
     match (
-        has(words::SIGMA),
-        has(words::DIFFERENCE),
-        has(words::MEASURED),
-        has(words::WANTED),
+        has(names::SIGMA),
+        has(names::DIFFERENCE),
+        has(names::MEASURED),
+        has(names::WANTED),
     ) {
         (true, ..) => PointRole::Sigma,
         (_, true, ..) => PointRole::Difference,
@@ -120,7 +120,7 @@ pub(super) fn points(names: &[Name]) -> Points {
         let minus = difference
             .words
             .iter()
-            .any(|word| words::lists(words::TARGET_LESS_MEASURED, word));
+            .any(|word| names::lists(names::TARGET_LESS_MEASURED, word));
         PointColumns {
             columns: target.columns,
             difference: Some((difference.columns, minus)),

@@ -1,11 +1,11 @@
 //! What a recording's columns seem to hold, by their names and values: a proposal that a person checks.
 
 use super::columns::{Choice, ExaminedFile};
+use super::names;
 use super::names::{LENGTHS, joints};
 use super::points::{PointColumns, Points, points};
 use super::reading::tables;
 use super::sheet::number;
-use super::words;
 use crate::error::Result;
 use crate::stage::ingest::is_clock_time;
 use crate::yaml::quoted;
@@ -189,7 +189,7 @@ impl ExaminedFile {
             let unit = self.said[sigma[0]]
                 .unit_of(&LENGTHS)
                 .unwrap_or(self.length_unit(&best.columns).0);
-            let (names, what) = match self.said[sigma[0]].stem().contains(words::U95) {
+            let (names, what) = match self.said[sigma[0]].stem().contains(names::U95) {
                 true => (["u95_x", "u95_y", "u95_z"], "two standard deviations"),
                 false => (["sigma_x", "sigma_y", "sigma_z"], "one standard deviation"),
             };
@@ -236,7 +236,7 @@ impl ExaminedFile {
         };
         let all =
             |prefix: &&str| ["w", "x", "y", "z"].map(|axis| column(&format!("{prefix}{axis}")));
-        let found = words::QUATERNIONS
+        let found = names::QUATERNIONS
             .iter()
             .map(all)
             .find_map(|columns| columns.into_iter().collect::<Option<Vec<usize>>>());
@@ -376,13 +376,13 @@ impl ExaminedFile {
 
     fn scalars(&mut self) {
         for (quantity, listed, unit, most) in [
-            ("payload", words::PAYLOADS, "kg", 1e4),
-            ("temperature", words::TEMPERATURES, "C", 200.0),
+            ("payload", names::PAYLOADS, "kg", 1e4),
+            ("temperature", names::TEMPERATURES, "C", 200.0),
         ] {
             let fits = |column: &usize| {
                 let name = &self.said[*column];
                 let named = if quantity == "payload" {
-                    words::lists(listed, &name.stem())
+                    names::lists(listed, &name.stem())
                 } else {
                     name.is(listed)
                 };
@@ -403,7 +403,7 @@ impl ExaminedFile {
     }
 
     fn time(&mut self) {
-        let named = |column: &usize| self.said[*column].is(words::TIMES) && !self.is_taken(*column);
+        let named = |column: &usize| self.said[*column].is(names::TIMES) && !self.is_taken(*column);
         let unit = |column: usize| match self.said[column].unit {
             // Beyond what ms of a date are, it is finer than any unit that is read.
             None => Some((
@@ -475,13 +475,13 @@ impl ExaminedFile {
                 && 3 * distinct <= self.sheet.rows.len()
                 && !self.sheet.is_numeric(column)
         };
-        let listed = |list, column: usize| words::lists(list, &self.said[column].stem());
+        let listed = |list, column: usize| names::lists(list, &self.said[column].stem());
         let usages: Vec<usize> = columns
             .clone()
-            .filter(|column| listed(words::USAGES, *column) && few(*column))
+            .filter(|column| listed(names::USAGES, *column) && few(*column))
             .collect();
         let reflectors: Vec<usize> = columns
-            .filter(|column| listed(words::REFLECTORS, *column) && few(*column))
+            .filter(|column| listed(names::REFLECTORS, *column) && few(*column))
             .collect();
         self.map("usage", &usages, None, None);
         self.map(

@@ -1,8 +1,8 @@
 //! How two files belong together: by points' names, found by equal values whatever the header; else by time; else row by row.
 
 use super::columns::{ExaminedFile, MOST_NAMED};
+use super::names;
 use super::sheet::number;
-use super::words;
 use crate::stage::ingest::last_number;
 use crate::statistics;
 use crate::yaml::quoted;
@@ -282,7 +282,7 @@ fn pairs_by(one: &ExaminedFile, two: &ExaminedFile, numbers: bool) -> Vec<Pair> 
             if shared >= LEAST_SHARED {
                 let text = names.iter().any(|name| number(name).is_none());
                 let listed = |file: &ExaminedFile, column: usize| {
-                    usize::from(words::lists(words::IDS, &file.said[column].stem()))
+                    usize::from(names::lists(names::IDS, &file.said[column].stem()))
                 };
                 let named = listed(one, *a) + listed(two, *b);
                 pairs.push(Pair {
@@ -320,7 +320,7 @@ fn may_name(file: &ExaminedFile, column: usize) -> bool {
     let whole = file.sheet.texts(column).all(|cell| {
         number(cell).is_none_or(|value| value.fract() == 0.0 && !cell.contains(['.', ',']))
     });
-    let listed = words::lists(words::IDS, &file.said[column].stem());
+    let listed = names::lists(names::IDS, &file.said[column].stem());
     !file.is_taken(column) && distinct >= 2 && 2 * distinct >= rows && (whole || listed)
 }
 

@@ -6,7 +6,8 @@
 //! for the braces at the end of its file's path, joined by `/`: `front/0`.
 
 use crate::yaml::{Node, Trouble, YamlValue};
-use std::path::{Path, PathBuf};
+use glob::{MatchOptions, Pattern, glob_with};
+use std::path::{Component, Path, PathBuf};
 
 /// Most files that a pattern may stand for: a slip must not read a whole disk.
 const MOST: usize = 10_000;
@@ -92,67 +93,33 @@ pub(super) fn expand(with: &mut Node, folder: &Path) -> Vec<Trouble> {
     troubles
 }
 
-/// Files below `start` whose path matches, as the pattern writes them, sorted.
+/// Files that match, relative to `start`, in the order of their paths.
 fn matching(start: &Path, pattern: &str) -> Result<Vec<String>, String> {
-    let mut found = vec![if pattern.starts_with('/') {
-        "/".to_string()
-    } else {
-        String::new()
-    }];
-    for part in pattern.split('/').filter(|part| !part.is_empty()) {
-        let mut next = Vec::new();
-        for before in &found {
-            let below = |name: &str| {
-                if before.is_empty() || before.ends_with('/') {
-                    format!("{before}{name}")
-                } else {
-                    format!("{before}/{name}")
-                }
-            };
-            if !part.contains(['*', '?']) {
-                next.push(below(part));
-                continue;
-            }
-            let Ok(entries) =
-                std::fs::read_dir(start.join(if before.is_empty() { "." } else { before }))
-            else {
-                continue;
-            };
-            let names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
-            next.extend(
-                names
-                    .filter(|name| !name.starts_with('.') && fits(part, name))
-                    .map(|name| below(&name)),
-            );
-        }
-        if next.len() > MOST {
-            return Err(format!("more than {MOST} files match; name a folder"));
-        }
-        found = next;
+    let is_named = |part: &Component| *part != Component::CurDir;
+    let start: PathBuf = start.components().filter(is_named).collect();
+    // Brackets are letters here, and no wildcard goes over folders.
+    let parts = pattern.split('/').filter(|part| !matches!(*part, "" | "."));
+    let parts = parts.map(|part| part.replace('[', "[[]").replace("**", "*"));
+    let root = if pattern.starts_with('/') { "/" } else { "" };
+    let here = if pattern.starts_with("./") { "./" } else { "" };
+    let below = root.to_string() + &parts.collect::<Vec<_>>().join("/");
+    let whole = Path::new(&Pattern::escape(&start.to_string_lossy())).join(below);
+    let options = MatchOptions {
+        require_literal_leading_dot: true,
+        ..MatchOptions::default()
+    };
+    let found = glob_with(&whole.to_string_lossy(), options).map_err(|error| error.to_string())?;
+    let relative = |path: PathBuf| {
+        let own = path.strip_prefix(&start).unwrap_or(&path);
+        Some(here.to_string() + own.to_str()?)
+    };
+    let files = found.flatten().filter(|path| path.is_file());
+    let mut found: Vec<String> = files.filter_map(relative).take(MOST + 1).collect();
+    if found.len() > MOST {
+        return Err(format!("more than {MOST} files match; name a folder"));
     }
-    found.retain(|path| start.join(path).is_file());
     found.sort();
     Ok(found)
-}
-
-/// Whether a name matches a pattern with `*` and `?`.
-fn fits(pattern: &str, name: &str) -> bool {
-    let mut rest = pattern.chars();
-    match rest.next() {
-        None => name.is_empty(),
-        Some('*') => name
-            .char_indices()
-            .map(|(at, _)| &name[at..])
-            .chain([""])
-            .any(|end| fits(rest.as_str(), end)),
-        Some('?') => name
-            .chars()
-            .next()
-            .is_some_and(|first| fits(rest.as_str(), &name[first.len_utf8()..])),
-        Some(letter) => name
-            .strip_prefix(letter)
-            .is_some_and(|end| fits(rest.as_str(), end)),
-    }
 }
 
 /// What stands for the braces of a pattern at the end of a path, joined by `/`.
@@ -205,13 +172,7 @@ fn braces(pattern: &str, text: &str) -> Option<Vec<String>> {
 
 #[cfg(test)]
 mod tests {
-    use super::{fits, named};
-
-    #[test]
-    fn a_star_is_any_text_and_a_question_mark_one_letter() {
-        assert!(fits("hole_?.csv", "hole_0.csv") && !fits("hole_?.csv", "hole_0_pose.csv"));
-        assert!(fits("*", "front") && fits("a*c*", "abcd") && !fits("a*d?", "abcd"));
-    }
+    use super::named;
 
     #[test]
     fn braces_name_what_stands_in_a_path() {

@@ -1,13 +1,19 @@
 //! What can be seen of a plan's input files without running it: the robot, the headers of the data. All faults at once.
+//!
+//! What a run would do, without doing it.
 
-use super::plan::{InputFile, PlannedStage};
-use super::{Override, Plan, services, spec};
+use super::plan::{InputFile, PlannedStage, Selection};
+use super::run_state::{KeyState, RunState};
+use super::spec;
+use super::{Override, Plan, reason, services};
 use crate::error::{Error, Fault, Result};
 use crate::raw;
 use crate::stage::{
     Context, InputTable, OpenedInput, Output, RawFile, STAGES, Services, Sink, StageEntry,
 };
 use crate::store::frame::Frame;
+use crate::store::{Lookup, Store};
+use serde::Serialize;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
@@ -175,4 +181,68 @@ impl Services for Onlooker<'_> {
             .unwrap_or_else(PoisonError::into_inner)
             .push(line);
     }
+}
+
+/// What would become of a stage.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case", tag = "status")]
+pub enum Prospect {
+    /// Its tables are there.
+    Cached,
+    /// It would run.
+    Run {
+        /// Why.
+        reason: String,
+    },
+    /// Not known before another stage has run.
+    Pending {
+        /// Ids of stages.
+        on: String,
+    },
+    /// Outside of `--only`, `--from`, `--until`, and not cached.
+    NotSelected,
+}
+
+/// What a run would do with a stage.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Forecast {
+    /// In the pipeline.
+    pub id: String,
+    /// Its kind.
+    pub uses: String,
+    /// Whether it would run.
+    #[serde(flatten)]
+    pub prospect: Prospect,
+}
+
+/// What a run would do, stage by stage. Fails where files cannot be read.
+pub fn preview(plan: &Plan, store: &Store, selection: &Selection) -> Result<Vec<Forecast>> {
+    let selected = selection.of(plan)?;
+    let mut state = RunState::new(plan);
+    let mut forecasts = Vec::new();
+    for (index, stage) in plan.stages.iter().enumerate() {
+        let inside = selected.stages.contains(&index);
+        let prospect = match state.key(index)? {
+            KeyState::Pending(on) if inside => Prospect::Pending {
+                on: plan.stages[on].id.clone(),
+            },
+            KeyState::Pending(_) => Prospect::NotSelected,
+            KeyState::Known(key) => match store.action(&key)? {
+                Lookup::Done(record) if !selected.forces(index) => {
+                    state.tables[index] = Some(record.tables);
+                    Prospect::Cached
+                }
+                _ if !inside => Prospect::NotSelected,
+                found => Prospect::Run {
+                    reason: reason::why(store, plan, &key, &found, selected.forces(index))?,
+                },
+            },
+        };
+        forecasts.push(Forecast {
+            id: stage.id.clone(),
+            uses: stage.entry.name.into(),
+            prospect,
+        });
+    }
+    Ok(forecasts)
 }

@@ -1,19 +1,33 @@
 //! The run: every stage in order; what is already done is taken as it is, the rest is executed and published.
+//!
+//! One stage executed: its tables loaded, its body run on the worker threads, its products handed back.
+//!
+//! Where in the YAML the setting stands of which a running stage complains.
+//!
+//! What a plan computes, as one hash: stages, settings, wiring and the content of the files; no paths, no dates.
 
-use super::execute::{self, ExecutionSite};
-use super::lock::ActionLock;
 use super::manifest::{
-    FileRecord, InputRecord, Manifest, OutputRecord, RunStatus, StageStatus, Surroundings,
+    FileRecord, InputRecord, Manifest, OutputRecord, RunOptions, RunStatus, StageStatus,
+    Surroundings,
 };
-use super::options::RunOptions;
-use super::plan::Plan;
-use super::reason;
-use super::run_state::{self, KeyState, RunState};
-use super::select::Selected;
-use super::services::Observer;
-use crate::error::{Error, Result};
-use crate::store::{ActionRecord, Lookup, Run, StageKey, Store};
+use super::plan::{Plan, Selected};
+use super::run_state::{self, ActionLock, KeyState, RunState};
+use super::services::{Interrupted, Observer, StageServices, label};
+use super::{overrides, reason};
+use crate::error::{Error, Fault, Result};
+use crate::stage::{Context, InputTable, Output, StoredTable};
+use crate::store::frame::Frame;
+use crate::store::key::canonical;
+use crate::store::{
+    Account, ActionRecord, FinishedFile, Lookup, PendingTable, PublishedTable, Run, StageKey,
+    Store, TableRef,
+};
+use crate::yaml::{self, Node, Trouble};
+use serde_json::json;
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
+use std::sync::OnceLock;
 use std::time::SystemTime;
 
 /// Seconds of work that are made durable together: more than a group of syncs costs, less than one would mind doing again.
@@ -175,7 +189,7 @@ impl Running<'_> {
             started: rfc3339(started),
             ..Default::default()
         };
-        let products = execute::stage(&self.state, index, &place, &mut account)?;
+        let products = products(&self.state, index, &place, &mut account)?;
         let ended = (self.now)();
         account.ended = rfc3339(ended);
         account.wall_seconds = seconds(started, ended);
@@ -215,7 +229,7 @@ impl Running<'_> {
                 .expose(&plan.name, &stage.id, output.name, table)?;
             if output.kind == "document" {
                 self.documents
-                    .extend(execute::documents(self.store, &plan.name, table)?);
+                    .extend(documents(self.store, &plan.name, table)?);
             }
             outputs.push(OutputRecord {
                 port: output.name.into(),
@@ -294,4 +308,232 @@ fn rfc3339(time: SystemTime) -> String {
 }
 fn seconds(from: SystemTime, to: SystemTime) -> f64 {
     to.duration_since(from).unwrap_or_default().as_secs_f64()
+}
+
+/// Where a stage is executed.
+pub(super) struct ExecutionSite<'a> {
+    pub store: &'a Store,
+    pub threads: &'a rayon::ThreadPool,
+    pub observer: &'a dyn Observer,
+    pub run: &'a str,
+}
+
+/// Runs the body of a stage; what it told the person goes into `account`. A panic is a bug with the stage's name.
+pub(super) fn products(
+    state: &RunState,
+    index: usize,
+    place: &ExecutionSite,
+    account: &mut Account,
+) -> Result<Vec<(String, PendingTable)>> {
+    let stage = &state.plan.stages[index];
+    let inputs = load(state, index, place.store)?;
+    let services = StageServices::new(&stage.id, Some(place.store), &stage.files, place.observer);
+    let context = Context {
+        id: &stage.id,
+        seed: state.seed(index),
+        jobs: place.threads.current_num_threads(),
+        services: &services,
+    };
+    let body = || place.threads.install(|| stage.stage.run(inputs, &context));
+    let outputs = catch_unwind(AssertUnwindSafe(body)).unwrap_or_else(|panic| {
+        if panic.is::<Interrupted>() {
+            return Err(Error::store(&stage.id, "was interrupted: run it again"));
+        }
+        Err(Error::Bug(format!(
+            "stage {} panicked: {}",
+            stage.id,
+            panic_message(&*panic)
+        )))
+    });
+    let lines = services.lines();
+    (account.notes, account.warnings) = (lines.notes, lines.warnings);
+    let outputs = outputs.map_err(|error| placed(error, state.plan, &stage.id))?;
+    if outputs.len() != stage.outputs.len() {
+        return Err(Error::Bug(format!(
+            "stage {} gave {} tables for {} ports",
+            stage.id,
+            outputs.len(),
+            stage.outputs.len()
+        )));
+    }
+    stage
+        .outputs
+        .iter()
+        .zip(outputs)
+        .map(|(port, output)| {
+            let (kind, product) = match output {
+                Output::Frame(frame) => (frame.kind(), PendingTable::Frame(frame)),
+                Output::Streamed(streamed) => {
+                    let file = streamed.handle.downcast::<FinishedFile>();
+                    let file = file.map_err(|_| {
+                        Error::Bug(format!(
+                            "stage {}: a sink that is not the engine's",
+                            stage.id
+                        ))
+                    })?;
+                    (streamed.kind, PendingTable::File(*file))
+                }
+            };
+            if kind != port.kind {
+                return Err(Error::Bug(format!(
+                    "stage {}: a table of {kind} on port {}",
+                    stage.id, port.name
+                )));
+            }
+            Ok((port.name.to_string(), product))
+        })
+        .collect()
+}
+
+/// A table that a stage reads chunk by chunk.
+struct LongTable {
+    table: PublishedTable,
+    /// All of it, where that is no more than a chunk: it is decoded once.
+    whole: OnceLock<Frame>,
+}
+
+/// Rows of a table that is held whole once it was read.
+const SHORT: usize = 1 << 16;
+
+impl StoredTable for LongTable {
+    fn rows(&self) -> usize {
+        self.table.rows()
+    }
+    fn frame(&self) -> Result<Frame> {
+        self.table.frame()
+    }
+    fn chunks(&self, take: &mut dyn FnMut(&Frame) -> Result<()>) -> Result<()> {
+        if self.rows() > SHORT {
+            return self.table.chunks(take);
+        }
+        if let Some(whole) = self.whole.get() {
+            return take(whole);
+        }
+        let whole = self.frame()?;
+        take(self.whole.get_or_init(|| whole))
+    }
+}
+
+fn load(state: &RunState, index: usize, store: &Store) -> Result<Vec<Vec<(String, InputTable)>>> {
+    let stages = &state.plan.stages;
+    let inputs = stages[index].inputs.iter();
+    inputs
+        .map(|input| {
+            let tables = input.from.iter().map(|origin| {
+                let from = &stages[origin.stage];
+                let tables = state.tables[origin.stage].as_ref();
+                let tables = tables
+                    .ok_or_else(|| Error::Bug(format!("stage {} has no tables yet", from.id)))?;
+                let table = run_state::table(tables, from, origin.port)?;
+                let input: InputTable = match input.port.chunked {
+                    true => Box::new(LongTable {
+                        table: store.published(table)?,
+                        whole: OnceLock::new(),
+                    }),
+                    false => Box::new(store.load(table)?),
+                };
+                Ok((from.id.clone(), input))
+            });
+            tables.collect()
+        })
+        .collect()
+}
+
+/// Writes the documents of a table to where people find them.
+pub(super) fn documents(store: &Store, pipeline: &str, table: &TableRef) -> Result<Vec<PathBuf>> {
+    let frame = store.load(table)?;
+    let names = frame.read::<String>("name")?;
+    let contents = frame.read::<String>("content")?;
+    names
+        .iter()
+        .zip(&contents)
+        .map(|(name, content)| store.expose_document(pipeline, name, content.as_bytes()))
+        .collect()
+}
+
+fn panic_message(panic: &(dyn Any + Send)) -> &str {
+    let text = panic.downcast_ref::<&str>().copied();
+    text.or_else(|| panic.downcast_ref::<String>().map(String::as_str))
+        .unwrap_or("without a message")
+}
+
+/// The same error with line, path and stage of each setting: `with.n` of `split` becomes `p.yaml:36:26: stages[2].with.n`.
+pub(super) fn placed(error: Error, plan: &Plan, id: &str) -> Error {
+    match error {
+        Error::Spec(faults) => Error::Spec(all(faults, plan, id)),
+        Error::Data(faults) => Error::Data(all(faults, plan, id)),
+        other => other,
+    }
+}
+
+fn all(faults: Vec<Fault>, plan: &Plan, id: &str) -> Vec<Fault> {
+    faults
+        .into_iter()
+        .map(|fault| one(&fault, plan, id).unwrap_or(fault))
+        .collect()
+}
+
+/// None where the fault is not in a setting.
+fn one(fault: &Fault, plan: &Plan, id: &str) -> Option<Fault> {
+    let own = fault
+        .place
+        .strip_prefix(id)
+        .and_then(|rest| rest.strip_prefix('.'))
+        .unwrap_or(&fault.place);
+    if own != "with" && !own.starts_with("with.") {
+        return None;
+    }
+    let mut tree = yaml::parse(&plan.text).0?;
+    overrides::apply(&mut tree, &plan.overrides);
+    let named = |stage: &Node| {
+        stage
+            .get("id")
+            .or_else(|| stage.get("uses"))
+            .and_then(Node::text)
+            .is_some_and(|name| name == id)
+    };
+    let index = tree.get("stages")?.items().iter().position(named)?;
+    let path = format!("stages[{index}].{own}");
+    let message = format!("stage `{id}`: {}", fault.message);
+    Some(
+        Trouble::new(message)
+            .at(tree.nearest_mark(&path))
+            .below(&path)
+            .fault(&plan.file.display().to_string()),
+    )
+}
+
+impl Plan {
+    /// The hash of everything that the plan's tables depend on, as 64 hex digits. Reads every input file; fails where one cannot
+    /// be read.
+    pub fn identity(&self) -> Result<String> {
+        let mut state = RunState::new(self);
+        let mut stages = Vec::new();
+        for stage in &self.stages {
+            let mut files = Vec::new();
+            for file in &stage.files {
+                files.push(json!([
+                    file.place,
+                    label(&file.path),
+                    state.hash(&file.path)?
+                ]));
+            }
+            let origins = stage.inputs.iter().map(|input| {
+                let from: Vec<_> = input
+                    .from
+                    .iter()
+                    .map(|origin| (origin.stage, origin.port))
+                    .collect();
+                (input.port.name, from)
+            });
+            stages.push(json!({
+                "id": stage.id, "stage": stage.entry.name, "implementation": stage.entry.implementation,
+                "settings": stage.stage.settings(), "files": files, "reads": origins.collect::<Vec<_>>(),
+            }));
+        }
+        let whole = json!({ "seed": self.seed, "stages": stages });
+        Ok(blake3::hash(canonical(&whole).as_bytes())
+            .to_hex()
+            .to_string())
+    }
 }

@@ -1,16 +1,20 @@
 //! How far a plan is: which tables every stage has, and from them the key of the next.
+//!
+//! One advisory lock per action, so that two runs share work instead of doing it twice. Correctness does not depend on it.
 
 use super::plan::{Plan, PlannedStage};
 use super::services::label;
 use crate::error::{Error, Result};
 use crate::raw;
 use crate::stage::Arity;
-use crate::store::schema;
-use crate::store::{FileHash, FileKey, KEY_FORMAT, ReadKey, StageKey, TableRef};
+use crate::store::{
+    ActionId, FileHash, FileKey, KEY_FORMAT, ReadKey, StageKey, Store, TableRef, schema,
+};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
+use std::fs::{self, File};
 use std::path::{Path, PathBuf};
-use std::time::SystemTime;
+use std::time::{Duration, SystemTime};
 
 pub(super) struct RunState<'a> {
     pub plan: &'a Plan,
@@ -187,4 +191,56 @@ pub(super) fn table<'t>(
             stage.id
         ))
     })
+}
+
+/// How long a run waits for another that does the same; after that it does the work itself.
+const PATIENCE: Duration = Duration::from_secs(600);
+const PAUSE: Duration = Duration::from_millis(50);
+
+/// Held while a stage runs; the kernel frees it when the process dies.
+pub(super) struct ActionLock {
+    held: Option<(File, PathBuf)>,
+}
+
+impl ActionLock {
+    /// Takes the lock of an action, waiting for whoever has it; `waiting` is told once.
+    pub fn take(store: &Store, action: &ActionId, waiting: &mut dyn FnMut()) -> Self {
+        let folder = store.root().join("locks");
+        let path = folder.join(format!("{action}.lock"));
+        let open = || {
+            fs::create_dir_all(&folder)
+                .and_then(|()| File::options().create(true).append(true).open(&path))
+        };
+        // Where locks cannot be had the work may be done twice, which is harmless.
+        let Ok(file) = open() else {
+            return Self { held: None };
+        };
+        let mut waited = Duration::ZERO;
+        loop {
+            match file.try_lock() {
+                Ok(()) => {
+                    return Self {
+                        held: Some((file, path)),
+                    };
+                }
+                Err(fs::TryLockError::WouldBlock) if waited < PATIENCE => {
+                    if waited.is_zero() {
+                        waiting();
+                    }
+                    std::thread::sleep(PAUSE);
+                    waited += PAUSE;
+                }
+                Err(_) => return Self { held: None },
+            }
+        }
+    }
+}
+
+impl Drop for ActionLock {
+    fn drop(&mut self) {
+        if let Some((file, path)) = self.held.take() {
+            let _ = fs::remove_file(path);
+            let _ = file.unlock();
+        }
+    }
 }

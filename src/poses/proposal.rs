@@ -1,7 +1,7 @@
 //! Poses for a robot file: the best for all parameters together, or for telling two effects apart whatever their sizes.
 
-use super::site::site;
-use super::{PoseRequest, recorded, wish};
+use super::site::{self, site};
+use super::{PoseRequest, wish};
 use crate::description::RobotDescription;
 use crate::effect::{EffectContext, EffectStack, Load, arm_effect, identified};
 use crate::error::{Error, Result};
@@ -60,11 +60,11 @@ pub fn proposal<'a>(
         }
     }
     let mut recording = against
-        .map(|path| recorded::recording(path, &imported))
+        .map(|path| site::recording(path, &imported))
         .transpose()?;
     let usual = recording
         .as_ref()
-        .and_then(|(data, _)| recorded::usual_sigma(data));
+        .and_then(|(data, _)| site::usual_sigma(data));
     let shown = request
         .sigma
         .or(usual.map(|sigma| sigma * 1e3))

@@ -4,7 +4,7 @@
 //! A listing holds no frames: UF 0 is the robot's world, other user frames are refused or assumed; UT names the tool. Of CONFIG the wrist (N,
 //! F), the elbow (U, D) and the turns of J1, J4 and J6 are read; the arm behind its base (B) and arms with left and right are refused.
 
-use super::force::ToolInForce;
+use super::literal::ToolInForce;
 use super::token::{ProgramText, Token, TokenKind, tokens};
 use super::{Declared, Gathered, Language, Literal, PostureStatement, TargetKind, quoted};
 use crate::spatial::Pose;

@@ -8,11 +8,9 @@
 mod correct;
 mod fanuc;
 mod flow;
-mod force;
 mod krl;
 mod list;
 mod literal;
-pub mod mark;
 mod pose;
 mod rapid;
 mod settle;
@@ -21,7 +19,7 @@ mod token;
 mod tools;
 mod urscript;
 
-pub use correct::{ProgramFile, ProgramLoad, ProgramRules, corrected};
+pub use correct::{ProgramFile, ProgramLoad, ProgramRules, corrected, has_mark, with_mark};
 pub use list::{JointList, ListedJoints, MOST_BYTES, joint_list, listing};
 pub use literal::{Literal, TargetKind};
 pub use pose::solve;
@@ -29,7 +27,7 @@ pub use stated::PostureStatement;
 pub use tools::RobotTool;
 
 use crate::robot::RobotModel;
-use force::ToolInForce;
+use literal::ToolInForce;
 use std::ops::Range;
 use token::ProgramText;
 

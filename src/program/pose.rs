@@ -3,8 +3,8 @@
 //! Cartesian targets are poses of the tool in force in the frame that the program states, else of the robot file's tool, in the robot's base. They stay Cartesian: the pose at which the
 //! controller, which believes in the nominal robot, drives the corrected joints.
 
-use super::stated::PostureReader;
-use super::{Literal, PostureStatement, SolvedLiteral, TargetKind};
+use super::stated::{PostureReader, PostureStatement};
+use super::{Literal, SolvedLiteral, TargetKind};
 use crate::compensate::{
     Chain, CommandTarget, CorrectedCommand, Corrector, Nominal, Remark, turns,
 };

@@ -1,7 +1,7 @@
 //! The targets of a program with what is in force where they are reached: gathered from all its motions, and given to the literals.
 
 use super::flow::JoinedState;
-use super::force::{InForce, Setting};
+use super::literal::{InForce, Setting};
 use super::{Gathered, Literal};
 use crate::spatial::Pose;
 use std::collections::{BTreeMap, BTreeSet};

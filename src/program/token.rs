@@ -6,7 +6,7 @@
 //! RAPID: the same, and `1.` and `.5` (ABB, Technical reference manual RAPID kernel, "Numeric literals"; its hexadecimal, octal and
 //! binary integers are no coordinates), as FANUC's listings and URScript. Blanks may stand nowhere in a number, but between it and its sign, which is an operator.
 
-use super::{Gathered, Language};
+use super::{DEPTH, Gathered, Language};
 use std::ops::Range;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,6 +34,81 @@ impl Token {
     pub fn is(&self, sign: u8) -> bool {
         self.sort == TokenKind::Sign(sign)
     }
+
+    /// +1 where a bracket opens, -1 where it closes.
+    pub fn opens(&self) -> i32 {
+        match self.sort {
+            TokenKind::Sign(b'{' | b'[' | b'(') => 1,
+            TokenKind::Sign(b'}' | b']' | b')') => -1,
+            _ => 0,
+        }
+    }
+}
+
+/// Brackets that open and close.
+pub(super) const BRACKETS: [(u8, u8); 3] = [(b'[', b']'), (b'(', b')'), (b'{', b'}')];
+
+/// The place of the bracket that closes the one at `open`.
+pub(super) fn closing(tokens: &[Token], open: usize) -> usize {
+    let pair = BRACKETS
+        .into_iter()
+        .find(|(opens, _)| tokens[open].is(*opens));
+    let mut depth = 0;
+    let closes = |token: &Token| {
+        depth += pair.map_or(0, |(opens, closes)| {
+            i32::from(token.is(opens)) - i32::from(token.is(closes))
+        });
+        depth == 0
+    };
+    let place = tokens[open..].iter().position(closes);
+    place.map_or(tokens.len() - 1, |length| open + length)
+}
+
+/// What stands between commas that are outside of brackets.
+pub(super) fn arguments(tokens: &[Token]) -> impl Iterator<Item = &[Token]> {
+    let mut depth = 0;
+    tokens.split(move |token| {
+        depth += token.opens();
+        depth == 0 && token.is(b',')
+    })
+}
+
+/// Lines with something on them.
+pub(super) fn lines(tokens: &[Token]) -> Vec<&[Token]> {
+    tokens
+        .split(|token| token.sort == TokenKind::LineEnd)
+        .filter(|line| !line.is_empty())
+        .collect()
+}
+
+/// Whether every bracket of these closes, none of them too deep; what does not is a fault. They stand in `whole`, e.g. `on its line`.
+pub(super) fn brackets_match(
+    tokens: &[Token],
+    brackets: &[(u8, u8)],
+    whole: &str,
+    found: &mut Gathered,
+) -> bool {
+    let mut open: Vec<(&Token, u8, u8)> = Vec::new();
+    let before = found.faults.len();
+    for token in tokens {
+        if let Some((opens, closes)) = brackets.iter().find(|(opens, _)| token.is(*opens)) {
+            open.push((token, *opens, *closes));
+            if open.len() == DEPTH {
+                found.fault(token.span.start, "brackets are nested too deep");
+            }
+        } else if let Some((opens, closes)) = brackets.iter().find(|(_, end)| token.is(*end))
+            && open.pop().is_none_or(|(_, last, _)| last != *opens)
+        {
+            let [opens, closes] = [*opens, *closes].map(char::from);
+            found.fault(token.span.start, format!("`{closes}` without `{opens}`"));
+        }
+    }
+    for (token, opens, closes) in open {
+        let [opens, closes] = [opens, closes].map(char::from);
+        let message = format!("`{opens}` without `{closes}` {whole}");
+        found.fault(token.span.start, message);
+    }
+    found.faults.len() == before
 }
 
 /// What is read, and how its words are compared: KRL and RAPID know no case.

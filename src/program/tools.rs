@@ -4,7 +4,7 @@
 //! frame at the flange, every other tool follows from its own frame. A program with one tool is taken to have that of the robot file, and
 //! says so; axis 6 tells some that are not: a tool keeps its distance from it.
 
-use super::force::ToolInForce;
+use super::literal::ToolInForce;
 use super::{Gathered, Literal};
 use crate::compensate::turns;
 use crate::robot::RobotModel;

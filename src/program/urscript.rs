@@ -4,8 +4,8 @@
 //! Whether a list of six numbers is a target follows from its use. What a program computes from literals (`pose_trans(frame, p[...])`) is
 //! refused, and so is every literal that is handed to a function of the program's own; what it computes from elsewhere stays, with a word.
 
-use super::force::ToolInForce;
-use super::token::{ProgramText, Token, TokenKind, tokens};
+use super::literal::ToolInForce;
+use super::token::{ProgramText, Token, TokenKind, arguments, closing, lines, tokens};
 use super::{DEPTH, Declared, Gathered, Language, Literal, PostureStatement, TargetKind, quoted};
 use crate::spatial::Pose;
 use nalgebra::Vector3;
@@ -132,35 +132,6 @@ impl SixNumbers {
     }
 }
 
-/// The place of the bracket that closes the one at `open`.
-fn closing(tokens: &[Token], open: usize) -> usize {
-    let mut depth = 0;
-    for (k, token) in tokens.iter().enumerate().skip(open) {
-        match token.sort {
-            TokenKind::Sign(b'(' | b'[' | b'{') => depth += 1,
-            TokenKind::Sign(b')' | b']' | b'}') => depth -= 1,
-            _ => {}
-        }
-        if depth == 0 {
-            return k;
-        }
-    }
-    tokens.len() - 1
-}
-
-/// Between the commas outside of brackets.
-fn arguments(tokens: &[Token]) -> impl Iterator<Item = &[Token]> {
-    let mut depth = 0;
-    tokens.split(move |token| {
-        match token.sort {
-            TokenKind::Sign(b'(' | b'[' | b'{') => depth += 1,
-            TokenKind::Sign(b')' | b']' | b'}') => depth -= 1,
-            _ => {}
-        }
-        depth == 0 && token.is(b',')
-    })
-}
-
 impl<'p> Reader<'p> {
     fn of(bytes: &'p [u8]) -> Self {
         let source = ProgramText {
@@ -178,10 +149,7 @@ impl<'p> Reader<'p> {
             tools,
             loads,
         };
-        for line in all
-            .split(|token| token.sort == TokenKind::LineEnd)
-            .filter(|line| !line.is_empty())
-        {
+        for line in lines(&all) {
             if reader.brackets_match(line) {
                 reader.line(line);
             }

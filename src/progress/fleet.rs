@@ -2,8 +2,7 @@
 
 use super::{PAUSE, Verbosity};
 use crate::error::{counted, visible};
-use crate::fleet::Watcher;
-use crate::fleet::{Ending, RobotRecord};
+use crate::fleet::{Ending, RobotRecord, Watcher};
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::sync::{Mutex, MutexGuard, PoisonError};

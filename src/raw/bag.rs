@@ -8,8 +8,7 @@ mod mcap;
 mod message;
 mod sqlite;
 
-use super::record::{Record, RecordFault, RecordReader};
-use super::source::InputSource;
+use super::record::{InputSource, Record, RecordFault, RecordReader};
 use crate::error::{Error, Result};
 pub use content::{BagContent, BagTopic, bag_content};
 use content::{no_topic, only_topic};

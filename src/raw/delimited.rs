@@ -3,7 +3,7 @@
 //! A quoted field may hold the delimiter, line ends and `""` for a quote; blanks may stand before its quote. Empty lines and comments are no
 //! rows. The crate `csv` is not used: it has neither runs of blanks as a delimiter, nor comments of two letters, nor a longest row.
 
-use super::record::{Record, RecordReader, failed};
+use super::record::{Record, RecordFault, RecordReader, failed};
 use super::shown;
 use crate::error::{Error, Result};
 use memchr::{memchr, memchr2_iter};
@@ -50,8 +50,12 @@ struct Splitter {
     start: usize,
     /// Where the quote stands that opened it and was not closed yet.
     open: Option<usize>,
+    /// Where the quotes of the present field close.
+    closed: Option<usize>,
     /// Whether a field has quotes around it.
     has_quoted: bool,
+    /// The first field with text behind its closing quote, and where that text begins.
+    stray: Option<(usize, usize)>,
 }
 
 impl Splitter {
@@ -69,15 +73,14 @@ impl Splitter {
                     }
                     if text[at] == byte {
                         if self.open.is_none() {
-                            fields.push(self.start..at);
-                            self.start = at + 1;
+                            self.end_field(text, at, fields);
                         }
                     } else if self.quote(text, at) {
                         next = at + 2;
                     }
                 }
                 if self.open.is_none() {
-                    fields.push(self.start..text.len());
+                    self.end_field(text, text.len(), fields);
                 }
             }
             Delimiter::Whitespace => {
@@ -88,8 +91,8 @@ impl Splitter {
                         continue;
                     }
                     if inside && is_blank {
-                        fields.push(self.start..at);
-                        (inside, self.start) = (false, at + 1);
+                        self.end_field(text, at, fields);
+                        inside = false;
                     } else if !inside && !is_blank {
                         (inside, self.start) = (true, at);
                     }
@@ -98,9 +101,23 @@ impl Splitter {
                     }
                 }
                 if inside && self.open.is_none() {
-                    fields.push(self.start..text.len());
+                    self.end_field(text, text.len(), fields);
                 }
             }
+        }
+    }
+
+    /// Ends the present field before `at`.
+    fn end_field(&mut self, text: &[u8], at: usize, fields: &mut Vec<Range<usize>>) {
+        fields.push(self.start..at);
+        self.start = at + 1;
+        if let Some(closed) = self.closed.take()
+            && let behind = text[closed..at].trim_ascii()
+            && !behind.is_empty()
+        {
+            let begins =
+                closed + text[closed..at].len() - text[closed..at].trim_ascii_start().len();
+            self.stray.get_or_insert((fields.len(), begins));
         }
     }
 
@@ -110,7 +127,7 @@ impl Splitter {
             if text.get(at + 1) == Some(&b'"') {
                 return true;
             }
-            self.open = None;
+            (self.open, self.closed) = (None, Some(at + 1));
         } else if text[self.start..at].trim_ascii().is_empty() {
             (self.open, self.has_quoted) = (Some(at), true);
         }
@@ -118,15 +135,24 @@ impl Splitter {
     }
 }
 
-/// Places of the fields of a line with their quotes and the blanks around them. Where a quote is left open, its place, and the last field
-/// reaches to the end.
-pub fn fields(line: &str, delimiter: Delimiter) -> (Vec<Range<usize>>, Option<usize>) {
+/// Why text behind the quotes of a field is refused.
+const STRAY: &str = "text behind the closing `\"` of a field; allowed: a delimiter there, and `\"\"` for a quote inside";
+
+/// Places of the fields of a line with their quotes and the blanks around them, and where its quotes are not well formed, with the reason.
+/// Where a quote is left open, the last field reaches to the end.
+pub fn fields(
+    line: &str,
+    delimiter: Delimiter,
+) -> (Vec<Range<usize>>, Option<(usize, &'static str)>) {
     let (mut fields, mut splitter) = (Vec::with_capacity(16), Splitter::default());
     splitter.split(line.as_bytes(), delimiter, &mut fields);
     if splitter.open.is_some() {
         fields.push(splitter.start..line.len());
     }
-    (fields, splitter.open)
+    let open = splitter
+        .open
+        .map(|at| (at, "`\"` is not closed on its line"));
+    (fields, splitter.stray.map(|(_, at)| (at, STRAY)).or(open))
 }
 
 /// A field without the blanks and the quotes around it, and with one quote for two inside.
@@ -152,7 +178,7 @@ fn unquoted(field: &[u8]) -> Cow<'_, [u8]> {
     let mut bytes = inner.iter().copied().peekable();
     while let Some(byte) = bytes.next() {
         if inside && byte == b'"' && bytes.next_if_eq(&b'"').is_none() {
-            // What stands behind a closed quote is text.
+            // A row with text behind it is refused.
             inside = false;
         } else {
             text.push(byte);
@@ -337,6 +363,9 @@ impl<R: BufRead + Send> RecordReader for TextRows<R> {
             splitter.split(&record.text, self.layout.delimiter, &mut record.fields);
         }
         record.is_quoted = splitter.has_quoted;
+        record.fault = splitter
+            .stray
+            .map(|(field, _)| (RecordFault::Damaged, format!("column {field}: {STRAY}")));
         if record.is_quoted {
             record.unquoted.clear();
             for place in &mut record.fields {
@@ -423,10 +452,10 @@ mod tests {
             row(5, &["", "", ""]),
         ];
         assert_eq!(rows(text, ";", None), expected);
-        // A quote inside a field, or behind a closed one, is text.
+        // A quote inside a field is text.
         assert_eq!(
-            rows("5\" pipe,\"a\"b,\"\"\n6\",\"\"\"\"", ",", None),
-            [row(1, &["5\" pipe", "ab", ""]), row(2, &["6\"", "\""])]
+            rows("5\" pipe,a,\"\"\n6\",\"\"\"\"", ",", None),
+            [row(1, &["5\" pipe", "a", ""]), row(2, &["6\"", "\""])]
         );
         assert_eq!(
             rows("\"a\r\n\r\n# b\",1\n \"\"\"\nc\"\"\",2", ",", Some("#")),
@@ -443,11 +472,57 @@ mod tests {
             row(3, &["c\nd", "e"]),
             row(5, &["f\"g", "h\""]),
         ];
+        assert!(!has_fault("f\"g h\"\n", "whitespace"));
         assert_eq!(rows(text, "whitespace", None), expected);
         assert_eq!(
             rows("a\tb\n\t\n", "tab", None),
             [row(1, &["a", "b"]), row(2, &["", ""])]
         );
+    }
+
+    fn has_fault(text: &str, delimiter: &str) -> bool {
+        let (mut reader, mut record) =
+            (opened(text.as_bytes(), delimiter, None), Record::default());
+        reader.next(&mut record).unwrap();
+        record.fault.is_some()
+    }
+
+    #[test]
+    fn text_behind_a_closing_quote_is_a_fault_of_its_row() {
+        let text = "a,b\n1,\"0.25\"0\n2,\"0.25\" \n3,\"x\ny\" z\n4,\"\"\"\"\n\"5\"\"\"6,7\n";
+        let mut reader = opened(text.as_bytes(), ",", None);
+        let (mut record, mut faults) = (Record::default(), Vec::new());
+        while reader.next(&mut record).unwrap() {
+            faults.extend(
+                record
+                    .fault
+                    .take()
+                    .map(|(kind, why)| (record.line, kind, why)),
+            );
+        }
+        let columns: Vec<(u64, &str)> = faults
+            .iter()
+            .map(|(line, _, why)| (*line, why.split(':').next().unwrap()))
+            .collect();
+        assert_eq!(columns, [(2, "column 2"), (4, "column 2"), (7, "column 1")]);
+        assert!(
+            faults
+                .iter()
+                .all(|(_, kind, _)| *kind == RecordFault::Damaged)
+        );
+        for (text, delimiter, expected) in [
+            ("\"a\"b\n", ";", true),
+            ("\"a\"b c\n", "whitespace", true),
+            ("\"a\" b\n", "whitespace", false),
+            ("\"a\"\t b\n", "tab", false),
+            (" \"a\" x\tb\n", "tab", true),
+        ] {
+            assert_eq!(has_fault(text, delimiter), expected, "{text}");
+        }
+        let at = |line: &str| fields(line, Delimiter::Byte(b',')).1.map(|(at, _)| at);
+        assert_eq!(at("1,\"0.25\"0,2"), Some(8));
+        assert_eq!(at("1,\"0.25\",\"2"), Some(9));
+        assert_eq!(at("1,\"0.25\" ,2"), None);
     }
 
     #[test]

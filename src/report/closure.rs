@@ -1,9 +1,8 @@
 //! How well the ball comes back to every socket, plane and sphere, before and after: a picture and a table.
 
 use super::Tables;
-use super::axis::{Area, Scale, baseline, name_x};
 use super::number::mm;
-use super::svg::Svg;
+use super::svg::{Area, Scale, Svg, baseline, name_x};
 use crate::table::{Prediction, PredictionRow};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;

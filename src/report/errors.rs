@@ -1,10 +1,9 @@
 //! The verdict, the table of errors after every step, and their pictures; held-out and training points never together.
 
 use super::Tables;
-use super::distribution::{self, cumulative, histogram};
 use super::findings::wrong_setup;
 use super::number::{count, mm};
-use super::workspace::{Colours, VIEWS, scatter};
+use super::workspace::{Colours, StepErrors, VIEWS, cumulative, histogram, scatter};
 use crate::error::{Error, Result};
 use crate::table::{Prediction, Statistics, StatisticsRow, UNFOLDED, Withdrawn};
 use serde_json::{Value, json};
@@ -266,13 +265,13 @@ fn picture(tables: &Tables, set: &StatisticsRow, steps: &Steps) -> Value {
         .0
         .iter()
         .filter(|row| row.held_out && row.set == set.set);
-    let errors: Vec<distribution::StepErrors> = rows
+    let errors: Vec<StepErrors> = rows
         .map(|row| {
             let table = tables.prediction.iter().flat_map(|table| &table.0);
             let of_row = table.filter(|p| p.step == row.step && p.set == row.set && p.held_out);
             let mut sorted_mm: Vec<f64> = of_row.map(|p| p.error_mm).collect();
             sorted_mm.sort_by(f64::total_cmp);
-            distribution::StepErrors {
+            StepErrors {
                 step: row.step.clone(),
                 colour: steps.colour(row.order),
                 sorted_mm,

@@ -1,10 +1,8 @@
 //! What was left out of the simulation: the diagnosis' verdict, its findings with their curves, what it could not see.
 
 use super::Tables;
-use super::axis::{Area, Scale, baseline, label, name_x, name_y};
-use super::number::{count, mm, significant};
-use super::page::sentence_case;
-use super::svg::Svg;
+use super::number::{count, mm, sentence_case, significant};
+use super::svg::{Area, Scale, Svg, baseline, label, name_x, name_y};
 use crate::table::{
     CurveRow, FindingRow, FormRow, RivalRow, VerdictRow, VerdictTopic, formula_in_words,
 };

@@ -1,6 +1,6 @@
 //! A fleet as one self-contained page: every robot a row, sorted and filtered in the browser without a request.
 
-use super::page::render;
+use super::number::render;
 use super::svg::Svg;
 use crate::error::{Result, visible};
 use crate::table::{FleetChanges, FleetRow, FleetTable};

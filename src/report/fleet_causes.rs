@@ -1,6 +1,6 @@
 //! What the robots of a fleet have in common, as one self-contained page: the table of causes, every robot's size, who needs a technician.
 
-use super::page::render;
+use super::number::render;
 use super::svg::Svg;
 use crate::error::{Result, counted, visible};
 use crate::table::{FleetCellRow, FleetCells, FleetFindingRow, FleetFindings, FleetOutliers};

@@ -1,9 +1,8 @@
 //! The page of a diagnosis of torques: what was found, and measured, simulated and corrected torque of each joint over time.
 
-use super::axis::{Area, Scale, baseline, name_x, name_y};
-use super::number::{count, fixed, significant};
-use super::svg::Svg;
-use super::{data, page};
+use super::data;
+use super::number::{self, count, fixed, significant};
+use super::svg::{Area, Scale, Svg, baseline, name_x, name_y};
 use crate::error::{Error, Result};
 use crate::table::{
     BodyConsistencies, BodyConsistencyRow, ContactRow, Contacts, FrictionCurveRow, FrictionCurves,
@@ -69,7 +68,7 @@ pub fn torque_page(tables: &TorqueTables, title: Option<&str>) -> Result<String>
         "remarks": said(VerdictTopic::Remark),
         "hashes": &tables.hashes,
     });
-    page::render("torques.html", include_str!("torques.html"), page)
+    number::render("torques.html", include_str!("torques.html"), page)
 }
 
 fn facts(verdict: &TorqueVerdictRow) -> Vec<String> {

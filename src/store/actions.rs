@@ -1,20 +1,19 @@
 //! Action records, the commit point: which tables a stage made from which key. Data first, then the record, put if absent.
 
-use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
-use std::fs;
-use std::path::PathBuf;
-
 use super::Store;
 use super::content::TableHash;
 use super::disk::{make_read_only, place, refused, write};
 use super::frame::Frame;
 use super::key::{ActionId, StageKey};
+use super::key::{TableRef, same_bytes};
+use super::notes::{seal, unseal};
 use super::reader::{self, PublishedTable};
-use super::seal::{seal, unseal};
-use super::table_ref::{TableRef, same_bytes};
 use super::writer::{FinishedFile, TableWriter};
 use crate::error::{Error, Result, counted};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::PathBuf;
 
 /// Bumped when older records can no longer be understood: all stages run again.
 const RECORD_FORMAT: u32 = 1;

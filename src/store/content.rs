@@ -3,12 +3,11 @@
 //! One blake3 stream per column over its cells (a presence byte, then 8 little-endian bytes, 1 byte, or length and text), then
 //! one hash over kind, major version, row count and every column's name, type, unit and stream.
 
+use super::frame::Frame;
 use arrow::array::{Array, ArrayRef, ArrowPrimitiveType, AsArray, PrimitiveArray, RecordBatch};
 use arrow::datatypes::{DataType, Float64Type, Int64Type};
 use serde::{Deserialize, Serialize};
 use std::fmt;
-
-use super::frame::Frame;
 
 /// Hash of a table's logical content, as 64 hex digits.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]

@@ -1,14 +1,17 @@
 //! What a stage's result depends on, as a record that a person can read; its hash names the action.
 //!
 //! Content only: never a path, a date, a host, a thread count or calib's own version.
+//!
+//! What a record says of a published table: enough to find its file and to know whether it is whole.
 
+use super::content::TableHash;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fmt;
+use std::fs::File;
 use std::io::Read;
-
-use super::content::TableHash;
+use std::path::Path;
 
 /// Bumped when the meaning of a key changes: all stages run again.
 pub const KEY_FORMAT: u32 = 1;
@@ -140,4 +143,26 @@ pub fn canonical(value: &Value) -> String {
         ),
         plain => plain.to_string(),
     }
+}
+
+/// A published table.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TableRef {
+    /// `name/version`.
+    pub schema: String,
+    /// Identity of the content.
+    pub table_hash: TableHash,
+    /// Name of the object that holds it.
+    pub file_hash: FileHash,
+    /// How many.
+    pub rows: u64,
+    /// Size of the file, bytes.
+    pub bytes: u64,
+}
+
+/// Whether a file is the one that was published, byte for byte.
+pub(super) fn same_bytes(path: &Path, table: &TableRef) -> bool {
+    File::open(path)
+        .and_then(FileHash::of_reader)
+        .is_ok_and(|found| found == table.file_hash)
 }

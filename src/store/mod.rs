@@ -3,15 +3,32 @@
 //! `format.json` | `objects/ab/<file hash>.parquet` | `actions/cd/<key hash>.json` | `runs/<id>/` | `tables/`, `documents/` for
 //! people | `tmp/`. Objects and records are written aside and moved into place, then made durable in groups; a crash leaves nothing
 //! visible by half, and what a power cut tears is told by its hash.
+//!
+//! What a store asks of object storage.
+
+use crate::error::{Error, Result};
+pub use actions::{Account, ActionRecord, Lookup, PendingTable, Published};
+pub use content::TableHash;
+use disk::{Durability, Workspace, make_dir, put_if_absent, refused, sync_dir, write_synced};
+pub use key::{ActionId, FileHash, FileKey, KEY_FORMAT, ReadKey, StageKey, TableRef};
+pub(crate) use reader::table_of_bytes;
+pub use reader::{Loose, PublishedTable, read_table};
+use remote::Remote;
+pub use runs::{Link, Run, Sealed};
+use serde::{Deserialize, Serialize};
+use std::fmt::Debug;
+use std::fs;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+pub use sweep::Sweep;
+pub use verify::Verification;
+pub use writer::{FinishedFile, TableWriter};
 
 pub mod actions;
-mod bucket;
-mod cell;
 mod check;
 pub mod content;
-mod decode;
 mod disk;
-mod durable;
 pub mod frame;
 pub mod key;
 mod notes;
@@ -21,38 +38,9 @@ pub mod runs;
 #[cfg(feature = "s3")]
 mod s3;
 pub mod schema;
-mod seal;
 mod sweep;
-mod table_ref;
-mod tags;
 mod verify;
-mod view;
-mod workspace;
 pub mod writer;
-
-pub use actions::{Account, ActionRecord, Lookup, PendingTable, Published};
-pub use bucket::Bucket;
-pub use content::TableHash;
-pub use key::{ActionId, FileHash, FileKey, KEY_FORMAT, ReadKey, StageKey};
-pub(crate) use reader::table_of_bytes;
-pub use reader::{Loose, PublishedTable, read_table};
-pub use runs::{Link, Run, Sealed};
-pub use sweep::Sweep;
-pub use table_ref::TableRef;
-pub use verify::Verification;
-pub use writer::{FinishedFile, TableWriter};
-
-use serde::{Deserialize, Serialize};
-use std::fs;
-use std::io::ErrorKind;
-use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
-
-use crate::error::{Error, Result};
-use disk::{make_dir, put_if_absent, refused, sync_dir, write_synced};
-use durable::Durability;
-use remote::Remote;
-use workspace::Workspace;
 
 /// The layout described above.
 const STORE_FORMAT: u32 = 1;
@@ -181,4 +169,20 @@ fn check_vacant(root: &Path) -> Result<()> {
             ))
         }
     }
+}
+
+/// Whole files under keys with slashes, as S3 has them; what is written is seen by all at once.
+pub trait Bucket: Debug + Send + Sync {
+    /// As a person writes it: `s3://bucket/prefix`.
+    fn name(&self) -> &str;
+    /// Fetches into a new file; false where there is nothing.
+    fn fetch(&self, key: &str, to: &Path) -> Result<bool>;
+    /// Writes a file over what may be there.
+    fn send(&self, from: &Path, key: &str) -> Result<()>;
+    /// Writes a small file where nothing is, decided once for all who try; false where something is.
+    fn create(&self, from: &Path, key: &str) -> Result<bool>;
+    /// Takes away; nothing where there is nothing.
+    fn remove(&self, key: &str) -> Result<()>;
+    /// Keys below a folder (all where it is empty) with their bytes, in order, `most` at most.
+    fn list(&self, folder: &str, most: usize) -> Result<Vec<(String, u64)>>;
 }

@@ -5,20 +5,20 @@
 //! store is opened, records when they are looked up, tables when they are needed; what does not have the hash of its name is not taken.
 //! What is for people (`tables/`, `documents/`) lies in the folder alone, where every run puts it.
 
+use super::Bucket;
+use super::Store;
+use super::disk::{
+    component, make_dir, make_read_only, place, put_if_absent, refused, together, write,
+};
+use super::key::{TableRef, same_bytes};
+use crate::error::{Error, Result};
 use std::collections::BTreeSet;
-use std::fs;
+use std::fmt::Debug;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread;
 use std::time::Duration;
-
-use super::Store;
-use super::bucket::Bucket;
-use super::disk::{component, make_dir, make_read_only, place, put_if_absent, refused, write};
-use super::durable::together;
-use super::table_ref::{TableRef, same_bytes};
-use crate::error::{Error, Result};
+use std::{fs, thread};
 
 /// How often and at which distance a record is asked for that was there and is not: another machine's is being decided just now.
 const TRIES: u32 = 5;

@@ -1,17 +1,19 @@
 //! The audit record of runs: `runs/<id>/manifest.json` and `events.jsonl`. Ids (ULIDs) and times are made by the caller.
 //!
 //! A manifest is sealed and names the seal of the run before it; every event carries the hash of all events up to it.
-
-use serde::{Deserialize, Serialize};
-use serde_json::Value;
-use std::fs::{self, File};
-use std::io::Write;
-use std::path::{Path, PathBuf};
+//!
+//! Names for runs, `tags/<name>.json`: what is tagged is kept.
 
 use super::Store;
 use super::disk::{component, make_dir, place, refused, replace, write, write_synced};
-use super::seal::{seal, unseal};
+use super::notes::{seal, unseal};
 use crate::error::{Error, Result};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::io::Write;
+use std::path::{Path, PathBuf};
 
 /// A run in flight.
 #[derive(Debug)]
@@ -268,5 +270,77 @@ impl Store {
         let sealed = unseal(&bytes).map_err(|why| damaged(why.into()))?;
         let manifest = serde_json::from_slice(&bytes).map_err(|e| damaged(e.to_string()))?;
         Ok(Sealed { manifest, sealed })
+    }
+}
+
+#[derive(Serialize, Deserialize)]
+struct Tag {
+    run: String,
+}
+
+impl Store {
+    fn tag_path(&self, name: &str) -> Result<PathBuf> {
+        let name = component(name)?;
+        if name.starts_with("HEAD") || name.ends_with(".json") {
+            return Err(Error::spec(
+                format!("tag {name}"),
+                "a tag must not begin with HEAD or end in .json",
+            ));
+        }
+        Ok(self.root().join("tags").join(format!("{name}.json")))
+    }
+
+    /// All tags with their runs.
+    pub fn tags(&self) -> Result<BTreeMap<String, String>> {
+        let dir = self.root().join("tags");
+        let entries = match fs::read_dir(&dir) {
+            Ok(entries) => entries,
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(BTreeMap::new()),
+            Err(e) => return Err(refused(&dir, "read", &e)),
+        };
+        let mut tags = BTreeMap::new();
+        for path in entries.flatten().map(|entry| entry.path()) {
+            let Some(name) = path
+                .file_name()
+                .and_then(|name| name.to_str()?.strip_suffix(".json"))
+            else {
+                continue;
+            };
+            let bytes = fs::read(&path).map_err(|e| refused(&path, "read", &e))?;
+            let damaged = |why: &str| {
+                Error::store(
+                    path.display().to_string(),
+                    format!("damaged: {why}; set it again with calib tag RUN {name}"),
+                )
+            };
+            unseal(&bytes).map_err(damaged)?;
+            let tag: Tag = serde_json::from_slice(&bytes).map_err(|e| damaged(&e.to_string()))?;
+            tags.insert(name.to_string(), tag.run);
+        }
+        Ok(tags)
+    }
+
+    /// Gives a run a name, or the name to another run; gives the run that had it before, where that can be read.
+    pub fn tag(&self, name: &str, run: &str) -> Result<Option<String>> {
+        let path = self.tag_path(name)?;
+        // Ids are found in small letters, too.
+        if ulid::Ulid::from_string(&name.to_ascii_uppercase()).is_ok() {
+            let message = "has the form of a run's id and would hide that run; allowed: any other name, e.g. `released`";
+            return Err(Error::spec(format!("tag {name}"), message));
+        }
+        let before = fs::read(&path).ok().filter(|bytes| unseal(bytes).is_ok());
+        let before = before.and_then(|bytes| Some(serde_json::from_slice::<Tag>(&bytes).ok()?.run));
+        let aside = self.workspace()?.fresh();
+        write_synced(&aside, &seal(&Tag { run: run.into() })?)?;
+        self.give(&aside, &path)?;
+        replace(&aside, &path)?;
+        Ok(before)
+    }
+
+    /// Takes a name away; the run stays.
+    pub fn untag(&self, name: &str) -> Result<()> {
+        let path = self.tag_path(name)?;
+        self.withdraw(&path)?;
+        fs::remove_file(&path).map_err(|e| refused(&path, "remove", &e))
     }
 }

@@ -15,7 +15,7 @@ use std::path::Path;
 use std::time::Duration;
 use tokio::runtime::Runtime;
 
-use super::bucket::Bucket;
+use super::Bucket;
 use super::disk::refused;
 use crate::error::{Error, Result};
 

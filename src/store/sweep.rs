@@ -1,16 +1,14 @@
 //! Taking away what nothing keeps: action records first, then objects that no record names. Never by itself, never anything young.
 
+use super::Store;
+use super::disk::{self, refused};
+use super::verify::files;
+use crate::error::{Error, Result};
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
-
-use super::Store;
-use super::disk::refused;
-use super::verify::files;
-use super::workspace;
-use crate::error::{Error, Result};
 
 /// Letters and digits of a run's id, a ULID.
 const RUN_ID: usize = 26;
@@ -47,7 +45,7 @@ impl Store {
                 "a store in a bucket cannot be swept: copy it to a folder, run calib gc there and copy it back",
             ));
         }
-        if !dry_run && workspace::in_use(&self.root().join("tmp")) {
+        if !dry_run && disk::in_use(&self.root().join("tmp")) {
             let message = "a run is in flight in this store: sweep when it has ended";
             return Err(Error::store(self.root().display().to_string(), message));
         }

@@ -10,8 +10,8 @@ use super::Store;
 use super::actions::ActionRecord;
 use super::disk::refused;
 use super::key::FileHash;
+use super::notes::unseal;
 use super::runs::{Sealed, events_fault};
-use super::seal::unseal;
 use crate::error::{Error, Fault, Result};
 
 /// What a verification read, and everything that it found wrong.

@@ -1,5 +1,13 @@
 //! Tables to Parquet files: chunks in, one file out, in bounded memory and with bytes that do not depend on the chunks.
 
+use super::check;
+use super::content::ContentHasher;
+use super::disk::{Workspace, refused};
+use super::frame::Frame;
+use super::key::FileHash;
+use super::key::TableRef;
+use super::schema::TableSchema;
+use crate::error::{Error, Result};
 use arrow::array::{Array, ArrayRef, AsArray, RecordBatch};
 use arrow::compute::concat_batches;
 use arrow::datatypes::{DataType, Float64Type, SchemaRef};
@@ -16,16 +24,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::JoinHandle;
-
-use super::check;
-use super::content::ContentHasher;
-use super::disk::refused;
-use super::frame::Frame;
-use super::key::FileHash;
-use super::schema::TableSchema;
-use super::table_ref::TableRef;
-use super::workspace::Workspace;
-use crate::error::{Error, Result};
 
 /// Keys of a file's metadata: the table's `name/version`, the units of its columns as JSON, and the hash of its content.
 pub(super) const SCHEMA: &str = "calib.schema";

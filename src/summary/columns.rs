@@ -1,6 +1,9 @@
 //! The tables of a run with their columns: those of one kind together, since they have the same.
+//!
+//! The library of effects for other programs.
 
 use crate::audit::{QueryColumn, QueryTable};
+use crate::effect::Cause;
 use crate::error::{Result, counted};
 use crate::store::Store;
 use serde_json::{Value, json};
@@ -82,4 +85,16 @@ fn text(store: &Store, kind: &str, tables: &[&QueryTable]) -> Result<String> {
         ));
     }
     Ok(text)
+}
+
+/// Name, formula, usual size, what each is confounded with, and what a recording needs to show it.
+pub fn effects_json(causes: &[&Cause]) -> Value {
+    let one = |about: &&Cause| {
+        json!({
+            "name": about.name, "place": about.place, "formula": about.formula, "size": about.size,
+            "confounded": about.confounded, "needs": about.needs,
+            "measure": about.measure.map(|measure| measure.advice),
+        })
+    };
+    causes.iter().map(one).collect()
 }

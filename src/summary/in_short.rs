@@ -1,13 +1,17 @@
 //! A run in ten lines: what was measured, the error before and after, what was found, the verdict, what is in doubt, one next step.
+//!
+//! Tables of a run as text and as rows: errors step by step, rivals of learned corrections, optimisers compared, rejected rows.
 
 use super::estimate::length;
-use super::statistics::statistics_rows;
 use super::{DiagnosisSummary, labelled, screen, tables};
 use crate::error::{Result, counted};
-use crate::pipeline::CompletedRun;
+use crate::pipeline::{CompletedRun, Manifest};
 use crate::stage::{DIAGNOSES, DeclaredStage, Transfer};
 use crate::store::Store;
-use crate::table::{Contradicted, Robot, Standing, StatisticsRow, Withdrawn};
+use crate::table::{
+    Contradicted, Corrections, CorrectionsRow, Robot, Searches, SearchesRow, Standing, Statistics,
+    StatisticsRow, Table, Withdrawn,
+};
 use screen::NextStep;
 
 /// How a result is printed.
@@ -210,4 +214,306 @@ fn unknown_noise(row: &StatisticsRow) -> Option<NextStep> {
         what: "state `instrument` in `ingest`: the noise is not known".into(),
         command: None,
     })
+}
+
+/// Errors of every step and set.
+pub fn statistics_rows(outcome: &CompletedRun, store: &Store) -> Result<Vec<StatisticsRow>> {
+    let tables = tables::<Statistics>(&outcome.manifest, store)?;
+    Ok(tables.into_iter().flat_map(|table| table.0).collect())
+}
+
+/// Rivals of learned corrections.
+pub fn corrections_rows(outcome: &CompletedRun, store: &Store) -> Result<Vec<CorrectionsRow>> {
+    let tables = tables::<Corrections>(&outcome.manifest, store)?;
+    Ok(tables.into_iter().flat_map(|table| table.0).collect())
+}
+
+/// Optimisers on functions whose minima are known.
+pub fn searches_rows(outcome: &CompletedRun, store: &Store) -> Result<Vec<SearchesRow>> {
+    let tables = tables::<Searches>(&outcome.manifest, store)?;
+    Ok(tables.into_iter().flat_map(|table| table.0).collect())
+}
+
+/// Three tables: points that no model has seen, those that the models were fitted to, and these again
+/// cross-validated. `expected` is the rms of a complete
+/// model under the instrument's noise.
+pub fn statistics(
+    outcome: &CompletedRun,
+    standing: Option<&Standing>,
+    store: &Store,
+) -> Result<String> {
+    let mut rows = statistics_rows(outcome, store)?;
+    let withdrawn: Vec<&str> = standing
+        .iter()
+        .flat_map(|stands| &stands.withdrawn)
+        .map(|gone| gone.step.as_str())
+        .collect();
+    for row in rows
+        .iter_mut()
+        .filter(|row| withdrawn.contains(&row.step.as_str()))
+    {
+        row.step.push_str(" (withdrawn)");
+    }
+    let mut text = String::new();
+    for (held_out, title) in [
+        (
+            false,
+            "training points (the models were fitted to these: flattered)",
+        ),
+        (true, "held-out points (no model has seen these)"),
+    ] {
+        let rows: Vec<&StatisticsRow> =
+            rows.iter().filter(|row| row.held_out == held_out).collect();
+        if !rows.is_empty() {
+            text.push_str(&errors(title, &rows));
+        }
+    }
+    if rows.iter().any(StatisticsRow::is_inferred) {
+        text.push_str("expected rests on an assumed noise: none is recorded, and no `instrument` is stated in `ingest`\n\n");
+    }
+    text.push_str(&folds(&rows));
+    text.push_str(&references(&rows));
+    Ok(text)
+}
+
+fn errors(title: &str, rows: &[&StatisticsRow]) -> String {
+    let heads = [
+        "<step",
+        "<set",
+        ">6points",
+        ">8mean",
+        ">8std",
+        ">8p95",
+        ">8max",
+        ">8rms",
+        ">8expected",
+    ];
+    let cells = rows.iter().map(|row| {
+        let of_row = [row.step.clone(), row.set.clone(), row.points.to_string()];
+        let figures = [row.mean_mm, row.std_mm, row.p95_mm, row.max_mm, row.rms_mm].map(Some);
+        let figures = figures.into_iter().chain([row.expected_rms_mm]);
+        of_row
+            .into_iter()
+            .chain(figures.map(|mm| figure(mm, "")))
+            .collect()
+    });
+    format!(
+        "{title}, error in mm\n{}\n",
+        aligned(&heads, cells.collect())
+    )
+}
+
+/// Training points under fits without them; nothing where no step made folds.
+fn folds(rows: &[StatisticsRow]) -> String {
+    let rows = rows.iter().filter(|row| row.fold_rms_mm.is_some());
+    let rows: Vec<&StatisticsRow> = rows.collect();
+    let contacts = rows.iter().filter(|row| row.is_contact()).count();
+    let blocks = match contacts {
+        _ if rows.is_empty() => return String::new(),
+        0 => "contiguous folds",
+        some if some == rows.len() => "whole places",
+        _ => "contiguous folds, whole places",
+    };
+    let heads = [
+        "<step",
+        "<set",
+        ">8mean",
+        ">8max",
+        ">8rms",
+        ">8expected",
+        ">8|mean",
+        ">8max",
+        ">8rms",
+    ];
+    let cells = rows.iter().map(|row| {
+        let figures = [
+            row.fold_mean_mm,
+            row.fold_max_mm,
+            row.fold_rms_mm,
+            row.fold_expected_mm,
+            row.block_mean_mm,
+            row.block_max_mm,
+            row.block_rms_mm,
+        ];
+        let of_row = [row.step.clone(), row.set.clone()];
+        of_row
+            .into_iter()
+            .chain(figures.map(|mm| figure(mm, "")))
+            .collect()
+    });
+    format!(
+        "training points, each under a fit without it (cross-validated), error in mm: random folds | {blocks}\n{}\n",
+        aligned(&heads, cells.collect())
+    )
+}
+
+/// Our figures beside those that the pipeline names; nothing where it names none.
+fn references(rows: &[StatisticsRow]) -> String {
+    let pair = |ours: f64, theirs| format!("{ours:>7.4} | {:>7}", figure(theirs, ""));
+    let cells = rows.iter().filter_map(|row| {
+        Some(vec![
+            row.reference.clone()?,
+            row.step.clone(),
+            row.set.clone(),
+            pair(row.mean_mm, row.reference_mean_mm),
+            pair(row.std_mm, row.reference_std_mm),
+            pair(row.max_mm, row.reference_max_mm),
+        ])
+    });
+    let cells: Vec<Vec<String>> = cells.collect();
+    if cells.is_empty() {
+        return String::new();
+    }
+    let heads = ["<reference", "<step", "<set", ">17mean", ">17std", ">17max"];
+    format!(
+        "reference figures, error in mm: ours | theirs\n{}\n",
+        aligned(&heads, cells)
+    )
+}
+
+/// One line per rival of each learned correction, the kept one marked; nothing where nothing was learnt.
+pub fn corrections(outcome: &CompletedRun, store: &Store) -> Result<String> {
+    let rows = corrections_rows(outcome, store)?;
+    if rows.is_empty() {
+        return Ok(String::new());
+    }
+    let heads = [
+        "<  step",
+        "<16rival",
+        ">8mean",
+        ">8rms",
+        ">8max",
+        ">7numbers",
+        ">11evaluations",
+        "<why",
+    ];
+    let cells = rows.iter().map(|row| {
+        let settings = row.hidden.zip(row.decay);
+        let settings =
+            settings.map(|(hidden, decay)| format!(" ({hidden} neurons, decay {decay})"));
+        vec![
+            format!("{} {}", if row.chosen { ">" } else { " " }, row.step),
+            row.rival.clone(),
+            figure(row.mean_mm, "-"),
+            figure(row.rms_mm, "-"),
+            figure(row.max_mm, "-"),
+            row.numbers.to_string(),
+            row.evaluations.to_string(),
+            format!("{}{}", row.reason, settings.unwrap_or_default()),
+        ]
+    });
+    Ok(format!(
+        "learned corrections, cross-validated on their own training rows (> kept), error in mm\n{}\n",
+        aligned(&heads, cells.collect())
+    ))
+}
+
+/// One line per function and optimiser; nothing where nothing was searched.
+pub fn searches(outcome: &CompletedRun, store: &Store) -> Result<String> {
+    let rows = searches_rows(outcome, store)?;
+    if rows.is_empty() {
+        return Ok(String::new());
+    }
+    let mut heads = vec![
+        "<16function",
+        "<6method",
+        ">5seeds",
+        ">6found",
+        ">6stuck",
+        ">8median",
+        ">8p90",
+        ">10error p50",
+        ">10error p90",
+    ];
+    if rows.iter().any(|row| row.reference_s.is_some()) {
+        heads.push("<published time");
+    }
+    let cells = rows.iter().map(|row| {
+        let share =
+            |count: i64| format!("{:.1}%", 100.0 * count as f64 / row.searches.max(1) as f64);
+        let count =
+            |value: Option<f64>| value.map_or_else(|| "-".into(), |value| format!("{value:.0}"));
+        let error =
+            |value: Option<f64>| value.map_or_else(|| "-".into(), |value| format!("{value:.2e}"));
+        let published = row.reference.as_ref().zip(row.reference_s);
+        let published = published.map(|(label, seconds)| format!("{label}: {seconds:.3} s"));
+        vec![
+            format!("{} {}-D", row.function, row.dimensions),
+            row.method.clone(),
+            row.searches.to_string(),
+            share(row.found),
+            share(row.stuck),
+            count(row.evaluations_median),
+            count(row.evaluations_p90),
+            error(row.error_median),
+            error(row.error_p90),
+            published.unwrap_or_default(),
+        ]
+    });
+    Ok(format!(
+        "searches for known minima: found and stuck of all seeds, evaluations to the target of those that found it\n{}\n",
+        aligned(&heads, cells.collect())
+    ))
+}
+
+fn figure(mm: Option<f64>, none: &str) -> String {
+    mm.map_or_else(|| none.into(), |mm| format!("{mm:.4}"))
+}
+
+/// Rows below their heads. A head says how a column is aligned (`<`, `>`), how wide it is at least, and with `|` that a line stands before it.
+fn aligned(heads: &[&str], rows: Vec<Vec<String>>) -> String {
+    let digits = |c: char| c.is_ascii_digit();
+    let names = heads
+        .iter()
+        .map(|head| head[1..].trim_start_matches(digits));
+    let titles = names.map(|name| name.trim_start_matches('|').to_string());
+    let all: Vec<Vec<String>> = std::iter::once(titles.collect()).chain(rows).collect();
+    let width = |k: usize| {
+        let least = heads[k][1..].split(|c| !digits(c)).next();
+        let least = least.and_then(|least| least.parse().ok()).unwrap_or(0);
+        let cells = all.iter().map(|row| row[k].chars().count());
+        cells.max().unwrap_or(0).max(least)
+    };
+    let widths: Vec<usize> = (0..heads.len()).map(width).collect();
+    let line = |row: &Vec<String>| {
+        let mut line = String::new();
+        for (k, (head, cell)) in heads.iter().zip(row).enumerate() {
+            let before = if head.contains('|') { " | " } else { "  " };
+            match (head.starts_with('<'), k + 1 == heads.len()) {
+                (true, true) if cell.is_empty() => {}
+                (true, true) => line += &format!("{before}{cell}"),
+                (true, false) => line += &format!("{before}{cell:0$}", widths[k]),
+                (false, _) => line += &format!("{before}{cell:>0$}", widths[k]),
+            }
+        }
+        line + "\n"
+    };
+    all.iter().map(line).collect()
+}
+
+/// How many rows of the raw files were rejected.
+pub fn rejected_rows(manifest: &Manifest) -> u64 {
+    manifest
+        .tables(crate::table::Rejected::KIND)
+        .map(|output| output.table.rows)
+        .sum()
+}
+
+/// Nothing where nothing was rejected.
+pub fn rejected(manifest: &Manifest) -> String {
+    let line = |output: &crate::pipeline::OutputRecord| {
+        let path = output.path.as_deref().unwrap_or_default();
+        labelled(
+            "rejected",
+            &format!(
+                "{}, each with its reason in {path}",
+                counted(output.table.rows, "row")
+            ),
+        )
+    };
+    manifest
+        .tables(crate::table::Rejected::KIND)
+        .filter(|output| output.table.rows > 0)
+        .map(line)
+        .collect()
 }

@@ -2,46 +2,34 @@
 
 mod columns;
 mod diagnosis;
-mod effects;
 mod estimate;
-mod explanation;
 mod first_look;
 #[cfg(feature = "query")]
 mod grid;
 mod in_short;
-mod labelled;
 mod limits;
-#[cfg(feature = "query")]
-mod lines;
-mod own_effect;
-mod plan;
 mod rival_changes;
 mod run;
 mod run_diff;
 mod screen;
 mod short_finding;
-mod statistics;
 
-pub use columns::{columns, columns_json};
+pub use columns::{columns, columns_json, effects_json};
 pub use diagnosis::DiagnosisSummary;
-pub use effects::effects_json;
-pub use explanation::explanation;
 pub use first_look::first_look;
 #[cfg(feature = "query")]
 pub use grid::grid;
-pub use in_short::{ResultScreen, in_short};
-pub use labelled::{LABEL, folded, labelled};
-pub use limits::LimitsSummary;
 #[cfg(feature = "query")]
-pub use lines::{csv, json};
-pub use plan::graph;
-pub use rival_changes::{RivalChange, rival_changes};
-pub use run::{run, stage, status};
-pub use run_diff::run_diff;
-pub use statistics::{
-    corrections, corrections_rows, rejected, rejected_rows, searches, searches_rows, statistics,
-    statistics_rows,
+pub use grid::{csv, json};
+pub use in_short::{
+    ResultScreen, corrections, corrections_rows, in_short, rejected, rejected_rows, searches,
+    searches_rows, statistics, statistics_rows,
 };
+pub use limits::LimitsSummary;
+pub use rival_changes::{RivalChange, rival_changes};
+pub use run::{explanation, graph, run, stage, status};
+pub use run_diff::run_diff;
+pub use screen::{LABEL, folded, labelled};
 
 use crate::error::Result;
 use crate::pipeline::{Manifest, StageReport};

@@ -61,12 +61,12 @@ impl std::fmt::Display for CauseAtPlace {
 }
 
 /// The findings of a diagnosis, and the rivals of each with their probabilities.
-struct Said(Vec<(CauseAtPlace, Vec<Listed>)>);
+struct DiagnosedCauses(Vec<(CauseAtPlace, Vec<Listed>)>);
 
 /// A rival and its probability.
 type Listed = (CauseAtPlace, Option<f64>);
 
-impl Said {
+impl DiagnosedCauses {
     /// None where a table was not written or has left the store.
     fn read(stage: &StageReport, store: &Store) -> Result<Option<Self>> {
         let (findings, rivals): (Option<Findings>, Option<Rivals>) =
@@ -129,7 +129,7 @@ fn table<T: Table>(stage: &StageReport, store: &Store) -> Result<Option<T>> {
     T::from_frame(&store.load(&own.table)?).map(Some)
 }
 
-fn compare(stage: &str, a: &Said, b: &Said) -> Vec<RivalChange> {
+fn compare(stage: &str, a: &DiagnosedCauses, b: &DiagnosedCauses) -> Vec<RivalChange> {
     let change = |finding: &CauseAtPlace, rival: &CauseAtPlace, outcome, before, now| {
         let (stage, finding, rival) = (stage.to_string(), finding.clone(), rival.clone());
         RivalChange {
@@ -208,8 +208,11 @@ pub fn rival_changes(
         else {
             continue;
         };
-        if let (Some(before), Some(said)) = (Said::read(before, store)?, Said::read(now, store)?) {
-            out.extend(compare(&now.id, &before, &said));
+        if let (Some(before), Some(after)) = (
+            DiagnosedCauses::read(before, store)?,
+            DiagnosedCauses::read(now, store)?,
+        ) {
+            out.extend(compare(&now.id, &before, &after));
         }
     }
     Ok(out)
@@ -262,7 +265,7 @@ pub fn rival_words(changes: &[RivalChange]) -> String {
 mod tests {
     use super::*;
 
-    fn said(findings: &[(&str, &[(&str, f64)])]) -> Said {
+    fn diagnosed(findings: &[(&str, &[(&str, f64)])]) -> DiagnosedCauses {
         let named = |text: &str| {
             text.split_once('@')
                 .map(|(effect, place)| cause(effect, place))
@@ -273,7 +276,7 @@ mod tests {
                 .map(|(name, value)| (named(name), Some(*value)))
                 .collect()
         };
-        Said(
+        DiagnosedCauses(
             findings
                 .iter()
                 .map(|(name, own)| (named(name), rivals(own)))
@@ -283,7 +286,7 @@ mod tests {
 
     #[test]
     fn every_rival_that_was_open_is_confirmed_reversed_or_still_open() {
-        let before = said(&[
+        let before = diagnosed(&[
             (
                 "joint_compliance@joint 2",
                 &[
@@ -296,7 +299,7 @@ mod tests {
             ("link_mass@link 4", &[("link_mass@link 5", 0.3)]),
             ("tool_shift@tool", &[("base_shift@base", 0.1)]),
         ]);
-        let now = said(&[
+        let now = diagnosed(&[
             (
                 "joint_compliance@joint 2",
                 &[

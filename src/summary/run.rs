@@ -1,165 +1,63 @@
 //! A run as its manifest has it, and a stage of it.
+//!
+//! Why a stage ran, or did not.
+//!
+//! A pipeline as it was understood: its stages, what they read and write.
 
+use crate::audit::Explanation;
 use crate::error::counted;
-use crate::pipeline::{Manifest, RunStatus, StageReport};
-use crate::store::TableRef;
+use crate::pipeline::{Manifest, Plan, RunStatus, StageReport};
+use minijinja::syntax::SyntaxConfig;
+use minijinja::value::Serde;
+use minijinja::{Environment, UndefinedBehavior, context};
+
+/// A template of this folder, filled.
+pub(super) fn filled(template: &'static str, about: minijinja::Value) -> String {
+    let mut environment = Environment::new();
+    // Lines of tags alone leave no line.
+    let syntax = SyntaxConfig::builder()
+        .trim_blocks(true)
+        .lstrip_blocks(true)
+        .keep_trailing_newline(true)
+        .build();
+    environment.set_syntax(syntax.expect("the usual delimiters"));
+    environment.set_undefined_behavior(UndefinedBehavior::Strict);
+    environment.add_filter("counted", |count: u64, what: &str| counted(count, what));
+    environment.add_filter("words", |name: &str| name.replace('_', " "));
+    environment.add_filter("fixed", |value: f64, decimals: usize| {
+        format!("{value:.decimals$}")
+    });
+    environment.add_filter("figure", |value: Option<f64>| {
+        value.map_or_else(|| "-".into(), |value| format!("{value:.3}"))
+    });
+    environment.add_filter("left", |text: &str, width: usize| format!("{text:width$}"));
+    environment.add_filter("right", |value: minijinja::Value, width: usize| {
+        format!("{:>width$}", value.to_string())
+    });
+    environment.add_filter("brief", brief);
+    environment
+        .render_str(template, about)
+        .expect("a template that names what it is given")
+}
 
 /// A whole run.
 pub fn run(manifest: &Manifest) -> String {
-    let mut text = format!(
-        "run {}, {}, {}\n",
-        manifest.run_id,
-        manifest.what(),
-        status(manifest)
-    );
-    text.push_str(
-        &manifest
-            .error
-            .as_ref()
-            .map_or_else(String::new, |error| format!("error: {error}\n")),
-    );
-    let seconds = manifest
-        .wall_seconds
-        .map_or_else(String::new, |seconds| format!(", {seconds:.1} s"));
-    let memory = manifest
-        .peak_memory_bytes
-        .map_or_else(String::new, |bytes| {
-            format!(", {:.0} MB at most", bytes as f64 / 1e6)
-        });
-    text.push_str(&format!("started {}{seconds}{memory}\n", manifest.started));
-    text.push_str(&format!(
-        "pipeline {}, {}, seed {}\n",
-        manifest.pipeline.name, manifest.pipeline.file, manifest.seed
-    ));
-    for set in &manifest.overrides {
-        text.push_str(&format!(
-            "set on the command line: {} = {}\n",
-            set.target, set.value
-        ));
-    }
-    let (tool, host) = (&manifest.tool, &manifest.host);
-    let user = manifest
-        .user
-        .as_ref()
-        .map_or_else(String::new, |user| format!("{user} on "));
-    text.push_str(&format!(
-        "{} {} on {user}{}, {} {}, {}\n",
-        tool.name,
-        tool.version,
-        host.name,
-        host.os,
-        host.architecture,
-        counted(manifest.jobs, "job")
-    ));
-    if let Some(previous) = &manifest.previous {
-        text.push_str(&format!("after run {}\n", previous.run));
-    }
-    let width = manifest
-        .stages
-        .iter()
-        .map(|stage| stage.id.len())
-        .max()
-        .unwrap_or(0);
-    text.push('\n');
-    for stage in &manifest.stages {
-        let rows: Vec<String> = stage
-            .outputs
-            .iter()
-            .map(|output| format!("{} {}", output.port, output.table.rows))
-            .collect();
-        let seconds = stage
-            .wall_seconds
-            .map_or_else(String::new, |seconds| format!("{seconds:.2} s"));
-        text.push_str(&format!(
-            "{:width$}  {:8}  {seconds:>9}  {}\n",
-            stage.id,
-            word(stage),
-            rows.join(", ")
-        ));
-        text.push_str(&stage.reason.as_ref().map_or_else(String::new, |reason| {
-            format!("{:width$}  because: {reason}\n", "")
-        }));
-        text.extend(
-            stage
-                .warnings
-                .iter()
-                .map(|warning| format!("{:width$}  warning: {warning}\n", "")),
-        );
-    }
-    text
-}
-
-/// The state of a stage as it is printed.
-pub(super) fn word(stage: &StageReport) -> String {
-    serde_json::to_value(stage.status)
-        .ok()
-        .and_then(|value| value.as_str().map(|word| word.replace('_', " ")))
-        .unwrap_or_default()
+    let ids = manifest.stages.iter().map(|stage| stage.id.len());
+    filled(
+        include_str!("text/run.txt"),
+        context! {
+            run => Serde(manifest), what => manifest.what(), status => status(manifest),
+            width => ids.max().unwrap_or(0),
+        },
+    )
 }
 
 /// One stage with its inputs and tables.
 pub fn stage(stage: &StageReport) -> String {
-    let mut text = format!(
-        "stage {} (uses {}, implementation {}): {}\n",
-        stage.id,
-        stage.uses,
-        stage.implementation,
-        word(stage)
-    );
-    text.push_str(
-        &stage
-            .reason
-            .as_ref()
-            .map_or_else(String::new, |reason| format!("because: {reason}\n")),
-    );
-    text.push_str(
-        &stage
-            .action
-            .as_ref()
-            .map_or_else(String::new, |action| format!("action {action}\n")),
-    );
-    for file in &stage.files {
-        text.push_str(&format!(
-            "file    {} = {}, {} bytes, {:.12}\n",
-            file.place,
-            file.path,
-            file.bytes,
-            file.blake3.as_str()
-        ));
-    }
-    let mut table = |verb: &str, what: String, table: &TableRef| {
-        text.push_str(&format!(
-            "{verb:7} {what}, {}, {:.12}\n",
-            counted(table.rows, "row"),
-            table.table_hash.as_str()
-        ));
-    };
-    stage.inputs.iter().for_each(|input| {
-        table(
-            "reads",
-            format!("{} <- {}", input.port, input.from),
-            &input.table,
-        )
-    });
-    stage.outputs.iter().for_each(|output| {
-        table(
-            "writes",
-            format!("{} ({})", output.port, output.table.schema),
-            &output.table,
-        )
-    });
-    if let Some(key) = &stage.key {
-        let settings = serde_json::to_string_pretty(&key.settings).unwrap_or_default();
-        text.push_str(&format!("seed    {}\nsettings {settings}\n", key.seed));
-    }
-    text.extend(stage.notes.iter().map(|note| format!("note    {note}\n")));
-    text.extend(
-        stage
-            .warnings
-            .iter()
-            .map(|warning| format!("warning {warning}\n")),
-    );
-    text
+    let settings = stage.key.as_ref().map(|key| &key.settings);
+    let settings = serde_json::to_string_pretty(&settings).unwrap_or_default();
+    let about = context! { stage => Serde(stage), settings };
+    filled(include_str!("text/stage.txt"), about)
 }
 
 /// The state of a run as it is printed.
@@ -169,4 +67,81 @@ pub fn status(manifest: &Manifest) -> &'static str {
         RunStatus::Done => "done",
         RunStatus::Failed => "failed",
     }
+}
+
+/// Why a stage ran, as text.
+pub fn explanation(explanation: &Explanation) -> String {
+    let about = context! { of => Serde(explanation) };
+    filled(include_str!("text/explanation.txt"), about)
+}
+
+fn brief(value: &str) -> String {
+    let cut: String = value.chars().take(60).collect();
+    // Of hashes the beginning says enough.
+    let is_hash = value.len() == 64 && value.chars().all(|c| c.is_ascii_hexdigit());
+    match () {
+        () if is_hash => value[..12].into(),
+        () if cut.len() < value.len() => format!("{cut}…"),
+        () => cut,
+    }
+}
+
+/// Stages with their tables and files, as `calib check` prints them.
+pub fn graph(plan: &Plan) -> String {
+    let mut text = format!(
+        "pipeline {}, seed {}, {}\n",
+        plan.name,
+        plan.seed,
+        counted(plan.stages.len(), "stage")
+    );
+    for stage in &plan.stages {
+        let uses = if stage.id == stage.entry.name {
+            String::new()
+        } else {
+            format!(" (uses {})", stage.entry.name)
+        };
+        text.push_str(&format!("\n{}{uses}: {}\n", stage.id, stage.entry.summary));
+        let width = stage
+            .inputs
+            .iter()
+            .map(|input| input.port.name.len())
+            .max()
+            .unwrap_or(0);
+        for input in &stage.inputs {
+            let from = input.from.iter().map(|origin| {
+                let writer = &plan.stages[origin.stage];
+                format!("{}.{}", writer.id, writer.outputs[origin.port].name)
+            });
+            let from: Vec<String> = from.collect();
+            let from = if from.is_empty() {
+                "(none)".into()
+            } else {
+                from.join(", ")
+            };
+            text.push_str(&format!(
+                "  reads   {:width$}  <- {from}\n",
+                input.port.name
+            ));
+        }
+        for file in &stage.files {
+            text.push_str(&format!(
+                "  file    {} = {}\n",
+                file.place,
+                file.path.display()
+            ));
+        }
+        let outputs: Vec<String> = stage
+            .outputs
+            .iter()
+            .map(|port| {
+                if port.name == port.kind {
+                    port.name.into()
+                } else {
+                    format!("{} ({})", port.name, port.kind)
+                }
+            })
+            .collect();
+        text.push_str(&format!("  writes  {}\n", outputs.join(", ")));
+    }
+    text
 }

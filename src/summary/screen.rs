@@ -1,8 +1,13 @@
 //! The lines of a result, as `run` and `diagnose` print them: 100 columns at most.
+//!
+//! A formula that a diagnosis proposes, as a file of an effect of one's own.
+//!
+//! Lines of a result: a label, then text; on a terminal long ones are broken at spaces and indented.
 
 use super::short_finding::ShortFinding;
-use super::{LABEL, folded, labelled};
-use crate::error::counted;
+use crate::effect::{EffectDeclaration, ShapeRange};
+use crate::error::{Error, Result, counted};
+use serde::Serialize;
 use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
 
 /// Columns of a result at most.
@@ -220,6 +225,112 @@ pub(super) fn cut(text: &str, width: usize) -> String {
     out + "…"
 }
 
+/// The file's text; `heading` says where it is from.
+pub(super) fn declared_in_yaml(declaration: &str, heading: &str) -> Result<String> {
+    let unreadable =
+        |error: serde_json::Error| Error::data("table forms", format!("`{declaration}`: {error}"));
+    let declared: EffectDeclaration = serde_json::from_str(declaration).map_err(unreadable)?;
+    let mut lines = vec![
+        format!("# {heading}."),
+        "# `with: {effects: [this file]}` below `uses: diagnose` tries it; rename it once its cause is known.".into(),
+        "calib_effect: 1".into(),
+        format!("name: {}", json(&declared.name)),
+        format!("place: {}", json(&declared.place)),
+    ];
+    lines.extend(
+        declared
+            .motion
+            .iter()
+            .map(|motion| format!("motion: {}", json(motion))),
+    );
+    match &declared.law.0[..] {
+        [one] => lines.push(format!("law: {}", json(one))),
+        several => {
+            lines.push("law:".into());
+            lines.extend(several.iter().map(|law| format!("  - {}", json(law))));
+        }
+    }
+    if !declared.shape.is_empty() {
+        lines.push("shape:".into());
+        lines.extend(
+            declared
+                .shape
+                .iter()
+                .map(|(name, range)| format!("  {name}: {}", bounds(range))),
+        );
+    }
+    lines.extend(
+        declared
+            .unit
+            .iter()
+            .map(|unit| format!("unit: {}", json(unit))),
+    );
+    lines.extend(
+        declared
+            .sentence
+            .iter()
+            .map(|sentence| format!("sentence: {}", json(sentence))),
+    );
+    Ok(lines.join("\n") + "\n")
+}
+
+fn bounds(range: &ShapeRange) -> String {
+    format!(
+        "{{from: {}, to: {}, start: {}}}",
+        range.from,
+        range.to,
+        json(&range.start)
+    )
+}
+
+/// JSON's texts and lists are YAML's.
+fn json(value: &impl Serialize) -> String {
+    serde_json::to_string(value).expect("numbers and texts serialise")
+}
+
+/// Columns of a label.
+pub const LABEL: usize = 10;
+/// A terminal narrower than this breaks lines itself.
+const NARROWEST: usize = 40;
+
+/// A label and its text on a line.
+pub fn labelled(label: &str, text: &str) -> String {
+    format!("{label:LABEL$}{text}\n")
+}
+
+/// The same lines, none wider than `width` but for words that are longer and commands, which are there to be copied.
+pub fn folded(text: &str, width: usize) -> String {
+    let fold = |line: &str| {
+        if line.trim_start().starts_with("calib ") {
+            format!("{line}\n")
+        } else {
+            broken(line, width)
+        }
+    };
+    if width < NARROWEST {
+        text.into()
+    } else {
+        text.lines().map(fold).collect()
+    }
+}
+
+fn broken(line: &str, width: usize) -> String {
+    let mut out = String::new();
+    let mut column = 0;
+    for (k, word) in line.split(' ').enumerate() {
+        if k > 0 && column + 1 + word.width() > width && column > LABEL {
+            out.push_str(&format!("\n{:LABEL$}", ""));
+            column = LABEL;
+        } else if k > 0 {
+            out.push(' ');
+            column += 1;
+        }
+        out.push_str(word);
+        column += word.width();
+    }
+    out + "\n"
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -272,6 +383,28 @@ mod tests {
                 text.contains("or: joint 4") && text.contains(" more\n"),
                 "{text}"
             );
+        }
+    }
+
+    #[test]
+    fn a_long_text_is_broken_at_spaces_under_its_label() {
+        assert_eq!(labelled("verdict", "explained"), "verdict   explained\n");
+        let text = folded(&labelled("next", &"poses ".repeat(30)), 60);
+        assert!(
+            text.lines().count() > 2 && text.lines().all(|line| line.len() <= 60),
+            "{text}"
+        );
+        assert!(
+            text.lines()
+                .skip(1)
+                .all(|line| line.starts_with("          poses")),
+            "{text}"
+        );
+        for whole in [
+            labelled("report", &"x".repeat(120)),
+            labelled("", &format!("calib poses {}", "a ".repeat(60))),
+        ] {
+            assert_eq!(folded(&whole, 60), whole);
         }
     }
 }

@@ -82,9 +82,9 @@ pub(super) struct ShortFinding {
     pub instead: Option<String>,
 }
 
-/// Which number of a finding is told.
+/// Which number of a finding is shown.
 #[derive(Clone, Copy)]
-enum Told {
+enum NumberShown {
     No,
     /// The largest.
     Largest,
@@ -98,10 +98,10 @@ enum Told {
     Called(&'static str),
 }
 
-use Told::{Amplitude, Called, Largest, No, Size, Twice};
+use NumberShown::{Amplitude, Called, Largest, No, Size, Twice};
 
-/// An effect, what it does at a place `{}`, and the number that is told of it.
-const PHRASES: &[(&str, &str, Told)] = &[
+/// An effect, what it does at a place `{}`, and the number that is shown of it.
+const PHRASES: &[(&str, &str, NumberShown)] = &[
     ("joint_compliance", "{} yields under load", Largest),
     ("joint_hardening", "{} yields nonlinearly", No),
     ("link_compliance", "{} bends under load", Largest),
@@ -206,7 +206,7 @@ const PHRASES: &[(&str, &str, Told)] = &[
     ("gravity_direction", "base is tilted", Called("tilt")),
 ];
 
-fn phrase(effect: &str) -> Option<(&'static str, Told)> {
+fn phrase(effect: &str) -> Option<(&'static str, NumberShown)> {
     PHRASES
         .iter()
         .find(|(name, ..)| *name == effect)
@@ -230,15 +230,15 @@ impl ShortFinding {
             .then(|| nearest(found))
             .flatten();
         let effect = nearest.unwrap_or(&found.effect);
-        let told = phrase(effect).map_or(
+        let shown = phrase(effect).map_or(
             if effect == names::UNKNOWN {
                 No
             } else {
                 Largest
             },
-            |(_, told)| told,
+            |(_, shown)| shown,
         );
-        let number = told.number(&found.numbers);
+        let number = shown.number(&found.numbers);
         let of_rows = number.is_none() && found.size.is_none();
         let mut what = if of_rows {
             found.statement.trim_end_matches('.').to_string()
@@ -327,7 +327,7 @@ fn instead(found: &Found, nearest: Option<&str>) -> Option<String> {
     Some(format!("or: {}", others.join(", ")))
 }
 
-impl Told {
+impl NumberShown {
     fn number(self, all: &[FindingNumberRow]) -> Option<String> {
         let written = |one: &FindingNumberRow| {
             let per = if one.name.ends_with("per_kelvin") {

@@ -1,9 +1,17 @@
 //! What a diagnosis found, its numbers, and what would explain the data as well: three tables linked by the finding's rank.
+//!
+//! Where the residual sits and what it depends on, before and after the findings: three tables.
+//!
+//! Formulas for findings without a name, with their numbers.
 
-use super::{FindingNumberRow, FindingNumbers, FindingRow, Findings, RivalRow, Rivals};
-use crate::diagnose::{Diagnosis, Finding};
+use super::{
+    CellRow, Cells, FindingNumberRow, FindingNumbers, FindingRow, Findings, FormRow, Forms,
+    RivalRow, Rivals, ShareRow, Shares, Spectrum, SpectrumRow, picked, picked_of,
+};
+use crate::diagnose::{Diagnosis, Finding, Located};
 use crate::effect::cause;
 use crate::observation::Dimension;
+use serde_json::Value;
 
 impl FindingRow {
     /// The joint (from 1) whose range bounds it, that range as people read it, and the range's unit.
@@ -177,5 +185,169 @@ impl Findings {
             forms: serde_json::to_string(&finding.forms).expect("numbers and names serialise"),
         });
         Self(rows.collect())
+    }
+}
+
+fn moments(diagnosis: &Diagnosis) -> [(&'static str, &Located); 2] {
+    [
+        ("after", &diagnosis.located_after),
+        ("before", &diagnosis.located_before),
+    ]
+}
+
+impl Shares {
+    /// A row for each place and variable, before and after.
+    pub fn of(diagnosis: &Diagnosis) -> Self {
+        let rows = moments(diagnosis)
+            .into_iter()
+            .flat_map(|(moment, located)| {
+                located.shares.iter().map(move |share| ShareRow {
+                    moment: moment.into(),
+                    by: share.by.into(),
+                    name: share.name.clone(),
+                    share: share.share,
+                    numbers: share.parameters as i64,
+                    delta_bic: share.delta_bic,
+                    effect: share.effect.into(),
+                })
+            });
+        let mut rows: Vec<ShareRow> = rows.collect();
+        rows.sort_by(|a, b| (&a.moment, &a.by, &a.name).cmp(&(&b.moment, &b.by, &b.name)));
+        Self(rows)
+    }
+}
+
+impl Cells {
+    /// A row for each place and kind of variable, before and after.
+    pub fn of(diagnosis: &Diagnosis) -> Self {
+        let lengths = diagnosis.dimension == Dimension::Length;
+        let rows = moments(diagnosis)
+            .into_iter()
+            .flat_map(|(moment, located)| {
+                located.cells.iter().map(move |cell| CellRow {
+                    moment: moment.into(),
+                    place: cell.place.to_string(),
+                    follows: cell.follows.into(),
+                    explains_mm: lengths.then_some(1e3 * cell.explains),
+                    delta_bic: cell.delta_bic,
+                    effect: cell.effect.into(),
+                })
+            });
+        let mut rows: Vec<CellRow> = rows.collect();
+        rows.sort_by(|a, b| {
+            (&a.moment, &a.place, &a.follows).cmp(&(&b.moment, &b.place, &b.follows))
+        });
+        Self(rows)
+    }
+}
+
+impl Spectrum {
+    /// A row for each order of each joint.
+    pub fn of(diagnosis: &Diagnosis) -> Self {
+        let rows = moments(diagnosis)
+            .into_iter()
+            .flat_map(|(moment, located)| {
+                located.spectrum.iter().map(move |line| SpectrumRow {
+                    moment: moment.into(),
+                    joint: line.joint as i64 + 1,
+                    of: if line.motor { "motor" } else { "joint" }.into(),
+                    order: i64::from(line.order),
+                    share: line.share,
+                })
+            });
+        Self(rows.collect())
+    }
+}
+
+impl Forms {
+    /// The formulas of a diagnosis.
+    pub fn of(diagnosis: &Diagnosis) -> Self {
+        let (mut rows, mut last, mut form) = (Vec::new(), None, 0);
+        for one in &diagnosis.formulas {
+            form = if last == Some(one.finding) {
+                form + 1
+            } else {
+                1
+            };
+            last = Some(one.finding);
+            let declaration =
+                serde_json::to_string(&one.declaration).expect("numbers and texts serialise");
+            rows.extend(one.numbers.iter().map(|number| FormRow {
+                rank: one.finding as i64 + 1,
+                form,
+                number: number.name.clone(),
+                formula: one.declaration.law.0.join("; "),
+                price: one.price as i64,
+                folds_rms_mm: one.folds * 1e3,
+                curve_rms_mm: one.curve * 1e3,
+                without_rms_mm: one.without.map(|without| without * 1e3),
+                proposed: one.chosen,
+                value: number.value,
+                unit: number.unit.into(),
+                sigma: number.sigma.filter(|sigma| sigma.is_finite()),
+                declaration: declaration.clone(),
+            }));
+        }
+        rows.sort_by(|a, b| (a.rank, a.form, &a.number).cmp(&(b.rank, b.form, &b.number)));
+        Self(rows)
+    }
+
+    /// Formulas of a finding, each as its rows, cheapest first.
+    pub fn of_finding(&self, rank: i64) -> impl Iterator<Item = &[FormRow]> {
+        let own = move |rows: &&[FormRow]| rows.first().is_some_and(|row| row.rank == rank);
+        self.0
+            .chunk_by(|a, b| (a.rank, a.form) == (b.rank, b.form))
+            .filter(own)
+    }
+}
+
+impl Forms {
+    /// The formulas of a finding as JSON.
+    pub fn document(&self, rank: i64) -> Vec<Value> {
+        let one = |rows: &[FormRow]| {
+            let columns = "formula price proposed folds_rms_mm curve_rms_mm without_rms_mm";
+            let mut form = picked(&rows[0], columns);
+            form["numbers"] = picked_of(rows, "name=number value unit sigma");
+            form
+        };
+        self.of_finding(rank).map(one).collect()
+    }
+}
+
+/// A formula with its numbers in words: `exp(-((q - centre) / width)^2): centre = 0.71 +- 0.02 rad, c1 = 53 +- 2 arcsec`.
+pub fn formula_in_words(rows: &[FormRow]) -> String {
+    let Some(first) = rows.first() else {
+        return String::new();
+    };
+    let number = |row: &FormRow| {
+        let sigma = row
+            .sigma
+            .map(|sigma| format!(" +- {}", brief(sigma)))
+            .unwrap_or_default();
+        let unit = if row.unit == "1" || row.unit == "SI" {
+            String::new()
+        } else {
+            format!(" {}", row.unit)
+        };
+        format!("{} = {}{sigma}{unit}", row.number, brief(row.value))
+    };
+    format!(
+        "{}: {}",
+        first.formula,
+        rows.iter().map(number).collect::<Vec<_>>().join(", ")
+    )
+}
+
+/// Three digits.
+fn brief(value: f64) -> String {
+    let power = if value == 0.0 {
+        0.0
+    } else {
+        value.abs().log10().floor()
+    };
+    if (-4.0..6.0).contains(&power) {
+        format!("{value:.*}", (2.0 - power).max(0.0) as usize)
+    } else {
+        format!("{value:.2e}")
     }
 }

@@ -5,9 +5,19 @@
 
 use crate::error::Result;
 pub use crate::store::Loose;
-pub use crate::store::frame::Frame;
 use crate::store::frame::{Cell, FrameBuilder};
+pub use crate::store::frame::{Frame, TextCells};
+pub use cause_grid::{CauseGrid, CauseGridCell};
+pub use findings::{formula_in_words, is_separable_by_poses};
+pub use motion::{ArmMotion, TorqueCourse};
+pub use observability::{FitContext, UNFOLDED};
+pub use parameters::Corrected;
+pub use recording::{
+    Recording, SOURCE as SIGMA_SOURCE, columns as recording_columns, frame as recording_frame,
+};
+pub use standing::{Contradicted, Standing, Step, Unseen, Withdrawn, standing};
 use std::path::Path;
+pub use verdict::VerdictTopic;
 
 /// A table kind: Rust values that go to and from checked columns.
 pub trait Table: Sized + Send + Sync + 'static {
@@ -69,7 +79,7 @@ pub fn picked_of<'a, R: serde::Serialize + 'a>(
 macro_rules! rows {
     ($kind:literal, $(#[$doc:meta])* pub struct $table:ident of $row:ident { $( $(#[$fdoc:meta])* $field:ident: $ty:ty, )+ }) => {
         #[doc = concat!("A row of the table `", $kind, "`.")]
-        #[derive(Debug, Clone, PartialEq, serde::Serialize)]
+        #[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
         pub struct $row { $( $(#[$fdoc])* pub $field: $ty, )+ }
         $(#[$doc])*
         #[derive(Debug, Clone, Default, PartialEq)]
@@ -103,54 +113,22 @@ macro_rules! tables {
     };
 }
 
-mod body_consistency;
 mod cause_grid;
-mod contacts;
-mod convention;
-mod corrections;
-mod covariance;
 mod findings;
-mod fit;
-mod forms;
-mod friction_curves;
-mod inertials;
-mod joint_torques;
-mod located;
 mod motion;
 mod network;
 mod observability;
 mod parameters;
-mod point;
 mod prediction;
 mod recording;
 mod robot;
-mod robot_identity;
-mod split;
 mod standing;
 mod statistics;
-mod suspects;
-mod torque_changes;
-mod torque_course;
 mod torque_findings;
 mod torque_parameters;
-mod torque_verdict;
 mod verdict;
-mod verdict_sentences;
 
-pub use crate::store::frame::TextCells;
-pub use cause_grid::{CauseGrid, CauseGridCell};
-pub use findings::is_separable_by_poses;
-pub use forms::formula_in_words;
-pub use motion::ArmMotion;
-pub use observability::{FitContext, UNFOLDED};
-pub use parameters::Corrected;
-pub use recording::{
-    Recording, SOURCE as SIGMA_SOURCE, columns as recording_columns, frame as recording_frame,
-};
-pub use standing::{Contradicted, Standing, Step, Unseen, Withdrawn, standing};
-pub(crate) use suspects::slip;
-pub use torque_course::TorqueCourse;
-pub use verdict_sentences::VerdictTopic;
+pub(crate) use prediction::slip;
 
 tables! {
     acceptance => Acceptance of AcceptanceRow,

@@ -1,12 +1,14 @@
 //! The identified model: every parameter by name, with its status.
+//!
+//! The covariance of the estimated parameters, from the rows that they were fitted to.
 
-use super::{ParameterRow, Parameters};
+use super::{CovarianceRow, CovarianceTable, ParameterRow, Parameters};
 use crate::effect::{
-    AnchorShift, Effect, EffectContext, EffectStack, Form, Load, ToolOffset, arm_effect,
-    identified, names,
+    AnchorShift, Effect, EffectContext, EffectStack, Form, Load, ParameterSpec, ToolOffset,
+    arm_effect, identified, names,
 };
 use crate::error::{Error, Result};
-use crate::estimate::{CONFLICT, Fitted, Model, ParameterStatus, PriorCheck};
+use crate::estimate::{CONFLICT, Covariance, Fitted, Model, ParameterStatus, PriorCheck};
 use crate::robot::{Anchor, MeasurementSetup, RobotModel, Shape, Target};
 use crate::spatial::Pose;
 use crate::units::Unit;
@@ -131,9 +133,7 @@ impl Parameters {
                     step: step.into(),
                     remark,
                     form: form.clone(),
-                    corrects: None,
-                    robot: None,
-                    kinematics: None,
+                    ..ParameterRow::default()
                 });
             }
         }
@@ -407,6 +407,64 @@ fn against_prior(check: &PriorCheck, unit: Unit) -> Option<String> {
     }
 }
 
+impl CovarianceTable {
+    /// The covariance of a fit. Parameters that it kept are taken over from `earlier`: what was estimated on top is held to be independent.
+    pub fn of(model: &Model, fitted: &Fitted, earlier: Option<&Self>) -> Self {
+        let specs = model.stack.specs();
+        let own = fitted
+            .covariance
+            .iter()
+            .flat_map(|covariance| covariance.pairs());
+        let mut rows: Vec<CovarianceRow> = own
+            .map(|(a, b, value, correlation)| row(&specs[a], &specs[b], value, correlation))
+            .collect();
+        let new: BTreeSet<String> = rows.iter().map(|row| row.parameter.clone()).collect();
+        let known: BTreeSet<&str> = specs.iter().map(|spec| spec.name.as_str()).collect();
+        let kept = |name: &String| known.contains(name.as_str()) && !new.contains(name);
+        let before = earlier.iter().flat_map(|table| &table.0);
+        rows.extend(
+            before
+                .filter(|row| kept(&row.parameter) && kept(&row.other))
+                .cloned(),
+        );
+        rows.sort_by(|a, b| (&a.parameter, &a.other).cmp(&(&b.parameter, &b.other)));
+        Self(rows)
+    }
+
+    /// The covariance of the parameters of `model`, SI; `None` where the table is empty, or says nothing of one of its own.
+    pub fn of_model(&self, model: &Model) -> Option<Covariance> {
+        let specs = model.stack.specs();
+        let position: BTreeMap<&str, usize> = specs
+            .iter()
+            .enumerate()
+            .map(|(k, spec)| (spec.name.as_str(), k))
+            .collect();
+        let mut values = BTreeMap::new();
+        for row in &self.0 {
+            let (a, b) = (
+                *position.get(row.parameter.as_str())?,
+                *position.get(row.other.as_str())?,
+            );
+            values.insert(
+                (a.min(b), a.max(b)),
+                row.covariance * specs[a].unit.to_si(1.0) * specs[b].unit.to_si(1.0),
+            );
+        }
+        Covariance::of_pairs(&values)
+    }
+}
+
+fn row(a: &ParameterSpec, b: &ParameterSpec, value: f64, correlation: f64) -> CovarianceRow {
+    let (a, b) = if a.name <= b.name { (a, b) } else { (b, a) };
+    CovarianceRow {
+        parameter: a.name.clone(),
+        other: b.name.clone(),
+        covariance: a.unit.from_si(1.0) * b.unit.from_si(1.0) * value,
+        unit: format!("{} {}", a.unit.symbol(), b.unit.symbol()),
+        correlation,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -425,10 +483,7 @@ mod tests {
             status: "free".into(),
             step: "diagnose".into(),
             remark: remark.map(String::from),
-            form: None,
-            corrects: None,
-            robot: None,
-            kinematics: None,
+            ..ParameterRow::default()
         };
         let advice = BTreeMap::from([("joint_offset.j2".to_string(), "measure more".to_string())]);
         for remark in [None, Some("moves with another")] {

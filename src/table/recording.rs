@@ -1,14 +1,20 @@
 //! The recording: joints as commanded or logged, and what was measured of the tool. SI in Rust, mm and rad in the table.
+//!
+//! Which row serves what.
+//!
+//! Points of a recording as the numerics see them.
 
-use crate::error::Result;
+use super::Split;
+use crate::error::{Error, Result, instead};
 use crate::observation::{DeclaredColumn, KINDS};
 use crate::robot::{
-    CIRCUMSTANCES, Measurements, Memories, Named, NoiseBasis, Sequence, SigmaSource, law_columns,
+    CIRCUMSTANCES, Measurements, Memories, Named, NoiseBasis, PointReadings, START, Sequence,
+    SigmaSource, law_columns,
 };
 use crate::store::frame::{Cell, Column, Frame, FrameBuilder};
 use crate::table::Table;
-use crate::table::point::{is_whole, points};
 use crate::units::Unit;
+use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
 /// All columns, in the order in which people see them: circumstances, and what kinds of measurement own.
@@ -331,4 +337,76 @@ fn interleave(columns: &[Vec<f64>]) -> Vec<f64> {
     (0..rows)
         .flat_map(|row| columns.iter().map(move |column| column[row]))
         .collect()
+}
+
+impl Split {
+    /// Rows of the recording in any of `sets`. A set without rows, or a split of another recording, is an error.
+    pub fn rows(&self, recording: &Recording, sets: &[String]) -> Result<Vec<usize>> {
+        let same = self.0.len() == recording.rows()
+            && self
+                .0
+                .iter()
+                .zip(&recording.sequence)
+                .all(|(row, s)| row.sequence == *s);
+        if !same {
+            return Err(Error::data(
+                "table split",
+                "does not belong to this recording: their sequence numbers differ",
+            ));
+        }
+        for (k, set) in sets.iter().enumerate() {
+            if !self.0.iter().any(|row| row.set == *set) {
+                let mut names: Vec<&str> = self.0.iter().map(|row| row.set.as_str()).collect();
+                names.sort_unstable();
+                names.dedup();
+                return Err(Error::data(
+                    format!("with.on[{k}]"),
+                    format!("no row is in set `{set}`{}", instead(set, &names)),
+                ));
+            }
+        }
+        Ok((0..self.0.len())
+            .filter(|row| sets.contains(&self.0[*row].set))
+            .collect())
+    }
+}
+
+/// Whether all three axes were measured.
+pub(super) fn is_whole(point: &[f64; 3]) -> bool {
+    point.iter().all(|axis| axis.is_finite())
+}
+
+/// Points (m, NaN along axes that were not measured) with their standard deviations, the weight that one starts from where a point has
+/// none; and whether one of these was inferred.
+pub(super) fn points(
+    position: &[[f64; 3]],
+    sigma: Option<&[[f64; 3]]>,
+    source: Option<&[SigmaSource]>,
+) -> (PointReadings, bool) {
+    let there = |row: usize, axis: usize| position[row][axis].is_finite();
+    let own = |row: usize, axis: usize| sigma.map(|all| all[row][axis]).filter(|own| *own > 0.0);
+    let measured = |value: &f64| if value.is_finite() { *value } else { 0.0 };
+    let points: Vec<Vector3<f64>> = position
+        .iter()
+        .map(|point| Vector3::from_iterator(point.iter().map(measured)))
+        .collect();
+    let of = |row: usize, axis: usize| match there(row, axis) {
+        true => own(row, axis).unwrap_or_else(|| START.sigma(&points[row])),
+        false => f64::INFINITY,
+    };
+    let sigma = (0..points.len())
+        .map(|row| Vector3::from_fn(|axis, _| of(row, axis)))
+        .collect();
+    let inferred = |row: usize| {
+        let is_inferred = source.is_some_and(|all| all[row] == SigmaSource::Inferred);
+        (0..3).any(|axis| there(row, axis) && (is_inferred || own(row, axis).is_none()))
+    };
+    let is_inferred = (0..points.len()).any(inferred);
+    (
+        PointReadings {
+            position: points,
+            sigma,
+        },
+        is_inferred,
+    )
 }

@@ -1,15 +1,20 @@
 //! The robot as a table: base, joints, tool; at the zero pose in the base frame.
+//!
+//! How the controller counts its joints, as a table.
+//!
+//! Whose model a table is: the robot's name, and a hash of its kinematics, without which numbers of one arm would move another.
 
-use super::{Robot, RobotRow};
+use super::{JointConventionRow, JointConventions, Parameters, Robot, RobotRow, TorqueParameters};
 use crate::description::{
     Coupling, DeclaredInertias, InertiaMoments, JointDescription, JointKind, MassTolerance,
     RobotDescription,
 };
 use crate::error::{Error, Result};
-use crate::robot::Bound;
+use crate::robot::{Bound, CountedCoupling, JointConvention};
 use crate::units::Unit;
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
+use std::fmt::Write as _;
 
 /// A cell of the column `couplings`; `by` counts from 1.
 #[derive(Serialize, Deserialize)]
@@ -265,38 +270,7 @@ fn empty(body: usize, name: &str, kind: &str) -> RobotRow {
         body: body as i64,
         name: name.into(),
         kind: kind.into(),
-        axis_x: None,
-        axis_y: None,
-        axis_z: None,
-        point_x_mm: None,
-        point_y_mm: None,
-        point_z_mm: None,
-        lower_rad: None,
-        upper_rad: None,
-        lower_mm: None,
-        upper_mm: None,
-        reduction_ratio: None,
-        motor_constant_nm_a: None,
-        mass_kg: None,
-        centre_x_mm: None,
-        centre_y_mm: None,
-        centre_z_mm: None,
-        orientation_w: None,
-        orientation_x: None,
-        orientation_y: None,
-        orientation_z: None,
-        gravity_m_s2: None,
-        couplings: None,
-        inertia_xx_kg_m2: None,
-        inertia_xy_kg_m2: None,
-        inertia_xz_kg_m2: None,
-        inertia_yy_kg_m2: None,
-        inertia_yz_kg_m2: None,
-        inertia_zz_kg_m2: None,
-        tolerance_mass: None,
-        tolerance_centre_mm: None,
-        tolerance_inertia: None,
-        coulomb_nm: None,
+        ..RobotRow::default()
     }
 }
 
@@ -339,3 +313,204 @@ fn fault(row: &RobotRow, message: &str) -> Error {
         message,
     )
 }
+
+/// A cell of the column `coupled`.
+#[derive(Serialize, Deserialize)]
+struct CoupledCell {
+    by: usize,
+    ratio: f64,
+    /// In which order couplings are taken off.
+    order: usize,
+}
+
+impl JointConventions {
+    /// The rows of a convention; `prismatic` says which joints are.
+    pub fn of(convention: &JointConvention, prismatic: &[bool]) -> Self {
+        let cells = |joint: usize| {
+            let mine = convention
+                .coupled()
+                .iter()
+                .enumerate()
+                .filter(|(_, one)| one.joint == joint);
+            let cells: Vec<CoupledCell> = mine
+                .map(|(at, one)| CoupledCell {
+                    by: one.by + 1,
+                    ratio: one.ratio,
+                    order: at + 1,
+                })
+                .collect();
+            (!cells.is_empty())
+                .then(|| serde_json::to_string(&cells).expect("numbers and names serialise"))
+        };
+        let joints = convention
+            .sign()
+            .iter()
+            .zip(convention.zero())
+            .zip(prismatic)
+            .enumerate();
+        let row = |(joint, ((sign, zero), prismatic)): (usize, ((&f64, &f64), &bool))| {
+            JointConventionRow {
+                joint: joint as i64 + 1,
+                sign: *sign,
+                zero_rad: (!prismatic).then_some(*zero),
+                zero_mm: prismatic.then(|| Unit::Millimetre.from_si(*zero)),
+                coupled: cells(joint),
+            }
+        };
+        Self(joints.map(row).collect())
+    }
+
+    /// The convention that the rows hold; fails where a zero is missing, a sign is none, or a joint is named that is not there.
+    pub fn to_convention(&self) -> Result<JointConvention> {
+        let fault = |row: &JointConventionRow, message: String| {
+            Error::data(format!("table convention, joint {}", row.joint), message)
+        };
+        let (mut sign, mut zero, mut coupled) = (Vec::new(), Vec::new(), Vec::new());
+        for (joint, row) in self.0.iter().enumerate() {
+            if row.sign.abs() != 1.0 {
+                return Err(fault(
+                    row,
+                    format!("sign is {}; allowed: 1 and -1", row.sign),
+                ));
+            }
+            let value = row
+                .zero_rad
+                .or_else(|| row.zero_mm.map(|mm| Unit::Millimetre.to_si(mm)));
+            sign.push(row.sign);
+            zero.push(value.ok_or_else(|| fault(row, "has no zero".into()))?);
+            let cells: Vec<CoupledCell> = match &row.coupled {
+                Some(text) => serde_json::from_str(text)
+                    .map_err(|error| fault(row, format!("coupled: {error}")))?,
+                None => Vec::new(),
+            };
+            for cell in cells {
+                let by = cell
+                    .by
+                    .checked_sub(1)
+                    .filter(|by| *by < self.0.len() && *by != joint);
+                let by = by.ok_or_else(|| {
+                    fault(row, format!("coupled: there is no other joint {}", cell.by))
+                })?;
+                coupled.push((
+                    cell.order,
+                    CountedCoupling {
+                        joint,
+                        by,
+                        ratio: cell.ratio,
+                    },
+                ));
+            }
+        }
+        coupled.sort_by_key(|(order, _)| *order);
+        Ok(JointConvention::new(
+            sign,
+            zero,
+            coupled.into_iter().map(|(_, one)| one).collect(),
+        ))
+    }
+}
+
+/// Parts of a metre and of a unit vector that count: what a unit is converted by and back moves less.
+const PARTS: f64 = 1e9;
+/// Hexadecimal digits of a hash.
+const DIGITS: usize = 16;
+
+/// A robot as its tables call it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct RobotIdentity {
+    name: String,
+    kinematics: String,
+}
+
+impl RobotIdentity {
+    fn of(robot: &RobotDescription) -> Self {
+        let mut text = String::new();
+        let numbers = |vector: &[f64]| {
+            vector
+                .iter()
+                .map(|x| format!(" {}", (x * PARTS).round() as i128))
+                .collect::<String>()
+        };
+        for joint in &robot.joints {
+            // What a sliding joint's point is changes nothing.
+            let (kind, point) = match joint.kind {
+                JointKind::Revolute => ("revolute", numbers(&joint.point)),
+                JointKind::Prismatic => ("prismatic", String::new()),
+            };
+            writeln!(text, "{kind}{}{point}", numbers(&joint.axis)).expect("text grows");
+        }
+        for coupling in &robot.couplings {
+            writeln!(
+                text,
+                "coupled {} {}{}",
+                coupling.moved,
+                coupling.by,
+                numbers(&[coupling.ratio])
+            )
+            .expect("text grows");
+        }
+        let kinematics = blake3::hash(text.as_bytes()).to_hex()[..DIGITS].to_string();
+        Self {
+            name: robot.name.clone(),
+            kinematics,
+        }
+    }
+
+    /// Fails where a table of the kind `kind` with this identity is used for another robot.
+    fn must_be(&self, other: &Self, kind: &str) -> Result<()> {
+        let message = match (self.name == other.name, self.kinematics == other.kinematics) {
+            (true, true) => return Ok(()),
+            (false, true) => format!(
+                "is the model of the robot `{}`, and this robot file is of `{}`, whose axes are the same: a model belongs to one arm; where this \
+                 is that arm, give it its name in the robot file",
+                self.name, other.name
+            ),
+            (false, false) => format!(
+                "is the model of another robot, `{}`, whose axes are not those of `{}`: take the robot file that it was identified with",
+                self.name, other.name
+            ),
+            (true, false) => format!(
+                "is the model of `{}` with other axes than this robot file has: take the robot file that it was identified with, or identify anew",
+                self.name
+            ),
+        };
+        Err(Error::data(format!("table {kind}"), message))
+    }
+}
+
+/// Gives a table the robot's columns, and refuses it for another robot; tables of earlier versions lack them.
+macro_rules! of_one_robot {
+    ($table:ident, $kind:literal) => {
+        impl $table {
+            /// The same as the model of this robot.
+            pub fn of_robot(mut self, robot: &RobotDescription) -> Self {
+                let RobotIdentity { name, kinematics } = RobotIdentity::of(robot);
+                for row in &mut self.0 {
+                    (row.robot, row.kinematics) = (Some(name.clone()), Some(kinematics.clone()));
+                }
+                self
+            }
+
+            /// Whether the table says of which robot it is.
+            pub fn says_its_robot(&self) -> bool {
+                self.0
+                    .iter()
+                    .all(|row| row.robot.is_some() && row.kinematics.is_some())
+            }
+
+            /// Fails where the table says that it is the model of another robot.
+            pub fn must_be_of(&self, robot: &RobotDescription) -> Result<()> {
+                let other = RobotIdentity::of(robot);
+                let mut stated = self
+                    .0
+                    .iter()
+                    .filter_map(|row| row.robot.clone().zip(row.kinematics.clone()));
+                stated.try_for_each(|(name, kinematics)| {
+                    RobotIdentity { name, kinematics }.must_be(&other, $kind)
+                })
+            }
+        }
+    };
+}
+of_one_robot!(Parameters, "parameters");
+of_one_robot!(TorqueParameters, "torque_parameters");

@@ -1,6 +1,8 @@
 //! Position error by step and set; held-out and training rows apart.
+//!
+//! The rivals of a learned correction, as cross-validation within the training rows judged them.
 
-use super::StatisticsRow;
+use super::{Corrections, StatisticsRow};
 use crate::error::counted;
 use crate::observation::KINDS;
 use crate::robot::NoiseBasis;
@@ -28,5 +30,12 @@ impl StatisticsRow {
     /// Whether its figures of noise rest on nothing that was stated or measured again.
     pub fn is_inferred(&self) -> bool {
         self.noise_basis.as_deref() == Some(NoiseBasis::Inferred.name())
+    }
+}
+
+impl Corrections {
+    /// Root mean square error (mm) of the training rows under the rival that was kept, each row unseen; none where it could not be tried.
+    pub fn rms_mm(&self) -> Option<f64> {
+        self.0.iter().find(|row| row.chosen)?.rms_mm
     }
 }

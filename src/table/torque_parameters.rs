@@ -72,22 +72,29 @@ impl TorqueParameters {
                 .map(|variance| variance.max(0.0).sqrt());
             (name.clone(), (*unit).to_string(), sigma)
         });
-        let mut rows = Vec::with_capacity(width);
-        let known = (0..model.inertials.len()).filter(|number| model.identified[*number]);
-        for (number, (name, unit, sigma)) in known.zip(numbers.by_ref()) {
-            let link = number / INERTIAL_NUMBERS;
-            rows.push(TorqueParameterRow {
+        let row = |(name, unit, sigma): (String, String, Option<f64>),
+                   effect: &str,
+                   place: Place,
+                   value| {
+            TorqueParameterRow {
+                quantity: name.rsplit('.').next().unwrap_or_default().to_string(),
+                effect: effect.into(),
+                place: place.to_string(),
                 name,
-                effect: LINKS.into(),
-                place: Place::Links(link, link).to_string(),
-                quantity: INERTIAL_NAMES[number % INERTIAL_NUMBERS].into(),
-                value: model.inertials[number],
+                value,
                 unit,
                 sigma,
-                rms_nm: None,
-                form: None,
-                robot: None,
-                kinematics: None,
+                ..TorqueParameterRow::default()
+            }
+        };
+        let mut rows = Vec::with_capacity(width);
+        let known = (0..model.inertials.len()).filter(|number| model.identified[*number]);
+        for (number, named) in known.zip(numbers.by_ref()) {
+            let link = number / INERTIAL_NUMBERS;
+            let place = Place::Links(link, link);
+            rows.push(TorqueParameterRow {
+                quantity: INERTIAL_NAMES[number % INERTIAL_NUMBERS].into(),
+                ..row(named, LINKS, place, model.inertials[number])
             });
         }
         for term in &model.terms {
@@ -96,48 +103,17 @@ impl TorqueParameters {
                 shape: term.shape.clone(),
             });
             let form = form.map_err(|error| Error::Bug(error.to_string()))?;
-            for (value, (name, unit, sigma)) in term.coefficients.iter().zip(numbers.by_ref()) {
-                let quantity = name.rsplit('.').next().unwrap_or_default().to_string();
-                let (effect, place) = (term.effect.clone(), term.place.to_string());
-                let (rms_nm, form) = (Some(term.rms), Some(form.clone()));
-                let (robot, kinematics) = (None, None);
-                let value = *value;
+            for (value, named) in term.coefficients.iter().zip(numbers.by_ref()) {
                 rows.push(TorqueParameterRow {
-                    name,
-                    effect,
-                    place,
-                    quantity,
-                    value,
-                    unit,
-                    sigma,
-                    rms_nm,
-                    form,
-                    robot,
-                    kinematics,
+                    rms_nm: Some(term.rms),
+                    form: Some(form.clone()),
+                    ..row(named, &term.effect, term.place, *value)
                 });
             }
         }
         for term in &model.terms {
-            for (value, (name, unit, sigma)) in
-                term.shape_numbers()?.into_iter().zip(numbers.by_ref())
-            {
-                let quantity = name.rsplit('.').next().unwrap_or_default().to_string();
-                let (effect, place) = (term.effect.clone(), term.place.to_string());
-                let (rms_nm, form, robot, kinematics) = (None, None, None, None);
-                rows.push(TorqueParameterRow {
-                    name,
-                    effect,
-                    place,
-                    quantity,
-                    value,
-                    unit,
-                    sigma,
-                    rms_nm,
-                    form,
-                    robot,
-                    kinematics,
-                });
-            }
+            let shape = term.shape_numbers()?.into_iter().zip(numbers.by_ref());
+            rows.extend(shape.map(|(value, named)| row(named, &term.effect, term.place, value)));
         }
         rows.extend(seen(model));
         // The last number of the covariance is the width of a sign.
@@ -280,11 +256,7 @@ fn seen(model: &TorqueModel) -> Vec<TorqueParameterRow> {
             quantity: quantity.into(),
             value,
             unit: unit.into(),
-            sigma: None,
-            rms_nm: None,
-            form: None,
-            robot: None,
-            kinematics: None,
+            ..TorqueParameterRow::default()
         }
     };
     let whole = WHOLE.iter().zip([
@@ -438,8 +410,7 @@ mod tests {
             sigma,
             rms_nm: Some(1.0),
             form: Some("{}".into()),
-            robot: None,
-            kinematics: None,
+            ..TorqueParameterRow::default()
         };
         let all = TorqueParameters(vec![
             row(1, 6.0, Some(0.1)),

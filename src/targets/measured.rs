@@ -1,5 +1,7 @@
 //! Targets beside what was measured when the robot went there: the table of targets as it was before correction, with the measured point of
 //! each row in x, y, z.
+//!
+//! Files that appear only when they are whole.
 
 use super::Layout;
 use super::columns::TargetColumns;
@@ -7,6 +9,8 @@ use super::text::{fields, row, table};
 use crate::compensate::CommandTarget;
 use crate::error::{Error, Fault, Result};
 use nalgebra::Vector3;
+use std::fs::File;
+use std::path::{Path, PathBuf};
 
 /// A target and the point that was measured, m, tracker's frame.
 #[derive(Debug, Clone)]
@@ -54,4 +58,40 @@ pub fn measured(text: &str, layout: &Layout) -> Result<Vec<MeasuredTarget>> {
     } else {
         Err(Error::Data(faults))
     }
+}
+
+/// The error of an output file that could not be written.
+pub fn unwritten(out: &Path, error: &std::io::Error) -> Error {
+    Error::store(
+        out.display().to_string(),
+        format!("cannot be written: {error}"),
+    )
+}
+
+/// A file appears only when it is whole; a pipe or a device is written as it stands.
+pub fn whole<T>(out: &Path, fill: impl FnOnce(File) -> Result<T>) -> Result<T> {
+    if out
+        .metadata()
+        .is_ok_and(|found| !found.is_file() && !found.is_dir())
+    {
+        return fill(
+            File::options()
+                .write(true)
+                .open(out)
+                .map_err(|error| unwritten(out, &error))?,
+        );
+    }
+    let mut name = out.to_path_buf().into_os_string();
+    name.push(".part");
+    let aside = PathBuf::from(name);
+    let file = File::create(&aside).map_err(|error| unwritten(out, &error))?;
+    let result = fill(file).and_then(|filled| {
+        std::fs::rename(&aside, out)
+            .map(|()| filled)
+            .map_err(|error| unwritten(out, &error))
+    });
+    if result.is_err() {
+        let _ = std::fs::remove_file(&aside);
+    }
+    result
 }

@@ -2,18 +2,14 @@
 //! target is appended; everything else stays as it is. A target that is not reached gets no joints.
 
 mod columns;
-mod decimal;
 mod measured;
 pub mod parquet;
-mod row;
 pub mod text;
 mod trajectory;
-mod whole;
 
 pub use columns::Units;
-pub use measured::{MeasuredTarget, measured};
+pub use measured::{MeasuredTarget, measured, unwritten, whole};
 pub use trajectory::Trajectory;
-pub use whole::{unwritten, whole};
 
 use crate::description::RobotDescription;
 use crate::error::{Error, Fault, Result};

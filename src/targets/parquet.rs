@@ -1,7 +1,6 @@
 //! Targets in Parquet: batch by batch, columns of joints replaced, all others passed on, what is known of each target appended.
 
-use super::columns::TargetColumns;
-use super::row::{FarTurned, TargetRow};
+use super::columns::{FarTurned, TargetColumns, TargetRow};
 use super::{Layout, Unreached};
 use crate::compensate::{CommandTarget, CorrectedCommand, Corrector};
 use crate::description::JointKind;

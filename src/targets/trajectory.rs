@@ -1,7 +1,7 @@
 //! A planned motion as delimited text: times and joints in even steps; what it needs of torque is appended, all else stays.
 
 use super::text::{TableText, TextField, fields, parse, table};
-use super::{MOST, decimal};
+use super::{MOST, text};
 use crate::description::RobotDescription;
 use crate::dynamics::{JudgedRow, NeededTorques, PlannedMotion};
 use crate::error::{Error, Fault, Result};
@@ -190,7 +190,7 @@ impl<'a> Trajectory<'a> {
             let mut number = |value: Option<f64>| {
                 text.push(between);
                 if let Some(value) = value {
-                    decimal::push(&mut text, value, DECIMALS, point);
+                    text::push_decimal(&mut text, value, DECIMALS, point);
                 }
             };
             let allowed = |value: f64| (!judged.is_refused()).then_some(value);

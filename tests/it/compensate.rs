@@ -342,6 +342,12 @@ fn a_faulty_text_of_targets_is_refused_with_line_and_column() {
         said.contains("stdin:3: column 13: `\"` is not closed on its line"),
         "{said}"
     );
+    let (code, said, _) = run(&format!("{header}1,2,3,4,5,\"0.25\"0\n"));
+    assert_eq!(code, Some(10));
+    assert!(
+        said.contains("stdin:2: column 17: text behind the closing `\"` of a field; allowed:"),
+        "{said}"
+    );
     let (code, said, _) = run(&header.replace("q6_deg", "\"q6_deg"));
     assert_eq!(code, Some(10));
     assert!(

@@ -61,87 +61,91 @@ const EXAMPLES: &str = "Examples:
 /// Rounds after which a search ends whatever it finds.
 const ROUNDS: usize = 40;
 
-pub(super) fn main(arguments: &FleetDiagnoseArguments, command_line: &[OsString]) -> Result<()> {
-    let begun = Instant::now();
-    let store = arguments.place.store()?;
-    let fleet = Fleet::load(&arguments.place.fleet, &store)?;
-    let fresh = || surroundings(command_line);
-    let mut workshop = workshop(&fleet, &store, &fresh);
-    let by = match arguments.by {
-        By::Model => GroupColumn::Model,
-        By::Plant => GroupColumn::Plant,
-        By::Campaign => GroupColumn::Campaign,
-    };
-    let mut search = CauseSearch::new(by);
-    workshop.round = Some(search.round().clone());
-    sound(&workshop)?;
-    let chosen: Vec<usize> = (0..fleet.roster.0.len()).collect();
-    let verbosity = if arguments.quiet {
-        Verbosity::Quiet
-    } else {
-        Verbosity::Normal
-    };
-    let mut computed = 0;
-    let last = loop {
-        let mut note = note(&fleet, &arguments.place, &fresh().run_id)?;
-        note.round.clone_from(&workshop.round);
-        let slurm = arguments.engine == Engine::Slurm;
-        let workers = arguments.jobs.map_or_else(cores, usize::from);
-        let shown = if slurm { 0 } else { workers };
-        let progress = FleetProgress::new(verbosity, shown, chosen.len());
-        let records = if slurm {
-            note.engine = "slurm".into();
-            let waited = on_slurm(&workshop, &mut note, &chosen, &arguments.cluster, &progress);
-            let Some(now) = waited? else {
-                return emit("submitted the robots of one round; the same command again goes on\n");
-            };
-            computed += now;
-            records(&workshop)?
-        } else {
-            workshop.ledger.put_run(&note)?;
-            let options = local::WorkerOptions {
-                workers,
-                fail_fast: false,
-                stop: &|| workshop.ledger.cancelled(&note.run),
-            };
-            let worked = local::work(&workshop, &chosen, &options, &progress)?;
-            computed += worked.computed;
-            worked.records
+impl FleetDiagnoseArguments {
+    pub fn run(&self, command_line: &[OsString]) -> Result<()> {
+        let begun = Instant::now();
+        let store = self.place.store()?;
+        let fleet = Fleet::load(&self.place.fleet, &store)?;
+        let fresh = || surroundings(command_line);
+        let mut workshop = workshop(&fleet, &store, &fresh);
+        let by = match self.by {
+            By::Model => GroupColumn::Model,
+            By::Plant => GroupColumn::Plant,
+            By::Campaign => GroupColumn::Campaign,
         };
-        let missing = records.iter().filter(|record| record.is_none()).count();
-        if missing > 0 {
-            let message = format!("{} not computed yet; run again", counted(missing, "robot"));
-            return Err(Error::store(fleet.name(), message));
-        }
-        let goes_on = search.take(&fleet, &workshop.ledger, &records)?;
-        let found = search.so_far();
-        progress.say(&format!(
-            "round {}: {} given now{}{}",
-            search.rounds,
-            counted(found.len(), "cause"),
-            if found.is_empty() { "" } else { ": " },
-            found.join(", ")
-        ));
-        progress.finish();
-        if !goes_on || search.rounds >= ROUNDS {
-            break records;
-        }
+        let mut search = CauseSearch::new(by);
         workshop.round = Some(search.round().clone());
-    };
-    let made = causes::publish(&fleet, &workshop.ledger, &search, &last)?;
-    let seconds = begun.elapsed().as_secs_f64();
-    if arguments.json {
-        let rejected = last
-            .iter()
-            .flatten()
-            .filter(|record| record.ending != Ending::Done);
-        return emit_json(&json!({
-            "fleet": fleet.name(), "robots": last.len(), "not_asked": rejected.count(), "rounds": search.rounds, "computed": computed,
-            "wall_seconds": seconds, "findings": made.answers.findings.0, "outliers": made.answers.outliers.0,
-            "tables": made.tables.iter().map(|path| path.to_string_lossy()).collect::<Vec<_>>(), "page": made.page.to_string_lossy(),
-        }));
+        sound(&workshop)?;
+        let chosen: Vec<usize> = (0..fleet.roster.0.len()).collect();
+        let verbosity = if self.quiet {
+            Verbosity::Quiet
+        } else {
+            Verbosity::Normal
+        };
+        let mut computed = 0;
+        let last = loop {
+            let mut note = note(&fleet, &self.place, &fresh().run_id)?;
+            note.round.clone_from(&workshop.round);
+            let slurm = self.engine == Engine::Slurm;
+            let workers = self.jobs.map_or_else(cores, usize::from);
+            let shown = if slurm { 0 } else { workers };
+            let progress = FleetProgress::new(verbosity, shown, chosen.len());
+            let records = if slurm {
+                note.engine = "slurm".into();
+                let waited = on_slurm(&workshop, &mut note, &chosen, &self.cluster, &progress);
+                let Some(now) = waited? else {
+                    return emit(
+                        "submitted the robots of one round; the same command again goes on\n",
+                    );
+                };
+                computed += now;
+                records(&workshop)?
+            } else {
+                workshop.ledger.put_run(&note)?;
+                let options = local::WorkerOptions {
+                    workers,
+                    fail_fast: false,
+                    stop: &|| workshop.ledger.cancelled(&note.run),
+                };
+                let worked = local::work(&workshop, &chosen, &options, &progress)?;
+                computed += worked.computed;
+                worked.records
+            };
+            let missing = records.iter().filter(|record| record.is_none()).count();
+            if missing > 0 {
+                let message = format!("{} not computed yet; run again", counted(missing, "robot"));
+                return Err(Error::store(fleet.name(), message));
+            }
+            let goes_on = search.take(&fleet, &workshop.ledger, &records)?;
+            let found = search.so_far();
+            progress.say(&format!(
+                "round {}: {} given now{}{}",
+                search.rounds,
+                counted(found.len(), "cause"),
+                if found.is_empty() { "" } else { ": " },
+                found.join(", ")
+            ));
+            progress.finish();
+            if !goes_on || search.rounds >= ROUNDS {
+                break records;
+            }
+            workshop.round = Some(search.round().clone());
+        };
+        let made = causes::publish(&fleet, &workshop.ledger, &search, &last)?;
+        let seconds = begun.elapsed().as_secs_f64();
+        if self.json {
+            let rejected = last
+                .iter()
+                .flatten()
+                .filter(|record| record.ending != Ending::Done);
+            return emit_json(&json!({
+                "fleet": fleet.name(), "robots": last.len(), "not_asked": rejected.count(), "rounds": search.rounds, "computed": computed,
+                "wall_seconds": seconds, "findings": made.answers.findings.0, "outliers": made.answers.outliers.0,
+                "tables": made.tables.iter().map(|path| path.to_string_lossy()).collect::<Vec<_>>(), "page": made.page.to_string_lossy(),
+            }));
+        }
+        emit(&text(&made, last.len(), search.rounds, computed, seconds))
     }
-    emit(&text(&made, last.len(), search.rounds, computed, seconds))
 }
 
 /// Sentences of each kind that the terminal shows; the tables have all.

@@ -2,8 +2,6 @@
 
 mod cluster;
 mod diagnose;
-mod exec;
-mod render;
 mod run;
 mod status;
 
@@ -31,9 +29,9 @@ enum FleetVerb {
     Status(status::StatusArguments),
     Retry(run::RetryArguments),
     Cancel(status::CancelArguments),
-    Render(render::RenderArguments),
+    Render(status::RenderArguments),
     #[command(hide = true)]
-    Exec(exec::ExecArguments),
+    Exec(run::ExecArguments),
 }
 
 /// What all verbs need.
@@ -62,15 +60,17 @@ fn folder(store: &Path) -> Result<Store> {
     Store::open(store)
 }
 
-pub(super) fn main(arguments: &FleetArguments, command_line: &[OsString]) -> Result<()> {
-    match &arguments.verb {
-        FleetVerb::Run(verb) => run::main(verb, command_line),
-        FleetVerb::Diagnose(verb) => diagnose::main(verb, command_line),
-        FleetVerb::Status(verb) => status::main(verb, command_line),
-        FleetVerb::Retry(verb) => run::retry(verb, command_line),
-        FleetVerb::Cancel(verb) => status::cancel(verb),
-        FleetVerb::Render(verb) => render::main(verb, command_line),
-        FleetVerb::Exec(verb) => exec::main(verb, command_line),
+impl FleetArguments {
+    pub fn run(&self, command_line: &[OsString]) -> Result<()> {
+        match &self.verb {
+            FleetVerb::Run(verb) => verb.run(command_line),
+            FleetVerb::Diagnose(verb) => verb.run(command_line),
+            FleetVerb::Status(verb) => verb.run(command_line),
+            FleetVerb::Retry(verb) => run::retry(verb, command_line),
+            FleetVerb::Cancel(verb) => status::cancel(verb),
+            FleetVerb::Render(verb) => verb.run(command_line),
+            FleetVerb::Exec(verb) => verb.run(command_line),
+        }
     }
 }
 

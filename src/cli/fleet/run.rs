@@ -1,4 +1,6 @@
 //! `calib fleet run` and `retry`.
+//!
+//! `calib fleet exec`: the one command that a cluster runs; idempotent, and silent about names.
 
 use super::super::surroundings::{cores, surroundings};
 use super::super::{emit, emit_json};
@@ -13,6 +15,7 @@ use crate::table::picked;
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use std::ffi::OsString;
+use std::path::PathBuf;
 use std::time::Instant;
 
 /// Run the pipeline for every robot that has no record yet; a robot with bad data is reported and the others finish.
@@ -78,16 +81,12 @@ const EXAMPLES: &str = "Examples:
   calib fleet run FLEET.yaml --robot 'cell 4' --robot r7 -j 1
   calib fleet run FLEET.yaml --engine slurm --partition main --robots-per-task 4 --store /shared/store";
 
-pub(super) fn main(arguments: &FleetRunArguments, command_line: &[OsString]) -> Result<()> {
-    let store = arguments.place.store()?;
-    let fleet = Fleet::load(&arguments.place.fleet, &store)?;
-    run(
-        &fleet,
-        &store,
-        &arguments.place,
-        &arguments.how,
-        command_line,
-    )
+impl FleetRunArguments {
+    pub fn run(&self, command_line: &[OsString]) -> Result<()> {
+        let store = self.place.store()?;
+        let fleet = Fleet::load(&self.place.fleet, &store)?;
+        run(&fleet, &store, &self.place, &self.how, command_line)
+    }
 }
 
 pub(super) fn retry(arguments: &RetryArguments, command_line: &[OsString]) -> Result<()> {
@@ -319,4 +318,76 @@ fn document(
 /// The ledger of a fleet whose robots need not be known.
 pub(super) fn ledger<'a>(store: &'a Store, name: &str) -> Ledger<'a> {
     Ledger::new(store, name)
+}
+
+/// Compute the robots of one task of a run.
+#[derive(Args)]
+pub(super) struct ExecArguments {
+    #[arg(long, value_name = "DIR")]
+    store: PathBuf,
+    #[arg(long, value_name = "NAME")]
+    fleet: String,
+    #[arg(long, value_name = "ID")]
+    run: String,
+    #[arg(long, value_name = "N")]
+    task: usize,
+}
+
+impl ExecArguments {
+    pub fn run(&self, command_line: &[OsString]) -> Result<()> {
+        let store = super::folder(&self.store)?;
+        let ledger = ledger(&store, &self.fleet);
+        let note = ledger.run(Some(&self.run))?;
+        let note = note.ok_or_else(|| {
+            Error::store(
+                &self.run,
+                "no such run in the store, or not yet visible here",
+            )
+        })?;
+        let tasks = note.tasks.len();
+        let robots = note.tasks.get(self.task).ok_or_else(|| {
+            Error::spec("--task", format!("the run has {}", counted(tasks, "task")))
+        })?;
+        let fleet = Fleet::load(&note.file, &store)?;
+        // By name: the roster may have grown since.
+        let names = robots
+            .iter()
+            .filter_map(|index| note.robots.get(*index))
+            .map(|member| member.name.as_str());
+        let chosen: Vec<usize> = names
+            .filter_map(|name| fleet.roster.position(name))
+            .collect();
+        let fresh = || surroundings(command_line);
+        let mut workshop = workshop(&fleet, &store, &fresh);
+        let variable = |name: &str| std::env::var(name).ok();
+        workshop.name = variable("SLURMD_NODENAME").unwrap_or(workshop.name);
+        let task = variable("SLURM_ARRAY_JOB_ID").zip(variable("SLURM_ARRAY_TASK_ID"));
+        workshop.round.clone_from(&note.round);
+        workshop.log = task.map(|(job, task)| format!("{job}_{task}.out"));
+        let progress = FleetProgress::new(Verbosity::Normal, 1, chosen.len());
+        let stop = || workshop.ledger.cancelled(&note.run);
+        let worked = local::work(
+            &workshop,
+            &chosen,
+            &local::WorkerOptions {
+                workers: 1,
+                fail_fast: false,
+                stop: &stop,
+            },
+            &progress,
+        )?;
+        let recorded = worked.records.iter().flatten().count();
+        emit(&format!(
+            "{recorded} of {} recorded, {} computed here\n",
+            counted(robots.len(), "robot"),
+            worked.computed
+        ))?;
+        if recorded < robots.len() {
+            return Err(Error::store(
+                &self.run,
+                "not all robots of this task are recorded",
+            ));
+        }
+        Ok(())
+    }
 }

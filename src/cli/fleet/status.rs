@@ -1,12 +1,15 @@
 //! `calib fleet status` and `cancel`.
+//!
+//! `calib fleet render`: the job files of a run, to submit by hand.
 
 use super::super::surroundings::surroundings;
 use super::super::{emit, emit_json};
-use super::run::{count, ledger};
+use super::cluster::ClusterArguments;
+use super::run::{self, count, ledger};
 use super::{FleetLocation, records, workshop};
 use crate::error::{Error, Result, counted, visible};
-use crate::fleet::{Ending, Fleet, FleetFile, RobotRecord, slurm};
-use clap::Args;
+use crate::fleet::{Ending, Fleet, FleetFile, RobotRecord, cluster, slurm};
+use clap::{Args, ValueEnum};
 use serde_json::json;
 use std::ffi::OsString;
 
@@ -33,60 +36,62 @@ pub(super) struct CancelArguments {
     place: FleetLocation,
 }
 
-pub(super) fn main(arguments: &StatusArguments, command_line: &[OsString]) -> Result<()> {
-    let store = arguments.place.store()?;
-    let fleet = Fleet::load(&arguments.place.fleet, &store)?;
-    let fresh = || surroundings(command_line);
-    let workshop = workshop(&fleet, &store, &fresh);
-    if let Some(name) = &arguments.robot {
-        let position = fleet
-            .roster
-            .position(name)
-            .ok_or_else(|| Error::spec("--robot", format!("no robot {name:?} in the fleet")))?;
-        let record = workshop.record(&fleet.roster.0[position])?;
-        return match (record, arguments.json) {
-            (Some(record), true) => emit_json(&json!(record)),
-            (Some(record), false) => emit(&detail(&record, &store, fleet.name())),
-            (None, true) => emit_json(&json!({ "robot": name, "ending": "missing" })),
-            (None, false) => emit(&format!(
-                "{}: not computed yet for its settings and data as they are\n",
-                visible(name)
-            )),
-        };
-    }
-    let records = records(&workshop)?;
-    let missing = records.iter().filter(|record| record.is_none()).count();
-    let [done, rejected, failed] =
-        [Ending::Done, Ending::Rejected, Ending::Failed].map(|ending| count(&records, ending));
-    if arguments.json {
-        let robots = fleet.roster.0.iter().zip(&records).map(|(robot, record)| {
+impl StatusArguments {
+    pub fn run(&self, command_line: &[OsString]) -> Result<()> {
+        let store = self.place.store()?;
+        let fleet = Fleet::load(&self.place.fleet, &store)?;
+        let fresh = || surroundings(command_line);
+        let workshop = workshop(&fleet, &store, &fresh);
+        if let Some(name) = &self.robot {
+            let position = fleet
+                .roster
+                .position(name)
+                .ok_or_else(|| Error::spec("--robot", format!("no robot {name:?} in the fleet")))?;
+            let record = workshop.record(&fleet.roster.0[position])?;
+            return match (record, self.json) {
+                (Some(record), true) => emit_json(&json!(record)),
+                (Some(record), false) => emit(&detail(&record, &store, fleet.name())),
+                (None, true) => emit_json(&json!({ "robot": name, "ending": "missing" })),
+                (None, false) => emit(&format!(
+                    "{}: not computed yet for its settings and data as they are\n",
+                    visible(name)
+                )),
+            };
+        }
+        let records = records(&workshop)?;
+        let missing = records.iter().filter(|record| record.is_none()).count();
+        let [done, rejected, failed] =
+            [Ending::Done, Ending::Rejected, Ending::Failed].map(|ending| count(&records, ending));
+        if self.json {
+            let robots = fleet.roster.0.iter().zip(&records).map(|(robot, record)| {
             let ending = record.as_ref().map_or("missing", |record| record.ending.name());
             json!({ "robot": robot.name, "status": ending, "reason": record.as_ref().and_then(|record| record.reason.clone()) })
         });
-        let robots: Vec<_> = robots.collect();
-        return emit_json(&json!({
-            "fleet": fleet.name(), "done": done, "rejected": rejected, "failed": failed, "missing": missing, "robots": robots,
-        }));
-    }
-    let mut text = String::new();
-    for record in records
-        .iter()
-        .flatten()
-        .filter(|record| record.ending != Ending::Done)
-    {
+            let robots: Vec<_> = robots.collect();
+            return emit_json(&json!({
+                "fleet": fleet.name(), "done": done, "rejected": rejected, "failed": failed, "missing": missing, "robots": robots,
+            }));
+        }
+        let mut text = String::new();
+        for record in records
+            .iter()
+            .flatten()
+            .filter(|record| record.ending != Ending::Done)
+        {
+            text.push_str(&format!(
+                "{}: {}: {}\n",
+                visible(&record.robot),
+                record.ending.name(),
+                first_line(record)
+            ));
+        }
         text.push_str(&format!(
-            "{}: {}: {}\n",
-            visible(&record.robot),
-            record.ending.name(),
-            first_line(record)
-        ));
-    }
-    text.push_str(&format!(
         "fleet {}: {done} of {} done, {rejected} rejected, {failed} failed, {missing} not computed yet\n",
         fleet.name(),
         counted(records.len(), "robot")
     ));
-    emit(&text)
+        emit(&text)
+    }
 }
 
 fn first_line(record: &RobotRecord) -> String {
@@ -174,4 +179,84 @@ pub(super) fn cancel(arguments: &CancelArguments) -> Result<()> {
         "run {} stops after the robots in hand; `calib fleet run` goes on where it stood\n",
         note.run
     ))
+}
+
+/// Print the job files for the robots that have no record yet, and submit nothing.
+#[derive(Args)]
+#[command(after_help = "Examples:
+  calib fleet render FLEET.yaml --engine slurm --store /shared/store > jobs.sh
+  calib fleet render FLEET.yaml --engine k8s --store /store --image calib:0.2 --claim robots > job.yaml")]
+pub(super) struct RenderArguments {
+    #[command(flatten)]
+    place: FleetLocation,
+    #[arg(long, value_enum)]
+    engine: Scheduler,
+    #[command(flatten)]
+    cluster: ClusterArguments,
+    /// Container image of calib
+    #[arg(
+        long,
+        value_name = "IMAGE",
+        default_value = "calib",
+        help_heading = "Cluster"
+    )]
+    image: String,
+    /// Persistent volume claim that holds the store and the recordings
+    #[arg(
+        long,
+        value_name = "NAME",
+        default_value = "calib",
+        help_heading = "Cluster"
+    )]
+    claim: String,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Scheduler {
+    /// Scripts for sbatch
+    Slurm,
+    /// An Indexed Job of Kubernetes (experimental)
+    K8s,
+}
+
+impl RenderArguments {
+    pub fn run(&self, command_line: &[OsString]) -> Result<()> {
+        let store = self.place.store()?;
+        let fleet = Fleet::load(&self.place.fleet, &store)?;
+        let fresh = || surroundings(command_line);
+        let workshop = workshop(&fleet, &store, &fresh);
+        let mut note = run::note(&fleet, &self.place, &fresh().run_id)?;
+        let missing: Vec<usize> = (0..)
+            .zip(records(&workshop)?)
+            .filter(|(_, record)| record.is_none())
+            .map(|(k, _)| k)
+            .collect();
+        if missing.is_empty() {
+            return Err(Error::spec(
+                fleet.name(),
+                "every robot is recorded: nothing to submit",
+            ));
+        }
+        note.tasks = self.cluster.tasks(&missing);
+        let options = self.cluster.options(store.root())?;
+        let text: String = match self.engine {
+            Scheduler::Slurm => {
+                note.engine = "slurm".into();
+                cluster::slurm(&note, &options)?
+                    .into_iter()
+                    .map(|script| script.text)
+                    .collect()
+            }
+            Scheduler::K8s => {
+                note.engine = "k8s".into();
+                cluster::kubernetes(&note, &options, &self.image, &self.claim)
+            }
+        };
+        // The tasks find their robots there.
+        workshop.ledger.put_run(&note)?;
+        let folder = cluster::logs(&options.store, fleet.name());
+        std::fs::create_dir_all(&folder)
+            .map_err(|error| Error::store(folder.display().to_string(), error.to_string()))?;
+        emit(&text)
+    }
 }

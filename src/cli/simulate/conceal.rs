@@ -133,24 +133,26 @@ impl ConcealArguments {
     }
 }
 
-pub(super) fn main(arguments: &ConcealArguments) -> Result<()> {
-    let design = design(arguments)?;
-    vacant(&arguments.out)?;
-    let rows = conceal(&arguments.out, &design, arguments.threads())?;
-    let row = if arguments.dynamics { "row" } else { "point" };
-    let (recordings, seal) = (arguments.out.join(RECORDINGS), arguments.out.join(SEAL));
-    if arguments.json {
-        return emit_json(
-            &json!({ "cases": design.cases(), (format!("{row}s")): rows, "recordings": recordings, "seal": seal }),
-        );
+impl ConcealArguments {
+    pub fn run(&self) -> Result<()> {
+        let design = design(self)?;
+        vacant(&self.out)?;
+        let rows = conceal(&self.out, &design, self.threads())?;
+        let row = if self.dynamics { "row" } else { "point" };
+        let (recordings, seal) = (self.out.join(RECORDINGS), self.out.join(SEAL));
+        if self.json {
+            return emit_json(
+                &json!({ "cases": design.cases(), (format!("{row}s")): rows, "recordings": recordings, "seal": seal }),
+            );
+        }
+        emit(&format!(
+            "{}, {}: {}\nseal: {}\n",
+            counted(design.cases(), "recording"),
+            counted(rows, row),
+            recordings.display(),
+            seal.display()
+        ))
     }
-    emit(&format!(
-        "{}, {}: {}\nseal: {}\n",
-        counted(design.cases(), "recording"),
-        counted(rows, row),
-        recordings.display(),
-        seal.display()
-    ))
 }
 
 /// The design that the options state; fails with every fault of them.

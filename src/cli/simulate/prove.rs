@@ -1,11 +1,15 @@
 //! `calib simulate prove`: conceals, has every recording diagnosed by a process that sees nothing else, and reveals.
+//!
+//! `calib simulate reveal`: checks the seal, opens the truths, and marks what a diagnosis said.
 
 use super::super::surroundings::program;
 use super::super::{emit, emit_json};
 use super::conceal::{self, ConcealArguments};
 use crate::error::{Error, Result, counted};
 use crate::estimate::threads::in_order;
-use crate::proof::{self, ConcealedSet, LEFT_OUT, RECORDINGS, SEAL, SEALED, Seal};
+use crate::proof::{
+    self, ConcealedSet, LEFT_OUT, RECORDINGS, SEAL, SEALED, Seal, board, write_scoreboard,
+};
 use clap::Args;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -51,81 +55,83 @@ fn pipeline(arguments: &ProveArguments, set: &ConcealedSet) -> PathBuf {
     arguments.pipeline.clone().unwrap_or_else(|| usual.into())
 }
 
-pub(super) fn main(arguments: &ProveArguments) -> Result<()> {
-    let (design, folder) = (conceal::design(&arguments.conceal)?, &arguments.conceal.out);
-    let pipeline = pipeline(arguments, &design);
-    if !pipeline.is_file() {
-        return Err(Error::spec(
-            "--pipeline",
-            format!("no such file: {}", pipeline.display()),
-        ));
-    }
-    if folder.join(SEAL).is_file() {
-        if !Seal::read(folder)?.is_of(&design) {
+impl ProveArguments {
+    pub fn run(&self) -> Result<()> {
+        let (design, folder) = (conceal::design(&self.conceal)?, &self.conceal.out);
+        let pipeline = pipeline(self, &design);
+        if !pipeline.is_file() {
             return Err(Error::spec(
-                folder.display().to_string(),
-                "holds a set made with other options; name a new folder, or give the same options",
+                "--pipeline",
+                format!("no such file: {}", pipeline.display()),
             ));
         }
-    } else {
-        proof::vacant(folder)?;
-        proof::conceal(folder, &design, arguments.conceal.threads())?;
-    }
-    // Before anything is diagnosed, and again before anything is revealed: a diagnosis must not have touched the truth.
-    let names: Vec<String> = Seal::check(folder)?
-        .iter()
-        .filter_map(|name| case(name))
-        .collect();
-    let store = |error: std::io::Error| {
-        Error::store(
-            folder.join(VERDICTS).display().to_string(),
-            error.to_string(),
-        )
-    };
-    let verdicts = folder.join(VERDICTS);
-    std::fs::create_dir_all(&verdicts).map_err(store)?;
-    let program = program().map_err(store)?;
-    let blind = BlindDiagnosis {
-        program: &program,
-        pipeline: &pipeline,
-        folder,
-    };
-    let told = in_order(
-        arguments.conceal.threads(),
-        names.len(),
-        |number| -> Result<()> {
-            let name = &names[number];
-            let tell = |said: &str| {
-                if !arguments.quiet {
-                    let _ = writeln!(std::io::stderr(), "{name}: {said}");
-                }
-            };
-            tell(&blind.diagnose(name, &verdicts, None)?);
-            let left_out = arguments
-                .left_out
-                .then(|| proof::single_cause(&folder.join(SEALED).join(format!("{name}.json"))));
-            if let Some(cause) = left_out.transpose()?.flatten() {
-                let verdicts = verdicts.join(LEFT_OUT);
-                std::fs::create_dir_all(&verdicts).map_err(store)?;
-                tell(&format!(
-                    "without its cause: {}",
-                    blind.diagnose(name, &verdicts, Some(&cause))?
+        if folder.join(SEAL).is_file() {
+            if !Seal::read(folder)?.is_of(&design) {
+                return Err(Error::spec(
+                    folder.display().to_string(),
+                    "holds a set made with other options; name a new folder, or give the same options",
                 ));
             }
-            Ok(())
-        },
-    );
-    told.into_iter().collect::<Result<()>>()?;
-    let sealed = Seal::check(folder)?;
-    let board = proof::board(folder, &sealed, &verdicts)?;
-    if arguments.conceal.json {
-        return emit_json(&board.document());
+        } else {
+            proof::vacant(folder)?;
+            proof::conceal(folder, &design, self.conceal.threads())?;
+        }
+        // Before anything is diagnosed, and again before anything is revealed: a diagnosis must not have touched the truth.
+        let names: Vec<String> = Seal::check(folder)?
+            .iter()
+            .filter_map(|name| case(name))
+            .collect();
+        let store = |error: std::io::Error| {
+            Error::store(
+                folder.join(VERDICTS).display().to_string(),
+                error.to_string(),
+            )
+        };
+        let verdicts = folder.join(VERDICTS);
+        std::fs::create_dir_all(&verdicts).map_err(store)?;
+        let program = program().map_err(store)?;
+        let blind = BlindDiagnosis {
+            program: &program,
+            pipeline: &pipeline,
+            folder,
+        };
+        let diagnosed = in_order(
+            self.conceal.threads(),
+            names.len(),
+            |number| -> Result<()> {
+                let name = &names[number];
+                let tell = |said: &str| {
+                    if !self.quiet {
+                        let _ = writeln!(std::io::stderr(), "{name}: {said}");
+                    }
+                };
+                tell(&blind.diagnose(name, &verdicts, None)?);
+                let left_out = self.left_out.then(|| {
+                    proof::single_cause(&folder.join(SEALED).join(format!("{name}.json")))
+                });
+                if let Some(cause) = left_out.transpose()?.flatten() {
+                    let verdicts = verdicts.join(LEFT_OUT);
+                    std::fs::create_dir_all(&verdicts).map_err(store)?;
+                    tell(&format!(
+                        "without its cause: {}",
+                        blind.diagnose(name, &verdicts, Some(&cause))?
+                    ));
+                }
+                Ok(())
+            },
+        );
+        diagnosed.into_iter().collect::<Result<()>>()?;
+        let sealed = Seal::check(folder)?;
+        let board = proof::board(folder, &sealed, &verdicts)?;
+        if self.conceal.json {
+            return emit_json(&board.document());
+        }
+        emit(&format!(
+            "the seal holds: {}, all as they were\n{}",
+            counted(sealed.len(), "file"),
+            board.text()
+        ))
     }
-    emit(&format!(
-        "the seal holds: {}, all as they were\n{}",
-        counted(sealed.len(), "file"),
-        board.text()
-    ))
 }
 
 /// The case that a sealed truth is of.
@@ -191,5 +197,47 @@ impl BlindDiagnosis<'_> {
             .and_then(|answer| answer.get("verdict")?.as_str())
             .unwrap_or("a verdict that is no JSON");
         Ok(said.chars().filter(|c| !c.is_control()).collect())
+    }
+}
+
+/// Open the sealed truths and mark diagnoses.
+///
+/// Every file of DIR is held against seal.json first; one changed byte and nothing is revealed. VDIR/CASE.json is what
+/// `calib diagnose --json` printed for DIR/recordings/CASE. L is the squared displacement that geometry cannot absorb over the
+/// noise's variance: from about 15 an effect is detectable, from 50 it should be named.
+#[derive(Args)]
+#[command(after_help = "Examples:
+  calib simulate reveal blind --verdicts blind/verdicts
+  calib simulate reveal blind --verdicts blind/verdicts --out scoreboard.parquet --json > score.json")]
+pub(super) struct RevealArguments {
+    /// The folder that `conceal` made
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+    /// The folder of verdicts, CASE.json each
+    #[arg(long, value_name = "VDIR")]
+    verdicts: PathBuf,
+    /// Writes one row per concealed effect as Parquet (table `scoreboard`)
+    #[arg(long, short, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Prints one JSON document on stdout
+    #[arg(long)]
+    json: bool,
+}
+
+impl RevealArguments {
+    pub fn run(&self) -> Result<()> {
+        let sealed = Seal::check(&self.folder)?;
+        let board = board(&self.folder, &sealed, &self.verdicts)?;
+        if let Some(path) = &self.out {
+            write_scoreboard(path, &board)?;
+        }
+        if self.json {
+            return emit_json(&board.document());
+        }
+        emit(&format!(
+            "the seal holds: {}, all as they were\n{}",
+            counted(sealed.len(), "file"),
+            board.text()
+        ))
     }
 }

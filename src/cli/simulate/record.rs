@@ -44,78 +44,79 @@ pub(super) struct RecordArguments {
     quiet: bool,
 }
 
-pub(super) fn main(arguments: &RecordArguments, command_line: &[OsString]) -> Result<()> {
-    let place = arguments.pipeline.display().to_string();
-    let plan = Plan::load(&arguments.pipeline, &arguments.set, STAGES)?;
-    let stage = plan
-        .stages
-        .iter()
-        .position(|stage| stage.entry.name == Simulate::NAME);
-    let Some(stage) = stage else {
-        return Err(Error::spec(place, "has no stage `simulate`"));
-    };
-    vacant(&arguments.out)?;
-    let plan = plan.needed_for(stage);
-    let moves = plan
-        .stages
-        .last()
-        .is_some_and(|stage| stage.stage.settings().get("motion").is_some());
-    let store = open_store(arguments.store.as_deref())?;
-    let verbosity = if arguments.quiet {
-        Verbosity::Quiet
-    } else {
-        Verbosity::Normal
-    };
-    let progress = Progress::new(
-        verbosity,
-        plan.stages
+impl RecordArguments {
+    pub fn run(&self, command_line: &[OsString]) -> Result<()> {
+        let place = self.pipeline.display().to_string();
+        let plan = Plan::load(&self.pipeline, &self.set, STAGES)?;
+        let stage = plan
+            .stages
             .iter()
-            .map(|stage| stage.id.len())
-            .max()
-            .unwrap_or(0),
-    );
-    let options = RunOptions {
-        selection: Selection::default(),
-        jobs: cores(),
-        purpose: Purpose::Simulate,
-    };
-    let result = run(
-        &plan,
-        &store,
-        &options,
-        &surroundings(command_line),
-        &progress,
-    );
-    progress.finish();
-    let outcome = result?;
-    let robot = table::<Robot>(&outcome, &store)?.to_description()?;
-    let (recording, truth): (Recording, Truth) =
-        (table(&outcome, &store)?, table(&outcome, &store)?);
-    let rows = recording.rows();
-    let files =
-        recorded(&robot, recording, &truth, moves).map_err(|fault| Error::spec(&place, fault))?;
-    let fault = |error: std::io::Error| {
-        Error::store(arguments.out.display().to_string(), error.to_string())
-    };
-    std::fs::create_dir_all(&arguments.out).map_err(fault)?;
-    for (name, text) in files {
-        let file = arguments.out.join(name);
-        file.parent()
-            .map_or(Ok(()), std::fs::create_dir_all)
-            .map_err(fault)?;
-        std::fs::write(file, text).map_err(fault)?;
-    }
-    if arguments.json {
-        return emit_json(
-            &json!({ "folder": arguments.out.to_string_lossy(), "points": rows, "true_numbers": truth.0.len() }),
+            .position(|stage| stage.entry.name == Simulate::NAME);
+        let Some(stage) = stage else {
+            return Err(Error::spec(place, "has no stage `simulate`"));
+        };
+        vacant(&self.out)?;
+        let plan = plan.needed_for(stage);
+        let moves = plan
+            .stages
+            .last()
+            .is_some_and(|stage| stage.stage.settings().get("motion").is_some());
+        let store = open_store(self.store.as_deref())?;
+        let verbosity = if self.quiet {
+            Verbosity::Quiet
+        } else {
+            Verbosity::Normal
+        };
+        let progress = Progress::new(
+            verbosity,
+            plan.stages
+                .iter()
+                .map(|stage| stage.id.len())
+                .max()
+                .unwrap_or(0),
         );
+        let options = RunOptions {
+            selection: Selection::default(),
+            jobs: cores(),
+            purpose: Purpose::Simulate,
+        };
+        let result = run(
+            &plan,
+            &store,
+            &options,
+            &surroundings(command_line),
+            &progress,
+        );
+        progress.finish();
+        let outcome = result?;
+        let robot = table::<Robot>(&outcome, &store)?.to_description()?;
+        let (recording, truth): (Recording, Truth) =
+            (table(&outcome, &store)?, table(&outcome, &store)?);
+        let rows = recording.rows();
+        let files = recorded(&robot, recording, &truth, moves)
+            .map_err(|fault| Error::spec(&place, fault))?;
+        let fault =
+            |error: std::io::Error| Error::store(self.out.display().to_string(), error.to_string());
+        std::fs::create_dir_all(&self.out).map_err(fault)?;
+        for (name, text) in files {
+            let file = self.out.join(name);
+            file.parent()
+                .map_or(Ok(()), std::fs::create_dir_all)
+                .map_err(fault)?;
+            std::fs::write(file, text).map_err(fault)?;
+        }
+        if self.json {
+            return emit_json(
+                &json!({ "folder": self.out.to_string_lossy(), "points": rows, "true_numbers": truth.0.len() }),
+            );
+        }
+        emit(&format!(
+            "{}, {}: {}\n",
+            counted(rows, "point"),
+            counted(truth.0.len(), "true number"),
+            self.out.display()
+        ))
     }
-    emit(&format!(
-        "{}, {}: {}\n",
-        counted(rows, "point"),
-        counted(truth.0.len(), "true number"),
-        arguments.out.display()
-    ))
 }
 
 fn table<T: Table>(outcome: &CompletedRun, store: &Store) -> Result<T> {

@@ -66,6 +66,7 @@ pub(super) fn numbers(term: &Term, robot: &RobotModel) -> Vec<NumberSpec> {
         Motion::Links { .. } => each(&["c"], Unit::One, WIDE),
         Motion::Slide { along: true, .. } => each(&["s"], Unit::Millimetre, WIDE),
         Motion::Slide { .. } => each(&["u", "v"], Unit::Millimetre, WIDE),
+        Motion::Coupled { .. } => each(&["c"], term.motion().unit(robot), WIDE),
         motion => {
             let numbers = counted
                 .clone()

@@ -1,8 +1,7 @@
 //! `{[TYPE:] NAME value, ...}`: the fields of a target, each known, named once, and one number.
 
-use super::super::token::{ProgramText, Token, TokenKind};
+use super::super::token::{ProgramText, Token, TokenKind, arguments};
 use super::super::{Gathered, Literal, PostureStatement, TargetKind, quoted};
-use super::line::opens;
 use std::ops::Range;
 
 const AXES: [&str; 6] = ["A1", "A2", "A3", "A4", "A5", "A6"];
@@ -80,13 +79,7 @@ impl<'t> Aggregate<'t> {
         {
             (prefix, inner) = (Some(source.upper(name)), rest);
         }
-        let mut depth = 0;
-        let fields = inner
-            .split(|token| {
-                depth += opens(token);
-                depth == 0 && token.is(b',')
-            })
-            .collect();
+        let fields = arguments(inner).collect();
         Self {
             source,
             tokens,

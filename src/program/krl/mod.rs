@@ -4,23 +4,22 @@
 //! in the same file, else by the motion. FRAME is a target only as operand of a motion. Variables of the system (`$BASE`, `$H_POS`),
 //! relative motions (`LIN_REL`) and motions of external axes (`ASYPTP`) are left alone. What the geometric operator `:` joins is no
 //! absolute pose: such targets are refused, and so is every aggregate that may be a target and of which the file does not tell.
-
-mod aggregate;
-mod line;
-mod listed;
-mod reached;
-mod steps;
-mod system;
+//!
+//! The positions by axes that a file declares, by their names.
 
 use super::settle::{Reached, Words, settle};
-use super::token::{ProgramText, Token, TokenKind, tokens};
-use super::{Companion, DEPTH, Gathered, Language, quoted};
+use super::token::{ProgramText, Token, TokenKind, brackets_match, closing, lines, tokens};
+use super::{Companion, Declared, Gathered, Language, quoted};
 use aggregate::{Aggregate, Type};
-use line::{closing, declared, member, opens, structure, variable};
-pub(super) use listed::listed;
+use line::{declared, member, structure, variable};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use system::SystemData;
+
+mod aggregate;
+mod line;
+mod reached;
+mod system;
 
 /// Motions, and how many positions each has.
 const MOTIONS: [(&str, usize); 7] = [
@@ -100,14 +99,6 @@ pub(super) fn read(bytes: &[u8], companions: &[Companion]) -> Gathered {
     } = reader;
     in_force(source, &lines, companions, &names, &mut found);
     found
-}
-
-/// Statements, one a line.
-fn lines(tokens: &[Token]) -> Vec<&[Token]> {
-    tokens
-        .split(|token| token.sort == TokenKind::LineEnd)
-        .filter(|line| !line.is_empty())
-        .collect()
 }
 
 /// Gives targets their frames, tools and loads, by all files of the program.
@@ -195,24 +186,7 @@ impl Reader<'_> {
     }
 
     fn braces_match(&mut self, line: &[Token]) -> bool {
-        let mut open: Vec<&Token> = Vec::new();
-        let before = self.found.faults.len();
-        for token in line {
-            if token.is(b'{') {
-                open.push(token);
-                if open.len() == DEPTH {
-                    self.found
-                        .fault(token.span.start, "brackets are nested too deep");
-                }
-            } else if token.is(b'}') && open.pop().is_none() {
-                self.found.fault(token.span.start, "`}` without `{`");
-            }
-        }
-        for token in open {
-            self.found
-                .fault(token.span.start, "`{` without `}` on its line");
-        }
-        self.found.faults.len() == before
+        brackets_match(line, &[(b'{', b'}')], "on its line", &mut self.found)
     }
 
     fn motion(&mut self, line: &[Token], positions: usize) {
@@ -229,7 +203,7 @@ impl Reader<'_> {
         while k < end {
             let token = &line[k];
             if !token.is(b'{') {
-                depth += opens(token);
+                depth += token.opens();
                 if depth == 0 && token.is(b',') {
                     (operand, begins) = (operand + 1, true);
                 } else {
@@ -511,5 +485,60 @@ impl Reader<'_> {
                 ),
             );
         }
+    }
+}
+
+pub(super) fn listed(bytes: &[u8]) -> Declared {
+    let mut found = Gathered::default();
+    let source = ProgramText {
+        bytes,
+        language: Language::Krl,
+    };
+    let tokens = tokens(source, &mut found);
+    let mut reader = Reader {
+        source,
+        types: BTreeMap::new(),
+        structures: BTreeSet::new(),
+        names: Vec::new(),
+        found,
+    };
+    let (mut names, mut poses) = (Vec::new(), 0);
+    for line in lines(&tokens) {
+        let declares = declared(source, line).map(|(kind, _)| kind);
+        if !line.iter().any(|token| token.is(b'{')) || !reader.braces_match(line) {
+            continue;
+        }
+        let mut k = 0;
+        while let Some(open) = line[k..]
+            .iter()
+            .position(|token| token.is(b'{'))
+            .map(|at| k + at)
+        {
+            let close = closing(line, open);
+            k = close + 1;
+            let aggregate = Aggregate::new(source, &line[open..k]);
+            let kind = aggregate.prefix().or_else(|| declares.clone());
+            let (Some(kind), Some((name, None))) = (
+                kind.as_deref().and_then(Type::of),
+                variable(source, &line[..open]),
+            ) else {
+                continue;
+            };
+            if !kind.is_of_axes() {
+                poses += 1;
+                continue;
+            }
+            let before = reader.found.literals.len();
+            aggregate.take(kind, &mut reader.found);
+            names.extend(std::iter::repeat_n(
+                name,
+                reader.found.literals.len() - before,
+            ));
+        }
+    }
+    Declared {
+        found: reader.found,
+        names,
+        poses,
     }
 }

@@ -1,12 +1,11 @@
 //! What is in force where a file of KRL moves to its targets.
 
 use super::super::flow::{Flow, FlowStep};
-use super::super::force::InForce;
+use super::super::literal::InForce;
 use super::super::settle::Reached;
-use super::super::token::{ProgramText, Token, TokenKind};
+use super::super::token::{ProgramText, Token, TokenKind, arguments};
 use super::MOTIONS;
-use super::line::{declared, opens};
-use super::steps::{step, steps};
+use super::line::{declared, step, steps};
 use super::system::{SystemData, SystemState};
 
 /// Adds the motions of a file; `file`: how people find it, where it is not the one that is corrected.
@@ -91,11 +90,7 @@ fn operands<'t>(source: ProgramText, line: &'t [Token]) -> impl Iterator<Item = 
         .iter()
         .position(|token| source.is_word(token, &["WITH"]))
         .unwrap_or(line.len());
-    let mut depth = 0;
-    line[1..end].split(move |token| {
-        depth += opens(token);
-        depth == 0 && token.is(b',')
-    })
+    arguments(&line[1..end])
 }
 
 /// Names that a line uses otherwise than as the position of a motion: where what they hold goes is not followed.

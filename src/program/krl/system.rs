@@ -5,11 +5,10 @@
 //! form names: `FDAT_ACT=FP1` with `BAS(#PTP_PARAMS, ..)`, or `WITH $BASE=SBASE(FP1.BASE_NO), $TOOL=STOOL2(FP1)` for one motion.
 
 use super::super::flow::{FlowStep, JoinedState};
-use super::super::force::{InForce, Setting, ToolInForce};
-use super::super::token::{ProgramText, Token, TokenKind};
+use super::super::literal::{InForce, Setting, ToolInForce};
+use super::super::token::{ProgramText, Token, TokenKind, arguments, closing};
 use super::aggregate::Aggregate;
-use super::line::{closing, declared, member, opens};
-use super::steps::step;
+use super::line::{declared, member, step};
 use crate::compensate::turns;
 use crate::spatial::Pose;
 use nalgebra::Vector3;
@@ -259,11 +258,7 @@ impl SystemData {
             .iter()
             .position(|token| source.is_word(token, &["WITH"]))
             .map_or(line.len(), |at| at + 1);
-        let mut depth = 0;
-        let settings = line[with..].split(|token| {
-            depth += opens(token);
-            depth == 0 && token.is(b',')
-        });
+        let settings = arguments(&line[with..]);
         for setting in settings.filter(|setting| !setting.is_empty()) {
             self.set(source, setting, place, &mut state);
         }

@@ -2,7 +2,6 @@
 
 use super::super::token::{ProgramText, Token};
 use super::super::{DEPTH, Gathered, Literal, PostureStatement, TargetKind, quoted};
-use super::arguments::depths;
 use crate::error::counted;
 use std::ops::Range;
 
@@ -330,4 +329,14 @@ fn configuration(numbers: &[(f64, Range<usize>)], found: &mut Gathered) -> Postu
         return PostureStatement::Unstated;
     }
     PostureStatement::Configuration(all)
+}
+
+/// Tokens with the depth of brackets at each: the brackets themselves are outside.
+pub(super) fn depths(tokens: &[Token]) -> impl Iterator<Item = (&Token, i32)> {
+    let mut depth = 0;
+    tokens.iter().map(move |token| {
+        let opens = token.opens();
+        depth += opens;
+        (token, depth - opens.max(0))
+    })
 }

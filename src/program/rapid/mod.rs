@@ -4,21 +4,18 @@
 //! instruction. Everything else that has the form of one is refused: RAPID gives a literal no type of its own. `Offs` and `RelTool` of a
 //! named target stay: the controller adds the offset to the corrected target, so that the robot goes to the shifted point with the
 //! correction of the unshifted one; a warning names the line.
+//!
+//! The jointtargets that a program declares, by their names.
 
-mod arguments;
-mod list;
-mod listed;
-mod reached;
-mod surroundings;
-
-use super::token::{ProgramText, Token, TokenKind, tokens};
-use super::{Companion, DEPTH, Gathered, Language, quoted};
-use arguments::{arguments, depths};
-use list::{List, Want};
-pub(super) use listed::listed;
-use reached::in_force;
+use super::token::{self, BRACKETS, ProgramText, Token, TokenKind, arguments, tokens};
+use super::{Companion, Declared, Gathered, Language, quoted};
+use list::{List, Want, depths};
 use std::collections::BTreeMap;
 use std::ops::Range;
+use surroundings::in_force;
+
+mod list;
+mod surroundings;
 
 /// Motion instructions by how they begin, and which of the positional arguments are positions.
 const MOTIONS: [(&str, &[usize]); 10] = [
@@ -260,37 +257,8 @@ impl Reader<'_> {
         }
     }
 
-    /// Brackets of all kinds close in their order.
     fn brackets_match(&mut self, statement: &[Token]) -> bool {
-        const PAIRS: [(u8, u8); 3] = [(b'[', b']'), (b'(', b')'), (b'{', b'}')];
-        let mut open: Vec<(&Token, u8, u8)> = Vec::new();
-        let before = self.found.faults.len();
-        for token in statement {
-            if let Some((opens, closes)) = PAIRS.into_iter().find(|(opens, _)| token.is(*opens)) {
-                open.push((token, opens, closes));
-                if open.len() == DEPTH {
-                    self.found
-                        .fault(token.span.start, "brackets are nested too deep");
-                }
-            } else if let Some((opens, closes)) =
-                PAIRS.into_iter().find(|(_, closes)| token.is(*closes))
-                && open.pop().is_none_or(|(_, last, _)| last != opens)
-            {
-                self.found.fault(
-                    token.span.start,
-                    format!("`{}` without `{}`", char::from(closes), char::from(opens)),
-                );
-            }
-        }
-        for (token, opens, closes) in open {
-            let message = format!(
-                "`{}` without `{}` in its statement",
-                char::from(opens),
-                char::from(closes)
-            );
-            self.found.fault(token.span.start, message);
-        }
-        self.found.faults.len() == before
+        token::brackets_match(statement, &BRACKETS, "in its statement", &mut self.found)
     }
 
     /// Displacements.
@@ -488,4 +456,82 @@ impl Reader<'_> {
             );
         }
     }
+}
+
+pub(super) fn listed(bytes: &[u8]) -> Declared {
+    let mut found = Gathered::default();
+    let source = ProgramText {
+        bytes,
+        language: Language::Rapid,
+    };
+    let tokens = tokens(source, &mut found);
+    let statements = statements(source, &tokens, &mut found);
+    let mut reader = Reader {
+        source,
+        types: BTreeMap::new(),
+        names: Vec::new(),
+        found,
+    };
+    let (mut names, mut poses) = (Vec::new(), 0);
+    for statement in statements {
+        let Some((value, kind)) =
+            declaration(source, statement).and_then(|own| Some((own.value?, own.kind)))
+        else {
+            continue;
+        };
+        if kind == "ROBTARGET" {
+            poses += 1;
+        }
+        if kind != "JOINTTARGET" || !reader.brackets_match(statement) {
+            continue;
+        }
+        let name = name(source, statement);
+        if !value.first().is_some_and(|first| first.is(b'[')) {
+            let at = value
+                .first()
+                .map_or(statement[0].span.start, |first| first.span.start);
+            reader.found.fault(
+                at,
+                format!("`{name}` is no list of numbers; expected [[6 joints], [6 external axes]]"),
+            );
+            continue;
+        }
+        let list = List::read(source, value);
+        if list.tokens < value.len() {
+            reader.found.fault(
+                value[list.tokens].span.start,
+                format!("something behind the list of `{name}`; expected `;`"),
+            );
+            continue;
+        }
+        let (before, is_array) = (
+            reader.found.literals.len(),
+            value.get(2).is_some_and(|token| token.is(b'[')),
+        );
+        list.take(Want::Joints, is_array, &mut reader.found);
+        let count = reader.found.literals.len() - before;
+        names.extend((1..=count).map(|k| {
+            if is_array {
+                format!("{name}{{{k}}}")
+            } else {
+                name.clone()
+            }
+        }));
+    }
+    Declared {
+        found: reader.found,
+        names,
+        poses,
+    }
+}
+
+/// The name that a declaration gives, as it is written.
+fn name(source: ProgramText, statement: &[Token]) -> String {
+    // Scope, storage and type are words, too; the name is the last one before a dimension or `:=`.
+    let words = statement
+        .iter()
+        .take_while(|token| token.sort == TokenKind::Word);
+    words.last().map_or_else(String::new, |word| {
+        String::from_utf8_lossy(&source.bytes[word.span.clone()]).into_owned()
+    })
 }

@@ -4,16 +4,19 @@
 //! `tooldata`: [robhold, tframe, tload]; `wobjdata`: [robhold, ufprog, ufmec, uframe, oframe]; `loaddata`: [mass, ...] (ABB, Technical
 //! reference manual RAPID). A work object is applied where it stands still and the program alone says where; the world frame is taken as
 //! the robot's base.
+//!
+//! What is in force where the files of a program in RAPID move to its targets.
 
-use super::super::force::{InForce, Setting, ToolInForce};
-use super::super::quoted;
-use super::super::settle::Reached;
-use super::super::token::{ProgramText, Token, TokenKind};
+use super::super::literal::{InForce, Setting, ToolInForce};
+use super::super::settle::{Reached, Words, settle};
+use super::super::token::{ProgramText, Token, TokenKind, arguments, tokens};
+use super::super::{Companion, Gathered, Language, quoted};
 use super::list::List;
-use super::{Declaration, declaration};
+use super::{Declaration, declaration, motion, statements};
 use crate::spatial::Pose;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// Instructions whose last positional argument is the tool.
 const TOOL_LAST: [&str; 4] = ["MOVEL", "MOVEJ", "MOVEC", "MOVEABSJ"];
@@ -294,4 +297,96 @@ fn frame(list: &List) -> Option<Pose> {
             translation,
         )
     })
+}
+
+const WORDS: Words = Words {
+    base: "work object",
+    tool: "tool",
+    no_base: "no work object is named: calib assumed that the target stands in the robot's base",
+};
+
+/// Gives targets their frames, tools and loads, by all files of the program. `names`: literals that a variable holds, and its name.
+pub(super) fn in_force(
+    (source, own): (ProgramText, &[&[Token]]),
+    companions: &[Companion],
+    names: &[(Range<usize>, String)],
+    found: &mut Gathered,
+) {
+    // What is wrong with the writing of another file is no fault of this one.
+    let read =
+        |companion: &Companion| tokens(companion.text(Language::Rapid), &mut Gathered::default());
+    let others: Vec<Vec<Token>> = companions.iter().map(read).collect();
+    let others = companions
+        .iter()
+        .map(|companion| companion.text(Language::Rapid))
+        .zip(&others);
+    let others: Vec<(ProgramText, Vec<&[Token]>)> = others
+        .map(|(source, tokens)| (source, statements(source, tokens, &mut Gathered::default())))
+        .collect();
+    let mut surroundings = DeclaredSurroundings::default();
+    for (source, statements) in &others {
+        surroundings.declare_all(*source, statements);
+    }
+    surroundings.declare_all(source, own);
+    let mut reached = Reached::default();
+    for (source, statement) in others
+        .iter()
+        .flat_map(|(source, statements)| statements.iter().map(move |one| (source, one)))
+    {
+        reach(*source, statement, &surroundings, false, &mut reached);
+    }
+    for statement in own {
+        reach(source, statement, &surroundings, true, &mut reached);
+    }
+    let uses = reached.uses(&found.literals, names);
+    settle(found, uses, &WORDS);
+    found.tools = surroundings.tools().collect();
+}
+
+/// Takes note of the targets that a statement moves to, and of those that it hands on.
+fn reach(
+    source: ProgramText,
+    statement: &[Token],
+    known: &DeclaredSurroundings,
+    is_own: bool,
+    out: &mut Reached,
+) {
+    let name = source.upper(&statement[0]);
+    let assigns = statement
+        .iter()
+        .position(|token| token.sort == TokenKind::Pair(b':'));
+    let plain = assigns.is_none_or(|at| {
+        statement[..at]
+            .iter()
+            .any(|token| token.is(b'\\') || token.is(b','))
+    });
+    if declaration(source, statement).is_some() {
+        return;
+    }
+    if let Some((_, positions)) = motion(&name).filter(|_| plain) {
+        known.motion(
+            source,
+            (
+                &name,
+                &arguments(&statement[1..]).collect::<Vec<_>>(),
+                positions,
+            ),
+            is_own,
+            out,
+        );
+        return;
+    }
+    let from = if plain {
+        1
+    } else {
+        assigns.unwrap_or_default()
+    };
+    for word in statement
+        .iter()
+        .skip(from)
+        .filter(|token| token.sort == TokenKind::Word)
+    {
+        let force = InForce::open(&format!("is not followed: `{name}` hands the target on"));
+        out.mentioned.entry(source.upper(word)).or_insert(force);
+    }
 }

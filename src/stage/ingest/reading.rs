@@ -147,6 +147,9 @@ impl<'a> OpenedFile<'a> {
             names: None,
         };
         if header {
+            if let Some((_, why)) = &record.fault {
+                return Err(Error::data(format!("{label}:{}", record.line), why));
+            }
             let mut names = record.cells();
             // A delimiter at the end of the header makes no column.
             while names.last().is_some_and(String::is_empty) {

@@ -4,6 +4,7 @@ use crate::diagnose::VerdictKind;
 use crate::effect::names;
 use crate::error::{Error, Result, counted};
 use crate::summary::estimate::{angle, length};
+use crate::summary::run::filled;
 use crate::summary::short_finding::Found;
 use crate::summary::{labelled, screen};
 use crate::table::{
@@ -12,6 +13,8 @@ use crate::table::{
     picked, picked_of,
 };
 use crate::units::Unit;
+use minijinja::context;
+use minijinja::value::Serde;
 use serde_json::{Value, json};
 
 /// Rows set aside that are named.
@@ -232,64 +235,13 @@ impl Positions {
 
     /// Verdict, errors and where they are, as `calib diagnose --details` prints them before the findings.
     pub fn text(&self) -> String {
-        let v = &self.verdict;
-        let mm =
-            |value: Option<f64>| value.map_or_else(|| "-".into(), |value| format!("{value:.3}"));
-        let rows = if v.held_out {
-            "held-out points"
-        } else {
-            "fitted points (none are held out: flattered)"
+        let located = [("place", "where"), ("variable", "depends on")]
+            .map(|(by, what)| (what, self.located(by)));
+        let about = context! {
+            v => Serde(&self.verdict), assumed => self.verdict.is_noise_assumed(), located => Serde(located),
+            shares => !self.shares.0.is_empty(), grid => CauseGrid::of(&self.cells, &self.findings).text(),
         };
-        let basis = v
-            .noise_basis
-            .as_ref()
-            .map(|basis| format!(" (noise basis: {basis})"))
-            .unwrap_or_default();
-        let mut text = format!("{}{basis}\n", v.verdict.replace('_', " "));
-        v.statement
-            .iter()
-            .for_each(|statement| text.push_str(&format!("{statement}\n")));
-        text.push('\n');
-        text.push_str(&format!("error in mm, {rows}: mean / rms / max\n"));
-        for (name, mean, rms, max) in [
-            ("before", v.before_mean_mm, v.before_rms_mm, v.before_max_mm),
-            ("after", v.after_mean_mm, v.after_rms_mm, v.after_max_mm),
-        ] {
-            text.push_str(&format!(
-                "  {name:6}  {:>8}  {:>8}  {:>8}\n",
-                mm(mean),
-                mm(rms),
-                mm(max)
-            ));
-        }
-        let assumed = if v.is_noise_assumed() {
-            "  assumed: none is recorded, and no `instrument` is stated"
-        } else {
-            ""
-        };
-        text.push_str(&format!(
-            "  noise   {:>8}  {:>8}{assumed}\n\n",
-            "",
-            mm(v.noise_floor_mm)
-        ));
-        for (by, what) in [("place", "where"), ("variable", "depends on")] {
-            let all = self.located(by);
-            let all: Vec<String> = all
-                .iter()
-                .map(|row| format!("{} {:.0} %", row.name, row.share * 100.0))
-                .collect();
-            if !all.is_empty() {
-                text.push_str(&format!("{what:10}  {}\n", all.join(", ")));
-            }
-        }
-        if !self.shares.0.is_empty() {
-            text.push_str("            (of the squared residual, what one cause there could explain at most)\n\n");
-        }
-        let grid = CauseGrid::of(&self.cells, &self.findings).text();
-        if !grid.is_empty() {
-            text.push_str(&format!("{grid}            (rms at the tool of the findings, by place and kind of variable)\n\n"));
-        }
-        text
+        filled(include_str!("../text/positions.txt"), about)
     }
 
     /// The formulas of a finding, a line each.

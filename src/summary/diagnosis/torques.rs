@@ -3,6 +3,7 @@
 use crate::diagnose::VerdictKind;
 use crate::effect::figure;
 use crate::error::{Error, Result};
+use crate::summary::run::filled;
 use crate::summary::short_finding::Found;
 use crate::summary::{labelled, screen};
 use crate::table::{
@@ -10,6 +11,8 @@ use crate::table::{
     TablesByKind, TorqueFindingRow, TorqueFindings, TorqueVerdict, TorqueVerdictRow, of_kind,
     picked, picked_of,
 };
+use minijinja::context;
+use minijinja::value::Serde;
 use serde_json::{Value, json};
 use std::cmp::Ordering;
 
@@ -142,47 +145,10 @@ impl Torques {
         document
     }
 
-    fn errors(&self) -> String {
-        let v = &self.verdict;
-        let rows = if v.held_out {
-            "held-out rows"
-        } else {
-            "fitted rows (none are held out: flattered)"
-        };
-        format!(
-            "{:.3} -> {:.3} of the torques' own rms, mean over joints; {rows}, {} at {:.1} Hz, low-pass {:.1} Hz",
-            v.before_nrmse, v.after_nrmse, v.rows, v.rate_hz, v.cutoff_hz
-        )
-    }
-
     /// Verdict and errors, as `calib diagnose --details` prints them before the findings.
     pub fn text(&self) -> String {
-        let v = &self.verdict;
-        let mut text = format!(
-            "{}: {}\n\nerror: {}\n",
-            v.verdict.replace('_', " "),
-            v.statement,
-            self.errors()
-        );
-        text.push_str(
-            "joint   rms before   after   moving   resting   noise  (Nm)  autocorrelation\n",
-        );
-        let nm =
-            |value: Option<f64>| value.map_or_else(|| "-".into(), |value| format!("{value:.3}"));
-        for row in &self.joints {
-            text.push_str(&format!(
-                "{:>5}   {:>10} {:>7}  {:>7}   {:>7} {:>7}        {:.1}\n",
-                row.joint,
-                nm(Some(row.before_rms_nm)),
-                nm(Some(row.after_rms_nm)),
-                nm(row.after_moving_rms_nm),
-                nm(row.after_rest_rms_nm),
-                nm(Some(row.noise_nm)),
-                row.autocorrelation
-            ));
-        }
-        text.push('\n');
-        text
+        let about = context! { v => Serde(&self.verdict), joints => Serde(&self.joints) };
+        filled(include_str!("../text/torques.txt"), about)
     }
 
     /// What is left at each joint, a line each.

@@ -1,8 +1,8 @@
 //! From the table back to the correction, or what is wrong with it.
 
-use super::numbers::{Numbers, index};
 use super::{
-    MILLI, Network, activation_name, coefficient_unit, feature_unit, map_name, place, source_unit,
+    MILLI, Network, Numbers, activation_name, coefficient_unit, feature_unit, index, map_name,
+    place, source_unit,
 };
 use crate::error::{Error, Result, counted};
 use crate::estimate::network::arm::{Hinge, ScrewArm};

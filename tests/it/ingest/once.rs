@@ -43,6 +43,34 @@ fn refused(taken: &Taken) -> Vec<(&str, i64, &str)> {
 }
 
 #[test]
+fn text_behind_a_closing_quote_refuses_its_row() {
+    let (taken, _) = read(
+        "A,1\nB,\"0.25\"0\nC,\"0.25\"\n\"D\"x,3\n",
+        "A,1,1,1\nC,3,3,3\n",
+        JOINED,
+    );
+    assert_eq!(taken.recording.point_id, ["A", "C"]);
+    assert_eq!(
+        refused(&taken),
+        [("arm.csv", 3, "damaged"), ("arm.csv", 5, "damaged")]
+    );
+    let detail = &taken.rejected.0[0].detail;
+    assert!(
+        detail.starts_with("column 2: text behind the closing `\"` of a field; allowed:"),
+        "{detail}"
+    );
+    let desk = Desk::default().with("a.csv", format!("\"id\"x,q1,q2,x,y,z\n{}", good(3)));
+    let header = take(&desk, TWO, robot("rr", 1.0))
+        .err()
+        .unwrap()
+        .to_string();
+    assert!(
+        header.starts_with("a.csv:1: column 1: text behind"),
+        "{header}"
+    );
+}
+
+#[test]
 fn rows_that_are_used_as_they_come_are_read_once() {
     let (taken, opened) = read(
         "A,1\nB,2\nC,bad\nD,3\n",
