@@ -94,6 +94,7 @@ fn unnamed(survey: &Survey) -> Vec<Hypothesis> {
     let motions = [
         Motion::Joint { joint: 0 },
         Motion::Joint { joint: 1 },
+        Motion::Coupled { by: 0, moved: 1 },
         axis(true),
         axis(false),
         Motion::Slide {
