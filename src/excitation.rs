@@ -43,9 +43,9 @@ pub struct MotionRequest {
 /// A motion for a robot.
 pub struct MotionProposal {
     /// Its name.
-    pub robot: String,
+    pub(crate) robot: String,
     /// What was asked, SI.
-    pub request: ExciteRequest,
+    pub(crate) request: ExciteRequest,
     /// The motion, and what it tells.
     pub motion: ExcitingMotion,
     joints: usize,

@@ -158,13 +158,13 @@ pub use calib_twin as twin;
 
 pub mod program;
 pub mod raw;
-pub mod shell;
+pub(crate) mod shell;
 
 pub mod targets;
 
 pub mod store;
 
-pub mod diff;
+pub(crate) mod diff;
 
 pub mod table;
 
@@ -177,19 +177,19 @@ pub mod pipeline;
 pub mod api;
 pub mod audit;
 pub mod excitation;
-pub mod export;
+pub(crate) mod export;
 pub mod fleet;
 pub mod identified;
-pub mod init;
+pub(crate) mod init;
 pub mod poses;
-pub mod proof;
+pub(crate) mod proof;
 pub mod summary;
 
 #[expect(
     clippy::disallowed_methods,
     reason = "shows how long things take, on stderr"
 )]
-pub mod progress;
+pub(crate) mod progress;
 
 #[expect(
     clippy::disallowed_methods,

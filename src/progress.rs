@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 
 /// How much is shown while a run works.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Verbosity {
+pub(crate) enum Verbosity {
     /// Besides, what stages note while they work, rows of tables, and what was warned of when a cached stage ran.
     Detailed,
     /// A line a stage, bars on a terminal, warnings once.
@@ -30,7 +30,7 @@ pub enum Verbosity {
 const PAUSE: Duration = Duration::from_secs(5);
 
 /// Watches a run.
-pub struct Progress {
+pub(crate) struct Progress {
     verbosity: Verbosity,
     /// Width of the stages' ids.
     width: usize,

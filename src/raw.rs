@@ -32,7 +32,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 /// What a file's name ends in, in small letters, without the dot; nothing where it has none.
-pub fn ending(path: &Path) -> String {
+pub(crate) fn ending(path: &Path) -> String {
     path.extension()
         .and_then(|ending| ending.to_str())
         .unwrap_or_default()
@@ -40,7 +40,7 @@ pub fn ending(path: &Path) -> String {
 }
 
 /// Whether two names are of one file that is there.
-pub fn same_file(a: &Path, b: &Path) -> bool {
+pub(crate) fn same_file(a: &Path, b: &Path) -> bool {
     let found = |path: &Path| path.canonicalize().ok();
     found(a).is_some() && found(a) == found(b)
 }
@@ -65,7 +65,7 @@ pub fn text(path: &Path) -> io::Result<String> {
 }
 
 /// The bytes of a regular file.
-pub fn bytes(path: &Path) -> io::Result<Vec<u8>> {
+pub(crate) fn bytes(path: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     open(path)?.read_to_end(&mut bytes)?;
     Ok(bytes)
@@ -92,7 +92,7 @@ fn what(kind: FileType) -> &'static str {
 }
 
 /// What a decoder gives; its panic is told in words.
-pub fn decoded<T>(decode: impl FnOnce() -> T) -> Result<T, String> {
+pub(crate) fn decoded<T>(decode: impl FnOnce() -> T) -> Result<T, String> {
     catch_unwind(AssertUnwindSafe(decode)).map_err(|panic| {
         let text = panic
             .downcast_ref::<&str>()
@@ -108,9 +108,9 @@ pub fn decoded<T>(decode: impl FnOnce() -> T) -> Result<T, String> {
 /// A Parquet file, batch by batch; what is wrong with it comes in words, once.
 pub struct ParquetFile {
     /// Its columns, as the file declares them.
-    pub schema: SchemaRef,
+    pub(crate) schema: SchemaRef,
     /// Rows by its footer.
-    pub rows: u64,
+    pub(crate) rows: u64,
     reader: Option<ParquetRecordBatchReader>,
 }
 

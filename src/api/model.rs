@@ -173,7 +173,7 @@ impl Model {
     }
 
     /// Places the arm one pose (rad and m) after the other, each by itself, whatever came before: mm in the frame of the instrument.
-    pub fn placing(&self) -> impl FnMut(&Circumstance, &mut [f64]) -> [f64; 3] + '_ {
+    pub(crate) fn placing(&self) -> impl FnMut(&Circumstance, &mut [f64]) -> [f64; 3] + '_ {
         let (mut reach, convention) = (self.arm.reach(), self.convention());
         move |circumstance, q| {
             convention.to_robot(q);
@@ -184,7 +184,7 @@ impl Model {
 
     /// What corrects commands, with the defaults of `calib compensate`. Fails where the model is refused, unless one insists; `insist` says
     /// how that is done.
-    pub fn corrector(&self, insisted: bool, insist: &str) -> Result<Corrector<'_>> {
+    pub(crate) fn corrector(&self, insisted: bool, insist: &str) -> Result<Corrector<'_>> {
         let identified = &self.identified;
         let gate = identified.gate(GateLimits::default(), insisted);
         if !insisted {
@@ -200,7 +200,7 @@ impl Model {
     }
 
     /// The largest load that was measured, kg, where commands must state theirs: the arm depends on it.
-    pub fn needed_load(&self) -> Option<f64> {
+    pub(crate) fn needed_load(&self) -> Option<f64> {
         let heaviest = self.identified.heaviest();
         heaviest.filter(|load| load_matters(&self.arm, *load))
     }

@@ -86,7 +86,7 @@ impl Robot {
     }
 
     /// Positions of arrays, row-major -> rad and m.
-    pub fn to_si(&self, joints: &[f64]) -> Vec<f64> {
+    pub(crate) fn to_si(&self, joints: &[f64]) -> Vec<f64> {
         self.converted(joints, Unit::to_si)
     }
 

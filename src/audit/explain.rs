@@ -11,16 +11,16 @@ use serde::Serialize;
 #[derive(Debug, Clone, Serialize)]
 pub struct Explanation {
     /// Its id.
-    pub run: String,
+    pub(crate) run: String,
     /// What the manifest says of the stage.
-    pub stage: StageReport,
+    pub(crate) stage: StageReport,
     /// The run that the stage is compared with: the last one before of this pipeline that had it, of a complete run a
     /// complete one.
-    pub before: Option<String>,
+    pub(crate) before: Option<String>,
     /// What differs from the run before.
-    pub changes: Vec<KeyChange>,
+    pub(crate) changes: Vec<KeyChange>,
     /// For every input that changed: the stage that wrote it.
-    pub writers: Vec<(String, String)>,
+    pub(crate) writers: Vec<(String, String)>,
 }
 
 /// Explains a stage of a run.

@@ -10,42 +10,42 @@ use std::collections::{BTreeMap, BTreeSet};
 #[derive(Debug, Clone, Serialize)]
 pub struct LineageNode {
     /// Hash of its content.
-    pub table_hash: TableHash,
+    pub(crate) table_hash: TableHash,
     /// Nothing where the store has no record of who made it.
-    pub made: Option<Provenance>,
+    pub(crate) made: Option<Provenance>,
 }
 
 /// What made a table.
 #[derive(Debug, Clone, Serialize)]
 pub struct Provenance {
     /// Id of the stage.
-    pub stage: String,
+    pub(crate) stage: String,
     /// Its kind.
-    pub uses: String,
+    pub(crate) uses: String,
     /// Version of its algorithm.
-    pub implementation: u32,
+    pub(crate) implementation: u32,
     /// On which it was written.
-    pub port: String,
+    pub(crate) port: String,
     /// `name/version`.
-    pub schema: String,
+    pub(crate) schema: String,
     /// How many.
-    pub rows: u64,
+    pub(crate) rows: u64,
     /// Id of the action record.
-    pub action: String,
+    pub(crate) action: String,
     /// Id of the run that executed it.
-    pub run: String,
+    pub(crate) run: String,
     /// RFC 3339, UTC.
-    pub when: String,
+    pub(crate) when: String,
     /// With defaults filled in.
-    pub settings: serde_json::Value,
+    pub(crate) settings: serde_json::Value,
     /// The seed of the stage.
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// Raw files: name and blake3.
-    pub files: Vec<(String, String)>,
+    pub(crate) files: Vec<(String, String)>,
     /// Input tables by port; empty where they were shown already.
-    pub reads: Vec<(String, LineageNode)>,
+    pub(crate) reads: Vec<(String, LineageNode)>,
     /// Whether its inputs stand above in the same answer.
-    pub shown_before: bool,
+    pub(crate) shown_before: bool,
 }
 
 /// Traces the table whose content hash begins with `start`.

@@ -13,54 +13,54 @@ use crate::store::schema::{self, TableSchema};
 #[derive(Debug, Clone, Serialize)]
 pub struct RunDiff {
     /// The earlier.
-    pub a: RunSummary,
+    pub(crate) a: RunSummary,
     /// The later.
-    pub b: RunSummary,
+    pub(crate) b: RunSummary,
     /// What was put in: settings, files, seeds, implementations. What follows from these is no cause.
-    pub causes: Vec<SettingChange>,
+    pub(crate) causes: Vec<SettingChange>,
     /// Tables of both, in the order of the pipeline.
-    pub tables: Vec<TableChange>,
+    pub(crate) tables: Vec<TableChange>,
 }
 
 /// A run in a line.
 #[derive(Debug, Clone, Serialize)]
 pub struct RunSummary {
     /// Its id.
-    pub run: String,
+    pub(crate) run: String,
     /// Its name.
-    pub pipeline: String,
+    pub(crate) pipeline: String,
     /// RFC 3339, UTC.
-    pub started: String,
+    pub(crate) started: String,
     /// The version of calib.
-    pub version: String,
+    pub(crate) version: String,
 }
 
 /// A setting that differs.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct SettingChange {
     /// Id of the stage.
-    pub stage: String,
+    pub(crate) stage: String,
     /// Before and now.
     #[serde(flatten)]
-    pub change: KeyChange,
+    pub(crate) change: KeyChange,
 }
 
 /// A table of one or both runs.
 #[derive(Debug, Clone, Serialize)]
 pub struct TableChange {
     /// `stage.port`.
-    pub name: String,
+    pub(crate) name: String,
     /// The name of its schema.
-    pub kind: String,
+    pub(crate) kind: String,
     /// How it differs, in words.
-    pub status: &'static str,
+    pub(crate) status: &'static str,
     /// Where both have it, their content differs, and both are still in the store.
-    pub diff: Option<TableDiff>,
+    pub(crate) diff: Option<TableDiff>,
 }
 
 impl RunDiff {
     /// Whether neither settings nor tables differ.
-    pub fn is_same(&self) -> bool {
+    pub(crate) fn is_same(&self) -> bool {
         self.tables.iter().all(|table| {
             table.status == "same" || table.diff.as_ref().is_some_and(TableDiff::is_same)
         })
@@ -155,11 +155,11 @@ fn known_columns(kinds: &BTreeSet<&str>, options: &DiffOptions) -> Result<()> {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RunAddress {
     /// As `calib log` names it.
-    pub run: String,
+    pub(crate) run: String,
     /// Its id, if one is named.
-    pub stage: Option<String>,
+    pub(crate) stage: Option<String>,
     /// Its port, if one is named.
-    pub port: Option<String>,
+    pub(crate) port: Option<String>,
 }
 
 fn summary_of(manifest: &Manifest) -> RunSummary {

@@ -21,15 +21,15 @@ pub struct QueryTables {
 #[derive(Debug, Clone)]
 pub struct QueryTable {
     /// `stage_port`, a dash written as an underscore.
-    pub name: String,
+    pub(crate) name: String,
     /// Its kind, where no other stage of the run writes such a table.
-    pub short: Option<String>,
+    pub(crate) short: Option<String>,
     /// Id of the stage that wrote it.
-    pub stage: String,
+    pub(crate) stage: String,
     /// On which it was written.
-    pub port: String,
+    pub(crate) port: String,
     /// The name of its schema.
-    pub kind: String,
+    pub(crate) kind: String,
     /// Where it is.
     pub table: TableRef,
 }
@@ -38,14 +38,14 @@ pub struct QueryTable {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct QueryColumn {
     /// As SQL knows it.
-    pub name: String,
+    pub(crate) name: String,
     /// As the schema states it.
     #[serde(rename = "type")]
-    pub column_type: String,
+    pub(crate) column_type: String,
     /// Unit of its numbers, where the schema states one.
-    pub unit: Option<String>,
+    pub(crate) unit: Option<String>,
     /// What it means.
-    pub description: String,
+    pub(crate) description: String,
 }
 
 impl QueryTables {
@@ -73,7 +73,7 @@ impl QueryTables {
     }
 
     /// In the order of the pipeline.
-    pub fn iter(&self) -> impl Iterator<Item = &QueryTable> {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &QueryTable> {
         self.tables.iter()
     }
 
@@ -132,7 +132,7 @@ impl QueryTable {
     }
 
     /// What the kind of table is for; nothing of a kind that this calib does not know.
-    pub fn schema(&self) -> Option<&'static TableSchema> {
+    pub(crate) fn schema(&self) -> Option<&'static TableSchema> {
         schema::all().find(|schema| schema.name == self.kind)
     }
 

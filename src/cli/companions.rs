@@ -39,7 +39,7 @@ impl Companions {
     }
 
     /// As programs take them.
-    pub fn files(&self) -> Vec<Companion<'_>> {
+    pub(crate) fn files(&self) -> Vec<Companion<'_>> {
         self.0
             .iter()
             .map(|(place, text)| Companion { place, text })
@@ -47,7 +47,7 @@ impl Companions {
     }
 
     /// What was read beside the program, in a line; none where nothing was.
-    pub fn summary_line(&self) -> Option<String> {
+    pub(crate) fn summary_line(&self) -> Option<String> {
         let names: Vec<&str> = self.0.iter().map(|(place, _)| place.as_str()).collect();
         (!names.is_empty()).then(|| format!("read with the program: {}\n", names.join(", ")))
     }

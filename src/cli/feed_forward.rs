@@ -15,18 +15,18 @@ const MOST: usize = 20;
 /// What is asked.
 pub(super) struct FeedForward<'a> {
     /// `-`: stdin.
-    pub motion: &'a Path,
-    pub out: Option<&'a Path>,
+    pub(crate) motion: &'a Path,
+    pub(crate) out: Option<&'a Path>,
     /// s from when the arm began to move; none: it is warm.
-    pub since_start: Option<f64>,
+    pub(crate) since_start: Option<f64>,
     /// C, where the motion does not say it.
-    pub temperature: Option<f64>,
+    pub(crate) temperature: Option<f64>,
     /// Nm, 95 %: the limit of a joint's uncertainty.
-    pub max_uncertainty: Option<f64>,
+    pub(crate) max_uncertainty: Option<f64>,
     /// Whether uncertainties are written and judged.
-    pub sigma: bool,
-    pub force: bool,
-    pub quiet: bool,
+    pub(crate) sigma: bool,
+    pub(crate) force: bool,
+    pub(crate) quiet: bool,
 }
 
 pub(super) fn feed_forward(asked: &FeedForward, identified: &IdentifiedModel) -> Result<()> {

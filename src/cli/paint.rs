@@ -34,7 +34,7 @@ const VERDICTS: [(&str, AnsiColor); 7] = [
 ];
 
 /// The same lines with bold labels; of the others nothing changes.
-pub fn painted(text: &str) -> String {
+pub(crate) fn painted(text: &str) -> String {
     text.lines().map(|line| line_of(line) + "\n").collect()
 }
 

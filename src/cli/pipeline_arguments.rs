@@ -29,12 +29,12 @@ use std::path::{Path, PathBuf};
 pub(super) struct PipelineArguments {
     /// The pipeline's YAML file
     #[arg(value_name = "PIPELINE")]
-    pub pipeline: PathBuf,
+    pub(crate) pipeline: PathBuf,
     #[command(flatten)]
     means: ExecutionArguments,
     /// Prints one JSON document on stdout
     #[arg(long)]
-    pub json: bool,
+    pub(crate) json: bool,
     /// Prints no progress; warnings and errors remain
     #[arg(long, short)]
     quiet: bool,
@@ -42,7 +42,7 @@ pub(super) struct PipelineArguments {
 
 impl PipelineArguments {
     /// The pipeline, its reports in another language where one is given.
-    pub fn plan(&self, language: Option<&str>) -> Result<Plan> {
+    pub(crate) fn plan(&self, language: Option<&str>) -> Result<Plan> {
         let plan = self.means.plan(&self.pipeline)?;
         let Some(language) = language else {
             return Ok(plan);
@@ -71,11 +71,11 @@ impl PipelineArguments {
     }
 
     /// See [`ExecutionArguments::store_again`].
-    pub fn store_again(&self) -> String {
+    pub(crate) fn store_again(&self) -> String {
         self.means.store_again()
     }
 
-    pub fn store(&self) -> Result<Store> {
+    pub(crate) fn store(&self) -> Result<Store> {
         self.means.store()
     }
 
@@ -97,7 +97,7 @@ impl PipelineArguments {
     }
 
     /// The result, whose failure is also a document where one is asked for.
-    pub fn reported<T>(&self, result: Result<T>) -> Result<T> {
+    pub(crate) fn reported<T>(&self, result: Result<T>) -> Result<T> {
         reported_as(self.json, result)
     }
 }
@@ -135,9 +135,9 @@ pub(super) struct ExecutionArguments {
 
 /// What a pipeline is run for, how much of it, and how much of its progress is shown.
 pub(super) struct CommandTask {
-    pub purpose: Purpose,
-    pub selection: Selection,
-    pub shown: Verbosity,
+    pub(crate) purpose: Purpose,
+    pub(crate) selection: Selection,
+    pub(crate) shown: Verbosity,
 }
 
 /// As much as `--quiet` and `--details` ask for.
@@ -151,32 +151,32 @@ pub(super) fn shown(quiet: bool, details: bool) -> Verbosity {
 
 impl ExecutionArguments {
     /// Reads a pipeline. Fails with every fault of its YAML and of the robot file at once.
-    pub fn plan(&self, pipeline: &Path) -> Result<Plan> {
+    pub(crate) fn plan(&self, pipeline: &Path) -> Result<Plan> {
         self.plan_with(pipeline, &[])
     }
 
     /// The same with more overrides, behind those of the command line.
-    pub fn plan_with(&self, pipeline: &Path, more: &[Override]) -> Result<Plan> {
+    pub(crate) fn plan_with(&self, pipeline: &Path, more: &[Override]) -> Result<Plan> {
         checked_plan(pipeline, &[&self.set, more].concat())
     }
 
-    pub fn store(&self) -> Result<Store> {
+    pub(crate) fn store(&self) -> Result<Store> {
         open_store(self.store.as_deref())
     }
 
     /// Whether anything is to be set on the command line.
-    pub fn overrides(&self) -> bool {
+    pub(crate) fn overrides(&self) -> bool {
         !self.set.is_empty()
     }
 
     /// `--store` as it was given, to be typed again; empty for the usual place.
-    pub fn store_again(&self) -> String {
+    pub(crate) fn store_again(&self) -> String {
         self.store.as_ref().map_or_else(String::new, |store| {
             format!(" --store {}", typed(&store.display().to_string()))
         })
     }
 
-    pub fn jobs(&self) -> usize {
+    pub(crate) fn jobs(&self) -> usize {
         self.jobs.map_or_else(cores, usize::from)
     }
 
@@ -245,16 +245,16 @@ pub(super) struct ModelArguments {
     /// Insists on a model that is refused (set-up wrong, limits of the report exceeded, further from the robot file than --max-shift or
     /// --max-tilt), and on commands and files that are refused; what is written says so
     #[arg(long)]
-    pub force: bool,
+    pub(crate) force: bool,
     #[command(flatten)]
     means: ExecutionArguments,
     /// Prints no progress and no summary; warnings and errors remain
     #[arg(long, short)]
-    pub quiet: bool,
+    pub(crate) quiet: bool,
 }
 
 impl ModelArguments {
-    pub fn jobs(&self) -> usize {
+    pub(crate) fn jobs(&self) -> usize {
         self.means.jobs()
     }
 

@@ -33,7 +33,7 @@ fn refused(path: &Path, error: &dyn Display) -> Error {
 }
 
 impl CellWriter {
-    pub fn create(path: &Path, a: &TableFile, key: &[String]) -> Result<Self> {
+    pub(crate) fn create(path: &Path, a: &TableFile, key: &[String]) -> Result<Self> {
         let key_type = |name: &String| match a.position(name).map(|at| a.columns[at].kind) {
             Some(CellKind::Float) => DataType::Float64,
             Some(CellKind::Int | CellKind::Flag) => DataType::Int64,
@@ -71,7 +71,7 @@ impl CellWriter {
     }
 
     /// Rows without a partner.
-    pub fn unpaired(&mut self, keys: &Keys, rows: &[u32], class: &str) -> Result<()> {
+    pub(crate) fn unpaired(&mut self, keys: &Keys, rows: &[u32], class: &str) -> Result<()> {
         for rows in rows.chunks(GROUP_ROWS) {
             let classes = StringArray::from_iter_values(rows.iter().map(|_| class));
             self.write(keys.columns(rows)?, vec![Arc::new(classes)])?;
@@ -79,7 +79,12 @@ impl CellWriter {
         Ok(())
     }
 
-    pub fn cell(&mut self, keys: &Keys, column: &ColumnPair, cell: &CellDifference) -> Result<()> {
+    pub(crate) fn cell(
+        &mut self,
+        keys: &Keys,
+        column: &ColumnPair,
+        cell: &CellDifference,
+    ) -> Result<()> {
         let (name, unit) = match self.gathered.last() {
             Some((name, unit, _)) if **name == *column.name => (name.clone(), unit.clone()),
             _ => (column.name.as_str().into(), column.unit.as_str().into()),
@@ -92,7 +97,7 @@ impl CellWriter {
     }
 
     /// Writes what was gathered.
-    pub fn flush(&mut self, keys: &Keys) -> Result<()> {
+    pub(crate) fn flush(&mut self, keys: &Keys) -> Result<()> {
         let gathered = std::mem::take(&mut self.gathered);
         let rows: Vec<u32> = gathered.iter().map(|(.., cell)| cell.row).collect();
         let text = |pick: &dyn Fn(&CellDifference) -> Option<&str>| -> ArrayRef {
@@ -146,7 +151,7 @@ impl CellWriter {
             .map_err(|e| refused(&self.path, &e))
     }
 
-    pub fn close(self) -> Result<()> {
+    pub(crate) fn close(self) -> Result<()> {
         self.writer
             .close()
             .map(|_| ())

@@ -11,18 +11,18 @@ use crate::units::{Quantity, Unit};
 #[derive(Debug, Clone)]
 pub(super) struct ColumnPair {
     /// As A calls it.
-    pub name: String,
-    pub a: Vec<usize>,
-    pub b: Vec<usize>,
-    pub how: Comparator,
+    pub(crate) name: String,
+    pub(crate) a: Vec<usize>,
+    pub(crate) b: Vec<usize>,
+    pub(crate) how: Comparator,
     /// Unit of the difference; empty where there is none, `row` where every row has its own.
-    pub unit: String,
+    pub(crate) unit: String,
     /// B's values are multiplied by the first and added to the second, so that they are in A's unit.
-    pub conversion: (f64, f64),
-    pub atol: f64,
-    pub rtol: f64,
+    pub(crate) conversion: (f64, f64),
+    pub(crate) atol: f64,
+    pub(crate) rtol: f64,
     /// Columns with one standard deviation of the values, in A and in B.
-    pub sigma: Option<(usize, usize)>,
+    pub(crate) sigma: Option<(usize, usize)>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]

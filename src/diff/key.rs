@@ -28,22 +28,27 @@ pub(super) struct Keys {
 #[derive(Debug, Default)]
 pub(super) struct Pairing {
     /// By row of A.
-    pub partner: Vec<u32>,
+    pub(crate) partner: Vec<u32>,
     /// Every row has the partner of its number.
     in_place: bool,
-    pub paired: usize,
-    pub only_a: Vec<u32>,
-    pub only_b: Vec<u32>,
+    pub(crate) paired: usize,
+    pub(crate) only_a: Vec<u32>,
+    pub(crate) only_b: Vec<u32>,
     /// Rows whose key occurs more than once in A or in B, and that were not paired.
-    pub twice_a: Vec<u32>,
-    pub twice_b: Vec<u32>,
+    pub(crate) twice_a: Vec<u32>,
+    pub(crate) twice_b: Vec<u32>,
     /// How many keys occur more than once.
-    pub keys_twice: usize,
+    pub(crate) keys_twice: usize,
 }
 
 impl Pairing {
     /// The cells of B that belong to `count` rows of A from `start` on; null where a row has no partner.
-    pub fn aligned(&self, theirs: &ArrayRef, start: usize, count: usize) -> Result<ArrayRef> {
+    pub(crate) fn aligned(
+        &self,
+        theirs: &ArrayRef,
+        start: usize,
+        count: usize,
+    ) -> Result<ArrayRef> {
         if self.in_place {
             return Ok(theirs.slice(start, count));
         }
@@ -116,7 +121,7 @@ impl Keys {
     }
 
     /// `robot r1, pose 17`, of every row.
-    pub fn texts(&self, rows: &[u32]) -> Result<Vec<String>> {
+    pub(crate) fn texts(&self, rows: &[u32]) -> Result<Vec<String>> {
         let columns = self.columns(rows)?;
         let cell = |cells: &ArrayRef, row: usize| match cells.data_type() {
             DataType::Utf8 => cells.as_string::<i32>().value(row).to_string(),
@@ -132,7 +137,7 @@ impl Keys {
     }
 
     /// The first of the rows whose keys differ from that before them.
-    pub fn distinct(&self, rows: &[u32], most: usize) -> Vec<u32> {
+    pub(crate) fn distinct(&self, rows: &[u32], most: usize) -> Vec<u32> {
         let mut distinct: Vec<u32> = Vec::new();
         for &row in rows {
             let key = |row: u32| self.rows.row(row as usize);

@@ -20,15 +20,15 @@ pub(super) const CHANGED: u8 = 2;
 #[derive(Debug, Clone)]
 pub(super) struct CellDifference {
     /// The row of A.
-    pub row: u32,
-    pub changed: bool,
-    pub a: CellValue,
-    pub b: CellValue,
+    pub(crate) row: u32,
+    pub(crate) changed: bool,
+    pub(crate) a: CellValue,
+    pub(crate) b: CellValue,
     /// B minus A in A's unit; null where one of them has no finite number.
-    pub difference: Option<f64>,
-    pub sigmas: Option<f64>,
+    pub(crate) difference: Option<f64>,
+    pub(crate) sigmas: Option<f64>,
     /// Differences over tolerance, or sigmas: what the worst are ranked by.
-    pub score: f64,
+    pub(crate) score: f64,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -41,10 +41,10 @@ pub(super) enum CellValue {
 /// Two files side by side: which rows are paired, and the class of every row of A.
 #[derive(Clone, Copy)]
 pub(super) struct ComparedTables<'d> {
-    pub a: &'d TableFile,
-    pub b: &'d TableFile,
-    pub pairing: &'d Pairing,
-    pub rows: &'d [AtomicU8],
+    pub(crate) a: &'d TableFile,
+    pub(crate) b: &'d TableFile,
+    pub(crate) pairing: &'d Pairing,
+    pub(crate) rows: &'d [AtomicU8],
 }
 
 impl ComparedTables<'_> {

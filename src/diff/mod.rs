@@ -25,39 +25,39 @@ use crate::units::Unit;
 #[derive(Debug, Clone, Default)]
 pub struct DiffOptions {
     /// Instead of the key that the files name.
-    pub key: Vec<String>,
+    pub(crate) key: Vec<String>,
     /// Absolute, in the unit of the column.
-    pub atol: Tolerances,
+    pub(crate) atol: Tolerances,
     /// As a share of the larger value.
-    pub rtol: Tolerances,
+    pub(crate) rtol: Tolerances,
     /// Columns that are left out.
-    pub ignore: BTreeSet<String>,
+    pub(crate) ignore: BTreeSet<String>,
     /// Whether columns named here may be missing in both tables: one wish is for several pairs of them.
-    pub where_present: bool,
+    pub(crate) where_present: bool,
     /// Columns w, x, y, z that are one rotation together.
-    pub quaternions: Vec<Vec<String>>,
+    pub(crate) quaternions: Vec<Vec<String>>,
     /// Pairs rows of equal keys in their order instead of reporting them.
-    pub by_occurrence: bool,
+    pub(crate) by_occurrence: bool,
     /// Reads everything, also where the files say that they have equal content.
-    pub reread: bool,
+    pub(crate) reread: bool,
     /// Worst rows that are kept.
-    pub limit: usize,
+    pub(crate) limit: usize,
     /// Where every cell that differs is written as a row.
-    pub out: Option<PathBuf>,
+    pub(crate) out: Option<PathBuf>,
 }
 
 /// A tolerance for all columns, and for some.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Tolerances {
+pub(crate) struct Tolerances {
     /// The tolerance of every column.
-    pub all: Option<f64>,
+    pub(crate) all: Option<f64>,
     /// Tolerances of single columns, each with the unit in which it was given.
-    pub columns: BTreeMap<String, (f64, Option<Unit>)>,
+    pub(crate) columns: BTreeMap<String, (f64, Option<Unit>)>,
 }
 
 impl Tolerances {
     /// Takes in `0.1`, `x_mm=0.1` or `x_mm=100um`.
-    pub fn add(&mut self, flag: &str, text: &str) -> Result<()> {
+    pub(crate) fn add(&mut self, flag: &str, text: &str) -> Result<()> {
         let fault = || {
             Error::spec(
                 flag,
@@ -109,31 +109,31 @@ impl Tolerances {
 
 /// Two tables compared.
 #[derive(Debug, Clone, Serialize)]
-pub struct TableDiff {
+pub(crate) struct TableDiff {
     /// The first table.
-    pub a: DiffedTable,
+    pub(crate) a: DiffedTable,
     /// The second table.
-    pub b: DiffedTable,
+    pub(crate) b: DiffedTable,
     /// Columns that identify rows.
-    pub key: Vec<String>,
+    pub(crate) key: Vec<String>,
     /// Equal without a look at any row: by the hash of their content, or byte by byte.
-    pub equal: Option<Equal>,
+    pub(crate) equal: Option<Equal>,
     /// What differs beside the values: columns, units, types, the schema's version.
-    pub findings: Vec<Discrepancy>,
+    pub(crate) findings: Vec<Discrepancy>,
     /// How many rows are what.
-    pub rows: RowCounts,
+    pub(crate) rows: RowCounts,
     /// Compared columns, in the order of A.
-    pub columns: Vec<ColumnDiff>,
+    pub(crate) columns: Vec<ColumnDiff>,
     /// The worst first.
-    pub worst: Vec<WorstRow>,
+    pub(crate) worst: Vec<WorstRow>,
     /// Keys that occur in one table only or more than once, some of them.
-    pub examples: Examples,
+    pub(crate) examples: Examples,
 }
 
 /// Why two tables are the same whatever their rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Equal {
+pub(crate) enum Equal {
     /// The files say that they have the same content.
     Hash,
     /// They are one file.
@@ -144,7 +144,7 @@ pub enum Equal {
 
 impl Equal {
     /// What it means, in words.
-    pub fn says(self) -> &'static str {
+    pub(crate) fn says(self) -> &'static str {
         match self {
             Self::Hash => "equal by the hash of their content",
             Self::File => "one and the same file",
@@ -155,26 +155,26 @@ impl Equal {
 
 /// One side of a comparison.
 #[derive(Debug, Clone, Serialize)]
-pub struct DiffedTable {
+pub(crate) struct DiffedTable {
     /// As it was given.
-    pub path: String,
+    pub(crate) path: String,
     /// `prediction/1.0.0`.
-    pub schema: Option<String>,
+    pub(crate) schema: Option<String>,
     /// Hash of its content, where the file carries it.
-    pub table_hash: Option<String>,
+    pub(crate) table_hash: Option<String>,
     /// How many.
-    pub rows: u64,
+    pub(crate) rows: u64,
 }
 
 /// A difference of the tables' make.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Discrepancy {
+pub(crate) struct Discrepancy {
     /// `column`, `unit`, `type`, `semantic`, `schema`, `key`.
-    pub what: String,
+    pub(crate) what: String,
     /// Its name.
-    pub column: String,
+    pub(crate) column: String,
     /// What differs, in words.
-    pub says: String,
+    pub(crate) says: String,
 }
 
 impl Discrepancy {
@@ -189,114 +189,114 @@ impl Discrepancy {
 
 /// How many rows of each class.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct RowCounts {
+pub(crate) struct RowCounts {
     /// In every column.
-    pub same: u64,
+    pub(crate) same: u64,
     /// In every column, and not in all the same.
-    pub within_tolerance: u64,
+    pub(crate) within_tolerance: u64,
     /// Beyond tolerance in some column.
-    pub changed: u64,
+    pub(crate) changed: u64,
     /// Keys of the first table alone.
-    pub only_a: u64,
+    pub(crate) only_a: u64,
     /// Keys of the second table alone.
-    pub only_b: u64,
+    pub(crate) only_b: u64,
     /// Rows whose key occurs more than once in a table.
-    pub duplicate_a: u64,
+    pub(crate) duplicate_a: u64,
     /// The same of the second table.
-    pub duplicate_b: u64,
+    pub(crate) duplicate_b: u64,
     /// How many keys occur more than once.
-    pub duplicate_keys: u64,
+    pub(crate) duplicate_keys: u64,
 }
 
 /// A column of which values differ.
 #[derive(Debug, Clone, Serialize)]
-pub struct ColumnDiff {
+pub(crate) struct ColumnDiff {
     /// Its name.
-    pub name: String,
+    pub(crate) name: String,
     /// Unit of tolerance and statistics, A's; `row` where every row has its own.
-    pub unit: String,
+    pub(crate) unit: String,
     /// Rows with a value in both.
-    pub pairs: u64,
+    pub(crate) pairs: u64,
     /// Values that differ within tolerance.
-    pub within: u64,
+    pub(crate) within: u64,
     /// Values that differ beyond.
-    pub changed: u64,
+    pub(crate) changed: u64,
     /// Absolute tolerance, in the unit of the column.
-    pub atol: f64,
+    pub(crate) atol: f64,
     /// Relative tolerance.
-    pub rtol: f64,
+    pub(crate) rtol: f64,
     /// Statistics of B minus A over all pairs; null for texts and where rows have units of their own.
-    pub statistics: Option<DifferenceStatistics>,
+    pub(crate) statistics: Option<DifferenceStatistics>,
     /// Largest difference in standard deviations, where the table has them.
-    pub max_sigmas: Option<f64>,
+    pub(crate) max_sigmas: Option<f64>,
     /// The same, rms.
-    pub rms_sigmas: Option<f64>,
+    pub(crate) rms_sigmas: Option<f64>,
     #[serde(skip)]
     worst_row: Option<u32>,
     /// Where the difference is largest.
-    pub worst_key: Option<String>,
+    pub(crate) worst_key: Option<String>,
 }
 
 /// Differences of a column of numbers, in its unit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct DifferenceStatistics {
+pub(crate) struct DifferenceStatistics {
     /// Largest size.
-    pub max: f64,
+    pub(crate) max: f64,
     /// Root of the mean square.
-    pub rms: f64,
+    pub(crate) rms: f64,
     /// Mean.
-    pub bias: f64,
+    pub(crate) bias: f64,
     /// 95th percentile of the size.
-    pub p95: f64,
+    pub(crate) p95: f64,
 }
 
 /// A row that changed, with its cells that changed.
 #[derive(Debug, Clone, Serialize)]
-pub struct WorstRow {
+pub(crate) struct WorstRow {
     /// Key of the row, in words.
-    pub key: String,
+    pub(crate) key: String,
     /// What differs in it.
-    pub cells: Vec<WorstCell>,
+    pub(crate) cells: Vec<WorstCell>,
 }
 
 /// A value that differs.
 #[derive(Debug, Clone, Serialize)]
-pub struct WorstCell {
+pub(crate) struct WorstCell {
     /// Its column.
-    pub column: String,
+    pub(crate) column: String,
     /// In the first table.
-    pub a: serde_json::Value,
+    pub(crate) a: serde_json::Value,
     /// In the second table.
-    pub b: serde_json::Value,
+    pub(crate) b: serde_json::Value,
     /// The difference of numbers, in their unit.
-    pub difference: Option<f64>,
+    pub(crate) difference: Option<f64>,
     /// Empty where there is none.
-    pub unit: String,
+    pub(crate) unit: String,
     /// The difference in standard deviations, where the table has them.
-    pub sigmas: Option<f64>,
+    pub(crate) sigmas: Option<f64>,
 }
 
 /// A few keys of each kind.
 #[derive(Debug, Clone, Default, Serialize)]
-pub struct Examples {
+pub(crate) struct Examples {
     /// Keys of the first table alone.
-    pub only_a: Vec<String>,
+    pub(crate) only_a: Vec<String>,
     /// Keys of the second table alone.
-    pub only_b: Vec<String>,
+    pub(crate) only_b: Vec<String>,
     /// Keys that occur more than once.
-    pub duplicate: Vec<String>,
+    pub(crate) duplicate: Vec<String>,
 }
 
 impl TableDiff {
     /// True where nothing differs beyond tolerance.
-    pub fn is_same(&self) -> bool {
+    pub(crate) fn is_same(&self) -> bool {
         let rows = &self.rows;
         self.findings.is_empty()
             && rows.changed + rows.only_a + rows.only_b + self.duplicates() == 0
     }
 
     /// Rows that could not be paired because their key is not theirs alone.
-    pub fn duplicates(&self) -> u64 {
+    pub(crate) fn duplicates(&self) -> u64 {
         self.rows.duplicate_a + self.rows.duplicate_b
     }
 }

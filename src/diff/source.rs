@@ -33,24 +33,24 @@ pub(super) enum CellKind {
 
 #[derive(Debug, Clone)]
 pub(super) struct TableColumn {
-    pub name: String,
-    pub kind: CellKind,
+    pub(crate) name: String,
+    pub(crate) kind: CellKind,
     /// As the file has it, for findings.
-    pub stored: String,
-    pub unit: Option<String>,
-    pub semantic: Option<String>,
+    pub(crate) stored: String,
+    pub(crate) unit: Option<String>,
+    pub(crate) semantic: Option<String>,
 }
 
 /// A Parquet file, by its footer.
 pub(super) struct TableFile {
-    pub path: PathBuf,
-    pub rows: usize,
-    pub columns: Vec<TableColumn>,
+    pub(crate) path: PathBuf,
+    pub(crate) rows: usize,
+    pub(crate) columns: Vec<TableColumn>,
     /// Kind and version, where the file says so.
-    pub table: Option<(String, Version)>,
-    pub table_hash: Option<String>,
+    pub(crate) table: Option<(String, Version)>,
+    pub(crate) table_hash: Option<String>,
     /// Columns that tell every row from every other, where the file says so.
-    pub key: Vec<String>,
+    pub(crate) key: Vec<String>,
     metadata: ArrowReaderMetadata,
 }
 
@@ -128,17 +128,17 @@ impl TableFile {
     }
 
     /// The schema that this calib knows of the table, whatever the version.
-    pub fn schema(&self) -> Option<&'static TableSchema> {
+    pub(crate) fn schema(&self) -> Option<&'static TableSchema> {
         let (kind, _) = self.table.as_ref()?;
         schema::all().find(|schema| &schema.name == kind)
     }
 
-    pub fn position(&self, column: &str) -> Option<usize> {
+    pub(crate) fn position(&self, column: &str) -> Option<usize> {
         self.columns.iter().position(|known| known.name == column)
     }
 
     /// The place of a column that a key needs.
-    pub fn key_column(&self, name: &str) -> Result<usize> {
+    pub(crate) fn key_column(&self, name: &str) -> Result<usize> {
         self.position(name).ok_or_else(|| {
             let known: Vec<&str> = self
                 .columns
@@ -151,7 +151,7 @@ impl TableFile {
     }
 
     /// Batches of the given columns, in the given order, each cast to the type of its kind.
-    pub fn stream(
+    pub(crate) fn stream(
         &self,
         columns: &[usize],
     ) -> Result<impl Iterator<Item = Result<Vec<ArrayRef>>> + use<>> {
@@ -223,7 +223,7 @@ impl TableFile {
     }
 
     /// A whole column as texts.
-    pub fn whole_text(&self, column: usize) -> Result<ArrayRef> {
+    pub(crate) fn whole_text(&self, column: usize) -> Result<ArrayRef> {
         let batches = self
             .stream(&[column])?
             .map(|batch| -> Result<ArrayRef> { Ok(Arc::new(texts_of(&batch?[0])?)) });

@@ -18,18 +18,18 @@ use std::io;
 /// A body in a frame at its joint's point, parallel to the base at the zero pose.
 pub(super) struct LinkBody {
     /// kg.
-    pub mass: f64,
+    pub(crate) mass: f64,
     /// m, from the joint's point.
-    pub centre: [f64; 3],
+    pub(crate) centre: [f64; 3],
     /// kg m2 about the centre: xx, xy, xz, yy, yz, zz.
-    pub inertia: [f64; 6],
+    pub(crate) inertia: [f64; 6],
     /// What is to be said of it.
-    pub remark: Option<&'static str>,
+    pub(crate) remark: Option<&'static str>,
 }
 
 impl LinkBody {
     /// Whether the inertia stands for one that is not known.
-    pub fn is_placeholder(&self) -> bool {
+    pub(crate) fn is_placeholder(&self) -> bool {
         self.remark == Some(PLACEHOLDER)
     }
 }

@@ -207,7 +207,7 @@ impl DeviationEntry {
         }
     }
 
-    pub fn place(self) -> Place {
+    pub(crate) fn place(self) -> Place {
         match self {
             Self::Zero(joint) | Self::Factor(joint) => Place::Joint(joint),
             Self::Coupling { by, moved } => Place::Coupled(by, moved),
@@ -224,7 +224,7 @@ pub(super) struct JointDeviation {
 
 impl JointDeviation {
     /// One number of 1, all others 0, in the robot file's counting.
-    pub fn unit(entry: DeviationEntry, joints: usize) -> Self {
+    pub(crate) fn unit(entry: DeviationEntry, joints: usize) -> Self {
         let mut out = Self {
             slope: DMatrix::zeros(joints, joints),
             zero: DVector::zeros(joints),
@@ -237,7 +237,7 @@ impl JointDeviation {
         out
     }
 
-    pub fn at(&self, entry: DeviationEntry) -> f64 {
+    pub(crate) fn at(&self, entry: DeviationEntry) -> f64 {
         match entry {
             DeviationEntry::Zero(joint) => self.zero[joint],
             DeviationEntry::Factor(joint) => self.slope[(joint, joint)],
@@ -246,12 +246,12 @@ impl JointDeviation {
     }
 
     /// Whether a number is more than rounding.
-    pub fn holds(&self, entry: DeviationEntry) -> bool {
+    pub(crate) fn holds(&self, entry: DeviationEntry) -> bool {
         self.at(entry).abs() > ROUNDING * self.slope.amax().max(self.zero.amax())
     }
 
     /// In the controller's numbers c: with q = A (c - z), c_true - c = B slope A (c - z) + B zero, B the inverse of A.
-    pub fn counted(&self, convention: &JointConvention) -> Self {
+    pub(crate) fn counted(&self, convention: &JointConvention) -> Self {
         let shown = DVector::from_column_slice(convention.zero());
         let joints = shown.len();
         let matrix = |change: &dyn Fn(&mut DVector<f64>)| {

@@ -130,7 +130,7 @@ pub(super) fn gear(torques: &IdentifiedTorques, joint: usize) -> Option<f64> {
 
 impl Export {
     /// What the reader of a format must know, a sentence a line: of torques, each cause that it leaves out, with its size.
-    pub fn remarks_in(&self, format: &Format) -> Vec<String> {
+    pub(crate) fn remarks_in(&self, format: &Format) -> Vec<String> {
         let mut lines = vec![self.mark(format.name).to_string()];
         lines.extend(self.remarks());
         let Some(torques) = &self.identified.torques else {

@@ -9,11 +9,11 @@ use std::fmt;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ExportMark {
     /// Of the file.
-    pub format: String,
+    pub(crate) format: String,
     /// Of the robot, where the pipeline's report states it.
-    pub serial: Option<String>,
+    pub(crate) serial: Option<String>,
     /// Of the nominal robot and all that was identified.
-    pub model: String,
+    pub(crate) model: String,
 }
 
 /// How a mark begins.
@@ -66,7 +66,7 @@ pub enum Belonging {
 
 impl Export {
     /// The mark of a file in this format.
-    pub fn mark(&self, format: &str) -> ExportMark {
+    pub(crate) fn mark(&self, format: &str) -> ExportMark {
         // As text that holds no sign of another format; hashes of tables are those of their content.
         let plain = |serial: &String| {
             one_line(serial)
@@ -102,7 +102,7 @@ impl Export {
     }
 
     /// Whether a file is this model's export. Fails where it carries no mark.
-    pub fn check(&self, label: &str, text: &str) -> Result<Belonging> {
+    pub(crate) fn check(&self, label: &str, text: &str) -> Result<Belonging> {
         let none = || {
             Error::data(
                 label,

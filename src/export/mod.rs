@@ -20,20 +20,20 @@ pub use model::Export;
 use crate::error::Result;
 
 /// A way to write the model down.
-pub struct Format {
+pub(crate) struct Format {
     /// What `--format` calls it.
-    pub name: &'static str,
+    pub(crate) name: &'static str,
     /// What it is, in one line.
-    pub help: &'static str,
+    pub(crate) help: &'static str,
     /// What it holds of identified torques.
-    pub carries: CarriedTorques,
+    pub(crate) carries: CarriedTorques,
     /// The whole file. Fails where the format cannot hold this arm at all.
-    pub text: fn(&Export) -> Result<String>,
+    pub(crate) text: fn(&Export) -> Result<String>,
 }
 
 /// What a format holds of identified torques.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum CarriedTorques {
+pub(crate) enum CarriedTorques {
     /// None of it.
     Nothing,
     /// Inertials, and these causes at joints.
@@ -43,7 +43,7 @@ pub enum CarriedTorques {
 }
 
 /// All formats, in the order of the help.
-pub const FORMATS: &[Format] = &[
+pub(crate) const FORMATS: &[Format] = &[
     urdf::URDF,
     xacro::XACRO,
     ur_kinematics::UR_KINEMATICS,

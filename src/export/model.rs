@@ -45,7 +45,7 @@ impl Export {
     }
 
     /// What the reader of an export must know, a sentence a line.
-    pub fn remarks(&self) -> Vec<String> {
+    pub(crate) fn remarks(&self) -> Vec<String> {
         let which = if self.recorded {
             "recorded poses"
         } else {

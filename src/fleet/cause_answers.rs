@@ -15,19 +15,19 @@ use crate::table::{
 use std::collections::BTreeMap;
 
 /// What was found.
-pub struct Answers {
+pub(crate) struct Answers {
     /// Causes of groups and of single robots.
-    pub findings: FleetFindings,
+    pub(crate) findings: FleetFindings,
     /// Every robot's size of each.
-    pub cells: FleetCells,
+    pub(crate) cells: FleetCells,
     /// Robots that are not like their group.
-    pub outliers: FleetOutliers,
+    pub(crate) outliers: FleetOutliers,
 }
 
 /// Sizes of robots, mm: the usual one and how it scatters from robot to robot.
 pub(super) struct Population {
-    pub usual: f64,
-    pub spread: f64,
+    pub(crate) usual: f64,
+    pub(crate) spread: f64,
 }
 
 /// Answers by the last round.

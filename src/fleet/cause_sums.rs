@@ -33,10 +33,10 @@ fn log_mean(logs: impl Iterator<Item = f64> + Clone) -> f64 {
 /// What a cell, or one of its shapes, says of a group.
 #[derive(Debug, Clone)]
 pub(super) struct Sum {
-    pub effect: String,
-    pub place: String,
-    pub follows: String,
-    pub log_prior: f64,
+    pub(crate) effect: String,
+    pub(crate) place: String,
+    pub(crate) follows: String,
+    pub(crate) log_prior: f64,
     /// At each share, over that of robots of which no more is known than the least.
     logs: [f64; SHARES],
     /// Of the robot in which it is plainest.
@@ -82,13 +82,13 @@ impl Sum {
     }
 
     /// ln of the evidence for it over that of nothing, of so many robots.
-    pub fn total(&self, robots: usize) -> f64 {
+    pub(crate) fn total(&self, robots: usize) -> f64 {
         let at = |(log, share): (&f64, f64)| log + robots as f64 * mixed(*LEAST_EVIDENCE, share);
         log_mean(self.logs.iter().zip(shares()).map(at))
     }
 
     /// The same without the robot in which it is plainest.
-    pub fn of_the_others(&self, robots: usize) -> f64 {
+    pub(crate) fn of_the_others(&self, robots: usize) -> f64 {
         let at = |(log, share): (&f64, f64)| {
             log + robots as f64 * mixed(*LEAST_EVIDENCE, share) - mixed(self.strongest, share)
         };
@@ -107,7 +107,7 @@ impl Sum {
     }
 
     /// A usual size, mm.
-    pub fn size_mm(&self) -> f64 {
+    pub(crate) fn size_mm(&self) -> f64 {
         (self.sized.0 / self.sized.1.max(f64::MIN_POSITIVE))
             .exp()
             .clamp(1e-3, 100.0)
@@ -120,7 +120,7 @@ type CellKey = (String, String, String);
 /// The sums of a group.
 #[derive(Debug, Default)]
 pub(super) struct GroupSums {
-    pub robots: usize,
+    pub(crate) robots: usize,
     /// Sums of what each given cell says in its shape, and of the squares.
     owners: BTreeMap<String, [f64; 2]>,
     sums: BTreeMap<CellKey, Sum>,
@@ -128,20 +128,20 @@ pub(super) struct GroupSums {
 
 /// What a cell says of a group, with the shape that all robots share where that says more.
 pub(super) struct CellTotal<'a> {
-    pub cell: &'a str,
-    pub shape: Option<&'a str>,
-    pub sum: &'a Sum,
+    pub(crate) cell: &'a str,
+    pub(crate) shape: Option<&'a str>,
+    pub(crate) sum: &'a Sum,
     /// ln of its posterior odds.
-    pub odds: f64,
+    pub(crate) odds: f64,
     /// The same without the robot in which it is plainest.
-    pub of_the_others: f64,
+    pub(crate) of_the_others: f64,
     /// Variance of what it says less than the cell in whose place it is asked.
-    pub scatter: f64,
+    pub(crate) scatter: f64,
 }
 
 impl GroupSums {
     /// Takes a robot that was asked with some given cells.
-    pub fn add(&mut self, rows: &[CellEvidenceRow], given: &[Given]) {
+    pub(crate) fn add(&mut self, rows: &[CellEvidenceRow], given: &[Given]) {
         self.robots += 1;
         let mut logs: BTreeMap<&str, f64> = BTreeMap::new();
         for one in given {

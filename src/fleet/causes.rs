@@ -38,11 +38,11 @@ struct Alone {
 }
 
 /// The search over a fleet's groups.
-pub struct CauseSearch {
+pub(crate) struct CauseSearch {
     round: Round,
     groups: BTreeMap<String, GroupSearch>,
     /// Rounds so far.
-    pub rounds: usize,
+    pub(crate) rounds: usize,
 }
 
 impl CauseSearch {
@@ -56,18 +56,18 @@ impl CauseSearch {
     }
 
     /// What robots are to be asked now.
-    pub fn round(&self) -> &Round {
+    pub(crate) fn round(&self) -> &Round {
         &self.round
     }
 
     /// Keys of the cells that the groups have so far.
-    pub fn so_far(&self) -> Vec<String> {
+    pub(crate) fn so_far(&self) -> Vec<String> {
         let given = self.round.groups.values().flatten();
         given.map(|given| visible(&given.cell)).collect()
     }
 
     /// Takes the robots' answers; whether they are to be asked again.
-    pub fn take(
+    pub(crate) fn take(
         &mut self,
         fleet: &Fleet,
         ledger: &Ledger,
@@ -227,11 +227,11 @@ impl GroupSearch {
 /// What a fleet's diagnosis came to.
 pub struct Published {
     /// What was found.
-    pub answers: Answers,
+    pub(crate) answers: Answers,
     /// Where people find the tables and the page.
-    pub tables: Vec<PathBuf>,
+    pub(crate) tables: Vec<PathBuf>,
     /// The page.
-    pub page: PathBuf,
+    pub(crate) page: PathBuf,
 }
 
 /// Makes the tables and the page from the last round's records and publishes them.

@@ -12,29 +12,29 @@ const ARRAY: usize = 1000;
 
 /// What a cluster is asked for.
 #[derive(Debug, Clone)]
-pub struct ClusterOptions {
+pub(crate) struct ClusterOptions {
     /// The `calib` that the nodes run.
-    pub program: PathBuf,
+    pub(crate) program: PathBuf,
     /// Absolute, on storage that all nodes share.
-    pub store: PathBuf,
+    pub(crate) store: PathBuf,
     /// The partition of the cluster; its default if none.
-    pub partition: Option<String>,
+    pub(crate) partition: Option<String>,
     /// Tasks at once.
-    pub max_parallel: Option<u32>,
+    pub(crate) max_parallel: Option<u32>,
     /// E.g. `2G`.
-    pub memory: Option<String>,
+    pub(crate) memory: Option<String>,
     /// E.g. `00:30:00`.
-    pub time: Option<String>,
+    pub(crate) time: Option<String>,
     /// More options of sbatch, each a word.
-    pub more: Vec<String>,
+    pub(crate) more: Vec<String>,
 }
 
 /// The script of one array and the tasks that it takes.
-pub struct Script {
+pub(crate) struct Script {
     /// Text of the script.
-    pub text: String,
+    pub(crate) text: String,
     /// How many.
-    pub tasks: usize,
+    pub(crate) tasks: usize,
 }
 
 impl ClusterOptions {
@@ -78,12 +78,12 @@ impl ClusterOptions {
 }
 
 /// Where the tasks of a run say what they did.
-pub fn logs(store: &Path, fleet: &str) -> PathBuf {
+pub(crate) fn logs(store: &Path, fleet: &str) -> PathBuf {
     store.join("fleets").join(fleet).join("logs")
 }
 
 /// The scripts of a run for `sbatch`, one an array.
-pub fn slurm(note: &RunNote, options: &ClusterOptions) -> Result<Vec<Script>> {
+pub(crate) fn slurm(note: &RunNote, options: &ClusterOptions) -> Result<Vec<Script>> {
     options.check()?;
     let count = note.tasks.len();
     let scripts = (0..count).step_by(ARRAY).map(|first| {
@@ -117,7 +117,12 @@ pub fn slurm(note: &RunNote, options: &ClusterOptions) -> Result<Vec<Script>> {
 }
 
 /// An Indexed Job for Kubernetes. Experimental: rendered, never run here.
-pub fn kubernetes(note: &RunNote, options: &ClusterOptions, image: &str, claim: &str) -> String {
+pub(crate) fn kubernetes(
+    note: &RunNote,
+    options: &ClusterOptions,
+    image: &str,
+    claim: &str,
+) -> String {
     let yaml = crate::yaml::quoted;
     let name: String = format!("calib-{}-{}", note.fleet, note.run)
         .to_lowercase()

@@ -20,28 +20,28 @@ const FORMAT: u64 = 1;
 #[schemars(title = "calib fleet")]
 pub struct FleetFile {
     /// Format of this file: 1.
-    pub calib: u64,
+    pub(crate) calib: u64,
     /// Name of the fleet, e.g. of a plant and its campaign; part of the paths of its tables.
-    pub name: String,
+    pub(crate) name: String,
     /// The pipeline's YAML file, relative to this one.
-    pub pipeline: PathBuf,
+    pub(crate) pipeline: PathBuf,
     /// Variables and settings of the pipeline for all robots, as `--set`: `{seed: 7, split.n: 4}`.
     #[serde(default)]
-    pub set: BTreeMap<String, Value>,
+    pub(crate) set: BTreeMap<String, Value>,
     /// What is known of all robots.
     #[serde(default)]
-    pub groups: Groups,
+    pub(crate) groups: Groups,
     /// Where the robots come from.
     pub robots: Vec<RobotSource>,
     /// Robots that differ from the others; later entries win.
     #[serde(default)]
-    pub overrides: Vec<Exception>,
+    pub(crate) overrides: Vec<Exception>,
     /// An earlier fleet of the same robots, done in the same store: changes since then are tested.
     #[serde(default)]
     pub previous: Option<Previous>,
     /// What an earlier fleet in the same store says of parameters, as priors.
     #[serde(default)]
-    pub prior: Option<PriorFrom>,
+    pub(crate) prior: Option<PriorFrom>,
 }
 
 /// What distinguishes robots in tables and pools.
@@ -50,13 +50,13 @@ pub struct FleetFile {
 pub struct Groups {
     /// Model of the robot.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub model: Option<String>,
+    pub(crate) model: Option<String>,
     /// Where it stands.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub plant: Option<String>,
+    pub(crate) plant: Option<String>,
     /// Date of the measurement, e.g. 2026-10-01.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub campaign: Option<String>,
+    pub(crate) campaign: Option<String>,
 }
 
 impl Groups {
@@ -77,40 +77,40 @@ impl Groups {
 pub struct RobotSource {
     /// One folder a robot, as a pattern relative to this file: `recordings/*`. The folder's name is the robot's.
     #[serde(default)]
-    pub folders: Option<String>,
+    pub(crate) folders: Option<String>,
     /// CSV or Parquet with the columns `robot`, and if wanted `folder`, `model`, `plant`, `campaign`, `set.TARGET` (a value as in
     /// `set`) and `path.TARGET` (a file relative to the list).
     #[serde(default)]
-    pub list: Option<PathBuf>,
+    pub(crate) list: Option<PathBuf>,
     /// One CSV or Parquet table with the rows of all robots.
     #[serde(default)]
-    pub recording: Option<PathBuf>,
+    pub(crate) recording: Option<PathBuf>,
     /// The column of `recording` that names the robot.
     #[serde(default = "robot_id")]
-    pub by: String,
+    pub(crate) by: String,
     /// The pipeline's variable that takes the folder, or the robot's part of the recording.
     #[serde(default)]
-    pub variable: Option<String>,
+    pub(crate) variable: Option<String>,
     /// What is known of these robots.
     #[serde(default)]
-    pub groups: Groups,
+    pub(crate) groups: Groups,
     /// Variables and settings of the pipeline for these robots.
     #[serde(default)]
-    pub set: BTreeMap<String, Value>,
+    pub(crate) set: BTreeMap<String, Value>,
 }
 
 /// Robots that differ from the others.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Exception {
+pub(crate) struct Exception {
     /// Names; `*` stands for anything.
-    pub robots: Vec<String>,
+    pub(crate) robots: Vec<String>,
     /// Labels by which robots are grouped.
     #[serde(default)]
-    pub groups: Groups,
+    pub(crate) groups: Groups,
     /// Overrides of the pipeline.
     #[serde(default)]
-    pub set: BTreeMap<String, Value>,
+    pub(crate) set: BTreeMap<String, Value>,
 }
 
 /// The campaign before this one.
@@ -118,34 +118,34 @@ pub struct Exception {
 #[serde(deny_unknown_fields)]
 pub struct Previous {
     /// Name of the earlier fleet.
-    pub fleet: String,
+    pub(crate) fleet: String,
     /// The id of this pipeline's stage `compare`.
     #[serde(default = "compare")]
     pub stage: String,
     /// Chance of a false flag in the whole fleet, shared by all robots and parameters.
     #[serde(default = "five_percent")]
-    pub alpha: f64,
+    pub(crate) alpha: f64,
 }
 
 /// Priors of a stage from an earlier fleet.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct PriorFrom {
+pub(crate) struct PriorFrom {
     /// Name of the earlier fleet.
-    pub fleet: String,
+    pub(crate) fleet: String,
     /// The stage of this pipeline that takes the priors, with a setting `prior`; its namesake there gives them.
-    pub stage: String,
+    pub(crate) stage: String,
     /// Whose values are taken.
-    pub by: PriorBy,
+    pub(crate) by: PriorBy,
     /// Effects that it speaks of, by canonical name; of `causes` none.
     #[serde(default)]
-    pub effects: Vec<String>,
+    pub(crate) effects: Vec<String>,
 }
 
 /// Whose parameters make a prior.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum PriorBy {
+pub(crate) enum PriorBy {
     /// The robot's own.
     Robot,
     /// Mean and spread over all robots of the same `groups.model`, with the robot's own left out.

@@ -16,7 +16,7 @@ use std::path::PathBuf;
 /// Bumped when older records can no longer be understood.
 const RECORD_FORMAT: u32 = 1;
 /// Exit code of what may work later.
-pub const LATER: u8 = 75;
+pub(crate) const LATER: u8 = 75;
 
 /// How it ended for a robot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -32,7 +32,7 @@ pub enum Ending {
 
 impl Ending {
     /// As tables hold it.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Done => "done",
             Self::Rejected => "rejected",
@@ -43,62 +43,62 @@ impl Ending {
 
 /// A table of a robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct RobotTable {
+pub(crate) struct RobotTable {
     /// Id of its stage.
-    pub stage: String,
+    pub(crate) stage: String,
     /// On which it was written.
-    pub port: String,
+    pub(crate) port: String,
     /// The name of its schema.
-    pub kind: String,
+    pub(crate) kind: String,
     /// Where it is.
     #[serde(flatten)]
-    pub table: TableRef,
+    pub(crate) table: TableRef,
 }
 
 /// Result of a robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RobotRecord {
     /// Format of this record.
-    pub record_format: u32,
+    pub(crate) record_format: u32,
     /// Its name.
-    pub robot: String,
+    pub(crate) robot: String,
     /// Hash of the robot's name, settings and data.
-    pub key: String,
+    pub(crate) key: String,
     /// How it ended.
-    pub ending: Ending,
+    pub(crate) ending: Ending,
     /// As `calib run` would have ended.
-    pub exit_code: u8,
+    pub(crate) exit_code: u8,
     /// Why it is not done.
-    pub reason: Option<String>,
+    pub(crate) reason: Option<String>,
     /// The run in `runs/`, with all that was said; none where the plan could not be made.
-    pub run: Option<String>,
+    pub(crate) run: Option<String>,
     /// Host or node, and thread.
-    pub worker: String,
+    pub(crate) worker: String,
     /// What the cluster's task said, among the fleet's logs.
     #[serde(default)]
-    pub log: Option<String>,
+    pub(crate) log: Option<String>,
     /// RFC 3339, UTC.
-    pub ended: String,
+    pub(crate) ended: String,
     /// From start to end.
-    pub wall_seconds: f64,
+    pub(crate) wall_seconds: f64,
     /// That its run wrote or took.
-    pub tables: Vec<RobotTable>,
+    pub(crate) tables: Vec<RobotTable>,
     /// Name of the robot's folder among the documents.
-    pub handle: String,
+    pub(crate) handle: String,
     /// Names of its documents.
-    pub documents: Vec<String>,
+    pub(crate) documents: Vec<String>,
 }
 
 impl RobotRecord {
     /// The last table of a kind.
-    pub fn last(&self, kind: &str) -> Option<&TableRef> {
+    pub(crate) fn last(&self, kind: &str) -> Option<&TableRef> {
         self.tables
             .iter()
             .rfind(|made| made.kind == kind)
             .map(|made| &made.table)
     }
     /// The table of a kind that a stage wrote.
-    pub fn of_stage(&self, stage: &str, kind: &str) -> Option<&TableRef> {
+    pub(crate) fn of_stage(&self, stage: &str, kind: &str) -> Option<&TableRef> {
         self.tables
             .iter()
             .rfind(|made| made.stage == stage && made.kind == kind)
@@ -128,45 +128,45 @@ impl RobotRecord {
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct RunNote {
     /// Its id.
-    pub run: String,
+    pub(crate) run: String,
     /// Its name.
-    pub fleet: String,
+    pub(crate) fleet: String,
     /// `local` or `slurm`.
-    pub engine: String,
+    pub(crate) engine: String,
     /// Absolute, so that other hosts find it.
-    pub file: PathBuf,
+    pub(crate) file: PathBuf,
     /// In the order of the roster.
-    pub robots: Vec<Member>,
+    pub(crate) robots: Vec<Member>,
     /// Robots of every task of a cluster, by position.
     #[serde(default)]
-    pub tasks: Vec<Vec<usize>>,
+    pub(crate) tasks: Vec<Vec<usize>>,
     /// Ids of the cluster's jobs.
     #[serde(default)]
-    pub jobs: Vec<String>,
+    pub(crate) jobs: Vec<String>,
     /// The round of a fleet's diagnosis that it computes; none where it is the whole pipeline.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub round: Option<Round>,
+    pub(crate) round: Option<Round>,
 }
 
 /// A robot of a run.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Member {
+pub(crate) struct Member {
     /// Name of the robot.
-    pub name: String,
+    pub(crate) name: String,
     /// Its labels.
     #[serde(default)]
-    pub groups: Groups,
+    pub(crate) groups: Groups,
     /// Key of its record, once there is one.
     #[serde(default)]
-    pub key: Option<String>,
+    pub(crate) key: Option<String>,
 }
 
 /// The records of one fleet.
 pub struct Ledger<'a> {
     /// Where records are.
-    pub store: &'a Store,
+    pub(crate) store: &'a Store,
     /// Its name.
-    pub fleet: String,
+    pub(crate) fleet: String,
 }
 
 /// Held while a robot is computed; the kernel frees it when the process dies.
@@ -219,7 +219,7 @@ impl<'a> Ledger<'a> {
     }
 
     /// Records a robot's result; the record that stands is handed back, be it another's.
-    pub fn put(&self, record: RobotRecord) -> Result<RobotRecord> {
+    pub(crate) fn put(&self, record: RobotRecord) -> Result<RobotRecord> {
         let (place, name) = (self.records(&record.key), format!("{}.json", record.key));
         if self.store.put_note_once(&place, &name, &record)? {
             return Ok(record);
@@ -241,7 +241,7 @@ impl<'a> Ledger<'a> {
     }
 
     /// Takes a record away, so that the robot is computed again.
-    pub fn forget(&self, key: &str) -> Result<()> {
+    pub(crate) fn forget(&self, key: &str) -> Result<()> {
         self.store
             .drop_note(&self.records(key), &format!("{key}.json"))
     }
@@ -270,7 +270,7 @@ impl<'a> Ledger<'a> {
     }
 
     /// Keeps what a run of the fleet is about.
-    pub fn put_run(&self, note: &RunNote) -> Result<()> {
+    pub(crate) fn put_run(&self, note: &RunNote) -> Result<()> {
         self.store
             .put_note(&self.runs(), &format!("{}.json", note.run), note)
     }
@@ -295,18 +295,18 @@ impl<'a> Ledger<'a> {
     }
 
     /// Keeps the roster with the keys of its records, for status and later campaigns.
-    pub fn close(&self, note: &RunNote) -> Result<()> {
+    pub(crate) fn close(&self, note: &RunNote) -> Result<()> {
         self.store
             .put_note(&["fleets", &self.fleet], "roster.json", note)
     }
     /// The roster as the last run left it.
-    pub fn closed(&self) -> Result<Option<RunNote>> {
+    pub(crate) fn closed(&self) -> Result<Option<RunNote>> {
         let note = self.store.note(&["fleets", &self.fleet], "roster.json")?;
         Ok(note.and_then(|note| serde_json::from_value(note).ok()))
     }
 
     /// Asks the workers of a run to stop after the robots that they have in hand.
-    pub fn cancel(&self, run: &str) -> Result<()> {
+    pub(crate) fn cancel(&self, run: &str) -> Result<()> {
         self.store.put_note(
             &["fleets", &self.fleet],
             "cancelled.json",
@@ -314,7 +314,7 @@ impl<'a> Ledger<'a> {
         )
     }
     /// Whether a run was asked to stop.
-    pub fn cancelled(&self, run: &str) -> bool {
+    pub(crate) fn cancelled(&self, run: &str) -> bool {
         let note = self
             .store
             .note(&["fleets", &self.fleet], "cancelled.json")

@@ -13,25 +13,25 @@ const STACK: usize = 8 << 20;
 const PAUSE: Duration = Duration::from_millis(200);
 
 /// How robots are worked through.
-pub struct WorkerOptions<'a> {
+pub(crate) struct WorkerOptions<'a> {
     /// Robots at once.
-    pub workers: usize,
+    pub(crate) workers: usize,
     /// Stops at the first robot that is not done.
-    pub fail_fast: bool,
+    pub(crate) fail_fast: bool,
     /// Whether to stop after the robots in hand.
-    pub stop: &'a (dyn Fn() -> bool + Sync),
+    pub(crate) stop: &'a (dyn Fn() -> bool + Sync),
 }
 
 /// What came of it, in the order of the roster; nothing where the work was stopped before.
-pub struct FleetResults {
+pub(crate) struct FleetResults {
     /// In the order of the roster; none where a robot was not reached.
-    pub records: Vec<Option<RobotRecord>>,
+    pub(crate) records: Vec<Option<RobotRecord>>,
     /// Robots computed now.
-    pub computed: usize,
+    pub(crate) computed: usize,
 }
 
 /// Works through robots of the roster, by position. Fails where the store does; then all workers stop.
-pub fn work(
+pub(crate) fn work(
     workshop: &Workshop,
     robots: &[usize],
     options: &WorkerOptions,

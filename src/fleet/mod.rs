@@ -5,20 +5,20 @@
 
 mod cause_answers;
 mod cause_sums;
-pub mod causes;
-pub mod cluster;
+pub(crate) mod causes;
+pub(crate) mod cluster;
 pub mod file;
-pub mod ledger;
+pub(crate) mod ledger;
 mod list;
-pub mod local;
+pub(crate) mod local;
 mod partition;
 mod pool;
 mod recalibration;
-pub mod robot;
-pub mod roster;
-pub mod round;
-pub mod slurm;
-pub mod tables;
+pub(crate) mod robot;
+pub(crate) mod roster;
+pub(crate) mod round;
+pub(crate) mod slurm;
+pub(crate) mod tables;
 mod work;
 
 pub use file::{FleetFile, Groups};
@@ -32,15 +32,15 @@ use crate::store::Store;
 use std::path::{Path, PathBuf};
 
 /// A fleet whose file is sound and whose robots are known.
-pub struct Fleet {
+pub(crate) struct Fleet {
     /// As it was read.
-    pub file: FleetFile,
+    pub(crate) file: FleetFile,
     /// The pipeline's YAML, where it lies.
-    pub pipeline: PathBuf,
+    pub(crate) pipeline: PathBuf,
     /// Its text.
-    pub text: String,
+    pub(crate) text: String,
     /// Its robots.
-    pub roster: Roster,
+    pub(crate) roster: Roster,
 }
 
 impl Fleet {
@@ -63,7 +63,7 @@ impl Fleet {
     }
 
     /// As the file states it.
-    pub fn name(&self) -> &str {
+    pub(crate) fn name(&self) -> &str {
         &self.file.name
     }
 }

@@ -9,7 +9,7 @@ use crate::table::{Changes, Findings, FleetChangeRow, FleetChanges, Table};
 /// How rare a change by chance may be.
 pub(super) struct FalseAlarmRate {
     /// In the whole fleet.
-    pub alpha: f64,
+    pub(crate) alpha: f64,
 }
 
 /// Changes of all robots with their control limits: alpha shared by every robot and parameter that was tested (Bonferroni).
@@ -64,7 +64,7 @@ impl Earlier {
             .transpose()
     }
 
-    pub fn named(name: &str, place: &str, ledger: &Ledger) -> Result<Self> {
+    pub(crate) fn named(name: &str, place: &str, ledger: &Ledger) -> Result<Self> {
         let missing = || {
             Error::spec(
                 place,
@@ -83,12 +83,12 @@ impl Earlier {
         })
     }
 
-    pub fn members(&self) -> &[Member] {
+    pub(crate) fn members(&self) -> &[Member] {
         &self.note.robots
     }
 
     /// The record of a robot, where it has one there.
-    pub fn record(&self, ledger: &Ledger, robot: &str) -> Result<Option<RobotRecord>> {
+    pub(crate) fn record(&self, ledger: &Ledger, robot: &str) -> Result<Option<RobotRecord>> {
         let member = self.note.robots.iter().find(|member| member.name == robot);
         let Some(key) = member.and_then(|member| member.key.as_deref()) else {
             return Ok(None);
@@ -97,7 +97,7 @@ impl Earlier {
     }
 
     /// Why a person should look at a robot: `changed` beyond their limits, and another diagnosis than before.
-    pub fn flags(
+    pub(crate) fn flags(
         &self,
         ledger: &Ledger,
         robot: &str,

@@ -9,13 +9,13 @@ use std::collections::BTreeMap;
 #[derive(Debug, Clone)]
 pub struct FleetRobot {
     /// Unique in the fleet.
-    pub name: String,
+    pub(crate) name: String,
     /// Its labels.
-    pub groups: Groups,
+    pub(crate) groups: Groups,
     /// Later ones win.
-    pub sets: Vec<Override>,
+    pub(crate) sets: Vec<Override>,
     /// Why its data cannot be reached at all.
-    pub unreadable: Option<String>,
+    pub(crate) unreadable: Option<String>,
 }
 
 impl FleetRobot {
@@ -29,7 +29,7 @@ impl FleetRobot {
     }
 
     /// A name for paths: letters and digits of the robot's name, then its hash.
-    pub fn handle(&self) -> String {
+    pub(crate) fn handle(&self) -> String {
         let kept = self
             .name
             .chars()

@@ -95,7 +95,7 @@ impl Roster {
     }
 
     /// The position of a robot by its name.
-    pub fn position(&self, name: &str) -> Option<usize> {
+    pub(crate) fn position(&self, name: &str) -> Option<usize> {
         self.0.iter().position(|robot| robot.name == name)
     }
 }

@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 /// The label by which robots are grouped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum GroupColumn {
+pub(crate) enum GroupColumn {
     /// Model of the robot.
     Model,
     /// Where it stands.
@@ -36,18 +36,18 @@ impl GroupColumn {
 
 /// Which cells robots are taken to have.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Round {
+pub(crate) struct Round {
     /// The label by which robots are grouped.
-    pub by: GroupColumn,
+    pub(crate) by: GroupColumn,
     /// Of all robots of a group.
-    pub groups: BTreeMap<String, Vec<Given>>,
+    pub(crate) groups: BTreeMap<String, Vec<Given>>,
     /// Of single robots, by name.
-    pub robots: BTreeMap<String, Vec<Given>>,
+    pub(crate) robots: BTreeMap<String, Vec<Given>>,
 }
 
 impl Round {
     /// The first: nothing is given.
-    pub fn first(by: GroupColumn) -> Self {
+    pub(crate) fn first(by: GroupColumn) -> Self {
         Self {
             by,
             groups: BTreeMap::new(),

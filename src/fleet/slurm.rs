@@ -13,7 +13,7 @@ const LOOK: Duration = Duration::from_secs(1);
 const LOOKS: u32 = 10;
 
 /// Submits the arrays of a run and notes their ids. Fails where sbatch does.
-pub fn submit(ledger: &Ledger, note: &mut RunNote, options: &ClusterOptions) -> Result<()> {
+pub(crate) fn submit(ledger: &Ledger, note: &mut RunNote, options: &ClusterOptions) -> Result<()> {
     let scripts = slurm(note, options)?;
     ledger.put_run(note)?;
     let folder = logs(&options.store, &note.fleet);
@@ -37,7 +37,7 @@ pub fn submit(ledger: &Ledger, note: &mut RunNote, options: &ClusterOptions) -> 
 
 /// How a wait ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Waited {
+pub(crate) enum Waited {
     /// Every robot is recorded.
     Complete,
     /// The scheduler has nothing left of the run, and robots are missing.
@@ -47,7 +47,7 @@ pub enum Waited {
 }
 
 /// Waits until `missing` says 0. The scheduler is only asked whether it still has the jobs.
-pub fn wait(
+pub(crate) fn wait(
     jobs: &[String],
     mut missing: impl FnMut() -> Result<usize>,
     stop: &dyn Fn() -> bool,
@@ -84,7 +84,7 @@ pub fn wait(
 }
 
 /// Takes the jobs of a run from the scheduler.
-pub fn cancel(jobs: &[String]) -> Result<()> {
+pub(crate) fn cancel(jobs: &[String]) -> Result<()> {
     let words: Vec<&str> = jobs.iter().map(String::as_str).collect();
     if words.is_empty() {
         Ok(())

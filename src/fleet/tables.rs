@@ -19,15 +19,15 @@ use std::path::PathBuf;
 const STAGE: &str = "fleet";
 
 /// What a fleet came to.
-pub struct FleetSummary {
+pub(crate) struct FleetSummary {
     /// A row for each robot.
-    pub fleet: FleetTable,
+    pub(crate) fleet: FleetTable,
     /// A row for each parameter that was tested.
-    pub changes: FleetChanges,
+    pub(crate) changes: FleetChanges,
     /// Where people find the tables and the page.
-    pub tables: Vec<PathBuf>,
+    pub(crate) tables: Vec<PathBuf>,
     /// The page about the fleet.
-    pub page: PathBuf,
+    pub(crate) page: PathBuf,
 }
 
 /// Makes the tables and the page from the records (in the order of the roster; none: missing) and publishes them.

@@ -34,19 +34,19 @@ pub enum Visit {
 /// Where robots are computed.
 pub struct Workshop<'a> {
     /// Which robots, which pipeline.
-    pub fleet: &'a Fleet,
+    pub(crate) fleet: &'a Fleet,
     /// Where records go.
-    pub ledger: Ledger<'a>,
+    pub(crate) ledger: Ledger<'a>,
     /// Fresh for every run.
-    pub surroundings: &'a (dyn Fn() -> Surroundings + Sync),
+    pub(crate) surroundings: &'a (dyn Fn() -> Surroundings + Sync),
     /// E.g. the host.
-    pub name: String,
+    pub(crate) name: String,
     /// Where this process' own words go, among the fleet's logs.
-    pub log: Option<String>,
+    pub(crate) log: Option<String>,
     /// Threads inside one robot's run; no result depends on it.
-    pub threads: usize,
+    pub(crate) threads: usize,
     /// The round of a fleet's diagnosis that is computed; none where the whole pipeline is.
-    pub round: Option<Round>,
+    pub(crate) round: Option<Round>,
 }
 
 /// Longer reasons are cut; the run's manifest has them whole.
@@ -54,7 +54,7 @@ const REASON: usize = 2000;
 
 impl Workshop<'_> {
     /// The robot's plan with all that is set for it.
-    pub fn plan(&self, robot: &FleetRobot) -> Result<Plan> {
+    pub(crate) fn plan(&self, robot: &FleetRobot) -> Result<Plan> {
         if let Some(reason) = &robot.unreadable {
             return Err(Error::data("", reason.clone()));
         }
@@ -90,17 +90,22 @@ impl Workshop<'_> {
     }
 
     /// The key of the robot's record.
-    pub fn key(&self, robot: &FleetRobot) -> String {
+    pub(crate) fn key(&self, robot: &FleetRobot) -> String {
         self.prepared(robot).1
     }
 
     /// The robot's record, where there is one for its settings and data as they are.
-    pub fn record(&self, robot: &FleetRobot) -> Result<Option<RobotRecord>> {
+    pub(crate) fn record(&self, robot: &FleetRobot) -> Result<Option<RobotRecord>> {
         self.ledger.find(&self.prepared(robot).1)
     }
 
     /// Computes a robot unless it is recorded. Fails where the store does.
-    pub fn visit(&self, robot: &FleetRobot, worker: usize, watcher: &dyn Watcher) -> Result<Visit> {
+    pub(crate) fn visit(
+        &self,
+        robot: &FleetRobot,
+        worker: usize,
+        watcher: &dyn Watcher,
+    ) -> Result<Visit> {
         let (plan, key) = self.prepared(robot);
         let standing = |ledger: &Ledger| {
             ledger

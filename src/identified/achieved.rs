@@ -17,26 +17,26 @@ const FEWEST: usize = 4;
 #[derive(Debug, Default)]
 pub struct Achieved {
     /// How far the uncorrected commands would be off by the model.
-    pub before: Vec<f64>,
+    pub(crate) before: Vec<f64>,
     /// Within which the corrected ones were predicted to be with 95 %; empty where the model has no covariance.
-    pub predicted: Vec<f64>,
+    pub(crate) predicted: Vec<f64>,
     /// How far the measured points are from the wanted ones.
-    pub achieved: Vec<f64>,
+    pub(crate) achieved: Vec<f64>,
     /// Poses that were repeated often enough.
-    pub poses: Vec<RepeatedPose>,
+    pub(crate) poses: Vec<RepeatedPose>,
     /// Targets that the model could not reach, which were not corrected.
-    pub unreached: usize,
+    pub(crate) unreached: usize,
 }
 
 /// A pose of 30 cycles or more, ISO 9283.
 #[derive(Debug)]
 pub struct RepeatedPose {
     /// How often.
-    pub cycles: usize,
+    pub(crate) cycles: usize,
     /// Distance of the mean of the attained points from the wanted one (AP), m.
-    pub accuracy: f64,
+    pub(crate) accuracy: f64,
     /// Mean distance from that mean plus three standard deviations (RP), m.
-    pub repeatability: f64,
+    pub(crate) repeatability: f64,
 }
 
 /// Compares; `new_base` finds the tracker's place anew from these points. Fails where they are too few for that.

@@ -39,31 +39,31 @@ pub struct IdentifiedModel {
     /// Nominal arm, effects and their values.
     pub model: Model,
     /// What was identified of the torques, if anything.
-    pub torques: Option<IdentifiedTorques>,
+    pub(crate) torques: Option<IdentifiedTorques>,
     /// What was learned on top, if anything.
-    pub correction: Option<Correction>,
+    pub(crate) correction: Option<Correction>,
     /// Covariance of the estimated parameters, where it is known.
-    pub covariance: Option<Covariance>,
+    pub(crate) covariance: Option<Covariance>,
     /// How the arm scatters about the model.
-    pub scatter: Scatter,
+    pub(crate) scatter: Scatter,
     /// The recording, where it is known.
-    pub data: Option<Measurements>,
+    pub(crate) data: Option<Measurements>,
     /// How the controller counts its joints; none where a table alone was given, which does not say.
-    pub convention: Option<JointConvention>,
+    pub(crate) convention: Option<JointConvention>,
     /// The serial number of the robot, as the pipeline's report states it.
-    pub serial: Option<String>,
+    pub(crate) serial: Option<String>,
     /// Where the parameters come from, e.g. `run 01J..., stage geometry`.
     pub origin: String,
     /// What the last diagnosis left without a cause, if anything.
-    pub unexplained: Option<String>,
+    pub(crate) unexplained: Option<String>,
     /// What the person must know of it.
     pub warnings: Vec<String>,
     /// What the stage that identified it, or learned on top, warned of when it ran.
-    pub stage_warnings: Vec<String>,
+    pub(crate) stage_warnings: Vec<String>,
     /// Why no commands are to be made of it, a sentence each.
-    pub refusals: Vec<String>,
+    pub(crate) refusals: Vec<String>,
     /// The files that it was made from.
-    pub sources: Vec<PathBuf>,
+    pub(crate) sources: Vec<PathBuf>,
 }
 
 /// A table of parameters as a file, and the robot that they are of.
@@ -77,7 +77,7 @@ pub struct Files {
 }
 
 /// The stages of a plan that identify or learn: which of them stands is known once all have predicted.
-pub fn steps_of(plan: &Plan) -> Result<Vec<usize>> {
+pub(crate) fn steps_of(plan: &Plan) -> Result<Vec<usize>> {
     let writes =
         |at: usize, kind: &str| plan.stages[at].outputs.iter().any(|port| port.kind == kind);
     let kinds = [Parameters::KIND, Network::KIND, TorqueParameters::KIND];
@@ -94,7 +94,7 @@ pub fn steps_of(plan: &Plan) -> Result<Vec<usize>> {
 }
 
 /// The stages of a plan whose reports judge by limits that the user set.
-pub fn judges_of(plan: &Plan) -> Vec<usize> {
+pub(crate) fn judges_of(plan: &Plan) -> Vec<usize> {
     let limited = |at: &usize| {
         let settings = plan.stages[*at].stage.settings();
         let limits = settings.get("limits").and_then(|limits| limits.as_object());
@@ -266,7 +266,7 @@ impl IdentifiedModel {
     }
 
     /// The model that a stage identified, by the tables that it wrote; `learned`: those of the stage that learned a correction on top.
-    pub fn of_tables(
+    pub(crate) fn of_tables(
         robot: RobotDescription,
         origin: String,
         tables: &TablesByKind,
@@ -282,7 +282,7 @@ impl IdentifiedModel {
     }
 
     /// Limits of corrections, with why the model is refused where one insists on it.
-    pub fn gate(&self, limits: GateLimits, insisted: bool) -> Gate {
+    pub(crate) fn gate(&self, limits: GateLimits, insisted: bool) -> Gate {
         let mut gate = Gate {
             limits,
             insisted,
@@ -296,7 +296,7 @@ impl IdentifiedModel {
     }
 
     /// Fails with all reasons why no commands are to be made of the model; `insist` says how one insists on it.
-    pub fn accepted(&self, gate: &Gate, insist: &str) -> Result<()> {
+    pub(crate) fn accepted(&self, gate: &Gate, insist: &str) -> Result<()> {
         let reasons = [self.refusals.clone(), gate.beyond(&self.model)].concat();
         let fault = |reason: &String| {
             Fault::new(
@@ -323,7 +323,7 @@ impl IdentifiedModel {
     }
 
     /// Whether torques were identified and positions were not.
-    pub fn is_of_torques_alone(&self) -> bool {
+    pub(crate) fn is_of_torques_alone(&self) -> bool {
         self.torques.is_some() && self.parameters.0.is_empty()
     }
 
@@ -411,13 +411,13 @@ impl IdentifiedModel {
     }
 
     /// The largest load that was measured, kg; none where all rows carried nothing, or no recording is at hand.
-    pub fn heaviest(&self) -> Option<f64> {
+    pub(crate) fn heaviest(&self) -> Option<f64> {
         let loads = self.data.iter().flat_map(|data| &data.payload).copied();
         loads.filter(|load| *load > 0.0).max_by(f64::total_cmp)
     }
 
     /// How joints are counted in what goes out, where that is to be said: none where controller and robot file count alike.
-    pub fn counting(&self) -> Option<String> {
+    pub(crate) fn counting(&self) -> Option<String> {
         let Some(convention) = &self.convention else {
             return Some(
                 "joints are counted as in the robot file; a table of parameters does not say how the controller counts".into(),
@@ -430,7 +430,7 @@ impl IdentifiedModel {
     }
 
     /// Refuses to write over a file that the model was made from.
-    pub fn spare(&self, out: Option<&Path>) -> Result<()> {
+    pub(crate) fn spare(&self, out: Option<&Path>) -> Result<()> {
         let Some(out) = out else { return Ok(()) };
         let Ok(place) = out.canonicalize() else {
             return Ok(());
@@ -450,7 +450,7 @@ impl IdentifiedModel {
     }
 
     /// What the uncertainty of a target is made of; none where a table alone was given.
-    pub fn coverage(&self) -> Option<Coverage> {
+    pub(crate) fn coverage(&self) -> Option<Coverage> {
         self.data
             .as_ref()
             .filter(|data| data.rows() > 0)
@@ -458,7 +458,7 @@ impl IdentifiedModel {
     }
 
     /// How far a commanded position may be off, from the rows that the model was fitted to; none for a table of parameters alone.
-    pub fn uncertainty(&self, arm: &IdentifiedArm) -> Option<Uncertainty> {
+    pub(crate) fn uncertainty(&self, arm: &IdentifiedArm) -> Option<Uncertainty> {
         let uncertainty = self
             .covariance
             .clone()

@@ -15,21 +15,21 @@ use crate::table::{
 /// The model of torques, and the arm that it is of.
 pub struct IdentifiedTorques {
     /// As declared.
-    pub arm: DynamicArm,
+    pub(crate) arm: DynamicArm,
     /// What was identified.
-    pub model: TorqueModel,
+    pub(crate) model: TorqueModel,
     /// The table that it was read from.
-    pub parameters: TorqueParameters,
+    pub(crate) parameters: TorqueParameters,
     /// Nm at the joint per ampere of its motor, as declared; none where the robot file does not say it.
-    pub per_ampere: Option<Vec<f64>>,
+    pub(crate) per_ampere: Option<Vec<f64>>,
     /// Findings that belong to the recording and to no motion that is planned (latency, contacts), a sentence each.
-    pub of_the_recording: Vec<String>,
+    pub(crate) of_the_recording: Vec<String>,
     /// Where it comes from, e.g. `run 01J..., stage diagnose_torques`.
-    pub origin: String,
+    pub(crate) origin: String,
     /// What the person must know of it.
-    pub warnings: Vec<String>,
+    pub(crate) warnings: Vec<String>,
     /// Why no torques are to be made of it.
-    pub refusals: Vec<String>,
+    pub(crate) refusals: Vec<String>,
 }
 
 /// Findings that are no part of the model.

@@ -16,14 +16,14 @@ use std::path::Path;
 /// What recordings and pipeline must know of the arm.
 pub(super) struct StartingArm {
     /// Text of its robot file; none where the folder has one.
-    pub text: Option<String>,
-    pub joints: usize,
+    pub(crate) text: Option<String>,
+    pub(crate) joints: usize,
     /// Which of them slide, where one does.
-    pub sliding: Vec<bool>,
+    pub(crate) sliding: Vec<bool>,
     /// How its controller counts joints, as settings of `q`.
-    pub counting: Option<String>,
+    pub(crate) counting: Option<String>,
     /// What a person should know of the robot, a sentence each.
-    pub notes: Vec<String>,
+    pub(crate) notes: Vec<String>,
     /// Where another number of joints is said, and how.
     other: (&'static str, String),
 }
@@ -130,7 +130,7 @@ impl StartingArm {
     }
 
     /// Fails unless a recording has as many joints.
-    pub fn agrees(&self, joints: usize) -> Result<()> {
+    pub(crate) fn agrees(&self, joints: usize) -> Result<()> {
         let (place, message) = &self.other;
         if joints == self.joints {
             Ok(())

@@ -12,21 +12,21 @@ pub(super) const MOST_NAMED: usize = 200;
 
 /// What may stand for one quantity, best first.
 pub(super) struct Mapping {
-    pub quantity: &'static str,
-    pub choices: Vec<Choice>,
+    pub(crate) quantity: &'static str,
+    pub(crate) choices: Vec<Choice>,
     /// What to look at.
-    pub check: Option<String>,
+    pub(crate) check: Option<String>,
     /// For the terminal.
-    pub account: String,
+    pub(crate) account: String,
 }
 
 /// Lines below `columns`, and the columns that they take.
 #[derive(Default)]
 pub(super) struct Choice {
-    pub lines: Vec<String>,
+    pub(crate) lines: Vec<String>,
     /// The line `targets:` of the file, instead.
-    pub targets: Option<String>,
-    pub columns: Vec<usize>,
+    pub(crate) targets: Option<String>,
+    pub(crate) columns: Vec<usize>,
 }
 
 impl Choice {
@@ -42,23 +42,23 @@ impl Choice {
 
 /// A file, as far as it was understood.
 pub(super) struct ExaminedFile {
-    pub path: PathBuf,
+    pub(crate) path: PathBuf,
     /// As messages name it.
-    pub name: String,
-    pub sheet: Sheet,
-    pub said: Vec<Name>,
+    pub(crate) name: String,
+    pub(crate) sheet: Sheet,
+    pub(crate) said: Vec<Name>,
     /// How many columns are called so.
     named: BTreeMap<String, usize>,
-    pub mappings: Vec<Mapping>,
+    pub(crate) mappings: Vec<Mapping>,
     /// Seconds in the unit of a time column.
-    pub second: f64,
+    pub(crate) second: f64,
     /// Lines of comment.
-    pub remarks: Vec<String>,
+    pub(crate) remarks: Vec<String>,
 }
 
 impl ExaminedFile {
     /// Nothing is known yet of its columns.
-    pub fn unknown(path: &Path, sheet: Sheet) -> Self {
+    pub(crate) fn unknown(path: &Path, sheet: Sheet) -> Self {
         let own = path.file_name().map_or_else(
             || path.display().to_string(),
             |name| name.to_string_lossy().into_owned(),
@@ -91,7 +91,7 @@ impl ExaminedFile {
     }
 
     /// Whether a column without a header may name points: texts or whole numbers, each another.
-    pub fn may_be_names(&self, column: usize) -> bool {
+    pub(crate) fn may_be_names(&self, column: usize) -> bool {
         let whole = self
             .sheet
             .texts(column)
@@ -99,14 +99,14 @@ impl ExaminedFile {
         whole && !self.sheet.rows.is_empty() && self.distinct(column) == self.sheet.rows.len()
     }
 
-    pub fn get(&self, quantity: &str) -> Option<&Mapping> {
+    pub(crate) fn get(&self, quantity: &str) -> Option<&Mapping> {
         self.mappings
             .iter()
             .find(|mapping| mapping.quantity == quantity)
     }
 
     /// Takes a quantity out and leaves it as a remark.
-    pub fn drop(&mut self, quantity: &str, why: &str) {
+    pub(crate) fn drop(&mut self, quantity: &str, why: &str) {
         let is_it = |mapping: &Mapping| mapping.quantity == quantity;
         let Some(at) = self.mappings.iter().position(is_it) else {
             return;
@@ -129,7 +129,7 @@ impl ExaminedFile {
     }
 
     /// What was found, for the terminal.
-    pub fn account(&self) -> String {
+    pub(crate) fn account(&self) -> String {
         let mut parts: Vec<String> = self
             .sheet
             .notes
@@ -156,14 +156,14 @@ impl ExaminedFile {
     }
 
     /// Gives every row the same text of a quantity.
-    pub fn state(&mut self, quantity: &'static str, value: &str, check: &str) {
+    pub(crate) fn state(&mut self, quantity: &'static str, value: &str, check: &str) {
         let choice = Choice::of(vec![format!("{quantity}: {{value: {value}}}")], Vec::new());
         let account = format!("{quantity} {value}");
         self.propose(quantity, [choice], [check.into()], account);
     }
 
     /// Adds what may stand for a quantity, best first, with what is to be looked at.
-    pub fn propose(
+    pub(crate) fn propose(
         &mut self,
         quantity: &'static str,
         choices: impl IntoIterator<Item = Choice>,
@@ -180,7 +180,7 @@ impl ExaminedFile {
     }
 
     /// Adds a setting to a quantity's line.
-    pub fn add(&mut self, quantity: &str, setting: &str) {
+    pub(crate) fn add(&mut self, quantity: &str, setting: &str) {
         let mapping = self
             .mappings
             .iter_mut()
@@ -196,7 +196,7 @@ impl ExaminedFile {
         }
     }
 
-    pub fn is_taken(&self, column: usize) -> bool {
+    pub(crate) fn is_taken(&self, column: usize) -> bool {
         self.mappings.iter().any(|mapping| {
             mapping
                 .choices
@@ -206,7 +206,7 @@ impl ExaminedFile {
     }
 
     /// A column as the pipeline names it: by its number where the name is not its alone.
-    pub fn reference(&self, column: usize) -> String {
+    pub(crate) fn reference(&self, column: usize) -> String {
         let name = self.sheet.names.get(column).map_or("", String::as_str);
         let alone = self.named.get(name) == Some(&1);
         if name.is_empty() || !alone || name.contains("${") || !self.sheet.header {
@@ -224,7 +224,7 @@ impl ExaminedFile {
             .join(", ")
     }
 
-    pub fn line(&self, quantity: &str, column: usize, unit: Option<&str>) -> String {
+    pub(crate) fn line(&self, quantity: &str, column: usize, unit: Option<&str>) -> String {
         let unit = unit
             .map(|unit| format!(", unit: {unit}"))
             .unwrap_or_default();
@@ -232,7 +232,7 @@ impl ExaminedFile {
     }
 
     /// Maps a quantity to single columns, best first.
-    pub fn map(
+    pub(crate) fn map(
         &mut self,
         quantity: &'static str,
         columns: &[usize],
@@ -255,7 +255,12 @@ impl ExaminedFile {
     }
 
     /// A pattern where the names follow one, else a list.
-    pub fn joints_line(&self, quantity: &str, columns: &[usize], unit: Option<&str>) -> String {
+    pub(crate) fn joints_line(
+        &self,
+        quantity: &str,
+        columns: &[usize],
+        unit: Option<&str>,
+    ) -> String {
         let unit = unit
             .map(|unit| format!(", unit: {unit}"))
             .unwrap_or_default();
@@ -283,7 +288,7 @@ impl ExaminedFile {
         }
     }
 
-    pub fn distinct(&self, column: usize) -> usize {
+    pub(crate) fn distinct(&self, column: usize) -> usize {
         self.sheet
             .texts(column)
             .collect::<std::collections::BTreeSet<_>>()
@@ -291,7 +296,7 @@ impl ExaminedFile {
     }
 
     /// Columns that may name points by their header, whole, best first: texts before numbers, each of different cells.
-    pub fn ids(&self) -> Vec<usize> {
+    pub(crate) fn ids(&self) -> Vec<usize> {
         let rows = self.sheet.rows.len();
         let named = |column: &usize| {
             let stem = self.said[*column].stem();

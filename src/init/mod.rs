@@ -23,42 +23,42 @@ use quantities::examine;
 use std::path::{Path, PathBuf};
 
 /// What is there and what is wanted.
-pub struct InitRequest<'a> {
+pub(crate) struct InitRequest<'a> {
     /// The folder of robot.yaml and pipeline.yaml.
-    pub folder: &'a Path,
+    pub(crate) folder: &'a Path,
     /// Recordings: one file, or the controller's and the tracker's.
-    pub data: &'a [PathBuf],
+    pub(crate) data: &'a [PathBuf],
     /// The kind to start from; none where nobody asked for one: the folder's own robot.yaml, else the first kind.
-    pub robot: Option<RobotFileKind>,
+    pub(crate) robot: Option<RobotFileKind>,
     /// The robot instead, and its last link; of a robot.yaml that is there the URDF that it refers to.
-    pub urdf: Option<&'a Path>,
+    pub(crate) urdf: Option<&'a Path>,
     /// Last link of the chain in the URDF.
-    pub tip: &'a str,
+    pub(crate) tip: &'a str,
 }
 
 /// Files to start from.
-pub struct StarterFiles {
+pub(crate) struct StarterFiles {
     /// Text of `robot.yaml`; none where it is there already.
-    pub robot: Option<String>,
+    pub(crate) robot: Option<String>,
     /// Text of `pipeline.yaml`.
-    pub pipeline: String,
+    pub(crate) pipeline: String,
     /// What was found in each recording, and which.
-    pub accounts: Vec<(PathBuf, String)>,
+    pub(crate) accounts: Vec<(PathBuf, String)>,
     /// What no recording has.
-    pub missing: Vec<&'static str>,
+    pub(crate) missing: Vec<&'static str>,
     /// What a person should know of the robot, a sentence each.
-    pub notes: Vec<String>,
+    pub(crate) notes: Vec<String>,
 }
 
 impl StarterFiles {
     /// Whether recordings were given and neither joints nor points were found in them.
-    pub fn understood_nothing(&self) -> bool {
+    pub(crate) fn understood_nothing(&self) -> bool {
         !self.accounts.is_empty() && self.missing.len() == 2
     }
 }
 
 /// Looks at the recordings. Fails where one cannot be read, or has another number of joints than the robot.
-pub fn start(request: &InitRequest) -> Result<StarterFiles> {
+pub(crate) fn start(request: &InitRequest) -> Result<StarterFiles> {
     // Joints and points may stand in two sheets of one workbook.
     let places = if request.data.len() == 1 { 2 } else { 1 };
     let arm = StartingArm::of(request)?;

@@ -9,9 +9,9 @@ use std::collections::BTreeMap;
 #[derive(Debug, Clone)]
 pub(super) struct Name {
     /// In small letters, without the unit.
-    pub words: Vec<String>,
+    pub(crate) words: Vec<String>,
     /// Symbol of the unit that the name ends in.
-    pub unit: Option<&'static str>,
+    pub(crate) unit: Option<&'static str>,
     /// The unit as it stands there, where no bracket says that it is one: the `a` of `x_a`.
     ending: Option<String>,
 }
@@ -32,17 +32,17 @@ impl Name {
         }
     }
 
-    pub fn stem(&self) -> String {
+    pub(crate) fn stem(&self) -> String {
         self.words.join("_")
     }
 
     /// The unit, if it is one of these.
-    pub fn unit_of(&self, allowed: &[&str]) -> Option<&'static str> {
+    pub(crate) fn unit_of(&self, allowed: &[&str]) -> Option<&'static str> {
         self.unit.filter(|unit| allowed.contains(unit))
     }
 
     /// Whether the name is one of these, or one of them begins or ends it as a word of its own.
-    pub fn is(&self, list: &str) -> bool {
+    pub(crate) fn is(&self, list: &str) -> bool {
         let listed = |text: &str| lists(list, text);
         // A letter alone says little beside other words: `x_t` is no time.
         let mut ends = [self.words.first(), self.words.last()]
@@ -53,7 +53,7 @@ impl Name {
     }
 
     /// What the joints are called here, `#` for the number, and which one this is: `q1`, `A1_deg`, `joint_3`, `wrist 4 act [deg]`.
-    pub fn joint(&self) -> Option<(String, usize)> {
+    pub(crate) fn joint(&self) -> Option<(String, usize)> {
         let at = self
             .words
             .iter()
@@ -80,7 +80,7 @@ impl Name {
     }
 
     /// The axis (0 to 2) that this is the coordinate of, and what else the name says: `x_ist`, `Goal X`, `dx`, `Xsoll`.
-    pub fn axis(&self) -> Option<(usize, Vec<String>)> {
+    pub(crate) fn axis(&self) -> Option<(usize, Vec<String>)> {
         let (at, (axis, more)) = self
             .words
             .iter()

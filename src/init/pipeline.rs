@@ -439,11 +439,11 @@ const MARKS: [(&str, &str, &str); 2] = [
 /// Lines that are left as `calib init` marked them.
 pub struct MarkedLines {
     /// The label of their kind.
-    pub label: &'static str,
+    pub(crate) label: &'static str,
     /// What is to be done with them.
-    pub what: &'static str,
+    pub(crate) what: &'static str,
     /// File, number of the line and its text.
-    pub lines: Vec<(String, usize, String)>,
+    pub(crate) lines: Vec<(String, usize, String)>,
 }
 
 /// The lines of files that `calib init` marked, those to fill in before those to look at. A line that is a comment all over sets nothing.

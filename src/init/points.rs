@@ -7,9 +7,9 @@ use std::collections::BTreeMap;
 /// Columns of x, y and z under one name, and what the name says of them.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Family {
-    pub columns: [usize; 3],
-    pub words: Vec<String>,
-    pub role: PointRole,
+    pub(crate) columns: [usize; 3],
+    pub(crate) words: Vec<String>,
+    pub(crate) role: PointRole,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,23 +25,23 @@ pub(super) enum PointRole {
 /// A way to the measured point.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct PointColumns {
-    pub columns: [usize; 3],
+    pub(crate) columns: [usize; 3],
     /// Columns of the difference, and whether they are taken off.
-    pub difference: Option<([usize; 3], bool)>,
+    pub(crate) difference: Option<([usize; 3], bool)>,
 }
 
 /// Ways to the measured point, best first; what to ask where it is not plain; what else is known of points.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Points {
-    pub ways: Vec<PointColumns>,
-    pub question: Option<String>,
+    pub(crate) ways: Vec<PointColumns>,
+    pub(crate) question: Option<String>,
     /// Whether the name of the best one says that it was measured.
-    pub said: bool,
+    pub(crate) said: bool,
     /// Points of several targets side by side, by the targets' names; none where the names do not say so.
-    pub targets: Vec<(String, [usize; 3])>,
+    pub(crate) targets: Vec<(String, [usize; 3])>,
     /// A point that is wanted only.
-    pub wanted: Option<[usize; 3]>,
-    pub sigma: Option<[usize; 3]>,
+    pub(crate) wanted: Option<[usize; 3]>,
+    pub(crate) sigma: Option<[usize; 3]>,
 }
 
 /// All coordinates that come in threes.

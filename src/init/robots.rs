@@ -35,7 +35,7 @@ impl RobotFileKind {
     }
 
     /// As the command line names it.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Spherical6 => "spherical6",
             Self::Offset6 => "offset6",
@@ -46,7 +46,7 @@ impl RobotFileKind {
     }
 
     /// What it is, in one line.
-    pub fn help(self) -> &'static str {
+    pub(crate) fn help(self) -> &'static str {
         match self {
             Self::Spherical6 => {
                 "Six joints, the last three axes meet in a point (most industrial arms)"

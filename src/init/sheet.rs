@@ -17,28 +17,28 @@ const NARROWEST: usize = 3;
 #[derive(Default)]
 pub(super) struct Sheet {
     /// Its name in its workbook, where it is of one.
-    pub of_book: Option<String>,
+    pub(crate) of_book: Option<String>,
     /// The topic, where it is of a recording of ROS 2.
-    pub topic: Option<String>,
+    pub(crate) topic: Option<String>,
     /// What else is to be known of it, in the pipeline and on the terminal.
-    pub notes: Vec<String>,
-    pub delimiter: char,
+    pub(crate) notes: Vec<String>,
+    pub(crate) delimiter: char,
     /// Decimal comma.
-    pub comma: bool,
+    pub(crate) comma: bool,
     /// Lines above the header, or above the data where there is none.
-    pub skip: usize,
+    pub(crate) skip: usize,
     /// Whether a row of units stands below the header.
-    pub unit_row: bool,
-    pub comment: Option<&'static str>,
-    pub header_in_comment: bool,
-    pub header: bool,
+    pub(crate) unit_row: bool,
+    pub(crate) comment: Option<&'static str>,
+    pub(crate) header_in_comment: bool,
+    pub(crate) header: bool,
     /// Names of the columns; in a file without a header the numbers from 1.
-    pub names: Vec<String>,
+    pub(crate) names: Vec<String>,
     /// From a row of units.
-    pub units: Vec<Option<&'static str>>,
-    pub rows: Vec<Vec<String>>,
+    pub(crate) units: Vec<Option<&'static str>>,
+    pub(crate) rows: Vec<Vec<String>>,
     /// Why nothing was understood, and what stands in the file.
-    pub trouble: Option<String>,
+    pub(crate) trouble: Option<String>,
 }
 
 /// A line that is neither blank nor a comment, and its number from 0.
@@ -83,7 +83,7 @@ fn filled(mut cells: Vec<String>) -> Vec<String> {
 
 impl Sheet {
     /// What nothing can be said of, and why.
-    pub fn not_understood(trouble: String) -> Self {
+    pub(crate) fn not_understood(trouble: String) -> Self {
         Self {
             trouble: Some(trouble),
             delimiter: ',',
@@ -97,7 +97,7 @@ impl Sheet {
     }
 
     /// A sheet of a workbook, with tabs between its cells.
-    pub fn of_workbook(name: &str, lines: &[String]) -> Self {
+    pub(crate) fn of_workbook(name: &str, lines: &[String]) -> Self {
         // What separates cells is the workbook's own.
         Self {
             of_book: Some(name.into()),
@@ -107,7 +107,7 @@ impl Sheet {
     }
 
     /// A file of columns.
-    pub fn of_columns(names: Vec<String>, rows: Vec<Vec<String>>) -> Self {
+    pub(crate) fn of_columns(names: Vec<String>, rows: Vec<Vec<String>>) -> Self {
         Self {
             delimiter: ',',
             header: true,
@@ -118,7 +118,7 @@ impl Sheet {
     }
 
     /// The first messages of a topic; its times are in s.
-    pub fn of_topic(topic: &BagTopic, names: Vec<String>, rows: Vec<Vec<String>>) -> Self {
+    pub(crate) fn of_topic(topic: &BagTopic, names: Vec<String>, rows: Vec<Vec<String>>) -> Self {
         // ROS states everything in SI (REP 103); efforts are torques or whatever the driver has.
         let unit = |name: &String| match name.rsplit_once('.') {
             None => ["received", "stamp"]
@@ -222,13 +222,13 @@ impl Sheet {
         sheet
     }
 
-    pub fn numbers(&self, column: usize) -> impl Iterator<Item = f64> + '_ {
+    pub(crate) fn numbers(&self, column: usize) -> impl Iterator<Item = f64> + '_ {
         self.rows
             .iter()
             .filter_map(move |row| row.get(column).and_then(|cell| number(cell)))
     }
 
-    pub fn texts(&self, column: usize) -> impl Iterator<Item = &str> {
+    pub(crate) fn texts(&self, column: usize) -> impl Iterator<Item = &str> {
         self.rows
             .iter()
             .filter_map(move |row| row.get(column))
@@ -237,23 +237,23 @@ impl Sheet {
     }
 
     /// Whether nine of ten cells are numbers.
-    pub fn is_numeric(&self, column: usize) -> bool {
+    pub(crate) fn is_numeric(&self, column: usize) -> bool {
         !self.rows.is_empty() && 10 * self.numbers(column).count() >= 9 * self.rows.len()
     }
 
     /// Whether every cell that is not blank is a number, and some are.
-    pub fn holds_numbers(&self, column: usize) -> bool {
+    pub(crate) fn holds_numbers(&self, column: usize) -> bool {
         let numbers = self.numbers(column).count();
         numbers > 0 && numbers == self.texts(column).count()
     }
 
     /// Largest number without its sign.
-    pub fn largest(&self, column: usize) -> f64 {
+    pub(crate) fn largest(&self, column: usize) -> f64 {
         self.numbers(column).map(f64::abs).fold(0.0, f64::max)
     }
 
     /// What a column holds, for a person: `column 3: -12.5 to 80`, `column 1: P1, P2, ...`.
-    pub fn seen(&self, column: usize) -> String {
+    pub(crate) fn seen(&self, column: usize) -> String {
         if self.is_numeric(column) {
             let (lower, upper) = self
                 .numbers(column)

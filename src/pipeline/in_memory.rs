@@ -11,11 +11,11 @@ use crate::yaml::{self, Trouble};
 /// Which stage, and how.
 pub struct StageCall<'a> {
     /// As `uses:` of a pipeline names it; its id too.
-    pub uses: &'a str,
+    pub(crate) uses: &'a str,
     /// Its settings, as `with:` of a pipeline.
-    pub with: &'a serde_json::Value,
+    pub(crate) with: &'a serde_json::Value,
     /// That of the pipeline.
-    pub seed: u64,
+    pub(crate) seed: u64,
 }
 
 /// What a stage gave.

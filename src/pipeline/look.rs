@@ -207,12 +207,12 @@ pub enum Prospect {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Forecast {
     /// In the pipeline.
-    pub id: String,
+    pub(crate) id: String,
     /// Its kind.
-    pub uses: String,
+    pub(crate) uses: String,
     /// Whether it would run.
     #[serde(flatten)]
-    pub prospect: Prospect,
+    pub(crate) prospect: Prospect,
 }
 
 /// What a run would do, stage by stage. Fails where files cannot be read.

@@ -18,51 +18,51 @@ const MANIFEST_FORMAT: u32 = 1;
 #[derive(Debug, Clone)]
 pub struct Surroundings {
     /// Which calib.
-    pub tool: Tool,
+    pub(crate) tool: Tool,
     /// Which machine.
-    pub host: Host,
+    pub(crate) host: Host,
     /// Who ran it, where that is known and wanted.
-    pub user: Option<String>,
+    pub(crate) user: Option<String>,
     /// Variables that calib and its libraries look at, where they are set.
-    pub environment: BTreeMap<String, String>,
+    pub(crate) environment: BTreeMap<String, String>,
     /// As it was typed, word by word.
-    pub command_line: Vec<String>,
+    pub(crate) command_line: Vec<String>,
     /// The clock.
-    pub now: fn() -> std::time::SystemTime,
+    pub(crate) now: fn() -> std::time::SystemTime,
     /// Bytes that this process had in use at most, where that is known.
-    pub peak_memory: fn() -> Option<u64>,
+    pub(crate) peak_memory: fn() -> Option<u64>,
     /// A fresh id for a run.
-    pub run_id: String,
+    pub(crate) run_id: String,
 }
 
 /// The program that ran.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Tool {
     /// `calib`.
-    pub name: String,
+    pub(crate) name: String,
     /// Version of the package.
-    pub version: String,
+    pub(crate) version: String,
     /// Architecture and operating system.
-    pub target: String,
+    pub(crate) target: String,
     /// Revision of the sources; it and `rustc` are known where whoever built it said so (`CALIB_REVISION`, `CALIB_RUSTC`).
     #[serde(default)]
-    pub revision: Option<String>,
+    pub(crate) revision: Option<String>,
     /// Version of the compiler.
     #[serde(default)]
-    pub rustc: Option<String>,
+    pub(crate) rustc: Option<String>,
 }
 
 /// The machine that ran.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Host {
     /// Name of the machine.
-    pub name: String,
+    pub(crate) name: String,
     /// Operating system.
-    pub os: String,
+    pub(crate) os: String,
     /// Architecture of the processor.
-    pub architecture: String,
+    pub(crate) architecture: String,
     /// That the process may use.
-    pub cores: usize,
+    pub(crate) cores: usize,
 }
 
 /// The record of a run.
@@ -70,43 +70,43 @@ pub struct Host {
 pub struct Manifest {
     manifest_format: u32,
     /// ULID: ids sort by time.
-    pub run_id: String,
+    pub(crate) run_id: String,
     /// What the run was for.
     #[serde(default)]
-    pub purpose: Purpose,
+    pub(crate) purpose: Purpose,
     /// The run that ended last before this one, with the seal of its manifest.
-    pub previous: Option<Link>,
+    pub(crate) previous: Option<Link>,
     /// How it ended, or that it has not.
-    pub status: RunStatus,
+    pub(crate) status: RunStatus,
     /// What went wrong, where the status says so.
-    pub error: Option<String>,
+    pub(crate) error: Option<String>,
     /// What was run.
-    pub pipeline: PipelineRecord,
+    pub(crate) pipeline: PipelineRecord,
     /// Given on the command line.
-    pub overrides: Vec<Override>,
+    pub(crate) overrides: Vec<Override>,
     /// Which calib.
-    pub tool: Tool,
+    pub(crate) tool: Tool,
     /// Which machine.
-    pub host: Host,
+    pub(crate) host: Host,
     /// Who, where that is known.
-    pub user: Option<String>,
+    pub(crate) user: Option<String>,
     /// Variables that may change speed, never results.
-    pub environment: BTreeMap<String, String>,
+    pub(crate) environment: BTreeMap<String, String>,
     /// As it was typed, word by word.
-    pub command_line: Vec<String>,
+    pub(crate) command_line: Vec<String>,
     /// The seed of the pipeline.
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// Worker threads.
-    pub jobs: usize,
+    pub(crate) jobs: usize,
     /// RFC 3339, UTC.
-    pub started: String,
+    pub(crate) started: String,
     /// RFC 3339, UTC.
-    pub ended: Option<String>,
+    pub(crate) ended: Option<String>,
     /// From start to end.
-    pub wall_seconds: Option<f64>,
+    pub(crate) wall_seconds: Option<f64>,
     /// The most memory that the whole process had in use up to the end of this run.
     #[serde(default)]
-    pub peak_memory_bytes: Option<u64>,
+    pub(crate) peak_memory_bytes: Option<u64>,
     /// In the order of the pipeline.
     pub stages: Vec<StageReport>,
 }
@@ -124,14 +124,14 @@ pub enum RunStatus {
 }
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct PipelineRecord {
-    pub name: String,
-    pub file: String,
+pub(crate) struct PipelineRecord {
+    pub(crate) name: String,
+    pub(crate) file: String,
     /// Hash of the YAML file's bytes.
-    pub blake3: String,
-    pub text: String,
+    pub(crate) blake3: String,
+    pub(crate) text: String,
     /// With variables and overrides filled in.
-    pub resolved: serde_json::Value,
+    pub(crate) resolved: serde_json::Value,
 }
 
 /// How a stage stands.
@@ -152,61 +152,61 @@ pub enum StageStatus {
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct StageReport {
     /// In the pipeline.
-    pub id: String,
+    pub(crate) id: String,
     /// Its kind.
-    pub uses: String,
+    pub(crate) uses: String,
     /// Version of its algorithm.
-    pub implementation: u32,
+    pub(crate) implementation: u32,
     /// How it stands.
-    pub status: StageStatus,
+    pub(crate) status: StageStatus,
     /// Why it was executed.
-    pub reason: Option<String>,
+    pub(crate) reason: Option<String>,
     /// The key of its record.
-    pub action: Option<ActionId>,
+    pub(crate) action: Option<ActionId>,
     /// The components of `action`.
-    pub key: Option<StageKey>,
+    pub(crate) key: Option<StageKey>,
     /// Tables that it read.
-    pub inputs: Vec<InputRecord>,
+    pub(crate) inputs: Vec<InputRecord>,
     /// Raw files that it read.
-    pub files: Vec<FileRecord>,
+    pub(crate) files: Vec<FileRecord>,
     /// Tables that it wrote.
     pub outputs: Vec<OutputRecord>,
     /// What it told.
-    pub notes: Vec<String>,
+    pub(crate) notes: Vec<String>,
     /// What it warned of.
-    pub warnings: Vec<String>,
+    pub(crate) warnings: Vec<String>,
     /// Duration of the execution, also where it was an earlier run's.
-    pub wall_seconds: Option<f64>,
+    pub(crate) wall_seconds: Option<f64>,
 }
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct InputRecord {
-    pub port: String,
+pub(crate) struct InputRecord {
+    pub(crate) port: String,
     /// `stage.port` that wrote it.
-    pub from: String,
+    pub(crate) from: String,
     #[serde(flatten)]
-    pub table: TableRef,
+    pub(crate) table: TableRef,
 }
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct FileRecord {
-    pub place: String,
+pub(crate) struct FileRecord {
+    pub(crate) place: String,
     /// As text: what is not UTF-8 in it stands there as U+FFFD.
-    pub path: String,
-    pub bytes: u64,
-    pub modified: Option<String>,
-    pub blake3: FileHash,
+    pub(crate) path: String,
+    pub(crate) bytes: u64,
+    pub(crate) modified: Option<String>,
+    pub(crate) blake3: FileHash,
 }
 
 /// A table that a stage wrote.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct OutputRecord {
     /// On which it was written.
-    pub port: String,
+    pub(crate) port: String,
     /// The name of its schema.
     pub kind: String,
     /// Where people find it, as text: what is not UTF-8 in it stands there as U+FFFD.
-    pub path: Option<String>,
+    pub(crate) path: Option<String>,
     /// Where it is.
     #[serde(flatten)]
     pub table: TableRef,
@@ -225,7 +225,7 @@ impl Manifest {
     }
 
     /// Whether this is a run of `calib run` that has the tables of every stage.
-    pub fn is_complete(&self) -> bool {
+    pub(crate) fn is_complete(&self) -> bool {
         let has = |stage: &StageReport| {
             matches!(stage.status, StageStatus::Cached | StageStatus::Executed)
         };
@@ -235,7 +235,7 @@ impl Manifest {
     }
 
     /// Kind of run as it is listed; only a `run` can be HEAD.
-    pub fn what(&self) -> &'static str {
+    pub(crate) fn what(&self) -> &'static str {
         match (self.purpose, self.status) {
             (Purpose::Compensate, _) => "compensate",
             (Purpose::Diagnose, _) => "diagnose",
@@ -419,9 +419,9 @@ pub enum Purpose {
 #[derive(Debug, Clone)]
 pub struct RunOptions {
     /// Which stages.
-    pub selection: Selection,
+    pub(crate) selection: Selection,
     /// Worker threads; no result depends on it.
-    pub jobs: usize,
+    pub(crate) jobs: usize,
     /// For the log.
-    pub purpose: Purpose,
+    pub(crate) purpose: Purpose,
 }

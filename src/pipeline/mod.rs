@@ -5,7 +5,7 @@ mod in_memory;
 mod look;
 mod manifest;
 mod overrides;
-pub mod plan;
+pub(crate) mod plan;
 mod reason;
 mod run;
 mod run_state;

@@ -8,9 +8,9 @@ use std::collections::{BTreeMap, BTreeSet};
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Override {
     /// A variable, `seed` or `STAGE.path.of.setting`.
-    pub target: String,
+    pub(crate) target: String,
     /// YAML.
-    pub value: String,
+    pub(crate) value: String,
 }
 
 impl Override {

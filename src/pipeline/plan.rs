@@ -15,35 +15,35 @@ use std::path::{Path, PathBuf};
 /// A pipeline that can be run.
 pub struct Plan {
     /// The YAML file as it was named.
-    pub file: PathBuf,
+    pub(crate) file: PathBuf,
     /// The YAML as it was read.
-    pub text: String,
+    pub(crate) text: String,
     /// Part of the paths of its tables.
-    pub name: String,
+    pub(crate) name: String,
     /// Every random number comes from it.
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// In the order of the YAML; every stage comes after those it reads.
     pub stages: Vec<PlannedStage>,
     /// The YAML with variables and overrides filled in.
-    pub resolved: serde_json::Value,
+    pub(crate) resolved: serde_json::Value,
     /// Given on the command line.
-    pub overrides: Vec<Override>,
+    pub(crate) overrides: Vec<Override>,
 }
 
 /// A stage that is checked and wired.
 pub struct PlannedStage {
     /// In the pipeline.
-    pub id: String,
+    pub(crate) id: String,
     /// Its kind.
-    pub entry: &'static StageEntry,
+    pub(crate) entry: &'static StageEntry,
     /// With its settings.
     pub stage: Box<dyn ErasedStage>,
     /// Raw files that it reads.
     pub files: Vec<InputFile>,
     /// Where its tables come from.
-    pub inputs: Vec<Input>,
+    pub(crate) inputs: Vec<Input>,
     /// Tables that it writes.
-    pub outputs: Vec<Port>,
+    pub(crate) outputs: Vec<Port>,
 }
 
 impl Plan {
@@ -124,12 +124,12 @@ impl Plan {
     }
 
     /// The plan of a stage and those that it reads from, directly or not.
-    pub fn needed_for(self, stage: usize) -> Self {
+    pub(crate) fn needed_for(self, stage: usize) -> Self {
         self.needed_for_all(&[stage])
     }
 
     /// The plan of some stages and those that they read from, directly or not.
-    pub fn needed_for_all(mut self, stages: &[usize]) -> Self {
+    pub(crate) fn needed_for_all(mut self, stages: &[usize]) -> Self {
         let mut needed = vec![false; self.stages.len()];
         stages.iter().for_each(|stage| needed[*stage] = true);
         for at in (0..self.stages.len()).rev() {
@@ -186,19 +186,19 @@ impl Plan {
 #[derive(Debug, Clone, Default)]
 pub struct Selection {
     /// This stage alone.
-    pub only: Option<String>,
+    pub(crate) only: Option<String>,
     /// This stage and those after it.
-    pub from: Option<String>,
+    pub(crate) from: Option<String>,
     /// Up to this stage.
-    pub until: Option<String>,
+    pub(crate) until: Option<String>,
     /// Run again though cached: all selected stages, or those named.
-    pub force: Option<Vec<String>>,
+    pub(crate) force: Option<Vec<String>>,
 }
 
 /// The same with the plan's numbers.
 #[derive(Debug, Clone)]
 pub(super) struct Selected {
-    pub stages: RangeInclusive<usize>,
+    pub(crate) stages: RangeInclusive<usize>,
     forced: Vec<usize>,
 }
 
@@ -241,7 +241,7 @@ impl Selection {
 }
 
 impl Selected {
-    pub fn forces(&self, index: usize) -> bool {
+    pub(crate) fn forces(&self, index: usize) -> bool {
         self.forced.contains(&index)
     }
 }

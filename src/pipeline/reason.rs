@@ -63,13 +63,13 @@ fn last_key(store: &Store, pipeline: &str, stage: &str) -> Result<Option<StageKe
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct KeyChange {
     /// `settings`, `input`, `file`, `schema of`, `seed`, `stage`, `implementation`, `key format`.
-    pub what: &'static str,
+    pub(crate) what: &'static str,
     /// The setting, port or file.
-    pub name: String,
+    pub(crate) name: String,
     /// In the earlier key.
-    pub before: String,
+    pub(crate) before: String,
     /// In this key.
-    pub now: String,
+    pub(crate) now: String,
 }
 
 /// Every part in which two keys of a stage differ.

@@ -36,14 +36,14 @@ const GROUP: f64 = 1.0;
 /// A run that went through.
 pub struct CompletedRun {
     /// As it was written.
-    pub manifest: Manifest,
+    pub(crate) manifest: Manifest,
     /// Reports and other documents, where people find them.
-    pub documents: Vec<PathBuf>,
+    pub(crate) documents: Vec<PathBuf>,
 }
 
 impl CompletedRun {
     /// Whether every stage was cached.
-    pub fn nothing_done(&self) -> bool {
+    pub(crate) fn nothing_done(&self) -> bool {
         self.manifest
             .stages
             .iter()
@@ -312,10 +312,10 @@ fn seconds(from: SystemTime, to: SystemTime) -> f64 {
 
 /// Where a stage is executed.
 pub(super) struct ExecutionSite<'a> {
-    pub store: &'a Store,
-    pub threads: &'a rayon::ThreadPool,
-    pub observer: &'a dyn Observer,
-    pub run: &'a str,
+    pub(crate) store: &'a Store,
+    pub(crate) threads: &'a rayon::ThreadPool,
+    pub(crate) observer: &'a dyn Observer,
+    pub(crate) run: &'a str,
 }
 
 /// Runs the body of a stage; what it told the person goes into `account`. A panic is a bug with the stage's name.
@@ -506,7 +506,7 @@ fn one(fault: &Fault, plan: &Plan, id: &str) -> Option<Fault> {
 impl Plan {
     /// The hash of everything that the plan's tables depend on, as 64 hex digits. Reads every input file; fails where one cannot
     /// be read.
-    pub fn identity(&self) -> Result<String> {
+    pub(crate) fn identity(&self) -> Result<String> {
         let mut state = RunState::new(self);
         let mut stages = Vec::new();
         for stage in &self.stages {

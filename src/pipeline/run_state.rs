@@ -17,9 +17,9 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
 pub(super) struct RunState<'a> {
-    pub plan: &'a Plan,
+    pub(crate) plan: &'a Plan,
     /// Tables by port, for every stage whose tables are known.
-    pub tables: Vec<Option<BTreeMap<String, TableRef>>>,
+    pub(crate) tables: Vec<Option<BTreeMap<String, TableRef>>>,
     hashes: BTreeMap<PathBuf, HashedFile>,
 }
 
@@ -66,7 +66,7 @@ impl<'a> RunState<'a> {
         }
     }
 
-    pub fn key(&mut self, index: usize) -> Result<KeyState> {
+    pub(crate) fn key(&mut self, index: usize) -> Result<KeyState> {
         let stage = &self.plan.stages[index];
         let mut reads = BTreeMap::new();
         for input in &stage.inputs {
@@ -113,12 +113,12 @@ impl<'a> RunState<'a> {
     }
 
     /// The seed of a stage.
-    pub fn seed(&self, index: usize) -> u64 {
+    pub(crate) fn seed(&self, index: usize) -> u64 {
         seed(self.plan.seed, &self.plan.stages[index].id)
     }
 
     /// The hash of a raw input file, read once a run.
-    pub fn hash(&mut self, path: &Path) -> Result<FileHash> {
+    pub(crate) fn hash(&mut self, path: &Path) -> Result<FileHash> {
         if let Some(hashed) = self.hashes.get(path) {
             return Ok(hashed.content.clone());
         }
@@ -148,7 +148,7 @@ impl<'a> RunState<'a> {
 
     /// Fails where a raw input file of a stage is no longer what the stage's key says: its tables would stand under the key of another
     /// content, in this run and in all that follow.
-    pub fn unchanged(&mut self, index: usize) -> Result<()> {
+    pub(crate) fn unchanged(&mut self, index: usize) -> Result<()> {
         let stage = &self.plan.stages[index];
         for file in &stage.files {
             let Some(hashed) = self.hashes.get(&file.path) else {
@@ -204,7 +204,7 @@ pub(super) struct ActionLock {
 
 impl ActionLock {
     /// Takes the lock of an action, waiting for whoever has it; `waiting` is told once.
-    pub fn take(store: &Store, action: &ActionId, waiting: &mut dyn FnMut()) -> Self {
+    pub(crate) fn take(store: &Store, action: &ActionId, waiting: &mut dyn FnMut()) -> Self {
         let folder = store.root().join("locks");
         let path = folder.join(format!("{action}.lock"));
         let open = || {

@@ -32,19 +32,19 @@ pub struct Unwatched;
 impl Observer for Unwatched {}
 
 pub(super) struct StageServices<'a> {
-    pub id: &'a str,
+    pub(crate) id: &'a str,
     /// None where tables stay in memory.
-    pub store: Option<&'a Store>,
-    pub files: &'a [super::plan::InputFile],
-    pub observer: &'a dyn Observer,
+    pub(crate) store: Option<&'a Store>,
+    pub(crate) files: &'a [super::plan::InputFile],
+    pub(crate) observer: &'a dyn Observer,
     lines: Mutex<StageMessages>,
 }
 
 /// What a stage told the person.
 #[derive(Debug, Clone, Default)]
 pub(super) struct StageMessages {
-    pub notes: Vec<String>,
-    pub warnings: Vec<String>,
+    pub(crate) notes: Vec<String>,
+    pub(crate) warnings: Vec<String>,
 }
 
 impl<'a> StageServices<'a> {
@@ -62,7 +62,7 @@ impl<'a> StageServices<'a> {
             lines: Mutex::default(),
         }
     }
-    pub fn lines(self) -> StageMessages {
+    pub(crate) fn lines(self) -> StageMessages {
         self.lines
             .into_inner()
             .unwrap_or_else(PoisonError::into_inner)

@@ -15,54 +15,54 @@ pub(crate) const FORMAT: u64 = 1;
 
 /// A pipeline as far as it could be read.
 pub(super) struct Draft {
-    pub name: String,
-    pub seed: u64,
-    pub stages: Vec<StageDraft>,
+    pub(crate) name: String,
+    pub(crate) seed: u64,
+    pub(crate) stages: Vec<StageDraft>,
     /// The YAML with variables and overrides filled in.
-    pub resolved: serde_json::Value,
+    pub(crate) resolved: serde_json::Value,
     /// Faults of the command line.
-    pub faults: Vec<Fault>,
+    pub(crate) faults: Vec<Fault>,
     /// Faults of the file, with their places.
-    pub troubles: Vec<Trouble>,
+    pub(crate) troubles: Vec<Trouble>,
 }
 
 pub(super) struct StageDraft {
-    pub id: String,
-    pub mark: Mark,
+    pub(crate) id: String,
+    pub(crate) mark: Mark,
     /// Nothing where `uses` names no stage.
-    pub entry: Option<&'static StageEntry>,
+    pub(crate) entry: Option<&'static StageEntry>,
     /// Nothing where the settings are faulty.
-    pub stage: Option<Box<dyn ErasedStage>>,
-    pub files: Vec<InputFile>,
+    pub(crate) stage: Option<Box<dyn ErasedStage>>,
+    pub(crate) files: Vec<InputFile>,
     /// Sets of the split that the settings name.
-    pub sets: Vec<NamedSet>,
+    pub(crate) sets: Vec<NamedSet>,
     /// Wishes for the wiring: port -> names of stages.
-    pub reads: BTreeMap<String, PortSources>,
+    pub(crate) reads: BTreeMap<String, PortSources>,
 }
 
 /// Stages that a port is to be read from, as the YAML names them.
 pub(super) struct PortSources {
-    pub mark: Mark,
-    pub names: Vec<String>,
+    pub(crate) mark: Mark,
+    pub(crate) names: Vec<String>,
 }
 
 /// A set of the split, where the settings of a stage name it.
 pub(super) struct NamedSet {
     /// Below `with`.
-    pub place: String,
-    pub mark: Mark,
-    pub name: String,
+    pub(crate) place: String,
+    pub(crate) mark: Mark,
+    pub(crate) name: String,
     /// By the YAML itself, not by a default.
-    pub given: bool,
+    pub(crate) given: bool,
 }
 
 /// A raw input file of a stage.
 #[derive(Debug, Clone)]
 pub struct InputFile {
     /// Where it stands below `with`.
-    pub place: String,
+    pub(crate) place: String,
     /// From the working directory.
-    pub path: PathBuf,
+    pub(crate) path: PathBuf,
     /// As the YAML, or `--set`, names it.
     pub named: PathBuf,
 }
@@ -166,7 +166,7 @@ pub(super) fn read(
 
 impl Draft {
     /// All faults, those of the file in its order; nothing where it is sound.
-    pub fn all_faults(&mut self, file: &str) -> Vec<Fault> {
+    pub(crate) fn all_faults(&mut self, file: &str) -> Vec<Fault> {
         self.troubles.sort_by_key(|trouble| match trouble.mark {
             Some(Mark::Line { line, column }) => (line, column),
             _ => (u64::MAX, 0),

@@ -11,18 +11,18 @@ use crate::yaml::Trouble;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Origin {
     /// Position in the plan.
-    pub stage: usize,
+    pub(crate) stage: usize,
     /// Position among its outputs.
-    pub port: usize,
+    pub(crate) port: usize,
 }
 
 /// An input port with the tables that feed it, in pipeline order.
 #[derive(Debug, Clone)]
 pub struct Input {
     /// What is read.
-    pub port: Port,
+    pub(crate) port: Port,
     /// Who writes it; several where every one is read.
-    pub from: Vec<Origin>,
+    pub(crate) from: Vec<Origin>,
 }
 
 /// Wires one stage to the stages before it; all faults at once.

@@ -44,9 +44,9 @@ pub struct Apart<'a> {
 /// A run by its name, and which of its diagnoses.
 pub struct RunStage<'a> {
     /// As `calib log` names it.
-    pub run: &'a str,
+    pub(crate) run: &'a str,
     /// The stage, where there are several diagnoses.
-    pub step: Option<&'a str>,
+    pub(crate) step: Option<&'a str>,
 }
 
 /// Proposes poses that tell a finding from a rival; `names` say which, or nothing for the first that has one.

@@ -25,30 +25,30 @@ use std::path::PathBuf;
 #[serde(default, deny_unknown_fields)]
 pub struct PoseRequest {
     /// How many poses.
-    pub count: usize,
+    pub(crate) count: usize,
     /// Random poses to choose from.
-    pub candidates: usize,
+    pub(crate) candidates: usize,
     /// The same seed gives the same poses.
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// Effects to tell; none: all that `identify` estimates.
-    pub effects: Vec<String>,
+    pub(crate) effects: Vec<String>,
     /// Joint ranges instead of the robot file's, deg or mm.
     pub limits: Option<Vec<[f64; 2]>>,
     /// Part of each joint's travel left free at either end, percent.
-    pub margin: f64,
+    pub(crate) margin: f64,
     /// Where the measured point may be, mm: x, y, z.
     #[serde(rename = "box")]
-    pub bounds: Option<Vec<[f64; 2]>>,
+    pub(crate) bounds: Option<Vec<[f64; 2]>>,
     /// mm.
-    pub floor: Option<f64>,
+    pub(crate) floor: Option<f64>,
     /// kg; none: 0, or those of the run.
     #[serde(rename = "payload")]
-    pub payloads: Vec<f64>,
+    pub(crate) payloads: Vec<f64>,
     /// Standard deviation per axis of a measured point, mm.
-    pub sigma: Option<f64>,
+    pub(crate) sigma: Option<f64>,
     /// The file that the poses go to.
     #[serde(skip)]
-    pub out: Option<PathBuf>,
+    pub(crate) out: Option<PathBuf>,
 }
 
 /// The defaults of `calib poses`.
@@ -72,7 +72,7 @@ impl Default for PoseRequest {
 
 impl PoseRequest {
     /// Faults that need no robot; `pair` are two effects to separate, or none. Places are options of `calib poses`.
-    pub fn faults(&self, pair: &[String]) -> Vec<Fault> {
+    pub(crate) fn faults(&self, pair: &[String]) -> Vec<Fault> {
         let known: Vec<&str> = identified().map(|cause| cause.name()).collect();
         let mut faults = Vec::new();
         let mut fault = |place: &str, message: String| faults.push(Fault::new(place, message));
@@ -135,7 +135,7 @@ impl PoseRequest {
 }
 
 /// Poses and what they promise.
-pub trait PoseAnswer {
+pub(crate) trait PoseAnswer {
     /// None where no pose helps.
     fn drive(&self) -> Option<Drive<'_>>;
     /// For a person.

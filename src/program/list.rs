@@ -18,7 +18,7 @@ pub struct ListedJoints {
     /// Six joints, deg.
     pub joints: Vec<f64>,
     /// Six external axes, deg or mm; none where one is not connected or not given.
-    pub external: Vec<Option<f64>>,
+    pub(crate) external: Vec<Option<f64>>,
 }
 
 /// All joint positions that a program declares, in its order.

@@ -26,7 +26,7 @@ pub enum TargetKind {
 
 impl TargetKind {
     /// Whether it is a target of joints.
-    pub fn is_of_joints(self) -> bool {
+    pub(crate) fn is_of_joints(self) -> bool {
         matches!(self, Self::Joints | Self::Radians)
     }
 }
@@ -41,15 +41,15 @@ pub struct Literal {
     /// Where each value stands, sign included.
     pub spans: Vec<Range<usize>>,
     /// External axes, deg or mm; none where one is not connected.
-    pub external: Vec<Option<f64>>,
+    pub(crate) external: Vec<Option<f64>>,
     /// In which posture.
     pub posture: PostureStatement,
     /// Where each number of the posture stands.
-    pub posture_spans: Vec<Range<usize>>,
+    pub(crate) posture_spans: Vec<Range<usize>>,
     /// The frame that a Cartesian target stands in, in the robot's base (m); none: the base itself.
     pub frame: Option<Pose>,
     /// The tool that reaches a Cartesian target, in the frame of the robot file's tool (m); none: that one itself.
-    pub tool: Option<Pose>,
+    pub(crate) tool: Option<Pose>,
     /// As the program has it.
     pub(super) tool_in_force: Option<ToolInForce>,
     /// The mass at the flange that the program states, kg.
@@ -98,7 +98,7 @@ impl Literal {
     }
 
     /// The byte at which its first number stands.
-    pub fn at(&self) -> usize {
+    pub(crate) fn at(&self) -> usize {
         self.spans
             .iter()
             .map(|span| span.start)
@@ -174,7 +174,7 @@ pub(super) enum Setting<T> {
 /// A tool by its name and, where that is declared, its frame at the flange (m).
 #[derive(Debug, Clone)]
 pub(super) struct ToolInForce {
-    pub name: String,
+    pub(crate) name: String,
     pub frame: Option<Pose>,
 }
 
@@ -182,10 +182,10 @@ pub(super) struct ToolInForce {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct InForce {
     /// In the robot's base, m.
-    pub base: Setting<Pose>,
-    pub tool: Setting<ToolInForce>,
+    pub(crate) base: Setting<Pose>,
+    pub(crate) tool: Setting<ToolInForce>,
     /// kg; none where its declaration does not say.
-    pub load: Setting<Option<f64>>,
+    pub(crate) load: Setting<Option<f64>>,
 }
 
 impl PartialEq for ToolInForce {
@@ -240,7 +240,7 @@ impl JoinedState for InForce {
 
 impl InForce {
     /// Where nothing is set.
-    pub const NOTHING: Self = Self {
+    pub(crate) const NOTHING: Self = Self {
         base: Setting::Unset,
         tool: Setting::Unset,
         load: Setting::Unset,

@@ -11,19 +11,19 @@ use std::ops::Range;
 #[derive(Debug, Default)]
 pub(super) struct Reached {
     /// By the name of a target, in capitals.
-    pub named: BTreeMap<String, Vec<InForce>>,
+    pub(crate) named: BTreeMap<String, Vec<InForce>>,
     /// By the bytes of a target that stands in a motion of the file that is corrected.
-    pub placed: Vec<(Range<usize>, InForce)>,
+    pub(crate) placed: Vec<(Range<usize>, InForce)>,
     /// Names that are used otherwise than by motions.
-    pub mentioned: BTreeMap<String, InForce>,
+    pub(crate) mentioned: BTreeMap<String, InForce>,
     /// What was assumed of other files, at the bytes of the file that is corrected.
-    pub assumed: Vec<(usize, String)>,
+    pub(crate) assumed: Vec<(usize, String)>,
 }
 
 impl Reached {
     /// For each literal what is in force wherever it is reached; `names`: numbers of literals that a variable holds, and its name. Both are in the
     /// order of the program.
-    pub fn uses(
+    pub(crate) fn uses(
         &self,
         literals: &[Literal],
         names: &[(Range<usize>, String)],
@@ -56,10 +56,10 @@ impl Reached {
 
 /// How the language calls what is in force.
 pub(super) struct Words {
-    pub base: &'static str,
-    pub tool: &'static str,
+    pub(crate) base: &'static str,
+    pub(crate) tool: &'static str,
     /// What is assumed where nothing is set.
-    pub no_base: &'static str,
+    pub(crate) no_base: &'static str,
 }
 
 /// Gives literals their frames, tools and payloads, and says which they are. `uses`: for each literal what is in force wherever it is reached.

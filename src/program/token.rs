@@ -26,17 +26,17 @@ pub(super) enum TokenKind {
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Token {
-    pub sort: TokenKind,
-    pub span: Range<usize>,
+    pub(crate) sort: TokenKind,
+    pub(crate) span: Range<usize>,
 }
 
 impl Token {
-    pub fn is(&self, sign: u8) -> bool {
+    pub(crate) fn is(&self, sign: u8) -> bool {
         self.sort == TokenKind::Sign(sign)
     }
 
     /// +1 where a bracket opens, -1 where it closes.
-    pub fn opens(&self) -> i32 {
+    pub(crate) fn opens(&self) -> i32 {
         match self.sort {
             TokenKind::Sign(b'{' | b'[' | b'(') => 1,
             TokenKind::Sign(b'}' | b']' | b')') => -1,
@@ -114,17 +114,17 @@ pub(super) fn brackets_match(
 /// What is read, and how its words are compared: KRL and RAPID know no case.
 #[derive(Clone, Copy)]
 pub(super) struct ProgramText<'p> {
-    pub bytes: &'p [u8],
-    pub language: Language,
+    pub(crate) bytes: &'p [u8],
+    pub(crate) language: Language,
 }
 
 impl ProgramText<'_> {
     /// A token's text in capitals.
-    pub fn upper(&self, token: &Token) -> String {
+    pub(crate) fn upper(&self, token: &Token) -> String {
         String::from_utf8_lossy(&self.bytes[token.span.clone()]).to_ascii_uppercase()
     }
 
-    pub fn is_word(&self, token: &Token, words: &[&str]) -> bool {
+    pub(crate) fn is_word(&self, token: &Token, words: &[&str]) -> bool {
         let text = &self.bytes[token.span.clone()];
         token.sort == TokenKind::Word
             && words
@@ -154,7 +154,7 @@ impl ProgramText<'_> {
     }
 
     /// The bytes from the first to the last of some tokens.
-    pub fn over(&self, tokens: &[Token], otherwise: usize) -> Range<usize> {
+    pub(crate) fn over(&self, tokens: &[Token], otherwise: usize) -> Range<usize> {
         match (tokens.first(), tokens.last()) {
             (Some(first), Some(last)) => first.span.start..last.span.end,
             _ => otherwise..otherwise,

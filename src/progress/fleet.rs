@@ -85,14 +85,14 @@ impl FleetProgress {
     }
 
     /// A line for the person.
-    pub fn say(&self, line: &str) {
+    pub(crate) fn say(&self, line: &str) {
         if self.verbosity == Verbosity::Normal {
             self.print(line);
         }
     }
 
     /// How many of the robots are recorded, where others compute them.
-    pub fn count(&self, over: usize, bad: usize) {
+    pub(crate) fn count(&self, over: usize, bad: usize) {
         let mut state = self.state();
         state.fresh += over.saturating_sub(state.over);
         (state.over, state.bad) = (over, bad);

@@ -28,7 +28,7 @@ pub enum ConcealedSet {
 
 impl ConcealedSet {
     /// Recordings in it.
-    pub fn cases(&self) -> usize {
+    pub(crate) fn cases(&self) -> usize {
         match self {
             Self::Positions(design) => design.cases,
             Self::Torques(design) => design.cases,
@@ -145,7 +145,7 @@ impl Seal {
     }
 
     /// Whether the set was drawn from this design.
-    pub fn is_of(&self, design: &impl Debug) -> bool {
+    pub(crate) fn is_of(&self, design: &impl Debug) -> bool {
         self.design == Seal::new(design).design
     }
 
@@ -180,7 +180,7 @@ impl Seal {
 
     /// Holds every file of the set in `folder` against its hash; fails with all that are missing or changed. Gives
     /// their paths.
-    pub fn check(folder: &Path) -> Result<Vec<String>> {
+    pub(crate) fn check(folder: &Path) -> Result<Vec<String>> {
         let seal = Seal::read(folder)?;
         let mut faults = Vec::new();
         for (name, hash) in &seal.files {

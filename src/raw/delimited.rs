@@ -191,13 +191,13 @@ fn unquoted(field: &[u8]) -> Cow<'_, [u8]> {
 #[derive(Debug, Clone)]
 pub struct TextLayout {
     /// What separates fields.
-    pub delimiter: Delimiter,
+    pub(crate) delimiter: Delimiter,
     /// How lines begin that are no rows.
-    pub comment: Option<String>,
+    pub(crate) comment: Option<String>,
     /// The first row is the header, and a comment.
-    pub header_in_comment: bool,
+    pub(crate) header_in_comment: bool,
     /// Lines above the first row.
-    pub skip: u64,
+    pub(crate) skip: u64,
 }
 
 impl Default for TextLayout {

@@ -24,9 +24,9 @@ pub enum RecordFault {
 #[derive(Default)]
 pub struct Record {
     /// Line where it begins, from 1; of a file without lines the row.
-    pub line: u64,
+    pub(crate) line: u64,
     /// The bytes as they stand, without the line end.
-    pub text: Vec<u8>,
+    pub(crate) text: Vec<u8>,
     /// Why its source says that it is not to be used.
     pub fault: Option<(RecordFault, String)>,
     /// The fields without quotes, of a row that has some.
@@ -38,7 +38,7 @@ pub struct Record {
 
 impl Record {
     /// Starts a row whose fields are pushed one by one.
-    pub fn begin(&mut self, line: u64) {
+    pub(crate) fn begin(&mut self, line: u64) {
         self.line = line;
         self.text.clear();
         self.fields.clear();
@@ -55,15 +55,15 @@ impl Record {
         self.fields.push(start..self.text.len());
     }
     /// How many fields.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.fields.len()
     }
     /// Whether it has no field.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.fields.is_empty()
     }
     /// A field without the blanks around it; empty beyond the last.
-    pub fn field(&self, index: usize) -> &[u8] {
+    pub(crate) fn field(&self, index: usize) -> &[u8] {
         let bytes = if self.is_quoted {
             &self.unquoted
         } else {
@@ -81,7 +81,7 @@ impl Record {
             .collect()
     }
     /// Whether nothing stands in the fields from this one on.
-    pub fn is_blank(&self, from: usize) -> bool {
+    pub(crate) fn is_blank(&self, from: usize) -> bool {
         (from..self.len()).all(|index| self.field(index).is_empty())
     }
 }

@@ -61,7 +61,7 @@ impl Workbook {
     }
 
     /// The sheet that is read: the one of this name, else the only visible one with rows of numbers.
-    pub fn sheet(&mut self, wanted: Option<&str>) -> Result<String, String> {
+    pub(crate) fn sheet(&mut self, wanted: Option<&str>) -> Result<String, String> {
         let listed = |names: &[String]| {
             names
                 .iter()
@@ -146,7 +146,7 @@ impl Workbook {
     }
 
     /// A sheet as lines, numbers with this decimal mark.
-    pub fn lines(&mut self, sheet: &str, decimal: char) -> Result<String, String> {
+    pub(crate) fn lines(&mut self, sheet: &str, decimal: char) -> Result<String, String> {
         let is_1904 = self.is_1904;
         let mut texts = String::new();
         let mut cells: Vec<([u32; 2], [usize; 2])> = Vec::new();

@@ -64,19 +64,19 @@ fn length(mm: f64) -> String {
 /// What a page of one diagnosis is made of.
 pub struct DiagnosedTables<'a> {
     /// Head of the page.
-    pub title: &'a str,
+    pub(crate) title: &'a str,
     /// The run and the stage.
-    pub origin: [&'a str; 2],
+    pub(crate) origin: [&'a str; 2],
     /// Whether the error comes down to the noise, and the verdict in a sentence.
-    pub verdict: (bool, String),
+    pub(crate) verdict: (bool, String),
     /// Name, mean, rms and largest error, mm.
-    pub errors: Vec<[String; 4]>,
+    pub(crate) errors: Vec<[String; 4]>,
     /// The table of causes.
-    pub cells: &'a Cells,
+    pub(crate) cells: &'a Cells,
     /// What was found.
-    pub findings: &'a Findings,
+    pub(crate) findings: &'a Findings,
     /// What to measure next, a sentence each.
-    pub next: Vec<String>,
+    pub(crate) next: Vec<String>,
 }
 
 /// A diagnosis as one file that needs no other.
@@ -108,17 +108,17 @@ pub fn diagnosed_page(tables: &DiagnosedTables) -> Result<String> {
 /// What the page shows; lengths in mm.
 pub struct AchievedTables<'a> {
     /// Heading.
-    pub title: &'a str,
+    pub(crate) title: &'a str,
     /// Where the model is from.
-    pub model: &'a str,
+    pub(crate) model: &'a str,
     /// Name, mean, 95th percentile, largest, and what they are of.
-    pub rows: Vec<(&'static str, [f64; 3], String)>,
+    pub(crate) rows: Vec<(&'static str, [f64; 3], String)>,
     /// Errors of the uncorrected targets, by the model, and of the measured points.
-    pub errors: [Vec<f64>; 2],
+    pub(crate) errors: [Vec<f64>; 2],
     /// Cycles, accuracy and repeatability.
-    pub poses: Vec<(usize, f64, f64)>,
+    pub(crate) poses: Vec<(usize, f64, f64)>,
     /// What to know of the figures, a sentence each.
-    pub remarks: Vec<String>,
+    pub(crate) remarks: Vec<String>,
 }
 
 /// The page as one file that needs no other.

@@ -239,19 +239,19 @@ fn conditions(tables: &Tables) -> Vec<(&'static str, String)> {
 #[derive(Debug, Clone, Copy, Default)]
 pub struct AcceptanceLimits {
     /// Largest mean error of the held-out points.
-    pub mean_mm: Option<f64>,
+    pub(crate) mean_mm: Option<f64>,
     /// Largest 95th percentile of the errors of the held-out points.
-    pub p95_mm: Option<f64>,
+    pub(crate) p95_mm: Option<f64>,
     /// Largest error of any held-out point.
-    pub max_mm: Option<f64>,
+    pub(crate) max_mm: Option<f64>,
 }
 
 #[derive(Debug)]
 pub(super) struct Judgement {
-    pub sentence: String,
+    pub(crate) sentence: String,
     /// Limits as they were set; none where a wrong set-up alone is not accepted.
-    pub limits: Vec<AcceptanceRow>,
-    pub kept: bool,
+    pub(crate) limits: Vec<AcceptanceRow>,
+    pub(crate) kept: bool,
 }
 
 /// The row that is judged: of `set`, else of the held-out set with most points, after the step that stands.
@@ -326,7 +326,7 @@ impl Judgement {
     }
 
     /// Limits with what was found.
-    pub fn found(&self) -> impl Iterator<Item = (&AcceptanceRow, f64)> {
+    pub(crate) fn found(&self) -> impl Iterator<Item = (&AcceptanceRow, f64)> {
         self.limits
             .iter()
             .filter_map(|row| Some((row, row.found_mm?)))

@@ -36,7 +36,7 @@ impl Steps {
         }
     }
     /// The same with steps that do not stand.
-    pub fn without(self, withdrawn: &[Withdrawn]) -> Self {
+    pub(crate) fn without(self, withdrawn: &[Withdrawn]) -> Self {
         Self {
             withdrawn: withdrawn.iter().map(|gone| gone.step.clone()).collect(),
             ..self
@@ -62,7 +62,7 @@ impl Steps {
         }
     }
     /// Colour of a step by name; a step without predictions has the first one's.
-    pub fn colour_of(&self, step: &str) -> String {
+    pub(crate) fn colour_of(&self, step: &str) -> String {
         let order = self
             .names
             .iter()

@@ -35,55 +35,55 @@ mod torques;
 mod workspace;
 
 /// What a report is made of; lists are in pipeline order and may be empty.
-pub struct Tables {
+pub(crate) struct Tables {
     /// Errors of every step and set.
-    pub statistics: Statistics,
+    pub(crate) statistics: Statistics,
     /// Predictions of every step that predicts.
-    pub prediction: Vec<Prediction>,
+    pub(crate) prediction: Vec<Prediction>,
     /// Parameters of the last identified model.
-    pub parameters: Parameters,
+    pub(crate) parameters: Parameters,
     /// The nominal arm.
-    pub robot: Robot,
+    pub(crate) robot: Robot,
     /// What the controller counts otherwise than the robot file, where it does.
-    pub counting: Option<String>,
+    pub(crate) counting: Option<String>,
     /// What was measured.
-    pub recording: Recording,
+    pub(crate) recording: Recording,
     /// Who is fitted, who judges.
-    pub split: Split,
+    pub(crate) split: Split,
     /// What was read from each file.
-    pub intake: Vec<Intake>,
+    pub(crate) intake: Vec<Intake>,
     /// Rows that could not be used.
-    pub rejected: Vec<Rejected>,
+    pub(crate) rejected: Vec<Rejected>,
     /// Course of every fit.
-    pub fit: Vec<Fit>,
+    pub(crate) fit: Vec<Fit>,
     /// What the data determine.
-    pub observability: Vec<Observability>,
+    pub(crate) observability: Vec<Observability>,
     /// Course of every training.
-    pub training: Vec<Training>,
+    pub(crate) training: Vec<Training>,
     /// Rivals of learned corrections.
-    pub corrections: Vec<Corrections>,
+    pub(crate) corrections: Vec<Corrections>,
     /// The verdict of every diagnosis.
-    pub verdict: Vec<Verdict>,
+    pub(crate) verdict: Vec<Verdict>,
     /// Sentences of the verdict of every diagnosis.
-    pub sentences: Vec<VerdictSentences>,
+    pub(crate) sentences: Vec<VerdictSentences>,
     /// Findings of every diagnosis.
-    pub findings: Vec<Findings>,
+    pub(crate) findings: Vec<Findings>,
     /// Numbers of the findings of every diagnosis.
-    pub finding_numbers: Vec<FindingNumbers>,
+    pub(crate) finding_numbers: Vec<FindingNumbers>,
     /// Rivals of the findings of every diagnosis.
-    pub rivals: Vec<Rivals>,
+    pub(crate) rivals: Vec<Rivals>,
     /// Formulas of findings without a name.
-    pub forms: Vec<Forms>,
+    pub(crate) forms: Vec<Forms>,
     /// The table of causes of every diagnosis.
-    pub cells: Vec<Cells>,
+    pub(crate) cells: Vec<Cells>,
     /// Rows that were set aside.
-    pub suspects: Vec<Suspects>,
+    pub(crate) suspects: Vec<Suspects>,
     /// Findings over what reveals them.
-    pub curves: Curves,
+    pub(crate) curves: Curves,
     /// The step that the report speaks of; without one, the last.
-    pub standing: Option<String>,
+    pub(crate) standing: Option<String>,
     /// Later steps that are worse on the same held-out points.
-    pub withdrawn: Vec<Withdrawn>,
+    pub(crate) withdrawn: Vec<Withdrawn>,
 }
 
 impl Tables {
@@ -97,33 +97,33 @@ impl Tables {
 }
 
 /// What the person who asked for the report chose.
-pub struct ReportOptions<'a> {
+pub(crate) struct ReportOptions<'a> {
     /// Head of the page.
-    pub title: Option<&'a str>,
+    pub(crate) title: Option<&'a str>,
     /// The held-out set of the first sentence; else the one with most points.
-    pub set: Option<&'a str>,
+    pub(crate) set: Option<&'a str>,
     /// What the user calls good enough.
-    pub limits: AcceptanceLimits,
+    pub(crate) limits: AcceptanceLimits,
     /// Language of the page; its JSON is English.
-    pub language: PageLanguage,
+    pub(crate) language: PageLanguage,
     /// Who, with what, where and when: shown as it was given.
-    pub identity: &'a BTreeMap<String, String>,
+    pub(crate) identity: &'a BTreeMap<String, String>,
     /// Content hashes of the tables that the report rests on.
-    pub hashes: Vec<(String, String)>,
+    pub(crate) hashes: Vec<(String, String)>,
 }
 
 /// The report as HTML and as JSON.
-pub struct Pages {
+pub(crate) struct Pages {
     /// One file that needs no other.
-    pub html: String,
+    pub(crate) html: String,
     /// The same for programs.
-    pub json: String,
+    pub(crate) json: String,
     /// The user's limits and what was found.
-    pub acceptance: Acceptance,
+    pub(crate) acceptance: Acceptance,
 }
 
 /// The report; fails where `options.set` is no held-out set.
-pub fn pages(tables: &Tables, options: &ReportOptions) -> Result<Pages> {
+pub(crate) fn pages(tables: &Tables, options: &ReportOptions) -> Result<Pages> {
     let steps = errors::Steps::new(&tables.statistics, tables.standing.as_deref())
         .without(&tables.withdrawn);
     let robot = data::robot_name(&tables.robot);

@@ -79,7 +79,7 @@ pub(super) fn count(value: i64) -> String {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct UnitFormat {
     factor: f64,
-    pub symbol: &'static str,
+    pub(crate) symbol: &'static str,
     decimals: usize,
 }
 
@@ -121,17 +121,17 @@ pub(super) fn readings(stored: &str) -> Option<(UnitFormat, UnitFormat)> {
 
 impl UnitFormat {
     /// Decimals that show a sigma with two digits, at least the usual ones.
-    pub fn decimals_for(&self, sigma: Option<f64>) -> usize {
+    pub(crate) fn decimals_for(&self, sigma: Option<f64>) -> usize {
         let needed = match sigma.map(|s| (s * self.factor).abs()) {
             Some(s) if s > 0.0 => (1.0 - s.log10().floor()).max(0.0) as usize,
             _ => 0,
         };
         self.decimals.max(needed).min(self.decimals + 4)
     }
-    pub fn show(&self, value: f64, decimals: usize) -> String {
+    pub(crate) fn show(&self, value: f64, decimals: usize) -> String {
         fixed(value * self.factor, decimals)
     }
-    pub fn show_signed(&self, value: f64, decimals: usize) -> String {
+    pub(crate) fn show_signed(&self, value: f64, decimals: usize) -> String {
         signed(value * self.factor, decimals)
     }
 }

@@ -22,11 +22,11 @@ impl Svg {
             body: String::new(),
         }
     }
-    pub fn line(&mut self, class: &str, from: SvgPoint, to: SvgPoint) {
+    pub(crate) fn line(&mut self, class: &str, from: SvgPoint, to: SvgPoint) {
         self.path(class, &[from, to]);
     }
     /// An open line through the points.
-    pub fn path(&mut self, class: &str, points: &[SvgPoint]) {
+    pub(crate) fn path(&mut self, class: &str, points: &[SvgPoint]) {
         let _ = write!(self.body, "<path class=\"{class}\" d=\"");
         for (i, point) in points.iter().enumerate() {
             let _ = write!(
@@ -39,7 +39,7 @@ impl Svg {
         }
         self.body.push_str("\"/>\n");
     }
-    pub fn rect(&mut self, class: &str, corner: SvgPoint, size: SvgPoint) {
+    pub(crate) fn rect(&mut self, class: &str, corner: SvgPoint, size: SvgPoint) {
         let _ = writeln!(
             self.body,
             "<rect class=\"{class}\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"/>",
@@ -49,7 +49,7 @@ impl Svg {
             tenth(size[1])
         );
     }
-    pub fn circle(&mut self, class: &str, centre: SvgPoint, radius: f64) {
+    pub(crate) fn circle(&mut self, class: &str, centre: SvgPoint, radius: f64) {
         let _ = writeln!(
             self.body,
             "<circle class=\"{class}\" cx=\"{}\" cy=\"{}\" r=\"{}\"/>",
@@ -63,7 +63,7 @@ impl Svg {
         self.words(class, "", at, text);
     }
     /// A name that somebody gave, which no language changes.
-    pub fn name(&mut self, class: &str, at: SvgPoint, text: &str) {
+    pub(crate) fn name(&mut self, class: &str, at: SvgPoint, text: &str) {
         self.words(class, " translate=\"no\"", at, text);
     }
     fn words(&mut self, class: &str, more: &str, at: SvgPoint, text: &str) {
@@ -107,10 +107,10 @@ fn escape(text: &str) -> String {
 /// Where in a picture the data go: left, top, right, bottom, in user units.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Area {
-    pub left: f64,
-    pub top: f64,
-    pub right: f64,
-    pub bottom: f64,
+    pub(crate) left: f64,
+    pub(crate) top: f64,
+    pub(crate) right: f64,
+    pub(crate) bottom: f64,
 }
 
 impl Area {
@@ -137,7 +137,7 @@ pub(super) struct Scale {
 
 impl Scale {
     /// Linear over [lower, upper], widened where that is empty.
-    pub fn linear(lower: f64, upper: f64) -> Self {
+    pub(crate) fn linear(lower: f64, upper: f64) -> Self {
         let upper = if upper > lower {
             upper
         } else {
@@ -152,7 +152,7 @@ impl Scale {
         }
     }
     /// Logarithmic over the next rounder numbers around positive [lower, upper].
-    pub fn log(lower: f64, upper: f64) -> Self {
+    pub(crate) fn log(lower: f64, upper: f64) -> Self {
         let upper = round_up(upper.max(1e-9));
         let lower = round_down(lower.max(upper * 1e-16)).min(upper * 0.5);
         Self {
@@ -164,7 +164,7 @@ impl Scale {
         }
     }
     /// For positive values: logarithmic where they differ by more than a linear axis can show, else linear from zero.
-    pub fn positive(lower: f64, upper: f64) -> Self {
+    pub(crate) fn positive(lower: f64, upper: f64) -> Self {
         // Over a ratio of 12, the smaller values would share less than a tenth of a linear axis.
         if lower > 0.0 && upper / lower > 12.0 {
             Self::log(lower, upper)
@@ -173,11 +173,11 @@ impl Scale {
         }
     }
     /// The same scale drawn from `from` to `to`.
-    pub fn over(self, from: f64, to: f64) -> Self {
+    pub(crate) fn over(self, from: f64, to: f64) -> Self {
         Self { from, to, ..self }
     }
     /// Where a value is drawn; what lies outside is drawn on the edge.
-    pub fn at(&self, value: f64) -> f64 {
+    pub(crate) fn at(&self, value: f64) -> f64 {
         let share = if self.log {
             (value.max(self.lower) / self.lower).ln() / (self.upper / self.lower).ln()
         } else {
@@ -186,7 +186,7 @@ impl Scale {
         self.from + share.clamp(0.0, 1.0) * (self.to - self.from)
     }
     /// Round values within the scale, about `wanted` of them.
-    pub fn ticks(&self, wanted: usize) -> Vec<f64> {
+    pub(crate) fn ticks(&self, wanted: usize) -> Vec<f64> {
         if !self.log {
             let step = round_up((self.upper - self.lower) / wanted.max(1) as f64);
             let first = (self.lower / step).ceil() as i64;
@@ -214,14 +214,14 @@ impl Scale {
             .filter(|tick| (self.lower * 0.999..=self.upper * 1.001).contains(tick))
             .collect()
     }
-    pub fn grid_x(&self, svg: &mut Svg, area: Area, wanted: usize) {
+    pub(crate) fn grid_x(&self, svg: &mut Svg, area: Area, wanted: usize) {
         for tick in self.ticks(wanted) {
             let x = self.at(tick);
             svg.line("grid", [x, area.top], [x, area.bottom]);
             svg.text("tick mid", [x, area.bottom + 14.0], &label(tick));
         }
     }
-    pub fn grid_y(&self, svg: &mut Svg, area: Area, wanted: usize) {
+    pub(crate) fn grid_y(&self, svg: &mut Svg, area: Area, wanted: usize) {
         for tick in self.ticks(wanted) {
             let y = self.at(tick);
             svg.line("grid", [area.left, y], [area.right, y]);
@@ -291,8 +291,8 @@ pub(super) fn round_down(value: f64) -> f64 {
 /// One line of a chart.
 pub(super) struct Line {
     /// Class of its colour; with a further word, of its style.
-    pub colour: String,
-    pub points: Vec<[f64; 2]>,
+    pub(crate) colour: String,
+    pub(crate) points: Vec<[f64; 2]>,
 }
 
 const WIDTH: f64 = 420.0;

@@ -15,31 +15,31 @@ use serde_json::{Value, json};
 /// What the page is made of.
 pub struct TorqueTables {
     /// The arm.
-    pub robot: Robot,
+    pub(crate) robot: Robot,
     /// The verdict.
-    pub verdict: TorqueVerdict,
+    pub(crate) verdict: TorqueVerdict,
     /// What the diagnosis says beside it.
-    pub sentences: VerdictSentences,
+    pub(crate) sentences: VerdictSentences,
     /// Strongest first.
-    pub findings: TorqueFindings,
+    pub(crate) findings: TorqueFindings,
     /// Their numbers.
-    pub numbers: TorqueNumbers,
+    pub(crate) numbers: TorqueNumbers,
     /// What would explain the data as well.
-    pub rivals: TorqueRivals,
+    pub(crate) rivals: TorqueRivals,
     /// Errors and noise.
-    pub joints: JointTorques,
+    pub(crate) joints: JointTorques,
     /// Torques over time.
-    pub course: TorqueCourse,
+    pub(crate) course: TorqueCourse,
     /// Friction over velocity.
-    pub friction: FrictionCurves,
+    pub(crate) friction: FrictionCurves,
     /// Masses as the torques show them.
-    pub inertials: Inertials,
+    pub(crate) inertials: Inertials,
     /// Pushes on the arm.
-    pub contacts: Contacts,
+    pub(crate) contacts: Contacts,
     /// Whether the inertials are those of bodies.
-    pub consistency: BodyConsistencies,
+    pub(crate) consistency: BodyConsistencies,
     /// Content hashes of the tables that the page rests on.
-    pub hashes: Vec<(String, String)>,
+    pub(crate) hashes: Vec<(String, String)>,
 }
 
 /// The page; fails where the verdict is missing.

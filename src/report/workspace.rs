@@ -13,7 +13,7 @@ const CLASSES: usize = 7;
 /// Two coordinates of a point, as a view of the workspace.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct WorkspaceView {
-    pub name: &'static str,
+    pub(crate) name: &'static str,
     axes: [ViewAxis; 2],
 }
 
@@ -68,7 +68,7 @@ impl Colours {
         self.edges.iter().take_while(|edge| error > **edge).count()
     }
     /// What each class means, e.g. `0.1 - 0.2`.
-    pub fn legend(&self) -> Vec<(String, String)> {
+    pub(crate) fn legend(&self) -> Vec<(String, String)> {
         let text = |k: usize| match (
             k.checked_sub(1).and_then(|k| self.edges.get(k)),
             self.edges.get(k),
@@ -188,13 +188,13 @@ pub(super) fn scatter(
 
 /// The errors of one set of points after one step.
 pub(super) struct StepErrors {
-    pub step: String,
+    pub(crate) step: String,
     /// Class of its colour, the same in all pictures.
-    pub colour: String,
+    pub(crate) colour: String,
     /// Ascending, mm; not empty.
-    pub sorted_mm: Vec<f64>,
+    pub(crate) sorted_mm: Vec<f64>,
     /// From the statistics.
-    pub mean_mm: f64,
+    pub(crate) mean_mm: f64,
 }
 
 const WIDTH: f64 = 420.0;

@@ -15,10 +15,10 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct CellEvidence {
     /// Settings as of a stage `diagnose`.
-    pub diagnose: Diagnose,
+    pub(crate) diagnose: Diagnose,
     /// Cells that are taken to be in the robot.
     #[serde(default)]
-    pub given: Vec<Given>,
+    pub(crate) given: Vec<Given>,
 }
 
 /// A cell that is taken to be in the robot.
@@ -26,12 +26,12 @@ pub struct CellEvidence {
 #[serde(deny_unknown_fields)]
 pub struct Given {
     /// Its key, as the table cell_evidence has it.
-    pub cell: String,
+    pub(crate) cell: String,
     /// Key of the shape that all robots share; the robot's likeliest if none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub shape: Option<String>,
+    pub(crate) shape: Option<String>,
     /// Rms motion at the tool that is expected of it, mm.
-    pub size_mm: f64,
+    pub(crate) size_mm: f64,
 }
 
 crate::stage::stage! {

@@ -17,11 +17,11 @@ use std::io::Read;
 #[serde(deny_unknown_fields, default)]
 pub struct Compare {
     /// Table `parameters` of the earlier model, Parquet.
-    pub previous_parameters: Option<RawFile>,
+    pub(crate) previous_parameters: Option<RawFile>,
     /// Table `recording` that it was fitted to, Parquet.
-    pub previous_recording: Option<RawFile>,
+    pub(crate) previous_recording: Option<RawFile>,
     /// How well joints come back to a pose, as in `identify`.
-    pub repeatability: Repeatability,
+    pub(crate) repeatability: Repeatability,
 }
 
 crate::stage::stage! {

@@ -28,25 +28,25 @@ use std::collections::BTreeMap;
 pub struct Diagnose {
     /// Sets of the split to fit; all others are predicted in the end and choose nothing.
     #[serde(default = "fit_set")]
-    pub on: Vec<String>,
+    pub(crate) on: Vec<String>,
     /// By what ln of the odds of rare causes against common ones is multiplied: 0.5 or 2 shows how much a diagnosis rests on them.
     #[serde(default = "as_believed")]
-    pub prior_weight: f64,
+    pub(crate) prior_weight: f64,
     /// Prior probability that what acts somewhere is no cause of the list: 0.1 for an arm like many, 0.5 where little is known of it. Its odds
     /// scale those of causes without a name, products of two variables apart.
     #[serde(default = "open_world")]
-    pub open_world: f64,
+    pub(crate) open_world: f64,
     /// Causes that are never named: what an arm cannot have, or what a test of the library leaves out. What looks like one all the same is
     /// `unknown` at its place; of geometry and ratios the numbers of the robot file stay.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub without: Vec<String>,
+    pub(crate) without: Vec<String>,
     /// What other robots of the model say of causes: cells of the table `fleet_findings` with the share of robots that have each and their
     /// sizes. `prior: {fleet: F, stage: diagnose, by: causes}` of a fleet's file fills it in.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub prior: Vec<CellPrior>,
+    pub(crate) prior: Vec<CellPrior>,
     /// Files with effects of your own, which are compared with those of the library.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub effects: Vec<RawFile>,
+    pub(crate) effects: Vec<RawFile>,
 }
 
 /// What other robots of the model say of a cause.
@@ -54,14 +54,14 @@ pub struct Diagnose {
 #[serde(deny_unknown_fields)]
 pub struct CellPrior {
     /// Key of the cell, e.g. `backlash@joint 3`.
-    pub cell: String,
+    pub(crate) cell: String,
     /// Share of the robots that have it, 0 to 1.
-    pub share: f64,
+    pub(crate) share: f64,
     /// Usual rms motion at the tool, mm.
-    pub size_mm: f64,
+    pub(crate) size_mm: f64,
     /// Its standard deviation from robot to robot, mm.
     #[serde(default)]
-    pub spread_mm: f64,
+    pub(crate) spread_mm: f64,
 }
 
 impl CellPrior {
@@ -320,9 +320,9 @@ const SORTED_OTHERWISE: &str = "rows stand in another order than their times (so
 pub(super) struct AskedRows {
     declared: Vec<&'static DeclaredCause>,
     known: Vec<KnownCell>,
-    pub data: Measurements,
-    pub corrected: Corrected,
-    pub fit: Vec<usize>,
+    pub(crate) data: Measurements,
+    pub(crate) corrected: Corrected,
+    pub(crate) fit: Vec<usize>,
     validate: Vec<usize>,
     robot: RobotModel,
     set: Vec<usize>,
@@ -371,7 +371,7 @@ impl AskedRows {
     }
 
     /// What is asked of them.
-    pub fn question<'a>(&'a self, settings: &'a Diagnose, seed: u64) -> Question<'a> {
+    pub(crate) fn question<'a>(&'a self, settings: &'a Diagnose, seed: u64) -> Question<'a> {
         Question {
             robot: &self.robot,
             data: &self.data,

@@ -19,24 +19,24 @@ use std::collections::BTreeSet;
 pub struct DiagnoseTorques {
     /// Labels of the recording's `usage` to fit; all other rows are predicted in the end and choose nothing.
     #[serde(default = "fit")]
-    pub on: Vec<String>,
+    pub(crate) on: Vec<String>,
     /// Rows that are held out instead of those that `usage` labels otherwise. Where neither says anything, the last 30 %.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub hold_out: Option<HoldOut>,
+    pub(crate) hold_out: Option<HoldOut>,
     /// Whether masses are free within their tolerance, or identified without regard to what is declared.
     #[serde(default)]
-    pub inertials: InertialSetting,
+    pub(crate) inertials: InertialSetting,
     /// Whether it is reported that no body has a link's inertial numbers, or enforced that one has: the numbers move to the nearest of bodies
     /// in the metric of their covariance, and what that costs is said. Enforcing needs declared masses.
     #[serde(default)]
-    pub consistency: ConsistencySetting,
+    pub(crate) consistency: ConsistencySetting,
     /// Hz, of the low-pass that measured and simulated torque have in common; without it, chosen from how fast the joints come and go,
     /// from 10 Hz to a tenth of the rate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub cutoff_hz: Option<f64>,
+    pub(crate) cutoff_hz: Option<f64>,
     /// Causes that are not tried and never named.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub without: Vec<String>,
+    pub(crate) without: Vec<String>,
 }
 
 /// Which rows are held out.

@@ -10,17 +10,17 @@ use crate::table::{Prediction, PredictionRow};
 use std::collections::BTreeMap;
 
 /// A model, and where it was measured.
-pub struct KnownModel<'a> {
-    pub model: &'a Model,
+pub(crate) struct KnownModel<'a> {
+    pub(crate) model: &'a Model,
     /// Covariance of all of its parameters; none where that is not known.
-    pub covariance: Option<&'a Covariance>,
+    pub(crate) covariance: Option<&'a Covariance>,
     /// The recording that it was identified by.
-    pub measured: &'a Measurements,
+    pub(crate) measured: &'a Measurements,
 }
 
 impl KnownModel<'_> {
     /// A remark for each row of `data` among `rows` of which the correction is doubtful, none for all others.
-    pub fn remarks(&self, data: &Measurements, rows: &[usize]) -> Vec<Option<String>> {
+    pub(crate) fn remarks(&self, data: &Measurements, rows: &[usize]) -> Vec<Option<String>> {
         let mut out = vec![None; data.rows()];
         let Some(covariance) = self.covariance else {
             return out;
@@ -53,7 +53,7 @@ pub fn sentence(prediction: &Prediction) -> Option<String> {
 const NAMED: usize = 3;
 
 /// The first of some points, each once, with the remark of the first one.
-pub fn named(rows: &[&PredictionRow]) -> String {
+pub(crate) fn named(rows: &[&PredictionRow]) -> String {
     let mut names: Vec<&str> = Vec::new();
     for row in rows {
         if !names.contains(&row.point_id.as_str()) {
@@ -77,7 +77,10 @@ const FAR_BELOW: f64 = 5.0;
 const FEWEST_VALUES: f64 = 10.0;
 
 /// What to tell the person where whole points miss the model by far less than their noise, both mm; `parameters` were fitted to them.
-pub fn suspicion(points: impl Iterator<Item = [f64; 2]>, parameters: usize) -> Option<String> {
+pub(crate) fn suspicion(
+    points: impl Iterator<Item = [f64; 2]>,
+    parameters: usize,
+) -> Option<String> {
     let (mut count, mut error, mut noise) = (0usize, 0.0, 0.0);
     for [missed, expected] in points {
         count += 1;
@@ -113,7 +116,7 @@ fn plain(mm: f64) -> String {
 }
 
 /// Sentences for the remarks of redundant and unseen parameters, by name; the measurements that would show most are noted.
-pub fn advice(context: &Context, session: &Session) -> BTreeMap<String, String> {
+pub(crate) fn advice(context: &Context, session: &Session) -> BTreeMap<String, String> {
     let Session { model, fitted, .. } = *session;
     let found = remedies(session);
     let last = model.robot.joints();

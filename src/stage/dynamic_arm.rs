@@ -195,7 +195,7 @@ impl<'a> RecordedTorques<'a> {
     }
 
     /// The same with rows that judge in the end.
-    pub fn holding_out(self, held_out: Box<HeldOut<'a>>) -> Self {
+    pub(crate) fn holding_out(self, held_out: Box<HeldOut<'a>>) -> Self {
         Self {
             held_out: Some(held_out),
             ..self
@@ -203,7 +203,7 @@ impl<'a> RecordedTorques<'a> {
     }
 
     /// Whether torques are motor currents times a constant.
-    pub fn is_current(&self) -> bool {
+    pub(crate) fn is_current(&self) -> bool {
         self.factor.is_some()
     }
 

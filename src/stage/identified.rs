@@ -129,12 +129,12 @@ crate::stage::writes! {
 
 /// Rows of a recording that are to be fitted.
 pub struct RowsToFit<'a> {
-    pub recording: &'a Recording,
-    pub split: &'a Split,
-    pub data: Measurements,
-    pub rows: Vec<usize>,
+    pub(crate) recording: &'a Recording,
+    pub(crate) split: &'a Split,
+    pub(crate) data: Measurements,
+    pub(crate) rows: Vec<usize>,
     /// One standard deviation of every revolute joint that rows are weighted by, rad.
-    pub repeatability: Option<f64>,
+    pub(crate) repeatability: Option<f64>,
 }
 
 impl<'a> RowsToFit<'a> {
@@ -152,25 +152,25 @@ impl<'a> RowsToFit<'a> {
 
 /// A finished fit, and what a step says of it.
 pub struct Fitting<'a> {
-    pub asked: &'a RowsToFit<'a>,
-    pub fit: &'a FittedRows,
+    pub(crate) asked: &'a RowsToFit<'a>,
+    pub(crate) fit: &'a FittedRows,
     /// Parameters that the user holds.
-    pub held: &'a [usize],
+    pub(crate) held: &'a [usize],
     /// Parts of a cross-validation.
-    pub folds: FoldSetting,
-    pub earlier: Option<&'a Parameters>,
+    pub(crate) folds: FoldSetting,
+    pub(crate) earlier: Option<&'a Parameters>,
     /// Covariance of the earlier parameters.
-    pub earlier_covariance: Option<&'a CovarianceTable>,
+    pub(crate) earlier_covariance: Option<&'a CovarianceTable>,
     /// Rows that an earlier step was fitted to.
-    pub seen_before: Vec<bool>,
+    pub(crate) seen_before: Vec<bool>,
     /// Geometric rank: found and expected.
-    pub geometry: Option<(usize, usize)>,
+    pub(crate) geometry: Option<(usize, usize)>,
     /// What the model as a whole was identified by.
-    pub measured: &'a Measurements,
+    pub(crate) measured: &'a Measurements,
     /// Rows at which the model may say that it does not hold; the arm was fitted to none of them.
-    pub doubtful: Vec<usize>,
+    pub(crate) doubtful: Vec<usize>,
     /// Rows of places that none of them was fitted to, with what their errors are to be multiplied by: each has a part in its place.
-    pub placed: BTreeMap<usize, f64>,
+    pub(crate) placed: BTreeMap<usize, f64>,
 }
 
 impl<'a> Fitting<'a> {
@@ -200,7 +200,7 @@ impl<'a> Fitting<'a> {
     }
 
     /// The fitted rows with their model.
-    pub fn session(&self) -> Session<'_> {
+    pub(crate) fn session(&self) -> Session<'_> {
         self.fit.session(&self.asked.data)
     }
 }

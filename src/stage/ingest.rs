@@ -59,36 +59,36 @@ const MOST_HELD: usize = 1 << 30;
 #[serde(deny_unknown_fields)]
 pub struct Ingest {
     /// The raw files; the first one leads: its order is that of the recording.
-    pub files: Vec<FileLayout>,
+    pub(crate) files: Vec<FileLayout>,
     /// Files of later measurements in the same layout, e.g. of another day: joined among themselves, then appended.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub later: Vec<LaterFiles>,
+    pub(crate) later: Vec<LaterFiles>,
     /// How several files belong together.
     #[serde(default)]
-    pub join: Option<Join>,
+    pub(crate) join: Option<Join>,
     /// What becomes of rows whose point id occurs more than once in a file.
     #[serde(default)]
-    pub duplicates: Duplicates,
+    pub(crate) duplicates: Duplicates,
     /// What becomes of rows with a joint beyond the robot's limits.
     #[serde(default)]
-    pub limits: LimitPolicy,
+    pub(crate) limits: LimitPolicy,
     /// Axes of the points that were measured at all, e.g. `[z]` for a dial gauge on a plate; without it all three, unless
     /// orientations or distances are mapped. The others are not mapped; of those listed a cell may be blank where its column is
     /// `optional`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub axes: Option<Vec<Axis>>,
+    pub(crate) axes: Option<Vec<Axis>>,
     /// By what points were measured, for rows that record no standard deviation: a name, e.g. `leica_at960`, or figures, e.g.
     /// `{constant_um: 10, per_metre_um: 2.5, coverage: 2}`. With neither, noise is not known: points are
     /// weighted by an assumed one, and every figure that rests on it says so.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub instrument: Option<InstrumentSetting>,
+    pub(crate) instrument: Option<InstrumentSetting>,
     /// The arm moves while it is measured: joint velocities follow from the joints over time where no columns give them. `motion: {}`
     /// takes the usual settings.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub motion: Option<VelocitySettings>,
+    pub(crate) motion: Option<VelocitySettings>,
     /// A file of which more than this share of rows is rejected is an error.
     #[serde(default = "half")]
-    pub max_rejected_fraction: f64,
+    pub(crate) max_rejected_fraction: f64,
 }
 
 fn half() -> f64 {

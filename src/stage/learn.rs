@@ -42,35 +42,35 @@ const FOLD_ITERATIONS: usize = 60;
 #[serde(deny_unknown_fields, default)]
 pub struct Learn {
     /// Sets of the split to train on.
-    pub on: Vec<String>,
+    pub(crate) on: Vec<String>,
     /// What is compared; "no correction" always is.
-    pub rivals: Vec<RivalSetting>,
+    pub(crate) rivals: Vec<RivalSetting>,
     /// Where the training of networks starts, each a rival.
-    pub starts: Vec<StartSetting>,
+    pub(crate) starts: Vec<StartSetting>,
     /// What networks and the Gaussian process see.
-    pub inputs: Inputs,
+    pub(crate) inputs: Inputs,
     /// Whether they also see the payload; the recording must have it in every row to train on.
-    pub payload: bool,
+    pub(crate) payload: bool,
     /// Neurons of the hidden layer; chosen by cross-validation if not given.
-    pub hidden: Option<usize>,
+    pub(crate) hidden: Option<usize>,
     /// Activation of the hidden layer.
-    pub activation: Activation,
+    pub(crate) activation: Activation,
     /// Networks whose mean is the correction.
-    pub ensemble: usize,
+    pub(crate) ensemble: usize,
     /// Beetles of the swarm that finds where the gradient training starts; other swarms may spend as much.
-    pub beetles: usize,
+    pub(crate) beetles: usize,
     /// Generations of the swarm.
-    pub generations: usize,
+    pub(crate) generations: usize,
     /// Most iterations of the gradient training.
-    pub iterations: usize,
+    pub(crate) iterations: usize,
     /// Weight decay: half of it times the squared weights stands beside half the squared standardised errors of all rows. Chosen by
     /// cross-validation if not given.
-    pub decay: Option<f64>,
+    pub(crate) decay: Option<f64>,
     /// Share of the training rows that each network keeps back to stop in time, below 0.5. With the decay chosen by cross-validation the
     /// rows are worth more in training than kept back, hence 0.
-    pub keep_back: f64,
+    pub(crate) keep_back: f64,
     /// Folds of the cross-validation.
-    pub folds: usize,
+    pub(crate) folds: usize,
 }
 
 impl Default for Learn {
@@ -102,7 +102,7 @@ impl Default for Learn {
 /// A kind of correction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum RivalSetting {
+pub(crate) enum RivalSetting {
     /// Harmonics of the joints, alone and two by two, along the tracker's axes.
     Ridge,
     /// A smooth function of the inputs with a length for each.
@@ -118,7 +118,7 @@ pub enum RivalSetting {
 /// Where the training of networks starts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum StartSetting {
+pub(crate) enum StartSetting {
     /// Anywhere.
     Random,
     /// At what beetle antennae search found.
@@ -149,7 +149,7 @@ impl From<StartSetting> for TrainingStart {
 /// What the networks see of each joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Inputs {
+pub(crate) enum Inputs {
     /// Its position, as in the paper.
     Joints,
     /// Sine and cosine of its angle; the position of a prismatic joint.

@@ -14,7 +14,7 @@ mod identified;
 mod identify;
 pub mod ingest;
 mod known_cell;
-pub mod learn;
+pub(crate) mod learn;
 mod masses;
 mod optimise;
 mod ports;
@@ -123,15 +123,15 @@ pub struct Context<'a> {
 
 impl Context<'_> {
     /// As [`Services::note`].
-    pub fn note(&self, line: impl Into<String>) {
+    pub(crate) fn note(&self, line: impl Into<String>) {
         self.services.note(line.into());
     }
     /// As [`Services::warn`].
-    pub fn warn(&self, line: impl Into<String>) {
+    pub(crate) fn warn(&self, line: impl Into<String>) {
         self.services.warn(line.into());
     }
     /// The same of every line.
-    pub fn warn_each(&self, lines: impl IntoIterator<Item = String>) {
+    pub(crate) fn warn_each(&self, lines: impl IntoIterator<Item = String>) {
         lines.into_iter().for_each(|line| self.services.warn(line));
     }
     /// The label and content of a file that should hold `what`, a text of at most so many bytes.
@@ -222,7 +222,7 @@ fn on(sets: &[String]) -> Vec<(String, String)> {
 }
 
 /// Stages whose tables are a diagnosis, as `calib diagnose` runs and shows them.
-pub const DIAGNOSES: [&str; 2] = [Diagnose::NAME, DiagnoseTorques::NAME];
+pub(crate) const DIAGNOSES: [&str; 2] = [Diagnose::NAME, DiagnoseTorques::NAME];
 
 /// Every kind of stage, one line each.
 pub const STAGES: &[StageEntry] = &[

@@ -20,17 +20,17 @@ pub struct Optimise {
     /// What is minimised.
     pub problems: Vec<BenchmarkProblem>,
     /// The optimisers to compare.
-    pub methods: Vec<Algorithm>,
+    pub(crate) methods: Vec<Algorithm>,
     /// Individuals of a swarm; half of a bee colony is employed.
-    pub population: usize,
+    pub(crate) population: usize,
     /// Evaluations that each search may spend.
     pub evaluations: u64,
     /// Searches of every method on every problem.
     pub seeds: usize,
     /// Searches of every method on every problem of which the whole course is kept.
-    pub courses: usize,
+    pub(crate) courses: usize,
     /// Published times to stand beside ours.
-    pub reference: Vec<PublishedTime>,
+    pub(crate) reference: Vec<PublishedTime>,
 }
 
 /// A function, and how near to its minimum counts as found.
@@ -48,14 +48,14 @@ pub struct BenchmarkProblem {
 /// A published time to the target.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct PublishedTime {
+pub(crate) struct PublishedTime {
     /// Where it stands, e.g. `Table 2`.
-    pub label: String,
-    pub function: Landscape,
-    pub dimensions: usize,
-    pub method: Algorithm,
+    pub(crate) label: String,
+    pub(crate) function: Landscape,
+    pub(crate) dimensions: usize,
+    pub(crate) method: Algorithm,
     /// s.
-    pub seconds: f64,
+    pub(crate) seconds: f64,
 }
 
 impl Default for Optimise {

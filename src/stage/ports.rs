@@ -25,7 +25,7 @@ pub struct Port {
     /// How many tables it takes.
     pub arity: Arity,
     /// Whether its table is read chunk by chunk.
-    pub chunked: bool,
+    pub(crate) chunked: bool,
 }
 
 /// What a field of a `reads!` struct may be: `T`, `Option<T>`, `Vec<Labelled<T>>` or `Chunks<T>`.
@@ -258,7 +258,7 @@ impl<T: Table> Chunks<T> {
     }
 
     /// Hands on all rows in their order, as [`StoredTable::chunks`].
-    pub fn each(&self, mut take: impl FnMut(T) -> Result<()>) -> Result<()> {
+    pub(crate) fn each(&self, mut take: impl FnMut(T) -> Result<()>) -> Result<()> {
         self.0.chunks(&mut |frame| take(T::from_frame(frame)?))
     }
 }

@@ -64,7 +64,7 @@ impl<T: Stage> ErasedStage for T {
 }
 
 /// A stage whose settings are typed, or all their faults.
-pub type ParsedStage = Result<Box<dyn ErasedStage>, Vec<Trouble>>;
+pub(crate) type ParsedStage = Result<Box<dyn ErasedStage>, Vec<Trouble>>;
 
 /// One kind of stage, as the pipeline's YAML names it.
 #[derive(Debug, Clone, Copy)]
@@ -82,12 +82,12 @@ pub struct StageEntry {
     /// Types the settings; all their faults, with paths below `with`.
     pub parse: fn(&Node) -> ParsedStage,
     /// The JSON Schema of its settings.
-    pub schema: fn(&mut SchemaGenerator) -> Schema,
+    pub(crate) schema: fn(&mut SchemaGenerator) -> Schema,
 }
 
 impl StageEntry {
     /// The entry of a stage.
-    pub const fn of<T: Stage>() -> Self {
+    pub(crate) const fn of<T: Stage>() -> Self {
         Self {
             name: T::NAME,
             summary: T::SUMMARY,

@@ -208,9 +208,9 @@ const UPRIGHT: f64 = 0.99;
 /// What is said where links without masses are under load.
 pub(super) struct WeightlessLinks {
     /// What is missing, for a verdict.
-    pub missing: String,
+    pub(crate) missing: String,
     /// The same with what it costs and what to do.
-    pub warning: String,
+    pub(crate) warning: String,
 }
 
 /// What is said of links without masses at some rows; none where all masses are known, or weight turns no joint.

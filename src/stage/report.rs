@@ -320,7 +320,7 @@ fn placed(error: Error, stage: &str) -> Error {
 #[serde(deny_unknown_fields, default)]
 pub struct ReportTorques {
     /// Heading of the page; without it, the robot's name.
-    pub title: Option<String>,
+    pub(crate) title: Option<String>,
 }
 
 crate::stage::stage! {

@@ -10,14 +10,14 @@ use std::collections::BTreeMap;
 
 /// A model fitted to rows of a recording.
 pub struct FittedRows {
-    pub model: Model,
-    pub fitted: Fitted,
-    pub screening: Screening,
+    pub(crate) model: Model,
+    pub(crate) fitted: Fitted,
+    pub(crate) screening: Screening,
 }
 
 impl FittedRows {
     /// With the recording.
-    pub fn session<'a>(&'a self, data: &'a Measurements) -> Session<'a> {
+    pub(crate) fn session<'a>(&'a self, data: &'a Measurements) -> Session<'a> {
         Session {
             data,
             rows: &self.screening.kept,
@@ -28,7 +28,7 @@ impl FittedRows {
 }
 
 /// Fits, and with `screen` sets aside what does not belong.
-pub fn fit_rows(
+pub(crate) fn fit_rows(
     start: &Model,
     data: &Measurements,
     options: &FitOptions,
@@ -57,7 +57,7 @@ pub fn fit_rows(
 }
 
 /// The number of the set that each row belongs to.
-pub fn numbered(split: &Split) -> Vec<usize> {
+pub(crate) fn numbered(split: &Split) -> Vec<usize> {
     let mut numbers: BTreeMap<&str, usize> = BTreeMap::new();
     split
         .0
@@ -73,7 +73,7 @@ pub fn numbered(split: &Split) -> Vec<usize> {
 const NAMED: usize = 4;
 
 /// Notes for the person: who was set aside and why, and what looks like mistakes and was kept.
-pub fn note(context: &Context, screening: &Screening, recording: &Recording) {
+pub(crate) fn note(context: &Context, screening: &Screening, recording: &Recording) {
     if let Some(offset) = screening.apart {
         context.warn(format!(
             "most points belong to the joints {offset:+} rows away: the two logs are misaligned: join them again before anything else"

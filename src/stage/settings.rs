@@ -23,18 +23,18 @@ use std::fmt;
 #[serde(deny_unknown_fields)]
 pub struct PriorSetting {
     /// One standard deviation, in the parameter's unit.
-    pub sigma: f64,
+    pub(crate) sigma: f64,
     /// Expected change from nominal, in the parameter's unit.
     #[serde(default)]
-    pub mean: f64,
+    pub(crate) mean: f64,
 }
 
 /// The settings `free`, `hold`, `prior` and `bounds` of a stage.
-pub struct ParameterSet<'a> {
-    pub free: Option<&'a [String]>,
-    pub hold: &'a [String],
-    pub prior: &'a BTreeMap<String, PriorSetting>,
-    pub bounds: &'a BTreeMap<String, [f64; 2]>,
+pub(crate) struct ParameterSet<'a> {
+    pub(crate) free: Option<&'a [String]>,
+    pub(crate) hold: &'a [String],
+    pub(crate) prior: &'a BTreeMap<String, PriorSetting>,
+    pub(crate) bounds: &'a BTreeMap<String, [f64; 2]>,
 }
 
 impl ParameterSet<'_> {
@@ -55,7 +55,7 @@ impl ParameterSet<'_> {
     }
 
     /// What is wrong with the settings whatever the robot.
-    pub fn faults(&self, at: &mut Place) {
+    pub(crate) fn faults(&self, at: &mut Place) {
         let names: Vec<&str> = identified().map(|cause| cause.name()).collect();
         for (setting, pattern) in self.patterns() {
             let effect = pattern.split('.').next().unwrap_or_default();
@@ -94,7 +94,7 @@ impl ParameterSet<'_> {
 
     /// Sorts the parameters that this stage may estimate (`open`, positions in the stack) into (candidates, held), and tells the
     /// model what is known beforehand. Patterns that match none of them are warned of.
-    pub fn apply(
+    pub(crate) fn apply(
         &self,
         model: &mut Model,
         open: &[usize],
@@ -302,7 +302,7 @@ pub enum Repeatability {
 const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
 
 impl Repeatability {
-    pub fn faults(&self, at: &mut Place) {
+    pub(crate) fn faults(&self, at: &mut Place) {
         let possible = !matches!(self, Self::Arcsec(sigma) if !(*sigma > 0.0 && sigma.is_finite()));
         at.at("repeatability").must(
             possible,
@@ -311,7 +311,7 @@ impl Repeatability {
     }
 
     /// Gives every row the covariance that the joints make of it; the standard deviation of a joint (rad), where one is known.
-    pub fn apply(
+    pub(crate) fn apply(
         &self,
         model: &Model,
         data: &mut Measurements,
@@ -338,7 +338,7 @@ impl Repeatability {
 const UNLIKELY: f64 = 0.01;
 
 /// Notes for the person on what repeats say against the fit.
-pub fn note_repeats(context: &Context, repeated: &Repeated) {
+pub(crate) fn note_repeats(context: &Context, repeated: &Repeated) {
     let Repeated {
         poses,
         noise,

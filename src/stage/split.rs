@@ -95,10 +95,10 @@ pub enum SplitBy {
 #[serde(deny_unknown_fields)]
 pub struct Stretch {
     /// Name of the set.
-    pub set: String,
+    pub(crate) set: String,
     /// Number of rows.
     #[serde(default)]
-    pub rows: Option<u64>,
+    pub(crate) rows: Option<u64>,
 }
 
 fn validate() -> String {

@@ -217,9 +217,9 @@ fn sides(data: &Measurements, asked: &[usize], screenings: [&Screening; 2]) -> C
 /// A recording that a model was fitted to.
 pub(super) struct CarriedFrom<'a> {
     stage: String,
-    pub recording: &'a Recording,
+    pub(crate) recording: &'a Recording,
     /// Rows that it was fitted to.
-    pub rows: Vec<usize>,
+    pub(crate) rows: Vec<usize>,
 }
 
 impl<'a> CarriedFrom<'a> {
@@ -257,7 +257,7 @@ impl<'a> CarriedFrom<'a> {
 
     /// The geometry that an earlier stage identified by itself from the same recording, else the carried model's, fitted anew to the
     /// same rows without what else was found.
-    pub fn geometry(&self, reads: &TransferReads, load: Load) -> Result<Parameters> {
+    pub(crate) fn geometry(&self, reads: &TransferReads, load: Load) -> Result<Parameters> {
         let of_the_arm = |row: &ParameterRow| {
             row.status == "free"
                 && ![names::BASE_FRAME, names::TOOL_OFFSET].contains(&row.effect.as_str())

@@ -17,27 +17,27 @@ use std::collections::BTreeMap;
 pub struct Validate {
     /// Figures from elsewhere (a paper, a data sheet, last year's report) to stand beside ours.
     #[serde(default)]
-    pub reference: Vec<PublishedErrors>,
+    pub(crate) reference: Vec<PublishedErrors>,
 }
 
 /// Published or agreed statistics of one step on one set.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct PublishedErrors {
+pub(crate) struct PublishedErrors {
     /// Where the figures stand, e.g. `Table 9`.
-    pub label: String,
+    pub(crate) label: String,
     /// The step of ours that they belong beside.
-    pub step: String,
+    pub(crate) step: String,
     /// The set of ours that they belong beside.
-    pub set: String,
+    pub(crate) set: String,
     /// Mean of the position error, mm.
-    pub mean_mm: f64,
+    pub(crate) mean_mm: f64,
     /// Its standard deviation, mm.
     #[serde(default)]
-    pub std_mm: Option<f64>,
+    pub(crate) std_mm: Option<f64>,
     /// The largest error, mm.
     #[serde(default)]
-    pub max_mm: Option<f64>,
+    pub(crate) max_mm: Option<f64>,
 }
 
 crate::stage::stage! {

@@ -22,11 +22,11 @@ const RECORD_FORMAT: u32 = 1;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ActionRecord {
     /// Format of this record.
-    pub record_format: u32,
+    pub(crate) record_format: u32,
     /// Hash of the key.
     pub id: ActionId,
     /// What the tables depend on.
-    pub key: StageKey,
+    pub(crate) key: StageKey,
     /// By port.
     pub tables: BTreeMap<String, TableRef>,
     /// How it went.
@@ -100,7 +100,7 @@ impl Store {
     }
 
     /// The file of a published table, which of a store in a bucket is fetched first; fails where the bucket does not hold it whole.
-    pub fn object(&self, table: &TableRef) -> Result<PathBuf> {
+    pub(crate) fn object(&self, table: &TableRef) -> Result<PathBuf> {
         let path = self.object_path(table);
         match path.exists() || !self.in_bucket() || self.obtain(table, &path)? {
             true => Ok(path),
@@ -224,12 +224,12 @@ impl Store {
     }
 
     /// The same, to be read chunk by chunk.
-    pub fn published(&self, table: &TableRef) -> Result<PublishedTable> {
+    pub(crate) fn published(&self, table: &TableRef) -> Result<PublishedTable> {
         PublishedTable::open(self.object(table)?, table.clone())
     }
 
     /// Whether the file of a published table is there, byte for byte.
-    pub fn is_whole(&self, table: &TableRef) -> Result<bool> {
+    pub(crate) fn is_whole(&self, table: &TableRef) -> Result<bool> {
         Ok(same_bytes(&self.object(table)?, table))
     }
 

@@ -168,7 +168,7 @@ impl Store {
     }
 
     /// Makes everything durable that was written so far.
-    pub fn sync(&self) -> Result<()> {
+    pub(crate) fn sync(&self) -> Result<()> {
         self.sync_then(|| Ok(None))
     }
 

@@ -17,7 +17,7 @@ use arrow::datatypes::{DataType, SchemaRef};
 use std::sync::Arc;
 
 /// A column before it is checked.
-pub type Column = ArrayRef;
+pub(crate) type Column = ArrayRef;
 
 /// Columns of one table kind, in memory, checked.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,7 +45,11 @@ impl FrameBuilder {
         self.columns.push((name.into(), column));
     }
     /// Adds a column of numbers, NaN for null.
-    pub fn push_numbers(&mut self, name: impl Into<String>, values: impl Iterator<Item = f64>) {
+    pub(crate) fn push_numbers(
+        &mut self,
+        name: impl Into<String>,
+        values: impl Iterator<Item = f64>,
+    ) {
         let mut values: Vec<f64> = values.collect();
         let nulls = values.iter().any(|value| value.is_nan()).then(|| {
             let present = values
@@ -61,7 +65,7 @@ impl FrameBuilder {
         self.push(name, Arc::new(Float64Array::new(values.into(), nulls)));
     }
     /// Adds a column, but an optional one without a value is left out: tables that never needed it stay as they are.
-    pub fn push_present(&mut self, name: &str, column: ArrayRef) -> Result<()> {
+    pub(crate) fn push_present(&mut self, name: &str, column: ArrayRef) -> Result<()> {
         let optional = schema::of(&self.kind)?
             .fields
             .iter()
@@ -87,7 +91,7 @@ impl Frame {
         &self.schema.name
     }
     /// What it holds.
-    pub fn schema(&self) -> &'static TableSchema {
+    pub(crate) fn schema(&self) -> &'static TableSchema {
         self.schema
     }
     /// Its columns as Arrow has them.
@@ -216,7 +220,7 @@ impl TextCells {
         self.0.append_option(text);
     }
     /// The column so far; what follows begins another.
-    pub fn take(&mut self) -> ArrayRef {
+    pub(crate) fn take(&mut self) -> ArrayRef {
         Arc::new(self.0.finish())
     }
 }

@@ -44,18 +44,18 @@ pub struct StageKey {
 pub struct ReadKey {
     /// The stage that wrote it, where the port takes several and the reader sees whose they are.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub stage: Option<String>,
+    pub(crate) stage: Option<String>,
     /// Hash of its content.
-    pub table: TableHash,
+    pub(crate) table: TableHash,
 }
 
 /// A raw input file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FileKey {
     /// Its name without folders, which tables of rejected rows show.
-    pub name: String,
+    pub(crate) name: String,
     /// Hash of its bytes.
-    pub content: FileHash,
+    pub(crate) content: FileHash,
 }
 
 /// The hash of a [`StageKey`], as 64 hex digits.
@@ -98,7 +98,7 @@ impl FileHash {
         Self(hasher.finalize().to_hex().to_string())
     }
     /// Reads to the end.
-    pub fn of_reader(mut reader: impl Read) -> std::io::Result<Self> {
+    pub(crate) fn of_reader(mut reader: impl Read) -> std::io::Result<Self> {
         let mut hasher = blake3::Hasher::new();
         let mut block = vec![0; 1 << 18];
         loop {
@@ -121,7 +121,7 @@ impl fmt::Display for FileHash {
 }
 
 /// JSON without white space, keys in order, floats as their shortest round trip: one text per value.
-pub fn canonical(value: &Value) -> String {
+pub(crate) fn canonical(value: &Value) -> String {
     match value {
         Value::Object(map) => {
             let ordered: BTreeMap<&String, &Value> = map.iter().collect();
@@ -149,15 +149,15 @@ pub fn canonical(value: &Value) -> String {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TableRef {
     /// `name/version`.
-    pub schema: String,
+    pub(crate) schema: String,
     /// Identity of the content.
     pub table_hash: TableHash,
     /// Name of the object that holds it.
-    pub file_hash: FileHash,
+    pub(crate) file_hash: FileHash,
     /// How many.
     pub rows: u64,
     /// Size of the file, bytes.
-    pub bytes: u64,
+    pub(crate) bytes: u64,
 }
 
 /// Whether a file is the one that was published, byte for byte.

@@ -25,22 +25,22 @@ pub use sweep::Sweep;
 pub use verify::Verification;
 pub use writer::{FinishedFile, TableWriter};
 
-pub mod actions;
+pub(crate) mod actions;
 mod check;
-pub mod content;
+pub(crate) mod content;
 mod disk;
 pub mod frame;
 pub mod key;
 mod notes;
 mod reader;
 mod remote;
-pub mod runs;
+pub(crate) mod runs;
 #[cfg(feature = "s3")]
 mod s3;
 pub mod schema;
 mod sweep;
 mod verify;
-pub mod writer;
+pub(crate) mod writer;
 
 /// The layout described above.
 const STORE_FORMAT: u32 = 1;

@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 
 impl Store {
     /// Where a note lies; fails where a part of its place cannot be a file name.
-    pub fn place_of_note(&self, place: &[&str], name: &str) -> Result<PathBuf> {
+    pub(crate) fn place_of_note(&self, place: &[&str], name: &str) -> Result<PathBuf> {
         let mut path = self.root().to_path_buf();
         for part in place.iter().chain([&name]) {
             path.push(component(part)?);
@@ -26,7 +26,7 @@ impl Store {
     }
 
     /// A note, where there is one. A torn or damaged one is none.
-    pub fn note(&self, place: &[&str], name: &str) -> Result<Option<Value>> {
+    pub(crate) fn note(&self, place: &[&str], name: &str) -> Result<Option<Value>> {
         let path = self.place_of_note(place, name)?;
         match fs::read(&path) {
             Ok(bytes) => Ok(read(&bytes)),
@@ -36,7 +36,7 @@ impl Store {
     }
 
     /// Writes a note over what may be there, durably.
-    pub fn put_note(&self, place: &[&str], name: &str, note: &impl Serialize) -> Result<()> {
+    pub(crate) fn put_note(&self, place: &[&str], name: &str, note: &impl Serialize) -> Result<()> {
         let path = self.place_of_note(place, name)?;
         let aside = self.workspace()?.fresh();
         write_synced(&aside, &text(note)?)?;
@@ -44,7 +44,12 @@ impl Store {
     }
 
     /// Writes a note if there is none, durable after the next `sync`; false where one stands.
-    pub fn put_note_once(&self, place: &[&str], name: &str, note: &impl Serialize) -> Result<bool> {
+    pub(crate) fn put_note_once(
+        &self,
+        place: &[&str],
+        name: &str,
+        note: &impl Serialize,
+    ) -> Result<bool> {
         let path = self.place_of_note(place, name)?;
         let aside = self.workspace()?.fresh();
         let file = write(&aside, &text(note)?)?;
@@ -57,7 +62,7 @@ impl Store {
     }
 
     /// Writes a file over what may be there, durable after the next `sync`.
-    pub fn put_file(&self, folder: &[&str], name: &str, bytes: &[u8]) -> Result<()> {
+    pub(crate) fn put_file(&self, folder: &[&str], name: &str, bytes: &[u8]) -> Result<()> {
         let path = self.place_of_note(folder, name)?;
         let aside = self.workspace()?.fresh();
         let file = write(&aside, bytes)?;
@@ -66,7 +71,7 @@ impl Store {
     }
 
     /// Takes a note away; nothing where there is none.
-    pub fn drop_note(&self, place: &[&str], name: &str) -> Result<()> {
+    pub(crate) fn drop_note(&self, place: &[&str], name: &str) -> Result<()> {
         let path = self.place_of_note(place, name)?;
         match fs::remove_file(&path) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => {

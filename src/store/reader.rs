@@ -31,7 +31,7 @@ pub struct Loose<T> {
     pub table: T,
     /// Whether the file carries the hash of its content. One that does not was written by another program: nobody can tell whether
     /// its numbers were changed.
-    pub vouched: bool,
+    pub(crate) vouched: bool,
 }
 
 /// Opens a published table whose bytes are those that were published; another file is set aside, so that the next run makes it anew.
@@ -71,7 +71,7 @@ impl PublishedTable {
     }
 
     /// Hands on all rows in their order; of a table without rows, one empty chunk. Fails where the file cannot be read.
-    pub fn chunks(&self, take: &mut dyn FnMut(&Frame) -> Result<()>) -> Result<()> {
+    pub(crate) fn chunks(&self, take: &mut dyn FnMut(&Frame) -> Result<()>) -> Result<()> {
         let place = self.path.display().to_string();
         let (kind, version) = known_schema(&place, &self.table.schema)?;
         let unreadable = |why| Error::store(&place, format!("not a readable Parquet file: {why}"));
@@ -278,7 +278,7 @@ impl Decoded {
     }
 
     /// The file's own key-value metadata.
-    pub fn metadata_value(&self, key: &str) -> Option<&str> {
+    pub(crate) fn metadata_value(&self, key: &str) -> Option<&str> {
         self.said.get(key).map(String::as_str)
     }
 
@@ -386,7 +386,7 @@ impl DecodedChunks {
     }
 
     /// The next rows; of a file without rows, once none.
-    pub fn next(&mut self) -> Result<Option<Decoded>, String> {
+    pub(crate) fn next(&mut self) -> Result<Option<Decoded>, String> {
         let batch =
             raw::decoded(|| self.reader.next().transpose())?.map_err(|error| error.to_string())?;
         let first = !std::mem::replace(&mut self.begun, true);

@@ -89,7 +89,7 @@ impl Store {
     }
 
     /// The store as a person names it.
-    pub fn name(&self) -> String {
+    pub(crate) fn name(&self) -> String {
         self.remote.as_ref().map_or_else(
             || self.root().display().to_string(),
             |remote| remote.bucket.name().to_string(),

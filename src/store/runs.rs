@@ -28,18 +28,18 @@ pub struct Run {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Link {
     /// Its id.
-    pub run: String,
+    pub(crate) run: String,
     /// Hash of its manifest.
-    pub sealed: String,
+    pub(crate) sealed: String,
 }
 
 /// A manifest whose seal holds.
 #[derive(Debug, Clone)]
 pub struct Sealed {
     /// As it was written.
-    pub manifest: Value,
+    pub(crate) manifest: Value,
     /// Hash of it.
-    pub sealed: String,
+    pub(crate) sealed: String,
 }
 
 /// Hex digits of the hash that an event carries.
@@ -221,7 +221,7 @@ impl Store {
     }
 
     /// The last run whose manifest is whole and says that it ended.
-    pub fn last_ended(&self) -> Result<Option<Link>> {
+    pub(crate) fn last_ended(&self) -> Result<Option<Link>> {
         for run in self.run_folders()?.into_iter().rev() {
             // A manifest that is not there or cannot be read is found by a verification; it must not stop a run.
             if let Ok(Sealed { manifest, sealed }) = self.sealed_manifest(&run)
@@ -234,14 +234,14 @@ impl Store {
     }
 
     /// Whether anything of a run's manifest was written: a power cut may leave a run without, which then never ended.
-    pub fn has_manifest(&self, id: &str) -> bool {
+    pub(crate) fn has_manifest(&self, id: &str) -> bool {
         self.run_dir(id).is_ok_and(|dir| {
             fs::metadata(dir.join("manifest.json")).is_ok_and(|file| file.len() > 0)
         })
     }
 
     /// The events of a run, oldest first, as far as they were written; none where they cannot be read.
-    pub fn events(&self, id: &str) -> Vec<Value> {
+    pub(crate) fn events(&self, id: &str) -> Vec<Value> {
         let text = self
             .run_dir(id)
             .ok()
@@ -258,7 +258,7 @@ impl Store {
     }
 
     /// The manifest of a run with its seal, which holds.
-    pub fn sealed_manifest(&self, id: &str) -> Result<Sealed> {
+    pub(crate) fn sealed_manifest(&self, id: &str) -> Result<Sealed> {
         let path = self.run_dir(id)?.join("manifest.json");
         let bytes = fs::read(&path).map_err(|e| refused(&path, "read", &e))?;
         let damaged = |why: String| {

@@ -123,7 +123,7 @@ impl S3 {
     }
 
     /// A folder name for what is fetched from here; other endpoints have other buckets of the same name.
-    pub fn folder(&self) -> String {
+    pub(crate) fn folder(&self) -> String {
         let hash = blake3::hash(format!("{} {}", self.endpoint, self.name).as_bytes()).to_hex();
         format!("{}-{}", self.bucket, &hash[..16])
     }

@@ -50,7 +50,7 @@ pub struct TableSchema {
     /// Columns that tell every row from every other.
     pub primary_key: Vec<String>,
     /// Columns that rows are in ascending order of: the primary key in some order.
-    pub sort: Vec<String>,
+    pub(crate) sort: Vec<String>,
     /// In the order of the file.
     pub fields: Vec<FieldSchema>,
 }
@@ -69,18 +69,18 @@ pub struct FieldSchema {
     pub nullable: bool,
     /// Symbol of a stored unit; `row` where the row says it in its own `unit` column.
     #[serde(default)]
-    pub unit: Option<String>,
+    pub(crate) unit: Option<String>,
     /// What it means.
-    pub description: String,
+    pub(crate) description: String,
     /// `angle`, `quaternion`, `json`, `unit`: how values compare.
     #[serde(default)]
-    pub semantic: Option<String>,
+    pub(crate) semantic: Option<String>,
     /// What values are allowed.
     #[serde(default)]
     pub constraints: Constraints,
     /// Which differences do not count.
     #[serde(default)]
-    pub diff: Tolerance,
+    pub(crate) diff: Tolerance,
     /// Whether files without the column are read too.
     #[serde(default)]
     pub optional: bool,
@@ -124,27 +124,27 @@ pub struct Constraints {
 /// Differences that a comparison of two tables overlooks, in the unit of the column, and what it measures them by.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Tolerance {
+pub(crate) struct Tolerance {
     /// In the unit of the column.
     #[serde(default)]
-    pub atol: f64,
+    pub(crate) atol: f64,
     /// As a share of the larger value.
     #[serde(default)]
-    pub rtol: f64,
+    pub(crate) rtol: f64,
     /// The column that holds one standard deviation of this one.
     #[serde(default)]
-    pub sigma: Option<String>,
+    pub(crate) sigma: Option<String>,
 }
 
 /// `major.minor.patch`: a new nullable column is a minor step, any other change of columns a major one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Version {
     /// Readers of another one refuse the table.
-    pub major: u32,
+    pub(crate) major: u32,
     /// Columns were added.
-    pub minor: u32,
+    pub(crate) minor: u32,
     /// Descriptions changed.
-    pub patch: u32,
+    pub(crate) patch: u32,
 }
 
 impl Version {
@@ -179,7 +179,7 @@ impl<'de> Deserialize<'de> for Version {
 
 impl ColumnType {
     /// The type as Arrow has it.
-    pub fn arrow(self) -> DataType {
+    pub(crate) fn arrow(self) -> DataType {
         match self {
             Self::Utf8 => DataType::Utf8,
             Self::Int64 => DataType::Int64,
@@ -206,7 +206,7 @@ impl TableSchema {
     }
 
     /// The field that a column belongs to, with the joint (from 1) of a per-joint column.
-    pub fn field_of(&self, column: &str) -> Option<(&FieldSchema, Option<usize>)> {
+    pub(crate) fn field_of(&self, column: &str) -> Option<(&FieldSchema, Option<usize>)> {
         self.fields
             .iter()
             .find_map(|field| match field.joint_of(column) {
@@ -243,7 +243,7 @@ impl TableSchema {
 
 impl FieldSchema {
     /// The joint (from 1) that `column` is for, if it is a column of this per-joint field.
-    pub fn joint_of(&self, column: &str) -> Option<usize> {
+    pub(crate) fn joint_of(&self, column: &str) -> Option<usize> {
         let (prefix, suffix) = self.name.split_once("{j}")?;
         let digits = column.strip_prefix(prefix)?.strip_suffix(suffix)?;
         let joint = digits.parse::<usize>().ok()?;
@@ -259,7 +259,7 @@ impl FieldSchema {
     }
 
     /// The Arrow field of a column, with unit, description and semantic as metadata.
-    pub fn arrow(&self, joint: Option<usize>) -> Field {
+    pub(crate) fn arrow(&self, joint: Option<usize>) -> Field {
         let number = joint.map_or(String::new(), |joint| joint.to_string());
         let mut metadata = vec![(
             "description".to_string(),

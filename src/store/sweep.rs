@@ -17,17 +17,17 @@ const RUN_ID: usize = 26;
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Sweep {
     /// Records that go.
-    pub actions: u64,
+    pub(crate) actions: u64,
     /// Tables that go.
-    pub objects: u64,
+    pub(crate) objects: u64,
     /// Bytes of the records and tables that go.
-    pub bytes: u64,
+    pub(crate) bytes: u64,
     /// Records that stay.
-    pub kept_actions: u64,
+    pub(crate) kept_actions: u64,
     /// Tables that stay.
-    pub kept_objects: u64,
+    pub(crate) kept_objects: u64,
     /// Kept only because they are younger than the grace period.
-    pub young: u64,
+    pub(crate) young: u64,
 }
 
 impl Store {
@@ -127,7 +127,7 @@ fn remove(path: &Path, dry_run: bool) -> Result<u64> {
 
 impl Store {
     /// Runs that the records of fleets name.
-    pub fn runs_of_fleets(&self) -> Result<BTreeSet<String>> {
+    pub(crate) fn runs_of_fleets(&self) -> Result<BTreeSet<String>> {
         let mut runs = BTreeSet::new();
         for path in files(&self.root().join("fleets"))?
             .iter()

@@ -18,19 +18,19 @@ use crate::error::{Error, Fault, Result};
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Verification {
     /// Tables that were read.
-    pub objects: u64,
+    pub(crate) objects: u64,
     /// Bytes of these tables.
-    pub bytes: u64,
+    pub(crate) bytes: u64,
     /// Records that were read.
-    pub actions: u64,
+    pub(crate) actions: u64,
     /// Manifests that were read.
-    pub runs: u64,
+    pub(crate) runs: u64,
     /// Names that were followed.
-    pub tags: u64,
+    pub(crate) tags: u64,
     /// Files below `tables/` and `documents/`.
-    pub copies: u64,
+    pub(crate) copies: u64,
     /// Sealed notes of documents and fleets.
-    pub notes: u64,
+    pub(crate) notes: u64,
     /// What is not as it was written.
     #[serde(serialize_with = "texts")]
     pub faults: Vec<Fault>,

@@ -18,9 +18,9 @@ use screen::NextStep;
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ResultScreen<'a> {
     /// The `--store` of the commands that are proposed.
-    pub store: &'a str,
+    pub(crate) store: &'a str,
     /// Columns of the terminal, where there is one.
-    pub columns: Option<usize>,
+    pub(crate) columns: Option<usize>,
 }
 
 /// The errors at the largest set that the step which stands was not fitted to, else at the one that it was fitted to; nothing where no

@@ -60,12 +60,12 @@ impl LimitsSummary {
     }
 
     /// Whether all limits are kept; none where there are none.
-    pub fn accepted(&self) -> Option<bool> {
+    pub(crate) fn accepted(&self) -> Option<bool> {
         (!self.0.is_empty()).then(|| self.0.iter().all(|judged| judged.kept))
     }
 
     /// What is not accepted, a sentence a report.
-    pub fn exceeded(&self) -> Vec<String> {
+    pub(crate) fn exceeded(&self) -> Vec<String> {
         self.0
             .iter()
             .filter(|judged| !judged.kept)

@@ -15,31 +15,31 @@ const OPEN: f64 = 0.05;
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RivalChange {
     /// The diagnosis.
-    pub stage: String,
+    pub(crate) stage: String,
     /// What was found.
-    pub finding: CauseAtPlace,
+    pub(crate) finding: CauseAtPlace,
     /// What fitted as well, in one of the runs.
-    pub rival: CauseAtPlace,
+    pub(crate) rival: CauseAtPlace,
     /// What the later run makes of both.
-    pub outcome: RivalOutcome,
+    pub(crate) outcome: RivalOutcome,
     /// Probability of the rival, or of the finding where the rival took its place; null where it is not among the rivals.
-    pub before: Option<f64>,
+    pub(crate) before: Option<f64>,
     /// The same in the later run; `None` where it is gone.
-    pub now: Option<f64>,
+    pub(crate) now: Option<f64>,
 }
 
 /// An effect at a place, as tables have them.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct CauseAtPlace {
-    pub effect: String,
+pub(crate) struct CauseAtPlace {
+    pub(crate) effect: String,
     #[serde(rename = "where")]
-    pub place: String,
+    pub(crate) place: String,
 }
 
 /// What run B says of a finding and its rival in run A.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum RivalOutcome {
+pub(crate) enum RivalOutcome {
     /// The finding stays, the rival is excluded.
     Confirmed,
     /// The rival is the finding now, and what was found before is excluded.
@@ -219,7 +219,7 @@ pub fn rival_changes(
 }
 
 /// A line each.
-pub fn rival_words(changes: &[RivalChange]) -> String {
+pub(crate) fn rival_words(changes: &[RivalChange]) -> String {
     let number = |value: Option<f64>| {
         value.map_or_else(|| "not listed".into(), |value| format!("{value:.2}"))
     };

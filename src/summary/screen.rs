@@ -90,16 +90,16 @@ pub(super) fn withdrawn(count: usize) -> String {
 }
 
 /// One thing to do next.
-pub struct NextStep {
+pub(crate) struct NextStep {
     /// In a few words.
-    pub what: String,
+    pub(crate) what: String,
     /// What to type for it.
-    pub command: Option<String>,
+    pub(crate) command: Option<String>,
 }
 
 impl NextStep {
     /// To correct one's targets by the model of a run.
-    pub fn correct(run: &str, store: &str) -> Self {
+    pub(crate) fn correct(run: &str, store: &str) -> Self {
         Self {
             what: "correct your targets".into(),
             command: Some(format!("calib compensate {run} targets.csv{store}")),

@@ -15,22 +15,22 @@ const NAMED: usize = 2;
 
 /// A finding of positions or torques with its numbers and rivals.
 pub(super) struct Found {
-    pub rank: i64,
-    pub effect: String,
-    pub place: String,
-    pub statement: String,
+    pub(crate) rank: i64,
+    pub(crate) effect: String,
+    pub(crate) place: String,
+    pub(crate) statement: String,
     /// Its forms, objects of one cause each; null where it has none.
-    pub forms: Value,
-    pub numbers: Vec<FindingNumberRow>,
+    pub(crate) forms: Value,
+    pub(crate) numbers: Vec<FindingNumberRow>,
     /// Of its name, of its place, and of none of the names.
-    pub probabilities: [Option<f64>; 3],
+    pub(crate) probabilities: [Option<f64>; 3],
     /// Whether it was compared with others.
-    pub is_compared: bool,
-    pub rivals: Vec<RivalRow>,
+    pub(crate) is_compared: bool,
+    pub(crate) rivals: Vec<RivalRow>,
     /// Its size in a unit that all findings of a diagnosis share, and as it is printed.
-    pub size: Option<(f64, String)>,
+    pub(crate) size: Option<(f64, String)>,
     /// What `--json` has of it but numbers and rivals.
-    pub document: Value,
+    pub(crate) document: Value,
 }
 
 impl Found {
@@ -43,7 +43,7 @@ impl Found {
     }
 
     /// All of it for a person; `more` stands before the rivals that are shown.
-    pub fn details(&self, more: &str, is_shown: fn(&RivalRow) -> bool) -> String {
+    pub(crate) fn details(&self, more: &str, is_shown: fn(&RivalRow) -> bool) -> String {
         let (effect, at) = (&self.effect, &self.place);
         let mut text = format!("{}. {}\n", self.rank, self.statement);
         if let [Some(name), Some(place), Some(none)] = self.probabilities {
@@ -73,13 +73,13 @@ impl Found {
 
 /// A finding in a few words.
 pub(super) struct ShortFinding {
-    pub size: Option<(f64, String)>,
+    pub(crate) size: Option<(f64, String)>,
     /// What it is, e.g. `joint 3 yields under load`.
-    pub what: String,
+    pub(crate) what: String,
     /// Its number with the standard deviation.
-    pub number: Option<String>,
+    pub(crate) number: Option<String>,
     /// What it might be instead, where that matters.
-    pub instead: Option<String>,
+    pub(crate) instead: Option<String>,
 }
 
 /// Which number of a finding is shown.

@@ -30,7 +30,7 @@ impl FindingRow {
 
 impl RivalRow {
     /// Whether it is more than the nearest name of a finding that has none: one that the data exclude.
-    pub fn is_inseparable(&self) -> bool {
+    pub(crate) fn is_inseparable(&self) -> bool {
         self.probability
             .is_none_or(|probability| probability >= EXCLUDED)
     }
@@ -38,7 +38,7 @@ impl RivalRow {
 
 impl FindingNumbers {
     /// Those of a finding.
-    pub fn of_finding(&self, rank: i64) -> Vec<FindingNumberRow> {
+    pub(crate) fn of_finding(&self, rank: i64) -> Vec<FindingNumberRow> {
         let own = self.0.iter().filter(|row| row.rank == rank);
         own.cloned().collect()
     }
@@ -46,7 +46,7 @@ impl FindingNumbers {
 
 impl Rivals {
     /// Those of a finding.
-    pub fn of_finding(&self, rank: i64) -> Vec<RivalRow> {
+    pub(crate) fn of_finding(&self, rank: i64) -> Vec<RivalRow> {
         let own = self.0.iter().filter(|row| row.rank == rank);
         own.cloned().collect()
     }
@@ -293,7 +293,7 @@ impl Forms {
     }
 
     /// Formulas of a finding, each as its rows, cheapest first.
-    pub fn of_finding(&self, rank: i64) -> impl Iterator<Item = &[FormRow]> {
+    pub(crate) fn of_finding(&self, rank: i64) -> impl Iterator<Item = &[FormRow]> {
         let own = move |rows: &&[FormRow]| rows.first().is_some_and(|row| row.rank == rank);
         self.0
             .chunk_by(|a, b| (a.rank, a.form) == (b.rank, b.form))

@@ -47,17 +47,17 @@ fn typed<T: Table>(loose: Loose<Frame>) -> Result<Loose<T>> {
 }
 
 /// Tables of one stage by their kind, none of what it did not write.
-pub type TablesByKind<'a> = dyn Fn(&str) -> Result<Option<Frame>> + 'a;
+pub(crate) type TablesByKind<'a> = dyn Fn(&str) -> Result<Option<Frame>> + 'a;
 
 /// The table of a kind as Rust values, if there is one.
-pub fn of_kind<T: Table>(tables: &TablesByKind) -> Result<Option<T>> {
+pub(crate) fn of_kind<T: Table>(tables: &TablesByKind) -> Result<Option<T>> {
     tables(T::KIND)?
         .map(|frame| T::from_frame(&frame))
         .transpose()
 }
 
 /// A row as JSON with these of its columns, separated by blanks; `where=place` is the column `place` under the name `where`.
-pub fn picked(row: &impl serde::Serialize, columns: &str) -> serde_json::Value {
+pub(crate) fn picked(row: &impl serde::Serialize, columns: &str) -> serde_json::Value {
     let mut row = serde_json::json!(row);
     let column = |column: &str| {
         let (name, column) = column.split_once('=').unwrap_or((column, column));
@@ -68,7 +68,7 @@ pub fn picked(row: &impl serde::Serialize, columns: &str) -> serde_json::Value {
 }
 
 /// Rows as JSON, each as [`picked`] has it.
-pub fn picked_of<'a, R: serde::Serialize + 'a>(
+pub(crate) fn picked_of<'a, R: serde::Serialize + 'a>(
     rows: impl IntoIterator<Item = &'a R>,
     columns: &str,
 ) -> serde_json::Value {

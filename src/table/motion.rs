@@ -13,29 +13,29 @@ use std::collections::BTreeMap;
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ArmMotion {
     /// Joints of the arm.
-    pub joints: usize,
+    pub(crate) joints: usize,
     /// Which joints are prismatic.
-    pub prismatic: Vec<bool>,
+    pub(crate) prismatic: Vec<bool>,
     /// From 1.
-    pub sequence: Vec<i64>,
+    pub(crate) sequence: Vec<i64>,
     /// Stretch of the recording, from 1.
-    pub trajectory: Vec<i64>,
+    pub(crate) trajectory: Vec<i64>,
     /// What rows may be for.
-    pub usages: Vec<String>,
+    pub(crate) usages: Vec<String>,
     /// Which of [`ArmMotion::usages`] a row is for; none where the recording says nothing.
-    pub usage: Vec<Option<u16>>,
+    pub(crate) usage: Vec<Option<u16>>,
     /// s, ascending in a trajectory.
-    pub time: Vec<f64>,
+    pub(crate) time: Vec<f64>,
     /// rad or m.
-    pub q: Vec<f64>,
+    pub(crate) q: Vec<f64>,
     /// rad/s or m/s.
-    pub velocity: Option<Vec<f64>>,
+    pub(crate) velocity: Option<Vec<f64>>,
     /// A, of the motors.
-    pub current: Option<Vec<f64>>,
+    pub(crate) current: Option<Vec<f64>>,
     /// Nm, on the side of the joints.
-    pub torque: Option<Vec<f64>>,
+    pub(crate) torque: Option<Vec<f64>>,
     /// C; NaN where a row has none.
-    pub temperature: Option<Vec<f64>>,
+    pub(crate) temperature: Option<Vec<f64>>,
 }
 
 /// Stored names of a per-joint quantity and their units; `sliding` is that of prismatic joints.
@@ -205,25 +205,25 @@ impl Table for ArmMotion {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct TorqueCourse {
     /// Joints of the arm.
-    pub joints: usize,
+    pub(crate) joints: usize,
     /// Row of the recording.
-    pub sequence: Vec<i64>,
+    pub(crate) sequence: Vec<i64>,
     /// s.
-    pub time: Vec<f64>,
+    pub(crate) time: Vec<f64>,
     /// Whether no step was fitted to the row.
-    pub held_out: Vec<bool>,
+    pub(crate) held_out: Vec<bool>,
     /// Whether something pushed on the arm.
-    pub in_event: Vec<bool>,
+    pub(crate) in_event: Vec<bool>,
     /// Whether the joint rests.
-    pub rest: Vec<bool>,
+    pub(crate) rest: Vec<bool>,
     /// rad/s.
-    pub velocity: Vec<f64>,
+    pub(crate) velocity: Vec<f64>,
     /// Nm.
-    pub measured: Vec<f64>,
+    pub(crate) measured: Vec<f64>,
     /// Nm: of the rigid arm alone.
-    pub simulated: Vec<f64>,
+    pub(crate) simulated: Vec<f64>,
     /// Nm: with the findings.
-    pub corrected: Vec<f64>,
+    pub(crate) corrected: Vec<f64>,
 }
 
 impl TorqueCourse {
@@ -249,7 +249,7 @@ impl TorqueCourse {
     }
 
     /// A joint's part of a row-major list, by row.
-    pub fn of_joint<'a, T: Copy>(
+    pub(crate) fn of_joint<'a, T: Copy>(
         &self,
         all: &'a [T],
         joint: usize,

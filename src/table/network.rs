@@ -275,12 +275,12 @@ impl<'a> Numbers<'a> {
         Ok(Self(parts))
     }
 
-    pub fn has(&self, part: &str) -> bool {
+    pub(crate) fn has(&self, part: &str) -> bool {
         self.0.contains_key(part)
     }
 
     /// Highest number of a member that has such a part.
-    pub fn members(&self, part: &str) -> usize {
+    pub(crate) fn members(&self, part: &str) -> usize {
         let last = self
             .0
             .get(part)
@@ -299,12 +299,12 @@ impl<'a> Numbers<'a> {
             .map(|(place, value)| (*place, *value))
     }
 
-    pub fn count(&self, part: &str) -> usize {
+    pub(crate) fn count(&self, part: &str) -> usize {
         self.all(part).count()
     }
 
     /// Numbers of a part that the first member has.
-    pub fn first_member(&self, part: &str) -> usize {
+    pub(crate) fn first_member(&self, part: &str) -> usize {
         self.0
             .get(part)
             .and_then(|members| members.get(&1))
@@ -327,12 +327,12 @@ impl<'a> Numbers<'a> {
     }
 
     /// A shared number of entry `to`.
-    pub fn shared(&self, part: &str, to: usize) -> Result<f64> {
+    pub(crate) fn shared(&self, part: &str, to: usize) -> Result<f64> {
         self.of(0, part, [0, to, 0])
     }
 
     /// Shared numbers of entry `to`, `from` 1 to `N`.
-    pub fn row<const N: usize>(&self, part: &str, to: usize) -> Result<[f64; N]> {
+    pub(crate) fn row<const N: usize>(&self, part: &str, to: usize) -> Result<[f64; N]> {
         let mut values = [0.0; N];
         for (k, value) in values.iter_mut().enumerate() {
             *value = self.of(0, part, [0, to, k + 1])?;

@@ -12,15 +12,15 @@ pub const UNFOLDED: &str = "unfolded";
 #[derive(Debug, Clone, Copy, Default)]
 pub struct FitContext {
     /// Rank of the geometry, found and by theory, where all of it was asked for.
-    pub geometry: Option<(usize, usize)>,
+    pub(crate) geometry: Option<(usize, usize)>,
     /// Standard deviation of the joints that rows are weighted by, rad.
-    pub repeatability: Option<f64>,
+    pub(crate) repeatability: Option<f64>,
     /// Parts of the cross-validation.
-    pub folds: Option<usize>,
+    pub(crate) folds: Option<usize>,
     /// Poses that were too few, or too many, for the cross-validation that was asked for.
-    pub unfolded: Option<usize>,
+    pub(crate) unfolded: Option<usize>,
     /// Parameters of the model whose covariance is an earlier step's.
-    pub earlier: usize,
+    pub(crate) earlier: usize,
 }
 
 impl Observability {

@@ -142,7 +142,7 @@ impl Parameters {
     }
 
     /// The same with what would show a parameter (by name) added to its remark.
-    pub fn with_advice(mut self, advice: &BTreeMap<String, String>) -> Self {
+    pub(crate) fn with_advice(mut self, advice: &BTreeMap<String, String>) -> Self {
         for row in &mut self.0 {
             if let Some(sentence) = advice.get(&row.name) {
                 row.remark = Some(row.remark.take().map_or_else(
@@ -155,7 +155,7 @@ impl Parameters {
     }
 
     /// The same, with what they correct, which their remarks tell people.
-    pub fn correcting(mut self, corrected: Corrected) -> Self {
+    pub(crate) fn correcting(mut self, corrected: Corrected) -> Self {
         if corrected == Corrected::OutsideSimulation {
             for row in &mut self.0 {
                 row.corrects = Some(Corrected::OUTSIDE.into());
@@ -186,7 +186,7 @@ impl Parameters {
     }
 
     /// The effects of the whole arm in this model, in the registry's order.
-    pub fn effects(&self) -> Vec<&'static str> {
+    pub(crate) fn effects(&self) -> Vec<&'static str> {
         let has = |name: &&str| {
             self.0
                 .iter()
@@ -212,7 +212,7 @@ impl Parameters {
     }
 
     /// What belongs to the arm and not to the measurement by which it was identified. Fails where a form cannot be read.
-    pub fn of_the_arm(&self) -> Result<Self> {
+    pub(crate) fn of_the_arm(&self) -> Result<Self> {
         let mut rows = Vec::with_capacity(self.0.len());
         for row in &self.0 {
             let form = row.form.as_deref().map(read_form).transpose()?;
@@ -224,7 +224,7 @@ impl Parameters {
     }
 
     /// [`Parameters::model`] of a robot whose base stands elsewhere.
-    pub fn model_standing(
+    pub(crate) fn model_standing(
         &self,
         base: Pose,
         robot: RobotModel,
@@ -355,7 +355,7 @@ impl Parameters {
     }
 
     /// The same of a robot whose base stands elsewhere in the tracker's frame.
-    pub fn standing_at(mut self, base: &Pose) -> Self {
+    pub(crate) fn standing_at(mut self, base: &Pose) -> Self {
         let (translation, rotation) = (base.translation, base.rotation_vector());
         for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
             for (ending, value, unit) in [
@@ -373,7 +373,7 @@ impl Parameters {
     }
 
     /// Where the base stands in the tracker's frame; the identity without `base_frame`.
-    pub fn base_pose(&self) -> Pose {
+    pub(crate) fn base_pose(&self) -> Pose {
         let value = |axis: &str, unit: Unit| {
             let name = format!("{}.{axis}", names::BASE_FRAME);
             self.0

@@ -68,7 +68,7 @@ impl Prediction {
     }
 
     /// Whether these are the points of a recording: its rows, names and measured points.
-    pub fn is_of(&self, recording: &Recording) -> bool {
+    pub(crate) fn is_of(&self, recording: &Recording) -> bool {
         let measured = |row: &PredictionRow| {
             [
                 row.x_mm + row.dx_mm,
@@ -117,7 +117,7 @@ impl Prediction {
     }
 
     /// Mean squared one-sigma length of the noise of the points that the step was fitted to, mm2; zero of none.
-    pub fn mean_square_noise_mm2(&self) -> f64 {
+    pub(crate) fn mean_square_noise_mm2(&self) -> f64 {
         let (sum, count) = self
             .fitted_points()
             .fold((0.0, 0usize), |(sum, count), row| {
@@ -127,7 +127,7 @@ impl Prediction {
     }
 
     /// The same with errors larger by a factor, by row: of rows that had a part in what they were brought to.
-    pub fn with_places(mut self, inflation: &BTreeMap<usize, f64>) -> Self {
+    pub(crate) fn with_places(mut self, inflation: &BTreeMap<usize, f64>) -> Self {
         inflation
             .iter()
             .filter(|(_, by)| by.is_finite())
@@ -136,7 +136,7 @@ impl Prediction {
     }
 
     /// The same with the errors of `rows` under fits without them.
-    pub fn with_folds<'a>(
+    pub(crate) fn with_folds<'a>(
         mut self,
         rows: impl Iterator<Item = (&'a usize, (&'a f64, &'a f64))>,
     ) -> Self {
@@ -148,7 +148,7 @@ impl Prediction {
     }
 
     /// The same with the weights of `rows` in a fit to them; 0 of those that were set aside.
-    pub fn with_weights(mut self, rows: &[usize], fitted: &Fitted) -> Self {
+    pub(crate) fn with_weights(mut self, rows: &[usize], fitted: &Fitted) -> Self {
         rows.iter().for_each(|row| {
             self.0[*row].weight = Some(fitted.downweighted.get(row).copied().unwrap_or(1.0))
         });
@@ -160,7 +160,10 @@ impl Prediction {
     }
 
     /// The same with a remark for each row behind what is said already; nothing where there is none.
-    pub fn with_remarks(mut self, remarks: impl IntoIterator<Item = Option<String>>) -> Self {
+    pub(crate) fn with_remarks(
+        mut self,
+        remarks: impl IntoIterator<Item = Option<String>>,
+    ) -> Self {
         for (row, remark) in self.0.iter_mut().zip(remarks) {
             row.remark = match (row.remark.take(), remark) {
                 (Some(said), Some(more)) => Some(format!("{said}; {more}")),
@@ -171,7 +174,7 @@ impl Prediction {
     }
 
     /// The same with the rows marked that a screen set aside.
-    pub fn with_suspects(mut self, suspects: impl Iterator<Item = usize>) -> Self {
+    pub(crate) fn with_suspects(mut self, suspects: impl Iterator<Item = usize>) -> Self {
         for row in suspects {
             self.0[row].suspect = true;
         }

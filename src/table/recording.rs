@@ -138,7 +138,7 @@ impl Recording {
     }
 
     /// The name of what holds a row's target, where that contact is what was measured.
-    pub fn contact(&self, row: usize) -> Option<&str> {
+    pub(crate) fn contact(&self, row: usize) -> Option<&str> {
         let settings = KINDS
             .iter()
             .filter(|kind| kind.is_contact())

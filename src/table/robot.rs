@@ -361,7 +361,7 @@ impl JointConventions {
     }
 
     /// The convention that the rows hold; fails where a zero is missing, a sign is none, or a joint is named that is not there.
-    pub fn to_convention(&self) -> Result<JointConvention> {
+    pub(crate) fn to_convention(&self) -> Result<JointConvention> {
         let fault = |row: &JointConventionRow, message: String| {
             Error::data(format!("table convention, joint {}", row.joint), message)
         };

@@ -37,39 +37,39 @@ pub struct Unseen {
 /// A step that predicts.
 pub struct Step {
     /// Id of its stage.
-    pub id: String,
+    pub(crate) id: String,
     /// Whether it has a model of its own; else it learned on the step before it that has.
-    pub own: bool,
+    pub(crate) own: bool,
     /// Its errors at rows that its fits have not seen.
-    pub unseen: Unseen,
+    pub(crate) unseen: Unseen,
 }
 
 /// The step that stands.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Standing {
     /// Id of the stage that stands for the run.
-    pub step: String,
+    pub(crate) step: String,
     /// The step whose parameters it rests on: itself, or the one that it learned on.
-    pub model: String,
+    pub(crate) model: String,
     /// Later steps that were worse.
-    pub withdrawn: Vec<Withdrawn>,
+    pub(crate) withdrawn: Vec<Withdrawn>,
     /// An earlier step that is better at points that no step was fitted to.
-    pub contradicted: Option<Contradicted>,
+    pub(crate) contradicted: Option<Contradicted>,
 }
 
 /// A step that was worse than one before it, rms of the same points.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Withdrawn {
     /// Id of the stage that is withdrawn.
-    pub step: String,
+    pub(crate) step: String,
     /// Its rms at the points that both predict without having seen them.
-    pub rms_mm: f64,
+    pub(crate) rms_mm: f64,
     /// Id of the earlier stage.
-    pub than: String,
+    pub(crate) than: String,
     /// The rms of that one at the same points.
-    pub than_rms_mm: f64,
+    pub(crate) than_rms_mm: f64,
     /// How many these are.
-    pub points: usize,
+    pub(crate) points: usize,
 }
 
 /// The same of the step that stands, at points that choose nothing.
@@ -133,7 +133,7 @@ impl Unseen {
     }
 
     /// The same from a table `prediction` of which nothing else is read.
-    pub fn of_frame(frame: &Frame) -> Result<Self> {
+    pub(crate) fn of_frame(frame: &Frame) -> Result<Self> {
         let (sequence, error) = (
             frame.read::<i64>("sequence")?,
             frame.read::<f64>("error_mm")?,

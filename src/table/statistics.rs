@@ -20,7 +20,7 @@ impl StatisticsRow {
     }
 
     /// Whether it is of rows in which the target was brought to places: blocks that are left out are places then.
-    pub fn is_contact(&self) -> bool {
+    pub(crate) fn is_contact(&self) -> bool {
         let own = |word: &str| self.set.ends_with(&format!("({word})"));
         KINDS
             .iter()
@@ -28,14 +28,14 @@ impl StatisticsRow {
     }
 
     /// Whether its figures of noise rest on nothing that was stated or measured again.
-    pub fn is_inferred(&self) -> bool {
+    pub(crate) fn is_inferred(&self) -> bool {
         self.noise_basis.as_deref() == Some(NoiseBasis::Inferred.name())
     }
 }
 
 impl Corrections {
     /// Root mean square error (mm) of the training rows under the rival that was kept, each row unseen; none where it could not be tried.
-    pub fn rms_mm(&self) -> Option<f64> {
+    pub(crate) fn rms_mm(&self) -> Option<f64> {
         self.0.iter().find(|row| row.chosen)?.rms_mm
     }
 }

@@ -128,7 +128,7 @@ impl TorqueParameters {
 
     /// Dry friction of each joint (n, Nm); `None` where none was found, or less than is sure: what an arm has in the model without a name may
     /// as well be nothing, and says nothing of where a joint rests.
-    pub fn dry_friction(&self, joints: usize) -> Vec<Option<f64>> {
+    pub(crate) fn dry_friction(&self, joints: usize) -> Vec<Option<f64>> {
         let at = |joint: usize| {
             let place = Place::Joint(joint).to_string();
             let here = |row: &&TorqueParameterRow| {
@@ -141,7 +141,7 @@ impl TorqueParameters {
     }
 
     /// The model, without its covariance. Fails where rows that every model has are missing or not understood.
-    pub fn to_model(&self) -> Result<TorqueModel> {
+    pub(crate) fn to_model(&self) -> Result<TorqueModel> {
         let joints = (1..)
             .take_while(|joint| {
                 self.value(&format!("{SEEN}.j{joint}.{}", RANGE[0].0))

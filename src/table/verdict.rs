@@ -10,24 +10,24 @@ use crate::robot::NoiseBasis;
 
 impl VerdictRow {
     /// Whether something is left that neither a finding nor noise explains.
-    pub fn is_unexplained(&self) -> bool {
+    pub(crate) fn is_unexplained(&self) -> bool {
         self.verdict == VerdictKind::Unexplained.name()
     }
 
     /// Whether nothing is known of the noise: neither was it stated nor measured, nor is it what the joints scatter by.
-    pub fn is_noise_assumed(&self) -> bool {
+    pub(crate) fn is_noise_assumed(&self) -> bool {
         self.is_noise_inferred() && self.repeatability_rad == 0.0
     }
 
     /// Whether the noise was neither stated nor measured.
-    pub fn is_noise_inferred(&self) -> bool {
+    pub(crate) fn is_noise_inferred(&self) -> bool {
         self.noise_basis.as_deref() == Some(NoiseBasis::Inferred.name())
     }
 }
 
 impl Verdict {
     /// What is wrong with the set-up, where a diagnosis says so: `findings` are its own.
-    pub fn wrong_setup(&self, findings: &Findings) -> Option<String> {
+    pub(crate) fn wrong_setup(&self, findings: &Findings) -> Option<String> {
         let wrong = self
             .0
             .iter()
@@ -98,7 +98,7 @@ pub enum VerdictTopic {
 
 impl VerdictTopic {
     /// As the table has it.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::NotObservable => "not_observable",
             Self::NextMeasurement => "next_measurement",
@@ -126,7 +126,7 @@ impl VerdictSentences {
     }
 
     /// What a diagnosis of positions says, of the stage `step`.
-    pub fn of_positions(step: &str, diagnosis: &Diagnosis) -> Self {
+    pub(crate) fn of_positions(step: &str, diagnosis: &Diagnosis) -> Self {
         let next = (
             VerdictTopic::NextMeasurement,
             diagnosis.next_measurements.as_slice(),
@@ -141,7 +141,7 @@ impl VerdictSentences {
     }
 
     /// The same of a diagnosis of torques.
-    pub fn of_torques(step: &str, diagnosis: &TorqueDiagnosis) -> Self {
+    pub(crate) fn of_torques(step: &str, diagnosis: &TorqueDiagnosis) -> Self {
         let withdrawn = (VerdictTopic::Withdrawn, diagnosis.withdrawn.as_slice());
         let remarks = (VerdictTopic::Remark, diagnosis.remarks.as_slice());
         Self::of(

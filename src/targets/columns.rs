@@ -28,7 +28,7 @@ pub(super) enum ColumnRole {
 
 impl ColumnRole {
     /// Whether a target without it is none.
-    pub fn is_needed(self) -> bool {
+    pub(crate) fn is_needed(self) -> bool {
         matches!(
             self,
             Self::Joint(..) | Self::Axis(..) | Self::Quaternion(_) | Self::Turn(..)
@@ -49,22 +49,22 @@ impl ColumnRole {
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Units {
     /// Unit of angles whose column names none.
-    pub angle: Option<Unit>,
+    pub(crate) angle: Option<Unit>,
     /// Unit of lengths whose column names none.
-    pub length: Option<Unit>,
+    pub(crate) length: Option<Unit>,
 }
 
 /// The columns of a file of targets.
 #[derive(Debug, Clone)]
 pub(super) struct TargetColumns {
-    pub count: usize,
-    pub roles: Vec<(usize, ColumnRole)>,
+    pub(crate) count: usize,
+    pub(crate) roles: Vec<(usize, ColumnRole)>,
     /// Column and unit of each joint; empty where joints are not given.
-    pub joints: Vec<(usize, Unit)>,
-    pub point: bool,
-    pub quaternion: bool,
+    pub(crate) joints: Vec<(usize, Unit)>,
+    pub(crate) point: bool,
+    pub(crate) quaternion: bool,
     /// A, B, C.
-    pub turns: bool,
+    pub(crate) turns: bool,
 }
 
 /// What columns of joints may be called beside the robot's own names.
@@ -244,13 +244,13 @@ fn role(name: &str, robot: &RobotDescription, units: Units) -> Result<Option<Col
 #[derive(Default)]
 pub(super) struct TargetRow {
     target: CommandTarget,
-    pub point: [f64; 3],
+    pub(crate) point: [f64; 3],
     quaternion: [f64; 4],
     turns: [f64; 3],
 }
 
 impl TargetRow {
-    pub fn take(&mut self, role: ColumnRole, value: f64, joints: usize) {
+    pub(crate) fn take(&mut self, role: ColumnRole, value: f64, joints: usize) {
         let put = |slot: &mut Option<Vec<f64>>, joint: usize, value: f64| {
             slot.get_or_insert_with(|| vec![0.0; joints])[joint] = value
         };
@@ -267,7 +267,7 @@ impl TargetRow {
         }
     }
 
-    pub fn target(
+    pub(crate) fn target(
         mut self,
         columns: &TargetColumns,
         layout: &Layout,
@@ -335,7 +335,7 @@ pub(super) struct FarTurned {
 
 impl FarTurned {
     /// Counts a row; what the robot's own limits allow is not far.
-    pub fn count(
+    pub(crate) fn count(
         &mut self,
         place: impl FnOnce() -> String,
         target: &CommandTarget,

@@ -16,9 +16,9 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Clone)]
 pub struct MeasuredTarget {
     /// As it was before correction.
-    pub target: CommandTarget,
+    pub(crate) target: CommandTarget,
     /// What was measured.
-    pub point: Vector3<f64>,
+    pub(crate) point: Vector3<f64>,
 }
 
 /// Reads a whole table. Fails with the faults of its header, or of its rows with their lines.

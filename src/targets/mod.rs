@@ -3,8 +3,8 @@
 
 mod columns;
 mod measured;
-pub mod parquet;
-pub mod text;
+pub(crate) mod parquet;
+pub(crate) mod text;
 mod trajectory;
 
 pub use columns::Units;
@@ -20,19 +20,19 @@ const MOST: usize = 20;
 /// What holds for a whole table.
 pub struct Layout<'a> {
     /// For messages: the file's name, or `stdin`.
-    pub place: &'a str,
+    pub(crate) place: &'a str,
     /// Whose joint names columns may carry.
-    pub robot: &'a RobotDescription,
+    pub(crate) robot: &'a RobotDescription,
     /// Units of columns that name none.
-    pub units: Units,
+    pub(crate) units: Units,
     /// Appends nothing: joints are replaced, all else stays.
-    pub plain: bool,
+    pub(crate) plain: bool,
     /// Poses are the targets though there are joints.
-    pub cartesian: bool,
+    pub(crate) cartesian: bool,
     /// The largest load that was measured (kg), where the model depends on it and none is stated for targets without a payload.
-    pub load: Option<f64>,
+    pub(crate) load: Option<f64>,
     /// Takes a table that calib corrected already.
-    pub force: bool,
+    pub(crate) force: bool,
 }
 
 /// Columns that calib appends, and that no other table of targets has together.
@@ -55,11 +55,11 @@ impl Layout<'_> {
 
 /// The targets of a table that are not reached; their joints are empty.
 #[derive(Debug, Default)]
-pub struct Unreached {
+pub(crate) struct Unreached {
     /// How many targets were read.
-    pub count: u64,
+    pub(crate) count: u64,
     /// The first of them.
-    pub faults: Vec<Fault>,
+    pub(crate) faults: Vec<Fault>,
 }
 
 impl Unreached {

@@ -19,7 +19,7 @@ use std::sync::Arc;
 const BATCH: usize = 1 << 13;
 
 /// Reads targets from a Parquet file and writes them corrected as another.
-pub fn stream(
+pub(crate) fn stream(
     input: File,
     output: impl Write + Send,
     layout: &Layout,

@@ -30,7 +30,7 @@ const LONGEST: u64 = 16 << 20;
 const DECIMALS: usize = 7;
 
 /// Reads targets from `input` to its end and writes them corrected.
-pub fn stream(
+pub(crate) fn stream(
     input: &mut dyn BufRead,
     output: &mut dyn Write,
     layout: &Layout,
@@ -254,11 +254,11 @@ pub(super) fn fields(line: &str, delimiter: char) -> Result<Vec<TextField<'_>>, 
 
 /// A table in memory.
 pub(super) struct TableText<'t> {
-    pub delimiter: char,
-    pub header: &'t str,
-    pub names: Vec<TextField<'t>>,
+    pub(crate) delimiter: char,
+    pub(crate) header: &'t str,
+    pub(crate) names: Vec<TextField<'t>>,
     /// With their numbers, from 1.
-    pub rows: Vec<(usize, &'t str)>,
+    pub(crate) rows: Vec<(usize, &'t str)>,
 }
 
 /// Takes a table apart; fails where it has no header, and then `expected` something.

@@ -12,17 +12,17 @@ use calib_foundation::description::{JointKind, RobotDescription};
 #[derive(Debug, Clone)]
 pub struct Link {
     /// Whether the joint turns; else it slides.
-    pub revolute: bool,
+    pub(crate) revolute: bool,
     /// Unit vector.
-    pub axis: Vector,
+    pub(crate) axis: Vector,
     /// From the origin of this link to the next joint (the last: to the measured point), m, errors included.
-    pub span: Vector,
+    pub(crate) span: Vector,
     /// What the next joint is tilted by; identity for the last.
-    pub tilt: Matrix,
+    pub(crate) tilt: Matrix,
     /// kg, and its centre in the frame of the link, m.
-    pub mass: f64,
+    pub(crate) mass: f64,
     /// Centre of its mass, m.
-    pub centre: Vector,
+    pub(crate) centre: Vector,
     /// Motor turns per turn of the joint; 1 where unknown.
     pub gear: f64,
     /// Torque at the motor per ampere, Nm/A; 1 where unknown.
@@ -33,24 +33,24 @@ pub struct Link {
 #[derive(Debug, Clone)]
 pub struct Arm {
     /// From the base to joint 1, m.
-    pub foot: Vector,
+    pub(crate) foot: Vector,
     /// From base to tool.
     pub links: Vec<Link>,
     /// Centre of the payload in the frame of the last link, m.
-    pub payload_centre: Vector,
+    pub(crate) payload_centre: Vector,
     /// True mass of the payload per declared mass.
-    pub payload_share: f64,
+    pub(crate) payload_share: f64,
     /// m/s2, base frame.
-    pub gravity: Vector,
+    pub(crate) gravity: Vector,
 }
 
 /// Where everything is, in the base frame.
 #[derive(Debug, Clone)]
 pub struct Posture {
     /// The frame of every link.
-    pub frames: Vec<Matrix>,
+    pub(crate) frames: Vec<Matrix>,
     /// The axis of every joint as a direction.
-    pub axes: Vec<Vector>,
+    pub(crate) axes: Vec<Vector>,
     /// The measured point, m.
     pub tool: Vector,
 }

@@ -17,7 +17,7 @@ pub mod memory;
 pub mod motion;
 pub mod noise;
 pub mod plan;
-pub mod polar;
+pub(crate) mod polar;
 pub mod recorder;
 pub mod reveal;
 pub mod statics;

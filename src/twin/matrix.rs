@@ -1,9 +1,9 @@
 //! Rigid motions as plain 4x4 arrays, and the few vector operations that statics needs.
 
 /// A homogeneous transform, rows first.
-pub type Matrix = [[f64; 4]; 4];
+pub(crate) type Matrix = [[f64; 4]; 4];
 /// Three numbers: a point or a direction.
-pub type Vector = [f64; 3];
+pub(crate) type Vector = [f64; 3];
 
 /// No motion.
 pub const IDENTITY: Matrix = [
@@ -14,12 +14,12 @@ pub const IDENTITY: Matrix = [
 ];
 
 /// The motion `a` followed by `b` in a's frame.
-pub fn times(a: &Matrix, b: &Matrix) -> Matrix {
+pub(crate) fn times(a: &Matrix, b: &Matrix) -> Matrix {
     std::array::from_fn(|i| std::array::from_fn(|j| (0..4).map(|k| a[i][k] * b[k][j]).sum()))
 }
 
 /// A displacement.
-pub fn shift(v: Vector) -> Matrix {
+pub(crate) fn shift(v: Vector) -> Matrix {
     let mut m = IDENTITY;
     for i in 0..3 {
         m[i][3] = v[i];
@@ -28,7 +28,7 @@ pub fn shift(v: Vector) -> Matrix {
 }
 
 /// Rotation by `angle` (rad) about the unit vector `axis` through the origin (Rodrigues, written out).
-pub fn turn(axis: Vector, angle: f64) -> Matrix {
+pub(crate) fn turn(axis: Vector, angle: f64) -> Matrix {
     let [x, y, z] = axis;
     let (s, c) = angle.sin_cos();
     let u = 1.0 - c;
@@ -41,7 +41,7 @@ pub fn turn(axis: Vector, angle: f64) -> Matrix {
 }
 
 /// Rotation by a rotation vector (rad).
-pub fn turn_by(v: Vector) -> Matrix {
+pub(crate) fn turn_by(v: Vector) -> Matrix {
     let angle = norm(v);
     if angle == 0.0 {
         IDENTITY
@@ -51,7 +51,7 @@ pub fn turn_by(v: Vector) -> Matrix {
 }
 
 /// Roll, pitch, yaw (rad) about the fixed x, y and z axis, in this order.
-pub fn roll_pitch_yaw(v: Vector) -> Matrix {
+pub(crate) fn roll_pitch_yaw(v: Vector) -> Matrix {
     let x = turn([1.0, 0.0, 0.0], v[0]);
     let y = turn([0.0, 1.0, 0.0], v[1]);
     let z = turn([0.0, 0.0, 1.0], v[2]);
@@ -59,7 +59,7 @@ pub fn roll_pitch_yaw(v: Vector) -> Matrix {
 }
 
 /// The inverse of a rigid motion.
-pub fn inverse(m: &Matrix) -> Matrix {
+pub(crate) fn inverse(m: &Matrix) -> Matrix {
     let mut out = IDENTITY;
     for i in 0..3 {
         for j in 0..3 {
@@ -71,47 +71,47 @@ pub fn inverse(m: &Matrix) -> Matrix {
 }
 
 /// Where a point goes.
-pub fn place(m: &Matrix, p: Vector) -> Vector {
+pub(crate) fn place(m: &Matrix, p: Vector) -> Vector {
     add(direct(m, p), origin(m))
 }
 
 /// Where a direction goes.
-pub fn direct(m: &Matrix, v: Vector) -> Vector {
+pub(crate) fn direct(m: &Matrix, v: Vector) -> Vector {
     std::array::from_fn(|i| (0..3).map(|k| m[i][k] * v[k]).sum())
 }
 
 /// A direction of the outer frame as seen in the inner one.
-pub fn see(m: &Matrix, v: Vector) -> Vector {
+pub(crate) fn see(m: &Matrix, v: Vector) -> Vector {
     std::array::from_fn(|i| (0..3).map(|k| m[k][i] * v[k]).sum())
 }
 
 /// What a motion makes of the origin.
-pub fn origin(m: &Matrix) -> Vector {
+pub(crate) fn origin(m: &Matrix) -> Vector {
     [m[0][3], m[1][3], m[2][3]]
 }
 
 /// a + b.
-pub fn add(a: Vector, b: Vector) -> Vector {
+pub(crate) fn add(a: Vector, b: Vector) -> Vector {
     std::array::from_fn(|i| a[i] + b[i])
 }
 
 /// a - b.
-pub fn minus(a: Vector, b: Vector) -> Vector {
+pub(crate) fn minus(a: Vector, b: Vector) -> Vector {
     std::array::from_fn(|i| a[i] - b[i])
 }
 
 /// s a.
-pub fn scale(a: Vector, s: f64) -> Vector {
+pub(crate) fn scale(a: Vector, s: f64) -> Vector {
     a.map(|x| x * s)
 }
 
 /// a . b.
-pub fn dot(a: Vector, b: Vector) -> f64 {
+pub(crate) fn dot(a: Vector, b: Vector) -> f64 {
     (0..3).map(|i| a[i] * b[i]).sum()
 }
 
 /// a x b.
-pub fn cross(a: Vector, b: Vector) -> Vector {
+pub(crate) fn cross(a: Vector, b: Vector) -> Vector {
     [
         a[1] * b[2] - a[2] * b[1],
         a[2] * b[0] - a[0] * b[2],
@@ -120,6 +120,6 @@ pub fn cross(a: Vector, b: Vector) -> Vector {
 }
 
 /// Length.
-pub fn norm(a: Vector) -> f64 {
+pub(crate) fn norm(a: Vector) -> f64 {
     dot(a, a).sqrt()
 }

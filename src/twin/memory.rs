@@ -51,7 +51,7 @@ pub fn past(points: &[Point]) -> Vec<Moment> {
 }
 
 /// The past of an arm that moves: positions, time and temperature, row after row.
-pub fn along(course: impl Iterator<Item = (Vec<f64>, f64, f64)>) -> Vec<Moment> {
+pub(crate) fn along(course: impl Iterator<Item = (Vec<f64>, f64, f64)>) -> Vec<Moment> {
     let mut stood: Option<Vec<f64>> = None;
     let reach = |(q, time_s, temperature_c): (Vec<f64>, f64, f64)| {
         let pieces = stood.iter().map(|stood| piece(stood, &q)).collect();

@@ -4,7 +4,7 @@ use super::matrix::{self, IDENTITY, Matrix, Vector};
 use super::truth::ARCSEC;
 
 /// A share of a rigid step: a shift (um) after a rotation vector (arcsec).
-pub fn step(shift_um: Vector, turn_arcsec: Vector, share: f64) -> Matrix {
+pub(crate) fn step(shift_um: Vector, turn_arcsec: Vector, share: f64) -> Matrix {
     let moved = matrix::shift(matrix::scale(shift_um, 1e-6 * share));
     matrix::times(
         &moved,
@@ -16,19 +16,19 @@ pub fn step(shift_um: Vector, turn_arcsec: Vector, share: f64) -> Matrix {
 #[derive(Debug, Clone)]
 pub struct Motion {
     /// Motion of the tracker's frame.
-    pub tracker: Matrix,
+    pub(crate) tracker: Matrix,
     /// Motion of the base, base frame.
-    pub base: Matrix,
+    pub(crate) base: Matrix,
     /// Added to each joint, rad or m.
     pub joint: Vec<f64>,
     /// Motion of each link's far end, in the frame of the link, about that end.
-    pub link_end: Vec<Matrix>,
+    pub(crate) link_end: Vec<Matrix>,
     /// Shift of the measured point, last link's frame, m.
-    pub tool: Vector,
+    pub(crate) tool: Vector,
     /// What turns each joint besides gravity, Nm: springs and hoses. The gear carries it too.
-    pub load: Vec<f64>,
+    pub(crate) load: Vec<f64>,
     /// What each motor carries besides gravity, Nm at the joint.
-    pub motor_torque: Vec<f64>,
+    pub(crate) motor_torque: Vec<f64>,
 }
 
 impl Motion {
@@ -46,18 +46,18 @@ impl Motion {
     }
 
     /// Moves the base about a point of it, m.
-    pub fn move_base(&mut self, pivot: Vector, by: &Matrix) {
+    pub(crate) fn move_base(&mut self, pivot: Vector, by: &Matrix) {
         let about = matrix::times(by, &matrix::shift(matrix::scale(pivot, -1.0)));
         self.base = matrix::times(&self.base, &matrix::times(&matrix::shift(pivot), &about));
     }
 
     /// Moves the far end of a link (from 0), in its frame.
-    pub fn move_end(&mut self, link: usize, by: &Matrix) {
+    pub(crate) fn move_end(&mut self, link: usize, by: &Matrix) {
         self.link_end[link] = matrix::times(&self.link_end[link], by);
     }
 
     /// Moves the axis of a joint (from 0), seen from the body that carries it; the first stands on the base, at its foot.
-    pub fn move_axis(&mut self, foot: Vector, joint: usize, by: &Matrix) {
+    pub(crate) fn move_axis(&mut self, foot: Vector, joint: usize, by: &Matrix) {
         match joint.checked_sub(1) {
             Some(link) => self.move_end(link, by),
             None => self.move_base(foot, by),
@@ -65,7 +65,7 @@ impl Motion {
     }
 
     /// The largest difference of any number, rad, m or Nm; the motors' torque does not move the arm.
-    pub fn distance(&self, other: &Motion) -> f64 {
+    pub(crate) fn distance(&self, other: &Motion) -> f64 {
         let apart = |a: &Matrix, b: &Matrix| {
             a.as_flattened()
                 .iter()

@@ -39,13 +39,13 @@ impl Noise {
     }
 
     /// Standard normal (Box and Muller's cosine half).
-    pub fn normal(&mut self) -> f64 {
+    pub(crate) fn normal(&mut self) -> f64 {
         let radius = (-2.0 * (1.0 - self.0.random::<f64>()).ln()).sqrt();
         radius * (std::f64::consts::TAU * self.0.random::<f64>()).cos()
     }
 
     /// One of `0..count`; 0 where there is none.
-    pub fn index(&mut self, count: usize) -> usize {
+    pub(crate) fn index(&mut self, count: usize) -> usize {
         (self.uniform(0.0, count as f64) as usize).min(count.saturating_sub(1))
     }
 
@@ -55,24 +55,24 @@ impl Noise {
     }
 
     /// Fisher and Yates.
-    pub fn shuffle<T>(&mut self, all: &mut [T]) {
+    pub(crate) fn shuffle<T>(&mut self, all: &mut [T]) {
         for last in (1..all.len()).rev() {
             all.swap(last, self.index(last + 1));
         }
     }
 
     /// +1 or -1.
-    pub fn sign(&mut self) -> f64 {
+    pub(crate) fn sign(&mut self) -> f64 {
         if self.chance(0.5) { 1.0 } else { -1.0 }
     }
 
     /// A size between two bounds above 0, evenly on a logarithmic scale.
-    pub fn size(&mut self, lower: f64, upper: f64) -> f64 {
+    pub(crate) fn size(&mut self, lower: f64, upper: f64) -> f64 {
         (self.uniform(lower.ln(), upper.ln())).exp()
     }
 
     /// A vector of a length between two bounds, in any direction.
-    pub fn vector(&mut self, lower: f64, upper: f64) -> [f64; 3] {
+    pub(crate) fn vector(&mut self, lower: f64, upper: f64) -> [f64; 3] {
         let arrow = [self.normal(), self.normal(), self.normal()];
         let length = arrow.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-12);
         let wanted = self.uniform(lower, upper);

@@ -175,7 +175,7 @@ pub struct Point {
 
 impl Point {
     /// The row of this point, with joints at the gears' outputs and what effects make of the rows before.
-    pub fn row(&self, drive: Vec<f64>, memory: Vec<f64>) -> Row {
+    pub(crate) fn row(&self, drive: Vec<f64>, memory: Vec<f64>) -> Row {
         Row {
             command: self.q.clone(),
             drive,

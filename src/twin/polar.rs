@@ -4,18 +4,18 @@ use super::matrix::{self, Vector};
 
 /// m and rad, in the tracker's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Polar {
+pub(crate) struct Polar {
     /// m.
-    pub range: f64,
+    pub(crate) range: f64,
     /// rad.
-    pub azimuth: f64,
+    pub(crate) azimuth: f64,
     /// rad.
-    pub elevation: f64,
+    pub(crate) elevation: f64,
 }
 
 impl Polar {
     /// The range and the angles of a point as the instrument sees it, m.
-    pub fn of(point: Vector) -> Polar {
+    pub(crate) fn of(point: Vector) -> Polar {
         let level = point[0].hypot(point[1]);
         Polar {
             range: matrix::norm(point),
@@ -25,7 +25,7 @@ impl Polar {
     }
 
     /// The point, m.
-    pub fn point(self) -> Vector {
+    pub(crate) fn point(self) -> Vector {
         let (level, height) = (
             self.range * self.elevation.cos(),
             self.range * self.elevation.sin(),

@@ -24,7 +24,7 @@ pub struct Motors {
     /// +1 where a positive current drives the joint in its positive direction, else -1; empty: all +1.
     pub sign: Vec<f64>,
     /// Standard deviation of a logged current, A.
-    pub noise_a: f64,
+    pub(crate) noise_a: f64,
 }
 
 /// An experiment on a twin.

@@ -5,7 +5,7 @@ use super::matrix::{self, Vector};
 
 /// Bodies with weight, in the base frame: the link that carries it (the payload: one past the last), mass in kg, centre.
 #[derive(Debug, Clone)]
-pub struct Loads {
+pub(crate) struct Loads {
     bodies: Vec<(usize, f64, Vector)>,
     gravity: Vector,
 }
@@ -32,7 +32,7 @@ impl Loads {
     }
 
     /// Force (N) and moment about `point` (Nm) of the weight of everything from link `from` (from 0) on, base frame.
-    pub fn wrench(&self, from: usize, point: Vector) -> (Vector, Vector) {
+    pub(crate) fn wrench(&self, from: usize, point: Vector) -> (Vector, Vector) {
         let (mut force, mut moment) = ([0.0; 3], [0.0; 3]);
         for (_, mass, centre) in self.bodies.iter().filter(|(link, _, _)| *link >= from) {
             let weight = matrix::scale(self.gravity, *mass);
@@ -43,7 +43,7 @@ impl Loads {
     }
 
     /// What gravity does to each joint along its axis, Nm (N for a prismatic joint).
-    pub fn torques(&self, arm: &Arm, posture: &Posture) -> Vec<f64> {
+    pub(crate) fn torques(&self, arm: &Arm, posture: &Posture) -> Vec<f64> {
         let joints = arm
             .links
             .iter()

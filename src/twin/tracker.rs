@@ -103,7 +103,7 @@ impl Default for Tracker {
 
 impl Tracker {
     /// The base frame as the tracker sees it.
-    pub fn base(&self) -> Matrix {
+    pub(crate) fn base(&self) -> Matrix {
         let turned = matrix::roll_pitch_yaw(self.roll_pitch_yaw_deg.map(f64::to_radians));
         matrix::inverse(&matrix::times(
             &matrix::shift(matrix::scale(self.position_mm, 1e-3)),

@@ -61,19 +61,19 @@ pub struct TrueRobot {
 
 /// Summed errors of one link in m and rad.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct RigidError {
+pub(crate) struct RigidError {
     /// m.
-    pub shift: Vector,
+    pub(crate) shift: Vector,
     /// rad.
-    pub tilt: Vector,
+    pub(crate) tilt: Vector,
 }
 
 /// rad.
-pub const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
+pub(crate) const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
 
 impl TrueRobot {
     /// Errors of the link that joint `index` (from 0) moves.
-    pub fn link_error(&self, index: usize) -> RigidError {
+    pub(crate) fn link_error(&self, index: usize) -> RigidError {
         let mut out = RigidError::default();
         for error in self.links.iter().filter(|error| error.link == index + 1) {
             for axis in 0..3 {
@@ -102,7 +102,7 @@ impl TrueRobot {
     }
 
     /// Error of a joint's zero position, rad or m.
-    pub fn offset(&self, robot: &RobotDescription, joint: usize) -> f64 {
+    pub(crate) fn offset(&self, robot: &RobotDescription, joint: usize) -> f64 {
         let revolute = robot.joints[joint].kind == JointKind::Revolute;
         self.offset_deg.get(joint).copied().unwrap_or(0.0)
             * if revolute {
@@ -113,7 +113,7 @@ impl TrueRobot {
     }
 
     /// Linear wind-up of a joint per torque, rad/Nm; `per_ampere` is the joint's torque per ampere of its motor.
-    pub fn compliance(&self, joint: usize, per_ampere: f64) -> f64 {
+    pub(crate) fn compliance(&self, joint: usize, per_ampere: f64) -> f64 {
         let by_current = self
             .compliance_rad_a
             .get(joint)

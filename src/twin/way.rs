@@ -17,7 +17,7 @@ pub struct Way {
     /// Fastest that a joint turns, deg/s (mm/s for a prismatic joint).
     pub speed_deg_s: f64,
     /// How joints get from pose to pose.
-    pub shape: Shape,
+    pub(crate) shape: Shape,
     /// Standstill between two moves, s.
     pub dwell_s: f64,
     /// Time for which a joint's deviation (`repeatability_arcsec`) lasts, s; 0: a new one in every row.
@@ -42,7 +42,7 @@ impl Default for Way {
 /// Shapes of a way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Shape {
+pub(crate) enum Shape {
     /// Three sines a joint; within the joints' range, but neither `floor_mm` nor `clearance_mm` is kept.
     Waves,
     /// From one allowed pose to the next, all joints together, at rest at either end.
@@ -50,7 +50,7 @@ pub enum Shape {
 }
 
 /// A drawn way.
-pub enum Path {
+pub(crate) enum Path {
     /// Middle, and amplitude, angular frequency, phase of each wave, of every joint.
     Waves(Vec<(f64, [[f64; 3]; 3])>),
     /// From pose to pose, with rests between.
@@ -58,7 +58,7 @@ pub enum Path {
 }
 
 /// From a pose to the next.
-pub struct Move {
+pub(crate) struct Move {
     start_s: f64,
     duration_s: f64,
     from: Vec<f64>,
@@ -130,7 +130,7 @@ impl Path {
     }
 
     /// Joint positions and velocities at a time, rad or m, and a second.
-    pub fn at(&self, time: f64) -> (Vec<f64>, Vec<f64>) {
+    pub(crate) fn at(&self, time: f64) -> (Vec<f64>, Vec<f64>) {
         match self {
             Self::Waves(joints) => {
                 let sum = |of: &dyn Fn(&[f64; 3]) -> f64, waves: &[[f64; 3]; 3]| {

@@ -34,12 +34,12 @@ impl QueryResult {
     }
 
     /// Names of the columns, in order.
-    pub fn names(&self) -> impl Iterator<Item = &str> {
+    pub(crate) fn names(&self) -> impl Iterator<Item = &str> {
         self.0.columns().iter().map(|column| column.name().as_str())
     }
 
     /// The values of a row, counted from 0, in the order of the names.
-    pub fn row(&self, row: usize) -> impl Iterator<Item = QueryValue<'_>> {
+    pub(crate) fn row(&self, row: usize) -> impl Iterator<Item = QueryValue<'_>> {
         self.0
             .columns()
             .iter()

@@ -14,9 +14,9 @@ use std::ops::ControlFlow;
 /// What polars is asked.
 pub(super) struct Statement<'t> {
     /// With `stage.port` written as one name.
-    pub text: String,
+    pub(crate) text: String,
     /// The run's tables that it names, by the name that `text` has for them.
-    pub tables: BTreeMap<String, &'t QueryTable>,
+    pub(crate) tables: BTreeMap<String, &'t QueryTable>,
 }
 
 impl<'t> Statement<'t> {

@@ -131,7 +131,7 @@ impl IdentifiedArm {
     }
 
     /// What was learned on top, if anything.
-    pub fn correction(&self) -> Option<&Correction> {
+    pub(crate) fn correction(&self) -> Option<&Correction> {
         self.correction.as_ref()
     }
 
@@ -164,16 +164,16 @@ impl IdentifiedArm {
 /// A law that a command takes beyond the rows that it was fitted to.
 pub(super) struct BeyondFitted {
     /// First parameter of its form, in the stack.
-    pub parameter: usize,
+    pub(crate) parameter: usize,
     /// What it is a function of.
-    pub variable: Variable,
+    pub(crate) variable: Variable,
     /// What it may be off there: of the point, m2, tracker frame.
-    pub covariance: Matrix3<f64>,
+    pub(crate) covariance: Matrix3<f64>,
 }
 
 impl BeyondFitted {
     /// Its size squared, in any direction: what a law does there may have another direction than all of the correction.
-    pub fn square(&self) -> f64 {
+    pub(crate) fn square(&self) -> f64 {
         self.covariance.trace()
     }
 }
@@ -215,7 +215,7 @@ impl Reach<'_> {
     }
 
     /// How much of the learned correction applies at the command placed last: 1 inside its range, 0 far outside; 1 without one.
-    pub fn share(&mut self) -> f64 {
+    pub(crate) fn share(&mut self) -> f64 {
         let Some(correction) = self.arm.correction() else {
             return 1.0;
         };

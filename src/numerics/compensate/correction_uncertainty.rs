@@ -25,27 +25,27 @@ const USUAL: f64 = 6.0;
 #[derive(Debug, Clone, PartialEq)]
 pub struct CorrectionUncertainty {
     /// m: the correction at the uncorrected command.
-    pub correction: f64,
+    pub(crate) correction: f64,
     /// m, 95 %: along the correction by the parameters, and in any direction by laws that are used beyond the rows that they were fitted to.
-    pub u95: f64,
+    pub(crate) u95: f64,
     /// The effect and place that most of it comes from, where one stands out.
-    pub finding: Option<String>,
+    pub(crate) finding: Option<String>,
     /// Findings that are used beyond what was fitted and may be off there by more than the instrument leaves open, and over what.
-    pub beyond: Vec<(String, String)>,
+    pub(crate) beyond: Vec<(String, String)>,
     /// m, 95 %: what is usual at the recorded poses; 0 where they are not known.
-    pub usual: f64,
+    pub(crate) usual: f64,
     /// m: length of one standard deviation of the instrument at the recorded poses; 0 where they are not known.
-    pub instrument: f64,
+    pub(crate) instrument: f64,
 }
 
 impl CorrectionUncertainty {
     /// Whether the correction is doubtful: uncertain by more than half of itself, and by more than the instrument leaves open.
-    pub fn is_doubtful(&self) -> bool {
+    pub(crate) fn is_doubtful(&self) -> bool {
         self.u95.is_nan() || self.u95 > (DOUBTFUL * self.correction).max(SEEN * self.instrument)
     }
 
     /// Above this (m) the correction may do more harm than good.
-    pub fn limit(&self) -> f64 {
+    pub(crate) fn limit(&self) -> f64 {
         self.correction.max(USUAL * self.usual)
     }
 }
@@ -73,7 +73,7 @@ impl Uncertainty {
     }
 
     /// How certain the correction (m, tracker frame) is that brought the command to `q`, under the circumstances that `reach` is set to.
-    pub fn of_correction(
+    pub(crate) fn of_correction(
         &self,
         reach: &mut Reach,
         q: &[f64],

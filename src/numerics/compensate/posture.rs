@@ -28,9 +28,9 @@ pub struct StatedPosture {
 /// An arm, how its joints are counted, and its sides, where it has some.
 #[derive(Clone, Copy)]
 pub(super) struct CountedArm<'a> {
-    pub robot: &'a RobotModel,
-    pub convention: &'a JointConvention,
-    pub sides: Option<&'a ArmSides>,
+    pub(crate) robot: &'a RobotModel,
+    pub(crate) convention: &'a JointConvention,
+    pub(crate) sides: Option<&'a ArmSides>,
 }
 
 impl StatedPosture {

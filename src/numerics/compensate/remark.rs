@@ -103,7 +103,7 @@ pub struct CorrectedCommand {
     /// How far the uncorrected command would be off by the model.
     pub uncorrected: f64,
     /// How far the uncorrected command would turn the tool away by the model, rad.
-    pub turn: f64,
+    pub(crate) turn: f64,
     /// Distance from the wanted point that the model leaves, m.
     pub residual: f64,
     /// Steps of the solution.
@@ -111,7 +111,7 @@ pub struct CorrectedCommand {
     /// Uncertainty of the point that is reached; none where the model has no covariance.
     pub uncertainty: Option<PositionUncertainty>,
     /// How certain its correction is along its own direction; none where the model has no covariance.
-    pub certainty: Option<CorrectionUncertainty>,
+    pub(crate) certainty: Option<CorrectionUncertainty>,
     /// What is wrong with it.
     pub remarks: Vec<Remark>,
 }

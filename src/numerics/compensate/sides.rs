@@ -88,7 +88,7 @@ impl ArmSides {
     }
 
     /// Whether joints stand on these sides; at a border both hold.
-    pub fn hold(&self, robot: &RobotModel, q: &[f64], stated: &StatedSides) -> bool {
+    pub(crate) fn hold(&self, robot: &RobotModel, q: &[f64], stated: &StatedSides) -> bool {
         let shares = self.at(robot, q);
         shares.iter().zip(stated).all(|(share, stated)| {
             stated.is_none_or(|above| (*share > 0.0) == above || share.abs() < BORDER)
@@ -96,7 +96,7 @@ impl ArmSides {
     }
 
     /// The joints at which the same pose is reached with the wrist turned over.
-    pub fn turned_over(&self, robot: &RobotModel, q: &[f64]) -> Vec<f64> {
+    pub(crate) fn turned_over(&self, robot: &RobotModel, q: &[f64]) -> Vec<f64> {
         let (sine, cosine) = self.wrist(robot, q);
         let mut out = q.to_vec();
         out[3] += PI;

@@ -72,7 +72,7 @@ pub struct ToolGoal {
 
 impl ToolGoal {
     /// How far (rad) `pose` is turned away.
-    pub fn turn_left(&self, pose: &Pose) -> f64 {
+    pub(crate) fn turn_left(&self, pose: &Pose) -> f64 {
         self.error(pose).fixed_rows::<3>(3).norm()
     }
 
@@ -97,9 +97,9 @@ pub struct CommandSolution {
     /// What is left of the displacement, m, and of the turn, rad.
     pub residual: f64,
     /// What is left of the turn, rad.
-    pub turn: f64,
+    pub(crate) turn: f64,
     /// How far the start was off, m.
-    pub before: f64,
+    pub(crate) before: f64,
     /// Steps taken.
     pub iterations: usize,
 }

@@ -49,7 +49,7 @@ pub const TABLES: &[&[CriterionRow]] = &[
 
 /// Whether something came by a criterion since the last call, by the names of rooms and criteria.
 #[cfg(feature = "ablate")]
-pub fn reached() -> Vec<String> {
+pub(crate) fn reached() -> Vec<String> {
     all()
         .filter(|(_, criterion)| criterion.was_reached())
         .map(|(name, _)| name.to_string())

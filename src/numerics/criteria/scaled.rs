@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 /// What a criterion is multiplied by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
-pub enum CriterionFactor {
+pub(crate) enum CriterionFactor {
     /// As it is.
     One = 0,
     /// Halved.
@@ -55,7 +55,7 @@ impl<T: Scaled> CriterionScaling<T> {
 }
 
 /// What can be halved and doubled.
-pub trait Scaled: Send + Sync + 'static {
+pub(crate) trait Scaled: Send + Sync + 'static {
     /// `factor` times as much. A share above a half is as far from 1, a ratio below 2 as far above 1, times the factor; a count is at least 1.
     fn scaled(&self, factor: f64) -> Self;
 }

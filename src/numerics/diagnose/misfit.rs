@@ -12,26 +12,26 @@ use rayon::prelude::*;
 
 /// Sizes of what is left: lengths (m), or angles (rad) where no row to fit measured a length.
 pub(crate) struct Misfit {
-    pub dimension: Dimension,
+    pub(crate) dimension: Dimension,
     /// Size of what is left of every row, where it measured something of the dimension.
-    pub sizes: Vec<Option<f64>>,
+    pub(crate) sizes: Vec<Option<f64>>,
     /// Held-out rows that belong; where there are none, those that were fitted.
-    pub rows: Vec<usize>,
-    pub held_out: bool,
+    pub(crate) rows: Vec<usize>,
+    pub(crate) held_out: bool,
     /// Length of the noise of `rows`, and of the instrument's alone, rms.
-    pub noise_floor: f64,
-    pub instrument: f64,
+    pub(crate) noise_floor: f64,
+    pub(crate) instrument: f64,
     /// Rms size of what is left at fitted rows, and reduced chi-square there.
-    pub leftover_rms: f64,
-    pub chi_square: f64,
+    pub(crate) leftover_rms: f64,
+    pub(crate) chi_square: f64,
     /// Reduced chi-square at fitted rows against the stated or recorded uncertainty alone.
-    pub beyond_stated: f64,
+    pub(crate) beyond_stated: f64,
     /// Rows of the figures, suspects among them: held-out ones, else those that were fitted.
-    pub figures: Vec<usize>,
+    pub(crate) figures: Vec<usize>,
     /// Rms size of what is left at `rows`.
     left_here: f64,
     /// Rms size of what is left at held-out rows that belong, where it is more than what was fitted and the noise allow.
-    pub not_carried: Option<f64>,
+    pub(crate) not_carried: Option<f64>,
 }
 
 /// What is left of all that a row measured.
@@ -84,7 +84,7 @@ fn rms(values: impl Iterator<Item = Option<f64>>) -> f64 {
 
 impl Misfit {
     /// The misfit of a model, of which so many parameters were estimated.
-    pub fn of(
+    pub(crate) fn of(
         question: &Question,
         data: &Measurements,
         screening: &Screening,
@@ -148,7 +148,7 @@ impl Misfit {
     }
 
     /// The noise, of which an inferred one is at least the instrument's and no more than what is left.
-    pub fn noise(&self, basis: NoiseBasis) -> f64 {
+    pub(crate) fn noise(&self, basis: NoiseBasis) -> f64 {
         match basis {
             NoiseBasis::Inferred => self.noise_floor.min(self.left_here.max(self.instrument)),
             NoiseBasis::Repeats | NoiseBasis::Instrument => self.noise_floor,
@@ -156,7 +156,7 @@ impl Misfit {
     }
 
     /// What a verdict on it rests on; `nameless` where something was found that has no name.
-    pub fn ground(
+    pub(crate) fn ground(
         &self,
         data: &Measurements,
         basis: NoiseBasis,

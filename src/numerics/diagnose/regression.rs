@@ -20,7 +20,7 @@ pub(super) struct FormRegression<'p, 'a> {
     /// The same by each joint's travel.
     travels: Vec<OnceLock<ModelledRows>>,
     /// Squared residual.
-    pub square: f64,
+    pub(crate) square: f64,
 }
 
 /// What a model can absorb of some numbers a column, and what it leaves of the residual.
@@ -35,11 +35,11 @@ struct ModelledRows {
 /// The coefficients of a form.
 pub(super) struct Solution {
     /// By which the squared residual falls.
-    pub gain: f64,
+    pub(crate) gain: f64,
     /// How many of its numbers the data see.
-    pub rank: usize,
+    pub(crate) rank: usize,
     /// SI.
-    pub coefficients: Vec<f64>,
+    pub(crate) coefficients: Vec<f64>,
 }
 
 impl<'p, 'a> FormRegression<'p, 'a> {
@@ -88,12 +88,12 @@ impl<'p, 'a> FormRegression<'p, 'a> {
     }
 
     /// How many numbers the rows measured.
-    pub fn rows(&self) -> usize {
+    pub(crate) fn rows(&self) -> usize {
         self.rows.residual.len()
     }
 
     /// The fit of one form.
-    pub fn solve(&self, form: &Form) -> Solution {
+    pub(crate) fn solve(&self, form: &Form) -> Solution {
         match self.problem.plain_travel(form) {
             Some((joint, values)) => self.travels[joint]
                 .get_or_init(|| self.along(joint))
@@ -103,12 +103,12 @@ impl<'p, 'a> FormRegression<'p, 'a> {
     }
 
     /// By how much each form would lower the squared residual.
-    pub fn gains(&self, forms: &[Form]) -> Vec<f64> {
+    pub(crate) fn gains(&self, forms: &[Form]) -> Vec<f64> {
         forms.par_iter().map(|form| self.solve(form).gain).collect()
     }
 
     /// A form with its shape where it gains most (variable projection).
-    pub fn refined(&self, mut form: Form, survey: &Survey) -> Form {
+    pub(crate) fn refined(&self, mut form: Form, survey: &Survey) -> Form {
         let mut most = self.solve(&form).gain;
         let mut idle = 0;
         for level in 0..*LEVELS {

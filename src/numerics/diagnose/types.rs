@@ -146,7 +146,7 @@ pub const SETUP: &str = "setup";
 
 impl Finding {
     /// Whether it is a cause on the arm, its mounting or the instrument; else a fault of the recording, which has no evidence.
-    pub fn is_physics(&self) -> bool {
+    pub(crate) fn is_physics(&self) -> bool {
         self.evidence.is_some() && (self.place != Place::Recording || self.effect == names::UNKNOWN)
     }
 }

@@ -103,20 +103,20 @@ pub(super) struct DeclaredInertials {
     /// 10 n, of the links alone.
     pub links: Vec<f64>,
     /// 10 n, with the declared payload on the last link.
-    pub theta: Vec<f64>,
+    pub(crate) theta: Vec<f64>,
     /// The last link's numbers of a payload of 1 kg as declared (of a point at the tool where none is).
     pub payload: [f64; INERTIAL_NUMBERS],
     /// Change of the last link's numbers per kg m by which a payload's centre is elsewhere, in three coordinates.
-    pub payload_shift: [[f64; INERTIAL_NUMBERS]; 3],
+    pub(crate) payload_shift: [[f64; INERTIAL_NUMBERS]; 3],
     /// Per link: change of its numbers per m of its centre, in three coordinates.
-    pub centre_shift: Vec<[[f64; INERTIAL_NUMBERS]; 3]>,
+    pub(crate) centre_shift: Vec<[[f64; INERTIAL_NUMBERS]; 3]>,
     /// Per link, 10 x 10 by columns: change of its numbers by one standard deviation of mass, centre (3), inertia (6).
     pub tolerance: Vec<[[f64; INERTIAL_NUMBERS]; INERTIAL_NUMBERS]>,
 }
 
 impl DeclaredInertials {
     /// The inertial numbers of an arm that declares its links.
-    pub fn of(arm: &DynamicArm, bodies: &[Inertial]) -> Self {
+    pub(crate) fn of(arm: &DynamicArm, bodies: &[Inertial]) -> Self {
         let last = bodies.len() - 1;
         let point = |link: usize| arm.points[link].coords;
         let links: Vec<f64> = bodies

@@ -11,20 +11,20 @@ const AROUND: usize = 2;
 
 /// A recording without small gaps.
 pub(super) struct Bridged {
-    pub recording: TorqueRecording,
+    pub(crate) recording: TorqueRecording,
     /// The recorded row of each, or the one before it where it is made up.
-    pub origin: Vec<usize>,
+    pub(crate) origin: Vec<usize>,
 }
 
 impl Bridged {
     /// Bridges the gaps of a checked recording.
-    pub fn of(recording: TorqueRecording) -> Self {
+    pub(crate) fn of(recording: TorqueRecording) -> Self {
         let usual = ClockPace::usual_step(&recording);
         Self::by_steps(recording, usual)
     }
 
     /// The same of rows that usually come every so many s.
-    pub fn by_steps(recording: TorqueRecording, usual: f64) -> Self {
+    pub(crate) fn by_steps(recording: TorqueRecording, usual: f64) -> Self {
         let lost = lost(&recording, usual);
         let rows = recording.rows();
         if lost.is_empty() {

@@ -29,8 +29,8 @@ struct TorqueCell {
 /// A form in the covariance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct TorqueComponent {
-    pub form: usize,
-    pub amplitude: f64,
+    pub(crate) form: usize,
+    pub(crate) amplitude: f64,
 }
 
 /// The posterior of a cell given others.
@@ -468,7 +468,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
     }
 
     /// Components of given forms.
-    pub fn components(&self, set: &[usize]) -> Vec<TorqueComponent> {
+    pub(crate) fn components(&self, set: &[usize]) -> Vec<TorqueComponent> {
         self.backfit(
             set.iter()
                 .map(|form| TorqueComponent {
@@ -526,7 +526,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
     }
 
     /// The odds of a component and of all that could stand in its place.
-    pub fn odds_in_place(&self, components: &[TorqueComponent], form: usize) -> CellOdds {
+    pub(crate) fn odds_in_place(&self, components: &[TorqueComponent], form: usize) -> CellOdds {
         let kappa = self.state(components, None).known.kappa;
         let Some(place) = components.iter().position(|own| own.form == form) else {
             return CellOdds {
@@ -554,9 +554,9 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
 
 /// ln of posterior odds.
 pub(super) struct CellOdds {
-    pub own: f64,
+    pub(crate) own: f64,
     /// Of other names and places.
-    pub rivals: Vec<((&'static str, Place), f64)>,
+    pub(crate) rivals: Vec<((&'static str, Place), f64)>,
 }
 
 /// Wrong masses, drives and mountings that would stand in place of those of a set, together.
@@ -568,7 +568,11 @@ pub(super) struct OtherInertials {
 
 impl OtherInertials {
     /// They share the odds that one of them would have as the rival of a finding.
-    pub fn rivals(&self, choice: &CauseChoice, own: f64) -> Vec<((&'static str, Place), f64)> {
+    pub(crate) fn rivals(
+        &self,
+        choice: &CauseChoice,
+        own: f64,
+    ) -> Vec<((&'static str, Place), f64)> {
         let log = own - self.worse - (self.forms.len().max(1) as f64).ln();
         self.forms
             .iter()

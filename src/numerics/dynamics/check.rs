@@ -347,7 +347,7 @@ impl TorqueExtremes {
     }
 
     /// Takes rows x n torques, Nm.
-    pub fn push(&mut self, torque: &[f64]) {
+    pub(crate) fn push(&mut self, torque: &[f64]) {
         for row in torque.chunks_exact(self.joints.len().max(1)) {
             self.rows += 1;
             for (value, [least, most]) in row.iter().zip(&mut self.joints) {
@@ -358,14 +358,14 @@ impl TorqueExtremes {
     }
 
     /// A column that holds one number.
-    pub fn constant(&self, joint: usize) -> Option<Fault> {
+    pub(crate) fn constant(&self, joint: usize) -> Option<Fault> {
         let [(least, _), (most, _)] = self.joints[joint];
         let message = || format!("torque is {least} in every row: the column holds no measurement");
         (least == most).then(|| Fault::new(name(joint), message()))
     }
 
     /// Extremes that many rows share.
-    pub fn saturated(&self, joint: usize) -> impl Iterator<Item = Fault> {
+    pub(crate) fn saturated(&self, joint: usize) -> impl Iterator<Item = Fault> {
         let all = self.rows;
         let shared = move |(_, rows): &Extreme| {
             *rows >= SATURATED_ROWS && *rows as f64 > SATURATED * all as f64
@@ -378,7 +378,7 @@ impl TorqueExtremes {
     }
 
     /// All of it, joint after joint.
-    pub fn faults(&self) -> Vec<Fault> {
+    pub(crate) fn faults(&self) -> Vec<Fault> {
         let of = |joint: usize| match self.constant(joint) {
             Some(constant) => vec![constant],
             None => self.saturated(joint).collect(),

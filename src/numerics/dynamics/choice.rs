@@ -8,11 +8,11 @@ use crate::effect::Place;
 
 /// The forms of one problem, with the base model that is fitted with all of them.
 pub(super) struct CauseChoice<'a> {
-    pub problem: &'a TorqueProblem<'a>,
-    pub weighted: &'a WeightedColumns,
-    pub base: SweptColumns<'a>,
+    pub(crate) problem: &'a TorqueProblem<'a>,
+    pub(crate) weighted: &'a WeightedColumns,
+    pub(crate) base: SweptColumns<'a>,
     /// Forms that may be chosen; trial forms of a refinement are none of them.
-    pub open: usize,
+    pub(crate) open: usize,
 }
 
 impl<'a> CauseChoice<'a> {
@@ -27,7 +27,7 @@ impl<'a> CauseChoice<'a> {
     }
 
     /// Over those with a name: a curve without one would be a push, or several causes at once.
-    pub fn named(problem: &'a TorqueProblem<'a>, weighted: &'a WeightedColumns) -> Self {
+    pub(crate) fn named(problem: &'a TorqueProblem<'a>, weighted: &'a WeightedColumns) -> Self {
         let mut forms = problem.all.forms[..problem.all.listed].iter();
         let open = forms.position(|form| form.cause.name == UNKNOWN);
         Self {
@@ -36,12 +36,12 @@ impl<'a> CauseChoice<'a> {
         }
     }
 
-    pub fn form(&self, number: usize) -> &TorqueForm {
+    pub(crate) fn form(&self, number: usize) -> &TorqueForm {
         &self.problem.all.forms[number]
     }
 
     /// Whether a form with some coefficients, given the forms of a set, is one that its cause can have.
-    pub fn may_be(
+    pub(crate) fn may_be(
         &self,
         number: usize,
         set: &[usize],
@@ -57,14 +57,14 @@ impl<'a> CauseChoice<'a> {
     }
 
     /// Whether a curve of speed without a name is at the place of a form, in a set.
-    pub fn is_part_of_curve(&self, form: &TorqueForm, set: &[usize]) -> bool {
+    pub(crate) fn is_part_of_curve(&self, form: &TorqueForm, set: &[usize]) -> bool {
         set.iter()
             .map(|other| self.form(*other))
             .any(|curve| curve.place == form.place && curve.is_nameless_curve())
     }
 
     /// Whether a form may join a set: once a name and place, and what modifies a friction after it.
-    pub fn may_join(&self, number: usize, set: &[usize]) -> bool {
+    pub(crate) fn may_join(&self, number: usize, set: &[usize]) -> bool {
         let form = self.form(number);
         let taken = |other: &usize| {
             let other_form = self.form(*other);
@@ -98,13 +98,13 @@ impl<'a> CauseChoice<'a> {
     }
 
     /// Viscous and Coulomb friction of every joint: hardly an arm is without.
-    pub fn common(&self) -> Vec<usize> {
+    pub(crate) fn common(&self) -> Vec<usize> {
         let common = |number: &usize| [VISCOUS, COULOMB].contains(&self.form(*number).cause.name);
         (0..self.open).filter(common).collect()
     }
 
     /// The next form of the same cause and place with fewer numbers.
-    pub fn plainer(&self, form: &TorqueForm) -> Option<&TorqueForm> {
+    pub(crate) fn plainer(&self, form: &TorqueForm) -> Option<&TorqueForm> {
         let listed = self.problem.all.forms[..self.open].iter();
         let plainer = listed.filter(|other| {
             other.is_called_as(form) && other.with == form.with && other.width < form.width
@@ -113,14 +113,14 @@ impl<'a> CauseChoice<'a> {
     }
 
     /// Whether two forms may stand in each other's place: on one joint, or both wrong masses, drives or mounting.
-    pub fn compete(&self, a: usize, b: usize) -> bool {
+    pub(crate) fn compete(&self, a: usize, b: usize) -> bool {
         let (a, b) = (self.form(a), self.form(b));
         a.place == b.place || (a.cause.inertial && b.cause.inertial)
     }
 
     /// Viscous or Coulomb friction where a set has only the other one: hardly a joint is without either, and the missing one would bias the
     /// other without being in its uncertainty.
-    pub fn other_friction(&self, set: &[usize]) -> Vec<usize> {
+    pub(crate) fn other_friction(&self, set: &[usize]) -> Vec<usize> {
         let is_in = |name: &str, place: Place| {
             set.iter().any(|number| {
                 self.form(*number).cause.name == name && self.form(*number).place == place

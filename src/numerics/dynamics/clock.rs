@@ -15,14 +15,14 @@ const JUMP: f64 = 4.0;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct RecordingClock {
     /// Hz.
-    pub rate: f64,
+    pub(crate) rate: f64,
     /// Rows without a gap in time or position, ascending.
-    pub stretches: Vec<Range<usize>>,
+    pub(crate) stretches: Vec<Range<usize>>,
 }
 
 impl RecordingClock {
     /// The clock of a motion of one trajectory in even steps, s.
-    pub fn even(time: &[f64]) -> Self {
+    pub(crate) fn even(time: &[f64]) -> Self {
         let rows = time.len();
         let rate = (rows - 1) as f64 / (time[rows - 1] - time[0]);
         Self {
@@ -32,12 +32,12 @@ impl RecordingClock {
     }
 
     /// The clock of a checked recording.
-    pub fn of(recording: &TorqueRecording) -> Self {
+    pub(crate) fn of(recording: &TorqueRecording) -> Self {
         Self::paced(recording, &ClockPace::of(recording))
     }
 
     /// The clock of rows of a recording whose pace is known.
-    pub fn paced(recording: &TorqueRecording, pace: &ClockPace) -> Self {
+    pub(crate) fn paced(recording: &TorqueRecording, pace: &ClockPace) -> Self {
         let mut stretches = Vec::new();
         let mut start = 0;
         for row in 1..=recording.rows() {
@@ -57,14 +57,14 @@ impl RecordingClock {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ClockPace {
     /// s from row to row, median.
-    pub usual: f64,
+    pub(crate) usual: f64,
     /// rad from row to row, per joint: 999 of 1000 steps are shorter.
-    pub fastest: Vec<f64>,
+    pub(crate) fastest: Vec<f64>,
 }
 
 impl ClockPace {
     /// The pace of a checked recording.
-    pub fn of(recording: &TorqueRecording) -> Self {
+    pub(crate) fn of(recording: &TorqueRecording) -> Self {
         let fastest = |joint: usize| {
             let mut all: Vec<f64> = (1..recording.rows())
                 .map(|row| step(recording, row, joint))
@@ -78,7 +78,7 @@ impl ClockPace {
     }
 
     /// s from row to row, median.
-    pub fn usual_step(recording: &TorqueRecording) -> f64 {
+    pub(crate) fn usual_step(recording: &TorqueRecording) -> f64 {
         let mut steps: Vec<f64> = recording
             .time
             .windows(2)
@@ -88,7 +88,7 @@ impl ClockPace {
     }
 
     /// Whether clock or joints jump before a row, which is not the first one.
-    pub fn is_torn(&self, recording: &TorqueRecording, row: usize) -> bool {
+    pub(crate) fn is_torn(&self, recording: &TorqueRecording, row: usize) -> bool {
         let lasted = recording.time[row] - recording.time[row - 1];
         let jumps =
             |(joint, fastest): (usize, &f64)| step(recording, row, joint) > JUMP * fastest + 1e-12;
@@ -188,7 +188,12 @@ impl MotionPace {
     }
 
     /// Takes rows; whether the first stretch of them continues the last one of those before.
-    pub fn push(&mut self, recording: &TorqueRecording, clock: &RecordingClock, continues: bool) {
+    pub(crate) fn push(
+        &mut self,
+        recording: &TorqueRecording,
+        clock: &RecordingClock,
+        continues: bool,
+    ) {
         let step = ((STEP * clock.rate) as usize).max(1);
         for (joint, pace) in self.joints.iter_mut().enumerate() {
             let angles = column(&recording.position, recording.joints, joint);
@@ -202,7 +207,7 @@ impl MotionPace {
     }
 
     /// Hz, for a clock of `rate` Hz. A joint comes and goes as often as a sine of the same rms of velocity and of angle.
-    pub fn cutoff(mut self, rate: f64) -> f64 {
+    pub(crate) fn cutoff(mut self, rate: f64) -> f64 {
         self.joints.iter_mut().for_each(JointPace::end_stretch);
         let often = |[moved, apart]: [f64; 2]| {
             if apart > 0.0 {

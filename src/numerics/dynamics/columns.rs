@@ -10,16 +10,16 @@ use crate::criteria::torque::FRICTION;
 
 /// Base columns, then those of all forms, form after form.
 pub(super) struct TorqueColumns {
-    pub columns: Vec<TorqueColumn>,
+    pub(crate) columns: Vec<TorqueColumn>,
     /// Number of base columns.
-    pub base: usize,
+    pub(crate) base: usize,
     /// Link and change of its numbers per coefficient of the base.
-    pub base_changes: Vec<(usize, [f64; INERTIAL_NUMBERS])>,
+    pub(crate) base_changes: Vec<(usize, [f64; INERTIAL_NUMBERS])>,
     /// 1 / variance beforehand of each coefficient.
-    pub prior: Vec<f64>,
-    pub forms: Vec<TorqueForm>,
+    pub(crate) prior: Vec<f64>,
+    pub(crate) forms: Vec<TorqueForm>,
     /// Forms that causes list; later ones are trials of a refinement.
-    pub listed: usize,
+    pub(crate) listed: usize,
     /// First column of each form.
     first: Vec<usize>,
     /// Nm, half the range of each joint's torque.
@@ -31,7 +31,7 @@ const UNKNOWN_BEFOREHAND: f64 = 1e-9;
 
 impl TorqueColumns {
     /// None.
-    pub fn empty() -> Self {
+    pub(crate) fn empty() -> Self {
         Self {
             columns: Vec::new(),
             base: 0,
@@ -72,7 +72,7 @@ impl TorqueColumns {
     }
 
     /// Takes another form; its number.
-    pub fn push(
+    pub(crate) fn push(
         &mut self,
         form: TorqueForm,
         scene: &DynamicScene,
@@ -98,7 +98,7 @@ impl TorqueColumns {
     }
 
     /// Takes a form with its columns; its number.
-    pub fn take(&mut self, form: TorqueForm, columns: Vec<TorqueColumn>) -> usize {
+    pub(crate) fn take(&mut self, form: TorqueForm, columns: Vec<TorqueColumn>) -> usize {
         self.first.push(self.columns.len());
         self.prior.resize(self.columns.len(), 0.0);
         let prior: Vec<f64> = columns
@@ -127,7 +127,7 @@ impl TorqueColumns {
     }
 
     /// Columns of forms that are made of the rigid torque, anew.
-    pub fn renew(
+    pub(crate) fn renew(
         &mut self,
         scene: &DynamicScene,
         reduction: &Reduction,
@@ -143,7 +143,7 @@ impl TorqueColumns {
     }
 
     /// Columns of some forms that are made of the sign of a velocity, anew.
-    pub fn renew_signs(
+    pub(crate) fn renew_signs(
         &mut self,
         forms: &[usize],
         scene: &DynamicScene,
@@ -163,14 +163,14 @@ impl TorqueColumns {
     }
 
     /// Takes a column of no form; its number.
-    pub fn push_bare(&mut self, column: TorqueColumn) -> usize {
+    pub(crate) fn push_bare(&mut self, column: TorqueColumn) -> usize {
         self.columns.push(column);
         self.prior.resize(self.columns.len(), 0.0);
         self.columns.len() - 1
     }
 
     /// Rms of a column over half the range of the torque, over the joints that it acts on.
-    pub fn size(&self, column: usize) -> f64 {
+    pub(crate) fn size(&self, column: usize) -> f64 {
         let own = &self.columns[column];
         let of = |(joint, course): (&usize, &Vec<f64>)| {
             let range = self
@@ -190,7 +190,7 @@ impl TorqueColumns {
     }
 
     /// Columns of a form.
-    pub fn of(&self, form: usize) -> std::ops::Range<usize> {
+    pub(crate) fn of(&self, form: usize) -> std::ops::Range<usize> {
         self.first[form]..self.first[form] + self.forms[form].width
     }
 }

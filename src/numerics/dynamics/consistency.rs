@@ -60,12 +60,12 @@ impl TorqueModel {
     }
 
     /// The ten numbers of a link.
-    pub fn ten(&self, link: usize) -> &[f64] {
+    pub(crate) fn ten(&self, link: usize) -> &[f64] {
         &self.inertials[INERTIAL_NUMBERS * link..INERTIAL_NUMBERS * (link + 1)]
     }
 
     /// Covariance of a link's ten numbers; `None` where it is not known.
-    pub fn covariance_of(&self, link: usize) -> Option<DMatrix<f64>> {
+    pub(crate) fn covariance_of(&self, link: usize) -> Option<DMatrix<f64>> {
         let whole = self.is_whole(link) && !self.covariance.is_empty();
         let width = (self.covariance.len() as f64).sqrt().round() as usize;
         let first = self.identified[..INERTIAL_NUMBERS * link]

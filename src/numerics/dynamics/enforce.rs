@@ -28,11 +28,11 @@ const EXTENT: f64 = 0.1;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct NearestBodies {
     /// 10 a link.
-    pub theta: Vec<f64>,
+    pub(crate) theta: Vec<f64>,
     /// Squared distance in the metric: what the whitened squared residual, tolerances included, rises by.
-    pub cost: f64,
+    pub(crate) cost: f64,
     /// Links that were no bodies, from 0.
-    pub links: Vec<usize>,
+    pub(crate) links: Vec<usize>,
 }
 
 /// The nearest numbers (10 n) that are bodies', by the covariance of all (row-major, 10 n x 10 n). `None` where they are bodies' already.

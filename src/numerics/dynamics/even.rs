@@ -26,7 +26,7 @@ pub(super) struct EvenSource<'a> {
     by_stamps: bool,
     rows: usize,
     /// What was found and done.
-    pub remark: String,
+    pub(crate) remark: String,
 }
 
 /// What is known of the steps of a clock.
@@ -41,7 +41,7 @@ struct ClockSteps {
 
 impl<'a> EvenSource<'a> {
     /// The recording by an even clock; none where its steps are even, or a row cannot be used, which others say.
-    pub fn of(source: &'a dyn TorqueSource) -> Result<Option<Self>> {
+    pub(crate) fn of(source: &'a dyn TorqueSource) -> Result<Option<Self>> {
         let Some(steps) = ClockSteps::of(source)? else {
             return Ok(None);
         };

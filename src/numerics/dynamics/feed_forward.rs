@@ -37,26 +37,26 @@ pub struct NeededTorques {
     /// Nm at the joints, as the drives or sensors of the recording state it.
     pub torque: Vec<f64>,
     /// Nm of the rigid arm as identified.
-    pub load: Vec<f64>,
+    pub(crate) load: Vec<f64>,
     /// Nm by which `torque` differs from that of the arm as declared; all of it where no masses are declared.
-    pub correction: Vec<f64>,
+    pub(crate) correction: Vec<f64>,
     /// Nm, 95 %: by the model's covariance, and by laws that are used beyond the motion of the recording. `None` where the model
     /// carries no covariance.
     pub u95: Option<Vec<f64>>,
     /// rad/s.
-    pub velocity: Vec<f64>,
+    pub(crate) velocity: Vec<f64>,
     /// rad/s^2.
-    pub acceleration: Vec<f64>,
+    pub(crate) acceleration: Vec<f64>,
 }
 
 /// What a coefficient of a model adds at a joint, Nm per unit, a value a row.
 pub(super) struct TermCourse {
     /// Term of the model.
-    pub term: usize,
+    pub(crate) term: usize,
     /// Among all coefficients of the model.
-    pub coefficient: usize,
-    pub joint: usize,
-    pub course: Vec<f64>,
+    pub(crate) coefficient: usize,
+    pub(crate) joint: usize,
+    pub(crate) course: Vec<f64>,
 }
 
 impl TorqueModel {

@@ -49,7 +49,7 @@ impl ZeroPhase {
     }
 
     /// Filters courses of one length in place.
-    pub fn apply<C: AsMut<[f64]>>(&self, courses: &mut [C]) {
+    pub(crate) fn apply<C: AsMut<[f64]>>(&self, courses: &mut [C]) {
         let mut lanes = courses.chunks_exact_mut(LANES);
         for several in &mut lanes {
             if let Ok(several) = <&mut [C; LANES]>::try_from(several) {

@@ -22,11 +22,11 @@ const AGREEING: f64 = 0.6;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Latency {
     /// s.
-    pub seconds: f64,
+    pub(crate) seconds: f64,
     /// s.
-    pub sigma: f64,
+    pub(crate) sigma: f64,
     /// Fall of the whitened squared residual.
-    pub gain: f64,
+    pub(crate) gain: f64,
 }
 
 /// Whether so many joints gain enough that all of them have it.

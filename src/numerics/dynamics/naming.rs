@@ -17,11 +17,11 @@ const ROUNDS: usize = 40;
 /// What explains a recording.
 #[derive(Default)]
 pub(super) struct JudgedSet {
-    pub set: Vec<usize>,
+    pub(crate) set: Vec<usize>,
     /// What of the set is part of the model, but too little to be named.
-    pub silent: Vec<usize>,
+    pub(crate) silent: Vec<usize>,
     /// What cross-validation did not confirm, with what left-out rows gained by each.
-    pub withdrawn: Vec<(usize, f64)>,
+    pub(crate) withdrawn: Vec<(usize, f64)>,
 }
 
 /// What becomes of a form.

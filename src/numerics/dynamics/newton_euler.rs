@@ -181,7 +181,7 @@ impl InverseDynamics {
 }
 
 /// A turn about an axis.
-pub fn turn(axis: &Vector3<f64>, angle: f64) -> Matrix3<f64> {
+pub(crate) fn turn(axis: &Vector3<f64>, angle: f64) -> Matrix3<f64> {
     Pose::from_rotation_vector(axis * angle, Vector3::zeros()).rotation
 }
 
@@ -225,10 +225,11 @@ fn wrench_of(link: &LinkMotion, theta: &[f64]) -> Wrench {
 }
 
 /// Where xx xy xz yy yz zz stand in the matrix.
-pub const INERTIA_ENTRIES: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
+pub(crate) const INERTIA_ENTRIES: [(usize, usize); 6] =
+    [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
 
 /// The matrix of xx xy xz yy yz zz.
-pub fn inertia_matrix(six: &[f64]) -> Matrix3<f64> {
+pub(crate) fn inertia_matrix(six: &[f64]) -> Matrix3<f64> {
     let mut matrix = Matrix3::zeros();
     for (number, (row, column)) in INERTIA_ENTRIES.into_iter().enumerate() {
         matrix[(row, column)] = six[number];

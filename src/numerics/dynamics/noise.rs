@@ -22,16 +22,16 @@ pub(super) enum NoiseMemory {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct JointNoise {
     /// Nm, of the course.
-    pub sigma: f64,
+    pub(crate) sigma: f64,
     /// Nm, of what is new in a row.
-    pub innovation: f64,
+    pub(crate) innovation: f64,
     /// Share of the rows before, nearest first.
-    pub memory: Vec<f64>,
+    pub(crate) memory: Vec<f64>,
 }
 
 impl JointNoise {
     /// White noise.
-    pub fn white(sigma: f64) -> Self {
+    pub(crate) fn white(sigma: f64) -> Self {
         Self {
             sigma,
             innovation: sigma,
@@ -41,7 +41,12 @@ impl JointNoise {
 
     /// The noise of a residual over runs of rows, `spent` of whose freedoms a fit has taken: Yule and Walker's equations by Levinson, the order by
     /// Akaike's criterion.
-    pub fn of(residual: &[f64], runs: &[Range<usize>], spent: f64, longest: NoiseMemory) -> Self {
+    pub(crate) fn of(
+        residual: &[f64],
+        runs: &[Range<usize>],
+        spent: f64,
+        longest: NoiseMemory,
+    ) -> Self {
         let longest = MEMORY[longest as usize];
         let rows: usize = runs.iter().map(Range::len).sum();
         let correlation: Vec<f64> = (0..=longest)
@@ -87,13 +92,13 @@ impl JointNoise {
     }
 
     /// How many rows in a row count as one for what is slow.
-    pub fn autocorrelation(&self) -> f64 {
+    pub(crate) fn autocorrelation(&self) -> f64 {
         let gain = 1.0 - self.memory.iter().sum::<f64>();
         (self.innovation / self.sigma / gain.max(1e-3)).powi(2)
     }
 
     /// What is new in each row of the runs, in standard deviations; the first rows of a run only serve as memory.
-    pub fn whiten(&self, course: &[f64], runs: &[Range<usize>], out: &mut Vec<f64>) {
+    pub(crate) fn whiten(&self, course: &[f64], runs: &[Range<usize>], out: &mut Vec<f64>) {
         let scale = 1.0 / self.innovation;
         for run in runs {
             let rows = &course[run.clone()];

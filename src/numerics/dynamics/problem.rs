@@ -21,31 +21,31 @@ const EVENT_MARGIN: f64 = 0.3;
 
 /// What all steps work on.
 pub(super) struct TorqueProblem<'a> {
-    pub scene: DynamicScene<'a>,
+    pub(crate) scene: DynamicScene<'a>,
     /// s, of the first row.
-    pub start: f64,
-    pub reduction: Reduction,
-    pub regressor: ReducedRegressor,
-    pub all: TorqueColumns,
+    pub(crate) start: f64,
+    pub(crate) reduction: Reduction,
+    pub(crate) regressor: ReducedRegressor,
+    pub(crate) all: TorqueColumns,
     /// 10 n numbers from which the base is counted.
-    pub theta: Vec<f64>,
+    pub(crate) theta: Vec<f64>,
     /// `[joint][row]`, rows as recorded, filtered.
     torque: Vec<Vec<f64>>,
     /// s by which torques come late.
-    pub latency: f64,
+    pub(crate) latency: f64,
     /// `[joint]`: measured minus rigid torque of judged rows.
-    pub measured: Vec<Vec<f64>>,
+    pub(crate) measured: Vec<Vec<f64>>,
     /// Whether each judged row is held out.
     held_out: Vec<bool>,
-    pub events: Vec<ContactEvent>,
-    pub noise: Vec<JointNoise>,
+    pub(crate) events: Vec<ContactEvent>,
+    pub(crate) noise: Vec<JointNoise>,
     /// Causes at their places that are none: only a number at an end of its search would explain the torques, or cross-validation
     /// did not confirm them.
-    pub barred: Vec<TorqueForm>,
+    pub(crate) barred: Vec<TorqueForm>,
     /// Whether the width of a sign has changed since columns of forms outside a set were made.
     is_stale: bool,
     /// Least and greatest, C, where it was recorded.
-    pub temperature: Option<[f64; 2]>,
+    pub(crate) temperature: Option<[f64; 2]>,
 }
 
 impl<'a> TorqueProblem<'a> {
@@ -98,7 +98,7 @@ impl<'a> TorqueProblem<'a> {
     }
 
     /// Forms the columns.
-    pub fn form(&mut self, without: &[String]) {
+    pub(crate) fn form(&mut self, without: &[String]) {
         let half_range = |joint: usize| {
             let course = self.torque_at(joint, self.latency);
             let fitted = course
@@ -119,20 +119,20 @@ impl<'a> TorqueProblem<'a> {
     }
 
     /// Takes a trial form; its number.
-    pub fn push(&mut self, form: TorqueForm) -> usize {
+    pub(crate) fn push(&mut self, form: TorqueForm) -> usize {
         self.all
             .push(form, &self.scene, &self.reduction, &self.regressor)
     }
 
     /// Makes columns of a set of the sign of a velocity anew, after its width has changed; those of others wait.
-    pub fn renew_signs(&mut self, set: &[usize]) {
+    pub(crate) fn renew_signs(&mut self, set: &[usize]) {
         self.all
             .renew_signs(set, &self.scene, &self.reduction, &self.regressor);
         self.is_stale = true;
     }
 
     /// Makes the columns that wait anew.
-    pub fn refresh(&mut self) {
+    pub(crate) fn refresh(&mut self) {
         if std::mem::take(&mut self.is_stale) {
             let listed: Vec<usize> = (0..self.all.listed).collect();
             self.all
@@ -141,7 +141,7 @@ impl<'a> TorqueProblem<'a> {
     }
 
     /// Columns that change a link's inertial numbers, and by what: of the base, and of the forms of a set.
-    pub fn inertial_changes(
+    pub(crate) fn inertial_changes(
         &self,
         set: &[usize],
         link: usize,
@@ -169,7 +169,7 @@ impl<'a> TorqueProblem<'a> {
     }
 
     /// Inertial numbers with what coefficients change of them.
-    pub fn inertials(&self, set: &[usize], solution: &[(usize, f64)]) -> Vec<f64> {
+    pub(crate) fn inertials(&self, set: &[usize], solution: &[(usize, f64)]) -> Vec<f64> {
         let mut theta = self.theta.clone();
         for link in 0..self.joints() {
             let own = &mut theta[INERTIAL_NUMBERS * link..INERTIAL_NUMBERS * (link + 1)];
@@ -184,7 +184,7 @@ impl<'a> TorqueProblem<'a> {
     }
 
     /// Makes columns of the rigid torque and of friction anew, from the inertial numbers and the solution of a fit with a set of forms.
-    pub fn believe(&mut self, theta: &[f64], set: &[usize], solution: &[(usize, f64)]) {
+    pub(crate) fn believe(&mut self, theta: &[f64], set: &[usize], solution: &[(usize, f64)]) {
         self.scene.believe(theta);
         let coefficients: Vec<Vec<f64>> = set
             .iter()
@@ -205,13 +205,13 @@ impl<'a> TorqueProblem<'a> {
     }
 
     /// Coefficients of a form in a solution.
-    pub fn coefficients(&self, form: usize, solution: &[(usize, f64)]) -> Vec<f64> {
+    pub(crate) fn coefficients(&self, form: usize, solution: &[(usize, f64)]) -> Vec<f64> {
         let columns = self.all.of(form);
         columns.map(|column| value_of(solution, column)).collect()
     }
 
     /// Nm, rms of the torque of a form in a solution, over the joints that it acts on.
-    pub fn rms_of(&self, form: usize, solution: &[(usize, f64)]) -> f64 {
+    pub(crate) fn rms_of(&self, form: usize, solution: &[(usize, f64)]) -> f64 {
         let mut torques = vec![vec![0.0; self.reduction.rows.len()]; self.joints()];
         for column in self.all.of(form) {
             self.all.columns[column].add(value_of(solution, column), &mut torques);
@@ -227,12 +227,12 @@ impl<'a> TorqueProblem<'a> {
     }
 
     /// s, of judged rows, from the first recorded one.
-    pub fn time(&self, row: usize) -> f64 {
+    pub(crate) fn time(&self, row: usize) -> f64 {
         self.scene.time[self.reduction.rows[row]]
     }
 
     /// Measured torque of judged rows, as it was `latency` s later.
-    pub fn torque_at(&self, joint: usize, latency: f64) -> Vec<f64> {
+    pub(crate) fn torque_at(&self, joint: usize, latency: f64) -> Vec<f64> {
         let course = &self.torque[joint];
         let stretch_of = |row: usize| {
             self.scene
@@ -251,7 +251,7 @@ impl<'a> TorqueProblem<'a> {
     }
 
     /// Measured minus rigid torque with torques that come `latency` s late.
-    pub fn difference(&self, latency: f64) -> Vec<Vec<f64>> {
+    pub(crate) fn difference(&self, latency: f64) -> Vec<Vec<f64>> {
         let of = |joint: usize| {
             let mut course = self.torque_at(joint, latency);
             let rigid = self.regressor.torque(joint, &self.theta);
@@ -265,13 +265,13 @@ impl<'a> TorqueProblem<'a> {
     }
 
     /// Takes a latency.
-    pub fn shift(&mut self, latency: f64) {
+    pub(crate) fn shift(&mut self, latency: f64) {
         self.latency = latency;
         self.measured = self.difference(latency);
     }
 
     /// Courses of the regressor at each joint in some judged rows.
-    pub fn base_courses(&self, rows: &[usize]) -> Vec<Vec<Vec<f64>>> {
+    pub(crate) fn base_courses(&self, rows: &[usize]) -> Vec<Vec<Vec<f64>>> {
         let numbers = 10 * self.joints();
         let of = |joint: usize| {
             let courses = (10 * joint..numbers).map(|number| self.regressor.course(joint, number));
@@ -283,7 +283,7 @@ impl<'a> TorqueProblem<'a> {
     }
 
     /// Whether a judged row lies in an event.
-    pub fn in_event(&self, row: usize) -> bool {
+    pub(crate) fn in_event(&self, row: usize) -> bool {
         let time = self.time(row);
         self.events
             .iter()
@@ -291,12 +291,12 @@ impl<'a> TorqueProblem<'a> {
     }
 
     /// Whether a judged row is held out.
-    pub fn is_held_out(&self, row: usize) -> bool {
+    pub(crate) fn is_held_out(&self, row: usize) -> bool {
         self.held_out[row]
     }
 
     /// Runs of judged rows outside events, of the fitted or of the held-out ones.
-    pub fn runs(&self, held_out: bool) -> Vec<Range<usize>> {
+    pub(crate) fn runs(&self, held_out: bool) -> Vec<Range<usize>> {
         self.runs_where(|row| self.held_out[row] == held_out && !self.in_event(row))
     }
 
@@ -321,7 +321,7 @@ impl<'a> TorqueProblem<'a> {
     }
 
     /// Inner products of fitted rows under the present noise: of the base, all that causes list, and a set.
-    pub fn weighted(&mut self, set: &[usize]) -> WeightedColumns {
+    pub(crate) fn weighted(&mut self, set: &[usize]) -> WeightedColumns {
         self.refresh();
         let listed = 0..self.all.listed;
         let forms: Vec<usize> = listed
@@ -332,7 +332,7 @@ impl<'a> TorqueProblem<'a> {
     }
 
     /// The same of the base and some forms.
-    pub fn weighted_of(&self, forms: &[usize]) -> WeightedColumns {
+    pub(crate) fn weighted_of(&self, forms: &[usize]) -> WeightedColumns {
         let mut chosen: Vec<usize> = (0..self.all.base)
             .chain(forms.iter().flat_map(|form| self.all.of(*form)))
             .collect();
@@ -346,7 +346,7 @@ impl<'a> TorqueProblem<'a> {
     }
 
     /// The weighing of some runs under the present noise.
-    pub fn weighing<'b>(&'b self, runs: &'b [Range<usize>]) -> Weighing<'b> {
+    pub(crate) fn weighing<'b>(&'b self, runs: &'b [Range<usize>]) -> Weighing<'b> {
         Weighing {
             noise: &self.noise,
             runs,
@@ -354,7 +354,7 @@ impl<'a> TorqueProblem<'a> {
     }
 
     /// What coefficients leave of the measured torque, Nm.
-    pub fn residual(&self, solution: &[(usize, f64)]) -> Vec<Vec<f64>> {
+    pub(crate) fn residual(&self, solution: &[(usize, f64)]) -> Vec<Vec<f64>> {
         let mut left = self.measured.clone();
         for (column, value) in solution {
             self.all.columns[*column].add(-value, &mut left);

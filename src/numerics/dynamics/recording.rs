@@ -45,7 +45,7 @@ impl TorqueRecording {
     }
 
     /// Number of rows.
-    pub fn rows(&self) -> usize {
+    pub(crate) fn rows(&self) -> usize {
         self.time.len()
     }
 

@@ -20,13 +20,13 @@ const BLOCK: usize = 1 << 14;
 #[derive(Debug, Clone)]
 pub(super) struct Reduction {
     /// Hz.
-    pub cutoff: f64,
+    pub(crate) cutoff: f64,
     /// Hz, of kept rows.
-    pub rate: f64,
+    pub(crate) rate: f64,
     /// Kept rows of the recording, ascending.
-    pub rows: Vec<usize>,
+    pub(crate) rows: Vec<usize>,
     /// Runs of kept rows without a gap.
-    pub runs: Vec<Range<usize>>,
+    pub(crate) runs: Vec<Range<usize>>,
     filter: ZeroPhase,
     stretches: Vec<Range<usize>>,
     /// Rows beyond which a block does not feel what is filtered with it.
@@ -62,7 +62,7 @@ impl Reduction {
     }
 
     /// Filters whole courses (as long as the recording) in place.
-    pub fn filter(&self, courses: &mut [Vec<f64>]) {
+    pub(crate) fn filter(&self, courses: &mut [Vec<f64>]) {
         for stretch in &self.stretches {
             let mut own: Vec<&mut [f64]> = courses
                 .iter_mut()
@@ -73,7 +73,7 @@ impl Reduction {
     }
 
     /// The kept rows of courses as they were recorded.
-    pub fn reduce(&self, mut courses: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+    pub(crate) fn reduce(&self, mut courses: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
         self.filter(&mut courses);
         courses
             .into_iter()
@@ -83,7 +83,7 @@ impl Reduction {
 
     /// Kept rows of `width` courses that `write` makes for a range of rows, column after column (each as long as the range): the memory
     /// is that of a block.
-    pub fn reduce_blocks(
+    pub(crate) fn reduce_blocks(
         &self,
         width: usize,
         mut write: impl FnMut(Range<usize>, &mut [f64]),
@@ -120,14 +120,14 @@ impl Reduction {
 #[derive(Debug, Clone)]
 pub(super) struct TorqueColumn {
     /// Ascending, from 0.
-    pub joints: Vec<usize>,
+    pub(crate) joints: Vec<usize>,
     /// One a joint.
-    pub courses: Vec<Vec<f64>>,
+    pub(crate) courses: Vec<Vec<f64>>,
 }
 
 impl TorqueColumn {
     /// Adds it with a coefficient to torques, `[joint][judged row]`.
-    pub fn add(&self, coefficient: f64, torques: &mut [Vec<f64>]) {
+    pub(crate) fn add(&self, coefficient: f64, torques: &mut [Vec<f64>]) {
         for (joint, course) in self.joints.iter().zip(&self.courses) {
             let sums = torques[*joint].iter_mut().zip(course);
             sums.for_each(|(sum, part)| *sum += coefficient * part);
@@ -140,7 +140,7 @@ pub(super) struct ReducedRegressor(Vec<Vec<Vec<f64>>>);
 
 impl ReducedRegressor {
     /// The regressor of the motion of a recording.
-    pub fn of(scene: &DynamicScene, reduction: &Reduction) -> Self {
+    pub(crate) fn of(scene: &DynamicScene, reduction: &Reduction) -> Self {
         let n = scene.joints();
         let mut dynamics = InverseDynamics::new(scene.arm);
         // Courses of joint j begin where those of the joints before end.
@@ -181,12 +181,12 @@ impl ReducedRegressor {
     }
 
     /// Course of one number at a joint; empty where the link is before the joint.
-    pub fn course(&self, joint: usize, number: usize) -> &[f64] {
+    pub(crate) fn course(&self, joint: usize, number: usize) -> &[f64] {
         &self.0[joint][number]
     }
 
     /// The column of a change of a link's ten numbers.
-    pub fn column(&self, link: usize, ten: &[f64; INERTIAL_NUMBERS]) -> TorqueColumn {
+    pub(crate) fn column(&self, link: usize, ten: &[f64; INERTIAL_NUMBERS]) -> TorqueColumn {
         let joints: Vec<usize> = (0..=link).collect();
         let course = |joint: &usize| {
             let own = &self.0[*joint][INERTIAL_NUMBERS * link..INERTIAL_NUMBERS * (link + 1)];

@@ -9,7 +9,7 @@ pub(super) struct Resampler {
     pause: f64,
     by_stamps: bool,
     /// Recorded rows from `first` on, of which those before `done` are no longer needed as beginnings of a step.
-    pub held: TorqueRecording,
+    pub(crate) held: TorqueRecording,
     first: usize,
     done: usize,
     /// s, where the present stretch begins, and rows made of it.
@@ -41,7 +41,7 @@ impl Resampler {
     }
 
     /// Hands on what was made, each row with the recorded one that it is or comes after.
-    pub fn hand_on(
+    pub(crate) fn hand_on(
         &mut self,
         take: &mut dyn FnMut(&TorqueRecording, &[usize]) -> Result<()>,
     ) -> Result<()> {
@@ -60,7 +60,7 @@ impl Resampler {
     }
 
     /// Makes the rows of all steps whose surroundings are known.
-    pub fn advance(&mut self, ends: bool) {
+    pub(crate) fn advance(&mut self, ends: bool) {
         let rows = self.held.rows();
         while self.done + 2 < rows || (ends && self.done < rows) {
             let row = self.done;

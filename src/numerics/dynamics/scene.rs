@@ -17,32 +17,32 @@ const HIGHEST_BAND: f64 = 0.35;
 
 /// Courses of all rows, `[joint][row]`.
 pub(super) struct DynamicScene<'a> {
-    pub arm: &'a DynamicArm,
+    pub(crate) arm: &'a DynamicArm,
     /// Hz.
-    pub rate: f64,
+    pub(crate) rate: f64,
     /// s from the first row.
-    pub time: Vec<f64>,
-    pub stretches: Vec<Range<usize>>,
+    pub(crate) time: Vec<f64>,
+    pub(crate) stretches: Vec<Range<usize>>,
     /// rad.
-    pub position: Vec<Vec<f64>>,
+    pub(crate) position: Vec<Vec<f64>>,
     /// rad/s.
-    pub velocity: Vec<Vec<f64>>,
+    pub(crate) velocity: Vec<Vec<f64>>,
     /// rad/s^2.
-    pub acceleration: Vec<Vec<f64>>,
+    pub(crate) acceleration: Vec<Vec<f64>>,
     /// Nm, of the inertials as they are believed at present, payload included.
-    pub rigid: Vec<Vec<f64>>,
+    pub(crate) rigid: Vec<Vec<f64>>,
     /// Nm, of friction as it is believed at present.
-    pub friction: Vec<Vec<f64>>,
+    pub(crate) friction: Vec<Vec<f64>>,
     /// Nm, under a gravity of 9.81 m/s^2 along x, then along y of the base: of the declared masses, once a tilt is known of those that are
     /// believed.
-    pub sideways: [Vec<Vec<f64>>; 2],
+    pub(crate) sideways: [Vec<Vec<f64>>; 2],
     /// rad/s over which the sign of a velocity turns; at each joint, over that.
-    pub sign_width: f64,
+    pub(crate) sign_width: f64,
     sign_shares: Vec<f64>,
     /// s by which friction turns before the velocity does.
-    pub friction_lead: f64,
+    pub(crate) friction_lead: f64,
     /// Declared inertials; `None` where none are declared.
-    pub declared: Option<DeclaredInertials>,
+    pub(crate) declared: Option<DeclaredInertials>,
 }
 
 impl<'a> DynamicScene<'a> {
@@ -114,28 +114,28 @@ impl<'a> DynamicScene<'a> {
     }
 
     /// Number of rows.
-    pub fn rows(&self) -> usize {
+    pub(crate) fn rows(&self) -> usize {
         self.time.len()
     }
 
     /// Smoothed sign of a velocity.
-    pub fn sign(&self, velocity: f64) -> f64 {
+    pub(crate) fn sign(&self, velocity: f64) -> f64 {
         (velocity / self.sign_width).tanh()
     }
 
     /// Takes one width over which the sign of a velocity turns, rad/s, for all joints.
-    pub fn turn_over(&mut self, width: f64) {
+    pub(crate) fn turn_over(&mut self, width: f64) {
         self.sign_width = width;
         self.sign_shares.fill(1.0);
     }
 
     /// rad/s over which the sign of a joint's velocity turns.
-    pub fn width_at(&self, joint: usize) -> f64 {
+    pub(crate) fn width_at(&self, joint: usize) -> f64 {
         self.sign_width * self.sign_shares[joint]
     }
 
     /// Takes a width of each joint's own, rad/s.
-    pub fn turn_each_over(&mut self, widths: impl IntoIterator<Item = f64>) {
+    pub(crate) fn turn_each_over(&mut self, widths: impl IntoIterator<Item = f64>) {
         self.sign_shares = widths
             .into_iter()
             .map(|width| width / self.sign_width)
@@ -143,12 +143,12 @@ impl<'a> DynamicScene<'a> {
     }
 
     /// Takes a width of one joint's own, rad/s.
-    pub fn turn_one_over(&mut self, joint: usize, width: f64) {
+    pub(crate) fn turn_one_over(&mut self, joint: usize, width: f64) {
         self.sign_shares[joint] = width / self.sign_width;
     }
 
     /// Smoothed sign of a joint's velocity in a row, as friction has it.
-    pub fn direction(&self, joint: usize, row: usize) -> f64 {
+    pub(crate) fn direction(&self, joint: usize, row: usize) -> f64 {
         self.sign_at(
             joint,
             self.velocity[joint][row] + self.friction_lead * self.acceleration[joint][row],
@@ -156,27 +156,27 @@ impl<'a> DynamicScene<'a> {
     }
 
     /// Smoothed sign of a velocity of a joint.
-    pub fn sign_at(&self, joint: usize, velocity: f64) -> f64 {
+    pub(crate) fn sign_at(&self, joint: usize, velocity: f64) -> f64 {
         (velocity / self.width_at(joint)).tanh()
     }
 
     /// s from first to last row.
-    pub fn duration(&self) -> f64 {
+    pub(crate) fn duration(&self) -> f64 {
         self.time.last().copied().unwrap_or(0.0)
     }
 
     /// Takes 10 n inertial numbers for the rigid torques.
-    pub fn believe(&mut self, theta: &[f64]) {
+    pub(crate) fn believe(&mut self, theta: &[f64]) {
         self.rigid = self.torques_of(theta);
     }
 
     /// Rigid torques of 10 n inertial numbers, `[joint][row]`.
-    pub fn torques_of(&self, theta: &[f64]) -> Vec<Vec<f64>> {
+    pub(crate) fn torques_of(&self, theta: &[f64]) -> Vec<Vec<f64>> {
         self.torques(theta, &self.arm.gravity, true)
     }
 
     /// Takes 10 n inertial numbers for the torques of a gravity from the side.
-    pub fn tilt(&mut self, theta: &[f64]) {
+    pub(crate) fn tilt(&mut self, theta: &[f64]) {
         self.sideways =
             [Vector3::x(), Vector3::y()].map(|side| self.torques(theta, &(side * GRAVITY), false));
     }
@@ -200,7 +200,7 @@ impl<'a> DynamicScene<'a> {
     }
 
     /// Positions, velocities and accelerations (3 n) of a row.
-    pub fn motion_into(&self, row: usize, motion: &mut [f64]) {
+    pub(crate) fn motion_into(&self, row: usize, motion: &mut [f64]) {
         let n = self.joints();
         for joint in 0..n {
             motion[joint] = self.position[joint][row];
@@ -210,7 +210,7 @@ impl<'a> DynamicScene<'a> {
     }
 
     /// Jacobian of the tool point in a row: per joint the velocity of the point per velocity of the joint.
-    pub fn tool_jacobian(&self, row: usize) -> Vec<Vector3<f64>> {
+    pub(crate) fn tool_jacobian(&self, row: usize) -> Vec<Vector3<f64>> {
         let (mut rotation, mut origin, mut before) =
             (Matrix3::identity(), Vector3::zeros(), Vector3::zeros());
         let mut axes = Vec::with_capacity(self.joints());

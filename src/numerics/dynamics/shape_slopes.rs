@@ -29,7 +29,11 @@ pub(super) struct ShapeSlopes(pub Vec<(ShapeNumber, usize)>);
 
 impl ShapeSlopes {
     /// The slopes of a set at its solution; the columns join those of the problem.
-    pub fn of(problem: &mut TorqueProblem, weighted: &mut WeightedColumns, set: &[usize]) -> Self {
+    pub(crate) fn of(
+        problem: &mut TorqueProblem,
+        weighted: &mut WeightedColumns,
+        set: &[usize],
+    ) -> Self {
         let solution = SweptColumns::base(&problem.all, weighted)
             .with(set)
             .solution();
@@ -72,14 +76,14 @@ impl ShapeSlopes {
     }
 
     /// A fit that knows nothing of its shapes beforehand: for covariances.
-    pub fn with_slopes<'a>(&self, sweep: &SweptColumns<'a>) -> SweptColumns<'a> {
+    pub(crate) fn with_slopes<'a>(&self, sweep: &SweptColumns<'a>) -> SweptColumns<'a> {
         let mut all = sweep.clone();
         self.0.iter().for_each(|(_, column)| all.take(*column));
         all
     }
 
     /// Standard deviation of a shape number of a form, by a fit with the columns of all of them.
-    pub fn sigma(&self, uncertain: &SweptColumns, form: usize, index: usize) -> Option<f64> {
+    pub(crate) fn sigma(&self, uncertain: &SweptColumns, form: usize, index: usize) -> Option<f64> {
         let (_, column) = self
             .0
             .iter()

@@ -93,7 +93,7 @@ impl FrictionFit {
     }
 
     /// Takes measured minus rigid torques, `[joint][judged row]`.
-    pub fn take(&mut self, measured: &[Vec<f64>]) {
+    pub(crate) fn take(&mut self, measured: &[Vec<f64>]) {
         for (fit, course) in self.joints.iter_mut().zip(measured) {
             fit.left = fit.apart(&DVector::from_iterator(
                 self.rows.len(),
@@ -103,12 +103,12 @@ impl FrictionFit {
     }
 
     /// Number of rows.
-    pub fn rows(&self) -> usize {
+    pub(crate) fn rows(&self) -> usize {
         self.rows.len()
     }
 
     /// Logarithm of the mean square that is left at each joint as friction turns at present.
-    pub fn left(&self, problem: &TorqueProblem) -> Vec<f64> {
+    pub(crate) fn left(&self, problem: &TorqueProblem) -> Vec<f64> {
         let signs = problem.reduction.reduce(
             (0..self.joints.len())
                 .map(|joint| signs(problem, joint))

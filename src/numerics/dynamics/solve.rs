@@ -33,14 +33,14 @@ const CLOCK_ROUNDS: usize = 4;
 
 /// A recording with what explains it.
 pub(super) struct SolvedTorques<'a> {
-    pub problem: TorqueProblem<'a>,
-    pub weighted: WeightedColumns,
-    pub judged: JudgedSet,
+    pub(crate) problem: TorqueProblem<'a>,
+    pub(crate) weighted: WeightedColumns,
+    pub(crate) judged: JudgedSet,
     /// Slopes of the judged set.
-    pub slopes: ShapeSlopes,
-    pub latency: Option<Latency>,
+    pub(crate) slopes: ShapeSlopes,
+    pub(crate) latency: Option<Latency>,
     /// Wrong masses or drives in place of those of the set.
-    pub other: Option<OtherInertials>,
+    pub(crate) other: Option<OtherInertials>,
 }
 
 /// Looks for causes.

@@ -19,7 +19,7 @@ const PAYLOAD: &str = "payload_error";
 
 /// Common columns as the base, and forms that may change: the last link's inertial numbers, then causes.
 pub(super) struct StackedColumns {
-    pub all: TorqueColumns,
+    pub(crate) all: TorqueColumns,
     weighted: WeightedColumns,
     /// Nm, of both.
     measured: Vec<Vec<f64>>,
@@ -104,7 +104,7 @@ impl StackedColumns {
     }
 
     /// What a form must gain.
-    pub fn penalty(&self, form: usize) -> f64 {
+    pub(crate) fn penalty(&self, form: usize) -> f64 {
         let rows: usize = [0, self.joints]
             .map(|joint| self.weighted.measured[joint].len())
             .iter()
@@ -115,12 +115,12 @@ impl StackedColumns {
     }
 
     /// Common numbers and some forms.
-    pub fn fit(&self, set: &[usize]) -> SweptColumns<'_> {
+    pub(crate) fn fit(&self, set: &[usize]) -> SweptColumns<'_> {
         SweptColumns::base(&self.all, &self.weighted).with(set)
     }
 
     /// Adds the best form while it is worth its penalty, then removes what is not.
-    pub fn search(&self) -> Vec<usize> {
+    pub(crate) fn search(&self) -> Vec<usize> {
         let mut set: Vec<usize> = Vec::new();
         loop {
             let now = self.fit(&set);
@@ -146,7 +146,7 @@ impl StackedColumns {
     }
 
     /// What a fit leaves of the second recording, Nm rms per joint.
-    pub fn residual_rms(&self, fit: &SweptColumns) -> Vec<f64> {
+    pub(crate) fn residual_rms(&self, fit: &SweptColumns) -> Vec<f64> {
         let mut left = self.measured.clone();
         for (number, value) in fit.solution() {
             self.all.columns[number].add(-value, &mut left);

@@ -13,9 +13,9 @@ const INVISIBLE: f64 = 2e-5;
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Gain {
     /// Fall of the whitened squared residual, what the base's tolerances are stretched by included.
-    pub square: f64,
+    pub(crate) square: f64,
     /// Columns of it that are seen.
-    pub rank: usize,
+    pub(crate) rank: usize,
 }
 
 /// The base and a set of forms, swept out of all columns.
@@ -31,7 +31,7 @@ pub(super) struct SweptColumns<'a> {
     /// Per column: what is left of its inner product with the measured torque.
     right: Vec<f64>,
     /// Whitened squared residual and what the base's tolerances are stretched by.
-    pub square: f64,
+    pub(crate) square: f64,
 }
 
 /// The coefficient of a column; 0 of one that is not seen.
@@ -42,7 +42,7 @@ pub(super) fn value_of(solution: &[(usize, f64)], column: usize) -> f64 {
 
 impl<'a> SweptColumns<'a> {
     /// The base alone.
-    pub fn base(all: &'a TorqueColumns, weighted: &'a WeightedColumns) -> Self {
+    pub(crate) fn base(all: &'a TorqueColumns, weighted: &'a WeightedColumns) -> Self {
         let mut sweep = Self {
             all,
             weighted,
@@ -57,19 +57,19 @@ impl<'a> SweptColumns<'a> {
     }
 
     /// With forms.
-    pub fn with(&self, forms: &[usize]) -> Self {
+    pub(crate) fn with(&self, forms: &[usize]) -> Self {
         let mut sweep = self.clone();
         forms.iter().for_each(|form| sweep.add(*form));
         sweep
     }
 
     /// Takes a form.
-    pub fn add(&mut self, form: usize) {
+    pub(crate) fn add(&mut self, form: usize) {
         self.all.of(form).for_each(|column| self.take(column));
     }
 
     /// Takes a column.
-    pub fn take(&mut self, column: usize) {
+    pub(crate) fn take(&mut self, column: usize) {
         let prior = self.prior(column);
         let own = self.weighted.gram[column][column] + prior;
         let mut row = self.weighted.gram[column].clone();
@@ -105,7 +105,7 @@ impl<'a> SweptColumns<'a> {
     }
 
     /// What a form would gain, given the present ones.
-    pub fn gain(&self, form: usize) -> f64 {
+    pub(crate) fn gain(&self, form: usize) -> f64 {
         let (gram, right) = self.left_among(form);
         let first = self.all.of(form).start;
         let scale: Vec<f64> = (0..right.len())
@@ -128,7 +128,7 @@ impl<'a> SweptColumns<'a> {
     }
 
     /// What the present ones leave of the inner products of a column with all others.
-    pub fn left_of(&self, column: usize) -> Vec<f64> {
+    pub(crate) fn left_of(&self, column: usize) -> Vec<f64> {
         let mut left = self.weighted.gram[column].clone();
         for known in &self.rows {
             let share = known[column];
@@ -142,7 +142,7 @@ impl<'a> SweptColumns<'a> {
     }
 
     /// The same of columns of a form among each other, and with the measured torque.
-    pub fn left_among(&self, form: usize) -> (DMatrix<f64>, DVector<f64>) {
+    pub(crate) fn left_among(&self, form: usize) -> (DMatrix<f64>, DVector<f64>) {
         let columns = self.all.of(form);
         let (first, width) = (columns.start, columns.len());
         let swept = |a: usize, b: usize| {
@@ -159,17 +159,17 @@ impl<'a> SweptColumns<'a> {
     }
 
     /// What is left of the inner product of a column with the measured torque.
-    pub fn right_of(&self, column: usize) -> f64 {
+    pub(crate) fn right_of(&self, column: usize) -> f64 {
         self.right[column]
     }
 
     /// Whether each coefficient of a form would be positive alone.
-    pub fn rises(&self, form: usize) -> bool {
+    pub(crate) fn rises(&self, form: usize) -> bool {
         self.all.of(form).all(|column| self.right[column] > 0.0)
     }
 
     /// What a form of the set gains in addition to the others.
-    pub fn loss(&self, form: usize, solution: &[(usize, f64)]) -> Gain {
+    pub(crate) fn loss(&self, form: usize, solution: &[(usize, f64)]) -> Gain {
         let of = |column: usize| solution.iter().find(|(pivot, _)| *pivot == column).copied();
         let (columns, values): (Vec<usize>, Vec<f64>) = self.all.of(form).filter_map(of).unzip();
         let covariance =
@@ -185,7 +185,7 @@ impl<'a> SweptColumns<'a> {
     }
 
     /// Coefficients of the pivots.
-    pub fn solution(&self) -> Vec<(usize, f64)> {
+    pub(crate) fn solution(&self) -> Vec<(usize, f64)> {
         let count = self.pivots.len();
         let mut values = self.along.clone();
         for i in (0..count).rev() {
@@ -198,7 +198,7 @@ impl<'a> SweptColumns<'a> {
     }
 
     /// Covariance of some columns, row-major; columns that are no pivots have none.
-    pub fn covariance(&self, columns: &[usize]) -> Vec<f64> {
+    pub(crate) fn covariance(&self, columns: &[usize]) -> Vec<f64> {
         // Rows of the factor's inverse: covariance is their inner products.
         let count = self.pivots.len();
         let inverse = |column: &usize| {

@@ -31,9 +31,9 @@ const CONTEXT: usize = 4;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ThinningPlan {
     /// One of so many rows is kept.
-    pub every: usize,
+    pub(crate) every: usize,
     /// Spans of the recording, and how many of them are kept.
-    pub spans: [usize; 2],
+    pub(crate) spans: [usize; 2],
 }
 
 impl ThinningPlan {
@@ -65,19 +65,19 @@ impl ThinningPlan {
 
 /// A recording that was thinned.
 pub(super) struct ThinnedRecording {
-    pub recording: TorqueRecording,
-    pub clock: RecordingClock,
+    pub(crate) recording: TorqueRecording,
+    pub(crate) clock: RecordingClock,
     /// The recorded row of each.
-    pub origin: Vec<usize>,
+    pub(crate) origin: Vec<usize>,
     /// Rows that were made up where some were lost.
-    pub made_up: usize,
+    pub(crate) made_up: usize,
     /// Recorded rows before which clock or joints jump, and s since the row before.
-    pub tears: Vec<(usize, f64)>,
+    pub(crate) tears: Vec<(usize, f64)>,
 }
 
 impl ThinnedRecording {
     /// Reads all rows once more.
-    pub fn of(
+    pub(crate) fn of(
         source: &dyn TorqueSource,
         survey: &RecordingSurvey,
         plan: &ThinningPlan,
@@ -285,14 +285,14 @@ impl Thinner {
 /// What is known of a long recording before it is thinned.
 pub(super) struct RecordingSurvey {
     /// Median over blocks of their usual step; of each joint the largest of their steps.
-    pub pace: ClockPace,
+    pub(crate) pace: ClockPace,
     /// Hz, as it will be chosen for the recording or a little above.
-    pub cutoff: f64,
+    pub(crate) cutoff: f64,
 }
 
 impl RecordingSurvey {
     /// Reads all rows. Fails where one of them, or a column as a whole, cannot be used.
-    pub fn of(source: &dyn TorqueSource) -> Result<Self> {
+    pub(crate) fn of(source: &dyn TorqueSource) -> Result<Self> {
         let n = source.joints();
         // The row before a block, to see whether its stretch goes on.
         let mut last = TorqueRecording::of_motion(n, Vec::new(), Vec::new());

@@ -16,22 +16,26 @@ const MOST: usize = 1 << 17;
 
 /// Checked rows with their clock.
 pub(super) struct UsedRecording {
-    pub recording: TorqueRecording,
-    pub clock: RecordingClock,
+    pub(crate) recording: TorqueRecording,
+    pub(crate) clock: RecordingClock,
     /// The recorded row of each, or the one before it where it is made up.
-    pub origin: Vec<usize>,
+    pub(crate) origin: Vec<usize>,
     /// What is odd about it, a sentence each.
-    pub remarks: Vec<String>,
+    pub(crate) remarks: Vec<String>,
 }
 
 impl UsedRecording {
     /// What is used of a recording whose cut-off will be at so many Hz, or is not known yet. Fails where it cannot be used.
-    pub fn of(arm: &DynamicArm, source: &dyn TorqueSource, cutoff: Option<f64>) -> Result<Self> {
+    pub(crate) fn of(
+        arm: &DynamicArm,
+        source: &dyn TorqueSource,
+        cutoff: Option<f64>,
+    ) -> Result<Self> {
         Self::within(arm, source, cutoff, MOST)
     }
 
     /// The same with room for another number of rows.
-    pub fn within(
+    pub(crate) fn within(
         arm: &DynamicArm,
         source: &dyn TorqueSource,
         cutoff: Option<f64>,

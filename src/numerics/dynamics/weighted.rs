@@ -10,8 +10,8 @@ use std::ops::Range;
 /// Noise per joint, and which runs of judged rows are looked at.
 #[derive(Clone, Copy)]
 pub(super) struct Weighing<'a> {
-    pub noise: &'a [JointNoise],
-    pub runs: &'a [Range<usize>],
+    pub(crate) noise: &'a [JointNoise],
+    pub(crate) runs: &'a [Range<usize>],
 }
 
 impl Weighing<'_> {
@@ -23,7 +23,7 @@ impl Weighing<'_> {
     }
 
     /// A column, joint after joint.
-    pub fn column(&self, column: &TorqueColumn) -> TorqueColumn {
+    pub(crate) fn column(&self, column: &TorqueColumn) -> TorqueColumn {
         let courses = column
             .joints
             .iter()
@@ -36,7 +36,7 @@ impl Weighing<'_> {
     }
 
     /// Measured minus rigid, of all joints.
-    pub fn measured(&self, measured: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    pub(crate) fn measured(&self, measured: &[Vec<f64>]) -> Vec<Vec<f64>> {
         measured
             .iter()
             .enumerate()
@@ -47,17 +47,17 @@ impl Weighing<'_> {
 
 /// Inner products of whitened columns; those that are left out have none.
 pub(super) struct WeightedColumns {
-    pub columns: Vec<TorqueColumn>,
+    pub(crate) columns: Vec<TorqueColumn>,
     /// `[joint]`: whitened rows of measured minus rigid torque.
-    pub measured: Vec<Vec<f64>>,
+    pub(crate) measured: Vec<Vec<f64>>,
     /// Symmetric, row after row.
-    pub gram: Vec<Vec<f64>>,
+    pub(crate) gram: Vec<Vec<f64>>,
     /// With the measured torque.
-    pub right: Vec<f64>,
+    pub(crate) right: Vec<f64>,
     /// Product of the measured torque with itself.
-    pub square: f64,
+    pub(crate) square: f64,
     /// Rows of a joint.
-    pub rows: usize,
+    pub(crate) rows: usize,
 }
 
 impl WeightedColumns {
@@ -81,7 +81,11 @@ impl WeightedColumns {
     }
 
     /// The same of columns and torques that are whitened already.
-    pub fn of_white(columns: Vec<TorqueColumn>, measured: Vec<Vec<f64>>, chosen: &[usize]) -> Self {
+    pub(crate) fn of_white(
+        columns: Vec<TorqueColumn>,
+        measured: Vec<Vec<f64>>,
+        chosen: &[usize],
+    ) -> Self {
         let count = columns.len();
         let mut all = Self {
             columns,
@@ -129,7 +133,7 @@ impl WeightedColumns {
     }
 
     /// The same columns with another measured torque (whitened, `[joint]`).
-    pub fn with_measured(&self, measured: Vec<Vec<f64>>) -> Self {
+    pub(crate) fn with_measured(&self, measured: Vec<Vec<f64>>) -> Self {
         let along = |column: &TorqueColumn| {
             column
                 .joints
@@ -149,19 +153,19 @@ impl WeightedColumns {
     }
 
     /// Whether a column has inner products.
-    pub fn has(&self, column: usize) -> bool {
+    pub(crate) fn has(&self, column: usize) -> bool {
         !self.gram[column].is_empty()
     }
 
     /// Takes what coefficients explain off the measured torque; inner products stay as they were.
-    pub fn subtract(&mut self, solution: &[(usize, f64)]) {
+    pub(crate) fn subtract(&mut self, solution: &[(usize, f64)]) {
         for (column, value) in solution {
             self.columns[*column].add(-value, &mut self.measured);
         }
     }
 
     /// Takes one more column.
-    pub fn push(&mut self, column: &TorqueColumn, weighing: Weighing) {
+    pub(crate) fn push(&mut self, column: &TorqueColumn, weighing: Weighing) {
         let white = weighing.column(column);
         let product = |other: &TorqueColumn| {
             let pairs = white.joints.iter().zip(&white.courses);

@@ -23,7 +23,7 @@ impl AnchorShift {
     }
 
     /// Endings of the names of an anchor's parameters.
-    pub fn endings(shape: &Shape) -> &'static [&'static str] {
+    pub(crate) fn endings(shape: &Shape) -> &'static [&'static str] {
         match shape {
             Shape::Point => &["x", "y", "z"],
             Shape::Plane(_) => &["offset", "rx", "ry"],

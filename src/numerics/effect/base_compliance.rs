@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct TiltingBase {
+pub(crate) struct TiltingBase {
     /// Two stiffnesses instead of one.
     two: bool,
     /// How far the point about which it tilts is below the base origin, m: pedestals and floors yield underneath.

@@ -21,7 +21,7 @@ impl BasePlacement {
     }
 
     /// The base pose after corrections `p` (m, rad).
-    pub fn pose(&self, p: &[f64]) -> Pose {
+    pub(crate) fn pose(&self, p: &[f64]) -> Pose {
         let mut twist = Twist::zeros();
         for (parameter, value) in p.iter().enumerate() {
             twist += self.direction(parameter) * *value;

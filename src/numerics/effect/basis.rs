@@ -114,7 +114,7 @@ impl Basis {
     }
 
     /// Whether it is a free curve.
-    pub fn is_curve(&self) -> bool {
+    pub(crate) fn is_curve(&self) -> bool {
         matches!(self, Self::Cosines { .. } | Self::Series { .. })
     }
 

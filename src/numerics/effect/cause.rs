@@ -47,11 +47,11 @@ pub struct Cause {
 #[derive(Debug)]
 pub struct OwnMotion {
     /// Every hypothesis that a recording can speak of.
-    pub propose: fn(&Survey) -> Vec<Hypothesis>,
+    pub(crate) propose: fn(&Survey) -> Vec<Hypothesis>,
     /// What a mechanic is told of a finding; `None`: what the row says.
-    pub sentence: Option<fn(&Summary) -> String>,
+    pub(crate) sentence: Option<fn(&Summary) -> String>,
     /// Reads its forms as [`Placed::body`](super::Placed::body) wrote them.
-    pub read: fn(&serde_json::Value) -> serde_json::Result<Form>,
+    pub(crate) read: fn(&serde_json::Value) -> serde_json::Result<Form>,
 }
 
 /// The effect of the whole arm in a setting.

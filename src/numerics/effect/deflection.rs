@@ -26,19 +26,19 @@ pub enum Direction {
 #[derive(Debug, Clone)]
 pub struct Deflection {
     /// Extra travel of each joint, rad or m.
-    pub joint: Vec<f64>,
+    pub(crate) joint: Vec<f64>,
     /// Twist at each station 0..=n.
-    pub station: Vec<Twist>,
+    pub(crate) station: Vec<Twist>,
     /// How far the row's anchor is from where it was believed, tracker frame, m.
-    pub anchor: Vector3<f64>,
+    pub(crate) anchor: Vector3<f64>,
     /// What the normal of the row's plane has across the one that was believed.
-    pub anchor_tilt: Vector3<f64>,
+    pub(crate) anchor_tilt: Vector3<f64>,
     /// How much larger the radius of the row's sphere is than was believed, m.
-    pub anchor_growth: f64,
+    pub(crate) anchor_growth: f64,
     /// How far the point is read from where it is, tracker frame, m.
-    pub reading: Vector3<f64>,
+    pub(crate) reading: Vector3<f64>,
     /// How far each joint yields to a torque more, rad/Nm.
-    pub compliance: Vec<f64>,
+    pub(crate) compliance: Vec<f64>,
     /// (parameter of the stack, direction); a parameter may appear several times.
     pub partials: Vec<(usize, Direction)>,
     /// Whether no partials are kept, where only the motions are wanted.
@@ -50,7 +50,7 @@ pub struct Deflection {
 /// What a form may be off beyond the rows that it was fitted to: groups of motions, each group with a factor of one standard deviation.
 pub struct BeyondRange {
     /// Their directions, by the parameters of the form.
-    pub motions: Deflection,
+    pub(crate) motions: Deflection,
     ends: Vec<(usize, f64)>,
 }
 
@@ -68,7 +68,7 @@ impl BeyondRange {
     }
 
     /// Ends a group: what was moved since the one before is off together, by `factor` times its size.
-    pub fn close(&mut self, factor: f64) {
+    pub(crate) fn close(&mut self, factor: f64) {
         self.ends.push((self.motions.partials.len(), factor));
     }
 
@@ -152,7 +152,7 @@ impl Deflection {
     }
 
     /// Says that a joint yields to a torque more by `compliance` (rad/Nm).
-    pub fn yields(&mut self, joint: usize, compliance: f64) {
+    pub(crate) fn yields(&mut self, joint: usize, compliance: f64) {
         self.compliance[joint] += compliance;
     }
 
@@ -163,13 +163,13 @@ impl Deflection {
     }
 
     /// Moves the row's anchor by `p[parameter] * rate` (m per unit); no effect that needs torques does.
-    pub fn move_anchor(&mut self, parameter: usize, p: &[f64], rate: Vector3<f64>) {
+    pub(crate) fn move_anchor(&mut self, parameter: usize, p: &[f64], rate: Vector3<f64>) {
         self.anchor += rate * p[parameter];
         self.partial(parameter, Direction::Anchor(rate));
     }
 
     /// Tilts the row's plane by `p[first]` and `p[first + 1]` (rad) along `across`, from the unit normal that was believed.
-    pub fn tilt_anchor(
+    pub(crate) fn tilt_anchor(
         &mut self,
         first: usize,
         p: &[f64],
@@ -188,13 +188,13 @@ impl Deflection {
     }
 
     /// Makes the radius of the row's sphere larger by `p[parameter]`, m.
-    pub fn grow_anchor(&mut self, parameter: usize, p: &[f64]) {
+    pub(crate) fn grow_anchor(&mut self, parameter: usize, p: &[f64]) {
         self.anchor_growth += p[parameter];
         self.partial(parameter, Direction::AnchorGrowth(1.0));
     }
 
     /// Moves what the instrument reads by `p[parameter] * rate` (m per unit).
-    pub fn misread(&mut self, parameter: usize, p: &[f64], rate: Vector3<f64>) {
+    pub(crate) fn misread(&mut self, parameter: usize, p: &[f64], rate: Vector3<f64>) {
         self.reading += rate * p[parameter];
         self.partial(parameter, Direction::Instrument(rate));
     }
@@ -210,7 +210,7 @@ impl Deflection {
     }
 
     /// Says that a unit of the parameter loads a joint with `rate` Nm more; the load itself is a correction of the load.
-    pub fn load(&mut self, parameter: usize, joint: usize, rate: f64) {
+    pub(crate) fn load(&mut self, parameter: usize, joint: usize, rate: f64) {
         self.partial(parameter, Direction::Torque(joint, rate));
     }
 }

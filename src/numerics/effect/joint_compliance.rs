@@ -83,7 +83,7 @@ fn sentence(summary: &Summary) -> String {
 
 /// The wind-up of one joint.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Windup {
+pub(crate) struct Windup {
     load: Load,
     /// From 0.
     joint: usize,

@@ -15,7 +15,7 @@ use std::f64::consts::FRAC_PI_2;
 /// What is added to the proportional part.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum HardeningLaw {
+pub(crate) enum HardeningLaw {
     /// tau / (1 + |tau| / at): a gear that stiffens.
     Saturating { at_nm: f64 },
     /// at tanh(tau / at): a soft zone around no load.
@@ -29,7 +29,7 @@ pub enum HardeningLaw {
 }
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct BentWindup {
+pub(crate) struct BentWindup {
     joint: usize,
     law: HardeningLaw,
 }

@@ -25,7 +25,7 @@ enum Behind {
 }
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Lag {
+pub(crate) struct Lag {
     /// Whether each joint lags by a share of its own; else all by one.
     each: bool,
     #[serde(default)]

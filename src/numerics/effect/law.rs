@@ -17,7 +17,7 @@ pub struct Factor {
     /// What the fitted rows have of the variable (SI): curves hold their values at its ends, other functions half of it beyond. None while
     /// the law is sought.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub within: Option<[f64; 2]>,
+    pub(crate) within: Option<[f64; 2]>,
 }
 
 impl PartialEq for Factor {
@@ -162,7 +162,7 @@ impl Law {
     }
 
     /// With another first variable.
-    pub fn by(self, of: Variable) -> Self {
+    pub(crate) fn by(self, of: Variable) -> Self {
         Self {
             first: Factor::new(of, self.first.basis),
             ..self

@@ -44,11 +44,11 @@ pub struct LawRow {
 #[derive(Debug, Clone, Copy)]
 pub struct Limit {
     /// SI.
-    pub most: f64,
+    pub(crate) most: f64,
     /// Of what more is not possible.
-    pub of: &'static str,
+    pub(crate) of: &'static str,
     /// Why a number below zero is not possible; `None` where it is.
-    pub negative: Option<&'static str>,
+    pub(crate) negative: Option<&'static str>,
 }
 
 /// Where laws act.

@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 /// Which moments bend the link.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Bending {
+pub(crate) enum Bending {
     /// Those across the link, at its middle: a joint within it.
     AcrossLink,
     /// Those across the link at each of its places: a beam that does not twist.
@@ -30,7 +30,7 @@ pub enum Bending {
 }
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct BentLink {
+pub(crate) struct BentLink {
     /// From 0.
     link: usize,
     bending: Bending,

@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct WrongLinkMass {
+pub(crate) struct WrongLinkMass {
     /// From 0.
     link: usize,
     /// Whether the centre is wrong too.

@@ -103,9 +103,9 @@ pub struct ArmState<'a> {
     data: &'a Measurements,
     row: usize,
     /// Commanded joint positions, rad or m.
-    pub q: &'a [f64],
+    pub(crate) q: &'a [f64],
     /// Where the arm really hangs and what it carries; at rest at the zero pose unless an effect of the stack asks for it.
-    pub posture: &'a Posture,
+    pub(crate) posture: &'a Posture,
     /// Where the target is, tracker frame, m; the origin unless the effect asks for it.
     point: Vector3<f64>,
 }
@@ -127,17 +127,17 @@ impl<'a> ArmState<'a> {
     }
 
     /// The target as the instrument sees it.
-    pub fn sight(&self) -> Sight {
+    pub(crate) fn sight(&self) -> Sight {
         Sight::of(&self.point)
     }
 
     /// What of the rows before this one remembers.
-    pub fn memory(&self, memory: Memory) -> f64 {
+    pub(crate) fn memory(&self, memory: Memory) -> f64 {
         self.data.memory(memory, self.row)
     }
 
     /// Load torque about each joint, Nm.
-    pub fn torque(&self) -> &'a [f64] {
+    pub(crate) fn torque(&self) -> &'a [f64] {
         &self.posture.torque
     }
 
@@ -170,12 +170,12 @@ impl<'a> ArmState<'a> {
     }
 
     /// A recorded circumstance, of a joint or of the whole row, SI.
-    pub fn circumstance(&self, column: &str, joint: Option<usize>) -> Option<f64> {
+    pub(crate) fn circumstance(&self, column: &str, joint: Option<usize>) -> Option<f64> {
         self.data.circumstance(column, self.row, joint)
     }
 
     /// Declared payload, kg.
-    pub fn payload(&self) -> f64 {
+    pub(crate) fn payload(&self) -> f64 {
         self.data.payload[self.row]
     }
 
@@ -190,7 +190,7 @@ impl<'a> ArmState<'a> {
     }
 
     /// The largest of the moves of all joints that turn from the stop before, rad.
-    pub fn largest_turn(&self, robot: &RobotModel) -> f64 {
+    pub(crate) fn largest_turn(&self, robot: &RobotModel) -> f64 {
         let turns = (0..robot.joints()).filter(|joint| robot.is_revolute(*joint));
         turns
             .map(|joint| self.last_move(joint).abs())
@@ -252,7 +252,7 @@ pub enum Load {
 
 impl Load {
     /// The unit of a joint's compliance to this load.
-    pub fn unit_of_compliance(self) -> Unit {
+    pub(crate) fn unit_of_compliance(self) -> Unit {
         match self {
             Self::GravityTorque => Unit::RadianPerNewtonMetre,
             Self::MotorCurrent => Unit::RadianPerAmpere,

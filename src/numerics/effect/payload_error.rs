@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct WrongPayload {
+pub(crate) struct WrongPayload {
     /// Whether the centre is wrong too.
     centre: bool,
     /// Whether it is a mass at the tool that every row carries, beside the declared payload.

@@ -61,11 +61,11 @@ impl PlacementBuffers {
 /// What follows from a station's summed twist. Kept until the twist changes: most are the same in every row.
 #[derive(Clone)]
 pub(super) struct Station {
-    pub twist: Twist,
+    pub(crate) twist: Twist,
     /// Whether nothing moves here: most stations of most models.
-    pub still: bool,
-    pub motion: Pose,
-    pub jacobian: Matrix6<f64>,
+    pub(crate) still: bool,
+    pub(crate) motion: Pose,
+    pub(crate) jacobian: Matrix6<f64>,
 }
 
 impl Station {
@@ -87,18 +87,18 @@ pub struct PlacedRow<'a> {
     pub(super) robot: &'a RobotModel,
     pub(super) scratch: &'a mut PlacementBuffers,
     /// The target's point, m.
-    pub point: Vector3<f64>,
+    pub(crate) point: Vector3<f64>,
 }
 
 impl PlacedRow<'_> {
     /// The target's orientation.
-    pub fn orientation(&self) -> Matrix3<f64> {
+    pub(crate) fn orientation(&self) -> Matrix3<f64> {
         self.scratch.posture.behind[self.robot.joints()].rotation
             * self.robot.mounting(self.scratch.target).rotation
     }
 
     /// From where an anchor is to the point, m. `None` where the robot knows no such anchor.
-    pub fn from_anchor(&self, anchor: &str) -> Option<Vector3<f64>> {
+    pub(crate) fn from_anchor(&self, anchor: &str) -> Option<Vector3<f64>> {
         let setup = self.robot.setup();
         let anchor = setup.anchors.get(setup.anchor(anchor)?)?;
         let Deflection {
@@ -111,7 +111,7 @@ impl PlacedRow<'_> {
     }
 
     /// What an anchor is, corrections included. `None` where the robot knows no such anchor.
-    pub fn anchor_shape(&self, anchor: &str) -> Option<Shape> {
+    pub(crate) fn anchor_shape(&self, anchor: &str) -> Option<Shape> {
         let setup = self.robot.setup();
         let deflection = &self.scratch.deflection;
         Some(match setup.anchors.get(setup.anchor(anchor)?)?.shape {
@@ -134,7 +134,7 @@ impl PlacedRow<'_> {
     }
 
     /// Derivatives of the point, m.
-    pub fn partials(&mut self, mut emit: impl FnMut(usize, Vector3<f64>)) {
+    pub(crate) fn partials(&mut self, mut emit: impl FnMut(usize, Vector3<f64>)) {
         self.scratch.velocities(self.robot, &self.point);
         let PlacementBuffers {
             deflection,
@@ -151,7 +151,7 @@ impl PlacedRow<'_> {
     }
 
     /// Derivatives of the orientation as small rotations about the tracker's axes, rad.
-    pub fn rotations(&self, mut emit: impl FnMut(usize, Vector3<f64>)) {
+    pub(crate) fn rotations(&self, mut emit: impl FnMut(usize, Vector3<f64>)) {
         let deflection = &self.scratch.deflection;
         let turns = self.scratch.turns(self.robot);
         for (parameter, direction) in &deflection.partials {
@@ -163,7 +163,7 @@ impl PlacedRow<'_> {
 
     /// Derivatives of the vector from the row's anchor to the point (m), which is `reach`: as seen from a plane that tilts, from the
     /// surface of a sphere that grows.
-    pub fn partials_from_anchor(
+    pub(crate) fn partials_from_anchor(
         &mut self,
         reach: &Vector3<f64>,
         mut emit: impl FnMut(usize, Vector3<f64>),

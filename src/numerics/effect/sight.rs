@@ -22,11 +22,11 @@ pub enum Polar {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sight {
     /// rad.
-    pub azimuth: f64,
+    pub(crate) azimuth: f64,
     /// rad.
-    pub elevation: f64,
+    pub(crate) elevation: f64,
     /// m.
-    pub range: f64,
+    pub(crate) range: f64,
 }
 
 impl Sight {
@@ -41,7 +41,7 @@ impl Sight {
     }
 
     /// By how much the point moves (m) where a reading grows by 1 (rad, m).
-    pub fn moved(&self, of: Polar) -> Vector3<f64> {
+    pub(crate) fn moved(&self, of: Polar) -> Vector3<f64> {
         let ((sa, ca), (se, ce)) = (libm::sincos(self.azimuth), libm::sincos(self.elevation));
         match of {
             Polar::Azimuth => Vector3::new(-sa, ca, 0.0) * (self.range * ce),

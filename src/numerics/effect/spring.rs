@@ -113,7 +113,7 @@ impl Spring {
     }
 
     /// Whether a joint (from 0) is one that balancers sit on.
-    pub fn balances(joint: usize) -> bool {
+    pub(crate) fn balances(joint: usize) -> bool {
         (1..=2).contains(&joint)
     }
 

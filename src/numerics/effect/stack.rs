@@ -369,7 +369,7 @@ impl EffectStack {
 pub struct PointMotion {
     row: usize,
     /// Predicted point, tracker frame, m.
-    pub point: Vector3<f64>,
+    pub(crate) point: Vector3<f64>,
     /// Joints and loads as they really are.
     pub posture: Posture,
     /// rad/Nm.
@@ -417,7 +417,7 @@ impl PointMotion {
     }
 
     /// Derivative of the point as the tracker reads it, m per unit of a parameter that acts there.
-    pub fn point_along(&self, direction: &Direction) -> Vector3<f64> {
+    pub(crate) fn point_along(&self, direction: &Direction) -> Vector3<f64> {
         along(
             direction,
             &self.by_joint,
@@ -427,7 +427,11 @@ impl PointMotion {
     }
 
     /// Derivative of the vector from the row's anchor to the point, which is `reach`, m per unit.
-    pub fn from_anchor_along(&self, direction: &Direction, reach: &Vector3<f64>) -> Vector3<f64> {
+    pub(crate) fn from_anchor_along(
+        &self,
+        direction: &Direction,
+        reach: &Vector3<f64>,
+    ) -> Vector3<f64> {
         from_anchor(
             direction,
             reach,
@@ -438,7 +442,7 @@ impl PointMotion {
     }
 
     /// Rotation of the target about the tracker's axes, rad per unit; zero where turns were not asked for.
-    pub fn turn_along(&self, direction: &Direction) -> Vector3<f64> {
+    pub(crate) fn turn_along(&self, direction: &Direction) -> Vector3<f64> {
         let turns = self.turns.as_ref();
         turns
             .and_then(|turns| turns.along(direction, &self.compliance))

@@ -15,15 +15,15 @@ pub struct Survey<'a> {
     /// Load torque (Nm) of every fitted row and joint, row-major.
     pub torque: &'a [f64],
     /// How far each joint yields under load in the present model, rad/Nm.
-    pub compliance: &'a [f64],
+    pub(crate) compliance: &'a [f64],
     /// Lowest and highest position of each joint, rad or m.
     pub range: Vec<[f64; 2]>,
     /// Times (s) between neighbouring fitted rows, ascending, ends left out.
     pub boundaries: Vec<f64>,
     /// First and last time of fitted rows, s.
-    pub time: [f64; 2],
+    pub(crate) time: [f64; 2],
     /// First temperature, C, where recorded.
-    pub reference_c: Option<f64>,
+    pub(crate) reference_c: Option<f64>,
     /// First and last boundary about the only change of the payload, s; none where it does not change or changes more often.
     payload_change: Option<[f64; 2]>,
 }
@@ -83,12 +83,12 @@ impl<'a> Survey<'a> {
     }
 
     /// Whether the payload changes once, so that what follows it may as well have moved then.
-    pub fn payload_changes_once(&self) -> bool {
+    pub(crate) fn payload_changes_once(&self) -> bool {
         self.payload_change.is_some()
     }
 
     /// Whether what steps at a time may as well follow the payload, which changes once, and about then.
-    pub fn is_payload_change(&self, time: f64) -> bool {
+    pub(crate) fn is_payload_change(&self, time: f64) -> bool {
         self.payload_change
             .is_some_and(|[first, last]| (first..=last).contains(&time))
     }
@@ -114,7 +114,7 @@ impl<'a> Survey<'a> {
     }
 
     /// Load torques of a joint, Nm.
-    pub fn torques(&self, joint: usize) -> impl Iterator<Item = f64> + '_ {
+    pub(crate) fn torques(&self, joint: usize) -> impl Iterator<Item = f64> + '_ {
         self.torque
             .iter()
             .skip(joint)
@@ -123,14 +123,14 @@ impl<'a> Survey<'a> {
     }
 
     /// Largest load torque of a joint, Nm.
-    pub fn load(&self, joint: usize) -> f64 {
+    pub(crate) fn load(&self, joint: usize) -> f64 {
         self.torques(joint)
             .fold(0.0, |most, torque| most.max(torque.abs()))
     }
 
     /// Largest load torque (Nm) of a joint that the recording holds: by the present model, and no more than robot file and stated payloads
     /// make, since a load that a model itself makes up is not recorded.
-    pub fn recorded_load(&self, joint: usize) -> f64 {
+    pub(crate) fn recorded_load(&self, joint: usize) -> f64 {
         let stated = |row: &usize| {
             Posture::as_stated(self.robot, self.data.q(*row), self.data.payload[*row]).torque[joint]
                 .abs()
@@ -143,7 +143,7 @@ impl<'a> Survey<'a> {
     }
 
     /// From the first fitted row to the last, s.
-    pub fn length(&self) -> f64 {
+    pub(crate) fn length(&self) -> f64 {
         self.time[1] - self.time[0]
     }
 
@@ -170,7 +170,7 @@ impl<'a> Survey<'a> {
     }
 
     /// The change points around one.
-    pub fn changes_near(&self, time: f64) -> &[f64] {
+    pub(crate) fn changes_near(&self, time: f64) -> &[f64] {
         near(&self.boundaries, time)
     }
 
@@ -256,7 +256,7 @@ impl Hypothesis {
     }
 
     /// With coefficients that must be positive.
-    pub fn positive(self) -> Self {
+    pub(crate) fn positive(self) -> Self {
         Self {
             positive: true,
             ..self
@@ -264,12 +264,12 @@ impl Hypothesis {
     }
 
     /// With coefficients up to `largest`, SI.
-    pub fn within(self, largest: f64) -> Self {
+    pub(crate) fn within(self, largest: f64) -> Self {
         Self { largest, ..self }
     }
 
     /// Less likely beside the other shapes of its cell, -2 ln of the odds.
-    pub fn penalised(self, prior_penalty: f64) -> Self {
+    pub(crate) fn penalised(self, prior_penalty: f64) -> Self {
         Self {
             prior_penalty: self.prior_penalty + prior_penalty,
             ..self

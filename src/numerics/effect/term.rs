@@ -58,7 +58,7 @@ impl Term {
     }
 
     /// The same with other bases of its first variable.
-    pub fn with_bases(&self, bases: impl IntoIterator<Item = Basis>) -> Vec<Self> {
+    pub(crate) fn with_bases(&self, bases: impl IntoIterator<Item = Basis>) -> Vec<Self> {
         bases
             .into_iter()
             .map(|basis| self.with(self.law.with(basis)))
@@ -80,13 +80,13 @@ impl Term {
     }
 
     /// Whether a joint follows a free curve of its own angle: nearly geometry, or another law of that angle, in its slow part.
-    pub fn is_own_curve(&self) -> bool {
+    pub(crate) fn is_own_curve(&self) -> bool {
         let own = |(joint, of)| of == Variable::Angle { joint };
         self.basis().is_curve() && self.of_one().is_some_and(own)
     }
 
     /// The angles of which it is a function, where they are two.
-    pub fn two_angles(&self) -> Option<[usize; 2]> {
+    pub(crate) fn two_angles(&self) -> Option<[usize; 2]> {
         match (self.law.first.of, self.law.times?.of) {
             (Variable::Angle { joint: a }, Variable::Angle { joint: b }) => Some([a, b]),
             _ => None,

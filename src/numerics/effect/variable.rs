@@ -129,7 +129,7 @@ pub enum Variable {
 
 impl Variable {
     /// The column of the table of causes to which it belongs, of something at a place.
-    pub fn kind(self, place: Place) -> &'static str {
+    pub(crate) fn kind(self, place: Place) -> &'static str {
         match self {
             Self::Angle { joint } | Self::Motor { joint } => match place {
                 Place::Joint(own) | Place::Links(own, _) if own == joint => "own angle",
@@ -267,7 +267,7 @@ impl Variable {
     }
 
     /// Whether no target states it: it follows from the moves before, or is a circumstance that targets have no column for.
-    pub fn is_no_targets(self) -> bool {
+    pub(crate) fn is_no_targets(self) -> bool {
         let by_moves = matches!(
             self,
             Self::Move { .. } | Self::Stretch { .. } | Self::Recent { .. } | Self::Work { .. }

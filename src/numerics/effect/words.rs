@@ -69,7 +69,7 @@ impl Clock {
 
     /// When something changed for good: ` at 447 s`, of a clock that counts since an epoch after the first row, or the first row (from 1)
     /// after it.
-    pub fn since(self, time: f64) -> String {
+    pub(crate) fn since(self, time: f64) -> String {
         match self {
             Self::Seconds { first } if first.abs() > EPOCH => {
                 format!(" {} s after the first row", figure(time - first, 0))
@@ -80,7 +80,7 @@ impl Clock {
     }
 
     /// A length of time.
-    pub fn span(self, length: f64) -> String {
+    pub(crate) fn span(self, length: f64) -> String {
         match self {
             Self::Seconds { .. } => format!("{} s", figure(length, 0)),
             Self::Rows => format!("{} rows", figure(length, 0)),

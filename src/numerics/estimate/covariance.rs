@@ -91,7 +91,7 @@ impl Covariance {
     }
 
     /// Covariance (m2) of a point with these derivatives (m per unit) by [`Covariance::parameters`].
-    pub fn of_point(&self, jacobian: &[Vector3<f64>]) -> Matrix3<f64> {
+    pub(crate) fn of_point(&self, jacobian: &[Vector3<f64>]) -> Matrix3<f64> {
         let along = |k: usize| -> Vector3<f64> {
             self.root
                 .column(k)

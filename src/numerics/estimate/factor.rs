@@ -9,7 +9,7 @@ use faer::{Mat, Par};
 
 /// Upper triangular factor R of the rows `[J | r]`: its last column is Q^T r, so R alone states the least-squares problem.
 #[derive(Debug, Clone)]
-pub struct TriangularFactor {
+pub(crate) struct TriangularFactor {
     /// (p + 1) x (p + 1).
     r: Triangle,
 }
@@ -44,7 +44,7 @@ impl StackedRows {
     }
 
     /// The columns of the next chunk of `height` rows; all zero.
-    pub fn chunk(&mut self, height: usize) -> Vec<&mut [f64]> {
+    pub(crate) fn chunk(&mut self, height: usize) -> Vec<&mut [f64]> {
         let top = self.top;
         let columns = self.rows.col_iter_mut().map(|column| {
             let column = column.try_as_col_major_mut().expect("stored by column");
@@ -54,7 +54,7 @@ impl StackedRows {
     }
 
     /// Takes the `height` rows written to [`Tall::chunk`] into the factor.
-    pub fn absorb(&mut self, height: usize) {
+    pub(crate) fn absorb(&mut self, height: usize) {
         let (used, columns) = (self.top + height, self.rows.ncols());
         let reflectors = self.reflectors.as_mut().subcols_mut(0, columns.min(used));
         let rows = self.rows.as_mut().subrows_mut(0, used);
@@ -74,7 +74,7 @@ impl StackedRows {
     }
 
     /// The factor of all chunks.
-    pub fn factor(&self) -> TriangularFactor {
+    pub(crate) fn factor(&self) -> TriangularFactor {
         TriangularFactor {
             r: Triangle::from_fn(self.rows.ncols(), |i, j| {
                 if i < self.top {
@@ -113,7 +113,7 @@ impl TriangularFactor {
     }
 
     /// The factor of both sets of rows together.
-    pub fn stack(&self, other: &TriangularFactor) -> Self {
+    pub(crate) fn stack(&self, other: &TriangularFactor) -> Self {
         let columns = self.r.size();
         Self::of_columns(
             columns,
@@ -122,7 +122,7 @@ impl TriangularFactor {
     }
 
     /// The factor of the problem in some of the parameters only.
-    pub fn select(&self, parameters: &[usize]) -> Self {
+    pub(crate) fn select(&self, parameters: &[usize]) -> Self {
         let p = self.parameters();
         if parameters.iter().copied().eq(0..p) {
             return self.clone();
@@ -132,7 +132,7 @@ impl TriangularFactor {
     }
 
     /// The problem that is left in the parameters without an entry when the others take the given steps.
-    pub fn given(&self, steps: &[Option<f64>]) -> Self {
+    pub(crate) fn given(&self, steps: &[Option<f64>]) -> Self {
         let p = self.parameters();
         if steps.iter().all(Option::is_none) {
             return self.clone();
@@ -151,14 +151,14 @@ impl TriangularFactor {
     }
 
     /// The factor of the same rows, all multiplied by `weight`.
-    pub fn weighted(self, weight: f64) -> Self {
+    pub(crate) fn weighted(self, weight: f64) -> Self {
         Self {
             r: self.r.scaled(weight),
         }
     }
 
     /// The same problem with `pull` beside J^T r: the downhill gradient of what is no sum of squares. Nothing where a column is nought.
-    pub fn pulled(self, pull: &[f64]) -> Self {
+    pub(crate) fn pulled(self, pull: &[f64]) -> Self {
         if pull.iter().all(|value| *value == 0.0) {
             return self;
         }
@@ -191,7 +191,7 @@ impl TriangularFactor {
     }
 
     /// Column `j` of R down to the diagonal.
-    pub fn column(&self, j: usize) -> &[f64] {
+    pub(crate) fn column(&self, j: usize) -> &[f64] {
         self.r.column(j)
     }
 
@@ -202,7 +202,7 @@ impl TriangularFactor {
     }
 
     /// Norm of column j of the Jacobian.
-    pub fn column_norm(&self, j: usize) -> f64 {
+    pub(crate) fn column_norm(&self, j: usize) -> f64 {
         dot(self.r.column(j), self.r.column(j)).sqrt()
     }
 
@@ -214,7 +214,7 @@ impl TriangularFactor {
     }
 
     /// The step of least |J dx - r|^2 + damping |D dx|^2, D the column norms (Marquardt's scaling). `None` if singular.
-    pub fn solve(&self, damping: f64) -> Option<Vec<f64>> {
+    pub(crate) fn solve(&self, damping: f64) -> Option<Vec<f64>> {
         let p = self.parameters();
         let mut scale: Vec<f64> = (0..p).map(|j| self.column_norm(j)).collect();
         if scale.iter().any(|norm| *norm <= 0.0 || !norm.is_finite()) {
@@ -248,7 +248,7 @@ impl TriangularFactor {
     }
 
     /// Singular values of J with columns scaled by `scale`, largest first.
-    pub fn singular_values(&self, scale: &[f64]) -> Vec<f64> {
+    pub(crate) fn singular_values(&self, scale: &[f64]) -> Vec<f64> {
         let p = self.parameters();
         if p == 0 {
             return Vec::new();

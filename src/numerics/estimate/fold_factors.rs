@@ -96,7 +96,7 @@ impl<'a> NearbyFits<'a> {
     }
 
     /// Errors of the rows of each part under a fit to the others; none where that is farther than a small step.
-    pub fn alone(&self) -> Option<Vec<Option<Vec<f64>>>> {
+    pub(crate) fn alone(&self) -> Option<Vec<Option<Vec<f64>>>> {
         self.with(&vec![None; self.columns.len()])
     }
 

@@ -8,15 +8,15 @@ use nalgebra::Vector3;
 /// What a known length says of a model, in standard deviations.
 pub(crate) struct LengthTerm {
     /// Known - of the model.
-    pub error: f64,
+    pub(crate) error: f64,
     /// Derivatives of the model's by parameters of the stack.
-    pub rates: Vec<(usize, f64)>,
+    pub(crate) rates: Vec<(usize, f64)>,
 }
 
 /// An anchor as the model has it.
 pub(super) struct StandingAnchor<'a> {
-    pub place: Vector3<f64>,
-    pub shape: Shape,
+    pub(crate) place: Vector3<f64>,
+    pub(crate) shape: Shape,
     anchor: &'a Anchor,
     /// Its first parameter in the stack.
     first: usize,
@@ -25,7 +25,7 @@ pub(super) struct StandingAnchor<'a> {
 
 impl Model {
     /// The model's own value of a known length, m; `None` where nothing places the anchors.
-    pub fn length(&self, known: &KnownLength) -> Option<f64> {
+    pub(crate) fn length(&self, known: &KnownLength) -> Option<f64> {
         let [from, to] = [
             self.standing_anchor(known.between[0])?,
             self.standing_anchor(known.between[1])?,

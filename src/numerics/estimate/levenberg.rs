@@ -62,9 +62,9 @@ pub(crate) const FINE: Effort = Effort {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Effort {
     /// Most accepted steps.
-    pub limit: usize,
+    pub(crate) limit: usize,
     /// Steps that move the whitened predictions by less than this end it, sigmas.
-    pub tolerance: f64,
+    pub(crate) tolerance: f64,
 }
 
 /// Minimises the problem in the `free` parameters, from and into `model.x`; `now` is the problem there.

@@ -93,7 +93,7 @@ fn length(values: &[f64]) -> f64 {
 }
 
 /// Condition and observability indices of singular values (largest first) from `rows` measured points.
-pub fn indices(singular: &[f64], rows: usize) -> Vec<(&'static str, f64, &'static str)> {
+pub(crate) fn indices(singular: &[f64], rows: usize) -> Vec<(&'static str, f64, &'static str)> {
     let (Some(first), Some(last)) = (singular.first(), singular.last()) else {
         return Vec::new();
     };

@@ -19,38 +19,38 @@ const CHUNK: usize = 256;
 
 /// What is fitted to what: residual rows (measured - predicted) / sigma with Huber's weights.
 pub(crate) struct Problem<'a> {
-    pub data: &'a Measurements,
+    pub(crate) data: &'a Measurements,
     /// Rows of the recording to fit.
-    pub rows: &'a [usize],
+    pub(crate) rows: &'a [usize],
     /// Standard deviations added to the instrument's: what the model does not explain.
-    pub excess: ExcessSigma,
+    pub(crate) excess: ExcessSigma,
 }
 
 /// The state of a problem at some parameters.
 pub(crate) struct Evaluation {
     /// Measured - predicted, in the order of the problem's rows; of a row in the order of kinds.
-    pub residuals: Vec<Residual>,
+    pub(crate) residuals: Vec<Residual>,
     /// Sum of Huber's losses, of the priors' and of known lengths', dimensionless.
-    pub cost: f64,
+    pub(crate) cost: f64,
     /// Sum over contacts of the logarithm of the volume that joint noise is spread over, and its derivatives by the
     /// parameters.
-    pub volume: f64,
-    pub pull: Vec<f64>,
+    pub(crate) volume: f64,
+    pub(crate) pull: Vec<f64>,
     /// Root mean square of the residual length of points, or of another length where no point was measured, m.
-    pub rms: f64,
-    pub factor: TriangularFactor,
+    pub(crate) rms: f64,
+    pub(crate) factor: TriangularFactor,
 }
 
 impl Evaluation {
     /// What is minimised: the cost less the volume, minus the logarithm of the likelihood but for constants.
-    pub fn objective(&self) -> f64 {
+    pub(crate) fn objective(&self) -> f64 {
         self.cost - self.volume
     }
 }
 
 impl Problem<'_> {
     /// Length in standard deviations and number of axes of every residual.
-    pub fn errors(&self, residuals: &[Residual]) -> Vec<(f64, usize)> {
+    pub(crate) fn errors(&self, residuals: &[Residual]) -> Vec<(f64, usize)> {
         let length = |residual: &Residual| {
             residual
                 .whitened(self.data, self.excess.of(residual.dimension()))
@@ -63,7 +63,7 @@ impl Problem<'_> {
     }
 
     /// The problem at the model's parameters, linearised in the `free` ones, with what is known of them beforehand.
-    pub fn evaluate(&self, model: &Model, free: &[usize]) -> Evaluation {
+    pub(crate) fn evaluate(&self, model: &Model, free: &[usize]) -> Evaluation {
         let data = self.observe(model, free);
         let (factor, cost) = model.with_priors(free, data.factor);
         Evaluation {
@@ -74,7 +74,7 @@ impl Problem<'_> {
     }
 
     /// The same from the data alone.
-    pub fn observe(&self, model: &Model, free: &[usize]) -> Evaluation {
+    pub(crate) fn observe(&self, model: &Model, free: &[usize]) -> Evaluation {
         let mut column = vec![None; model.stack.specs().len()];
         for (j, parameter) in free.iter().enumerate() {
             column[*parameter] = Some(j);
@@ -215,8 +215,8 @@ pub(crate) const HUBER: f64 = 3.5;
 /// Weighted residual and derivatives of one kind in one row.
 pub(crate) struct ObservationTerm {
     /// Measured - predicted in standard deviations.
-    pub error: Vector3<f64>,
-    pub axes: usize,
+    pub(crate) error: Vector3<f64>,
+    pub(crate) axes: usize,
     sensitivity: Sensitivity,
 }
 
@@ -244,7 +244,7 @@ impl ObservationTerm {
     }
 
     /// Root of Huber's weight: the share by which errors and derivatives count.
-    pub fn share(&self) -> f64 {
+    pub(crate) fn share(&self) -> f64 {
         share(self.error.norm(), self.axes)
     }
 

@@ -10,7 +10,7 @@ pub(crate) struct Triangle {
 
 impl Triangle {
     /// `entry(i, j)` for `i <= j < size`.
-    pub fn from_fn(size: usize, mut entry: impl FnMut(usize, usize) -> f64) -> Self {
+    pub(crate) fn from_fn(size: usize, mut entry: impl FnMut(usize, usize) -> f64) -> Self {
         let mut values = Vec::with_capacity(size * (size + 1) / 2);
         for j in 0..size {
             for i in 0..=j {
@@ -20,12 +20,12 @@ impl Triangle {
         Self { size, values }
     }
 
-    pub fn size(&self) -> usize {
+    pub(crate) fn size(&self) -> usize {
         self.size
     }
 
     /// Column `j` down to the diagonal.
-    pub fn column(&self, j: usize) -> &[f64] {
+    pub(crate) fn column(&self, j: usize) -> &[f64] {
         let first = j * (j + 1) / 2;
         &self.values[first..=first + j]
     }
@@ -38,7 +38,7 @@ impl Triangle {
         }
     }
 
-    pub fn scaled(mut self, by: f64) -> Self {
+    pub(crate) fn scaled(mut self, by: f64) -> Self {
         for value in &mut self.values {
             *value *= by;
         }
@@ -46,7 +46,7 @@ impl Triangle {
     }
 
     /// The first `size` rows and columns.
-    pub fn head(&self, size: usize) -> Self {
+    pub(crate) fn head(&self, size: usize) -> Self {
         Self {
             size,
             values: self.values[..size * (size + 1) / 2].to_vec(),
@@ -54,7 +54,7 @@ impl Triangle {
     }
 
     /// Solves in place for a right-hand side that ends with row `right.len() - 1`. The diagonal must not be zero there.
-    pub fn solve(&self, right: &mut [f64]) {
+    pub(crate) fn solve(&self, right: &mut [f64]) {
         for j in (0..right.len()).rev() {
             let column = self.column(j);
             let value = right[j] / column[j];

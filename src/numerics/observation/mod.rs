@@ -80,20 +80,20 @@ pub struct KindDescription {
     /// What it adds to the rank that theory gives.
     pub rank: Rank,
     /// Whether rows that stand out by it are named and set aside; else they are only down-weighted, by Huber's loss.
-    pub is_screened: bool,
+    pub(crate) is_screened: bool,
 }
 
 /// What a kind can see of the geometry, by theory.
 #[derive(Debug, Clone, Copy)]
 pub struct Rank {
     /// Whether it sees where axes and targets are; else directions alone.
-    pub places: bool,
+    pub(crate) places: bool,
     /// Whether it sees how targets are turned.
     pub rotations: bool,
     /// Whether it sees how large the arm is: a length was measured, or is known.
-    pub scale: bool,
+    pub(crate) scale: bool,
     /// Translations and rotations of the whole cell that it does not see.
-    pub blind: [usize; 2],
+    pub(crate) blind: [usize; 2],
 }
 
 /// What of a target's motion a kind sees, in standard deviations: of the point, the orientation, the vector from the anchor.

@@ -9,9 +9,9 @@ use nalgebra::{Matrix3, Vector3};
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct ExcessSigma {
     /// Per axis of a point and of other lengths, m.
-    pub length: f64,
+    pub(crate) length: f64,
     /// About each axis, rad.
-    pub angle: f64,
+    pub(crate) angle: f64,
 }
 
 impl ExcessSigma {
@@ -30,7 +30,7 @@ pub struct Residual {
     /// What was measured.
     pub kind: &'static dyn MeasurementKind,
     /// The row of the recording.
-    pub row: usize,
+    pub(crate) row: usize,
     /// m or rad, the numbers of the kind; 0 where one was not measured, and beyond them.
     pub error: Vector3<f64>,
     /// How many values were measured.

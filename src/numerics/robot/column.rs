@@ -14,7 +14,7 @@ pub struct DeclaredColumn {
     /// What its numbers are; [`Quantity::Number`] for texts, and for directions: 1, -1 or 0.
     pub quantity: Quantity,
     /// What a number may be, SI: one row beyond it would spoil the table.
-    pub range: [f64; 2],
+    pub(crate) range: [f64; 2],
     /// Names in the table, without the ending that says the unit; `{j}` is the joint's number from 1.
     pub stored: &'static [&'static str],
     /// Settings, itself among them, of which all are mapped or none.
@@ -22,7 +22,7 @@ pub struct DeclaredColumn {
     /// Whether it is the measured value, its uncertainty, or a name.
     pub part: Part,
     /// Whether declared laws may read it by its name.
-    pub in_laws: bool,
+    pub(crate) in_laws: bool,
 }
 
 /// How a file writes a quantity.
@@ -116,7 +116,7 @@ impl DeclaredColumn {
     }
 
     /// A measured number, stored by the name of its setting.
-    pub const fn value(
+    pub(crate) const fn value(
         name: &'static [&'static str; 1],
         quantity: Quantity,
         range: [f64; 2],
@@ -126,7 +126,7 @@ impl DeclaredColumn {
     }
 
     /// The standard deviation of what was measured, stored by the name of its setting.
-    pub const fn sigma(
+    pub(crate) const fn sigma(
         name: &'static [&'static str; 1],
         quantity: Quantity,
         about: &'static str,
@@ -135,7 +135,7 @@ impl DeclaredColumn {
     }
 
     /// A text, stored by the name of its setting.
-    pub const fn text(setting: &'static str, about: &'static str) -> Self {
+    pub(crate) const fn text(setting: &'static str, about: &'static str) -> Self {
         Self {
             shape: ColumnShape::Text,
             ..Self::number(setting, &[], Quantity::Number, [0.0, 0.0], about)
@@ -143,7 +143,7 @@ impl DeclaredColumn {
     }
 
     /// So many standard deviations of the settings `of`, which it stands for.
-    pub const fn uncertainty(
+    pub(crate) const fn uncertainty(
         setting: &'static str,
         of: &'static [&'static str],
         coverage: f64,
@@ -156,17 +156,17 @@ impl DeclaredColumn {
     }
 
     /// The same as another part of the measurement.
-    pub const fn as_part(self, part: Part) -> Self {
+    pub(crate) const fn as_part(self, part: Part) -> Self {
         Self { part, ..self }
     }
 
     /// The same, which must be mapped together with these settings.
-    pub const fn together(self, together: &'static [&'static str]) -> Self {
+    pub(crate) const fn together(self, together: &'static [&'static str]) -> Self {
         Self { together, ..self }
     }
 
     /// The same, which declared laws may read by its name.
-    pub const fn in_laws(self) -> Self {
+    pub(crate) const fn in_laws(self) -> Self {
         Self {
             in_laws: true,
             ..self

@@ -92,7 +92,7 @@ impl JointConvention {
     }
 
     /// Sides of approach, +1, -1 or 0, between the two countings, in place.
-    pub fn turn_sides(&self, sides: &mut [f64]) {
+    pub(crate) fn turn_sides(&self, sides: &mut [f64]) {
         for (side, sign) in sides.iter_mut().zip(&self.sign) {
             *side *= sign;
         }

@@ -140,7 +140,7 @@ impl Measurements {
     }
 
     /// When a row is for a law of time.
-    pub fn row_time(&self, row: usize) -> RowTime {
+    pub(crate) fn row_time(&self, row: usize) -> RowTime {
         if self.long_after {
             RowTime::LongAfter
         } else {
@@ -154,7 +154,12 @@ impl Measurements {
     }
 
     /// A circumstance (SI) of a joint, from 0, or of the whole row: that of the last row that has one where this row has none.
-    pub fn circumstance(&self, column: &str, row: usize, joint: Option<usize>) -> Option<f64> {
+    pub(crate) fn circumstance(
+        &self,
+        column: &str,
+        row: usize,
+        joint: Option<usize>,
+    ) -> Option<f64> {
         let all = self.circumstances.get(column)?;
         match joint {
             None => nearest(all, row),
@@ -207,7 +212,7 @@ impl Measurements {
     }
 
     /// The last row of the stop before that of a row, and the first row of its own; none at the first stop.
-    pub fn preceding_move(&self, row: usize) -> Option<[usize; 2]> {
+    pub(crate) fn preceding_move(&self, row: usize) -> Option<[usize; 2]> {
         let mut first = self.stop(row);
         loop {
             let before = self.at_place(self.rank_in_time(first).checked_sub(1)?);
@@ -240,7 +245,7 @@ impl Measurements {
     }
 
     /// Direction (+1 or -1) that the recording gives a joint, if it gives one.
-    pub fn recorded_direction(&self, row: usize, joint: usize) -> Option<f64> {
+    pub(crate) fn recorded_direction(&self, row: usize, joint: usize) -> Option<f64> {
         let recorded = self
             .direction
             .as_ref()

@@ -114,7 +114,7 @@ impl Memory {
 
 impl Measurements {
     /// A state at a row.
-    pub fn memory(&self, memory: Memory, row: usize) -> f64 {
+    pub(crate) fn memory(&self, memory: Memory, row: usize) -> f64 {
         self.memories.of(memory.key(), row, || memory.along(self))
     }
 }

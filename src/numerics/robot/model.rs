@@ -76,14 +76,14 @@ impl RobotModel {
     }
 
     /// Where a target (by number) sits, the tool point without one: zero pose, base frame.
-    pub fn mounting(&self, target: Option<usize>) -> &Pose {
+    pub(crate) fn mounting(&self, target: Option<usize>) -> &Pose {
         target
             .and_then(|target| self.setup.targets.get(target))
             .map_or(&self.home, |target| &target.mounting)
     }
 
     /// The tool frame where a target (by number) sits: how an instrument's frame is turned against the tool belongs to the instrument.
-    pub fn tool_at(&self, target: Option<usize>) -> Pose {
+    pub(crate) fn tool_at(&self, target: Option<usize>) -> Pose {
         Pose::new(self.home.rotation, self.mounting(target).translation)
     }
 
@@ -104,7 +104,7 @@ impl RobotModel {
     }
 
     /// Unit screws at the zero pose in the base frame.
-    pub fn screws(&self) -> &[Twist] {
+    pub(crate) fn screws(&self) -> &[Twist] {
         &self.screws
     }
 
@@ -135,7 +135,7 @@ impl RobotModel {
     }
 
     /// Two unit directions across the axis of joint `joint`, each with the number of the base axis that it comes from.
-    pub fn normals(&self, joint: usize) -> &[(usize, Vector3<f64>); 2] {
+    pub(crate) fn normals(&self, joint: usize) -> &[(usize, Vector3<f64>); 2] {
         &self.normals[joint]
     }
 
@@ -217,7 +217,7 @@ impl Travel {
     }
 
     /// The travel changed by `by`: addition theorems, with series for small changes.
-    pub fn moved(&self, by: f64) -> Self {
+    pub(crate) fn moved(&self, by: f64) -> Self {
         if by.abs() >= SMALL {
             return Self::new(self.value + by);
         }

@@ -10,7 +10,7 @@ pub const SAME: f64 = 1e-9;
 /// Joint positions (0.03 deg in rad; m) closer than this are one pose: a joint comes back to it, or rests in it, to less.
 pub const NEAR: f64 = 5.3e-4;
 /// Between logs of a joint (rad or m) closer than this it has not moved: what encoders of a halted arm show.
-pub const STILL: f64 = 2e-5;
+pub(crate) const STILL: f64 = 2e-5;
 
 /// Whether all joints are closer than `limit`.
 pub fn near(a: &[f64], b: &[f64], limit: f64) -> bool {
@@ -19,7 +19,7 @@ pub fn near(a: &[f64], b: &[f64], limit: f64) -> bool {
 
 /// Groups of rows whose joints are closer than `limit` to those of the group's first row; by first rows, rows ascending.
 /// `same` says what else two rows of a group share.
-pub fn grouped<'a>(
+pub(crate) fn grouped<'a>(
     rows: &[usize],
     q: impl Fn(usize) -> &'a [f64],
     limit: f64,

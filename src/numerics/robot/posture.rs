@@ -18,15 +18,15 @@ impl RobotModel {
 #[derive(Debug, Clone)]
 pub struct LoadCorrection {
     /// Payload beyond the declared, kg.
-    pub payload: f64,
+    pub(crate) payload: f64,
     /// Its first moment beyond the declared, kg m, zero-pose base axes of the last body.
-    pub payload_moment: Vector3<f64>,
+    pub(crate) payload_moment: Vector3<f64>,
     /// Mass of each body beyond the file's, at the file's centre, kg.
-    pub body: Vec<f64>,
+    pub(crate) body: Vec<f64>,
     /// First moment of each body beyond that, kg m, zero-pose base axes.
-    pub body_moment: Vec<Vector3<f64>>,
+    pub(crate) body_moment: Vec<Vector3<f64>>,
     /// Torque on each joint that masses do not make, e.g. of a balancer, Nm.
-    pub torque: Vec<f64>,
+    pub(crate) torque: Vec<f64>,
 }
 
 impl LoadCorrection {
@@ -44,7 +44,7 @@ impl LoadCorrection {
     }
 
     /// Sets every correction to zero.
-    pub fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.payload = 0.0;
         self.payload_moment = Vector3::zeros();
         self.body.fill(0.0);
@@ -57,24 +57,24 @@ impl LoadCorrection {
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Carried {
     /// kg.
-    pub mass: f64,
+    pub(crate) mass: f64,
     /// First moment, kg m.
-    pub moment: Vector3<f64>,
+    pub(crate) moment: Vector3<f64>,
 }
 
 /// Where the arm is and what it carries. Frames map zero-pose coordinates to one common frame.
 #[derive(Debug, Clone)]
 pub struct Posture {
     /// Frame behind station k = 0..=n: it carries the axis of joint k (from 0), the last one the tool.
-    pub behind: Vec<Pose>,
+    pub(crate) behind: Vec<Pose>,
     /// Frame of the body that joint j moves.
-    pub body: Vec<Pose>,
+    pub(crate) body: Vec<Pose>,
     /// What hangs beyond station k: bodies k.. and the payload.
-    pub carried: Vec<Carried>,
+    pub(crate) carried: Vec<Carried>,
     /// Torque of what hangs about each joint, Nm (N for a prismatic one): what it would turn the joint by if it could.
     pub torque: Vec<f64>,
     /// Common frame, m/s2.
-    pub gravity: Vector3<f64>,
+    pub(crate) gravity: Vector3<f64>,
 }
 
 impl Posture {
@@ -149,19 +149,19 @@ impl Posture {
     }
 
     /// Which way is down, in a station's zero-pose axes; `None` without gravity.
-    pub fn down(&self, station: usize) -> Option<Vector3<f64>> {
+    pub(crate) fn down(&self, station: usize) -> Option<Vector3<f64>> {
         let gravity = self.behind[station].rotation.tr_mul(&self.gravity);
         gravity.try_normalize(0.0)
     }
 
     /// Where the tool is in the base frame, m.
-    pub fn tool(&self, robot: &RobotModel) -> Vector3<f64> {
+    pub(crate) fn tool(&self, robot: &RobotModel) -> Vector3<f64> {
         let point = self.behind[robot.joints()].point(&robot.home().translation);
         self.behind[0].inverse().point(&point)
     }
 
     /// Moment (Nm) of all beyond station `station` about `point` (m), both in the station's zero-pose axes.
-    pub fn moment(&self, station: usize, point: &Vector3<f64>) -> Vector3<f64> {
+    pub(crate) fn moment(&self, station: usize, point: &Vector3<f64>) -> Vector3<f64> {
         let frame = &self.behind[station];
         let Carried { mass, moment } = self.carried[station];
         frame
@@ -170,7 +170,12 @@ impl Posture {
     }
 
     /// Torque about joint `joint` per kg m of first moment of body `body` along each zero-pose axis; zero if it does not carry it.
-    pub fn torque_of_moment(&self, robot: &RobotModel, joint: usize, body: usize) -> Vector3<f64> {
+    pub(crate) fn torque_of_moment(
+        &self,
+        robot: &RobotModel,
+        joint: usize,
+        body: usize,
+    ) -> Vector3<f64> {
         if body < joint || !robot.is_revolute(joint) {
             return Vector3::zeros();
         }
@@ -181,7 +186,7 @@ impl Posture {
     }
 
     /// Torque about joint `joint` per kg at the payload's centre.
-    pub fn torque_of_payload(&self, robot: &RobotModel, joint: usize) -> f64 {
+    pub(crate) fn torque_of_payload(&self, robot: &RobotModel, joint: usize) -> f64 {
         self.torque_of_weight(
             robot,
             joint,
@@ -191,7 +196,7 @@ impl Posture {
     }
 
     /// Torque about joint `joint` per kg at the centre of body `body`; zero if it does not carry it or the file gives no centre.
-    pub fn torque_of_mass(&self, robot: &RobotModel, joint: usize, body: usize) -> f64 {
+    pub(crate) fn torque_of_mass(&self, robot: &RobotModel, joint: usize, body: usize) -> f64 {
         let centre = robot.description().joints[body]
             .centre
             .filter(|_| body >= joint);

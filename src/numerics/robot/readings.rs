@@ -8,7 +8,7 @@ pub struct Named {
     /// Different names, in their order.
     pub names: Vec<String>,
     /// By row, position in `names`.
-    pub of: Vec<u32>,
+    pub(crate) of: Vec<u32>,
 }
 
 /// What rows measured of one kind, SI.
@@ -133,7 +133,7 @@ impl PointReadings {
     }
 
     /// One more whole point with a standard deviation, m.
-    pub fn push(&mut self, position: Vector3<f64>, sigma: f64) {
+    pub(crate) fn push(&mut self, position: Vector3<f64>, sigma: f64) {
         self.position.push(position);
         self.sigma.push(Vector3::repeat(sigma));
     }
@@ -155,7 +155,7 @@ impl PointReadings {
     }
 
     /// Where all three axes of a row were measured: its point.
-    pub fn all_axes(&self, row: usize) -> Option<Vector3<f64>> {
+    pub(crate) fn all_axes(&self, row: usize) -> Option<Vector3<f64>> {
         let is_whole = self
             .sigma
             .get(row)
@@ -164,7 +164,7 @@ impl PointReadings {
     }
 
     /// Whether an axis, from 0, of a row's point was measured.
-    pub fn has(&self, row: usize, axis: usize) -> bool {
+    pub(crate) fn has(&self, row: usize, axis: usize) -> bool {
         self.sigma
             .get(row)
             .is_some_and(|sigma| sigma[axis].is_finite())

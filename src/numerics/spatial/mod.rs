@@ -88,7 +88,7 @@ impl Pose {
 
     /// The point's coordinates in this frame.
     #[inline]
-    pub fn inverse_point(&self, point: &Vector3<f64>) -> Vector3<f64> {
+    pub(crate) fn inverse_point(&self, point: &Vector3<f64>) -> Vector3<f64> {
         self.rotation.tr_mul(&(point - self.translation))
     }
 }

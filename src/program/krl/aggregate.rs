@@ -20,7 +20,7 @@ pub(super) struct Type {
 }
 
 impl Type {
-    pub const FRAME: Self = Self {
+    pub(crate) const FRAME: Self = Self {
         axes: false,
         externals: 0,
         status: false,
@@ -44,7 +44,7 @@ impl Type {
         })
     }
 
-    pub fn is_of_axes(self) -> bool {
+    pub(crate) fn is_of_axes(self) -> bool {
         self.axes
     }
 
@@ -89,7 +89,7 @@ impl<'t> Aggregate<'t> {
     }
 
     /// The type before the colon, in capitals.
-    pub fn prefix(&self) -> Option<String> {
+    pub(crate) fn prefix(&self) -> Option<String> {
         self.prefix.clone()
     }
 
@@ -107,7 +107,7 @@ impl<'t> Aggregate<'t> {
     }
 
     /// What it is as operand of a motion.
-    pub fn by_fields(&self) -> Type {
+    pub(crate) fn by_fields(&self) -> Type {
         let axes = self.has_axes();
         Type {
             axes,
@@ -117,14 +117,14 @@ impl<'t> Aggregate<'t> {
     }
 
     /// X, Y, Z, A, B, C and nothing else: a FRAME as much as a POS.
-    pub fn is_frame(&self) -> bool {
+    pub(crate) fn is_frame(&self) -> bool {
         let names: Vec<String> = self.names().collect();
         names.iter().any(|name| name == "X")
             && names.iter().all(|name| FRAME.contains(&name.as_str()))
     }
 
     /// Whether its fields are those of a target.
-    pub fn may_be_target(&self) -> bool {
+    pub(crate) fn may_be_target(&self) -> bool {
         let names: Vec<String> = self.names().collect();
         let of =
             |sets: &[&[&str]], name: &String| sets.iter().any(|set| set.contains(&name.as_str()));
@@ -146,7 +146,7 @@ impl<'t> Aggregate<'t> {
     }
 
     /// How its type is stated.
-    pub fn advice(&self) -> &'static str {
+    pub(crate) fn advice(&self) -> &'static str {
         if self.has_axes() {
             "`{E6AXIS: ...}`"
         } else {
@@ -160,7 +160,7 @@ impl<'t> Aggregate<'t> {
     }
 
     /// Takes it as a target of type `kind`, or says everything that is wrong with it.
-    pub fn take(&self, kind: Type, found: &mut Gathered) {
+    pub(crate) fn take(&self, kind: Type, found: &mut Gathered) {
         let open = self.tokens[0].span.start;
         let before = found.faults.len();
         let mut numbers: Vec<(String, f64, Range<usize>)> = Vec::new();

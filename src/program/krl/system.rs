@@ -46,7 +46,7 @@ pub(super) struct SystemData {
 /// The state of a program: what is in force, and the point whose data come next.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct SystemState {
-    pub force: InForce,
+    pub(crate) force: InForce,
     point: Option<String>,
     /// Why the robot does not carry the tool in `$BASE`.
     astray: Setting<String>,
@@ -68,14 +68,14 @@ impl JoinedState for SystemState {
 
 impl SystemState {
     /// At the beginning of a program.
-    pub const START: Self = Self {
+    pub(crate) const START: Self = Self {
         force: InForce::NOTHING,
         point: None,
         astray: Setting::Unset,
     };
 
     /// What is in force at a motion.
-    pub fn at_motion(&self) -> InForce {
+    pub(crate) fn at_motion(&self) -> InForce {
         let base = match &self.astray {
             Setting::Unset => return self.force.clone(),
             Setting::Known(why, _) if why.is_empty() => return self.force.clone(),
@@ -102,7 +102,7 @@ fn note<K: Ord, T: PartialEq + Copy>(known: &mut BTreeMap<K, Option<T>>, key: K,
 
 impl SystemData {
     /// Adds what the lines of a file declare.
-    pub fn declare(&mut self, source: ProgramText, lines: &[&[Token]]) {
+    pub(crate) fn declare(&mut self, source: ProgramText, lines: &[&[Token]]) {
         for line in lines {
             if let Some((name, number, value)) = entry(source, line) {
                 match name.as_str() {
@@ -167,7 +167,7 @@ impl SystemData {
 
     /// Adds the routines of other files. What a routine calls may be declared behind it, or in a file behind its own: all are read until no
     /// further one is found to set anything.
-    pub fn declare_routines(&mut self, files: &[(ProgramText, Vec<&[Token]>)]) {
+    pub(crate) fn declare_routines(&mut self, files: &[(ProgramText, Vec<&[Token]>)]) {
         loop {
             let before = self.routines.clone();
             files
@@ -198,7 +198,7 @@ impl SystemData {
     }
 
     /// Whether a line sets what is in force.
-    pub fn sets(&self, source: ProgramText, line: &[Token]) -> bool {
+    pub(crate) fn sets(&self, source: ProgramText, line: &[Token]) -> bool {
         const SET: [&str; 7] = [
             "$BASE",
             "$TOOL",
@@ -225,7 +225,7 @@ impl SystemData {
     }
 
     /// The routine that a line calls and that no file that was read has.
-    pub fn unknown_call(&self, source: ProgramText, line: &[Token]) -> Option<String> {
+    pub(crate) fn unknown_call(&self, source: ProgramText, line: &[Token]) -> Option<String> {
         let call = line.len() > 2 && line[0].sort == TokenKind::Word && line[1].is(b'(');
         let known = source.is_word(&line[0], &["BAS"])
             || self.routines.contains_key(&source.upper(&line[0]));
@@ -233,7 +233,13 @@ impl SystemData {
     }
 
     /// Takes a state through a line; `place`: how people find it.
-    pub fn take(&self, source: ProgramText, line: &[Token], place: &str, state: &mut SystemState) {
+    pub(crate) fn take(
+        &self,
+        source: ProgramText,
+        line: &[Token],
+        place: &str,
+        state: &mut SystemState,
+    ) {
         if source.is_word(&line[0], &["BAS"]) {
             self.call(source, line, place, state);
         } else if let Some(name) = self.called(source, line) {
@@ -246,7 +252,7 @@ impl SystemData {
     }
 
     /// A motion with what stands behind its `WITH`.
-    pub fn at_motion(
+    pub(crate) fn at_motion(
         &self,
         source: ProgramText,
         line: &[Token],
@@ -418,7 +424,7 @@ impl SystemData {
     }
 
     /// Frames of tools by their names, as the files declare them.
-    pub fn tools(&self) -> impl Iterator<Item = ToolInForce> + '_ {
+    pub(crate) fn tools(&self) -> impl Iterator<Item = ToolInForce> + '_ {
         self.tools.keys().map(|number| self.tool_of(*number))
     }
 

@@ -18,7 +18,7 @@ pub(super) enum Want {
 }
 
 impl Want {
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         if self == Self::Joints {
             "jointtarget"
         } else {
@@ -46,7 +46,7 @@ pub(super) struct List<'t> {
     source: ProgramText<'t>,
     span: Range<usize>,
     /// How many it has, brackets included.
-    pub tokens: usize,
+    pub(crate) tokens: usize,
     items: Vec<Item<'t>>,
 }
 
@@ -115,7 +115,7 @@ impl<'t> List<'t> {
     }
 
     /// The list that is item `k`.
-    pub fn list(&self, k: usize) -> Option<&List<'t>> {
+    pub(crate) fn list(&self, k: usize) -> Option<&List<'t>> {
         self.items.get(k).and_then(|item| {
             if let Item::List(list) = item {
                 Some(list)
@@ -134,12 +134,12 @@ impl<'t> List<'t> {
     }
 
     /// Whether item `k` is a word, in any case.
-    pub fn is_word(&self, k: usize, word: &str) -> bool {
+    pub(crate) fn is_word(&self, k: usize, word: &str) -> bool {
         matches!(self.items.get(k), Some(Item::Leaf([token])) if self.source.is_word(token, &[word]))
     }
 
     /// What it, or a list inside it, has the form of: names may stand for some of its lists.
-    pub fn has_form(&self) -> Option<Want> {
+    pub(crate) fn has_form(&self) -> Option<Want> {
         let form = |want: &Want| {
             let shape = want.shape();
             let fits = |(item, size): (&Item, &usize)| match item {
@@ -165,7 +165,7 @@ impl<'t> List<'t> {
     }
 
     /// Takes the targets in it, those of an array where that is allowed, or says everything that is wrong.
-    pub fn take(&self, want: Want, array: bool, found: &mut Gathered) {
+    pub(crate) fn take(&self, want: Want, array: bool, found: &mut Gathered) {
         let flat = |item: &Item| match item {
             Item::List(list) => list.lists().next().is_none(),
             Item::Leaf(_) => true,

@@ -42,7 +42,7 @@ pub(super) struct DeclaredSurroundings {
 
 impl DeclaredSurroundings {
     /// Adds what the statements of a file declare, and the loads that they grip.
-    pub fn declare_all(&mut self, source: ProgramText, statements: &[&[Token]]) {
+    pub(crate) fn declare_all(&mut self, source: ProgramText, statements: &[&[Token]]) {
         for statement in statements {
             match declaration(source, statement) {
                 Some(Declaration {
@@ -126,7 +126,7 @@ impl DeclaredSurroundings {
     }
 
     /// Frames of tools by their names, as the files declare them.
-    pub fn tools(&self) -> impl Iterator<Item = ToolInForce> + '_ {
+    pub(crate) fn tools(&self) -> impl Iterator<Item = ToolInForce> + '_ {
         self.tools.iter().map(|(name, frame)| ToolInForce {
             name: name.clone(),
             frame: frame.clone().ok(),
@@ -135,7 +135,7 @@ impl DeclaredSurroundings {
 
     /// Takes note of what a motion names: `arguments` between its commas, `positions` by which of them are positions. Of a motion of another
     /// file the names alone count.
-    pub fn motion(
+    pub(crate) fn motion(
         &self,
         source: ProgramText,
         (instruction, arguments, positions): (&str, &[&[Token]], &[usize]),

@@ -10,17 +10,17 @@ use std::collections::BTreeMap;
 #[derive(Debug, Clone, Default)]
 pub struct BagTopic {
     /// As the setting `topic` names it.
-    pub name: String,
+    pub(crate) name: String,
     /// Its type.
-    pub kind: String,
+    pub(crate) kind: String,
     /// Whether messages of this type are read.
-    pub is_read: bool,
+    pub(crate) is_read: bool,
     /// How many.
-    pub messages: u64,
+    pub(crate) messages: u64,
     /// When the first and the last were received, s since 1970.
-    pub received: [f64; 2],
+    pub(crate) received: [f64; 2],
     /// The longest time between two of them, s.
-    pub gap: f64,
+    pub(crate) gap: f64,
 }
 
 impl BagTopic {
@@ -34,7 +34,7 @@ impl BagTopic {
         self.messages += 1;
     }
     /// In a line: type, number, rate, longest gap.
-    pub fn account(&self) -> String {
+    pub(crate) fn account(&self) -> String {
         let Self {
             name,
             kind,
@@ -67,9 +67,9 @@ impl BagTopic {
 /// What a bag holds.
 pub struct BagContent {
     /// Its topics by name.
-    pub topics: Vec<BagTopic>,
+    pub(crate) topics: Vec<BagTopic>,
     /// What of it is lost.
-    pub loss: Option<String>,
+    pub(crate) loss: Option<String>,
     source: Box<dyn InputSource>,
 }
 

@@ -24,9 +24,9 @@ enum FieldType {
 
 /// A type of message that is read.
 pub(super) struct MessageKind {
-    pub name: &'static str,
+    pub(crate) name: &'static str,
     /// It holds any number of them; its two frames select the one that is read.
-    pub of_frames: bool,
+    pub(crate) of_frames: bool,
     parts: &'static [FieldType],
 }
 
@@ -200,10 +200,10 @@ pub(super) enum FieldValue {
 /// The columns that messages have, and the cells of the present one.
 #[derive(Default)]
 pub(super) struct MessageCells {
-    pub names: Vec<String>,
-    pub cells: Vec<FieldValue>,
+    pub(crate) names: Vec<String>,
+    pub(crate) cells: Vec<FieldValue>,
     /// New names make no columns any more.
-    pub is_closed: bool,
+    pub(crate) is_closed: bool,
     places: HashMap<String, usize>,
     /// Names of the joints of the last message as they stand in it, and the columns that are theirs, by name and kind of list.
     joints: Vec<u8>,

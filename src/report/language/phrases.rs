@@ -29,7 +29,7 @@ struct Pattern {
 /// The sentences of one language.
 pub(super) struct Phrases {
     /// The English ones, in the order of the table.
-    pub english: Vec<&'static str>,
+    pub(crate) english: Vec<&'static str>,
     whole: BTreeMap<&'static str, &'static str>,
     /// Those with most letters first.
     patterns: Vec<Pattern>,
@@ -150,7 +150,7 @@ impl<'a> PhraseReader<'a> {
     }
 
     /// A text in the other language; none where the table does not have it.
-    pub fn translate(&self, text: &str) -> Option<String> {
+    pub(crate) fn translate(&self, text: &str) -> Option<String> {
         self.within(text, 0)
     }
 

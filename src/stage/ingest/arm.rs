@@ -9,12 +9,12 @@ use std::ops::Range;
 /// The joints of the robot table.
 pub(super) struct RobotJoints {
     /// Names of the joints; none where no robot is known.
-    pub names: Vec<String>,
-    pub prismatic: Vec<bool>,
+    pub(crate) names: Vec<String>,
+    pub(crate) prismatic: Vec<bool>,
     /// Travel of each joint, rad or m.
-    pub limits: Vec<[f64; 2]>,
+    pub(crate) limits: Vec<[f64; 2]>,
     /// The layout of its rows.
-    pub slots: Slots,
+    pub(crate) slots: Slots,
 }
 
 impl RobotJoints {
@@ -92,25 +92,25 @@ pub(super) struct Slots {
     columns: Vec<(&'static DeclaredColumn, Range<usize>)>,
     texts: Vec<&'static str>,
     /// Numbers in a row.
-    pub count: usize,
-    pub time: usize,
-    pub q: Range<usize>,
-    pub velocity: Range<usize>,
+    pub(crate) count: usize,
+    pub(crate) time: usize,
+    pub(crate) q: Range<usize>,
+    pub(crate) velocity: Range<usize>,
     /// The places of a measured point.
-    pub point: Range<usize>,
+    pub(crate) point: Range<usize>,
     /// What each kind of measurement takes.
-    pub kinds: Vec<KindSlots>,
+    pub(crate) kinds: Vec<KindSlots>,
 }
 
 /// Where a kind's numbers are.
 pub(super) struct KindSlots {
-    pub kind: &'static dyn MeasurementKind,
-    pub values: Vec<usize>,
-    pub sigma: Vec<usize>,
+    pub(crate) kind: &'static dyn MeasurementKind,
+    pub(crate) values: Vec<usize>,
+    pub(crate) sigma: Vec<usize>,
     /// Whether each reading needs its standard deviation.
-    pub own_sigma: bool,
+    pub(crate) own_sigma: bool,
     /// Among the row's texts: the name of the place that holds the target, of a contact constraint.
-    pub name: Option<usize>,
+    pub(crate) name: Option<usize>,
 }
 
 impl Slots {

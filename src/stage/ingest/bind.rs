@@ -19,30 +19,30 @@ const SHOWN: usize = 60;
 #[derive(Default)]
 pub(super) struct Binding {
     /// Fields of a row.
-    pub width: usize,
-    pub id: Option<TextBinding>,
+    pub(crate) width: usize,
+    pub(crate) id: Option<TextBinding>,
     /// In the order of the row's texts.
-    pub texts: Vec<Option<TextBinding>>,
+    pub(crate) texts: Vec<Option<TextBinding>>,
     /// Those that the file has.
-    pub worded: Vec<usize>,
+    pub(crate) worded: Vec<usize>,
     /// Quantities of several numbers: where they are, and how they are read.
-    pub conventions: Vec<(Range<usize>, &'static DeclaredColumn, &'static Convention)>,
+    pub(crate) conventions: Vec<(Range<usize>, &'static DeclaredColumn, &'static Convention)>,
     /// Whether the file has what a kind of measurement measured.
-    pub measures: bool,
+    pub(crate) measures: bool,
     /// The kinds of measurement of which the file has something.
-    pub kinds: Vec<usize>,
-    pub sequence: Option<usize>,
-    pub cells: Vec<NumberBinding>,
+    pub(crate) kinds: Vec<usize>,
+    pub(crate) sequence: Option<usize>,
+    pub(crate) cells: Vec<NumberBinding>,
     /// The point of each target of a wide row.
-    pub points: Vec<(String, [NumberBinding; 3])>,
+    pub(crate) points: Vec<(String, [NumberBinding; 3])>,
     /// Numbers that are the same in every row, SI.
-    pub constants: Vec<(usize, f64)>,
+    pub(crate) constants: Vec<(usize, f64)>,
     /// Joints (from 0) from which so many times another one is taken off.
-    pub coupled: Vec<(usize, usize, f64)>,
+    pub(crate) coupled: Vec<(usize, usize, f64)>,
     /// Places of a row's numbers that may be filled, ascending.
-    pub filled: Vec<usize>,
+    pub(crate) filled: Vec<usize>,
     /// Optional columns that the file does not have, for a note.
-    pub missing: Vec<String>,
+    pub(crate) missing: Vec<String>,
 }
 
 /// Text from a column, or for every row the same.
@@ -58,33 +58,33 @@ pub(super) enum TextBinding {
 /// A column of numbers.
 pub(super) struct NumberBinding {
     /// Place in a row's numbers.
-    pub index: usize,
-    pub column: usize,
-    pub unit: Unit,
+    pub(crate) index: usize,
+    pub(crate) column: usize,
+    pub(crate) unit: Unit,
     /// What a recording may hold, SI.
-    pub range: [f64; 2],
+    pub(crate) range: [f64; 2],
     /// A direction: 1, -1 or 0.
-    pub is_direction: bool,
-    pub optional: bool,
+    pub(crate) is_direction: bool,
+    pub(crate) optional: bool,
     /// What the file's number is divided by: how many standard deviations an uncertainty is.
-    pub divisor: f64,
+    pub(crate) divisor: f64,
     /// What is taken off, SI, and the sign of what remains.
-    pub zero: f64,
-    pub sign: f64,
+    pub(crate) zero: f64,
+    pub(crate) sign: f64,
     /// The column, as people call it: `x_mm`, or `column 4`.
-    pub name: String,
+    pub(crate) name: String,
     /// What is added to it.
-    pub difference: Option<Difference>,
+    pub(crate) difference: Option<Difference>,
     /// Whether it holds clock times as text.
-    pub is_clock: bool,
+    pub(crate) is_clock: bool,
 }
 
 /// A column whose numbers are added to those of another, times the sign.
 pub(super) struct Difference {
-    pub column: usize,
-    pub sign: f64,
-    pub unit: Unit,
-    pub name: String,
+    pub(crate) column: usize,
+    pub(crate) sign: f64,
+    pub(crate) unit: Unit,
+    pub(crate) name: String,
 }
 
 impl Binding {
@@ -153,11 +153,11 @@ impl Binding {
 
 /// The names of a file's columns, if it has a header, else how many there are.
 pub(super) struct FileHeader {
-    pub label: String,
+    pub(crate) label: String,
     /// Line of the header, or of the first data row.
-    pub line: u64,
-    pub width: usize,
-    pub names: Option<Vec<String>>,
+    pub(crate) line: u64,
+    pub(crate) width: usize,
+    pub(crate) names: Option<Vec<String>>,
 }
 
 struct Binder<'a> {

@@ -41,13 +41,13 @@ impl Texts {
 #[derive(Default)]
 pub(super) struct HeldRows {
     /// Places of a row's numbers that the file fills.
-    pub places: Vec<usize>,
+    pub(crate) places: Vec<usize>,
     /// Their values, row by row.
-    pub values: Vec<f64>,
+    pub(crate) values: Vec<f64>,
     /// The points of wide rows, of so many targets each.
-    pub points: Vec<[f64; 3]>,
+    pub(crate) points: Vec<[f64; 3]>,
     targets: usize,
-    pub ids: Texts,
+    pub(crate) ids: Texts,
     /// Places of a row's texts that the file has, and the texts of each.
     texts: Vec<(usize, Texts)>,
     /// What only writing its rows needs; given up where it is too much.
@@ -220,18 +220,18 @@ impl HeldReading<'_> {
 /// The point ids of the usable rows of a file, in its order.
 #[derive(Default)]
 pub(super) struct FileIds {
-    pub ids: Texts,
-    pub rows: Vec<NamedRow>,
+    pub(crate) ids: Texts,
+    pub(crate) rows: Vec<NamedRow>,
 }
 
 /// A row that has a point id.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct NamedRow {
     /// Data row in its file, from 1.
-    pub number: u32,
-    pub line: u32,
+    pub(crate) number: u32,
+    pub(crate) line: u32,
     /// Hash of what the row says, but for its place in the recording.
-    pub content: u64,
+    pub(crate) content: u64,
 }
 
 impl FileIds {

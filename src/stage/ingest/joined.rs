@@ -12,12 +12,12 @@ use crate::observation::{KINDS, Part};
 
 /// What all files give and decide together.
 pub(super) struct JoinDecisions<'a> {
-    pub settings: &'a Ingest,
-    pub arm: &'a RobotJoints,
-    pub scans: &'a [Scan],
-    pub decisions: &'a [FileDecision],
+    pub(crate) settings: &'a Ingest,
+    pub(crate) arm: &'a RobotJoints,
+    pub(crate) scans: &'a [Scan],
+    pub(crate) decisions: &'a [FileDecision],
     /// Names of the files in tables.
-    pub names: &'a [String],
+    pub(crate) names: &'a [String],
 }
 
 impl JoinDecisions<'_> {

@@ -18,41 +18,41 @@ pub struct FileLayout {
     /// (.xlsx, .xlsm), a sheet of which is read as text is; a file of columns (Parquet; Feather and streams of Arrow, uncompressed or by zstd; arrays of NumPy, .npz), for which only
     /// `columns` matters: a list of numbers in it is a column for each, `state[1]`, `state[2]` and so on; or a recording of ROS 2 (.mcap, .db3,
     /// or the folder of its parts).
-    pub file: RawFile,
+    pub(crate) file: RawFile,
     /// The sheet of a workbook; without it the only visible one with rows of numbers.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub sheet: Option<String>,
+    pub(crate) sheet: Option<String>,
     /// The topic of a recording of ROS 2 (.mcap, .db3), e.g. `/joint_states`; without it the only one whose type is read. Its fields are the
     /// columns: `received` and `stamp` (s), and by type `shoulder_pan_joint.position`, `point.x`, `data[1]` and so on. Transforms are named
     /// with their frames: `/tf base->tool0`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub topic: Option<String>,
+    pub(crate) topic: Option<String>,
     /// What stands between fields: one ASCII character, `tab`, or `whitespace` (any run of blanks and tabs).
     #[serde(default = "comma")]
-    pub delimiter: String,
+    pub(crate) delimiter: String,
     /// The decimal mark of the numbers.
     #[serde(default)]
-    pub decimal: Decimal,
+    pub(crate) decimal: Decimal,
     /// Whether a row of column names stands above the data.
     #[serde(default = "yes")]
-    pub header: bool,
+    pub(crate) header: bool,
     /// Lines to skip above the header (above the data where there is no header).
     #[serde(default)]
-    pub skip: u64,
+    pub(crate) skip: u64,
     /// Lines to skip between header and data, e.g. a row of units.
     #[serde(default)]
-    pub skip_below_header: u64,
+    pub(crate) skip_below_header: u64,
     /// Lines that begin with this text are skipped, e.g. `#`.
     #[serde(default)]
-    pub comment: Option<String>,
+    pub(crate) comment: Option<String>,
     /// The header is written as a comment: it begins with the text of `comment`, which is no part of the first name.
     #[serde(default, skip_serializing_if = "is_false")]
-    pub header_in_comment: bool,
+    pub(crate) header_in_comment: bool,
     /// Where several targets stand side by side in a row, the columns of each, instead of x, y, z and target under `columns`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub targets: Option<WideTargets>,
+    pub(crate) targets: Option<WideTargets>,
     /// Which column holds which quantity.
-    pub columns: Columns,
+    pub(crate) columns: Columns,
 }
 
 /// What a wide row holds of a recording.
@@ -66,10 +66,10 @@ pub(super) const SIMULATED: [&str; 3] = ["sim_x", "sim_y", "sim_z"];
 #[serde(deny_unknown_fields)]
 pub struct WideTargets {
     /// Unit of the file's numbers, e.g. `mm`.
-    pub unit: String,
+    pub(crate) unit: String,
     /// The columns of x, y and z by the target's name, e.g. `{smr1: [X1, Y1, Z1], smr2: [X2, Y2, Z2]}`; blank cells, or a point at 0, 0, 0,
     /// are a target that was not seen.
-    pub columns: BTreeMap<String, [ColumnRef; 3]>,
+    pub(crate) columns: BTreeMap<String, [ColumnRef; 3]>,
 }
 
 impl FileLayout {

@@ -60,24 +60,24 @@ impl fmt::Display for ColumnRef {
 pub struct TextColumn {
     /// Name or number of the column.
     #[serde(default)]
-    pub column: Option<ColumnRef>,
+    pub(crate) column: Option<ColumnRef>,
     /// The text of every row, instead of a column.
     #[serde(default)]
-    pub value: Option<String>,
+    pub(crate) value: Option<String>,
     /// The text of every row by the path of the file: what stands for the braces at its end, e.g. `"{position}/hole_{n}.csv"` names the
     /// rows of `data/front/hole_0.csv` `front/0`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub path: Option<String>,
+    pub(crate) path: Option<String>,
     /// The column may be missing from the file, and its cells may be blank.
     #[serde(default)]
-    pub optional: bool,
+    pub(crate) optional: bool,
     /// What of a name counts, for `point_id`: `number` for its last whole number, so that `Pose 17` and `pt_017` are one point; without
     /// it, the whole name.
     #[serde(default, rename = "match", skip_serializing_if = "Option::is_none")]
-    pub matching: Option<NameMatch>,
+    pub(crate) matching: Option<NameMatch>,
     /// What is taken off the beginning of every name, for `point_id`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub strip: Option<String>,
+    pub(crate) strip: Option<String>,
 }
 
 /// What of a point's name counts.
@@ -136,7 +136,7 @@ impl TextColumn {
 #[serde(deny_unknown_fields)]
 pub struct CountColumn {
     /// Name or number of the column.
-    pub column: ColumnRef,
+    pub(crate) column: ColumnRef,
 }
 
 /// A column of numbers, or the same number for every row of the file.
@@ -145,26 +145,26 @@ pub struct CountColumn {
 pub struct ScalarColumn {
     /// Name or number of the column.
     #[serde(default)]
-    pub column: Option<ColumnRef>,
+    pub(crate) column: Option<ColumnRef>,
     /// A column whose number is taken off, for lengths: where the file holds the target in `column` and, instead of the measured
     /// point, target less measured point here.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub minus: Option<ColumnRef>,
+    pub(crate) minus: Option<ColumnRef>,
     /// A column whose number is added, for lengths: measured point less target.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub plus: Option<ColumnRef>,
+    pub(crate) plus: Option<ColumnRef>,
     /// Unit of the column `minus` or `plus`; without it `unit`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub difference_unit: Option<String>,
+    pub(crate) difference_unit: Option<String>,
     /// The number of every row, instead of a column.
     #[serde(default)]
-    pub value: Option<f64>,
+    pub(crate) value: Option<f64>,
     /// Unit of the file's numbers, e.g. `mm`; `clock` where a time is a time of day (08:15:03) or a date with a time (ISO 8601).
     #[serde(default)]
-    pub unit: Option<String>,
+    pub(crate) unit: Option<String>,
     /// The column may be missing from the file, and its cells may be blank.
     #[serde(default)]
-    pub optional: bool,
+    pub(crate) optional: bool,
 }
 
 /// A column of uncertainties, or the same uncertainty for every row of the file.
@@ -173,19 +173,19 @@ pub struct ScalarColumn {
 pub struct UncertaintyColumn {
     /// Name or number of the column.
     #[serde(default)]
-    pub column: Option<ColumnRef>,
+    pub(crate) column: Option<ColumnRef>,
     /// The uncertainty of every row, instead of a column.
     #[serde(default)]
-    pub value: Option<f64>,
+    pub(crate) value: Option<f64>,
     /// Unit of the file's numbers, e.g. `mm`.
     #[serde(default)]
-    pub unit: Option<String>,
+    pub(crate) unit: Option<String>,
     /// How many standard deviations the numbers are; without it 2 for `u95`, 1 for `u`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub coverage_factor: Option<f64>,
+    pub(crate) coverage_factor: Option<f64>,
     /// The column may be missing from the file, and its cells may be blank.
     #[serde(default)]
-    pub optional: bool,
+    pub(crate) optional: bool,
 }
 
 /// Columns of numbers, one for each joint.
@@ -195,29 +195,29 @@ pub struct JointColumns {
     /// A pattern for the names, `{j}` being the joint's number from 1: `q{j}_deg`; `{name}` is its name in the robot file:
     /// `{name}.position`.
     #[serde(default)]
-    pub column: Option<String>,
+    pub(crate) column: Option<String>,
     /// Names or numbers of the columns from the first joint to the last, instead of a pattern.
     #[serde(default)]
-    pub columns: Option<Vec<ColumnRef>>,
+    pub(crate) columns: Option<Vec<ColumnRef>>,
     /// Unit of the file's numbers; for positions and velocities that of the revolute joints, e.g. `deg`.
     #[serde(default)]
-    pub unit: Option<String>,
+    pub(crate) unit: Option<String>,
     /// Unit of the positions or velocities of prismatic joints, e.g. `mm`.
     #[serde(default)]
-    pub linear_unit: Option<String>,
+    pub(crate) linear_unit: Option<String>,
     /// 1 or -1 for each joint: -1 where the file counts the other way than the robot file, e.g. `[1, 1, -1, 1, 1, 1]`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub sign: Vec<f64>,
+    pub(crate) sign: Vec<f64>,
     /// What the file shows where the robot file has its zero; for positions alone, for each joint in the unit of the column, e.g.
     /// `[0, -90, 0, 0, 0, 0]`. A position is `sign * (file - zero)`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub zero: Vec<f64>,
+    pub(crate) zero: Vec<f64>,
     /// Positions that hold a part of another joint's, as where a controller reports joint 3 against the horizon; the part is taken off.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub coupled: Vec<CoupledColumn>,
+    pub(crate) coupled: Vec<CoupledColumn>,
     /// The columns may be missing from the file, and their cells may be blank.
     #[serde(default)]
-    pub optional: bool,
+    pub(crate) optional: bool,
 }
 
 /// The column of joint `joint` holds `ratio` times the position of joint `by` beside its own.
@@ -225,11 +225,11 @@ pub struct JointColumns {
 #[serde(deny_unknown_fields)]
 pub struct CoupledColumn {
     /// Number of the joint, from 1.
-    pub joint: usize,
+    pub(crate) joint: usize,
     /// Number of the joint whose position is in its column, from 1.
-    pub by: usize,
+    pub(crate) by: usize,
     /// How often it is, e.g. 1 or -1.
-    pub ratio: f64,
+    pub(crate) ratio: f64,
 }
 
 /// Columns of a quantity of several numbers, by convention.
@@ -237,12 +237,12 @@ pub struct CoupledColumn {
 pub struct ConventionColumns {
     /// Setting -> columns of the file.
     #[serde(flatten)]
-    pub columns: BTreeMap<&'static str, Vec<ColumnRef>>,
+    pub(crate) columns: BTreeMap<&'static str, Vec<ColumnRef>>,
     /// Unit of the numbers, e.g. `deg`.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub unit: Option<String>,
+    pub(crate) unit: Option<String>,
     /// The cells may be blank: the row has none.
-    pub optional: bool,
+    pub(crate) optional: bool,
 }
 
 impl ScalarColumn {

@@ -16,13 +16,13 @@ use serde::{Deserialize, Serialize};
 pub struct VelocitySettings {
     /// Longer steps in time between rows are gaps, s; five times the usual step if not given.
     #[serde(default)]
-    pub gap_s: Option<f64>,
+    pub(crate) gap_s: Option<f64>,
     /// Least time from the first to the last row of a parabola, s: more than two steps where joints are logged coarsely.
     #[serde(default)]
-    pub over_s: f64,
+    pub(crate) over_s: f64,
     /// How much later the points were measured than the joints beside them, s, as `diagnose` says it: joints are carried there.
     #[serde(default)]
-    pub later_s: f64,
+    pub(crate) later_s: f64,
 }
 
 /// Steps beyond so many usual ones are gaps.

@@ -11,25 +11,25 @@ pub(super) const NONE: u32 = u32::MAX;
 /// Where the other row with the same id stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Twin {
-    pub file: u32,
-    pub line: u32,
+    pub(crate) file: u32,
+    pub(crate) line: u32,
     /// That row has the same values too, and is used.
-    pub copied: bool,
+    pub(crate) copied: bool,
 }
 
 /// What the files together decide about the usable rows of one of them.
 #[derive(Default)]
 pub(super) struct FileDecision {
     /// Rows given up as duplicates, by data row.
-    pub twins: BTreeMap<u32, Twin>,
+    pub(crate) twins: BTreeMap<u32, Twin>,
     /// For a join, the data row of each other file for each data row of the first, from 1; [`NONE`] where there is none. For the
     /// others that of the first alone, [`NONE`] also where that lacks another partner. Empty without a join.
-    pub partners: Vec<Vec<u32>>,
+    pub(crate) partners: Vec<Vec<u32>>,
 }
 
 impl FileDecision {
     /// Whether a data row, from 1, has all its partners.
-    pub fn is_whole(&self, number: usize) -> bool {
+    pub(crate) fn is_whole(&self, number: usize) -> bool {
         let row = number.wrapping_sub(1);
         self.partners
             .iter()

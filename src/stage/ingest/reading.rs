@@ -27,13 +27,13 @@ const BUFFER: usize = 1 << 16;
 #[derive(Default)]
 pub struct TableLayout<'l> {
     /// The sheet, of a workbook.
-    pub sheet: Option<&'l str>,
+    pub(crate) sheet: Option<&'l str>,
     /// The topic, of a recording of ROS 2.
-    pub topic: Option<&'l str>,
+    pub(crate) topic: Option<&'l str>,
     /// How its rows are written, of text.
-    pub text: TextLayout,
+    pub(crate) text: TextLayout,
     /// The decimal mark of its numbers, of text and workbooks.
-    pub decimal: Decimal,
+    pub(crate) decimal: Decimal,
 }
 
 /// Opens a table of any kind: the first that a file is, text at last.
@@ -88,7 +88,7 @@ pub fn records(
 
 /// An opened file below its header.
 pub(super) struct OpenedFile<'a> {
-    pub label: String,
+    pub(crate) label: String,
     reader: Box<dyn RecordReader>,
     judge: RowReader<'a>,
     /// The present row as it stands.
@@ -98,8 +98,8 @@ pub(super) struct OpenedFile<'a> {
     /// What was left out of the file as a whole.
     remark: Option<String>,
     /// Axes in addition to the arm's that nothing is read from.
-    pub external: ExternalAxes,
-    pub row: RecordedRow,
+    pub(crate) external: ExternalAxes,
+    pub(crate) row: RecordedRow,
 }
 
 impl<'a> OpenedFile<'a> {

@@ -58,8 +58,8 @@ impl From<RecordFault> for Reason {
 /// A row that is not used.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct RowRefusal {
-    pub reason: Reason,
-    pub detail: String,
+    pub(crate) reason: Reason,
+    pub(crate) detail: String,
 }
 
 pub(super) fn refuse<T>(reason: Reason, detail: String) -> Result<T, RowRefusal> {

@@ -21,25 +21,25 @@ const SHOWN: usize = 200;
 #[derive(Default)]
 pub(super) struct RecordedRow {
     /// Number of the data row in its file, from 1.
-    pub number: u64,
-    pub line: u64,
+    pub(crate) number: u64,
+    pub(crate) line: u64,
     /// Empty where there is none.
-    pub id: String,
+    pub(crate) id: String,
     /// By [`Slots::texts`]; empty where there is none.
     ///
     /// [`Slots::texts`]: super::arm::Slots::texts
-    pub texts: Vec<String>,
-    pub sequence: Option<i64>,
+    pub(crate) texts: Vec<String>,
+    pub(crate) sequence: Option<i64>,
     /// SI, by the places of the arm's slots; NaN where missing.
-    pub values: Vec<f64>,
+    pub(crate) values: Vec<f64>,
     /// The point of each target of a wide row, SI; NaN where it was not seen.
-    pub points: Vec<[f64; 3]>,
+    pub(crate) points: Vec<[f64; 3]>,
     /// The first joint beyond its limits, from 0.
-    pub beyond: Option<usize>,
+    pub(crate) beyond: Option<usize>,
     /// The first revolute joint beyond one and a half turns, from 0, and its angle, rad; also where the row is refused.
-    pub turned: Option<(usize, f64)>,
+    pub(crate) turned: Option<(usize, f64)>,
     /// Nothing stands in any of its fields.
-    pub is_blank: bool,
+    pub(crate) is_blank: bool,
 }
 
 impl RecordedRow {
@@ -67,7 +67,7 @@ impl RecordedRow {
 
 /// Reads rows of one file.
 pub(super) struct RowReader<'a> {
-    pub binding: Binding,
+    pub(crate) binding: Binding,
     mark: DecimalMark,
     limits: LimitPolicy,
     arm: &'a RobotJoints,

@@ -21,9 +21,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// How many rows were refused for a reason, and the first of them.
 #[derive(Debug, Clone)]
 pub(super) struct RefusalCount {
-    pub rows: u64,
-    pub first_line: u64,
-    pub first_detail: String,
+    pub(crate) rows: u64,
+    pub(crate) first_line: u64,
+    pub(crate) first_detail: String,
 }
 
 pub(super) type RefusalCounts = BTreeMap<Reason, RefusalCount>;
@@ -41,8 +41,8 @@ pub(super) fn tally(counts: &mut RefusalCounts, line: u64, refusal: &RowRefusal)
 /// Rows that say something odd about the whole file, with the first of them.
 #[derive(Debug, Clone, Default)]
 pub(super) struct FileOddities {
-    pub rows: u64,
-    pub first: Option<(u64, usize, f64)>,
+    pub(crate) rows: u64,
+    pub(crate) first: Option<(u64, usize, f64)>,
 }
 
 impl FileOddities {
@@ -55,31 +55,31 @@ impl FileOddities {
 /// What the reading of a file found.
 #[derive(Default)]
 pub(super) struct Scan {
-    pub label: String,
-    pub lines: u64,
-    pub read: u64,
+    pub(crate) label: String,
+    pub(crate) lines: u64,
+    pub(crate) read: u64,
     /// The last data row that is not blank all over, as a spreadsheet leaves them at the end.
-    pub last: u64,
-    pub tally: RefusalCounts,
-    pub ids: FileIds,
+    pub(crate) last: u64,
+    pub(crate) tally: RefusalCounts,
+    pub(crate) ids: FileIds,
     /// Time and number of usable rows, for a join by time.
-    pub times: Vec<(f64, u32)>,
+    pub(crate) times: Vec<(f64, u32)>,
     /// Usable data rows, for a join.
-    pub usable: Vec<bool>,
-    pub held: HeldRows,
-    pub slots: Vec<usize>,
+    pub(crate) usable: Vec<bool>,
+    pub(crate) held: HeldRows,
+    pub(crate) slots: Vec<usize>,
     /// Revolute joints beyond one and a half turns.
-    pub turns: FileOddities,
-    pub beyond: FileOddities,
+    pub(crate) turns: FileOddities,
+    pub(crate) beyond: FileOddities,
     /// Largest angle of a revolute joint, rad.
-    pub largest: f64,
+    pub(crate) largest: f64,
     /// Least and largest position of each joint, rad or m.
-    pub ranges: Vec<[f64; 2]>,
+    pub(crate) ranges: Vec<[f64; 2]>,
     /// Where the arm moves: of the file with the joints.
-    pub track: Option<Track>,
+    pub(crate) track: Option<Track>,
     samples: Option<JointSamples>,
     /// Hash of what all its usable rows say, of a file with what was measured.
-    pub measured: Option<u64>,
+    pub(crate) measured: Option<u64>,
     /// What could not be read of the file.
     loss: Option<String>,
 }

@@ -23,16 +23,16 @@ use serde::{Deserialize, Serialize};
 pub struct IngestTorques {
     /// The raw files, each with all quantities; one continues the other. `q`, `time`, and one of `torque` and `current` are needed;
     /// `trajectory`, `usage`, `velocity` and `temperature` are used where they are mapped.
-    pub files: Vec<FileLayout>,
+    pub(crate) files: Vec<FileLayout>,
     /// On which side of the gears `torque` is stated.
     #[serde(default)]
-    pub torque_side: TorqueSide,
+    pub(crate) torque_side: TorqueSide,
     /// What becomes of rows with a joint beyond the robot's limits.
     #[serde(default)]
-    pub limits: LimitPolicy,
+    pub(crate) limits: LimitPolicy,
     /// A file of which more than this share of rows is rejected is an error.
     #[serde(default = "few")]
-    pub max_rejected_fraction: f64,
+    pub(crate) max_rejected_fraction: f64,
 }
 
 /// On which side of the gears a torque is.

@@ -55,8 +55,8 @@ impl Compared {
 
 /// Rows of whole points: held-out ones judge and never choose.
 pub(super) struct ComparedRows {
-    pub choose: Vec<usize>,
-    pub judge: Vec<usize>,
+    pub(crate) choose: Vec<usize>,
+    pub(crate) judge: Vec<usize>,
 }
 
 /// Both models at the points that judge them.
@@ -95,17 +95,17 @@ impl Comparison {
     }
 
     /// Whether the geometry alone is better at the points that choose.
-    pub fn is_worse(&self) -> bool {
+    pub(crate) fn is_worse(&self) -> bool {
         self.chosen_by.points > 0 && self.chosen_by.whole.is_worse(&self.chosen_by.geometry)
     }
 
     /// Whether it is better at the points that judge.
-    pub fn is_worse_where_judged(&self) -> bool {
+    pub(crate) fn is_worse_where_judged(&self) -> bool {
         self.all.points > 0 && self.all.whole.is_worse(&self.all.geometry)
     }
 
     /// Whether it is better where the joints had not been.
-    pub fn is_worse_outside(&self) -> bool {
+    pub(crate) fn is_worse_outside(&self) -> bool {
         let outside = self.parts.as_ref().map(|[_, outside]| outside);
         outside.is_some_and(|outside| {
             outside.points >= FEWEST && outside.whole.is_worse(&outside.geometry)
@@ -113,7 +113,7 @@ impl Comparison {
     }
 
     /// Both, with their figures.
-    pub fn words(&self) -> String {
+    pub(crate) fn words(&self) -> String {
         let Compared {
             points,
             whole,
@@ -173,7 +173,7 @@ impl VisitedCells {
     }
 
     /// Whether joints lie where rows lie.
-    pub fn has(&self, q: &[f64]) -> bool {
+    pub(crate) fn has(&self, q: &[f64]) -> bool {
         let cell = self.cell(q);
         let near = |cell: i64| cell - 1..=cell + 1;
         pairs(cell.len()).all(|(a, b)| {

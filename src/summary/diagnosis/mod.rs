@@ -83,7 +83,7 @@ impl DiagnosisSummary {
     }
 
     /// What a stage `diagnose` says by its tables; the robot's name and the rows of the recording are not in them.
-    pub fn of_tables(run: &str, tables: &TablesByKind) -> Result<Self> {
+    pub(crate) fn of_tables(run: &str, tables: &TablesByKind) -> Result<Self> {
         let positions = Positions::read(tables)?;
         let numbers: FindingNumbers = of_kind(tables)?.unwrap_or_default();
         Ok(Self {
@@ -98,7 +98,7 @@ impl DiagnosisSummary {
     }
 
     /// The same of a robot and a recording with so many rows.
-    pub fn with_subject(self, robot: &str, rows: u64) -> Self {
+    pub(crate) fn with_subject(self, robot: &str, rows: u64) -> Self {
         Self {
             robot: Some(robot.into()),
             rows,
@@ -107,7 +107,7 @@ impl DiagnosisSummary {
     }
 
     /// Whether the files do not belong together as they are read.
-    pub fn is_wrong_setup(&self) -> bool {
+    pub(crate) fn is_wrong_setup(&self) -> bool {
         match &self.kind {
             Kind::Positions(diagnosis) => {
                 diagnosis.verdict.verdict == VerdictKind::WrongSetup.name()
@@ -117,7 +117,7 @@ impl DiagnosisSummary {
     }
 
     /// The proposed formula of a finding, of the first one that has one where none is named, as a file that declares it.
-    pub fn effect_file(&self, finding: Option<i64>) -> Result<String> {
+    pub(crate) fn effect_file(&self, finding: Option<i64>) -> Result<String> {
         let Kind::Positions(positions) = &self.kind else {
             return Err(Error::spec(
                 "--export-effect",
@@ -307,7 +307,7 @@ impl DiagnosisSummary {
     }
 
     /// The verdict in at most twelve words.
-    pub fn verdict(&self) -> String {
+    pub(crate) fn verdict(&self) -> String {
         match &self.kind {
             Kind::Positions(diagnosis) => diagnosis.verdict(),
             Kind::Torques(diagnosis) => diagnosis.verdict(),

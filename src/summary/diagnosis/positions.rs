@@ -25,10 +25,10 @@ const SHOWN: usize = 5;
 
 /// Tables of a diagnosis of positions but findings and sentences.
 pub(super) struct Positions {
-    pub verdict: VerdictRow,
-    pub findings: Findings,
-    pub cells: Cells,
-    pub forms: Forms,
+    pub(crate) verdict: VerdictRow,
+    pub(crate) findings: Findings,
+    pub(crate) cells: Cells,
+    pub(crate) forms: Forms,
     shares: Shares,
     suspects: Suspects,
 }
@@ -47,7 +47,7 @@ impl Positions {
         })
     }
 
-    pub fn found(&self, numbers: &FindingNumbers, rivals: &Rivals) -> Vec<Found> {
+    pub(crate) fn found(&self, numbers: &FindingNumbers, rivals: &Rivals) -> Vec<Found> {
         let one = |row: &FindingRow| {
             let columns =
                 "effect where=place statement probability place_probability none_probability";
@@ -78,7 +78,7 @@ impl Positions {
     }
 
     /// The verdict in at most twelve words.
-    pub fn verdict(&self) -> String {
+    pub(crate) fn verdict(&self) -> String {
         let v = &self.verdict;
         let size = |mm: Option<f64>, rad: Option<f64>| {
             mm.map(length)
@@ -123,7 +123,7 @@ impl Positions {
     }
 
     /// What was measured, and the errors before and after.
-    pub fn head(&self, robot: Option<&str>, rows: u64) -> String {
+    pub(crate) fn head(&self, robot: Option<&str>, rows: u64) -> String {
         let v = &self.verdict;
         let mut text = screen::measured(
             robot,
@@ -200,14 +200,14 @@ impl Positions {
     }
 
     /// The same, the worst first.
-    pub fn worst_aside(&self) -> Vec<&SuspectsRow> {
+    pub(crate) fn worst_aside(&self) -> Vec<&SuspectsRow> {
         let mut all: Vec<&SuspectsRow> = self.aside().collect();
         all.sort_by(|a, b| b.size_mm.total_cmp(&a.size_mm));
         all
     }
 
     /// How many rows are not fitted, and the worst of them by name.
-    pub fn set_aside(&self) -> Option<String> {
+    pub(crate) fn set_aside(&self) -> Option<String> {
         let all = self.worst_aside();
         let named: Vec<String> = all
             .iter()
@@ -245,7 +245,7 @@ impl Positions {
     }
 
     /// The formulas of a finding, a line each.
-    pub fn formulas(&self, rank: i64) -> String {
+    pub(crate) fn formulas(&self, rank: i64) -> String {
         let line = |rows: &[FormRow]| {
             let proposed = if rows.iter().any(|row| row.proposed) {
                 ", proposed"

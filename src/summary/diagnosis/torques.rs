@@ -18,7 +18,7 @@ use std::cmp::Ordering;
 
 /// Tables of a diagnosis of torques but findings and sentences.
 pub(super) struct Torques {
-    pub verdict: TorqueVerdictRow,
+    pub(crate) verdict: TorqueVerdictRow,
     findings: TorqueFindings,
     joints: Vec<JointTorqueRow>,
     contacts: Contacts,
@@ -37,7 +37,7 @@ impl Torques {
         })
     }
 
-    pub fn found(&self, numbers: &FindingNumbers, rivals: &Rivals) -> Vec<Found> {
+    pub(crate) fn found(&self, numbers: &FindingNumbers, rivals: &Rivals) -> Vec<Found> {
         let one = |row: &TorqueFindingRow| {
             let columns =
                 "effect where=place statement probability place_probability none_probability";
@@ -71,7 +71,7 @@ impl Torques {
     }
 
     /// The verdict in at most twelve words.
-    pub fn verdict(&self) -> String {
+    pub(crate) fn verdict(&self) -> String {
         let worst = self
             .joints
             .iter()
@@ -96,7 +96,7 @@ impl Torques {
     }
 
     /// What was measured, and the errors before and after.
-    pub fn head(&self, robot: Option<&str>, found: usize) -> String {
+    pub(crate) fn head(&self, robot: Option<&str>, found: usize) -> String {
         let v = &self.verdict;
         let rows = format!(
             "{} rows at {:.0} Hz, low-pass {:.1} Hz",
@@ -152,7 +152,7 @@ impl Torques {
     }
 
     /// What is left at each joint, a line each.
-    pub fn left(&self) -> String {
+    pub(crate) fn left(&self) -> String {
         let line = |row: &JointTorqueRow| {
             let left = row.signature.as_ref()?;
             Some(format!("residual at joint {}: {left}\n", row.joint))

@@ -19,9 +19,9 @@ use std::collections::BTreeSet;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tampering {
     /// What was done, by its canonical name.
-    pub effect: &'static str,
+    pub(crate) effect: &'static str,
     /// Rows, from 0.
-    pub rows: Vec<usize>,
+    pub(crate) rows: Vec<usize>,
 }
 
 /// A finished case.

@@ -97,7 +97,7 @@ impl Design {
     }
 
     /// Robots to draw from.
-    pub fn kinds(&self) -> Vec<Kind> {
+    pub(crate) fn kinds(&self) -> Vec<Kind> {
         if self.robots.is_empty() {
             self.collection.robots().to_vec()
         } else {
@@ -147,7 +147,7 @@ impl Design {
     }
 
     /// The seed of a case: splitmix64 of the design's seed and the case's number.
-    pub fn seed_of(&self, case: usize) -> u64 {
+    pub(crate) fn seed_of(&self, case: usize) -> u64 {
         let mut z = self
             .seed
             .wrapping_add((case as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15));

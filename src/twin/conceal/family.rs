@@ -43,24 +43,24 @@ pub struct Cause {
     /// What makes it.
     pub physical: Vec<Physical>,
     /// Its size may be changed to reach a visibility.
-    pub sized: bool,
+    pub(crate) sized: bool,
     /// Must be named; what only goes along with another cause may be.
     pub wanted: bool,
 }
 
 /// What a family has drawn.
 #[derive(Debug, Clone)]
-pub struct Draft {
+pub(crate) struct Draft {
     /// The form, in a few words.
-    pub form: &'static str,
+    pub(crate) form: &'static str,
     /// More than one where they act together.
-    pub causes: Vec<Cause>,
+    pub(crate) causes: Vec<Cause>,
     /// Names that are true as well, or that no position data can separate: they neither count nor hurt.
-    pub accepted: Vec<(&'static str, String)>,
+    pub(crate) accepted: Vec<(&'static str, String)>,
     /// Columns without which nobody can name it.
-    pub needs: Vec<Column>,
+    pub(crate) needs: Vec<Column>,
     /// Columns that the form takes away.
-    pub hides: Vec<Column>,
+    pub(crate) hides: Vec<Column>,
 }
 
 impl Draft {
@@ -125,7 +125,7 @@ fn link(number: usize) -> String {
 
 /// Whether a form is the one that a library would hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Form {
+pub(crate) enum Form {
     /// As a library would hold it.
     Obvious,
     /// Otherwise.
@@ -134,19 +134,19 @@ pub enum Form {
 
 /// What a family may look at: the robot, the plan, and the loads of the undeflected arm.
 #[derive(Debug)]
-pub struct Bench<'a> {
+pub(crate) struct Bench<'a> {
     /// As its owner believes it to be.
-    pub robot: &'a RobotDescription,
+    pub(crate) robot: &'a RobotDescription,
     /// Ranges of every joint, deg.
-    pub ranges_deg: &'a [[f64; 2]],
+    pub(crate) ranges_deg: &'a [[f64; 2]],
     /// Largest torque on each joint over the points, Nm.
-    pub peak: Vec<f64>,
+    pub(crate) peak: Vec<f64>,
     /// Largest moment about the foot, Nm.
-    pub overturning: f64,
+    pub(crate) overturning: f64,
     /// When the last point to fit is measured, and when the load changes, s.
-    pub end_s: f64,
+    pub(crate) end_s: f64,
     /// s.
-    pub change_s: f64,
+    pub(crate) change_s: f64,
 }
 
 impl<'a> Bench<'a> {
@@ -267,9 +267,9 @@ pub struct Family {
     /// The canonical name of the effect; `unknown` for what is in no list.
     pub name: &'static str,
     /// Draws one.
-    pub draw: Draw,
+    pub(crate) draw: Draw,
     /// May stand beside another one.
-    pub paired: bool,
+    pub(crate) paired: bool,
 }
 
 const fn alone(name: &'static str, draw: Draw) -> Family {
@@ -355,7 +355,7 @@ impl Collection {
     }
 
     /// Robots that are drawn.
-    pub fn robots(self) -> &'static [Kind] {
+    pub(crate) fn robots(self) -> &'static [Kind] {
         match self {
             Self::Library => &KINDS,
             Self::Beyond => &ALL_KINDS,

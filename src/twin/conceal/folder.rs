@@ -12,7 +12,7 @@ use calib_foundation::description::RobotDescription;
 use serde_json::{Value, json};
 
 /// A file's name and its bytes.
-pub type File = (&'static str, String);
+pub(crate) type File = (&'static str, String);
 
 /// A controller's display and a tracker's.
 const DECIMALS: Decimals = Decimals {

@@ -13,5 +13,5 @@ pub mod folder;
 pub mod layout;
 pub mod points;
 pub mod robots;
-pub mod size;
-pub mod visible;
+pub(crate) mod size;
+pub(crate) mod visible;

@@ -10,7 +10,7 @@ use crate::truth::TrueRobot;
 /// Blocks of the plan: points to fit and points held out.
 pub const FIT: usize = 0;
 /// Number of the block of points to judge by.
-pub const VALIDATE: usize = 1;
+pub(crate) const VALIDATE: usize = 1;
 
 /// How many points, and which of them twice.
 #[derive(Debug, Clone, Copy)]

@@ -18,7 +18,7 @@ pub enum Kind {
 }
 
 /// Those that recordings with effects of the library are made of.
-pub const KINDS: [Kind; 3] = [Kind::Sr210d, Kind::Compact6, Kind::Seven7r];
+pub(crate) const KINDS: [Kind; 3] = [Kind::Sr210d, Kind::Compact6, Kind::Seven7r];
 /// All of them.
 pub const ALL_KINDS: [Kind; 4] = [Kind::Sr210d, Kind::Compact6, Kind::Seven7r, Kind::Five5r];
 

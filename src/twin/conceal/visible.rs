@@ -15,15 +15,15 @@ use calib_foundation::description::RobotDescription;
 
 /// What a recording is made of, but for its effects and its noise.
 #[derive(Debug, Clone, Copy)]
-pub struct Site<'a> {
+pub(crate) struct Site<'a> {
     /// As its owner believes it to be.
-    pub robot: &'a RobotDescription,
+    pub(crate) robot: &'a RobotDescription,
     /// With a number for every joint, link and coupling.
-    pub truth: &'a TrueRobot,
+    pub(crate) truth: &'a TrueRobot,
     /// Where it stands and how well it measures.
-    pub tracker: &'a Tracker,
+    pub(crate) tracker: &'a Tracker,
     /// In the order of measurement.
-    pub points: &'a [Point],
+    pub(crate) points: &'a [Point],
 }
 
 /// Coordinates of all points after each other, tracker frame, m.
@@ -63,7 +63,7 @@ impl Site<'_> {
     }
 
     /// What the tracker sees with effects, less what it would see without them of the joints as logged.
-    pub fn displacement(&self, effects: &[Physical]) -> Column {
+    pub(crate) fn displacement(&self, effects: &[Physical]) -> Column {
         let base = self.tracker.base();
         let seen = self
             .at_rest(effects)
@@ -74,7 +74,7 @@ impl Site<'_> {
 
     /// What foreign effects do at the points after the first `fit` ones beyond what these show of them, root mean square of a coordinate, m:
     /// the effects less the same known without noise at the points to fit, and straight between them.
-    pub fn unseen(&self, fit: usize, effects: &[Physical]) -> f64 {
+    pub(crate) fn unseen(&self, fit: usize, effects: &[Physical]) -> f64 {
         let is_foreign = |effect: &Physical| matches!(effect, Physical::Foreign(_));
         if !effects.iter().any(is_foreign) {
             return 0.0;
@@ -163,7 +163,7 @@ impl Site<'_> {
     }
 
     /// Root mean square of a coordinate's noise: the tracker's, and the joints' from move to move (rad), m.
-    pub fn noise(&self, play_rad: f64) -> f64 {
+    pub(crate) fn noise(&self, play_rad: f64) -> f64 {
         let bare = self.bare(self.truth, self.tracker, &[]);
         let beam: f64 = bare
             .as_chunks::<3>()
@@ -188,7 +188,7 @@ impl Site<'_> {
     }
 
     /// The space of everything that geometry can do.
-    pub fn shadow(&self) -> Shadow {
+    pub(crate) fn shadow(&self) -> Shadow {
         let mut shadow = Shadow { basis: Vec::new() };
         let mut left: Vec<Column> = self.geometry().into_iter().filter_map(unit).collect();
         // The column with most of its own comes first, so that what hardly differs from the others cannot pass on its rounding.
@@ -210,7 +210,7 @@ impl Site<'_> {
 
 /// An orthonormal basis.
 #[derive(Debug, Clone)]
-pub struct Shadow {
+pub(crate) struct Shadow {
     basis: Vec<Column>,
 }
 
@@ -219,12 +219,12 @@ const OWN: f64 = 1e-6;
 
 impl Shadow {
     /// Dimension of the space.
-    pub fn rank(&self) -> usize {
+    pub(crate) fn rank(&self) -> usize {
         self.basis.len()
     }
 
     /// Takes a direction in; none where the space holds it already.
-    pub fn add(&mut self, column: Column) {
+    pub(crate) fn add(&mut self, column: Column) {
         let size = norm(&column);
         let left = self.outside(column);
         if norm(&left) > OWN * size {
@@ -233,7 +233,7 @@ impl Shadow {
     }
 
     /// What of a column lies outside of the space.
-    pub fn outside(&self, mut column: Column) -> Column {
+    pub(crate) fn outside(&self, mut column: Column) -> Column {
         for _ in 0..2 {
             self.basis
                 .iter()
@@ -244,7 +244,7 @@ impl Shadow {
 }
 
 /// Length of a column.
-pub fn norm(column: &[f64]) -> f64 {
+pub(crate) fn norm(column: &[f64]) -> f64 {
     column.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 

@@ -39,7 +39,7 @@ pub enum ForeignMotion {
 
 impl ForeignMotion {
     /// Whether it acts in what the instrument reads, and not on the arm.
-    pub fn is_sighted(self) -> bool {
+    pub(crate) fn is_sighted(self) -> bool {
         matches!(self, Self::Range | Self::Azimuth | Self::Elevation)
     }
 }
@@ -116,7 +116,7 @@ impl Foreign {
     }
 
     /// The same as far as rows show it at which the variables of its courses have these values: straight lines between them.
-    pub fn known_at(&self, values: &[Vec<f64>]) -> Self {
+    pub(crate) fn known_at(&self, values: &[Vec<f64>]) -> Self {
         let known =
             |(k, course): (usize, &ForeignCourse)| course.known_at(values.iter().map(|all| all[k]));
         Self {
@@ -310,7 +310,7 @@ impl ForeignVariable {
     }
 
     /// Whether it depends on the rows before.
-    pub fn is_remembered(&self) -> bool {
+    pub(crate) fn is_remembered(&self) -> bool {
         matches!(
             self,
             Self::LastMove(_) | Self::Relaxing(..) | Self::Slipping(..)

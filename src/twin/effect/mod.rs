@@ -23,19 +23,19 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// What an effect may look at: the row, and the arm as it hangs at present.
-pub struct State<'a> {
+pub(crate) struct State<'a> {
     /// As it really is.
-    pub arm: &'a Arm,
+    pub(crate) arm: &'a Arm,
     /// What is recorded at this point.
-    pub row: &'a Row,
+    pub(crate) row: &'a Row,
     /// Where everything is.
-    pub posture: &'a Posture,
+    pub(crate) posture: &'a Posture,
     /// What it carries.
-    pub loads: &'a Loads,
+    pub(crate) loads: &'a Loads,
     /// Torque of gravity and of other loads on each joint, Nm.
-    pub torque: &'a [f64],
+    pub(crate) torque: &'a [f64],
     /// What this effect makes of the rows before.
-    pub memory: f64,
+    pub(crate) memory: f64,
 }
 
 /// A joint as it is at present.
@@ -291,11 +291,11 @@ physical! {
 
 impl Physical {
     /// Adds what the effect does in `state` to `motion`.
-    pub fn act(&self, state: &State, motion: &mut Motion) {
+    pub(crate) fn act(&self, state: &State, motion: &mut Motion) {
         self.inner().act(state, motion);
     }
     /// Changes what the arm is for the whole recording.
-    pub fn shape(&self, arm: &mut Arm) {
+    pub(crate) fn shape(&self, arm: &mut Arm) {
         self.inner().shape(arm);
     }
     /// What the tracker reads of a point, m in its frame.
@@ -303,11 +303,11 @@ impl Physical {
         self.inner().sight(row, memory, point)
     }
     /// Changes what the controller logs of the joint positions `q` after a move from `before`, rad or m.
-    pub fn log(&self, q: &mut [f64], before: &[f64]) {
+    pub(crate) fn log(&self, q: &mut [f64], before: &[f64]) {
         self.inner().log(q, before);
     }
     /// How much later than the joints beside it a point is measured, s.
-    pub fn later(&self) -> f64 {
+    pub(crate) fn later(&self) -> f64 {
         self.inner().later()
     }
     /// Whether a standing arm knows nothing of it.
@@ -315,7 +315,7 @@ impl Physical {
         self.inner().moves_only()
     }
     /// The same effect, `by` times as large.
-    pub fn scaled(&self, by: f64) -> Physical {
+    pub(crate) fn scaled(&self, by: f64) -> Physical {
         let mut out = self.clone();
         out.inner_mut().scale(by);
         out

@@ -10,21 +10,21 @@ use serde_json::json;
 use std::collections::BTreeMap;
 
 /// Lower ends of the bins of visibility L.
-pub const BINS: [f64; 5] = [0.0, 5.0, 15.0, 50.0, 200.0];
+pub(crate) const BINS: [f64; 5] = [0.0, 5.0, 15.0, 50.0, 200.0];
 /// A held-out error that is no larger over its bound is as good as can be expected.
-pub const NEAR_BOUND: f64 = 1.15;
+pub(crate) const NEAR_BOUND: f64 = 1.15;
 
 /// Outcomes of causes.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Counts {
+pub(crate) struct Counts {
     /// Named, at their places.
-    pub exact: usize,
+    pub(crate) exact: usize,
     /// Among the rivals.
-    pub in_set: usize,
+    pub(crate) in_set: usize,
     /// Not named, and something else was.
-    pub wrong: usize,
+    pub(crate) wrong: usize,
     /// Not named, and nothing else was.
-    pub silent: usize,
+    pub(crate) silent: usize,
 }
 
 impl Counts {
@@ -41,11 +41,11 @@ impl Counts {
         out
     }
     /// All of them.
-    pub fn all(&self) -> usize {
+    pub(crate) fn all(&self) -> usize {
         self.exact + self.in_set + self.wrong + self.silent
     }
     /// Those that were named.
-    pub fn exactly(&self) -> Share {
+    pub(crate) fn exactly(&self) -> Share {
         Share {
             count: self.exact,
             of: self.all(),
@@ -84,7 +84,7 @@ const OWN_FORMS: [&str; 6] = [
 
 /// What a set of effects is counted over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Company {
+pub(crate) enum Company {
     /// The only cause of its recording.
     Alone,
     /// One of several.
@@ -99,7 +99,7 @@ impl Board {
     }
 
     /// Outcomes by bin of visibility.
-    pub fn by_strength(&self, company: Company) -> Vec<Counts> {
+    pub(crate) fn by_strength(&self, company: Company) -> Vec<Counts> {
         let upper = |bin: usize| BINS.get(bin + 1).copied().unwrap_or(f64::INFINITY);
         let alone = |case: &Case| (case.causes.len() == 1) == (company == Company::Alone);
         (0..BINS.len())
@@ -129,14 +129,14 @@ impl Board {
     }
 
     /// Outcomes of due causes by effect.
-    pub fn by_effect(&self) -> BTreeMap<&str, Counts> {
+    pub(crate) fn by_effect(&self) -> BTreeMap<&str, Counts> {
         let due = self.due_by_effect().into_iter();
         due.map(|(name, causes)| (name, Counts::of(causes.into_iter())))
             .collect()
     }
 
     /// Places and names of due causes: of all, and by effect.
-    pub fn places(&self) -> (Places, BTreeMap<&str, Places>) {
+    pub(crate) fn places(&self) -> (Places, BTreeMap<&str, Places>) {
         let by_effect = self.due_by_effect().into_iter().map(|(name, causes)| {
             let placed = causes.into_iter().map(|cause| cause.placed);
             (name, Places::of(placed))
@@ -146,13 +146,13 @@ impl Board {
     }
 
     /// Recordings with a due effect whose held-out error is near its bound.
-    pub fn near_bound(&self) -> Share {
+    pub(crate) fn near_bound(&self) -> Share {
         let [due, _] = self.ratios();
         Share::of(due.iter().map(|ratio| *ratio <= NEAR_BOUND))
     }
 
     /// Due causes whose formula the library has, or has not: outcomes, and the mean probability that the true name was given.
-    pub fn by_formula(&self, shared: bool) -> (Counts, Option<f64>) {
+    pub(crate) fn by_formula(&self, shared: bool) -> (Counts, Option<f64>) {
         let own: Vec<&Marked> = self
             .due()
             .filter(|cause| (cause.strange || OWN_FORMS.contains(&cause.form.as_str())) != shared)
@@ -163,7 +163,7 @@ impl Board {
     }
 
     /// Due causes: effect -> what it was called (`=`: rightly; `-`: nothing) -> how often.
-    pub fn confusion(&self) -> BTreeMap<&str, BTreeMap<String, usize>> {
+    pub(crate) fn confusion(&self) -> BTreeMap<&str, BTreeMap<String, usize>> {
         let mut out: BTreeMap<&str, BTreeMap<String, usize>> = BTreeMap::new();
         for cause in self.due() {
             let called = match (cause.outcome, &cause.label) {
@@ -185,12 +185,12 @@ impl Board {
     }
 
     /// Recordings without an effect in which one was declared.
-    pub fn alarms(&self) -> Share {
+    pub(crate) fn alarms(&self) -> Share {
         self.named_besides(true)
     }
 
     /// Recordings with effects in which something was named that is not there.
-    pub fn strays(&self) -> Share {
+    pub(crate) fn strays(&self) -> Share {
         self.named_besides(false)
     }
 
@@ -201,7 +201,7 @@ impl Board {
     }
 
     /// Recordings whose causes are all due: all named and nothing else; and the strongest named.
-    pub fn whole(&self, content: &str) -> [Share; 2] {
+    pub(crate) fn whole(&self, content: &str) -> [Share; 2] {
         let due = |case: &&Case| {
             case.content == content && case.causes.iter().all(|cause| cause.strength >= DUE)
         };
@@ -219,7 +219,7 @@ impl Board {
     }
 
     /// Faults of the recording by kind: how many were named.
-    pub fn tampered(&self) -> BTreeMap<&str, Share> {
+    pub(crate) fn tampered(&self) -> BTreeMap<&str, Share> {
         let faults = self.cases.iter().flat_map(|case| &case.tampered);
         Share::by_kind(faults.map(|(kind, named)| (kind.as_str(), *named)))
     }
@@ -234,7 +234,7 @@ impl Board {
     }
 
     /// Held-out errors over their bounds, ascending, where an effect is due, and in recordings without one.
-    pub fn ratios(&self) -> [Vec<f64>; 2] {
+    pub(crate) fn ratios(&self) -> [Vec<f64>; 2] {
         let nulls = self
             .cases
             .iter()
@@ -252,7 +252,7 @@ impl Board {
     }
 
     /// Recordings with a due effect whose held-out error is larger with the findings than before.
-    pub fn worse(&self) -> Share {
+    pub(crate) fn worse(&self) -> Share {
         Share::of(
             self.held_out_of_due()
                 .map(|held_out| held_out.after > held_out.before),
@@ -260,7 +260,7 @@ impl Board {
     }
 
     /// Recordings with a due effect whose held-out error is larger with the findings than before, and than its bound.
-    pub fn worse_than_bound(&self) -> Share {
+    pub(crate) fn worse_than_bound(&self) -> Share {
         Share::of(
             self.held_out_of_due()
                 .map(|held_out| held_out.after > held_out.before.max(held_out.bound)),
@@ -268,7 +268,7 @@ impl Board {
     }
 
     /// Explained shares of held-out errors where an effect is due, ascending.
-    pub fn explained(&self) -> Vec<f64> {
+    pub(crate) fn explained(&self) -> Vec<f64> {
         let mut out: Vec<f64> = self
             .held_out_of_due()
             .filter_map(|held_out| held_out.explained())
@@ -279,19 +279,19 @@ impl Board {
 
     /// Stated 95 % intervals that hold the true number, by effect; of recordings in which all due causes were named and nothing
     /// else: the numbers of a wrong model are not those of the truth.
-    pub fn intervals(&self) -> BTreeMap<&str, Share> {
+    pub(crate) fn intervals(&self) -> BTreeMap<&str, Share> {
         let right = self.cases.iter().filter(|case| case.right(DUE));
         let all = right.flat_map(|case| &case.intervals);
         Share::by_kind(all.map(|interval| (interval.effect.as_str(), interval.holds)))
     }
 
     /// Stated probabilities against what was true.
-    pub fn reliability(&self, subject: Subject) -> Reliability {
+    pub(crate) fn reliability(&self, subject: Subject) -> Reliability {
         reliability(self.cases.iter().flat_map(|case| &case.statements), subject)
     }
 
     /// Stated probabilities of recordings without their causes in which the data cannot tell that something is left out.
-    pub fn untold_reliability(&self) -> Reliability {
+    pub(crate) fn untold_reliability(&self) -> Reliability {
         let untold = self
             .left_out
             .iter()
@@ -300,7 +300,7 @@ impl Board {
     }
 
     /// Verdicts by content.
-    pub fn verdicts(&self) -> BTreeMap<(&str, &str), usize> {
+    pub(crate) fn verdicts(&self) -> BTreeMap<(&str, &str), usize> {
         let mut out = BTreeMap::new();
         for case in &self.cases {
             *out.entry((case.content.as_str(), case.verdict.as_str()))
@@ -310,7 +310,7 @@ impl Board {
     }
 
     /// Recordings that were not right: a due cause missed, or something said that is not there.
-    pub fn failures(&self) -> impl Iterator<Item = &Case> {
+    pub(crate) fn failures(&self) -> impl Iterator<Item = &Case> {
         self.cases.iter().filter(|case| !case.right(DUE))
     }
 }

@@ -7,24 +7,24 @@ use super::reliability::{Statement, Subject, ends, within};
 use serde::Serialize;
 
 /// Shares of recordings whose cause nobody listed.
-pub const UNLISTED: [f64; 2] = [0.3, 0.5];
+pub(crate) const UNLISTED: [f64; 2] = [0.3, 0.5];
 
 /// Statements of both kinds whose probability lies in a range.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct MixedBin {
-    pub from: f64,
-    pub to: f64,
-    pub stated: f64,
+pub(crate) struct MixedBin {
+    pub(crate) from: f64,
+    pub(crate) to: f64,
+    pub(crate) stated: f64,
     /// The share of statements that held.
-    pub right: f64,
+    pub(crate) right: f64,
     /// How many statements there are with the whole list, and without the cause.
-    pub statements_whole_list: usize,
-    pub statements_left_out: usize,
+    pub(crate) statements_whole_list: usize,
+    pub(crate) statements_left_out: usize,
 }
 
 impl Board {
     /// Stated probabilities of names of the recordings that were diagnosed with the whole list and without their causes.
-    pub fn mixed_reliability(&self, unlisted: f64) -> Vec<MixedBin> {
+    pub(crate) fn mixed_reliability(&self, unlisted: f64) -> Vec<MixedBin> {
         let due = || self.left_out.iter().filter(|one| one.strength >= DUE);
         let listed = self
             .cases

@@ -7,11 +7,11 @@ use calib_foundation::units::Unit;
 
 /// Whether a stated 95 % interval holds the true number.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Interval {
-    pub effect: String,
-    pub name: String,
+pub(crate) struct Interval {
+    pub(crate) effect: String,
+    pub(crate) name: String,
     /// Whether it holds the truth.
-    pub holds: bool,
+    pub(crate) holds: bool,
 }
 
 /// Two-sided 95 % of a normal distribution.

@@ -8,26 +8,26 @@ use super::share::Share;
 use std::collections::BTreeSet;
 
 /// A held-out error that exceeds the whole list's by this factor tells that something is left out.
-pub const TELLS: f64 = 1.1;
+pub(crate) const TELLS: f64 = 1.1;
 /// Verdicts by which nothing is left to be found.
 const CONTENT: [&str; 2] = ["explained", "nothing_missing"];
 
 /// A recording that was diagnosed without its causes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LeftOut {
-    pub name: String,
+    pub(crate) name: String,
     /// What was left out.
     pub effect: String,
     /// L of it.
-    pub strength: f64,
+    pub(crate) strength: f64,
     /// Whether the data can tell: the held-out error is above [`TELLS`] times that of a diagnosis with the whole list.
-    pub tells: bool,
+    pub(crate) tells: bool,
     /// The wrong name with the highest probability, `effect at place`.
-    pub wrong: Option<(String, f64)>,
-    pub verdict: String,
+    pub(crate) wrong: Option<(String, f64)>,
+    pub(crate) verdict: String,
     /// A finding has the name that was left out.
-    pub came_back: bool,
-    pub statements: Vec<Statement>,
+    pub(crate) came_back: bool,
+    pub(crate) statements: Vec<Statement>,
 }
 
 /// Marks a diagnosis `without` the causes of the recording beside one with the `whole` list; none where no single cause of the list was
@@ -84,20 +84,20 @@ pub fn left_out(truth: &Truth, whole: &Answer, without: &Answer) -> Option<LeftO
 
 /// Shares over recordings of one kind.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct LeftOutShares {
+pub(crate) struct LeftOutShares {
     /// A wrong name with [`GIVEN`] or more.
-    pub wrong: Share,
+    pub(crate) wrong: Share,
     /// A wrong name with 0.9 or more.
-    pub sure: Share,
+    pub(crate) sure: Share,
     /// Said to be explained, or that nothing is missing.
-    pub content: Share,
+    pub(crate) content: Share,
     /// The name that was left out was given.
-    pub came_back: Share,
+    pub(crate) came_back: Share,
 }
 
 impl LeftOutShares {
     /// Shares over recordings of L from [`DUE`] on in which the data can tell, or cannot.
-    pub fn of(all: &[LeftOut], tells: bool) -> LeftOutShares {
+    pub(crate) fn of(all: &[LeftOut], tells: bool) -> LeftOutShares {
         let own = || {
             all.iter()
                 .filter(|one| one.strength >= DUE && one.tells == tells)
@@ -116,7 +116,7 @@ impl LeftOutShares {
     }
 
     /// Each with a title.
-    pub fn titled(&self) -> [(String, Share); 4] {
+    pub(crate) fn titled(&self) -> [(String, Share); 4] {
         [
             (format!("a wrong name with {GIVEN} or more"), self.wrong),
             ("a wrong name with 0.9 or more".into(), self.sure),

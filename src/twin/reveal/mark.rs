@@ -6,7 +6,7 @@ use super::place::{POINT_FAULTS, Placed, placed};
 use super::reliability::{Statement, statements};
 
 /// From this visibility on an effect should be named.
-pub const DUE: f64 = 50.0;
+pub(crate) const DUE: f64 = 50.0;
 
 /// How a cause was named.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -40,16 +40,16 @@ pub struct Marked {
     pub place: String,
     pub form: String,
     /// Made by a formula that the library is not expected to hold.
-    pub strange: bool,
+    pub(crate) strange: bool,
     /// L, squared visible displacement over the variance of the noise.
     pub strength: f64,
     pub outcome: Outcome,
     /// Whether its place was found.
     pub placed: Placed,
     /// What was said instead, strongest first: `effect at place`.
-    pub label: Option<String>,
+    pub(crate) label: Option<String>,
     /// The stated probability of the true name, 0 where nothing was called so; none where no finding states any.
-    pub probability: Option<f64>,
+    pub(crate) probability: Option<f64>,
 }
 
 /// Held-out errors against what noise and the parameters' uncertainty leave, rms mm.
@@ -64,11 +64,11 @@ pub struct HeldOut {
 
 impl HeldOut {
     /// After over its bound.
-    pub fn ratio(&self) -> f64 {
+    pub(crate) fn ratio(&self) -> f64 {
         self.after / self.bound
     }
     /// Share of the squared error above the bound that is gone; none where there was next to nothing to explain.
-    pub fn explained(&self) -> Option<f64> {
+    pub(crate) fn explained(&self) -> Option<f64> {
         let above = |rms: f64| rms.powi(2) - self.bound.powi(2);
         (above(self.before) > 0.1 * self.bound.powi(2))
             .then(|| 1.0 - above(self.after).max(0.0) / above(self.before))
@@ -81,7 +81,7 @@ pub struct Case {
     pub name: String,
     /// What it conceals: null, single, pair or open.
     pub content: String,
-    pub family: String,
+    pub(crate) family: String,
     pub robot: String,
     pub points: usize,
     pub verdict: String,
@@ -93,13 +93,13 @@ pub struct Case {
     /// Where points were held out.
     pub held_out: Option<HeldOut>,
     /// Intervals of the numbers that were stated.
-    pub intervals: Vec<Interval>,
-    pub statements: Vec<Statement>,
+    pub(crate) intervals: Vec<Interval>,
+    pub(crate) statements: Vec<Statement>,
 }
 
 impl Case {
     /// Every cause of at least this strength named exactly, and nothing said that is not there.
-    pub fn right(&self, strength: f64) -> bool {
+    pub(crate) fn right(&self, strength: f64) -> bool {
         let due = |cause: &&Marked| cause.strength >= strength;
         self.strays.is_empty()
             && self

@@ -5,12 +5,12 @@
 //! Nothing of the diagnosis is used: what it said is read as any reader of its JSON would.
 
 pub mod board;
-pub mod both_worlds;
-pub mod interval;
+pub(crate) mod both_worlds;
+pub(crate) mod interval;
 pub mod left_out;
 pub mod mark;
 pub mod paper;
 pub mod place;
-pub mod reliability;
-pub mod share;
+pub(crate) mod reliability;
+pub(crate) mod share;
 mod text;

@@ -6,21 +6,21 @@ use std::collections::BTreeSet;
 /// An effect and its place.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
 pub struct Name {
-    pub effect: String,
+    pub(crate) effect: String,
     #[serde(rename = "where")]
-    pub place: String,
+    pub(crate) place: String,
 }
 
 /// A true number.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
-pub struct Number {
-    pub name: String,
-    pub value: f64,
+pub(crate) struct Number {
+    pub(crate) name: String,
+    pub(crate) value: f64,
     #[serde(default)]
-    pub unit: String,
+    pub(crate) unit: String,
     /// One standard deviation, if stated.
     #[serde(default)]
-    pub sigma: Option<f64>,
+    pub(crate) sigma: Option<f64>,
 }
 
 /// A concealed cause.
@@ -29,20 +29,20 @@ pub struct Cause {
     pub effect: String,
     #[serde(rename = "where")]
     pub place: String,
-    pub form: String,
+    pub(crate) form: String,
     /// Made by a formula that the library is not expected to hold.
     #[serde(default)]
-    pub strange: bool,
+    pub(crate) strange: bool,
     /// False for what goes along with another cause: it may be named, or counted to that one.
     #[serde(default = "yes")]
     pub wanted: bool,
     /// Squared visible displacement over the noise's variance.
     #[serde(rename = "L")]
-    pub strength: f64,
+    pub(crate) strength: f64,
     /// What data cannot separate from it: as good as its own name and place.
     #[serde(default)]
     pub same: Vec<Name>,
-    pub parameters: Vec<Number>,
+    pub(crate) parameters: Vec<Number>,
 }
 
 fn yes() -> bool {
@@ -51,21 +51,21 @@ fn yes() -> bool {
 
 /// How many points.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
-pub struct Points {
-    pub fit: usize,
-    pub validate: usize,
+pub(crate) struct Points {
+    pub(crate) fit: usize,
+    pub(crate) validate: usize,
 }
 
 /// Noise as it fell out, mm.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
-pub struct NoiseSize {
+pub(crate) struct NoiseSize {
     /// At the points to fit.
-    pub fit_rms_per_axis_mm: f64,
+    pub(crate) fit_rms_per_axis_mm: f64,
     /// At the points to judge by.
-    pub validate_rms_per_axis_mm: f64,
+    pub(crate) validate_rms_per_axis_mm: f64,
     /// What foreign effects do there beyond what the points to fit show of them.
     #[serde(default)]
-    pub unseen_rms_per_axis_mm: f64,
+    pub(crate) unseen_rms_per_axis_mm: f64,
 }
 
 /// The truth of a case; what it holds besides is not needed here.
@@ -74,32 +74,32 @@ pub struct Truth {
     pub case: String,
     /// `null`, `single`, `pair`, `open`.
     pub content: String,
-    pub family: String,
-    pub robot: String,
+    pub(crate) family: String,
+    pub(crate) robot: String,
     /// Names that are right too.
-    pub accepted: Vec<Name>,
+    pub(crate) accepted: Vec<Name>,
     pub effects: Vec<Cause>,
-    pub tampered: Vec<Name>,
-    pub points: Points,
+    pub(crate) tampered: Vec<Name>,
+    pub(crate) points: Points,
     /// Numbers that geometry amounts to.
     #[serde(default)]
-    pub geometry_rank: usize,
+    pub(crate) geometry_rank: usize,
     /// As it fell out, of recordings of points.
     #[serde(default)]
-    pub noise: Option<NoiseSize>,
+    pub(crate) noise: Option<NoiseSize>,
 }
 
 /// Errors of held-out points.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
-pub struct Errors {
+pub(crate) struct Errors {
     /// rms, mm.
     #[serde(default)]
-    pub validate_rms_mm: Option<f64>,
+    pub(crate) validate_rms_mm: Option<f64>,
 }
 
 /// A finding as the diagnosis states it.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
-pub struct Finding {
+pub(crate) struct Finding {
     pub effect: String,
     #[serde(rename = "where")]
     pub place: String,
@@ -110,35 +110,35 @@ pub struct Finding {
     pub rivals: Vec<Rival>,
     /// That it is this effect at this place, and that it acts at this place.
     #[serde(default)]
-    pub probability: Option<f64>,
+    pub(crate) probability: Option<f64>,
     #[serde(default)]
-    pub place_probability: Option<f64>,
+    pub(crate) place_probability: Option<f64>,
 }
 
 /// Another explanation of a finding.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
-pub struct Rival {
-    pub effect: String,
+pub(crate) struct Rival {
+    pub(crate) effect: String,
     #[serde(rename = "where")]
-    pub place: String,
+    pub(crate) place: String,
     #[serde(default)]
-    pub probability: Option<f64>,
+    pub(crate) probability: Option<f64>,
 }
 
 /// What a diagnosis said.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Answer {
-    pub verdict: String,
+    pub(crate) verdict: String,
     #[serde(default)]
-    pub before: Option<Errors>,
+    pub(crate) before: Option<Errors>,
     #[serde(default)]
-    pub after: Option<Errors>,
+    pub(crate) after: Option<Errors>,
     /// The strongest first.
-    pub findings: Vec<Finding>,
+    pub(crate) findings: Vec<Finding>,
 }
 
 /// Effects and places of single links.
-pub type Atoms = BTreeSet<(String, String)>;
+pub(crate) type Atoms = BTreeSet<(String, String)>;
 
 /// One (effect, place) for each link of a run: `link 2-4` is links 2, 3 and 4.
 pub(super) fn atoms(effect: &str, place: &str) -> Atoms {

@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 /// Faults of single points: they say nothing about where a cause sits.
 pub(super) const POINT_FAULTS: [&str; 2] = ["outlier", "mislabelled_point"];
 /// A name that is stated with this probability or more is given.
-pub const GIVEN: f64 = 0.5;
+pub(crate) const GIVEN: f64 = 0.5;
 /// What has a place and no name.
 pub const NAMELESS: &str = "unknown";
 
@@ -23,7 +23,7 @@ pub struct Placed {
     /// at the right place.
     pub wrong_name: bool,
     /// The same with a probability of [`GIVEN`] or more.
-    pub wrong_given: bool,
+    pub(crate) wrong_given: bool,
 }
 
 fn places(names: &Atoms) -> BTreeSet<&str> {
@@ -78,14 +78,14 @@ pub(super) fn placed(
 
 /// Shares of causes.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
-pub struct Places {
-    pub place: Share,
+pub(crate) struct Places {
+    pub(crate) place: Share,
     /// Right names, or `unknown` at the right place.
-    pub name_or_unknown: Share,
-    pub wrong_name: Share,
+    pub(crate) name_or_unknown: Share,
+    pub(crate) wrong_name: Share,
     /// Wrong names with a probability of [`GIVEN`] or more.
     #[serde(rename = "wrong_name_0.5")]
-    pub wrong_given: Share,
+    pub(crate) wrong_given: Share,
 }
 
 impl Places {

@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 
 /// What a probability is of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Subject {
+pub(crate) enum Subject {
     /// An effect at a place: of a finding or of a rival.
     Name,
     /// A finding's place.
@@ -26,22 +26,22 @@ impl Subject {
 
 /// Something that was said with a probability.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Statement {
+pub(crate) struct Statement {
     /// What it is about.
-    pub subject: Subject,
-    pub probability: f64,
+    pub(crate) subject: Subject,
+    pub(crate) probability: f64,
     /// Whether it held.
-    pub right: bool,
+    pub(crate) right: bool,
 }
 
 /// Statements whose probability lies in a range, and how many of them are right.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Bin {
-    pub from: f64,
-    pub to: f64,
-    pub stated: f64,
+pub(crate) struct Bin {
+    pub(crate) from: f64,
+    pub(crate) to: f64,
+    pub(crate) stated: f64,
     /// Statements that held.
-    pub right: Share,
+    pub(crate) right: Share,
 }
 
 /// Ends of the bins.
@@ -105,13 +105,13 @@ pub(super) fn statements(
 
 /// Stated probabilities of a subject against what was true.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Reliability {
+pub(crate) struct Reliability {
     /// Those that hold statements.
-    pub bins: Vec<Bin>,
+    pub(crate) bins: Vec<Bin>,
     /// Brier's score (1950): the mean squared difference of probability and outcome; none of no statements.
-    pub brier: Option<f64>,
+    pub(crate) brier: Option<f64>,
     /// Chance that a right statement has a higher probability than a wrong one (area under the ROC curve); none where all are alike.
-    pub auc: Option<f64>,
+    pub(crate) auc: Option<f64>,
 }
 
 /// The reliability of statements of one subject.

@@ -6,14 +6,14 @@ use std::collections::BTreeMap;
 
 /// How many of how many, with Wilson's 95 % limits.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Share {
-    pub count: usize,
-    pub of: usize,
+pub(crate) struct Share {
+    pub(crate) count: usize,
+    pub(crate) of: usize,
 }
 
 impl Share {
     /// Counts what holds.
-    pub fn of(all: impl IntoIterator<Item = bool>) -> Share {
+    pub(crate) fn of(all: impl IntoIterator<Item = bool>) -> Share {
         all.into_iter()
             .fold(Share::default(), |share, holds| Share {
                 count: share.count + usize::from(holds),
@@ -33,11 +33,11 @@ impl Share {
         out
     }
     /// The fraction; none of nothing.
-    pub fn value(&self) -> Option<f64> {
+    pub(crate) fn value(&self) -> Option<f64> {
         (self.of > 0).then(|| self.count as f64 / self.of as f64)
     }
     /// E. B. Wilson, 1927.
-    pub fn limits(&self) -> [f64; 2] {
+    pub(crate) fn limits(&self) -> [f64; 2] {
         if self.of == 0 {
             return [0.0, 1.0];
         }

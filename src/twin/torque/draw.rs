@@ -90,7 +90,7 @@ impl TorqueDesign {
 pub struct TorqueCase {
     /// `torque_017`.
     pub name: String,
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// The arm as its user believes it to be.
     pub robot: RobotDescription,
     pub(super) content: TorqueContent,

@@ -15,16 +15,16 @@ const BALANCED: usize = 1;
 /// What effects are drawn with.
 pub(super) struct Pool<'a> {
     /// rad/s over which the sign of friction turns.
-    pub width: f64,
+    pub(crate) width: f64,
     /// Whether joints have friction that others modify.
-    pub common: bool,
+    pub(crate) common: bool,
     /// Whether torques are measured at the joints.
-    pub sensors: bool,
+    pub(crate) sensors: bool,
     /// Nm, by joint.
-    pub scale: &'a [f64],
-    pub machine: &'a Machine,
+    pub(crate) scale: &'a [f64],
+    pub(crate) machine: &'a Machine,
     /// s from the begin in which something may touch the arm.
-    pub touched: f64,
+    pub(crate) touched: f64,
 }
 
 impl Pool<'_> {

@@ -4,7 +4,7 @@ use super::rigid::JointState;
 
 /// How friction at creeping speed falls with speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Fall {
+pub(crate) enum Fall {
     /// exp(-(|v| / speed)^exponent).
     Exponential(f64),
     /// 1 / (1 + (v / speed)^2).
@@ -13,7 +13,7 @@ pub enum Fall {
 
 /// What bends before a joint slides.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Bristles {
+pub(crate) enum Bristles {
     /// Bristles of one travel, which give way more and more.
     One,
     /// Bristles of two travels in parallel.
@@ -174,13 +174,13 @@ pub(super) struct Past {
 /// A moment of the recording, before latency.
 pub(super) struct Moment<'a> {
     /// s from the begin, and of a step.
-    pub time: f64,
-    pub step: f64,
-    pub state: &'a JointState,
+    pub(crate) time: f64,
+    pub(crate) step: f64,
+    pub(crate) state: &'a JointState,
     /// Nm, of the rigid bodies.
-    pub rigid: &'a [f64],
+    pub(crate) rigid: &'a [f64],
     /// Nm, of friction that other laws scale: viscous and Coulomb by joint.
-    pub friction: &'a [f64],
+    pub(crate) friction: &'a [f64],
 }
 
 impl Moment<'_> {
@@ -311,13 +311,13 @@ impl Law {
     }
 
     /// The joint that it acts on, from 0.
-    pub fn joint(&self) -> Option<usize> {
+    pub(crate) fn joint(&self) -> Option<usize> {
         let (word, number) = self.seat();
         number.filter(|_| word == "joint")
     }
 
     /// Where it sits, as people write it.
-    pub fn place(&self) -> String {
+    pub(crate) fn place(&self) -> String {
         match self.seat() {
             (word, Some(number)) => format!("{word} {}", number + 1),
             (place, None) => place.into(),

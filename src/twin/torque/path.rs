@@ -7,7 +7,7 @@ use crate::noise::Noise;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Path {
     /// s.
-    pub duration: f64,
+    pub(crate) duration: f64,
     form: Form,
 }
 

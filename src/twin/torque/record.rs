@@ -24,7 +24,7 @@ pub struct TorqueRows {
     /// True joints, rad, rad/s, rad/s2.
     pub state: Vec<JointState>,
     /// Nm of the rigid bodies as they are.
-    pub rigid: Vec<f64>,
+    pub(crate) rigid: Vec<f64>,
     /// Nm at the joints, as the drive or the sensor states it.
     pub torque: Vec<f64>,
 }

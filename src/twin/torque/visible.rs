@@ -21,10 +21,10 @@ const HELD: f64 = 1e-9;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Visible {
     /// After and before projection.
-    pub l: f64,
-    pub before: f64,
+    pub(crate) l: f64,
+    pub(crate) before: f64,
     /// Names and places that say the same.
-    pub same: Vec<(String, String)>,
+    pub(crate) same: Vec<(String, String)>,
 }
 
 /// Averaged and whitened columns of the rows to fit.

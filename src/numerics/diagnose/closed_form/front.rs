@@ -4,9 +4,9 @@ use crate::criteria::closed_form::{BETTER, LIKE, SHOWN};
 /// What a formula costs and how well it carries over to poses that it has not seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Priced {
-    pub price: usize,
+    pub(crate) price: usize,
     /// Rms of folds, m.
-    pub error: f64,
+    pub(crate) error: f64,
 }
 
 /// Positions of the formulas worth showing, cheapest first, of those that are better than none at all; and which of them is proposed:

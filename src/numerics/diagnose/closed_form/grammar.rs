@@ -9,17 +9,17 @@ use std::collections::BTreeMap;
 /// A variable by its name in formulas.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct NamedVariable {
-    pub name: String,
-    pub is_angle: bool,
+    pub(crate) name: String,
+    pub(crate) is_angle: bool,
     /// Whether it is the position of a joint that slides.
-    pub is_prismatic: bool,
+    pub(crate) is_prismatic: bool,
     /// Over the fitted rows, rounded outwards; of angles a turn to either side.
-    pub range: [f64; 2],
+    pub(crate) range: [f64; 2],
 }
 
 impl NamedVariable {
     /// The variable of a law at a joint; `None` if it has no name in formulas or never varies. `slides`: which joints do not turn.
-    pub fn of(
+    pub(crate) fn of(
         variable: Variable,
         joint: usize,
         [low, high]: [f64; 2],

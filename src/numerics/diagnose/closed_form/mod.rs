@@ -23,10 +23,10 @@ use shape_sigma::shape_sigmas;
 
 /// What formulas are looked for in: the fitted model, and the rows around it.
 pub(super) struct FormulaSearch<'a, 'b> {
-    pub state: &'b FitState,
-    pub view: &'b RoundView<'a>,
-    pub survey: &'b Survey<'a>,
-    pub fitter: &'b Fitter<'b>,
+    pub(crate) state: &'b FitState,
+    pub(crate) view: &'b RoundView<'a>,
+    pub(crate) survey: &'b Survey<'a>,
+    pub(crate) fitter: &'b Fitter<'b>,
 }
 
 /// A formula with its shape numbers where they fit best.
@@ -38,7 +38,7 @@ struct Candidate {
 
 impl FormulaSearch<'_, '_> {
     /// Formulas for findings, those of each cheapest first; none where it has a name, or is no function of one or two variables.
-    pub fn of_all(&self, findings: &[Finding]) -> Vec<ClosedForm> {
+    pub(crate) fn of_all(&self, findings: &[Finding]) -> Vec<ClosedForm> {
         findings
             .iter()
             .enumerate()

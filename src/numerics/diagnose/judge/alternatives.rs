@@ -19,7 +19,11 @@ pub(crate) struct Alternatives<'a> {
 
 impl<'a> Alternatives<'a> {
     /// `None` where the poses are too few for folds.
-    pub fn of(state: &'a FitState, fitter: &'a Fitter, rivals: &[EstimatedCause]) -> Option<Self> {
+    pub(crate) fn of(
+        state: &'a FitState,
+        fitter: &'a Fitter,
+        rivals: &[EstimatedCause],
+    ) -> Option<Self> {
         let at_zero = |cause: &EstimatedCause| EstimatedCause {
             coefficients: vec![0.0; cause.coefficients.len()],
             ..cause.clone()
@@ -41,7 +45,7 @@ impl<'a> Alternatives<'a> {
     }
 
     /// The fits around the state; none where bounds are in the way.
-    pub fn near(&self) -> Option<NearAlternatives<'_>> {
+    pub(crate) fn near(&self) -> Option<NearAlternatives<'_>> {
         let Self {
             state,
             fitter,
@@ -95,7 +99,7 @@ impl NearAlternatives<'_> {
 
     /// The errors of folds without some causes (by their positions), and with a rival (by its own) or none. Nothing where that is not near
     /// the state.
-    pub fn errors(&self, out: &[usize], rival: Option<usize>) -> Option<FoldErrors> {
+    pub(crate) fn errors(&self, out: &[usize], rival: Option<usize>) -> Option<FoldErrors> {
         let errors: Option<Vec<Vec<f64>>> = self
             .nearby
             .with(&self.steps(out, rival))?
@@ -109,7 +113,7 @@ impl NearAlternatives<'_> {
     }
 
     /// The coefficients of a rival (by its position) in the place of some causes, with their standard deviations, SI.
-    pub fn coefficients(&self, out: &[usize], rival: usize) -> Option<Vec<(f64, f64)>> {
+    pub(crate) fn coefficients(&self, out: &[usize], rival: usize) -> Option<Vec<(f64, f64)>> {
         let Alternatives { state, ranges, .. } = self.of;
         let own: Vec<usize> = ranges[state.causes.len() + rival].clone().collect();
         let found = self.nearby.estimated(&self.steps(out, Some(rival)), &own)?;

@@ -27,7 +27,7 @@ pub(crate) struct FoldErrors {
 
 impl FoldErrors {
     /// `None` where the poses are too few for folds.
-    pub fn of(now: &FitState, fitter: &Fitter) -> Option<Self> {
+    pub(crate) fn of(now: &FitState, fitter: &Fitter) -> Option<Self> {
         let session = now.session(fitter);
         let folds = folds(now, fitter)?;
         Some(Self::gathered(
@@ -38,7 +38,7 @@ impl FoldErrors {
     }
 
     /// From the errors of each fold's rows.
-    pub fn gathered(session: &Session, folds: &[Vec<usize>], errors: &[Vec<f64>]) -> Self {
+    pub(crate) fn gathered(session: &Session, folds: &[Vec<usize>], errors: &[Vec<f64>]) -> Self {
         let errors = gather(session.data, session.rows, folds, errors);
         let squares = session
             .rows
@@ -49,7 +49,7 @@ impl FoldErrors {
         Self { squares }
     }
 
-    pub fn rms(&self) -> f64 {
+    pub(crate) fn rms(&self) -> f64 {
         (self.squares.values().sum::<f64>() / self.squares.len() as f64).sqrt()
     }
 }

@@ -19,9 +19,9 @@ pub(super) enum PathCorrelation {
 /// What noise does from row to row, and what becomes of the causes that were found without it.
 pub(crate) struct CorrelationChange {
     /// None where it is white.
-    pub noise: Option<AutocorrelatedNoise>,
+    pub(crate) noise: Option<AutocorrelatedNoise>,
     /// Whether causes that do not follow time explain more than such noise would.
-    pub keeps_causes: bool,
+    pub(crate) keeps_causes: bool,
 }
 
 /// Whether neighbours in time are neighbours in pose.

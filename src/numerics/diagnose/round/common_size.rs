@@ -15,7 +15,7 @@ const STEPS: usize = 120;
 
 impl Fitter<'_> {
     /// The state with coefficients of one size held to the size that the rows show; itself where no cause has any.
-    pub fn held_to_a_common_size(&self, state: FitState) -> FitState {
+    pub(crate) fn held_to_a_common_size(&self, state: FitState) -> FitState {
         let mut now = state;
         for _ in 0..*FITS {
             let Some(causes) = held(&now) else { return now };

@@ -17,17 +17,17 @@ use std::ops::Range;
 
 /// A model with causes, fitted.
 pub(crate) struct FitState {
-    pub model: Model,
-    pub fitted: Fitted,
-    pub screening: Screening,
-    pub causes: Vec<EstimatedCause>,
+    pub(crate) model: Model,
+    pub(crate) fitted: Fitted,
+    pub(crate) screening: Screening,
+    pub(crate) causes: Vec<EstimatedCause>,
     /// Where in the model's parameters those of each cause are.
-    pub ranges: Vec<Range<usize>>,
+    pub(crate) ranges: Vec<Range<usize>>,
 }
 
 impl FitState {
     /// The rows with the model fitted to them.
-    pub fn session<'a>(&'a self, fitter: &'a Fitter) -> Session<'a> {
+    pub(crate) fn session<'a>(&'a self, fitter: &'a Fitter) -> Session<'a> {
         Session {
             data: &fitter.data,
             rows: &self.screening.kept,
@@ -37,13 +37,13 @@ impl FitState {
     }
 
     /// Whether any of its causes follows time.
-    pub fn follows_time(&self) -> bool {
+    pub(crate) fn follows_time(&self) -> bool {
         self.causes.iter().any(|cause| cause.form.follows_time())
     }
 
     /// The squared size of some causes together in their uncertainty, a mean over as many numbers as the rows show of them; 0 where none of
     /// these is estimated, none where there is no covariance.
-    pub fn square_size(&self, causes: &[usize]) -> Option<f64> {
+    pub(crate) fn square_size(&self, causes: &[usize]) -> Option<f64> {
         let (mut free, mut shown) = (Vec::new(), 0.0);
         for i in causes {
             for (k, prior) in self.ranges[*i].clone().zip(&self.causes[*i].priors) {
@@ -65,23 +65,23 @@ impl FitState {
 /// A cause with its coefficients, and what is known of them beforehand.
 #[derive(Clone)]
 pub(crate) struct EstimatedCause {
-    pub form: Form,
-    pub coefficients: Vec<f64>,
-    pub priors: Vec<Prior>,
+    pub(crate) form: Form,
+    pub(crate) coefficients: Vec<f64>,
+    pub(crate) priors: Vec<Prior>,
 }
 
 /// What fits stay the same in: the recording with its noise, and what of the base model is estimated.
 pub(crate) struct Fitter<'a> {
-    pub question: &'a Question<'a>,
+    pub(crate) question: &'a Question<'a>,
     /// The recording; its spread is what the joints' repeatability makes of each row.
-    pub data: Measurements,
+    pub(crate) data: Measurements,
     /// What errors of rows are compared and told in.
-    pub scale: ErrorScale,
+    pub(crate) scale: ErrorScale,
     /// Base parameters to estimate, in order of precedence; at first all.
     free: Vec<usize>,
     /// Base parameters that the rows hardly show.
     faint: Vec<usize>,
-    pub repeatability: JointRepeatability,
+    pub(crate) repeatability: JointRepeatability,
     /// What a deviation of the joints makes of every row's readings.
     spread: JointSpread,
     /// What repeats show of the joints' repeatability, rad: nothing of it rests on a residual.
@@ -91,7 +91,7 @@ pub(crate) struct Fitter<'a> {
     /// Whether the repeatability is that of a residual, or of what a settled model leaves between returns.
     asked: bool,
     /// Autocorrelated noise of standing points; none where it is white.
-    pub correlated: Option<AutocorrelatedNoise>,
+    pub(crate) correlated: Option<AutocorrelatedNoise>,
     /// How often that was learned.
     estimated: usize,
     /// Correlation of rows along a path.
@@ -100,7 +100,7 @@ pub(crate) struct Fitter<'a> {
 
 impl<'a> Fitter<'a> {
     /// The base model fitted, with the noise that repeats show.
-    pub fn start(question: &'a Question<'a>) -> (Self, FitState) {
+    pub(crate) fn start(question: &'a Question<'a>) -> (Self, FitState) {
         let mut fitter = Self {
             question,
             data: question.data.clone(),
@@ -169,23 +169,23 @@ impl<'a> Fitter<'a> {
     }
 
     /// Whether the joints' repeatability rests on what a model leaves.
-    pub fn infers_repeatability(&self, rows: &[usize]) -> bool {
+    pub(crate) fn infers_repeatability(&self, rows: &[usize]) -> bool {
         self.repeatability.sigma > self.repeated && self.repeats(rows).is_none()
     }
 
     /// Base parameters that are estimated.
-    pub fn free(&self) -> &[usize] {
+    pub(crate) fn free(&self) -> &[usize] {
         &self.free
     }
 
     /// Base parameters that the rows show at all: what they could do is no cause.
-    pub fn seen(&self) -> Vec<usize> {
+    pub(crate) fn seen(&self) -> Vec<usize> {
         self.free.iter().chain(&self.faint).copied().collect()
     }
 
     /// Takes the base parameters that the rows show around a fitted model: a large effect that the model lacked had hidden them.
     /// Those that they hardly show are not estimated.
-    pub fn follow(&mut self, state: &FitState) {
+    pub(crate) fn follow(&mut self, state: &FitState) {
         let first = state
             .ranges
             .first()
@@ -211,7 +211,7 @@ impl<'a> Fitter<'a> {
 
     /// How well the joints repeat (rad) by what is left of a residual without structure, if that is news: it is asked once, and where
     /// repeats are too few to tell. Where the arm was elsewhere between repeats, by what the model leaves between those.
-    pub fn noise_left_by(&self, settled: &FitState) -> Option<f64> {
+    pub(crate) fn noise_left_by(&self, settled: &FitState) -> Option<f64> {
         let FitState {
             model,
             fitted,
@@ -231,25 +231,25 @@ impl<'a> Fitter<'a> {
     }
 
     /// Takes the noise that a residual showed.
-    pub fn learn(&mut self, sigma: f64) {
+    pub(crate) fn learn(&mut self, sigma: f64) {
         self.asked = true;
         self.repeatability.sigma = sigma;
         self.spread.put(&mut self.data, sigma);
     }
 
     /// Whether the autocorrelation may still be estimated: not of a moving arm, and not for ever.
-    pub fn may_estimate_correlation(&self, settled: &FitState) -> bool {
+    pub(crate) fn may_estimate_correlation(&self, settled: &FitState) -> bool {
         self.estimated < *ESTIMATES && !self.data.in_motion(&settled.screening.kept)
     }
 
     /// Whether causes that do not follow time are searched by themselves: rows follow a path, and something looks correlated.
-    pub fn causes_of_the_arm_first(&self) -> bool {
+    pub(crate) fn causes_of_the_arm_first(&self) -> bool {
         self.on_path == PathCorrelation::CausesFirst
     }
 
     /// Takes the autocorrelation that a residual showed, and returns the causes to go on with: none, but on a path those that do not follow
     /// time. On a path it is not believed before these have been searched by themselves.
-    pub fn take_correlation(
+    pub(crate) fn take_correlation(
         &mut self,
         change: &CorrelationChange,
         settled: &FitState,
@@ -282,7 +282,7 @@ impl<'a> Fitter<'a> {
     }
 
     /// The base effects of `from` with other causes, which start at their coefficients, fitted to the rows that belong.
-    pub fn fit(&self, from: &Model, causes: Vec<EstimatedCause>) -> FitState {
+    pub(crate) fn fit(&self, from: &Model, causes: Vec<EstimatedCause>) -> FitState {
         let (start, ranges) = with_causes(from, &causes);
         let first = ranges.first().map_or(start.x.len(), |range| range.start);
         let all: Vec<usize> = (0..first).collect();

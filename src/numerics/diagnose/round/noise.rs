@@ -29,7 +29,7 @@ pub(super) struct JointSpread {
 
 impl JointSpread {
     /// As a model moves; the joints' repeatability has no part in `data` yet.
-    pub fn of(model: &Model, data: &Measurements) -> Self {
+    pub(crate) fn of(model: &Model, data: &Measurements) -> Self {
         let problem = WhitenedProblem::new(model, data, (0..data.rows()).collect());
         let summed = |motions: &[Vector3<f64>]| -> Matrix3<f64> {
             motions
@@ -61,7 +61,7 @@ impl JointSpread {
     }
 
     /// Gives every row what this deviation (rad) of every joint makes of its readings.
-    pub fn put(&self, data: &mut Measurements, sigma: f64) {
+    pub(crate) fn put(&self, data: &mut Measurements, sigma: f64) {
         let square = sigma * sigma;
         data.spread =
             (sigma > 0.0).then(|| self.points.iter().map(|matrix| matrix * square).collect());
@@ -127,8 +127,8 @@ struct LeftBySpread {
 /// What repeats show of the noise.
 pub(super) struct RepeatedNoise {
     /// By what the stated standard deviations of points are multiplied.
-    pub scale: f64,
-    pub joints: JointRepeatability,
+    pub(crate) scale: f64,
+    pub(crate) joints: JointRepeatability,
 }
 
 /// A repeat: what it is off by, with its covariance.
@@ -144,12 +144,12 @@ struct Sample {
 pub(super) struct RepeatPairs {
     pairs: Vec<[usize; 2]>,
     /// Whether the arm was elsewhere between the rows of some: what changes with time or side of approach is then in their difference.
-    pub are_returns: bool,
+    pub(crate) are_returns: bool,
 }
 
 impl RepeatPairs {
     /// Right after each other, where those are enough; else also returns, those after a shorter time, which drifts spoil least.
-    pub fn of(data: &Measurements, rows: &[usize]) -> Self {
+    pub(crate) fn of(data: &Measurements, rows: &[usize]) -> Self {
         let [mut pairs, mut returns] = Self::all(data, rows);
         if pairs.len() >= *REPEATS || returns.is_empty() {
             pairs.sort_unstable_by_key(|pair| pair[1]);
@@ -168,7 +168,7 @@ impl RepeatPairs {
     }
 
     /// Returns alone; none where they are too few.
-    pub fn returns(data: &Measurements, rows: &[usize]) -> Option<Self> {
+    pub(crate) fn returns(data: &Measurements, rows: &[usize]) -> Option<Self> {
         let [_, mut returns] = Self::all(data, rows);
         shortest(&mut returns);
         returns.sort_unstable_by_key(|pair| pair[1]);
@@ -200,7 +200,7 @@ impl RepeatPairs {
     /// What the pairs show of the instrument's noise, with the joints' repeatability at that: where they follow each other at once, are enough,
     /// and are clear evidence of another noise than the stated one. Where noise `lasts` from pose to pose, shots of a standing arm agree better than
     /// it is small.
-    pub fn noise(
+    pub(crate) fn noise(
         &self,
         model: &Model,
         data: &Measurements,
@@ -281,7 +281,7 @@ impl RepeatPairs {
     }
 
     /// The joints' repeatability by what the pairs differ beyond the motion that `model` knows between them.
-    pub fn repeatability(
+    pub(crate) fn repeatability(
         &self,
         model: &Model,
         data: &Measurements,

@@ -8,15 +8,15 @@ use crate::estimate::Model;
 
 /// What is left of the rows that a search looks at, and what moves it.
 pub(crate) struct RoundView<'a> {
-    pub problem: WhitenedProblem<'a>,
+    pub(crate) problem: WhitenedProblem<'a>,
     autocorrelation_time: f64,
     torque: Vec<f64>,
     /// How far each joint yields, rad/Nm.
-    pub compliance: Vec<f64>,
+    pub(crate) compliance: Vec<f64>,
 }
 
 impl<'a> RoundView<'a> {
-    pub fn of(now: &'a FitState, fitter: &'a Fitter) -> Self {
+    pub(crate) fn of(now: &'a FitState, fitter: &'a Fitter) -> Self {
         let data = &fitter.data;
         let compliance = compliance(&now.model);
         let mut problem =
@@ -37,11 +37,11 @@ impl<'a> RoundView<'a> {
     }
 
     /// How many rows of what is left count as one.
-    pub fn autocorrelation_time(&self) -> f64 {
+    pub(crate) fn autocorrelation_time(&self) -> f64 {
         self.autocorrelation_time
     }
 
-    pub fn survey(&self) -> Survey<'_> {
+    pub(crate) fn survey(&self) -> Survey<'_> {
         let WhitenedProblem {
             robot, data, rows, ..
         } = &self.problem;
@@ -49,7 +49,7 @@ impl<'a> RoundView<'a> {
     }
 
     /// The residual of the rows without the causes of a model.
-    pub fn without_causes(&self, now: &FitState) -> Vec<f64> {
+    pub(crate) fn without_causes(&self, now: &FitState) -> Vec<f64> {
         let problem = &self.problem;
         let mut residual = problem.residual.clone();
         for cause in &now.causes {

@@ -22,9 +22,9 @@ pub(super) struct AsStated<'a> {
     /// Whole rows in their order, and the positions among them of those that judge.
     rows: Vec<usize>,
     judges: Vec<usize>,
-    pub placed: Placement,
+    pub(crate) placed: Placement,
     /// m.
-    pub reach: f64,
+    pub(crate) reach: f64,
     cloud: f64,
     noise: f64,
 }
@@ -32,9 +32,9 @@ pub(super) struct AsStated<'a> {
 /// Set-up errors that together explain what the nominal robot leaves, those that explain as well, and what is left without them.
 #[derive(Clone)]
 pub(super) struct ExplainedSetup {
-    pub wrong: Vec<WrongSetup>,
-    pub alike: Vec<WrongSetup>,
-    pub placed: Placement,
+    pub(crate) wrong: Vec<WrongSetup>,
+    pub(crate) alike: Vec<WrongSetup>,
+    pub(crate) placed: Placement,
 }
 
 /// One try: what is left, as a share of the measured cloud's size.
@@ -46,7 +46,7 @@ struct Try {
 }
 
 impl<'a> AsStated<'a> {
-    pub fn of(question: &'a Question<'a>) -> Self {
+    pub(crate) fn of(question: &'a Question<'a>) -> Self {
         let data = question.data;
         let rows: Vec<usize> = (0..data.rows())
             .filter(|row| data.has_point(*row))
@@ -75,22 +75,22 @@ impl<'a> AsStated<'a> {
     }
 
     /// What the nominal robot leaves, as a share of its reach.
-    pub fn share_of_reach(&self) -> f64 {
+    pub(crate) fn share_of_reach(&self) -> f64 {
         self.placed.left / self.reach.max(f64::MIN_POSITIVE)
     }
 
     /// Whether no nominal robot leaves so much.
-    pub fn is_no_robot(&self) -> bool {
+    pub(crate) fn is_no_robot(&self) -> bool {
         self.share_of_reach() > *NOMINAL
     }
 
     /// Whether the nominal robot leaves more than most, and more than the noise of its points.
-    pub fn is_far_off(&self) -> bool {
+    pub(crate) fn is_far_off(&self) -> bool {
         self.is_no_robot() || self.share() > *NOMINAL && self.placed.left > self.noise
     }
 
     /// Whether a part of the rows lies farther off than any nominal robot leaves them, however near most are.
-    pub fn is_in_parts(&self) -> bool {
+    pub(crate) fn is_in_parts(&self) -> bool {
         is_in_parts(&self.placed.off, *NOMINAL * self.reach)
     }
 
@@ -150,7 +150,7 @@ impl<'a> AsStated<'a> {
     }
 
     /// Two set-ups whose rows were read as one, where that explains it.
-    pub fn two_setups(&self) -> Option<TwoSetups> {
+    pub(crate) fn two_setups(&self) -> Option<TwoSetups> {
         let of = |rows: &[usize]| {
             PointPairs::of(
                 self.question.robot,
@@ -166,7 +166,7 @@ impl<'a> AsStated<'a> {
 
     /// What explains it: one set-up error as a right set-up does, else the whole counting of joints, else one as far as it goes, else a
     /// counting and a unit, else two.
-    pub fn explained(&self) -> Option<ExplainedSetup> {
+    pub(crate) fn explained(&self) -> Option<ExplainedSetup> {
         let data = self.question.data;
         let in_order = PointPairs::of(
             self.question.robot,

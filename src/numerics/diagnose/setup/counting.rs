@@ -23,11 +23,11 @@ const SETTLED: f64 = 1e-6;
 /// A joint's number: sign (true + quarter turns), and so often the joint before it.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct CountedJoint {
-    pub reversed: bool,
+    pub(crate) reversed: bool,
     /// What is shown at the robot file's zero.
-    pub quarters: i32,
+    pub(crate) quarters: i32,
     /// -1, 0 or 1.
-    pub coupled: i32,
+    pub(crate) coupled: i32,
 }
 
 /// Of each joint of an arm.
@@ -78,12 +78,12 @@ impl Searched {
 }
 
 impl Counting {
-    pub fn joints(&self) -> &[CountedJoint] {
+    pub(crate) fn joints(&self) -> &[CountedJoint] {
         &self.0
     }
 
     /// One joint alone, that shows so many quarter turns at the robot file's zero.
-    pub fn of_a_zero(joint: usize, quarters: i32) -> Self {
+    pub(crate) fn of_a_zero(joint: usize, quarters: i32) -> Self {
         let mut out = Self::default();
         out.0
             .iter_mut()
@@ -94,7 +94,7 @@ impl Counting {
     }
 
     /// The controller's numbers -> joint positions of the robot file, in the order of `ingest`: zeros, signs, couplings.
-    pub fn to_robot(self, q: &mut [f64]) {
+    pub(crate) fn to_robot(self, q: &mut [f64]) {
         for (q, joint) in q.iter_mut().zip(&self.0) {
             *q -= f64::from(joint.quarters) * FRAC_PI_2;
             if joint.reversed {
@@ -115,7 +115,7 @@ impl Counting {
     }
 
     /// Those that leave least of these points, from the one that changes least on, each in its simplest form.
-    pub fn likely(pairs: &PointPairs) -> Vec<Self> {
+    pub(crate) fn likely(pairs: &PointPairs) -> Vec<Self> {
         let robot = pairs.robot;
         let turning: Vec<usize> = (0..robot.joints())
             .filter(|joint| robot.is_revolute(*joint))

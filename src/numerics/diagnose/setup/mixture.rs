@@ -19,12 +19,12 @@ pub(super) struct TwoSetups {
     placed: [Placement; 2],
     /// Within what the one placement and both together have most points, m.
     before: f64,
-    pub left: f64,
+    pub(crate) left: f64,
 }
 
 impl TwoSetups {
     /// The two set-ups of pairs, beside their one placement; none where two do not explain what it leaves.
-    pub fn of(pairs: &PointPairs, one: &Placement) -> Option<Self> {
+    pub(crate) fn of(pairs: &PointPairs, one: &Placement) -> Option<Self> {
         let found = starts(pairs, one)
             .into_iter()
             .filter_map(|start| dealt(pairs, start, most(&one.off)));
@@ -33,14 +33,14 @@ impl TwoSetups {
     }
 
     /// All rows of a recording, of which `numbers` are those of the pairs, by the placement that has them nearest.
-    pub fn of_all(self, all: &PointPairs, numbers: &[usize]) -> Self {
+    pub(crate) fn of_all(self, all: &PointPairs, numbers: &[usize]) -> Self {
         let rows =
             nearest(all, &self.placed).map(|own| own.into_iter().map(|k| numbers[k]).collect());
         Self { rows, ..self }
     }
 
     /// What is wrong and what to do; rows count from 1.
-    pub fn words(&self) -> String {
+    pub(crate) fn words(&self) -> String {
         let [one, other] = &self.placed;
         let (base, tool) = (one.base_apart(other), one.tool_apart(other));
         let lists = self

@@ -18,14 +18,14 @@ pub(super) enum FreeNumber {
 
 /// What a row sees of it: the last body, a displacement of the point, and the motion of the point by each number, base frame.
 pub(super) struct SeenNumber {
-    pub body: Pose,
-    pub shift: Vector3<f64>,
-    pub columns: Vec<Vector3<f64>>,
+    pub(crate) body: Pose,
+    pub(crate) shift: Vector3<f64>,
+    pub(crate) columns: Vec<Vector3<f64>>,
 }
 
 impl FreeNumber {
     /// All that a robot has.
-    pub fn all(robot: &RobotModel) -> Vec<Self> {
+    pub(crate) fn all(robot: &RobotModel) -> Vec<Self> {
         let turning = (0..robot.joints()).filter(|joint| robot.is_revolute(*joint));
         let lengths = (0..robot.joints().saturating_sub(1)).map(Self::Length);
         // The first zero is the base's, the last one the tool's.
@@ -39,12 +39,12 @@ impl FreeNumber {
             .collect()
     }
 
-    pub fn width(self) -> usize {
+    pub(crate) fn width(self) -> usize {
         if matches!(self, Self::Zero(_)) { 1 } else { 3 }
     }
 
     /// What a row sees of it at joint positions `q`; `seat` is where the point sits at the zero pose.
-    pub fn seen(
+    pub(crate) fn seen(
         self,
         robot: &RobotModel,
         q: &[f64],

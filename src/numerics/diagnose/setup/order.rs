@@ -22,7 +22,7 @@ pub(super) enum RowOrder {
 
 impl RowOrder {
     /// Those that these rows, in their order, may be in.
-    pub fn all(pairs: &PointPairs) -> Vec<Self> {
+    pub(crate) fn all(pairs: &PointPairs) -> Vec<Self> {
         let mut out = likely_shifts(pairs);
         out.push(Self::Reversed);
         if pairs.rows() >= *SORTED {
@@ -36,7 +36,7 @@ impl RowOrder {
     }
 
     /// The row of the point that belongs to the joints of each of `count` rows.
-    pub fn partners(self, count: usize) -> Vec<usize> {
+    pub(crate) fn partners(self, count: usize) -> Vec<usize> {
         let by_text = |first: usize| {
             let mut names: Vec<usize> = (first..first + count).collect();
             names.sort_by_key(usize::to_string);

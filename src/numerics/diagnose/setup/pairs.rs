@@ -9,14 +9,14 @@ use nalgebra::Vector3;
 /// Rows of joints and points.
 #[derive(Clone)]
 pub(super) struct PointPairs<'a> {
-    pub robot: &'a RobotModel,
+    pub(crate) robot: &'a RobotModel,
     /// rad or m, row-major.
-    pub q: Vec<f64>,
+    pub(crate) q: Vec<f64>,
     /// m, tracker frame.
-    pub points: Vec<Vector3<f64>>,
+    pub(crate) points: Vec<Vector3<f64>>,
     /// The target of each point, numbered from 0, and how many there are.
-    pub target: Vec<usize>,
-    pub targets: usize,
+    pub(crate) target: Vec<usize>,
+    pub(crate) targets: usize,
 }
 
 /// Some of the rows, evenly over all of them.
@@ -29,7 +29,7 @@ pub(super) fn sampled(rows: &[usize]) -> Vec<usize> {
 
 impl<'a> PointPairs<'a> {
     /// Joints of rows, each beside the point of a row that has a whole one.
-    pub fn of(
+    pub(crate) fn of(
         robot: &'a RobotModel,
         data: &Measurements,
         rows: impl Iterator<Item = (usize, usize)>,
@@ -52,27 +52,27 @@ impl<'a> PointPairs<'a> {
         }
     }
 
-    pub fn joints(&self) -> usize {
+    pub(crate) fn joints(&self) -> usize {
         self.robot.joints()
     }
 
-    pub fn rows(&self) -> usize {
+    pub(crate) fn rows(&self) -> usize {
         self.points.len()
     }
 
-    pub fn q(&self, row: usize) -> &[f64] {
+    pub(crate) fn q(&self, row: usize) -> &[f64] {
         &self.q[row * self.joints()..(row + 1) * self.joints()]
     }
 
     /// The same with a joint's positions changed row by row.
-    pub fn with_joints(&self, change: impl Fn(&mut [f64])) -> Self {
+    pub(crate) fn with_joints(&self, change: impl Fn(&mut [f64])) -> Self {
         let mut out = self.clone();
         out.q.chunks_mut(self.joints()).for_each(change);
         out
     }
 
     /// Some of the rows.
-    pub fn only(&self, rows: &[usize]) -> Self {
+    pub(crate) fn only(&self, rows: &[usize]) -> Self {
         Self {
             q: rows.iter().flat_map(|row| self.q(*row).to_vec()).collect(),
             points: rows.iter().map(|row| self.points[*row]).collect(),
@@ -81,7 +81,7 @@ impl<'a> PointPairs<'a> {
         }
     }
 
-    pub fn with_points(&self, change: impl Fn(&Vector3<f64>) -> Vector3<f64>) -> Self {
+    pub(crate) fn with_points(&self, change: impl Fn(&Vector3<f64>) -> Vector3<f64>) -> Self {
         Self {
             points: self.points.iter().map(change).collect(),
             ..self.clone()
@@ -89,7 +89,7 @@ impl<'a> PointPairs<'a> {
     }
 
     /// Root mean square distance of the points from their centre, m.
-    pub fn cloud(&self) -> f64 {
+    pub(crate) fn cloud(&self) -> f64 {
         let count = self.rows().max(1) as f64;
         let centre = self.points.iter().sum::<Vector3<f64>>() / count;
         (self
@@ -102,7 +102,7 @@ impl<'a> PointPairs<'a> {
     }
 
     /// How far the tool point of the robot file gets in these rows from the first axis that turns, or from its middle, m.
-    pub fn reach(&self) -> f64 {
+    pub(crate) fn reach(&self) -> f64 {
         let robot = self.robot;
         let first = (0..robot.joints()).find(|joint| robot.is_revolute(*joint));
         let all: Vec<Vec<Pose>> = (0..self.rows())

@@ -23,16 +23,16 @@ pub(super) struct Placement {
     /// Positions of the targets at the zero pose, base frame, m.
     seats: Vec<Vector3<f64>>,
     /// Values of the number that was asked for: m or rad.
-    pub values: Vec<f64>,
+    pub(crate) values: Vec<f64>,
     /// Distance of each point, m.
-    pub off: Vec<f64>,
+    pub(crate) off: Vec<f64>,
     /// Their median.
-    pub left: f64,
+    pub(crate) left: f64,
 }
 
 impl Placement {
     /// By how much it misses points, in the tracker's frame and in that of the last body.
-    pub fn missed(&self, pairs: &PointPairs) -> [Vec<Vector3<f64>>; 2] {
+    pub(crate) fn missed(&self, pairs: &PointPairs) -> [Vec<Vector3<f64>>; 2] {
         let robot = pairs.robot;
         let missed = |row: usize| {
             let body = bodies(robot, pairs.q(row))[robot.joints()];
@@ -48,12 +48,12 @@ impl Placement {
     }
 
     /// How far another one's base stands from its own, m.
-    pub fn base_apart(&self, other: &Self) -> f64 {
+    pub(crate) fn base_apart(&self, other: &Self) -> f64 {
         (self.base.translation - other.base.translation).norm()
     }
 
     /// How far another one's targets sit from its own at most, m.
-    pub fn tool_apart(&self, other: &Self) -> f64 {
+    pub(crate) fn tool_apart(&self, other: &Self) -> f64 {
         self.seats
             .iter()
             .zip(&other.seats)

@@ -11,7 +11,7 @@ pub(super) struct SignGroup(u64);
 
 impl SignGroup {
     /// The groups of two joints or more that a robot may have: swivel and roll, pitch, the pitch of the main axes, all, and every two.
-    pub fn all(robot: &RobotModel) -> Vec<Self> {
+    pub(crate) fn all(robot: &RobotModel) -> Vec<Self> {
         let turning: Vec<usize> = (0..robot.joints().min(64))
             .filter(|joint| robot.is_revolute(*joint))
             .collect();
@@ -57,7 +57,7 @@ impl SignGroup {
     }
 
     /// Its joints, from 0.
-    pub fn joints(self) -> impl Iterator<Item = usize> {
+    pub(crate) fn joints(self) -> impl Iterator<Item = usize> {
         (0..64).filter(move |joint| self.0 >> joint & 1 == 1)
     }
 }

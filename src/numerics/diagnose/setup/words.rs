@@ -11,10 +11,10 @@ use crate::robot::{RobotModel, numbered};
 
 /// What is wrong, and what to change in which file.
 pub(super) struct SetupWords {
-    pub what: String,
-    pub mend: String,
+    pub(crate) what: String,
+    pub(crate) mend: String,
     /// By how much lengths of the robot file are longer when it is mended.
-    pub scale: f64,
+    pub(crate) scale: f64,
 }
 
 impl SetupWords {

@@ -56,7 +56,7 @@ pub(super) const LENGTHS: [(f64, &str, &str); 9] = [
 
 impl WrongSetup {
     /// All that this robot and these rows, in their order, may have.
-    pub fn all(pairs: &PointPairs) -> Vec<Self> {
+    pub(crate) fn all(pairs: &PointPairs) -> Vec<Self> {
         let robot = pairs.robot;
         let turning: Vec<usize> = (0..robot.joints())
             .filter(|joint| robot.is_revolute(*joint))
@@ -106,7 +106,7 @@ impl WrongSetup {
     }
 
     /// The place of its mend in the order in which `ingest` applies them: columns, units, zeros, signs, couplings.
-    pub fn rank(self) -> usize {
+    pub(crate) fn rank(self) -> usize {
         match self {
             Self::Order(_) | Self::Exchanged(..) => 0,
             Self::PointUnit(_) | Self::InRadians | Self::InDegrees | Self::Mirrored => 1,
@@ -126,7 +126,7 @@ impl WrongSetup {
         }
     }
 
-    pub fn order(self) -> Option<RowOrder> {
+    pub(crate) fn order(self) -> Option<RowOrder> {
         if let Self::Order(order) = self {
             Some(order)
         } else {
@@ -135,7 +135,7 @@ impl WrongSetup {
     }
 
     /// The recording without it; the order of rows and numbers of the robot file are mended elsewhere.
-    pub fn mended<'a>(self, pairs: &PointPairs<'a>) -> PointPairs<'a> {
+    pub(crate) fn mended<'a>(self, pairs: &PointPairs<'a>) -> PointPairs<'a> {
         let robot = pairs.robot;
         let scaled = |factor: f64| {
             pairs.with_joints(|q| {

@@ -15,26 +15,26 @@ use std::collections::BTreeMap;
 /// One finding of a search.
 #[derive(Clone)]
 pub(crate) struct FoundCell {
-    pub effect: &'static str,
-    pub place: Place,
+    pub(crate) effect: &'static str,
+    pub(crate) place: Place,
     /// Positions of its forms among the causes of the model.
-    pub members: Vec<usize>,
+    pub(crate) members: Vec<usize>,
     /// ln of the evidence for it given all others.
-    pub log: f64,
+    pub(crate) log: f64,
     /// ln of the prior odds of its cells.
-    pub log_prior: f64,
+    pub(crate) log_prior: f64,
     /// Fall of the squared residual in standard deviations, and by how many numbers.
-    pub gain: f64,
-    pub numbers: usize,
-    pub probabilities: Probabilities,
-    pub rivals: Vec<RivalCause>,
+    pub(crate) gain: f64,
+    pub(crate) numbers: usize,
+    pub(crate) probabilities: Probabilities,
+    pub(crate) rivals: Vec<RivalCause>,
     /// Of each member: whether its coefficients are positive, and the largest of them (SI).
-    pub bounds: Vec<(bool, f64)>,
+    pub(crate) bounds: Vec<(bool, f64)>,
 }
 
 impl FoundCell {
     /// That it is no cause at all with a probability, names and places as probable among the rest as before.
-    pub fn or_nothing(&mut self, probability: f64) {
+    pub(crate) fn or_nothing(&mut self, probability: f64) {
         let rest = 1.0 - probability;
         self.probabilities = Probabilities {
             name: rest * self.probabilities.name,
@@ -49,16 +49,16 @@ impl FoundCell {
 
 /// What the table says of the last model.
 pub(crate) struct Answer {
-    pub found: Vec<FoundCell>,
+    pub(crate) found: Vec<FoundCell>,
     /// Probability that no further cell is there, at the start and at the end.
-    pub nothing_first: f64,
-    pub nothing_last: f64,
+    pub(crate) nothing_first: f64,
+    pub(crate) nothing_last: f64,
     /// What the best further cell would be.
-    pub next: Option<String>,
-    pub located_first: Located,
-    pub located_last: Located,
+    pub(crate) next: Option<String>,
+    pub(crate) located_first: Located,
+    pub(crate) located_last: Located,
     /// Standard errors of forms that geometry may hide: cause and place with the form and its error, SI.
-    pub hidden: Vec<(Form, f64)>,
+    pub(crate) hidden: Vec<(Form, f64)>,
 }
 
 impl CauseTable<'_, '_> {

@@ -8,15 +8,15 @@ use std::f64::consts::PI;
 /// A cause at a place, whatever its shape.
 pub(super) struct CauseCell {
     /// Canonical name of the cause, `unknown` of a cell without a name.
-    pub name: &'static str,
-    pub place: Place,
+    pub(crate) name: &'static str,
+    pub(crate) place: Place,
     /// What tells it from other cells of the recording.
-    pub key: String,
+    pub(crate) key: String,
     /// ln of its prior odds.
-    pub log_prior: f64,
-    pub shapes: Shapes,
+    pub(crate) log_prior: f64,
+    pub(crate) shapes: Shapes,
     /// Its usual sizes, m, where other robots say so.
-    pub between: Option<[f64; 2]>,
+    pub(crate) between: Option<[f64; 2]>,
 }
 
 /// The shapes of a cell.
@@ -30,31 +30,31 @@ pub(super) enum Shapes {
 /// Forms whose columns are looked at together, in one or several shapes.
 #[derive(Clone)]
 pub(super) struct ShapeGroup {
-    pub forms: Vec<Form>,
-    pub shapes: Vec<CellShape>,
+    pub(crate) forms: Vec<Form>,
+    pub(crate) shapes: Vec<CellShape>,
     /// Whether coefficients are positive.
-    pub positive: bool,
+    pub(crate) positive: bool,
     /// The largest coefficient that makes sense, SI.
-    pub largest: f64,
+    pub(crate) largest: f64,
 }
 
 /// A shape: how the prior variance is shared among the columns of a group.
 #[derive(Clone)]
 pub(super) struct CellShape {
     /// One for each column; their sum is 1. Empty: alike.
-    pub shares: Vec<f64>,
+    pub(crate) shares: Vec<f64>,
     /// ln of the weight of the shape within its cell.
-    pub log_weight: f64,
+    pub(crate) log_weight: f64,
     /// Whether it has further numbers in addition to the plain shapes of its cell.
-    pub is_bent: bool,
+    pub(crate) is_bent: bool,
 }
 
 /// A motion over a variable, or over two.
 #[derive(Clone, Copy)]
 pub(super) struct FreeShape {
-    pub motion: Motion,
-    pub of: Variable,
-    pub over: Over,
+    pub(crate) motion: Motion,
+    pub(crate) of: Variable,
+    pub(crate) over: Over,
 }
 
 /// In which shapes a motion follows its variable.
@@ -76,7 +76,7 @@ pub(super) enum Over {
 
 impl CauseCell {
     /// Its groups of shapes; all of them if `closely`.
-    pub fn groups(
+    pub(crate) fn groups(
         &self,
         survey: &Survey,
         values: &dyn Fn(Variable) -> Option<Vec<f64>>,
@@ -90,21 +90,21 @@ impl CauseCell {
     }
 
     /// Whether it has more shapes than are asked at first.
-    pub fn is_coarse(&self) -> bool {
+    pub(crate) fn is_coarse(&self) -> bool {
         match &self.shapes {
             Shapes::Free(_) => true,
             Shapes::Listed(groups) => groups.iter().all(|group| group.forms.iter().all(steps)),
         }
     }
 
-    pub fn is_named(&self) -> bool {
+    pub(crate) fn is_named(&self) -> bool {
         self.name != names::UNKNOWN
     }
 }
 
 impl ShapeGroup {
     /// A single form, all of its columns alike.
-    pub fn of(form: Form, log_weight: f64) -> Self {
+    pub(crate) fn of(form: Form, log_weight: f64) -> Self {
         let shape = CellShape {
             shares: Vec::new(),
             log_weight,
@@ -125,7 +125,7 @@ impl FreeShape {
     }
 
     /// The same with other numbers in its variables (a time, a limit, a direction); steps halve with the level. Empty where they have none.
-    pub fn near(&self, level: i32) -> Vec<Self> {
+    pub(crate) fn near(&self, level: i32) -> Vec<Self> {
         let first = near(self.of, level)
             .into_iter()
             .map(|of| Self { of, ..*self });
@@ -141,7 +141,7 @@ impl FreeShape {
     }
 
     /// Its curves at all correlation lengths.
-    pub fn curves(&self, values: &dyn Fn(Variable) -> Option<Vec<f64>>) -> Vec<ShapeGroup> {
+    pub(crate) fn curves(&self, values: &dyn Fn(Variable) -> Option<Vec<f64>>) -> Vec<ShapeGroup> {
         let (Over::Curve { count, lengths, .. }, Some(values)) = (self.over, values(self.of))
         else {
             return Vec::new();
@@ -163,7 +163,7 @@ impl FreeShape {
         }]
     }
 
-    pub fn groups(
+    pub(crate) fn groups(
         &self,
         survey: &Survey,
         values: &dyn Fn(Variable) -> Option<Vec<f64>>,

@@ -29,12 +29,12 @@ pub struct GroupEvidence {
     /// The likeliest amplitude, rms motion at the tool, m.
     pub amplitude: f64,
     /// What the group explains of the squared residual at that amplitude.
-    pub fit: f64,
+    pub(crate) fit: f64,
 }
 
 impl GroupEvidence {
     /// Of a group that the rows do not see.
-    pub const NONE: Self = Self {
+    pub(crate) const NONE: Self = Self {
         log: 0.0,
         amplitude: 0.0,
         fit: 0.0,

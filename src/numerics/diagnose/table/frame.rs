@@ -27,9 +27,9 @@ pub(super) struct NoiseShape {
 /// Columns of unit rms motion at the tool.
 pub(super) struct UnitColumns {
     /// Residual rows x columns.
-    pub values: Arc<DMatrix<f64>>,
+    pub(crate) values: Arc<DMatrix<f64>>,
     /// Mean squared motion (m2 or rad2) by a unit of each coefficient.
-    pub square: Vec<f64>,
+    pub(crate) square: Vec<f64>,
 }
 
 /// A direction in which a motion moves the rows.
@@ -49,7 +49,7 @@ struct Weighed {
 
 /// The rows of the recording around a model.
 pub(super) struct SearchRows<'a> {
-    pub view: &'a RoundView<'a>,
+    pub(crate) view: &'a RoundView<'a>,
     base: Mat<f64>,
     residual: Vec<f64>,
     /// Variance of one number of a row, m2 or rad2, by which columns become sizes.
@@ -61,7 +61,12 @@ pub(super) struct SearchRows<'a> {
 
 impl<'a> SearchRows<'a> {
     /// Around a fitted model; the residual is that without its causes.
-    pub fn of(view: &'a RoundView<'a>, now: &FitState, fitter: &Fitter, noise: NoiseShape) -> Self {
+    pub(crate) fn of(
+        view: &'a RoundView<'a>,
+        now: &FitState,
+        fitter: &Fitter,
+        noise: NoiseShape,
+    ) -> Self {
         let problem = &view.problem;
         let variance = |(i, row): (usize, &usize)| {
             fitter.scale.noise(problem.data, *row).powi(2)
@@ -97,7 +102,7 @@ impl<'a> SearchRows<'a> {
     }
 
     /// What is left, and how many rows say something of their own.
-    pub fn rows(&self) -> EvidenceRows {
+    pub(crate) fn rows(&self) -> EvidenceRows {
         let square = self.residual.iter().map(|value| value * value).sum();
         let counted = self.residual.len() as f64 / self.view.autocorrelation_time();
         EvidenceRows {
@@ -107,7 +112,7 @@ impl<'a> SearchRows<'a> {
     }
 
     /// The least variance of the noise over what is stated: what motor currents leave says nothing of the points'.
-    pub fn least_noise(&self) -> f64 {
+    pub(crate) fn least_noise(&self) -> f64 {
         if self.view.problem.of_readings().len() < self.residual.len() {
             1.0
         } else {
@@ -115,18 +120,18 @@ impl<'a> SearchRows<'a> {
         }
     }
 
-    pub fn residual(&self) -> &[f64] {
+    pub(crate) fn residual(&self) -> &[f64] {
         &self.residual
     }
 
     /// Products of some columns with the residual.
-    pub fn along(&self, columns: &DMatrix<f64>) -> DVector<f64> {
+    pub(crate) fn along(&self, columns: &DMatrix<f64>) -> DVector<f64> {
         let residual = MatRef::from_column_major_slice(&self.residual, self.residual.len(), 1);
         product(view(columns), residual).column(0).into_owned()
     }
 
     /// A variable at every row; none where some row does not tell it.
-    pub fn values(&self, of: Variable) -> Option<Vec<f64>> {
+    pub(crate) fn values(&self, of: Variable) -> Option<Vec<f64>> {
         match self.values.iter().find(|(other, _)| *other == of) {
             Some((_, values)) => values.clone(),
             None => self.view.problem.values(of),
@@ -134,7 +139,7 @@ impl<'a> SearchRows<'a> {
     }
 
     /// Computes once what the columns of many forms are made of.
-    pub fn prepare(&mut self, motions: &[Motion], variables: &[Variable]) {
+    pub(crate) fn prepare(&mut self, motions: &[Motion], variables: &[Variable]) {
         let problem = &self.view.problem;
         let fresh: Vec<Motion> = motions
             .iter()
@@ -164,7 +169,7 @@ impl<'a> SearchRows<'a> {
 
     /// Columns of some forms, one form after another, and how many each has. They end before the rows of motor currents where no form says
     /// anything of these.
-    pub fn columns(&self, forms: &[Form]) -> (UnitColumns, Vec<usize>) {
+    pub(crate) fn columns(&self, forms: &[Form]) -> (UnitColumns, Vec<usize>) {
         let each: Vec<Weighed> = forms
             .iter()
             .map(|form| self.of_term(form).unwrap_or_else(|| self.of_form(form)))
@@ -230,7 +235,7 @@ impl<'a> SearchRows<'a> {
     }
 
     /// How much of the squared length of `left` the columns of a law at a place explain if they are orthogonal; nothing of what needs more.
-    pub fn roughly(&self, form: &Form, left: &[f64]) -> Option<f64> {
+    pub(crate) fn roughly(&self, form: &Form, left: &[f64]) -> Option<f64> {
         let term = form.term().filter(|_| !self.view.problem.is_correlated())?;
         let (_, directions) = self
             .directions
@@ -361,7 +366,7 @@ impl<'a> SearchRows<'a> {
     }
 
     /// Rms motion at the tool of what makes the squared residual smaller by so much.
-    pub fn size(&self, fit: f64) -> f64 {
+    pub(crate) fn size(&self, fit: f64) -> f64 {
         let count = self.variance.len().max(1) as f64;
         (fit.max(0.0) * self.variance.iter().sum::<f64>() / (count * count)).sqrt()
     }
@@ -398,7 +403,7 @@ impl<'a> SearchRows<'a> {
 
 impl NoiseShape {
     /// Before anything was found: rows that measured one pose count as far as they say something of their own.
-    pub fn at_first(view: &RoundView, rows: usize) -> Self {
+    pub(crate) fn at_first(view: &RoundView, rows: usize) -> Self {
         let mut weights = vec![1.0; rows];
         share_among_repeats(view, &mut weights);
         Self {
@@ -409,7 +414,7 @@ impl NoiseShape {
 
     /// By what a fitted model leaves of the rows: those that are far off count less, and a noise that is stronger in some direction is made
     /// even.
-    pub fn of(view: &RoundView, rows: usize) -> Self {
+    pub(crate) fn of(view: &RoundView, rows: usize) -> Self {
         let problem = &view.problem;
         let residual = problem.of_readings();
         let square = |lines: std::ops::Range<usize>| {

@@ -52,21 +52,21 @@ pub(crate) struct Rounds {
 
 /// What a round found.
 pub(crate) struct Round {
-    pub causes: Vec<EstimatedCause>,
+    pub(crate) causes: Vec<EstimatedCause>,
     /// What it means, where the round is the last one.
-    pub answer: Option<Answer>,
+    pub(crate) answer: Option<Answer>,
     /// How many cells were compared.
-    pub cells: usize,
+    pub(crate) cells: usize,
 }
 
 impl Rounds {
     /// The number of rounds so far.
-    pub fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         self.round
     }
 
     /// From the beginning, where the noise is believed to be another one; where the residual sat at first stays.
-    pub fn again(&mut self) {
+    pub(crate) fn again(&mut self) {
         *self = Self {
             first: self.first.take(),
             ..Self::default()
@@ -74,7 +74,7 @@ impl Rounds {
     }
 
     /// Searches around a fitted model.
-    pub fn search(&mut self, view: &RoundView, now: &FitState, fitter: &Fitter) -> Round {
+    pub(crate) fn search(&mut self, view: &RoundView, now: &FitState, fitter: &Fitter) -> Round {
         self.round += 1;
         let survey = view.survey();
         let noise = if self.round > 1 {

@@ -16,7 +16,7 @@ type Variant<T> = (T, Vec<Form>);
 
 impl CauseTable<'_, '_> {
     /// Gives the best cell, and listed shapes near it, the numbers that say most.
-    pub fn refine(
+    pub(crate) fn refine(
         &self,
         scan: &mut CellScan,
         state: &KnownState,
@@ -59,7 +59,7 @@ impl CauseTable<'_, '_> {
     }
 
     /// The shape of a cell with its numbers where the evidence is largest, with ln of that and its amplitude; none where it has no numbers.
-    pub fn refined(
+    pub(crate) fn refined(
         &self,
         cell: usize,
         found: &CellEvidence,

@@ -17,45 +17,45 @@ use std::sync::{Arc, OnceLock};
 
 /// The table of cells over the rows of a recording.
 pub(super) struct CauseTable<'f, 'a> {
-    pub frame: &'f SearchRows<'a>,
-    pub survey: &'f Survey<'f>,
-    pub cells: Vec<CauseCell>,
-    pub coarse: Vec<CellColumns>,
+    pub(crate) frame: &'f SearchRows<'a>,
+    pub(crate) survey: &'f Survey<'f>,
+    pub(crate) cells: Vec<CauseCell>,
+    pub(crate) coarse: Vec<CellColumns>,
     fine: Vec<OnceLock<CellColumns>>,
     /// Products of the columns of each component with those of every coarse block.
     products: BTreeMap<u64, DMatrix<f64>>,
-    pub parts: PartProducts,
+    pub(crate) parts: PartProducts,
     known: ColumnProducts,
     /// The first of all coarse columns of each cell, and their number.
-    pub first: Vec<usize>,
+    pub(crate) first: Vec<usize>,
     columns: usize,
-    pub next: u64,
+    pub(crate) next: u64,
     /// Variables with numbers that components follow.
-    pub numbers: Vec<Variable>,
+    pub(crate) numbers: Vec<Variable>,
     /// Cells that were likely at the last look.
-    pub likely: Vec<usize>,
+    pub(crate) likely: Vec<usize>,
     /// Keys of cells that are in the model around which the rows are looked at.
-    pub from_before: Vec<String>,
+    pub(crate) from_before: Vec<String>,
     /// Cells of effects that the user declares.
-    pub declared: Vec<usize>,
+    pub(crate) declared: Vec<usize>,
     /// Motions and variables whose products with others are cells.
-    pub multiplied: Vec<FreeShape>,
+    pub(crate) multiplied: Vec<FreeShape>,
     /// What a joint that yields out of proportion to its load is called.
-    pub bent: &'static str,
+    pub(crate) bent: &'static str,
 }
 
 /// What a cell says given a state, with its likeliest shape.
 #[derive(Clone)]
 pub(super) struct CellEvidence {
     /// ln of the evidence, all shapes mixed.
-    pub log: f64,
+    pub(crate) log: f64,
     /// The same of its shapes with further numbers.
-    pub bent: f64,
+    pub(crate) bent: f64,
     /// Group and shape.
-    pub shape: (usize, usize),
-    pub amplitude: f64,
+    pub(crate) shape: (usize, usize),
+    pub(crate) amplitude: f64,
     /// The shape with its numbers where they say most, with ln of its evidence and its amplitude.
-    pub refined: Option<Refined>,
+    pub(crate) refined: Option<Refined>,
 }
 
 /// A shape with the numbers of which the rows say most: its forms, ln of its evidence, its amplitude.
@@ -64,16 +64,16 @@ pub(super) type Refined = (Vec<Form>, f64, f64);
 /// ln of posterior odds of every cell given a state.
 pub(super) struct CellScan {
     /// Minus infinity of cells that are not asked.
-    pub log_odds: Vec<f64>,
+    pub(crate) log_odds: Vec<f64>,
     /// Of those that were asked closely.
-    pub closely: BTreeMap<usize, CellEvidence>,
+    pub(crate) closely: BTreeMap<usize, CellEvidence>,
     /// All that were asked, the most promising first.
-    pub order: Vec<usize>,
+    pub(crate) order: Vec<usize>,
 }
 
 impl CellScan {
     /// The cell of the largest odds among those asked closely.
-    pub fn best(&self) -> Option<usize> {
+    pub(crate) fn best(&self) -> Option<usize> {
         self.closely
             .keys()
             .copied()
@@ -183,7 +183,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     }
 
     /// The cell of a key.
-    pub fn cell(&self, key: &str) -> Option<usize> {
+    pub(crate) fn cell(&self, key: &str) -> Option<usize> {
         self.cells.iter().position(|cell| cell.key == key)
     }
 
@@ -202,7 +202,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     }
 
     /// Computes once what scans need of some components.
-    pub fn know(&mut self, components: &[Component]) {
+    pub(crate) fn know(&mut self, components: &[Component]) {
         for component in components {
             if !self.products.contains_key(&component.id) {
                 let with = |block: &CellColumns| {
@@ -226,13 +226,17 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     }
 
     /// L^-1 Z'X of all coarse columns given a state.
-    pub fn across(&self, state: &KnownState) -> DMatrix<f64> {
+    pub(crate) fn across(&self, state: &KnownState) -> DMatrix<f64> {
         let all: Vec<usize> = (0..self.cells.len()).collect();
         self.across_cells(&all, state).0
     }
 
     /// The same of some cells, with the first column of each.
-    pub fn across_cells(&self, cells: &[usize], state: &KnownState) -> (DMatrix<f64>, Vec<usize>) {
+    pub(crate) fn across_cells(
+        &self,
+        cells: &[usize],
+        state: &KnownState,
+    ) -> (DMatrix<f64>, Vec<usize>) {
         let parts: Vec<&DMatrix<f64>> = state
             .components
             .iter()
@@ -269,7 +273,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     }
 
     /// Cells that do much of what a component does.
-    pub fn alike(&self, component: &Component, most: usize) -> Vec<usize> {
+    pub(crate) fn alike(&self, component: &Component, most: usize) -> Vec<usize> {
         // Its likeliest motion, of unit length, in the directions of its part.
         self.parts.know(&[component], self.frame);
         let state = KnownState::of(&[component], &self.parts, self.frame, None);
@@ -302,7 +306,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
 
     /// Cells with a name at the place of a component, and of a curve those over its variable there or next to it: columns that are looked at
     /// coarsely do not show how alike fine curves are.
-    pub fn near(&self, component: &Component) -> Vec<usize> {
+    pub(crate) fn near(&self, component: &Component) -> Vec<usize> {
         let of = |cell: &CauseCell| match &cell.shapes {
             Shapes::Free(FreeShape {
                 of,
@@ -341,7 +345,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     }
 
     /// Other motions over a variable with numbers that a component follows: coarsely asked they have other numbers.
-    pub fn over_the_same(&self, component: &Component) -> Vec<usize> {
+    pub(crate) fn over_the_same(&self, component: &Component) -> Vec<usize> {
         let Shapes::Free(free) = &self.cells[component.cell].shapes else {
             return Vec::new();
         };
@@ -359,7 +363,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     }
 
     /// The same of a block's columns, from the components that the state has.
-    pub fn across_block(
+    pub(crate) fn across_block(
         &self,
         block: &CellColumns,
         state: &KnownState,
@@ -382,13 +386,13 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         state.solved(DMatrix::from_vec(rows, columns, values))
     }
 
-    pub fn state(&self, components: &[&Component], kappa: Option<f64>) -> KnownState {
+    pub(crate) fn state(&self, components: &[&Component], kappa: Option<f64>) -> KnownState {
         self.parts.know(components, self.frame);
         KnownState::of(components, &self.parts, self.frame, kappa)
     }
 
     /// The evidence of a cell in all of its shapes given a state of some components.
-    pub fn closely(
+    pub(crate) fn closely(
         &self,
         cell: usize,
         state: &KnownState,
@@ -398,7 +402,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     }
 
     /// The same of one of its shapes, where that is given.
-    pub fn closely_in(
+    pub(crate) fn closely_in(
         &self,
         cell: usize,
         state: &KnownState,
@@ -464,7 +468,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
 
     /// ln of the prior odds of a cell next to others. One that is there already has no price for another component, nor has another motion of
     /// a place that is known to move with a variable: what moves does not keep to one axis.
-    pub fn log_prior(&self, cell: usize, mut others: impl Iterator<Item = usize>) -> f64 {
+    pub(crate) fn log_prior(&self, cell: usize, mut others: impl Iterator<Item = usize>) -> f64 {
         let moves = |cell: usize| match &self.cells[cell].shapes {
             Shapes::Free(free) if matches!(free.over, Over::Curve { .. }) => {
                 Some((free.motion.place(), free.of))
@@ -484,7 +488,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     }
 
     /// The odds of every cell given a state, closely those of the best and of some more.
-    pub fn scan(
+    pub(crate) fn scan(
         &self,
         state: &KnownState,
         components: &[&Component],
@@ -496,7 +500,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     }
 
     /// The odds of cells that do much of what a component does, given a state without it.
-    pub fn scan_alike(
+    pub(crate) fn scan_alike(
         &self,
         component: &Component,
         state: &KnownState,
@@ -508,7 +512,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     }
 
     /// The same of some cells.
-    pub fn scan_some(
+    pub(crate) fn scan_some(
         &self,
         cells: &[usize],
         state: &KnownState,
@@ -575,7 +579,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     }
 
     /// Those of some products that a state shows, the most probable first.
-    pub fn seen_pairs(
+    pub(crate) fn seen_pairs(
         &self,
         pairs: &[FreeShape],
         state: &KnownState,
@@ -613,7 +617,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     }
 
     /// The component that a cell is in a scan.
-    pub fn component(&mut self, cell: usize, found: &CellEvidence) -> Component {
+    pub(crate) fn component(&mut self, cell: usize, found: &CellEvidence) -> Component {
         let found_component = self.as_found(cell, found);
         let Some((forms, _, amplitude)) = found.refined.clone() else {
             self.next += 1;
@@ -631,7 +635,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     }
 
     /// The same with the numbers of its listed shape.
-    pub fn as_found(&self, cell: usize, found: &CellEvidence) -> Component {
+    pub(crate) fn as_found(&self, cell: usize, found: &CellEvidence) -> Component {
         let block = self.fine(cell);
         let seen = &block.groups[found.shape.0];
         let shape = seen.group.shapes[found.shape.1].clone();
@@ -681,7 +685,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     }
 
     /// A component with other forms, before it has a part in the covariance.
-    pub fn with_forms(&self, before: &Component, forms: Vec<Form>) -> Component {
+    pub(crate) fn with_forms(&self, before: &Component, forms: Vec<Form>) -> Component {
         let (columns, counts) = self.frame.columns(&forms);
         Component {
             forms,
@@ -693,7 +697,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     }
 
     /// A component of given forms, e.g. of the model before.
-    pub fn component_of(&mut self, before: &Component, cell: usize) -> Component {
+    pub(crate) fn component_of(&mut self, before: &Component, cell: usize) -> Component {
         self.next += 1;
         Component {
             cell,
@@ -703,7 +707,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     }
 
     /// ln of the evidence of one shape with its weight given a state, and its amplitude.
-    pub fn of_component(
+    pub(crate) fn of_component(
         &self,
         component: &Component,
         state: &KnownState,

@@ -125,7 +125,7 @@ impl ComponentSearch for CauseTable<'_, '_> {
 
 impl CauseTable<'_, '_> {
     /// Every component anew given all others: shape and amplitude.
-    pub fn backfit(&mut self, components: Vec<Component>, rounds: usize) -> Vec<Component> {
+    pub(crate) fn backfit(&mut self, components: Vec<Component>, rounds: usize) -> Vec<Component> {
         let all = (0..components.len()).collect::<Vec<_>>();
         self.backfit_some(components, &all, rounds)
     }
@@ -200,7 +200,7 @@ impl CauseTable<'_, '_> {
 
     /// Where the strongest cell is one of loads, every joint that yields to its own: one link that bends may look better than any one joint, and
     /// worse than all of them. Nothing else.
-    pub fn start(&mut self) -> Vec<Component> {
+    pub(crate) fn start(&mut self) -> Vec<Component> {
         let state = self.state(&[], None);
         let scan = self.scan(&state, &[], *CLOSELY, &[]);
         let loads = |form: &Form| {
@@ -229,7 +229,7 @@ impl CauseTable<'_, '_> {
     }
 
     /// Adds cells while they pay, then takes all anew.
-    pub fn grow(&mut self, components: Vec<Component>) -> Vec<Component> {
+    pub(crate) fn grow(&mut self, components: Vec<Component>) -> Vec<Component> {
         self.know(&components);
         self.likely = (0..self.cells.len()).collect();
         let before = components.len();
@@ -242,7 +242,7 @@ impl CauseTable<'_, '_> {
     }
 
     /// ln of the evidence of a component's cell, its refined shape among the others.
-    pub fn log_evidence(
+    pub(crate) fn log_evidence(
         &self,
         component: &Component,
         state: &KnownState,
@@ -256,7 +256,7 @@ impl CauseTable<'_, '_> {
     }
 
     /// Exchanges components for cells that say more in their place.
-    pub fn swap(&mut self, mut components: Vec<Component>) -> Vec<Component> {
+    pub(crate) fn swap(&mut self, mut components: Vec<Component>) -> Vec<Component> {
         let key = |components: &[Component]| {
             let mut cells: Vec<usize> = components.iter().map(|component| component.cell).collect();
             cells.sort_unstable();
@@ -320,7 +320,7 @@ impl CauseTable<'_, '_> {
     }
 
     /// A component without a name that a few causes of the list replace is those: two waves of a gear look like one curve.
-    pub fn by_several(&mut self, mut components: Vec<Component>) -> Vec<Component> {
+    pub(crate) fn by_several(&mut self, mut components: Vec<Component>) -> Vec<Component> {
         let unnamed: Vec<u64> = components
             .iter()
             .filter(|component| !self.cells[component.cell].is_named())

@@ -21,11 +21,11 @@ use std::sync::{Arc, RwLock, Weak};
 
 /// A group of shapes with its columns.
 pub(super) struct SeenGroup {
-    pub group: ShapeGroup,
+    pub(crate) group: ShapeGroup,
     /// Its columns among those of its block.
-    pub range: Range<usize>,
+    pub(crate) range: Range<usize>,
     /// Columns of each form.
-    pub counts: Vec<usize>,
+    pub(crate) counts: Vec<usize>,
     gram: DMatrix<f64>,
     gradient: DVector<f64>,
 }
@@ -48,14 +48,14 @@ pub(super) fn shape_keys(groups: &[SeenGroup]) -> Vec<String> {
 
 /// All shapes of a cell with their columns.
 pub(super) struct CellColumns {
-    pub groups: Vec<SeenGroup>,
-    pub columns: UnitColumns,
+    pub(crate) groups: Vec<SeenGroup>,
+    pub(crate) columns: UnitColumns,
     /// Its possible amplitudes, m.
-    pub between: [f64; 2],
+    pub(crate) between: [f64; 2],
 }
 
 impl CellColumns {
-    pub fn of(groups: Vec<ShapeGroup>, frame: &SearchRows) -> Self {
+    pub(crate) fn of(groups: Vec<ShapeGroup>, frame: &SearchRows) -> Self {
         let forms: Vec<Form> = groups
             .iter()
             .flat_map(|group| group.forms.iter().cloned())
@@ -94,7 +94,7 @@ impl CellColumns {
 
 impl CellColumns {
     /// The shape of a component alone.
-    pub fn of_component(component: &Component, frame: &SearchRows) -> Self {
+    pub(crate) fn of_component(component: &Component, frame: &SearchRows) -> Self {
         let values = component.values.clone();
         let (gram, gradient) = (product(view(&values), view(&values)), frame.along(&values));
         let range = 0..values.ncols();
@@ -116,7 +116,7 @@ impl CellColumns {
     }
 
     /// With the possible amplitudes that other robots show.
-    pub fn between(self, between: Option<[f64; 2]>) -> Self {
+    pub(crate) fn between(self, between: Option<[f64; 2]>) -> Self {
         Self {
             between: between.unwrap_or([0.0, f64::INFINITY]),
             ..self
@@ -124,7 +124,7 @@ impl CellColumns {
     }
 
     /// The largest share of a motion that the columns of a group can make, by their products with it; of unit length.
-    pub fn overlap(&self, along: &[f64]) -> f64 {
+    pub(crate) fn overlap(&self, along: &[f64]) -> f64 {
         let mut most = 0.0;
         for group in &self.groups {
             let along = DVector::from_column_slice(&along[group.range.clone()]);
@@ -147,21 +147,21 @@ impl CellColumns {
 #[derive(Clone)]
 pub(super) struct Component {
     /// Components of the same number have the same part in the covariance.
-    pub id: u64,
-    pub cell: usize,
-    pub forms: Vec<Form>,
-    pub counts: Vec<usize>,
-    pub shape: CellShape,
+    pub(crate) id: u64,
+    pub(crate) cell: usize,
+    pub(crate) forms: Vec<Form>,
+    pub(crate) counts: Vec<usize>,
+    pub(crate) shape: CellShape,
     /// Whether, and up to which size, its coefficients are positive.
-    pub group: Arc<ShapeGroup>,
-    pub values: Arc<DMatrix<f64>>,
-    pub square: Arc<Vec<f64>>,
+    pub(crate) group: Arc<ShapeGroup>,
+    pub(crate) values: Arc<DMatrix<f64>>,
+    pub(crate) square: Arc<Vec<f64>>,
     /// Rms motion at the tool, m.
-    pub amplitude: f64,
+    pub(crate) amplitude: f64,
     /// Columns whose products with themselves are its part in the covariance: the directions that the rows could show.
-    pub part: Arc<DMatrix<f64>>,
+    pub(crate) part: Arc<DMatrix<f64>>,
     /// What makes these of its columns.
-    pub mix: Arc<DMatrix<f64>>,
+    pub(crate) mix: Arc<DMatrix<f64>>,
 }
 
 /// Prior variance of a direction, in that of the noise, below which no row shows it.
@@ -177,7 +177,7 @@ impl Component {
     }
 
     /// Prior standard deviations of its coefficients, SI.
-    pub fn sigmas(&self) -> Vec<f64> {
+    pub(crate) fn sigmas(&self) -> Vec<f64> {
         let scale = |square: &f64| {
             if *square > 0.0 {
                 square.sqrt().recip()
@@ -192,7 +192,7 @@ impl Component {
     }
 
     /// With its part in the covariance.
-    pub fn with_part(self, id: u64) -> Self {
+    pub(crate) fn with_part(self, id: u64) -> Self {
         let roots: Vec<f64> = self.roots().collect();
         let mut mix = DMatrix::from_diagonal(&DVector::from_column_slice(&roots));
         if roots.len() > 2 {
@@ -237,7 +237,7 @@ impl Component {
     }
 
     /// One that has no part in the covariance yet.
-    pub fn apart(
+    pub(crate) fn apart(
         cell: usize,
         forms: Vec<Form>,
         counts: Vec<usize>,
@@ -263,7 +263,7 @@ impl Component {
     }
 
     /// Products of its part with other columns, by those of its columns with them.
-    pub fn by_part(&self, of_columns: &DMatrix<f64>) -> DMatrix<f64> {
+    pub(crate) fn by_part(&self, of_columns: &DMatrix<f64>) -> DMatrix<f64> {
         product(view(&self.mix), view(of_columns))
     }
 }
@@ -287,7 +287,7 @@ struct KnownProduct {
 
 impl ColumnProducts {
     /// The transpose of `a` times `b`.
-    pub fn of(&self, a: &Arc<DMatrix<f64>>, b: &Arc<DMatrix<f64>>) -> Arc<DMatrix<f64>> {
+    pub(crate) fn of(&self, a: &Arc<DMatrix<f64>>, b: &Arc<DMatrix<f64>>) -> Arc<DMatrix<f64>> {
         let key = (Arc::as_ptr(a) as usize, Arc::as_ptr(b) as usize);
         if let Ok(cache) = self.0.read()
             && let Some(known) = cache.known.get(&key)
@@ -325,7 +325,7 @@ struct PartCache {
 
 impl PartProducts {
     /// Computes what is missing for some components, and forgets what is too much.
-    pub fn know(&self, components: &[&Component], frame: &SearchRows) {
+    pub(crate) fn know(&self, components: &[&Component], frame: &SearchRows) {
         let Ok(mut cache) = self.0.write() else {
             return;
         };
@@ -391,7 +391,7 @@ impl PartProducts {
     }
 
     /// How much two components do the same, 0 to 1.
-    pub fn overlap(&self, a: &Component, b: &Component) -> f64 {
+    pub(crate) fn overlap(&self, a: &Component, b: &Component) -> f64 {
         let Ok(cache) = self.0.read() else { return 1.0 };
         let square = |a: u64, b: u64| {
             cache
@@ -415,7 +415,7 @@ pub struct KnownState {
     /// What is left, seen through the covariance.
     pub rows: EvidenceRows,
     /// Which components, by their numbers.
-    pub components: Vec<u64>,
+    pub(crate) components: Vec<u64>,
     /// Cholesky factor of kappa^2 + Z'Z.
     lower: Mat<f64>,
     /// L^-1 Z'r.
@@ -518,7 +518,7 @@ impl KnownState {
     }
 
     /// The likeliest weights of its columns; none where it has none.
-    pub fn weights(&self) -> Option<DVector<f64>> {
+    pub(crate) fn weights(&self) -> Option<DVector<f64>> {
         let mut weights = self.along.clone();
         let count = weights.len();
         if count == 0 {

@@ -7,20 +7,20 @@ use crate::estimate::ErrorScale;
 
 /// The last round.
 pub(crate) struct LastRound<'a, 'b> {
-    pub view: &'b RoundView<'a>,
-    pub survey: &'b Survey<'a>,
+    pub(crate) view: &'b RoundView<'a>,
+    pub(crate) survey: &'b Survey<'a>,
     /// The whole model with all causes.
-    pub state: FitState,
-    pub answer: Answer,
+    pub(crate) state: FitState,
+    pub(crate) answer: Answer,
     /// What errors of rows are compared and told in.
-    pub scale: ErrorScale,
+    pub(crate) scale: ErrorScale,
     /// Names of causes that are not to be given.
-    pub without: &'b [String],
+    pub(crate) without: &'b [String],
 }
 
 impl LastRound<'_, '_> {
     /// Whether a name is not to be given.
-    pub fn excludes(&self, effect: &str) -> bool {
+    pub(crate) fn excludes(&self, effect: &str) -> bool {
         self.without.iter().any(|name| name == effect)
     }
 }

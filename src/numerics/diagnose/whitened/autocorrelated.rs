@@ -6,9 +6,9 @@ use crate::criteria::noise::GROSS;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct AutocorrelatedNoise {
     /// Correlation of that part from one row of the recording to the next.
-    pub correlation: f64,
+    pub(crate) correlation: f64,
     /// Its share of the variance.
-    pub share: f64,
+    pub(crate) share: f64,
 }
 
 /// Tried values, from short to long.
@@ -17,13 +17,13 @@ const SHARES: [f64; 10] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0];
 
 impl AutocorrelatedNoise {
     /// White noise.
-    pub const NONE: Self = Self {
+    pub(crate) const NONE: Self = Self {
         correlation: 0.0,
         share: 0.0,
     };
 
     /// All that are tried, white noise (`None`) first.
-    pub fn all() -> impl Iterator<Item = Option<Self>> {
+    pub(crate) fn all() -> impl Iterator<Item = Option<Self>> {
         let some = AR1_COEFFICIENTS.into_iter().flat_map(|correlation| {
             SHARES
                 .into_iter()
@@ -33,7 +33,7 @@ impl AutocorrelatedNoise {
     }
 
     /// Brings gross residuals back to where they no longer hide what the others share.
-    pub fn without_gross(residual: &mut [f64]) {
+    pub(crate) fn without_gross(residual: &mut [f64]) {
         let scale = (residual.iter().map(|value| value * value).sum::<f64>()
             / residual.len().max(1) as f64)
             .sqrt();
@@ -43,12 +43,12 @@ impl AutocorrelatedNoise {
     }
 
     /// The share times the autocorrelation time.
-    pub fn length(self) -> f64 {
+    pub(crate) fn length(self) -> f64 {
         self.share * (1.0 + self.correlation) / (1.0 - self.correlation)
     }
 
     /// The filter of columns with `width` numbers for each of these rows of the recording, ascending.
-    pub fn filter(&self, rows: &[usize], width: usize) -> Innovations {
+    pub(crate) fn filter(&self, rows: &[usize], width: usize) -> Innovations {
         let mut variance = self.share;
         let mut steps = Vec::with_capacity(rows.len());
         for (i, row) in rows.iter().enumerate() {
@@ -85,7 +85,7 @@ pub(crate) struct Innovations {
 
 impl Innovations {
     /// Takes a column to its innovations in standard deviations.
-    pub fn apply(&self, column: &mut [f64]) {
+    pub(crate) fn apply(&self, column: &mut [f64]) {
         let mut drift = vec![0.0; self.width];
         for (step, row) in self.steps.iter().zip(column.chunks_exact_mut(self.width)) {
             let sigma = step.whole.sqrt();
@@ -99,7 +99,7 @@ impl Innovations {
     }
 
     /// ln of the determinant of the readings' covariance.
-    pub fn determinant(&self) -> f64 {
+    pub(crate) fn determinant(&self) -> f64 {
         self.width as f64 * self.steps.iter().map(|step| step.whole.ln()).sum::<f64>()
     }
 }

@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 /// The motors whose currents are usable.
 pub(crate) struct Currents {
     /// Joints, from 0.
-    pub joints: Vec<usize>,
+    pub(crate) joints: Vec<usize>,
     /// Nm for each residual row: rows of the recording x joints, row by row.
     residual: Vec<f64>,
     /// Standard deviation of each joint's residuals, Nm.
@@ -109,29 +109,29 @@ impl Currents {
         })
     }
 
-    pub fn residual_rows(&self) -> usize {
+    pub(crate) fn residual_rows(&self) -> usize {
         self.residual.len()
     }
 
     /// Residuals in standard deviations.
-    pub fn whitened(&self) -> impl Iterator<Item = f64> + '_ {
+    pub(crate) fn whitened(&self) -> impl Iterator<Item = f64> + '_ {
         self.residual
             .iter()
             .enumerate()
             .map(|(row, value)| value / self.sigma_of(row))
     }
 
-    pub fn sigma_of(&self, row: usize) -> f64 {
+    pub(crate) fn sigma_of(&self, row: usize) -> f64 {
         self.sigma[row % self.joints.len()]
     }
 
     /// Columns that each motor has of its own: bias and friction.
-    pub fn nuisances(&self) -> usize {
+    pub(crate) fn nuisances(&self) -> usize {
         2 * self.joints.len()
     }
 
     /// Entry of a nuisance in a residual row, whitened.
-    pub fn nuisance(&self, row: usize, column: usize) -> f64 {
+    pub(crate) fn nuisance(&self, row: usize, column: usize) -> f64 {
         let joint = row % self.joints.len();
         match column {
             bias if bias == 2 * joint => 1.0 / self.sigma[joint],
@@ -141,7 +141,7 @@ impl Currents {
     }
 
     /// What the currents alone say of some parameters with whitened `columns` (of the residual rows of currents), now at `values`.
-    pub fn priors(&self, columns: &[Vec<f64>], values: &[f64]) -> Option<Vec<Prior>> {
+    pub(crate) fn priors(&self, columns: &[Vec<f64>], values: &[f64]) -> Option<Vec<Prior>> {
         let (rows, own) = (self.residual_rows(), columns.len());
         let seen: Vec<f64> = self
             .whitened()

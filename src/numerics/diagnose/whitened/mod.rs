@@ -27,10 +27,10 @@ use std::sync::OnceLock;
 
 /// Fitted rows through the present model.
 pub(crate) struct WhitenedProblem<'a> {
-    pub robot: &'a RobotModel,
-    pub data: &'a Measurements,
+    pub(crate) robot: &'a RobotModel,
+    pub(crate) data: &'a Measurements,
     /// Rows of the recording, ascending.
-    pub rows: Vec<usize>,
+    pub(crate) rows: Vec<usize>,
     motions: Vec<PointMotion>,
     readings: ReadingLines,
     currents: Option<Currents>,
@@ -42,7 +42,7 @@ pub(crate) struct WhitenedProblem<'a> {
     /// Columns of a unit travel of each joint.
     travels: OnceLock<Vec<Vec<f64>>>,
     /// Whitened measured - predicted.
-    pub residual: Vec<f64>,
+    pub(crate) residual: Vec<f64>,
 }
 
 impl<'a> WhitenedProblem<'a> {
@@ -112,7 +112,7 @@ impl<'a> WhitenedProblem<'a> {
     }
 
     /// With the motor currents, which say something where a joint yields to torques.
-    pub fn with_currents(mut self) -> Self {
+    pub(crate) fn with_currents(mut self) -> Self {
         self.currents = Currents::new(self.robot, self.data, &self.rows, &self.motions);
         self.residual.extend(
             self.currents
@@ -124,7 +124,7 @@ impl<'a> WhitenedProblem<'a> {
     }
 
     /// With autocorrelated noise: all columns become innovations. Of rows that measured different numbers noise stays white.
-    pub fn with_autocorrelation(mut self, noise: AutocorrelatedNoise) -> Self {
+    pub(crate) fn with_autocorrelation(mut self, noise: AutocorrelatedNoise) -> Self {
         let (filter, measured) = (
             self.width().map(|width| noise.filter(&self.rows, width)),
             self.measured(),
@@ -137,12 +137,12 @@ impl<'a> WhitenedProblem<'a> {
     }
 
     /// Whether the noise is correlated from row to row.
-    pub fn is_correlated(&self) -> bool {
+    pub(crate) fn is_correlated(&self) -> bool {
         self.innovations.is_some()
     }
 
     /// Takes what a column says of readings to their innovations.
-    pub fn innovate(&self, column: &mut [f64]) {
+    pub(crate) fn innovate(&self, column: &mut [f64]) {
         if let Some(innovations) = &self.innovations {
             innovations.apply(&mut column[..self.measured()]);
         }
@@ -154,7 +154,7 @@ impl<'a> WhitenedProblem<'a> {
     }
 
     /// Numbers that each row measured, where all measured as many.
-    pub fn width(&self) -> Option<usize> {
+    pub(crate) fn width(&self) -> Option<usize> {
         let of_row = |i: usize| self.readings.of_row(i).len();
         let width = of_row(0);
         (!self.rows.is_empty() && width > 0 && (0..self.rows.len()).all(|i| of_row(i) == width))
@@ -162,21 +162,21 @@ impl<'a> WhitenedProblem<'a> {
     }
 
     /// Residuals of what was measured, row by row.
-    pub fn of_readings(&self) -> &[f64] {
+    pub(crate) fn of_readings(&self) -> &[f64] {
         &self.residual[..self.measured()]
     }
 
     /// Residual rows of the readings of a row, by its place in `rows`.
-    pub fn readings_of(&self, place: usize) -> Range<usize> {
+    pub(crate) fn readings_of(&self, place: usize) -> Range<usize> {
         self.readings.of_row(place)
     }
 
-    pub fn residual_rows(&self) -> usize {
+    pub(crate) fn residual_rows(&self) -> usize {
         self.residual.len()
     }
 
     /// The place in `rows` of a residual row.
-    pub fn row_of(&self, residual_row: usize) -> usize {
+    pub(crate) fn row_of(&self, residual_row: usize) -> usize {
         match &self.currents {
             Some(currents) if residual_row >= self.measured() => {
                 (residual_row - self.measured()) / currents.joints.len()
@@ -186,7 +186,7 @@ impl<'a> WhitenedProblem<'a> {
     }
 
     /// Load torques (Nm), row-major.
-    pub fn torques(&self) -> Vec<f64> {
+    pub(crate) fn torques(&self) -> Vec<f64> {
         self.motions
             .iter()
             .flat_map(|motion| motion.posture.torque.iter().copied())
@@ -194,13 +194,13 @@ impl<'a> WhitenedProblem<'a> {
     }
 
     /// Motion of each row's point by each joint, m/rad; row-major.
-    pub fn by_joint(&self, row: usize) -> &[Vector3<f64>] {
+    pub(crate) fn by_joint(&self, row: usize) -> &[Vector3<f64>] {
         &self.motions[row].by_joint
     }
 
     /// How far each joint moves the first three numbers that a row (by its place) measured of a kind, in standard deviations per rad or m;
     /// none where it measured none.
-    pub fn reading_by_joint(&self, place: usize, kind: &str) -> Option<Vec<Vector3<f64>>> {
+    pub(crate) fn reading_by_joint(&self, place: usize, kind: &str) -> Option<Vec<Vector3<f64>>> {
         let (_, reading) = self
             .readings
             .seen(place)
@@ -213,7 +213,7 @@ impl<'a> WhitenedProblem<'a> {
     }
 
     /// The largest motion of the point by each joint, m/rad.
-    pub fn reach(&self) -> Vec<f64> {
+    pub(crate) fn reach(&self) -> Vec<f64> {
         let joints = 0..self.robot.joints();
         joints
             .map(|j| {
@@ -226,7 +226,7 @@ impl<'a> WhitenedProblem<'a> {
     }
 
     /// Columns of a form, one after another.
-    pub fn columns(&self, form: &Form) -> Vec<f64> {
+    pub(crate) fn columns(&self, form: &Form) -> Vec<f64> {
         let mut out = self.motions_by(form);
         out.chunks_mut(self.residual_rows().max(1))
             .for_each(|column| self.innovate(column));
@@ -234,7 +234,7 @@ impl<'a> WhitenedProblem<'a> {
     }
 
     /// The same whether noise is correlated or not: whitened motions of the points per unit of each parameter.
-    pub fn motions_by(&self, form: &Form) -> Vec<f64> {
+    pub(crate) fn motions_by(&self, form: &Form) -> Vec<f64> {
         match self.travel(form) {
             Some((joint, values)) => self.travelled(joint, &values),
             None => self.motions_by_partials(form),
@@ -273,7 +273,7 @@ impl<'a> WhitenedProblem<'a> {
     }
 
     /// Whitened motions of the points by each direction of a motion, whatever the row; noise is not made white in time.
-    pub fn directions(&self, motion: Motion) -> Vec<Vec<f64>> {
+    pub(crate) fn directions(&self, motion: Motion) -> Vec<Vec<f64>> {
         // One from the beginning of time.
         let always = Law::new(Variable::Time, Basis::After { at: f64::MIN });
         let columns = self.motions_by(&Term::new(&Unknown, motion, always).into());
@@ -284,14 +284,14 @@ impl<'a> WhitenedProblem<'a> {
     }
 
     /// A variable of one number at every row; none where some row does not tell.
-    pub fn values(&self, of: Variable) -> Option<Vec<f64>> {
+    pub(crate) fn values(&self, of: Variable) -> Option<Vec<f64>> {
         let one =
             |(row, motion): (&usize, &PointMotion)| motion.value(self.robot, self.data, *row, of);
         self.rows.iter().zip(&self.motions).map(one).collect()
     }
 
     /// Columns of some parameters of the model itself, and what each motor has of its own.
-    pub fn jacobian(&self, free: &[usize]) -> Mat<f64> {
+    pub(crate) fn jacobian(&self, free: &[usize]) -> Mat<f64> {
         let model = self.model;
         let mut column = vec![None; model.stack.specs().len()];
         for (j, parameter) in free.iter().enumerate() {
@@ -348,7 +348,7 @@ impl<'a> WhitenedProblem<'a> {
     }
 
     /// What the currents alone say of the parameters of some forms; nothing where they say nothing.
-    pub fn priors_by_currents(&self, forms: &[&Form]) -> Vec<Prior> {
+    pub(crate) fn priors_by_currents(&self, forms: &[&Form]) -> Vec<Prior> {
         let Some(currents) = self.currents.as_ref().filter(|_| !forms.is_empty()) else {
             return Vec::new();
         };

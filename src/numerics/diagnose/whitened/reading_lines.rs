@@ -5,11 +5,11 @@ use std::ops::Range;
 
 /// What a row measured of one kind, as the present model sees it.
 pub(super) struct SeenReading {
-    pub kind: &'static dyn MeasurementKind,
+    pub(crate) kind: &'static dyn MeasurementKind,
     /// Lines of the kind's residual that were measured.
-    pub lines: &'static [usize],
+    pub(crate) lines: &'static [usize],
     /// How it follows the target's motion, in standard deviations.
-    pub sensitivity: Sensitivity,
+    pub(crate) sensitivity: Sensitivity,
 }
 
 /// Readings of all rows, one row after another.
@@ -23,12 +23,12 @@ pub(super) struct ReadingLines {
     /// By row: past its last residual row.
     end_line: Vec<usize>,
     /// By residual row: the place of its row.
-    pub row_of: Vec<usize>,
+    pub(crate) row_of: Vec<usize>,
 }
 
 impl ReadingLines {
     /// Takes the readings of the next row.
-    pub fn push(&mut self, readings: Vec<SeenReading>) {
+    pub(crate) fn push(&mut self, readings: Vec<SeenReading>) {
         let place = self.end.len();
         for reading in readings {
             self.first.push(self.row_of.len());
@@ -41,7 +41,7 @@ impl ReadingLines {
     }
 
     /// Readings of a row, each with its first residual row.
-    pub fn seen(&self, place: usize) -> impl Iterator<Item = (usize, &SeenReading)> {
+    pub(crate) fn seen(&self, place: usize) -> impl Iterator<Item = (usize, &SeenReading)> {
         let own = begin(&self.end, place)..self.end[place];
         self.first[own.clone()]
             .iter()
@@ -50,7 +50,7 @@ impl ReadingLines {
     }
 
     /// Residual rows of a row.
-    pub fn of_row(&self, place: usize) -> Range<usize> {
+    pub(crate) fn of_row(&self, place: usize) -> Range<usize> {
         begin(&self.end_line, place)..self.end_line[place]
     }
 }

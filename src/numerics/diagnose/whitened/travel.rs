@@ -21,7 +21,7 @@ impl WhitenedProblem<'_> {
     }
 
     /// The same where every residual row says what it says by itself.
-    pub fn plain_travel(&self, form: &Form) -> Option<(usize, Vec<f64>)> {
+    pub(crate) fn plain_travel(&self, form: &Form) -> Option<(usize, Vec<f64>)> {
         if self.innovations.is_some() {
             None
         } else {
@@ -30,7 +30,7 @@ impl WhitenedProblem<'_> {
     }
 
     /// Column of a unit travel of a joint, whether noise is correlated or not.
-    pub fn unit_travel(&self, joint: usize) -> &[f64] {
+    pub(crate) fn unit_travel(&self, joint: usize) -> &[f64] {
         let column = |joint: usize| {
             // One in every row, and the angle, which is not asked.
             let law = Law::new(
@@ -65,7 +65,7 @@ impl WhitenedProblem<'_> {
     }
 
     /// Sums, row by row, of the products of a column with that of a unit travel of a joint.
-    pub fn along_travel(&self, joint: usize, column: &[f64]) -> Vec<f64> {
+    pub(crate) fn along_travel(&self, joint: usize, column: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; self.rows.len()];
         for (residual_row, (value, unit)) in column.iter().zip(self.unit_travel(joint)).enumerate()
         {

@@ -8,28 +8,28 @@ use crate::robot::NoiseBasis;
 /// What a verdict rests on; rms sizes of a row's error, m or rad.
 #[derive(Clone, Copy)]
 pub(crate) struct Ground {
-    pub dimension: Dimension,
-    pub basis: NoiseBasis,
+    pub(crate) dimension: Dimension,
+    pub(crate) basis: NoiseBasis,
     /// Repeats that the noise was learnt from.
-    pub repeats: usize,
+    pub(crate) repeats: usize,
     /// The noise of all that moves a point at random.
-    pub noise: f64,
+    pub(crate) noise: f64,
     /// What the instrument explains of it; none where neither it nor standard deviations were stated.
-    pub instrument: Option<f64>,
+    pub(crate) instrument: Option<f64>,
     /// What is left at fitted rows.
-    pub left: f64,
+    pub(crate) left: f64,
     /// Whether what is left is no more than the noise gives.
-    pub agrees: bool,
+    pub(crate) agrees: bool,
     /// What is left of held-out points, where they are off by more than what was fitted and the noise allow.
-    pub not_carried: Option<f64>,
+    pub(crate) not_carried: Option<f64>,
     /// Whether only causes without a name were found.
-    pub nameless: bool,
+    pub(crate) nameless: bool,
     /// Whether some of what was found, which reproduces the error, has no name.
-    pub partly_nameless: bool,
+    pub(crate) partly_nameless: bool,
     /// Whether the arm moved while it was measured: no pose can be measured twice.
-    pub in_motion: bool,
+    pub(crate) in_motion: bool,
     /// Whether nothing was read but joints with the target brought to places: what is stated is how well that closes.
-    pub brought: bool,
+    pub(crate) brought: bool,
 }
 
 impl Ground {

@@ -57,16 +57,16 @@ pub(super) static TORQUE_CAUSES: [&TorqueCause; 27] = [
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ShapeSpan {
     /// As the cause's parameters call it.
-    pub name: &'static str,
-    pub unit: &'static str,
+    pub(crate) name: &'static str,
+    pub(crate) unit: &'static str,
     /// Position in the form's shape.
-    pub index: usize,
-    pub least: f64,
-    pub most: f64,
+    pub(crate) index: usize,
+    pub(crate) least: f64,
+    pub(crate) most: f64,
     /// Refined by ratios instead of differences.
-    pub by_ratio: bool,
+    pub(crate) by_ratio: bool,
     /// What it is unless the data are worth another number.
-    pub usual: Option<f64>,
+    pub(crate) usual: Option<f64>,
 }
 
 impl ShapeSpan {
@@ -80,59 +80,59 @@ impl ShapeSpan {
 /// A physical reason why measured torques differ from those of the rigid arm.
 pub(super) struct TorqueCause {
     /// Canonical.
-    pub name: &'static str,
+    pub(crate) name: &'static str,
     /// What its coefficients are called in a model, and their units; wrong masses, which are in the inertial numbers, have none.
-    pub coefficients: &'static [CoefficientName],
+    pub(crate) coefficients: &'static [CoefficientName],
     /// -2 ln of the prior odds of a form of it, relative to a common one.
-    pub price: fn(&TorqueForm) -> f64,
+    pub(crate) price: fn(&TorqueForm) -> f64,
     /// Frictions of the same joint that it modifies, and without which it is none.
-    pub modifies: &'static [&'static str],
+    pub(crate) modifies: &'static [&'static str],
     /// Whether a form is part of the rich model, which noise is taken from.
-    pub rich: fn(&TorqueForm) -> bool,
+    pub(crate) rich: fn(&TorqueForm) -> bool,
     /// Whether its coefficients can only be positive: a friction that falls with speed, a rotor.
-    pub positive: bool,
+    pub(crate) positive: bool,
     /// Whether it brakes, so that its coefficient is positive unless a curve of speed without a name is in the model too, with which it is a sum.
-    pub brakes: bool,
+    pub(crate) brakes: bool,
     /// Whether it is, like others of its kind, a torque over its joint's angle: one curve looks like several of others.
-    pub of_angle: bool,
+    pub(crate) of_angle: bool,
     /// Whether it is, like others of its kind, a wrong mass, drive or mounting: one such error looks like several of others.
-    pub inertial: bool,
+    pub(crate) inertial: bool,
     /// Whether its columns are the same at whatever joint it acts.
-    pub alike_at_joints: bool,
+    pub(crate) alike_at_joints: bool,
     /// Whether its columns are made of the rigid torque.
-    pub of_rigid: bool,
+    pub(crate) of_rigid: bool,
     /// Whether its columns are made of the smoothed sign of a velocity.
-    pub of_sign: bool,
+    pub(crate) of_sign: bool,
     /// Whether several forms of it may stand at a place.
-    pub may_repeat: bool,
+    pub(crate) may_repeat: bool,
     /// Whether it is a curve of speed, neither proportional to it nor of one size: one without a name stands for all of them.
-    pub bends: bool,
+    pub(crate) bends: bool,
     /// Lengths of the shapes that its forms have, by which causes of one name are known from each other; whatever length where there are none.
-    pub lengths: &'static [usize],
+    pub(crate) lengths: &'static [usize],
     /// All that are tried on a recording.
-    pub forms: fn(&'static TorqueCause, &DynamicScene) -> Vec<TorqueForm>,
+    pub(crate) forms: fn(&'static TorqueCause, &DynamicScene) -> Vec<TorqueForm>,
     /// A further joint whose torque it changes: neither its place nor one that carries its link, or the tool and the base.
-    pub and_on: fn(&TorqueForm) -> Option<usize>,
+    pub(crate) and_on: fn(&TorqueForm) -> Option<usize>,
     /// Its torque, Nm per unit of a coefficient.
-    pub torque: ColumnTorque,
+    pub(crate) torque: ColumnTorque,
     /// Link and change of its numbers per coefficient, for causes that are wrong masses.
-    pub changes: Option<fn(&TorqueForm, &DeclaredInertials) -> InertialChanges>,
+    pub(crate) changes: Option<fn(&TorqueForm, &DeclaredInertials) -> InertialChanges>,
     /// What distinguishes its cells at a place.
-    pub cell: fn(&TorqueForm) -> [usize; 2],
+    pub(crate) cell: fn(&TorqueForm) -> [usize; 2],
     /// Whether its coefficients are ones that an arm can have: no link weighs less than nothing.
-    pub is_possible: fn(&TorqueForm, &[f64]) -> bool,
+    pub(crate) is_possible: fn(&TorqueForm, &[f64]) -> bool,
     /// Whether its shape numbers are still those of this cause and not at an end where it is another's torque.
-    pub is_itself: fn(&TorqueForm, &DynamicScene) -> bool,
+    pub(crate) is_itself: fn(&TorqueForm, &DynamicScene) -> bool,
     /// Shape numbers that are refined once it is found.
-    pub spans: fn(&TorqueForm) -> Vec<ShapeSpan>,
+    pub(crate) spans: fn(&TorqueForm) -> Vec<ShapeSpan>,
     /// Torque per coefficient of a column at a velocity and its smoothed sign, for causes that are friction over velocity.
-    pub friction: Option<FrictionLaw>,
+    pub(crate) friction: Option<FrictionLaw>,
     /// Whether a number of it that is counted, as an order, is the last that is tried.
-    pub has_ends: fn(&TorqueForm) -> bool,
+    pub(crate) has_ends: fn(&TorqueForm) -> bool,
     /// Its numbers as people read them: its coefficients and shape numbers unless it has others.
-    pub parameters: fn(&TorqueForm, &[FittedNumber]) -> Vec<TorqueParameter>,
+    pub(crate) parameters: fn(&TorqueForm, &[FittedNumber]) -> Vec<TorqueParameter>,
     /// A sentence without a full stop, with its size.
-    pub statement: fn(&TorqueForm, &[FittedNumber]) -> String,
+    pub(crate) statement: fn(&TorqueForm, &[FittedNumber]) -> String,
 }
 
 /// Torque per coefficient of a form's column at a velocity and its smoothed sign.
@@ -153,10 +153,10 @@ pub(super) enum ColumnTorque {
 
 /// A column of a form at a joint.
 pub(super) struct ColumnOf<'a> {
-    pub form: &'a TorqueForm,
-    pub scene: &'a DynamicScene<'a>,
-    pub joint: usize,
-    pub column: usize,
+    pub(crate) form: &'a TorqueForm,
+    pub(crate) scene: &'a DynamicScene<'a>,
+    pub(crate) joint: usize,
+    pub(crate) column: usize,
 }
 
 impl ColumnOf<'_> {
@@ -209,12 +209,12 @@ const PLAIN: TorqueCause = TorqueCause {
 
 impl TorqueCause {
     /// Whether its forms have such shape numbers.
-    pub fn has_shape(&self, shape: &[f64]) -> bool {
+    pub(crate) fn has_shape(&self, shape: &[f64]) -> bool {
         self.lengths.is_empty() || self.lengths.contains(&shape.len())
     }
 
     /// Links and changes of their numbers per coefficient of a form; none of what is no wrong mass.
-    pub fn inertial(
+    pub(crate) fn inertial(
         &self,
         form: &TorqueForm,
         declared: &DeclaredInertials,
@@ -249,18 +249,18 @@ pub struct FittedNumber {
 /// A cause at a place with its shape numbers.
 #[derive(Clone)]
 pub(super) struct TorqueForm {
-    pub cause: &'static TorqueCause,
-    pub place: Place,
+    pub(crate) cause: &'static TorqueCause,
+    pub(crate) place: Place,
     /// Further joints (from 0) or an order, as the cause reads them.
-    pub with: [usize; 2],
-    pub shape: Vec<f64>,
+    pub(crate) with: [usize; 2],
+    pub(crate) shape: Vec<f64>,
     /// Columns.
-    pub width: usize,
+    pub(crate) width: usize,
 }
 
 impl TorqueForm {
     /// A form at a joint, without shape numbers.
-    pub fn at_joint(cause: &'static TorqueCause, joint: usize, width: usize) -> Self {
+    pub(crate) fn at_joint(cause: &'static TorqueCause, joint: usize, width: usize) -> Self {
         Self {
             cause,
             place: Place::Joint(joint),
@@ -271,13 +271,13 @@ impl TorqueForm {
     }
 
     /// The same with shape numbers.
-    pub fn shaped(mut self, shape: &[f64]) -> Self {
+    pub(crate) fn shaped(mut self, shape: &[f64]) -> Self {
         self.shape = shape.to_vec();
         self
     }
 
     /// Its joint, from 0; that of its link elsewhere.
-    pub fn joint(&self) -> usize {
+    pub(crate) fn joint(&self) -> usize {
         match self.place {
             Place::Joint(joint) => joint,
             Place::Links(link, _) => link,
@@ -286,12 +286,12 @@ impl TorqueForm {
     }
 
     /// Its link, from 0.
-    pub fn link(&self) -> usize {
+    pub(crate) fn link(&self) -> usize {
         self.joint()
     }
 
     /// Joints whose torque it changes: its own, and those that carry its link or the tool and the base.
-    pub fn acts_on(&self, joints: usize) -> Vec<usize> {
+    pub(crate) fn acts_on(&self, joints: usize) -> Vec<usize> {
         match self.place {
             Place::Joint(joint) => [joint]
                 .into_iter()
@@ -303,13 +303,13 @@ impl TorqueForm {
     }
 
     /// Torque per coefficient of a column at a velocity and its smoothed sign, of what is friction over velocity.
-    pub fn friction(&self, column: usize, velocity: f64, sign: f64) -> Option<f64> {
+    pub(crate) fn friction(&self, column: usize, velocity: f64, sign: f64) -> Option<f64> {
         let friction = self.cause.friction?;
         Some(friction(self, column, velocity, sign))
     }
 
     /// Writes a column of the torque at a joint (Nm per unit of its coefficient), rows as recorded; zero of what is a change of masses alone.
-    pub fn write(&self, scene: &DynamicScene, joint: usize, column: usize, out: &mut [f64]) {
+    pub(crate) fn write(&self, scene: &DynamicScene, joint: usize, column: usize, out: &mut [f64]) {
         let column = ColumnOf {
             form: self,
             scene,
@@ -330,22 +330,22 @@ impl TorqueForm {
     }
 
     /// Whether it is a curve of speed without a name, which viscous and Coulomb friction of its joint are parts of.
-    pub fn is_nameless_curve(&self) -> bool {
+    pub(crate) fn is_nameless_curve(&self) -> bool {
         self.cause.name == UNKNOWN && self.cause.bends
     }
 
     /// Whether it is a torque over the angles of joints.
-    pub fn is_over_angles(&self) -> bool {
+    pub(crate) fn is_over_angles(&self) -> bool {
         self.cause.of_angle || self.cause.alike_at_joints
     }
 
     /// Whether it is a gear that turns with two joints.
-    pub fn is_gear_of_two(&self) -> bool {
+    pub(crate) fn is_gear_of_two(&self) -> bool {
         (self.cause.and_on)(self).is_some()
     }
 
     /// Whether a curve without a name and another curve of speed would be one sum at one joint.
-    pub fn is_one_curve_with(&self, other: &Self) -> bool {
+    pub(crate) fn is_one_curve_with(&self, other: &Self) -> bool {
         let [one, two] = [self, other].map(|form| form.cause.bends);
         self.place == other.place
             && one
@@ -355,7 +355,7 @@ impl TorqueForm {
 
     /// The same with the numbers that are at an end of their search as they usually are; none where one of them has nothing usual. What is
     /// best at an end would be better beyond it.
-    pub fn within_ends(&self) -> Option<Self> {
+    pub(crate) fn within_ends(&self) -> Option<Self> {
         let mut within = self.clone();
         for span in self
             .shape_numbers()
@@ -368,17 +368,17 @@ impl TorqueForm {
     }
 
     /// Whether it modifies the friction that another form is.
-    pub fn modifies(&self, friction: &Self) -> bool {
+    pub(crate) fn modifies(&self, friction: &Self) -> bool {
         self.place == friction.place && self.cause.modifies.contains(&friction.cause.name)
     }
 
     /// Whether both are the same cause at the same place.
-    pub fn is_called_as(&self, other: &Self) -> bool {
+    pub(crate) fn is_called_as(&self, other: &Self) -> bool {
         self.cause.name == other.cause.name && self.place == other.place
     }
 
     /// Whether both are called the same, and what has no name is a function of the same.
-    pub fn is_of_kind(&self, other: &Self) -> bool {
+    pub(crate) fn is_of_kind(&self, other: &Self) -> bool {
         let kind = |form: &Self| form.cause.coefficients.first().map(|(name, _)| *name);
         self.is_called_as(other) && (self.cause.name != UNKNOWN || kind(self) == kind(other))
     }
@@ -396,14 +396,14 @@ impl TorqueForm {
     }
 
     /// The same with a shape number moved.
-    pub fn with_shape(&self, index: usize, value: f64) -> Self {
+    pub(crate) fn with_shape(&self, index: usize, value: f64) -> Self {
         let mut moved = self.clone();
         moved.shape[index] = value;
         moved
     }
 
     /// What its coefficients are called, one a column, with their units.
-    pub fn coefficient_names(&self) -> Vec<(String, &'static str)> {
+    pub(crate) fn coefficient_names(&self) -> Vec<(String, &'static str)> {
         let known = self.cause.coefficients;
         let name = |column: usize| match known.get(column) {
             Some((quantity, unit)) => ((*quantity).to_string(), *unit),

@@ -20,11 +20,11 @@ const FLOOR: f64 = 1e-12;
 
 /// Whose parameters, and how noisy torques are.
 pub(super) struct Information<'a> {
-    pub arm: &'a DynamicArm,
+    pub(crate) arm: &'a DynamicArm,
     /// Base parameters, `10 link + number`.
-    pub base: &'a [usize],
+    pub(crate) base: &'a [usize],
     /// Nm, per joint.
-    pub noise: &'a [f64],
+    pub(crate) noise: &'a [f64],
 }
 
 /// The information of a motion, scaled to ones on the diagonal, and the scales.
@@ -47,7 +47,7 @@ pub(super) fn base_of(arm: &DynamicArm, basis: &SeriesBasis, series: &JointSerie
 
 impl Information<'_> {
     /// The information of some rows of a motion, each standing for `share` recorded ones.
-    pub fn of(
+    pub(crate) fn of(
         &self,
         basis: &SeriesBasis,
         series: &JointSeries,
@@ -99,7 +99,7 @@ impl Information<'_> {
 
 impl MotionInformation {
     /// Natural logarithm of the determinant; minus infinity where something is not seen.
-    pub fn log_determinant(&self) -> f64 {
+    pub(crate) fn log_determinant(&self) -> f64 {
         let scales: f64 = self.scale.iter().map(|scale| 2.0 * scale.ln()).sum();
         let factor = self.scaled.clone().cholesky();
         factor.map_or(f64::NEG_INFINITY, |factor| {
@@ -115,7 +115,7 @@ impl MotionInformation {
     }
 
     /// How many times other parameters raise the variance of each.
-    pub fn inflations(&self) -> Vec<f64> {
+    pub(crate) fn inflations(&self) -> Vec<f64> {
         let inverse = self
             .scaled
             .clone()
@@ -129,7 +129,7 @@ impl MotionInformation {
     }
 
     /// One standard deviation of each parameter.
-    pub fn sigmas(&self) -> Vec<f64> {
+    pub(crate) fn sigmas(&self) -> Vec<f64> {
         self.inflations()
             .iter()
             .zip(&self.scale)
@@ -138,7 +138,7 @@ impl MotionInformation {
     }
 
     /// Condition of the regressor with columns of one length.
-    pub fn condition(&self) -> f64 {
+    pub(crate) fn condition(&self) -> f64 {
         let values = self.scaled.symmetric_eigenvalues();
         (values.max() / values.min().max(f64::MIN_POSITIVE)).sqrt()
     }

@@ -13,16 +13,16 @@ const USED: f64 = 0.98;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct JointLimits {
     /// rad.
-    pub range: [f64; 2],
+    pub(crate) range: [f64; 2],
     /// rad/s.
-    pub speed: f64,
+    pub(crate) speed: f64,
     /// rad/s^2.
-    pub acceleration: f64,
+    pub(crate) acceleration: f64,
 }
 
 /// Sines and cosines of a clock, times the start and stop, with their derivatives: `[row][2 harmonic + (sine or cosine)]`.
 pub(super) struct SeriesBasis {
-    pub time: Vec<f64>,
+    pub(crate) time: Vec<f64>,
     terms: usize,
     position: Vec<f64>,
     velocity: Vec<f64>,
@@ -34,10 +34,10 @@ pub(super) struct JointSeries(Vec<(f64, Vec<f64>)>);
 
 /// Row-major (rows x n).
 pub(super) struct SeriesMotion {
-    pub time: Vec<f64>,
-    pub position: Vec<f64>,
-    pub velocity: Vec<f64>,
-    pub acceleration: Vec<f64>,
+    pub(crate) time: Vec<f64>,
+    pub(crate) position: Vec<f64>,
+    pub(crate) velocity: Vec<f64>,
+    pub(crate) acceleration: Vec<f64>,
 }
 
 impl SeriesBasis {
@@ -70,7 +70,7 @@ impl SeriesBasis {
     }
 
     /// So many rows, evenly spread, the first and the last apart.
-    pub fn spread(&self, count: usize) -> Vec<usize> {
+    pub(crate) fn spread(&self, count: usize) -> Vec<usize> {
         let count = count.min(self.time.len() - 2).max(1);
         (0..count)
             .map(|one| 1 + (one * (self.time.len() - 2)) / count)
@@ -86,7 +86,7 @@ impl SeriesBasis {
     }
 
     /// Positions, velocities and accelerations (3 n) of a row.
-    pub fn row_into(&self, series: &JointSeries, row: usize, motion: &mut [f64]) {
+    pub(crate) fn row_into(&self, series: &JointSeries, row: usize, motion: &mut [f64]) {
         let n = series.0.len();
         for (joint, (middle, coefficients)) in series.0.iter().enumerate() {
             motion[joint] = middle + self.sum(&self.position, row, coefficients);
@@ -96,7 +96,7 @@ impl SeriesBasis {
     }
 
     /// All rows.
-    pub fn motion(&self, series: &JointSeries) -> SeriesMotion {
+    pub(crate) fn motion(&self, series: &JointSeries) -> SeriesMotion {
         let n = series.0.len();
         let mut all = SeriesMotion {
             time: self.time.clone(),

@@ -28,10 +28,10 @@ const SHAPE: usize = 3;
 const STARTS: usize = 200;
 /// The faults found so far.
 #[derive(Default)]
-pub struct DeclarationFaults(pub Vec<DeclarationFault>);
+pub(crate) struct DeclarationFaults(pub Vec<DeclarationFault>);
 
 impl DeclarationFaults {
-    pub fn add(&mut self, path: impl Into<String>, message: impl Into<String>) {
+    pub(crate) fn add(&mut self, path: impl Into<String>, message: impl Into<String>) {
         self.0.push(DeclarationFault {
             path: path.into(),
             message: message.into(),
@@ -52,7 +52,7 @@ impl DeclarationFaults {
         }
     }
 
-    pub fn seat(&mut self, place: &str) -> Option<Seat> {
+    pub(crate) fn seat(&mut self, place: &str) -> Option<Seat> {
         let seat = Seat::read(place);
         if seat.is_none() {
             self.add(
@@ -86,7 +86,7 @@ impl DeclarationFaults {
         found
     }
 
-    pub fn shape(&mut self, declaration: &EffectDeclaration) {
+    pub(crate) fn shape(&mut self, declaration: &EffectDeclaration) {
         if declaration.shape.len() > SHAPE {
             self.add(
                 "shape",
@@ -139,7 +139,11 @@ impl DeclarationFaults {
         }
     }
 
-    pub fn laws(&mut self, declaration: &EffectDeclaration, names: &[String]) -> Vec<Formula> {
+    pub(crate) fn laws(
+        &mut self,
+        declaration: &EffectDeclaration,
+        names: &[String],
+    ) -> Vec<Formula> {
         let texts = &declaration.law.0;
         if texts.is_empty() || texts.len() > LAWS {
             self.add(
@@ -181,7 +185,7 @@ impl DeclarationFaults {
         laws
     }
 
-    pub fn unit(&mut self, moves: Moves, unit: Option<&str>) -> Option<Unit> {
+    pub(crate) fn unit(&mut self, moves: Moves, unit: Option<&str>) -> Option<Unit> {
         let unit = unit?;
         let allowed: Vec<&str> = moves
             .quantities()
@@ -204,7 +208,7 @@ impl DeclarationFaults {
     }
 
     /// Whether the formulas ask for what there is at the place.
-    pub fn agreement(&mut self, seat: Seat, moves: Moves, laws: &[Formula]) {
+    pub(crate) fn agreement(&mut self, seat: Seat, moves: Moves, laws: &[Formula]) {
         use QuantityKind as K;
         let jointed = seat.is_joint();
         let read = matches!(moves, Moves::Reading(_));

@@ -69,7 +69,7 @@ const BETWEEN: [usize; 3] = [25, 9, 5];
 
 impl ShapeRange {
     /// At which a search of so many shape numbers starts.
-    pub fn starts(&self, numbers: usize) -> Vec<f64> {
+    pub(crate) fn starts(&self, numbers: usize) -> Vec<f64> {
         if !self.start.0.is_empty() {
             return self.start.0.clone();
         }
@@ -83,7 +83,7 @@ impl ShapeRange {
     }
 
     /// Whether it goes in ratios: over more than a power of ten of positive numbers.
-    pub fn is_of_ratios(&self) -> bool {
+    pub(crate) fn is_of_ratios(&self) -> bool {
         self.from > 0.0 && self.to >= 10.0 * self.from
     }
 }

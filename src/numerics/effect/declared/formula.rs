@@ -7,7 +7,7 @@ use std::fmt;
 
 /// A formula; shape numbers stand by their position.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Formula {
+pub(crate) enum Formula {
     Number(f64),
     Shape(usize),
     Row(RowQuantity),
@@ -17,7 +17,7 @@ pub enum Formula {
 
 /// Functions of one argument.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Function {
+pub(crate) enum Function {
     Minus,
     Sin,
     Cos,
@@ -36,7 +36,7 @@ pub enum Function {
 
 impl Function {
     /// All that have a name.
-    pub const NAMED: [(&'static str, Self); 11] = [
+    pub(crate) const NAMED: [(&'static str, Self); 11] = [
         ("sin", Self::Sin),
         ("cos", Self::Cos),
         ("tan", Self::Tan),
@@ -78,7 +78,7 @@ impl Function {
 
 /// What joins two formulas.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Operator {
+pub(crate) enum Operator {
     Plus,
     Less,
     Times,
@@ -121,11 +121,11 @@ impl Operator {
 const MINUS: u8 = 3;
 
 impl Formula {
-    pub fn call(function: Function, of: Self) -> Self {
+    pub(crate) fn call(function: Function, of: Self) -> Self {
         Self::Call(function, Box::new(of))
     }
 
-    pub fn join(operator: Operator, a: Self, b: Self) -> Self {
+    pub(crate) fn join(operator: Operator, a: Self, b: Self) -> Self {
         Self::Join(operator, Box::new(a), Box::new(b))
     }
 
@@ -156,14 +156,14 @@ impl Formula {
     }
 
     /// How many parts it has.
-    pub fn parts(&self) -> usize {
+    pub(crate) fn parts(&self) -> usize {
         let mut count = 0;
         self.walk(&mut |_| count += 1);
         count
     }
 
     /// What it asks of a row, each once.
-    pub fn quantities(&self) -> Vec<RowQuantity> {
+    pub(crate) fn quantities(&self) -> Vec<RowQuantity> {
         let mut out = Vec::new();
         self.walk(&mut |part| match part {
             Self::Row(quantity) if !out.contains(quantity) => out.push(*quantity),

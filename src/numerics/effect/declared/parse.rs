@@ -6,9 +6,9 @@ use crate::error::nearest;
 
 /// What is wrong with a formula, and at which of its characters (from 1).
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct FormulaFault {
-    pub at: usize,
-    pub message: String,
+pub(crate) struct FormulaFault {
+    pub(crate) at: usize,
+    pub(crate) message: String,
 }
 
 /// Deeper brackets are nobody's formula.

@@ -12,16 +12,16 @@ use crate::units::Unit;
 /// What a declaration means.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DeclaredPattern {
-    pub seat: Seat,
-    pub moves: Moves,
-    pub laws: Vec<Formula>,
+    pub(crate) seat: Seat,
+    pub(crate) moves: Moves,
+    pub(crate) laws: Vec<Formula>,
     /// Names of the shape numbers, in the order of their positions.
-    pub names: Vec<String>,
-    pub shape: Vec<ShapeRange>,
+    pub(crate) names: Vec<String>,
+    pub(crate) shape: Vec<ShapeRange>,
     /// Unit of the coefficients, where it is stated.
-    pub unit: Option<Unit>,
+    pub(crate) unit: Option<Unit>,
     /// The usual size of a coefficient, SI, where it is stated.
-    pub size: Option<f64>,
+    pub(crate) size: Option<f64>,
 }
 
 /// Known beforehand of a coefficient of no stated size, SI; and of one of a stated size in multiples of it.
@@ -79,7 +79,7 @@ impl DeclaredPattern {
     }
 
     /// Where it may act on an arm.
-    pub fn motions(&self, survey: &Survey) -> Vec<Motion> {
+    pub(crate) fn motions(&self, survey: &Survey) -> Vec<Motion> {
         let joints = survey.joints();
         let one = |place: Place| self.moves.at(place);
         match self.seat {
@@ -101,7 +101,7 @@ impl DeclaredPattern {
     }
 
     /// All combinations of starts.
-    pub fn starts(&self) -> Vec<Vec<f64>> {
+    pub(crate) fn starts(&self) -> Vec<Vec<f64>> {
         let each = self
             .shape
             .iter()

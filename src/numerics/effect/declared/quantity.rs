@@ -7,16 +7,16 @@ use crate::robot::{CircumstanceName, law_columns};
 
 /// A number of a row.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RowQuantity {
-    pub kind: QuantityKind,
-    pub of: Whose,
+pub(crate) struct RowQuantity {
+    pub(crate) kind: QuantityKind,
+    pub(crate) of: Whose,
     /// The constant of a memory: a travel, a cooling time, a lag.
-    pub constant: Option<Constant>,
+    pub(crate) constant: Option<Constant>,
 }
 
 /// A number that is the same in every row.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Constant {
+pub(crate) enum Constant {
     Number(f64),
     /// A shape number, by its position.
     Shape(usize),
@@ -24,7 +24,7 @@ pub enum Constant {
 
 /// To which joint (from 0) a quantity belongs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Whose {
+pub(crate) enum Whose {
     Own,
     Next,
     Before,
@@ -35,7 +35,7 @@ pub enum Whose {
 
 /// What is asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum QuantityKind {
+pub(crate) enum QuantityKind {
     Angle,
     Motor,
     Load,
@@ -123,7 +123,7 @@ pub fn known() -> String {
 }
 
 /// All names without what may follow them.
-pub fn names() -> impl Iterator<Item = &'static str> {
+pub(crate) fn names() -> impl Iterator<Item = &'static str> {
     all().map(|row| row.0)
 }
 
@@ -173,12 +173,17 @@ impl RowQuantity {
     }
 
     /// Whether it is of the joint at which the effect acts, or of a neighbour of that.
-    pub fn is_relative(&self) -> bool {
+    pub(crate) fn is_relative(&self) -> bool {
         matches!(self.of, Whose::Own | Whose::Next | Whose::Before)
     }
 
     /// The variable of an arm of so many joints, where the effect acts at `joint`; `None` where there is no such joint.
-    pub fn variable(&self, joint: Option<usize>, joints: usize, shape: &[f64]) -> Option<Variable> {
+    pub(crate) fn variable(
+        &self,
+        joint: Option<usize>,
+        joints: usize,
+        shape: &[f64],
+    ) -> Option<Variable> {
         let of = match self.of {
             Whose::Row => 0,
             Whose::Own => joint?,
@@ -225,7 +230,7 @@ impl RowQuantity {
     }
 
     /// The column that a recording must have for it, where it must have one.
-    pub fn needs(&self) -> Option<&'static str> {
+    pub(crate) fn needs(&self) -> Option<&'static str> {
         match self.kind {
             K::Current => Some("motor currents"),
             K::Velocity => Some("joint velocities"),

@@ -5,7 +5,7 @@ use crate::units::{Quantity, Unit};
 
 /// Where it may act.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Seat {
+pub(crate) enum Seat {
     /// At one of the joints that turn.
     AnyJoint,
     /// At a link that has a length.
@@ -15,7 +15,7 @@ pub enum Seat {
 
 /// What moves there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Moves {
+pub(crate) enum Moves {
     Angle,
     Axis { turning: bool },
     Growth,
@@ -43,7 +43,7 @@ const OF_TRACKERS: [(&str, Moves); 6] = [
     ("elevation", Moves::Reading(Polar::Elevation)),
     ("range", Moves::Reading(Polar::Range)),
 ];
-pub const PLACES: &str = "joint, joint 3, link, link 2, link 2-4, base, tool, tracker";
+pub(crate) const PLACES: &str = "joint, joint 3, link, link 2, link 2-4, base, tool, tracker";
 
 impl Seat {
     /// The place of these words.
@@ -67,7 +67,7 @@ impl Seat {
     }
 
     /// What may move there; the first is the usual one.
-    pub fn allowed(self) -> &'static [(&'static str, Moves)] {
+    pub(crate) fn allowed(self) -> &'static [(&'static str, Moves)] {
         match self {
             Self::AnyJoint | Self::Fixed(Place::Joint(_)) => &OF_JOINTS,
             Self::AnyLink | Self::Fixed(Place::Links(..)) => &OF_LINKS,
@@ -76,7 +76,7 @@ impl Seat {
         }
     }
 
-    pub fn is_joint(self) -> bool {
+    pub(crate) fn is_joint(self) -> bool {
         matches!(self, Self::AnyJoint | Self::Fixed(Place::Joint(_)))
     }
 }
@@ -101,7 +101,7 @@ impl Moves {
     }
 
     /// The unit that coefficients have where none is stated; none where they have several.
-    pub fn unit(self) -> Option<Unit> {
+    pub(crate) fn unit(self) -> Option<Unit> {
         Some(match self {
             Self::Angle | Self::Axis { .. } | Self::Frame(Axes::Rotation) => Unit::Radian,
             Self::Reading(Polar::Azimuth | Polar::Elevation) => Unit::Radian,
@@ -112,7 +112,7 @@ impl Moves {
     }
 
     /// What a coefficient may be in.
-    pub fn quantities(self) -> &'static [Quantity] {
+    pub(crate) fn quantities(self) -> &'static [Quantity] {
         use Quantity::*;
         match self {
             Self::Angle => &[

@@ -26,7 +26,7 @@ pub(super) struct DesignTerm {
 
 /// What chosen poses make as large as possible.
 pub(super) struct Criterion {
-    pub terms: Vec<DesignTerm>,
+    pub(crate) terms: Vec<DesignTerm>,
 }
 
 impl DesignTerm {
@@ -51,7 +51,11 @@ impl DesignTerm {
     }
 
     /// Given what is known before: the factor of its rows. `None` where that leaves a direction free.
-    pub fn given(weight: f64, jacobian: PointJacobian, known: &TriangularFactor) -> Option<Self> {
+    pub(crate) fn given(
+        weight: f64,
+        jacobian: PointJacobian,
+        known: &TriangularFactor,
+    ) -> Option<Self> {
         let inverse = known.inverse()?;
         let round = Mat::from_fn(inverse.size(), inverse.size(), |i, j| inverse.at(i, j));
         Some(Self {
@@ -190,7 +194,7 @@ impl State {
 
 impl Criterion {
     /// The best poses of those drawn, then of their neighbours (`around`, within a step) until the steps are small.
-    pub fn choose(
+    pub(crate) fn choose(
         &self,
         model: &Model,
         drawn: &Measurements,
@@ -207,7 +211,7 @@ impl Criterion {
     }
 
     /// `count` rows of the pool, from `start` or, where that is shorter, filled up greedily.
-    pub fn exchange(
+    pub(crate) fn exchange(
         &self,
         model: &Model,
         pool: &Measurements,

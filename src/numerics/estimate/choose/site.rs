@@ -133,7 +133,7 @@ impl Site {
     }
 
     /// Whether a pose is inside the box and above the floor.
-    pub fn allows(&self, robot: &RobotModel, q: &[f64]) -> bool {
+    pub(crate) fn allows(&self, robot: &RobotModel, q: &[f64]) -> bool {
         let mut frame = Pose::identity();
         for ((twist, value), joint) in robot
             .screws()

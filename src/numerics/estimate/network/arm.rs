@@ -96,7 +96,7 @@ impl Stance {
     }
 
     /// What a tilt of `station` about its `axis` through the next joint does, m per rad; nothing at the tool.
-    pub fn tilt(&self, station: usize, axis: usize) -> Vector3<f64> {
+    pub(crate) fn tilt(&self, station: usize, axis: usize) -> Vector3<f64> {
         self.axes
             .get(station)
             .map_or_else(Vector3::zeros, |(_, point, _)| {
@@ -105,7 +105,7 @@ impl Stance {
     }
 
     /// The torque (or force) on `joint` of a unit weight where the body moved by joint `body` ends, m (or 1).
-    pub fn torque(&self, joint: usize, body: usize) -> f64 {
+    pub(crate) fn torque(&self, joint: usize, body: usize) -> f64 {
         let (axis, point, slides) = &self.axes[joint];
         let end = self.axes.get(body + 1).map_or(self.tool, |next| next.1);
         if *slides {

@@ -48,7 +48,7 @@ const ROWS_EACH: usize = 8;
 const HARMONICS: usize = 3;
 
 /// Ridge on harmonics: constants, three orders of every joint, and first orders of every two joints multiplied.
-pub fn harmonics(prismatic: &[bool]) -> Vec<Vec<BasisTerm>> {
+pub(crate) fn harmonics(prismatic: &[bool]) -> Vec<Vec<BasisTerm>> {
     let first = |joint: usize| match prismatic[joint] {
         true => vec![Wave::Value(joint)],
         false => vec![Wave::Sin(joint, 1), Wave::Cos(joint, 1)],
@@ -91,7 +91,7 @@ pub fn harmonics(prismatic: &[bool]) -> Vec<Vec<BasisTerm>> {
 }
 
 /// Joint curves as fine as `rows` can show, small motions of all stations, and wind-up by weight.
-pub fn curves(arm: &ScrewArm, rows: usize) -> Vec<Vec<BasisTerm>> {
+pub(crate) fn curves(arm: &ScrewArm, rows: usize) -> Vec<Vec<BasisTerm>> {
     let joints = arm.hinges.len();
     let single = |way: OutputMotion, wave: Wave| BasisTerm {
         way,
@@ -139,7 +139,7 @@ pub fn curves(arm: &ScrewArm, rows: usize) -> Vec<Vec<BasisTerm>> {
 }
 
 /// Terms at a posture, with the memory that this takes.
-pub struct BasisFunctions<'a> {
+pub(crate) struct BasisFunctions<'a> {
     arm: Option<&'a ScrewArm>,
     terms: &'a [BasisTerm],
     /// Sines and cosines of the multiples of each joint's angle.

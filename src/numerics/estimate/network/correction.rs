@@ -84,7 +84,7 @@ impl Scaling {
         }
     }
     /// (value - mean) / scale.
-    pub fn scaled(&self, value: f64) -> f64 {
+    pub(crate) fn scaled(&self, value: f64) -> f64 {
         (value - self.mean) / self.scale
     }
 }
@@ -102,7 +102,7 @@ pub struct NetworkScaling {
 
 impl NetworkScaling {
     /// Standardised inputs at `sources`.
-    pub fn scaled(&self, sources: &[f64]) -> Vec<f64> {
+    pub(crate) fn scaled(&self, sources: &[f64]) -> Vec<f64> {
         self.features
             .iter()
             .zip(&self.inputs)
@@ -130,7 +130,7 @@ pub struct JointMotion {
 
 impl JointMotion {
     /// What each output does to the measured point at joint positions `q`, m per unit.
-    pub fn ways(&self, q: &[f64]) -> Vec<[f64; OUTPUTS]> {
+    pub(crate) fn ways(&self, q: &[f64]) -> Vec<[f64; OUTPUTS]> {
         let stance = self.arm.stance(q);
         self.scales
             .iter()

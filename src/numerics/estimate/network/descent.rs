@@ -20,9 +20,9 @@ pub struct DescentIteration {
     /// Loss on the training rows, decay included.
     pub loss: f64,
     /// Mean squared error per output on the training rows, and on the rows kept back.
-    pub train: [f64; OUTPUTS],
+    pub(crate) train: [f64; OUTPUTS],
     /// Mean squares of each output at the check rows, where there are some.
-    pub check: Option<[f64; OUTPUTS]>,
+    pub(crate) check: Option<[f64; OUTPUTS]>,
     /// Evaluations of the loss so far.
     pub evaluations: u64,
 }

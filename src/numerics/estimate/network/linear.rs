@@ -25,7 +25,7 @@ const PRIORS: usize = 4;
 /// Rows so many sigmas off begin to count less.
 const HUBER: f64 = 3.0;
 /// Draws from the posterior that tell the spread.
-pub const DRAWS: usize = 8;
+pub(crate) const DRAWS: usize = 8;
 
 /// Terms and their coefficients.
 #[derive(Debug, Clone, PartialEq)]

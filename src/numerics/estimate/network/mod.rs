@@ -11,11 +11,11 @@ pub mod correction;
 pub mod descent;
 pub mod linear;
 pub mod loss;
-pub mod perceptron;
+pub(crate) mod perceptron;
 pub mod process;
 pub mod region;
 pub mod rivals;
-pub mod training;
+pub(crate) mod training;
 
 pub use arm::ScrewArm;
 pub use correction::{AppliedCorrection, Body, Correction, Feature, Map};

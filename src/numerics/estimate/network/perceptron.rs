@@ -172,18 +172,18 @@ const TILE: usize = 4;
 #[derive(Clone, Copy)]
 pub(super) struct LaneProduct<'a> {
     /// Added to each row of the product; zero where it is empty.
-    pub biases: &'a [f64],
+    pub(crate) biases: &'a [f64],
     /// The matrix, column after column.
-    pub weights: &'a [f64],
-    pub columns: &'a [BlockColumn],
+    pub(crate) weights: &'a [f64],
+    pub(crate) columns: &'a [BlockColumn],
     /// Rows of each column to work on.
-    pub length: usize,
+    pub(crate) length: usize,
 }
 
 impl LaneProduct<'_> {
     /// Writes `out[m] = biases[m] + sum_k weights[m, k] columns[k]`, summed in this order.
     #[inline(always)]
-    pub fn write<S: Simd>(&self, simd: S, out: &mut [BlockColumn]) {
+    pub(crate) fn write<S: Simd>(&self, simd: S, out: &mut [BlockColumn]) {
         let (mut m, count) = (0, out.len());
         while m < count {
             match count - m {

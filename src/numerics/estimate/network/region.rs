@@ -60,11 +60,11 @@ pub struct Valid {
 
 impl Valid {
     /// The range of a joint's positions, rad or m.
-    pub fn joint(values: impl Iterator<Item = f64> + Clone) -> Self {
+    pub(crate) fn joint(values: impl Iterator<Item = f64> + Clone) -> Self {
         Self::of(values, |_| LEAST_MARGIN)
     }
     /// The range of a payload, kg: what a load does is proportional to it, so a tenth of the load is as near as a tenth of the range.
-    pub fn payload(values: impl Iterator<Item = f64> + Clone) -> Self {
+    pub(crate) fn payload(values: impl Iterator<Item = f64> + Clone) -> Self {
         Self::of(values, |heaviest| MARGIN * heaviest.max(1.0))
     }
     fn of(values: impl Iterator<Item = f64> + Clone, least: impl Fn(f64) -> f64) -> Self {
@@ -181,7 +181,7 @@ impl Region {
     }
 
     /// 1 inside, 0 where nothing is known, between on the margin. A source that is missing or no number is outside.
-    pub fn share(&self, sources: &[f64]) -> f64 {
+    pub(crate) fn share(&self, sources: &[f64]) -> f64 {
         let count = self.ranges.len();
         if sources.len() < count || sources.iter().take(count).any(|v| !v.is_finite()) {
             return 0.0;
@@ -198,7 +198,7 @@ impl Region {
     }
 
     /// The nearest sources within the ranges.
-    pub fn held(&self, sources: &[f64]) -> Vec<f64> {
+    pub(crate) fn held(&self, sources: &[f64]) -> Vec<f64> {
         self.ranges
             .iter()
             .zip(sources)

@@ -103,7 +103,7 @@ pub struct JudgedRival {
     /// `None`: no correction.
     pub rival: Option<Rival>,
     /// Length of what is left of each row, m.
-    pub left: Vec<f64>,
+    pub(crate) left: Vec<f64>,
     /// Mean gain over no correction and its standard error, m.
     pub gain: f64,
     /// Standard error of the mean gain, m.

@@ -16,7 +16,7 @@ use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 
 /// Rows on which the swarm judges: drawn once, enough for a start.
-pub const SWARM_ROWS: usize = 256;
+pub(crate) const SWARM_ROWS: usize = 256;
 /// Beetles search weights in -1..1: with standardised inputs no neuron is saturated there.
 const SWARM_BOUND: f64 = 1.0;
 

@@ -14,13 +14,13 @@ use rayon::prelude::*;
 /// Where a row stands.
 pub(super) struct LeaveOneOut {
     /// Predicted point, m.
-    pub predicted: Vector3<f64>,
+    pub(crate) predicted: Vector3<f64>,
     /// Measured - predicted, m.
-    pub residual: Vector3<f64>,
+    pub(crate) residual: Vector3<f64>,
     /// Standard deviation per axis that a row of this kind has, m.
-    pub sigma: f64,
+    pub(crate) sigma: f64,
     /// Length of the leave-one-out residual in standard deviations.
-    pub distance: f64,
+    pub(crate) distance: f64,
 }
 
 /// Rows handled at once.

@@ -11,9 +11,9 @@ use rand::RngExt;
 #[derive(Debug, Clone, PartialEq)]
 pub struct BeeColony {
     /// Sources of food, half of the colony: as many bees are employed as look on.
-    pub sources: usize,
+    pub(crate) sources: usize,
     /// Trials without gain after which a source is left, per coordinate and source.
-    pub limit: f64,
+    pub(crate) limit: f64,
 }
 
 impl Default for BeeColony {

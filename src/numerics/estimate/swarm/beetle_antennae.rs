@@ -10,13 +10,13 @@ use rand::RngExt;
 #[derive(Debug, Clone, PartialEq)]
 pub struct BeetleAntennae {
     /// First sensing length `d`, in units of the coordinates.
-    pub antenna: f64,
+    pub(crate) antenna: f64,
     /// First step `delta`, in units of the coordinates.
-    pub step: f64,
+    pub(crate) step: f64,
     /// Factor of both per iteration.
-    pub decay: f64,
+    pub(crate) decay: f64,
     /// What the antenna gains per iteration, so that it never vanishes.
-    pub antenna_floor: f64,
+    pub(crate) antenna_floor: f64,
 }
 
 impl Default for BeetleAntennae {

@@ -9,19 +9,19 @@ use rand::rngs::ChaCha8Rng;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Genetic {
     /// Members.
-    pub individuals: usize,
+    pub(crate) individuals: usize,
     /// The best so many live on unchanged.
-    pub elite: usize,
+    pub(crate) elite: usize,
     /// Individuals in a tournament for parenthood.
-    pub tournament: usize,
+    pub(crate) tournament: usize,
     /// Share of the pairs that cross.
-    pub crossover: f64,
+    pub(crate) crossover: f64,
     /// Distribution index of the crossover: larger keeps children nearer to their parents.
-    pub crossover_index: f64,
+    pub(crate) crossover_index: f64,
     /// Expected number of coordinates of a child that mutate.
-    pub mutations: f64,
+    pub(crate) mutations: f64,
     /// Distribution index of the mutation.
-    pub mutation_index: f64,
+    pub(crate) mutation_index: f64,
 }
 
 impl Default for Genetic {

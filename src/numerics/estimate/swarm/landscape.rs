@@ -61,7 +61,7 @@ impl Landscape {
     }
 
     /// The box that is searched.
-    pub fn bounds(self, dimensions: usize) -> SearchBox {
+    pub(crate) fn bounds(self, dimensions: usize) -> SearchBox {
         let (lower, upper) = match self {
             Self::Michalewicz => (0.0, PI),
             Self::Rastrigin => (-5.12, 5.12),

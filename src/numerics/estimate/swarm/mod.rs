@@ -66,7 +66,7 @@ impl SearchBox {
         Self::new(vec![lower; dimensions], vec![upper; dimensions])
     }
     /// How many numbers are searched.
-    pub fn dimensions(&self) -> usize {
+    pub(crate) fn dimensions(&self) -> usize {
         self.lower.len()
     }
     fn width(&self, s: usize) -> f64 {

@@ -10,9 +10,9 @@ pub struct About {
     /// As the maker publishes it, m.
     pub reach: Option<f64>,
     /// Where the numbers are from.
-    pub sources: Vec<String>,
+    pub(crate) sources: Vec<String>,
     /// What is left out or differs between sources, a sentence each.
-    pub notes: Vec<String>,
+    pub(crate) notes: Vec<String>,
     /// Joints that the controller reports with a part of another one, as `coupled` of `ingest` has them.
     pub coupled: Vec<CountedCoupling>,
 }

@@ -41,7 +41,7 @@ impl<'f> Faults<'f> {
         self.list.borrow_mut().push(trouble.fault(self.file));
     }
     /// Takes over faults that already carry their place; passes on what is no fault of a file.
-    pub fn absorb<T>(&self, result: Result<T>) -> Result<Option<T>> {
+    pub(crate) fn absorb<T>(&self, result: Result<T>) -> Result<Option<T>> {
         match result {
             Ok(value) => Ok(Some(value)),
             Err(Error::Spec(faults)) => {
@@ -52,7 +52,7 @@ impl<'f> Faults<'f> {
         }
     }
     /// What was noted, a sentence each with its place. Fails with all faults.
-    pub fn finish(self) -> Result<Vec<String>> {
+    pub(crate) fn finish(self) -> Result<Vec<String>> {
         let list = self.list.into_inner();
         if list.is_empty() {
             Ok(self.notes.into_inner())
@@ -80,7 +80,7 @@ pub(super) struct DocumentNode<'a> {
 }
 
 impl<'a> DocumentNode<'a> {
-    pub fn root(node: &'a Node, faults: &'a Faults<'a>) -> Self {
+    pub(crate) fn root(node: &'a Node, faults: &'a Faults<'a>) -> Self {
         Self {
             content: Content::There(node),
             path: String::new(),
@@ -103,7 +103,7 @@ impl<'a> DocumentNode<'a> {
             .push(Trouble::new(message).at(self.mark).below(&self.path));
     }
     /// Something that a person should know and that is no fault.
-    pub fn note(&self, message: impl Into<String>) {
+    pub(crate) fn note(&self, message: impl Into<String>) {
         let fault = Trouble::new(message)
             .at(self.mark)
             .below(&self.path)
@@ -133,11 +133,11 @@ impl<'a> DocumentNode<'a> {
         self.node().map(|node| &node.value)
     }
     /// The place if there is something other than null.
-    pub fn given(&self) -> Option<&Self> {
+    pub(crate) fn given(&self) -> Option<&Self> {
         self.node().map(|_| self)
     }
     /// The keys of a map; none for anything else.
-    pub fn keys(&self) -> impl Iterator<Item = &'a str> + use<'a> {
+    pub(crate) fn keys(&self) -> impl Iterator<Item = &'a str> + use<'a> {
         self.node()
             .map(Node::entries)
             .unwrap_or_default()
@@ -145,7 +145,7 @@ impl<'a> DocumentNode<'a> {
             .map(|(key, _, _)| key.as_str())
     }
     /// The same place, checked to be a map with no other keys than `allowed`.
-    pub fn map(self, allowed: &[&str]) -> Self {
+    pub(crate) fn map(self, allowed: &[&str]) -> Self {
         let place = self.open_map(allowed);
         for (key, mark, _) in place.node().map(Node::entries).unwrap_or_default() {
             if !allowed.contains(&key.as_str()) {
@@ -159,7 +159,7 @@ impl<'a> DocumentNode<'a> {
         place
     }
     /// The same place, checked to be a map; it may have other keys than the `known` ones.
-    pub fn open_map(self, known: &[&str]) -> Self {
+    pub(crate) fn open_map(self, known: &[&str]) -> Self {
         if let Some(YamlValue::Map(_)) = self.value() {
             return self;
         }
@@ -197,7 +197,7 @@ impl<'a> DocumentNode<'a> {
         }
     }
     /// A list with one entry per joint; one fault when the count differs.
-    pub fn per_joint(&self, joints: usize) -> Vec<Self> {
+    pub(crate) fn per_joint(&self, joints: usize) -> Vec<Self> {
         let items = self.items();
         if matches!(self.value(), Some(YamlValue::List(_))) && items.len() != joints {
             self.fault(format!(
@@ -218,7 +218,7 @@ impl<'a> DocumentNode<'a> {
         }
     }
     /// A number in SI, of a size that a robot's can have.
-    pub fn sized(&self, bound: Bound, unit: Unit) -> f64 {
+    pub(crate) fn sized(&self, bound: Bound, unit: Unit) -> f64 {
         let value = unit.to_si(self.number());
         if let Some(message) = bound.fault(value) {
             self.fault(message);
@@ -226,7 +226,7 @@ impl<'a> DocumentNode<'a> {
         value
     }
     /// A mass, kg.
-    pub fn not_negative(&self) -> f64 {
+    pub(crate) fn not_negative(&self) -> f64 {
         let number = self.sized(Bound::Mass, Unit::Kilogram);
         if number < 0.0 {
             self.fault(format!(
@@ -235,11 +235,11 @@ impl<'a> DocumentNode<'a> {
         }
         number
     }
-    pub fn vector<const N: usize>(&self) -> [f64; N] {
+    pub(crate) fn vector<const N: usize>(&self) -> [f64; N] {
         self.numbers(Self::number)
     }
     /// Numbers in SI, of sizes that a robot's can have.
-    pub fn sized_vector<const N: usize>(&self, bound: Bound, unit: Unit) -> [f64; N] {
+    pub(crate) fn sized_vector<const N: usize>(&self, bound: Bound, unit: Unit) -> [f64; N] {
         self.numbers(|item| item.sized(bound, unit))
     }
     fn numbers<const N: usize>(&self, number: impl Fn(&Self) -> f64) -> [f64; N] {
@@ -268,7 +268,7 @@ impl<'a> DocumentNode<'a> {
         }
     }
     /// The one of `allowed` that is named here.
-    pub fn choice<T: Copy>(&self, allowed: &[(&str, T)]) -> Option<T> {
+    pub(crate) fn choice<T: Copy>(&self, allowed: &[(&str, T)]) -> Option<T> {
         let list = allowed
             .iter()
             .map(|(name, _)| *name)
@@ -289,7 +289,7 @@ impl<'a> DocumentNode<'a> {
         found
     }
     /// A joint counted from 1, as its index.
-    pub fn joint(&self, joints: usize) -> Option<usize> {
+    pub(crate) fn joint(&self, joints: usize) -> Option<usize> {
         let value = self.number();
         if value.is_nan() {
             return None;
