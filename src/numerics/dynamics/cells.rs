@@ -44,6 +44,9 @@ struct CellPosterior {
 /// A form's columns at unit amplitude, the base swept out: with each other, and with the measured torque.
 type FormProducts = (DMatrix<f64>, DVector<f64>);
 
+/// Whether a form is of a kind.
+type FormKind = fn(&TorqueForm) -> bool;
+
 /// Components in the covariance.
 struct TorqueState {
     known: KnownState,
@@ -405,7 +408,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
     /// One wrong mass, drive or mounting instead of several; one gear that turns with two joints instead of another and friction of its joint;
     /// one torque over angles instead of several at a joint.
     fn merge(&self, mut components: Vec<TorqueComponent>) -> Vec<TorqueComponent> {
-        let kinds: [(fn(&TorqueForm) -> bool, fn(&TorqueForm) -> bool); 3] = [
+        let kinds: [(FormKind, FormKind); 3] = [
             (|form| form.cause.inertial, |form| form.cause.inertial),
             (TorqueForm::is_gear_of_two, |form| {
                 form.is_gear_of_two() || form.cause.brakes
