@@ -1,6 +1,6 @@
 //! Lengths between anchors that are known from elsewhere: of a print, a gauge block, a ball bar; each with its standard deviation.
 
-use super::model::{KnownLength, Model};
+use super::model::Model;
 use crate::effect::names;
 use crate::robot::{Anchor, Shape};
 use nalgebra::Vector3;
@@ -24,15 +24,7 @@ pub(super) struct StandingAnchor<'a> {
 }
 
 impl Model {
-    /// The model's own value of a known length, m; `None` where nothing places the anchors.
-    pub(crate) fn length(&self, known: &KnownLength) -> Option<f64> {
-        let [from, to] = [
-            self.standing_anchor(known.between[0])?,
-            self.standing_anchor(known.between[1])?,
-        ];
-        Some(between(&from, &to).0)
-    }
-
+    /// What each known length says of the model, where the anchors are placed.
     pub(crate) fn length_terms(&self) -> impl Iterator<Item = LengthTerm> {
         self.lengths.iter().filter_map(|known| {
             let [from, to] = [

@@ -50,13 +50,6 @@ impl Function {
         ("step", Self::Step),
     ];
 
-    fn name(self) -> &'static str {
-        Self::NAMED
-            .iter()
-            .find(|(_, function)| *function == self)
-            .map_or("-", |(name, _)| name)
-    }
-
     fn value(self, x: f64) -> f64 {
         match self {
             Self::Minus => -x,
@@ -87,25 +80,6 @@ pub(crate) enum Operator {
 }
 
 impl Operator {
-    fn sign(self) -> &'static str {
-        match self {
-            Self::Plus => " + ",
-            Self::Less => " - ",
-            Self::Times => " * ",
-            Self::Over => " / ",
-            Self::Power => "^",
-        }
-    }
-
-    /// The higher, the closer it binds.
-    fn rank(self) -> u8 {
-        match self {
-            Self::Plus | Self::Less => 1,
-            Self::Times | Self::Over => 2,
-            Self::Power => 4,
-        }
-    }
-
     fn value(self, a: f64, b: f64) -> f64 {
         match self {
             Self::Plus => a + b,
@@ -116,9 +90,6 @@ impl Operator {
         }
     }
 }
-
-/// Rank of a sign in front: binds closer than products, not than powers.
-const MINUS: u8 = 3;
 
 impl Formula {
     pub(crate) fn call(function: Function, of: Self) -> Self {
@@ -171,76 +142,5 @@ impl Formula {
         });
         out
     }
-
-    /// Its text, with these names of the shape numbers.
-    pub fn text(&self, shape: &[String]) -> String {
-        Written {
-            formula: self,
-            shape,
-        }
-        .to_string()
-    }
-
-    fn rank(&self) -> u8 {
-        match self {
-            Self::Join(operator, ..) => operator.rank(),
-            Self::Call(Function::Minus, _) => MINUS,
-            Self::Number(number) if *number < 0.0 => MINUS,
-            _ => u8::MAX,
-        }
-    }
 }
 
-/// A formula with the names of its shape numbers.
-struct Written<'a> {
-    formula: &'a Formula,
-    shape: &'a [String],
-}
-
-impl Written<'_> {
-    fn part(&self, formula: &Formula, least: u8, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let part = Written {
-            formula,
-            shape: self.shape,
-        };
-        if formula.rank() < least {
-            write!(f, "({part})")
-        } else {
-            write!(f, "{part}")
-        }
-    }
-}
-
-impl fmt::Display for Written<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.formula {
-            Formula::Number(number) => write!(f, "{number}"),
-            Formula::Shape(k) => f.write_str(self.shape.get(*k).map_or("?", String::as_str)),
-            Formula::Row(quantity) => f.write_str(&quantity.text(self.shape)),
-            Formula::Call(Function::Minus, of) => {
-                f.write_str("-")?;
-                self.part(of, MINUS, f)
-            }
-            Formula::Call(function, of) => write!(
-                f,
-                "{}({})",
-                function.name(),
-                Written {
-                    formula: of,
-                    shape: self.shape
-                }
-            ),
-            Formula::Join(operator, a, b) => {
-                // Powers bind to the right, all others to the left.
-                let (left, right) = if *operator == Operator::Power {
-                    (1, 0)
-                } else {
-                    (0, 1)
-                };
-                self.part(a, operator.rank() + left, f)?;
-                f.write_str(operator.sign())?;
-                self.part(b, operator.rank() + right, f)
-            }
-        }
-    }
-}
