@@ -12,6 +12,7 @@ mod run_state;
 mod schema;
 mod services;
 mod spec;
+
 #[cfg(test)]
 mod tests;
 mod wiring;

@@ -1,9 +1,6 @@
 //! The picture of the table of causes: findings and residual, by place and kind of variable.
-//!
-//! The page of a verification: errors before, predicted and achieved, and the poses that were repeated often enough for ISO 9283.
 
-use super::number::{count, fixed, render, sentence_case, significant};
-use super::workspace::{StepErrors, histogram};
+use super::number::{render, sentence_case, significant};
 use crate::error::Result;
 use crate::table::{CauseGrid, CauseGridCell, Cells, Findings};
 use serde_json::{Value, json};
@@ -103,67 +100,4 @@ pub fn diagnosed_page(tables: &DiagnosedTables) -> Result<String> {
         "next": tables.next,
     });
     render("diagnosed.html", include_str!("diagnosed.html"), page)
-}
-
-/// What the page shows; lengths in mm.
-pub struct AchievedTables<'a> {
-    /// Heading.
-    pub(crate) title: &'a str,
-    /// Where the model is from.
-    pub(crate) model: &'a str,
-    /// Name, mean, 95th percentile, largest, and what they are of.
-    pub(crate) rows: Vec<(&'static str, [f64; 3], String)>,
-    /// Errors of the uncorrected targets, by the model, and of the measured points.
-    pub(crate) errors: [Vec<f64>; 2],
-    /// Cycles, accuracy and repeatability.
-    pub(crate) poses: Vec<(usize, f64, f64)>,
-    /// What to know of the figures, a sentence each.
-    pub(crate) remarks: Vec<String>,
-}
-
-/// The page as one file that needs no other.
-pub fn achieved_page(tables: &AchievedTables) -> Result<String> {
-    let mm = |length: f64| fixed(length, 4);
-    let row = |(name, figures, what): &(&str, [f64; 3], String)| {
-        let [mean, p95, max] = figures.map(mm);
-        [format!("{name}: {what}"), mean, p95, max]
-    };
-    let errors = tables
-        .errors
-        .iter()
-        .zip([("before", "s0"), ("achieved", "s-last")])
-        .map(|(lengths, (step, colour))| {
-            let mut sorted_mm = lengths.clone();
-            sorted_mm.sort_by(f64::total_cmp);
-            let mean_mm = sorted_mm.iter().sum::<f64>() / sorted_mm.len().max(1) as f64;
-            StepErrors {
-                step: step.into(),
-                colour: colour.into(),
-                sorted_mm,
-                mean_mm,
-            }
-        });
-    let errors: Vec<StepErrors> = errors
-        .filter(|errors| !errors.sorted_mm.is_empty())
-        .collect();
-    let poses = (1..)
-        .zip(&tables.poses)
-        .map(|(k, (cycles, accuracy, repeatability)): (i64, _)| {
-            [
-                k.to_string(),
-                count(*cycles as i64),
-                mm(*accuracy),
-                mm(*repeatability),
-            ]
-        });
-    let page = json!({
-        "title": tables.title,
-        "model": tables.model,
-        "points": count(tables.errors[1].len() as i64),
-        "rows": tables.rows.iter().map(row).collect::<Vec<_>>(),
-        "remarks": &tables.remarks,
-        "picture": histogram(&errors, "Histogram of the position error before and after correction"),
-        "poses": poses.collect::<Vec<_>>(),
-    });
-    render("achieved.html", include_str!("achieved.html"), page)
 }

@@ -1,23 +1,8 @@
 //! Tables to one self-contained HTML file: no script, no network, inline SVG, light and dark, fit to print.
 //!
 //! Every figure is a column of a table; the pictures only bin, sort and scale them, and values are shown in people's units.
-//!
-//! `report.json`: what the report says, for other programs. Every figure is a column of a table.
 
-use self::certificate::Judgement;
-use crate::error::Result;
-use crate::table::{
-    Acceptance, Cells, Corrections, Curves, FindingNumbers, Findings, Fit, Forms, Intake,
-    Observability, Parameters, Prediction, Recording, Rejected, Rivals, Robot, Split, Statistics,
-    Suspects, Training, Verdict, VerdictSentences, VerdictTopic, Withdrawn, picked, picked_of,
-};
-pub use causes::{AchievedTables, DiagnosedTables, achieved_page, diagnosed_page};
-pub use certificate::AcceptanceLimits;
-pub use language::{PageLanguage, Translation};
-use serde_json::json;
-use std::collections::BTreeMap;
-pub use torques::{TorqueTables, torque_page};
-
+mod achieved;
 mod causes;
 mod certificate;
 mod closure;
@@ -27,12 +12,28 @@ mod findings;
 mod fits;
 pub mod fleet;
 pub mod fleet_causes;
+mod json;
 mod language;
 mod number;
 mod parameters;
 mod svg;
 mod torques;
 mod workspace;
+
+pub use achieved::{AchievedTables, achieved_page};
+pub use causes::{DiagnosedTables, diagnosed_page};
+pub use certificate::AcceptanceLimits;
+pub use language::{PageLanguage, Translation};
+pub use torques::{TorqueTables, torque_page};
+
+use crate::error::Result;
+use crate::table::{
+    Acceptance, Cells, Corrections, Curves, FindingNumbers, Findings, Fit, Forms, Intake,
+    Observability, Parameters, Prediction, Recording, Rejected, Rivals, Robot, Split, Statistics,
+    Suspects, Training, Verdict, VerdictSentences, VerdictTopic, Withdrawn,
+};
+use serde_json::json;
+use std::collections::BTreeMap;
 
 /// What a report is made of; lists are in pipeline order and may be empty.
 pub(crate) struct Tables {
@@ -131,7 +132,7 @@ pub(crate) fn pages(tables: &Tables, options: &ReportOptions) -> Result<Pages> {
     let title = options
         .title
         .map_or_else(|| format!("Calibration of {robot}"), str::to_owned);
-    let json = crate::report::document(tables, options, &title, judgement.as_ref())?;
+    let json = json::document(tables, options, &title, judgement.as_ref())?;
     let choices = [("title", options.title), ("set", options.set)];
     let page = json!({
         "title": title,
@@ -160,81 +161,4 @@ pub(crate) fn pages(tables: &Tables, options: &ReportOptions) -> Result<Pages> {
         json,
         acceptance,
     })
-}
-
-/// The document; `judgement` is that of the page.
-fn document(
-    tables: &Tables,
-    options: &ReportOptions,
-    title: &str,
-    judgement: Option<&Judgement>,
-) -> Result<String> {
-    let findings = tables
-        .findings
-        .iter()
-        .flat_map(|table| &table.0)
-        .map(|row| {
-            let (numbers, rivals) = (tables.finding_numbers.iter(), tables.rivals.iter());
-            let numbers = numbers
-                .flat_map(|table| &table.0)
-                .filter(|number| number.rank == row.rank);
-            let rivals = rivals
-                .flat_map(|table| &table.0)
-                .filter(|rival| rival.rank == row.rank);
-            let columns =
-                "rank effect where=place statement probability place_probability none_probability";
-            let mut finding = picked(row, columns);
-            finding["numbers"] = picked_of(numbers, "name value unit sigma");
-            finding["evidence"] = picked(row, "f_statistic p_value delta_bic heldout_gain_mm");
-            finding["forms"] = tables
-                .forms
-                .iter()
-                .flat_map(|table| table.document(row.rank))
-                .collect();
-            finding["rivals"] = picked_of(rivals, "effect where=place delta_bic probability");
-            finding
-        });
-    let diagnosis = tables.verdict.iter().flat_map(|table| &table.0).next_back().map(|row| {
-        let columns = "step verdict statement noise_basis noise_floor_mm before_rms_mm after_rms_mm clock";
-        let mut diagnosis = picked(row, columns);
-        diagnosis["not_observable"] = json!(tables.statements(&row.step, VerdictTopic::NotObservable));
-        diagnosis
-    });
-    let limits = judgement.map(|judgement| {
-        let figures = judgement.found().map(|(row, _)| row);
-        json!({
-            "asked": !judgement.limits.is_empty(), "kept": judgement.kept, "sentence": judgement.sentence,
-            "figures": picked_of(figures, "figure found_mm limit_mm kept"),
-        })
-    });
-    let counting = tables.counting.as_ref().map_or_else(
-        || "robot file".into(),
-        |difference| format!("robot file; the controller counts otherwise: {difference}"),
-    );
-    let document = json!({
-        "calib_report": 1,
-        "title": title,
-        "robot": data::robot_name(&tables.robot),
-        "calib": env!("CARGO_PKG_VERSION"),
-        "identity": options.identity,
-        "standing": tables.standing,
-        "withdrawn": tables.withdrawn,
-        "limits": limits,
-        "statistics": picked_of(
-            &tables.statistics.0,
-            "step set held_out points mean_mm std_mm p95_mm max_mm rms_mm median_mm noise_rms_mm noise_basis",
-        ),
-        "diagnosis": diagnosis,
-        "findings": findings.collect::<Vec<_>>(),
-        "corrections": picked_of(
-            tables.corrections.iter().flat_map(|table| &table.0),
-            "step rival chosen reason before_mm mean_mm rms_mm max_mm gain_mm gain_sigma_mm numbers",
-        ),
-        "parameters_counting": counting,
-        "parameters": picked_of(&tables.parameters.0, "name where=place unit nominal value sigma status"),
-        "rejected_rows": tables.rejected.iter().map(|table| table.0.len()).sum::<usize>(),
-        "suspects": tables.suspects.iter().map(|table| table.0.len()).sum::<usize>(),
-        "tables": options.hashes.iter().map(|(kind, hash)| json!({ "table": kind, "content": hash })).collect::<Vec<_>>(),
-    });
-    Ok(format!("{document:#}\n"))
 }

@@ -3,27 +3,6 @@
 //! `format.json` | `objects/ab/<file hash>.parquet` | `actions/cd/<key hash>.json` | `runs/<id>/` | `tables/`, `documents/` for
 //! people | `tmp/`. Objects and records are written aside and moved into place, then made durable in groups; a crash leaves nothing
 //! visible by half, and what a power cut tears is told by its hash.
-//!
-//! What a store asks of object storage.
-
-use crate::error::{Error, Result};
-pub use actions::{Account, ActionRecord, Lookup, PendingTable, Published};
-pub use content::TableHash;
-use disk::{Durability, Workspace, make_dir, put_if_absent, refused, sync_dir, write_synced};
-pub use key::{ActionId, FileHash, FileKey, KEY_FORMAT, ReadKey, StageKey, TableRef};
-pub(crate) use reader::table_of_bytes;
-pub use reader::{Loose, PublishedTable, read_table};
-use remote::Remote;
-pub use runs::{Link, Run, Sealed};
-use serde::{Deserialize, Serialize};
-use std::fmt::Debug;
-use std::fs;
-use std::io::ErrorKind;
-use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
-pub use sweep::Sweep;
-pub use verify::Verification;
-pub use writer::{FinishedFile, TableWriter};
 
 pub(crate) mod actions;
 mod check;
@@ -41,6 +20,26 @@ pub mod schema;
 mod sweep;
 mod verify;
 pub(crate) mod writer;
+
+pub use actions::{Account, ActionRecord, Lookup, PendingTable, Published};
+pub use content::TableHash;
+pub use key::{ActionId, FileHash, FileKey, KEY_FORMAT, ReadKey, StageKey, TableRef};
+pub(crate) use reader::table_of_bytes;
+pub use reader::{Loose, PublishedTable, read_table};
+pub use runs::{Link, Run, Sealed};
+pub use sweep::Sweep;
+pub use verify::Verification;
+pub use writer::{FinishedFile, TableWriter};
+
+use crate::error::{Error, Result};
+use disk::{Durability, Workspace, make_dir, put_if_absent, refused, sync_dir, write_synced};
+use remote::Remote;
+use serde::{Deserialize, Serialize};
+use std::fmt::Debug;
+use std::fs;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// The layout described above.
 const STORE_FORMAT: u32 = 1;

@@ -8,7 +8,7 @@ pub struct CriterionRow {
     /// Its name in the code.
     pub name: &'static str,
     /// Its value as the code has it.
-    pub(crate) value: &'static str,
+    pub value: &'static str,
     /// What it decides.
     pub meaning: &'static str,
     /// Its unit.
@@ -16,7 +16,7 @@ pub struct CriterionRow {
     /// Where it is from.
     pub source: &'static str,
     /// What halving and doubling it does to diagnoses; empty where that was not seen.
-    pub(crate) scaled: &'static str,
+    pub scaled: &'static str,
 }
 
 /// A table: `/// meaning`, `NAME: kind = value, "unit", "source", "what halving and doubling does";`.

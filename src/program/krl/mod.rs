@@ -7,6 +7,11 @@
 //!
 //! The positions by axes that a file declares, by their names.
 
+mod aggregate;
+mod line;
+mod reached;
+mod system;
+
 use super::settle::{Reached, Words, settle};
 use super::token::{ProgramText, Token, TokenKind, brackets_match, closing, lines, tokens};
 use super::{Companion, Declared, Gathered, Language, quoted};
@@ -15,11 +20,6 @@ use line::{declared, member, structure, variable};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use system::SystemData;
-
-mod aggregate;
-mod line;
-mod reached;
-mod system;
 
 /// Motions, and how many positions each has.
 const MOTIONS: [(&str, usize); 7] = [

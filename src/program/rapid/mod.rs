@@ -7,15 +7,15 @@
 //!
 //! The jointtargets that a program declares, by their names.
 
+mod list;
+mod surroundings;
+
 use super::token::{self, BRACKETS, ProgramText, Token, TokenKind, arguments, tokens};
 use super::{Companion, Declared, Gathered, Language, quoted};
 use list::{List, Want, depths};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use surroundings::in_force;
-
-mod list;
-mod surroundings;
 
 /// Motion instructions by how they begin, and which of the positional arguments are positions.
 const MOTIONS: [(&str, &[usize]); 10] = [
