@@ -14,7 +14,7 @@ mod ur_kinematics;
 mod urdf;
 mod xacro;
 
-pub use mark::{Belonging, ExportMark};
+pub use mark::Belonging;
 pub use model::Export;
 
 use crate::error::Result;

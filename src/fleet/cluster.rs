@@ -29,14 +29,6 @@ pub(crate) struct ClusterOptions {
     pub(crate) more: Vec<String>,
 }
 
-/// The script of one array and the tasks that it takes.
-pub(crate) struct Script {
-    /// Text of the script.
-    pub(crate) text: String,
-    /// How many.
-    pub(crate) tasks: usize,
-}
-
 impl ClusterOptions {
     /// Everything that goes into a directive is a plain word: sbatch has no quoting that all its versions share.
     fn check(&self) -> Result<()> {
@@ -83,7 +75,7 @@ pub(crate) fn logs(store: &Path, fleet: &str) -> PathBuf {
 }
 
 /// The scripts of a run for `sbatch`, one an array.
-pub(crate) fn slurm(note: &RunNote, options: &ClusterOptions) -> Result<Vec<Script>> {
+pub(crate) fn slurm(note: &RunNote, options: &ClusterOptions) -> Result<Vec<String>> {
     options.check()?;
     let count = note.tasks.len();
     let scripts = (0..count).step_by(ARRAY).map(|first| {
@@ -111,7 +103,7 @@ pub(crate) fn slurm(note: &RunNote, options: &ClusterOptions) -> Result<Vec<Scri
             quoted(&note.fleet),
             quoted(&note.run)
         ));
-        Script { text, tasks }
+        text
     });
     Ok(scripts.collect())
 }

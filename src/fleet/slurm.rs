@@ -20,7 +20,7 @@ pub(crate) fn submit(ledger: &Ledger, note: &mut RunNote, options: &ClusterOptio
     std::fs::create_dir_all(&folder)
         .map_err(|error| Error::store(folder.display().to_string(), error.to_string()))?;
     for script in scripts {
-        let answer = output_of("sbatch", &["--parsable"], Some(&script.text))?;
+        let answer = output_of("sbatch", &["--parsable"], Some(&script))?;
         // `id` or `id;cluster`.
         note.jobs.push(
             answer

@@ -7,8 +7,8 @@ use crate::error::Result;
 use crate::report::fleet as page;
 use crate::store::{Account, KEY_FORMAT, PendingTable, StageKey};
 use crate::table::{
-    Changes, Findings, FleetChangeRow, FleetChanges, FleetRow, FleetTable, Statistics,
-    StatisticsRow, Table, Verdict,
+    Changes, Findings, FleetChangeRow, FleetRow, FleetTable, Statistics, StatisticsRow, Table,
+    Verdict,
 };
 use rayon::prelude::*;
 use serde_json::json;
@@ -22,8 +22,6 @@ const STAGE: &str = "fleet";
 pub(crate) struct FleetSummary {
     /// A row for each robot.
     pub(crate) fleet: FleetTable,
-    /// A row for each parameter that was tested.
-    pub(crate) changes: FleetChanges,
     /// Where people find the tables and the page.
     pub(crate) tables: Vec<PathBuf>,
     /// The page about the fleet.
@@ -105,7 +103,6 @@ pub fn publish(
     ledger.store.sync()?;
     Ok(FleetSummary {
         fleet: table,
-        changes,
         tables,
         page,
     })

@@ -4,7 +4,7 @@
 
 use super::overrides::Override;
 pub use super::spec::InputFile;
-pub use super::wiring::{Input, Origin};
+pub use super::wiring::Input;
 use super::{spec, wiring};
 use crate::error::{Error, Fault, Result};
 use crate::raw;

@@ -58,10 +58,6 @@ impl Record {
     pub(crate) fn len(&self) -> usize {
         self.fields.len()
     }
-    /// Whether it has no field.
-    pub(crate) fn is_empty(&self) -> bool {
-        self.fields.is_empty()
-    }
     /// A field without the blanks around it; empty beyond the last.
     pub(crate) fn field(&self, index: usize) -> &[u8] {
         let bytes = if self.is_quoted {

@@ -242,10 +242,7 @@ impl RenderArguments {
         let text: String = match self.engine {
             Scheduler::Slurm => {
                 note.engine = "slurm".into();
-                cluster::slurm(&note, &options)?
-                    .into_iter()
-                    .map(|script| script.text)
-                    .collect()
+                cluster::slurm(&note, &options)?.concat()
             }
             Scheduler::K8s => {
                 note.engine = "k8s".into();

@@ -3,7 +3,6 @@
 //! Small on purpose: a search for closed forms builds and prices such trees, and `libm` gives the same bits on every machine.
 
 use super::quantity::RowQuantity;
-use std::fmt;
 
 /// A formula; shape numbers stand by their position.
 #[derive(Debug, Clone, PartialEq)]
