@@ -58,7 +58,7 @@ pub(super) fn document(
     let document = json!({
         "calib_report": 1,
         "title": title,
-        "robot": data::robot_name(&tables.robot),
+        "robot": super::data::robot_name(&tables.robot),
         "calib": env!("CARGO_PKG_VERSION"),
         "identity": options.identity,
         "standing": tables.standing,
