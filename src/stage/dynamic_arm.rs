@@ -150,7 +150,7 @@ pub(crate) fn torque_per_ampere(robot: &RobotDescription) -> Result<Vec<f64>> {
     Err(Error::data("table robot", message))
 }
 
-/// Which rows judge and choose nothing; a row is told by its number in the recording, from 0.
+/// Which rows judge and choose nothing; a row is identified by its number in the recording, from 0.
 pub(super) type HeldOut<'a> = dyn Fn(&ArmMotion, usize, usize) -> bool + 'a;
 
 /// Torques of a motion that is read chunk by chunk.

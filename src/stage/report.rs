@@ -91,7 +91,7 @@ impl Stage for Report {
     fn run(&self, reads: ReportReads, context: &Context) -> Result<ReportWrites> {
         let curves = self.curves(&reads)?;
         let hashes = hashes(&reads)?;
-        // A diagnosis beside an outside simulation speaks of that, not of this robot's model.
+        // A diagnosis against an outside simulation speaks of that, not of this robot's model.
         let diagnosed = reads
             .findings
             .last()

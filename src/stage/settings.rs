@@ -216,7 +216,7 @@ impl FoldSetting {
         }
     }
 
-    /// The folds of a fit; where they had to be dropped, the person is told.
+    /// The folds of a fit; where they had to be dropped, a warning says so.
     pub(super) fn folds(
         self,
         whole: &Session,

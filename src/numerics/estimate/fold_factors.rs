@@ -25,7 +25,7 @@ pub struct NearbyFits<'a> {
     data: &'a Measurements,
     model: &'a Model,
     excess: ExcessSigma,
-    /// What errors are told in.
+    /// Scale of the errors.
     scale: ErrorScale,
     /// Parameters that are estimated or moved.
     columns: Vec<usize>,

@@ -1,4 +1,4 @@
-//! A carried model beside its geometry alone, carried likewise: everywhere, and where the joints had been and had not.
+//! A carried model compared with its geometry alone, carried likewise: everywhere, and where the joints had been and had not.
 
 use crate::error::counted;
 use crate::robot::Measurements;

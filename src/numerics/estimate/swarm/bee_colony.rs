@@ -1,6 +1,6 @@
 //! The artificial bee colony (ABC): Karaboga (2005), Karaboga and Basturk (2007).
 //!
-//! Employed bees try `v_s = x_s + phi (x_s - x_ks)` in one coordinate beside their source, onlookers do so beside sources drawn by
+//! Employed bees try `v_s = x_s + phi (x_s - x_ks)` in one coordinate near their source, onlookers do so near sources drawn by
 //! fitness `1 / (1 + f)` (`1 + |f|` below zero), and a source that `limit` trials did not better is left for a random one. All
 //! bees of a phase fly at once, from the sources as they are when it begins.
 
