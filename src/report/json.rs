@@ -1,7 +1,7 @@
 //! `report.json`: what the report says, for other programs. Every figure is a column of a table.
 
 use super::certificate::Judgement;
-use super::{ReportOptions, Tables, data};
+use super::{ReportOptions, Tables};
 use crate::error::Result;
 use crate::table::{VerdictTopic, picked, picked_of};
 use serde_json::json;

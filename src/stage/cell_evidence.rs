@@ -1,9 +1,7 @@
 //! `cell_evidence`: what every cell of the table of causes says of a robot given cells that its fleet has accepted. `calib fleet diagnose` puts
 //! it in the place of a stage `diagnose`, with that stage's settings.
 
-use crate::criteria::fleet::WRITTEN;
 use crate::diagnose::{CellAnswer, GivenCell, cell_evidence};
-use crate::effect::names;
 use crate::error::{Error, Place, Result};
 use crate::stage::{AskedRows, Context, Diagnose, DiagnoseReads, RawFile, Stage};
 use crate::table::{CellEvidence as CellEvidenceTable, CellEvidenceRow};
@@ -86,11 +84,6 @@ impl Stage for CellEvidence {
 }
 
 fn table(answers: Vec<CellAnswer>) -> CellEvidenceTable {
-    let kept = |answer: &CellAnswer| {
-        let is_plain = answer.shape.is_none() && answer.effect != names::UNKNOWN;
-        let least = WRITTEN[usize::from(!is_plain)];
-        answer.log >= least || answer.sigma.is_some()
-    };
     // So many digits decide nothing, and they would fill the store.
     let rounded = |value: f64| (1e3 * value).round() / 1e3;
     let row = |answer: CellAnswer| CellEvidenceRow {
@@ -105,7 +98,11 @@ fn table(answers: Vec<CellAnswer>) -> CellEvidenceTable {
         size_mm: rounded(1e6 * answer.size) / 1e3,
         sigma_mm: answer.sigma.map(|sigma| rounded(1e6 * sigma) / 1e3),
     };
-    let mut rows: Vec<CellEvidenceRow> = answers.into_iter().filter(kept).map(row).collect();
+    let mut rows: Vec<CellEvidenceRow> = answers
+        .into_iter()
+        .filter(CellAnswer::counts)
+        .map(row)
+        .collect();
     let key = |row: &CellEvidenceRow| (row.given.clone(), row.cell.clone(), row.shape.clone());
     rows.sort_by_cached_key(key);
     rows.dedup_by_key(|row| key(row));

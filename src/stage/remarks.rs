@@ -324,14 +324,14 @@ const UNIFORM: f64 = 0.288_675;
 /// By what rounded_joints are turned to see how far the point goes, rad or m.
 const TURN: f64 = 1e-4;
 
-/// What rounding does to the rounded_points, m.
+/// What rounding does to points, m.
 struct Rounding {
     what: String,
     rms: f64,
     most: f64,
 }
 
-/// What is said of rounded rounded_joints and rounded_points, a sentence each, where rounding is as large as what the model leaves.
+/// What is said of rounded joints and points, a sentence each, where rounding is as large as what the model leaves.
 pub(super) fn rounded_logs(model: &Model, data: &Measurements, rows: &[usize]) -> Vec<String> {
     let predicted = model.predict(data);
     let left = rms(rows
@@ -448,7 +448,7 @@ fn rounded_points(data: &Measurements, rows: &[usize]) -> Option<Rounding> {
         .fold(f64::INFINITY, f64::min);
     let length = Unit::Millimetre.to_si(step) * 3f64.sqrt();
     Some(Rounding {
-        what: format!("measured rounded_points are rounded to {step} mm"),
+        what: format!("measured points are rounded to {step} mm"),
         rms: UNIFORM * length,
         most: 0.5 * length,
     })

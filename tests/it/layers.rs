@@ -65,7 +65,8 @@ fn every_layer_is_a_row_of_the_map_and_every_row_a_layer() {
     let declared: BTreeSet<String> = text
         .lines()
         .filter_map(|line| {
-            line.strip_prefix("pub mod ")?
+            line.strip_prefix("pub mod ")
+                .or_else(|| line.strip_prefix("pub(crate) mod "))?
                 .strip_suffix(';')
                 .map(String::from)
         })

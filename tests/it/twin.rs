@@ -389,7 +389,7 @@ fn more_points_than_fit_into_memory_are_refused_with_their_place() {
     all.blocks[1].points = 1 << 32;
     all.poses.candidates = 1 << 32;
     let places: Vec<String> = all.check().into_iter().map(|fault| fault.place).collect();
-    assert_eq!(places, ["blocks[1].points", "poses.candidates"]);
+    assert_eq!(places, ["poses.candidates", "blocks[1].points"]);
 }
 
 #[test]

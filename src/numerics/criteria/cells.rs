@@ -83,7 +83,7 @@ criteria! {
     /// Functions of each of two variables where products are looked at for the first time.
     ROUGHLY: usize = 4, "functions", "judgement: bounds time", "";
     /// Functions of each of two variables in a product, of motions in one direction, in two, in three.
-    EACH: [usize; 3] = [10, 8, 6], "functions", "judgement: bounds time", "";
+    EACH: [usize; 3] = [6, 5, 4], "functions", "judgement: bounds time", "";
     /// Cosines of what is not straight in a law that is nearly a line.
     BENDING: usize = 12, "cosines", "count: bends over a twelfth of the range", "";
     /// Steps in time of a motion without a name that are asked at first.

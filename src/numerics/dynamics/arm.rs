@@ -1,8 +1,23 @@
 //! The arm that moves as the user believes it: axes, masses and tolerances in the base frame at zero pose, SI; and its inertial numbers as the
 //! regressor counts them.
 
-use super::newton_euler::{INERTIA_ENTRIES, INERTIAL_NUMBERS, inertia_matrix};
 use nalgebra::{Matrix3, Point3, Vector3};
+
+/// Inertial numbers of a link.
+pub const INERTIAL_NUMBERS: usize = 10;
+/// Where xx xy xz yy yz zz stand in the matrix.
+pub(crate) const INERTIA_ENTRIES: [(usize, usize); 6] =
+    [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
+
+/// The matrix of xx xy xz yy yz zz.
+pub(crate) fn inertia_matrix(six: &[f64]) -> Matrix3<f64> {
+    let mut matrix = Matrix3::zeros();
+    for (number, (row, column)) in INERTIA_ENTRIES.into_iter().enumerate() {
+        matrix[(row, column)] = six[number];
+        matrix[(column, row)] = six[number];
+    }
+    matrix
+}
 
 /// Mass, centre and inertia of a body.
 #[derive(Debug, Clone, Copy, PartialEq)]

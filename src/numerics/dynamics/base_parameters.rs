@@ -1,6 +1,6 @@
 //! Base parameters: inertial numbers that torques can determine, by QR with column pivoting of the stacked regressor (Gautier, 1991).
 
-use super::newton_euler::INERTIAL_NUMBERS;
+use super::arm::INERTIAL_NUMBERS;
 use super::reduce::ReducedRegressor;
 
 /// A column of which less than this share is new is a combination of others.

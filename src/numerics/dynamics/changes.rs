@@ -2,13 +2,13 @@
 //! friction are common but for what the second recording shows to be another.
 
 use super::arm::DynamicArm;
+use super::arm::INERTIAL_NUMBERS;
 use super::cause::{COULOMB, OFFSET, TORQUE_CAUSES, TorqueForm, VISCOUS};
 use super::model::TorqueModel;
-use super::newton_euler::INERTIAL_NUMBERS;
 use super::noise::NoiseMemory;
-use super::noise::noise_of_fit;
 use super::problem::TorqueProblem;
 use super::recording::TorqueSource;
+use super::rich::noise_of_fit;
 use super::stacked::StackedColumns;
 use super::sweep::{SweptColumns, value_of};
 use super::types::{ContactEvent, TorqueQuestion};

@@ -1,7 +1,6 @@
 //! The clock of a recording: its rate, and the runs of rows over which a filter may work.
 
 use super::recording::TorqueRecording;
-use super::scene::column;
 use crate::statistics::nearest;
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -220,4 +219,9 @@ impl MotionPace {
         let usual = nearest(&mut paces, 0.5).unwrap_or(0.0);
         (HARMONICS * usual).clamp(LEAST, (MOST * rate).max(LEAST))
     }
+}
+
+/// One column of row-major values.
+pub(super) fn column(values: &[f64], n: usize, joint: usize) -> Vec<f64> {
+    values.iter().skip(joint).step_by(n).copied().collect()
 }

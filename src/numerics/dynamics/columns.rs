@@ -1,8 +1,8 @@
 //! Judged rows of the base and of every form, filtered and decimated alike.
 
+use super::arm::INERTIAL_NUMBERS;
 use super::base_parameters::base_parameters;
 use super::cause::{TORQUE_CAUSES, TorqueForm};
-use super::newton_euler::INERTIAL_NUMBERS;
 use super::reduce::Reduction;
 use super::reduce::{ReducedRegressor, TorqueColumn};
 use super::scene::{DynamicScene, largest};

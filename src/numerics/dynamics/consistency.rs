@@ -3,8 +3,8 @@
 
 use super::arm::Inertial;
 use super::arm::numbers;
+use super::arm::{INERTIAL_NUMBERS, inertia_matrix};
 use super::model::TorqueModel;
-use super::newton_euler::{INERTIAL_NUMBERS, inertia_matrix};
 use nalgebra::{DMatrix, Matrix3, Point3, Vector3};
 
 /// Mass below which there is no centre, kg.

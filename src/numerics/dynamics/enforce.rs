@@ -4,7 +4,7 @@
 //! moments and the mass as their border (4 x 4), is positive (Wensing, Kim, Slotine, RA-L 2018). Least squares under that condition is a
 //! projection onto a product of cones, found by alternating directions (ADMM): a step in the metric, a step onto the cones.
 
-use super::newton_euler::{INERTIAL_NUMBERS, inertia_matrix};
+use super::arm::{INERTIAL_NUMBERS, inertia_matrix};
 use super::problem::TorqueProblem;
 use super::sweep::SweptColumns;
 use super::types::EnforcedBodies;

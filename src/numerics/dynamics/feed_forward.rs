@@ -1,13 +1,15 @@
 //! Torques that a planned motion needs, by the identified model: differentiated and composed as the recording was.
 
 use super::arm::DynamicArm;
+use super::arm::INERTIAL_NUMBERS;
 use super::cause::{TorqueForm, friction_of};
 use super::clock::RecordingClock;
+use super::clock::column;
 use super::model::{JointRange, TorqueModel};
 use super::modelled::COVERAGE;
-use super::newton_euler::{INERTIAL_NUMBERS, InverseDynamics};
+use super::newton_euler::InverseDynamics;
 use super::recording::TorqueRecording;
-use super::scene::{DynamicScene, column, split};
+use super::scene::{DynamicScene, split};
 use super::shape_slopes::planned_slopes;
 use crate::effect::Place;
 use crate::error::{Error, Result};

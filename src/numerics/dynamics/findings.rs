@@ -1,5 +1,6 @@
 //! What was found in words and numbers: sizes, evidence, rivals, probabilities.
 
+use super::cause::TorqueParameter;
 use super::cause::{COULOMB, TorqueForm, VISCOUS};
 use super::cells::{CellOdds, OtherInertials, TorqueTable};
 use super::choice::CauseChoice;
@@ -7,7 +8,7 @@ use super::naming::{JudgedSet, fitted};
 use super::problem::TorqueProblem;
 use super::shape_slopes::ShapeSlopes;
 use super::sweep::SweptColumns;
-use super::types::{ContactEvent, TorqueFinding, TorqueParameter};
+use super::types::{ContactEvent, TorqueFinding};
 use crate::criteria::cells::{MISLED, RIVAL};
 use crate::diagnose::table::log_sum;
 use crate::diagnose::{Evidence, Probabilities, RivalCause};

@@ -1,8 +1,9 @@
 //! How much later torques come than the positions of their rows, and by how much friction turns before the velocity does: friction that a
 //! simulator lets a solver find turns with velocity and acceleration, and velocities that a drive smooths lag behind the friction that it feels.
 
-use super::noise::{NoiseMemory, basic_forms, noise_of_fit};
+use super::noise::NoiseMemory;
 use super::problem::TorqueProblem;
+use super::rich::{basic_forms, noise_of_fit};
 use super::sign_width::{FrictionFit, joint_sign_widths, sign_width};
 use super::sweep::SweptColumns;
 use super::weighted::{Weighing, WeightedColumns};

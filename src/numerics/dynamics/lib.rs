@@ -48,6 +48,7 @@ mod recording;
 mod reduce;
 mod refine;
 mod resample;
+mod rich;
 mod scene;
 mod shape_slopes;
 mod sign_width;
@@ -60,7 +61,9 @@ mod used;
 mod weighted;
 
 pub use arm::INERTIAL_NAMES;
+pub use arm::INERTIAL_NUMBERS;
 pub use arm::{DynamicArm, Inertial, InertialTolerance};
+pub use cause::TorqueParameter;
 pub use cause::{COULOMB, FittedNumber};
 pub use changes::{DiagnosedRecording, TorqueChange, TorqueChanges, changes};
 pub use consistency::{BodyConsistency, inertial_numbers};
@@ -69,13 +72,12 @@ pub use feed_forward::{NeededTorques, PlannedMotion};
 pub use feed_gate::{JudgedRow, TorqueGate, TorqueRemark};
 pub use masses::LinkFromTorques;
 pub use model::{JointRange, TorqueModel, TorqueTerm};
-pub use newton_euler::{INERTIAL_NUMBERS, InverseDynamics, MotionRow};
+pub use newton_euler::{InverseDynamics, MotionRow};
 pub use recording::TorqueRecording;
 pub use recording::TorqueSource;
 pub use types::{
     ContactEvent, EnforcedBodies, FrictionCurve, InertialBasis, InertialEstimate, TorqueCourses,
-    TorqueDiagnosis, TorqueErrors, TorqueFinding, TorqueLeftover, TorqueNoise, TorqueParameter,
-    TorqueQuestion,
+    TorqueDiagnosis, TorqueErrors, TorqueFinding, TorqueLeftover, TorqueNoise, TorqueQuestion,
 };
 
 use crate::error::{Error, Result};

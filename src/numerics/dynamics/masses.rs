@@ -4,11 +4,11 @@
 //! itself, so that any mass may be written to a link when the links before it give it back; gravity is the same. A link keeps the mass that
 //! is declared for it, and its centre is where the torques need it.
 
+use super::arm::INERTIAL_NUMBERS;
 use super::arm::numbers;
 use super::arm::{DynamicArm, Inertial};
 use super::consistency::nearest;
 use super::model::TorqueModel;
-use super::newton_euler::INERTIAL_NUMBERS;
 use nalgebra::{Matrix3, Point3, Vector3};
 
 /// A link as torques show it.

@@ -1,8 +1,8 @@
 //! The identified model of an arm's torques as data: inertial numbers of the links, and the causes that add torque at joints.
 
+use super::arm::INERTIAL_NUMBERS;
 use super::arm::{inertial_name, inertial_unit};
 use super::cause::{TORQUE_CAUSES, TorqueForm};
-use super::newton_euler::INERTIAL_NUMBERS;
 use crate::effect::Place;
 use crate::error::{Error, Result};
 

@@ -1,8 +1,8 @@
 //! A judged set as one model, with its covariance.
 
+use super::arm::INERTIAL_NUMBERS;
 use super::choice::CauseChoice;
 use super::model::{JointRange, TorqueModel, TorqueTerm};
-use super::newton_euler::INERTIAL_NUMBERS;
 use super::problem::TorqueProblem;
 use super::scene::{ends, largest};
 use super::shape_slopes::ShapeSlopes;

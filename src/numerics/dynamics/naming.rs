@@ -4,7 +4,7 @@
 use super::cause::{FittedNumber, TorqueForm, UNKNOWN, VISCOUS, line_of_power};
 use super::choice::CauseChoice;
 use super::problem::TorqueProblem;
-use super::refine::polish;
+use super::refine::{polish, push};
 use super::scene::largest;
 use super::shape_slopes::{ShapeNumber, ShapeSlopes, slope};
 use super::sweep::{SweptColumns, value_of};
@@ -88,21 +88,6 @@ pub(super) fn settle_names(
         }
         polish(problem, weighted, &mut judged.set);
     }
-}
-
-/// A form as a number of the problem.
-pub(super) fn push(
-    problem: &mut TorqueProblem,
-    weighted: &mut WeightedColumns,
-    form: TorqueForm,
-) -> usize {
-    let number = problem.push(form);
-    let runs = problem.runs(false);
-    problem
-        .all
-        .of(number)
-        .for_each(|column| weighted.push(&problem.all.columns[column], problem.weighing(&runs)));
-    number
 }
 
 /// The form with the least right to its name.

@@ -4,12 +4,9 @@
 //! Link frames sit at the joints' points and are parallel to the base at zero pose; the ten numbers of a link are mass, mass times centre
 //! (3) and the inertia about the joint's point (xx xy xz yy yz zz), in these axes.
 
-use super::arm::DynamicArm;
+use super::arm::{DynamicArm, INERTIA_ENTRIES, INERTIAL_NUMBERS, inertia_matrix};
 use crate::spatial::Pose;
 use nalgebra::{Matrix3, Vector3};
-
-/// Inertial numbers of a link.
-pub const INERTIAL_NUMBERS: usize = 10;
 
 /// Position, velocity and acceleration of the joints in one row, length n each.
 #[derive(Clone, Copy)]
@@ -222,20 +219,6 @@ fn wrench_of(link: &LinkMotion, theta: &[f64]) -> Wrench {
         force: a * theta[0] + dw.cross(&moment) + w.cross(&w.cross(&moment)),
         moment: moment.cross(a) + inertia * dw + w.cross(&(inertia * w)),
     }
-}
-
-/// Where xx xy xz yy yz zz stand in the matrix.
-pub(crate) const INERTIA_ENTRIES: [(usize, usize); 6] =
-    [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
-
-/// The matrix of xx xy xz yy yz zz.
-pub(crate) fn inertia_matrix(six: &[f64]) -> Matrix3<f64> {
-    let mut matrix = Matrix3::zeros();
-    for (number, (row, column)) in INERTIA_ENTRIES.into_iter().enumerate() {
-        matrix[(row, column)] = six[number];
-        matrix[(column, row)] = six[number];
-    }
-    matrix
 }
 
 #[cfg(test)]

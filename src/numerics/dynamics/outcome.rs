@@ -1,11 +1,12 @@
 //! The answer to a diagnosis of torques, from what was solved.
 
+use super::arm::INERTIAL_NUMBERS;
 use super::arm::{INERTIAL_NAMES, inertial_unit};
+use super::cause::TorqueParameter;
 use super::choice::CauseChoice;
 use super::enforce::with_bodies;
 use super::findings::{contact, findings, plain_finding};
 use super::model::TorqueModel;
-use super::newton_euler::INERTIAL_NUMBERS;
 use super::noise::{JointNoise, NoiseMemory};
 use super::problem::TorqueProblem;
 use super::scene::{ends, largest};
@@ -13,7 +14,7 @@ use super::solve::SolvedTorques;
 use super::sweep::SweptColumns;
 use super::types::{
     EnforcedBodies, InertialBasis, InertialEstimate, TorqueCourses, TorqueDiagnosis, TorqueErrors,
-    TorqueFinding, TorqueLeftover, TorqueNoise, TorqueParameter, TorqueQuestion,
+    TorqueFinding, TorqueLeftover, TorqueNoise, TorqueQuestion,
 };
 use crate::diagnose::VerdictKind;
 use crate::effect::Place;

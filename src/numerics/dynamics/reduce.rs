@@ -1,9 +1,10 @@
 //! From rows as recorded to judged rows: one low-pass, alike for measured torque and every column, then fewer rows; and the columns of the
 //! regressor so.
 
+use super::arm::INERTIAL_NUMBERS;
 use super::clock::RecordingClock;
 use super::filter::ZeroPhase;
-use super::newton_euler::{INERTIAL_NUMBERS, InverseDynamics};
+use super::newton_euler::InverseDynamics;
 use super::scene::{DynamicScene, split};
 use std::ops::Range;
 

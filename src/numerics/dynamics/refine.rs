@@ -3,7 +3,6 @@
 
 use super::cause::{COULOMB, ShapeSpan, TorqueForm, VISCOUS};
 use super::choice::CauseChoice;
-use super::naming::push;
 use super::problem::TorqueProblem;
 use super::shape_slopes::{ShapeNumber, ShapeSlopes};
 use super::sweep::SweptColumns;
@@ -179,6 +178,21 @@ const STEPS: usize = 3;
 const FARTHEST: f64 = 1.4;
 /// rad/s between which the width lies.
 const WIDTHS: [f64; 2] = [5e-4, 0.2];
+
+/// A form as a number of the problem.
+pub(super) fn push(
+    problem: &mut TorqueProblem,
+    weighted: &mut WeightedColumns,
+    form: TorqueForm,
+) -> usize {
+    let number = problem.push(form);
+    let runs = problem.runs(false);
+    problem
+        .all
+        .of(number)
+        .for_each(|column| weighted.push(&problem.all.columns[column], problem.weighing(&runs)));
+    number
+}
 
 /// Moves the numbers of a set to where the residual is least.
 pub(super) fn polish(

@@ -2,7 +2,7 @@
 
 use super::arm::DeclaredInertials;
 use super::arm::DynamicArm;
-use super::clock::RecordingClock;
+use super::clock::{RecordingClock, column};
 use super::filter::ZeroPhase;
 use super::filter::derivatives;
 use super::newton_euler::{InverseDynamics, MotionRow, turn};
@@ -263,9 +263,4 @@ pub(super) fn ends(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
 pub(super) fn largest<'v>(values: impl IntoIterator<Item = &'v f64>) -> f64 {
     let sizes = values.into_iter().map(|value| value.abs());
     sizes.fold(0.0, f64::max)
-}
-
-/// One column of row-major values.
-pub(super) fn column(values: &[f64], n: usize, joint: usize) -> Vec<f64> {
-    values.iter().skip(joint).step_by(n).copied().collect()
 }

@@ -1,9 +1,9 @@
 //! Two recordings in one least squares: what is common to both, and forms that only the second one has. Joints of the second count
 //! on from those of the first.
 
+use super::arm::INERTIAL_NUMBERS;
 use super::cause::{TORQUE_CAUSES, TorqueForm};
 use super::columns::TorqueColumns;
-use super::newton_euler::INERTIAL_NUMBERS;
 use super::problem::TorqueProblem;
 use super::reduce::TorqueColumn;
 use super::sweep::SweptColumns;

@@ -1,5 +1,6 @@
 //! What a diagnosis of joint torques is asked, and what it answers.
 
+use super::cause::TorqueParameter;
 use super::model::TorqueModel;
 use crate::diagnose::{Evidence, Probabilities, RivalCause, VerdictKind};
 use crate::effect::Place;
@@ -49,19 +50,6 @@ pub struct TorqueErrors {
     pub rms_moving: Vec<Option<f64>>,
     /// Rms (Nm) of rows in which the joint rests: friction is any value inside the Coulomb band there.
     pub rms_rest: Vec<Option<f64>>,
-}
-
-/// A fitted number of a finding.
-#[derive(Debug, Clone, PartialEq)]
-pub struct TorqueParameter {
-    /// E.g. `viscous`, `travel`, `mass`.
-    pub name: String,
-    /// In `unit`.
-    pub value: f64,
-    /// As people read it.
-    pub unit: &'static str,
-    /// One standard deviation with autocorrelation, where it was estimated.
-    pub sigma: Option<f64>,
 }
 
 /// A cause of what the rigid arm leaves.

@@ -249,7 +249,7 @@ impl FreeShape {
                         }
                     }
                 };
-                let lengths = &LENGTHS[..3];
+                let lengths = &LENGTHS[..2];
                 let shape = |length: f64| {
                     let [first, second] = [a, b].map(|basis| spectrum(basis, length));
                     let mut shares: Vec<f64> = first

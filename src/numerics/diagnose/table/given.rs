@@ -8,8 +8,9 @@ use super::search::without;
 use super::state::{CellColumns, Component, KnownState, SeenGroup, shape_keys};
 use super::{by_currents, estimated, is_kept};
 use crate::criteria::cells::{CLOSELY, OPEN, SMALLEST};
+use crate::criteria::fleet::WRITTEN;
 use crate::diagnose::round::{EstimatedCause, FitState, Fitter, RoundView};
-use crate::effect::{Basis, Form, Place, Term};
+use crate::effect::{Basis, Form, Place, Term, names};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -47,6 +48,14 @@ pub struct CellAnswer {
     pub size: f64,
     /// One standard deviation of the size of a given cell, m.
     pub sigma: Option<f64>,
+}
+
+impl CellAnswer {
+    /// Whether a sum over robots has to know it: what is missing there counts as the least evidence.
+    pub fn counts(&self) -> bool {
+        let is_plain = self.shape.is_none() && self.effect != names::UNKNOWN;
+        self.log >= WRITTEN[usize::from(!is_plain)] || self.sigma.is_some()
+    }
 }
 
 /// Does something with the table of the cells that `keeps` leaves, around a fitted model.

@@ -4,10 +4,10 @@ use super::{
     ColumnTorque, FittedNumber, PLAIN, TorqueCause, TorqueForm, at_each_link, plain, shape,
     size_of_two,
 };
+use crate::dynamics::arm::INERTIAL_NUMBERS;
 use crate::dynamics::arm::{INERTIAL_NAMES, inertial_unit};
-use crate::dynamics::newton_euler::INERTIAL_NUMBERS;
+use crate::dynamics::cause::TorqueParameter;
 use crate::dynamics::scene::GRAVITY;
-use crate::dynamics::types::TorqueParameter;
 use crate::effect::Place;
 
 /// A change of one of ten numbers.

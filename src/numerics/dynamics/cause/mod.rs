@@ -12,15 +12,27 @@ mod shared_friction;
 mod unnamed_friction;
 
 use super::arm::DeclaredInertials;
-use super::newton_euler::INERTIAL_NUMBERS;
+use super::arm::INERTIAL_NUMBERS;
 use super::scene::DynamicScene;
-use super::types::TorqueParameter;
 use crate::criteria::torque::AT_END;
 use crate::effect::Place;
 pub(super) use angle::{OFFSET, UNKNOWN};
 pub(super) use drive::{ROTOR, TORQUE_CONSTANT};
 pub use friction::COULOMB;
 pub(super) use friction::{VISCOUS, line_of_power};
+
+/// A fitted number of a finding.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TorqueParameter {
+    /// E.g. `viscous`, `travel`, `mass`.
+    pub name: String,
+    /// In `unit`.
+    pub value: f64,
+    /// As people read it.
+    pub unit: &'static str,
+    /// One standard deviation with autocorrelation, where it was estimated.
+    pub sigma: Option<f64>,
+}
 
 /// All causes with columns; latency and contacts are looked for before. What has no name comes last.
 pub(super) static TORQUE_CAUSES: [&TorqueCause; 27] = [

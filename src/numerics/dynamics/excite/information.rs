@@ -1,9 +1,10 @@
 //! What torques along a motion tell of base parameters and friction: the information matrix under white noise.
 
 use super::super::arm::DynamicArm;
+use super::super::arm::INERTIAL_NUMBERS;
 use super::super::base_parameters::base_parameters;
 use super::super::clock::RecordingClock;
-use super::super::newton_euler::{INERTIAL_NUMBERS, InverseDynamics};
+use super::super::newton_euler::InverseDynamics;
 use super::super::recording::TorqueRecording;
 use super::super::reduce::ReducedRegressor;
 use super::super::reduce::Reduction;
