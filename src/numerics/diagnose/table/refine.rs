@@ -1,9 +1,9 @@
 //! The numbers of a shape (an order, a time, a direction) where the rows say most of it.
 
-use super::cell::{FreeShape, ShapeGroup, Shapes, fields};
+use super::cell::{FreeShape, Over, ShapeGroup, Shapes, fields};
 use super::scan::{CauseTable, CellEvidence, CellScan, Refined};
 use super::state::{Component, KnownState};
-use crate::criteria::cells::{BENDS, LEVELS};
+use crate::criteria::cells::{BENDS, LEVELS, STICKS};
 use crate::effect::{Basis, Form, Variable};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -33,7 +33,7 @@ impl CauseTable<'_, '_> {
         let asked = |cell: &usize| {
             Some(*cell) == best
                 || self.declared.contains(cell)
-                || near(cell)
+                || near(cell) && !self.is_product(*cell)
                 || self.is_over_numbers(*cell)
         };
         let listed: Vec<usize> = scan.closely.keys().copied().filter(asked).collect();
@@ -97,6 +97,7 @@ impl CauseTable<'_, '_> {
                     free.near(level)
                         .into_iter()
                         .chain(known)
+                        .filter(|free| self.slips(free))
                         .filter_map(forms)
                         .filter(|(_, forms)| !is_there(forms))
                         .collect::<Vec<_>>()
@@ -137,12 +138,25 @@ impl CauseTable<'_, '_> {
     /// Whether a cell follows a variable with numbers that a component follows with others.
     fn is_over_numbers(&self, cell: usize) -> bool {
         match &self.cells[cell].shapes {
-            Shapes::Free(free) => self
-                .numbers
-                .iter()
-                .any(|of| free.of.is_alike(*of) && free.of != *of),
+            Shapes::Free(free) => {
+                let other = |of: &Variable| free.of.is_alike(*of) && free.of != *of;
+                !self.is_product(cell) && self.numbers.iter().any(other)
+            }
             Shapes::Listed(_) => false,
         }
+    }
+
+    fn is_product(&self, cell: usize) -> bool {
+        matches!(&self.cells[cell].shapes, Shapes::Free(free) if matches!(free.over, Over::Product(_)))
+    }
+
+    /// Whether a shape is none of what sticks over so much of a joint's travel that it is the joint's angle.
+    fn slips(&self, free: &FreeShape) -> bool {
+        let slips = |of: Variable| match of {
+            Variable::Stretch { joint, limit } => limit <= *STICKS * self.survey.travel(joint),
+            _ => true,
+        };
+        slips(free.of) && !matches!(free.over, Over::Product(other) if !slips(other))
     }
 
     /// The forms of a shape of a group: those that it gives a share; none where the group has fewer shapes with other numbers.
