@@ -91,7 +91,7 @@ criteria! {
     /// A variable of no more values than this bears no curve.
     FEW: usize = 3, "values", "count: three values", "";
     /// Limits at which what sticks beside a joint slips.
-    LIMITS: [f64; 3] = [0.07, 0.14, 0.28], "share of the joint's travel", "count: twofold", "";
+    LIMITS: [f64; 4] = [0.06, 0.12, 0.24, 0.48], "share of the joint's travel", "count: twofold, up to half of it", "";
     /// The same at most: what sticks over more of the travel is the joint's angle.
     STICKS: f64 = 0.5, "share of the joint's travel", "physics: half of it either way is all of it", "";
     /// Times in which a move fades.

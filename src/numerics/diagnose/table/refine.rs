@@ -33,7 +33,7 @@ impl CauseTable<'_, '_> {
         let asked = |cell: &usize| {
             Some(*cell) == best
                 || self.declared.contains(cell)
-                || near(cell) && !self.is_product(*cell)
+                || near(cell)
                 || self.is_over_numbers(*cell)
         };
         let listed: Vec<usize> = scan.closely.keys().copied().filter(asked).collect();
@@ -140,14 +140,10 @@ impl CauseTable<'_, '_> {
         match &self.cells[cell].shapes {
             Shapes::Free(free) => {
                 let other = |of: &Variable| free.of.is_alike(*of) && free.of != *of;
-                !self.is_product(cell) && self.numbers.iter().any(other)
+                self.numbers.iter().any(other)
             }
             Shapes::Listed(_) => false,
         }
-    }
-
-    fn is_product(&self, cell: usize) -> bool {
-        matches!(&self.cells[cell].shapes, Shapes::Free(free) if matches!(free.over, Over::Product(_)))
     }
 
     /// Whether a shape is none of what sticks over so much of a joint's travel that it is the joint's angle.
