@@ -98,7 +98,7 @@ impl PlacedRow<'_> {
     }
 
     /// From where an anchor is to the point, m. `None` where the robot knows no such anchor.
-    pub(crate) fn from_anchor(&self, anchor: &str) -> Option<Vector3<f64>> {
+    pub(crate) fn anchor_reach(&self, anchor: &str) -> Option<Vector3<f64>> {
         let setup = self.robot.setup();
         let anchor = setup.anchors.get(setup.anchor(anchor)?)?;
         let Deflection {
@@ -178,7 +178,7 @@ impl PlacedRow<'_> {
         for (parameter, direction) in &deflection.partials {
             emit(
                 *parameter,
-                from_anchor(
+                anchor_reach(
                     direction,
                     reach,
                     by_joint,
@@ -276,7 +276,7 @@ impl Turns {
 }
 
 /// Derivative of the vector from the row's anchor to the point, which is `reach`.
-pub(super) fn from_anchor(
+pub(super) fn anchor_reach(
     direction: &Direction,
     reach: &Vector3<f64>,
     by_joint: &[Vector3<f64>],

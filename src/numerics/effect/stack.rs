@@ -2,7 +2,7 @@
 //!
 //! P = base E_0 exp(x1 (q1 + d1)) E_1 ... exp(xn (qn + dn)) E_n tool, with E_k = exp of the summed twists at station k.
 
-use super::placed_row::{PlacedRow, PlacementBuffers, Station, Turns, along, from_anchor};
+use super::placed_row::{PlacedRow, PlacementBuffers, Station, Turns, along, anchor_reach};
 use super::{ArmState, BeyondRange, Deflection, Direction, Effect, Law, ParameterSpec, Variable};
 use crate::robot::{Measurements, Posture, RobotModel, Travel};
 use crate::spatial::Pose;
@@ -427,12 +427,12 @@ impl PointMotion {
     }
 
     /// Derivative of the vector from the row's anchor to the point, which is `reach`, m per unit.
-    pub(crate) fn from_anchor_along(
+    pub(crate) fn anchor_reach_along(
         &self,
         direction: &Direction,
         reach: &Vector3<f64>,
     ) -> Vector3<f64> {
-        from_anchor(
+        anchor_reach(
             direction,
             reach,
             &self.by_joint,

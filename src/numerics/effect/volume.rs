@@ -257,7 +257,7 @@ tool: {point: [20, 10, 60]}
                 let closing = match placed.anchor_shape("a").expect("there") {
                     Shape::Point => Closing::Point,
                     Shape::Plane(normal) => Closing::Plane(normal),
-                    Shape::Sphere(_) => Closing::Sphere(placed.from_anchor("a").expect("there")),
+                    Shape::Sphere(_) => Closing::Sphere(placed.anchor_reach("a").expect("there")),
                 };
                 placed
                     .log_volume(&closing, emit)

@@ -55,7 +55,7 @@ impl Distance {
     fn along(&self, at: RowView) -> Option<(Vector3<f64>, f64)> {
         let reach = at
             .placed
-            .from_anchor(self.reading(at.data, at.row)?.anchor)?;
+            .anchor_reach(self.reading(at.data, at.row)?.anchor)?;
         Some((reach.try_normalize(0.0)?, reach.norm()))
     }
 }
@@ -80,7 +80,10 @@ impl MeasurementKind for Distance {
         let anchor = self
             .reading(at.data, at.row)
             .map_or("", |reading| reading.anchor);
-        let reach = at.placed.from_anchor(anchor).unwrap_or_else(Vector3::zeros);
+        let reach = at
+            .placed
+            .anchor_reach(anchor)
+            .unwrap_or_else(Vector3::zeros);
         Sensitivity::FromAnchor(Weight::Along(weight.apply(&along)), reach)
     }
 

@@ -114,7 +114,7 @@ impl Sensitivity {
             Self::Point(weight) => weight.apply(&motion.point_along(direction)),
             Self::Rotation(weight) => weight.apply(&motion.turn_along(direction)),
             Self::FromAnchor(weight, reach) => {
-                weight.apply(&motion.from_anchor_along(direction, reach))
+                weight.apply(&motion.anchor_reach_along(direction, reach))
             }
         }
     }

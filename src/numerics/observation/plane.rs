@@ -52,7 +52,7 @@ impl PlaneKind {
         let Shape::Plane(normal) = at.placed.anchor_shape(anchor)? else {
             return None;
         };
-        Some((at.placed.from_anchor(anchor)?, normal))
+        Some((at.placed.anchor_reach(anchor)?, normal))
     }
 }
 

@@ -84,7 +84,7 @@ impl MeasurementKind for SocketKind {
             .anchor_shape(reading.anchor)
             .filter(|shape| *shape == Shape::Point)?;
         Some((
-            -placed.from_anchor(reading.anchor)?,
+            -placed.anchor_reach(reading.anchor)?,
             reading.sigma * reading.sigma,
         ))
     }

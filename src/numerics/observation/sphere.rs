@@ -45,7 +45,7 @@ impl SphereKind {
             return None;
         };
         at.placed
-            .from_anchor(anchor)
+            .anchor_reach(anchor)
             .filter(|reach| reach.norm() > 0.0)
             .map(|reach| (reach, radius))
     }
