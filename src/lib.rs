@@ -12,7 +12,7 @@
 //! |---|---|---|
 //! | [`error`], [`units`], [`statistics`] | errors by reader, units of stored columns, quantiles; all may use them | - |
 //! | [`description`] | the robot as plain data | - |
-//! | [`shell`] | words for a shell, in scripts and in what one is told to type | - |
+//! | `shell` | words for a shell, in scripts and in what one is told to type | - |
 //! | [`raw`] | the files of others: regular ones alone, decoded without a panic; tables of any kind (text, workbook, Parquet, Feather, arrays, bags of ROS 2) as records of cells, numbers in cells | - |
 //! | [`yaml`] | YAML as a tree with places, and trees as typed values with every fault | - |
 //! | [`criteria`] | numbers by which something is decided: meaning, unit, source | - |
@@ -28,22 +28,22 @@
 //! | [`dynamics`] | torques of the moving arm, and which physics a rigid one lacks | criteria, diagnose, effect, estimate, spatial |
 //! | [`twin`] | the truth maker: recordings by other kinematics than the estimator's | the robot's description only |
 //! | [`store`] | schemas, checked frames, content-addressed objects, runs; knows no robot | raw |
-//! | [`diff`] | two tables or two runs compared | raw, store |
+//! | `diff` | two tables or two runs compared | raw, store |
 //! | [`table`] | Rust values <-> checked columns; rows are made of the schema files | store, the numerics |
 //! | [`report`] | tables -> HTML; computes nothing that is not a column | table |
 //! | [`stage`] | one file per step of a pipeline | compensate, program, raw, report, table, numerics, twin, yaml |
 //! | [`pipeline`] | the YAML, the plan, the run | raw, stage, store, yaml |
 //! | [`identified`] | the identified model of a run, or of tables, as it is compensated and exported | compensate, pipeline, raw, stage, store, targets, table, numerics |
-//! | [`export`] | the identified model for other programs, one file per format | compensate, criteria, dynamics, effect, estimate, identified, raw, robot, spatial, table, yaml |
-//! | [`init`] | what a folder of files is, and the pipeline that reads it | program, raw, robot, stage, yaml |
+//! | `export` | the identified model for other programs, one file per format | compensate, criteria, dynamics, effect, estimate, identified, raw, robot, spatial, table, yaml |
+//! | `init` | what a folder of files is, and the pipeline that reads it | program, raw, robot, stage, yaml |
 //! | [`excitation`] | which motion to record for torques, for a robot file | identified, numerics, stage |
 //! | [`fleet`] | many robots: roster, records, workers, cluster, causes, tables | criteria, effect, estimate, pipeline, raw, report, shell, stage, store, table, yaml |
 //! | [`audit`] | runs told, explained, compared, asked, traced, swept | diff, pipeline, raw, shell, stage, store |
-//! | [`proof`] | sets of concealed recordings, their seal, diagnoses held against the truth | estimate, raw, robot, table, twin |
+//! | `proof` | sets of concealed recordings, their seal, diagnoses held against the truth | estimate, raw, robot, table, twin |
 //! | [`poses`] | which poses to measure, for a robot file or for a finding of a run | audit, identified, numerics, pipeline, raw, store, table |
 //! | [`summary`] | what runs, tables and diagnoses say, as text and as JSON | audit, diagnose, diff, effect, pipeline, report, shell, stage, store, table |
 //! | [`api`] | calib from arrays: a robot and a recording, and what the stages make of them in memory | audit, compensate, identified, pipeline, poses, raw, stage, store, summary, table, numerics |
-//! | [`cli`], [`progress`] | the only places that print, and the only ones that know a terminal | all |
+//! | [`cli`], `progress` | the only places that print, and the only ones that know a terminal | all |
 //!
 //! # A measurement, from file to report
 //! 1. `cell7/tracker.csv`, line 17: `P0014; 1834,112; -402,871; 1290,455`. [`stage::ingest`] reads it by the columns that the YAML names
@@ -81,10 +81,10 @@
 //! | number that decides | a row of `src/numerics/criteria/<class>.rs` | the code that says `*NAME` |
 //! | stage | `src/stage/<name>.rs`, declared with its ports by `stage!` | one line in [`stage::STAGES`] |
 //! | table | `schemas/<kind>.json`, of which its rows are made; `src/table/<kind>.rs` for what fills them | one line in [`table::TABLES`] |
-//! | export format | `src/export/<name>.rs`, which declares an [`export::Format`] | its `mod`, and one line in [`export::FORMATS`] |
+//! | export format | `src/export/<name>.rs`, which declares an `export::Format` | its `mod`, and one line in `export::FORMATS` |
 //! | figure of a page | - | the template in `src/report`: it has the rows of tables with all their columns, and the filters `mm`, `count`, `fixed`, `significant` |
 //! | line of `calib show`, `explain`, `diagnose --details` | - | the template in `src/summary/text` |
-//! | figure of `--json` | - | the columns that [`table::picked`] is asked for where the document is made |
+//! | figure of `--json` | - | the columns that `table::picked` is asked for where the document is made |
 //! | pipeline | `pipelines/<name>/pipeline.yaml` | - |
 //!
 //! An effect step by step, with a row of the table that a test compiles and fits: `src/numerics/effect/README.md`.

@@ -1,7 +1,7 @@
 //! Many robots through one pipeline: FLEET.yaml -> roster -> one record a robot in the store -> tables and a page.
 //!
-//! A robot is done when its record is in the store, whoever computed it: threads of this process ([`local`]) or tasks of a
-//! cluster ([`cluster`]). Names of robots are data: they become hashes in paths and never reach a shell.
+//! A robot is done when its record is in the store, whoever computed it: threads of this process (`local`) or tasks of a
+//! cluster (`cluster`). Names of robots are data: they become hashes in paths and never reach a shell.
 
 mod cause_answers;
 mod cause_sums;

@@ -29,7 +29,7 @@ pub trait Placed: Send + Sync {
     fn numbers(&self, robot: &RobotModel) -> Vec<NumberSpec>;
     /// See [`Effect::deflect`].
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection);
-    /// Its place and shape as JSON, as [`OwnMotion::read`](super::OwnMotion::read) reads it: what tells it from others of its cause.
+    /// Its place and shape as JSON, as `OwnMotion::read` reads it: what tells it from others of its cause.
     fn body(&self) -> serde_json::Value;
     /// See [`Effect::needs_torque`].
     fn needs_torque(&self) -> bool {

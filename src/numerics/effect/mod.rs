@@ -211,7 +211,7 @@ pub trait Effect: Send + Sync {
     fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec>;
     /// Adds the motions that parameters `p` (SI) cause in this state, with their partials.
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection);
-    /// True if the effect reads [`ArmState::posture`].
+    /// True if the effect reads `ArmState::posture`.
     fn needs_torque(&self) -> bool {
         false
     }
@@ -219,7 +219,7 @@ pub trait Effect: Send + Sync {
     fn needs_current(&self) -> bool {
         false
     }
-    /// True if the effect reads [`ArmState::sight`]; such a one reads no posture.
+    /// True if the effect reads `ArmState::sight`; such a one reads no posture.
     fn needs_sight(&self) -> bool {
         false
     }

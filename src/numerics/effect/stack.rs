@@ -246,7 +246,7 @@ impl EffectStack {
         self.place(robot, data, row, x, scratch).point
     }
 
-    /// The measured point, and its derivative by every parameter through `emit(parameter, derivative)`, as [`PlacedRow::partials`].
+    /// The measured point, and its derivative by every parameter through `emit(parameter, derivative)`, as `PlacedRow::partials`.
     pub fn derivatives(
         &self,
         robot: &RobotModel,

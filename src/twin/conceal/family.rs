@@ -338,7 +338,7 @@ pub const BEYOND: &[Family] = &[
 /// What a set of recordings is drawn from.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Collection {
-    /// [`FAMILIES`] on the robots of [`KINDS`].
+    /// [`FAMILIES`] on the robots of `KINDS`.
     #[default]
     Library,
     /// [`BEYOND`], one plain cause a recording, on an arm of five joints, too.

@@ -1,7 +1,7 @@
 //! Concealed recordings: a seed draws a robot, its errors and what physics is hidden in it; the truth is sealed apart.
 //!
-//! `design` says what is drawn, [`family`] which effects there are and in which forms, `points` what is measured, [`visible`] how much
-//! of an effect is left when geometry has absorbed what it can, [`size`] how large it is made, [`case`] makes one recording of it and
+//! `design` says what is drawn, [`family`] which effects there are and in which forms, `points` what is measured, `visible` how much
+//! of an effect is left when geometry has absorbed what it can, `size` how large it is made, [`case`] makes one recording of it and
 //! `folder` writes it down.
 //! Adding a family: a function in `family/` and a line in [`family::FAMILIES`], or in [`family::BEYOND`] for what no library
 //! of effects holds yet.

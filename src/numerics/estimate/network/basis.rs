@@ -1,6 +1,6 @@
 //! Terms of a linear correction: a way in which the point moves, times waves of the joints.
 //!
-//! Two dictionaries: [`harmonics`] moves the point along the tracker's axes (ridge on harmonics), [`curves`] turns each joint by a
+//! Two dictionaries: `harmonics` moves the point along the tracker's axes (ridge on harmonics), `curves` turns each joint by a
 //! smooth curve of its own angle, tilts and shifts the stations between, and winds joints up by the weight of what they carry.
 
 use super::arm::{ScrewArm, Stance};

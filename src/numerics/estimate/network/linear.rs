@@ -34,7 +34,7 @@ pub struct Linear {
     pub arm: Option<ScrewArm>,
     /// What is summed.
     pub terms: Vec<BasisTerm>,
-    /// The most likely coefficients, then [`DRAWS`] draws from the posterior.
+    /// The most likely coefficients, then `DRAWS` draws from the posterior.
     pub members: Vec<Vec<f64>>,
     /// What is left per axis, m.
     pub noise: f64,
