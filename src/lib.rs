@@ -12,7 +12,7 @@
 //! |---|---|---|
 //! | [`error`], [`units`], [`statistics`] | errors by reader, units of stored columns, quantiles; all may use them | - |
 //! | [`description`] | the robot as plain data | - |
-//! | `shell` | words for a shell, in scripts and in what one is told to type | - |
+//! | `shell` | words for a shell, in scripts and in commands that are proposed | - |
 //! | [`raw`] | the files of others: regular ones alone, decoded without a panic; tables of any kind (text, workbook, Parquet, Feather, arrays, bags of ROS 2) as records of cells, numbers in cells | - |
 //! | [`yaml`] | YAML as a tree with places, and trees as typed values with every fault | - |
 //! | [`criteria`] | numbers by which something is decided: meaning, unit, source | - |

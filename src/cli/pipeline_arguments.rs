@@ -1,6 +1,6 @@
 //! What every verb that runs a pipeline takes, and how it fails under `--json`.
 //!
-//! What every verb that runs a pipeline, or takes its result, may be told: overrides, the store, worker threads.
+//! Options of every verb that runs a pipeline or takes its result: overrides, the store, worker threads.
 //!
 //! The identified model that a verb works with: from a pipeline, a run in the store, or a table of parameters.
 

@@ -241,7 +241,7 @@ fn document(
     }))
 }
 
-/// Check whether a pipeline can run: what is left to fill in, what to look at, and every fault with its line.
+/// Check whether a pipeline can run: what is still to be filled in, what to look at, and every fault with its line.
 ///
 /// The robot file is read, and the headers of the data files: columns that are mapped and not there are named. Exit code 2 for faults of
 /// the YAML or of the robot file, 10 for those of the data files alone. Lines that `calib init` marked REPLACE (put your value there) or

@@ -2,7 +2,7 @@
 //!
 //! A panic is a bug in calib: one line that says where, and exit code 70.
 //!
-//! Panics that somebody catches, as of a decoder at a damaged file, are told by whoever catches them, and by nobody else.
+//! Panics that somebody catches, as of a decoder at a damaged file, are reported by whoever catches them, and by nobody else.
 
 use crate::error::{Error, Result};
 use crate::pipeline::{Host, Surroundings, Tool};
@@ -166,7 +166,7 @@ fn cache() -> PathBuf {
 /// The last panic of any thread: what it said, and where.
 static LAST: Mutex<String> = Mutex::new(String::new());
 
-/// Runs a verb; its panic becomes a bug, told on stderr.
+/// Runs a verb; its panic becomes a bug, reported on stderr.
 pub(super) fn guarded(verb: impl FnOnce() -> u8) -> u8 {
     std::panic::set_hook(Box::new(keep));
     caught(verb).unwrap_or_else(|bug| super::complain(&bug))

@@ -171,7 +171,7 @@ pub(super) fn of(stage: &TablesByKind, learned: Option<&TablesByKind>) -> Result
         corrections.as_ref().and_then(Corrections::rms_mm),
         &prediction,
     ) {
-        // The errors of a correction's folds hold the noise, the parameters' uncertainty and what is left.
+        // The errors of a correction's folds hold the noise, the parameters' uncertainty and the remaining error.
         let left = rms.powi(2) - prediction.mean_square_noise_mm2();
         unexplained = unexplained.min((left / 3.0).max(0.0).sqrt());
     }
@@ -181,7 +181,7 @@ pub(super) fn of(stage: &TablesByKind, learned: Option<&TablesByKind>) -> Result
     })
 }
 
-/// Reads a robot file by its ending: `.json` is the practice layout, all else calib's YAML, beside which a URDF may stand.
+/// Reads a robot file by its ending: `.json` is the practice layout, all else calib's YAML, which may name a URDF.
 pub fn robot_file(path: &Path, urdf: Option<&Path>) -> Result<RobotDescription> {
     let read = |path: &Path| {
         let label = path.display().to_string();

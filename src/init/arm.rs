@@ -151,7 +151,7 @@ fn read(path: &Path) -> Result<(String, String)> {
 }
 
 /// What a recording of torques is read of, besides torques, currents and velocities.
-const BESIDE: [&str; 4] = ["time", "q", "usage", "temperature"];
+const WITH_TORQUES: [&str; 4] = ["time", "q", "usage", "temperature"];
 const OF_MOTORS: &str =
     "is it the torque at the joint? if at the motor: `torque_side: motor` next to `files`";
 const EFFORT: &str = "drivers of ROS state torques or motor currents as effort";
@@ -215,7 +215,7 @@ impl ExaminedFile {
 
     fn drives(&mut self) {
         self.mappings
-            .retain(|mapping| BESIDE.contains(&mapping.quantity));
+            .retain(|mapping| WITH_TORQUES.contains(&mapping.quantity));
         let [torques, currents, velocities] =
             [TORQUES, CURRENTS, VELOCITIES].map(|listed| self.by_joint(listed));
         let degrees = self

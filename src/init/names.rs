@@ -271,7 +271,7 @@ pub(super) const NAMED_JOINTS: [&[&str]; 3] = [
     ],
 ];
 
-/// What joint torques, motor currents and joint velocities are called beside the number or name of a joint.
+/// What joint torques, motor currents and joint velocities are called, apart from the number or name of a joint.
 pub(super) const TORQUES: &str = "tau torque torques trq effort efforts moment moments drehmoment drehmomente couple coppia momento \
     momente";
 pub(super) const CURRENTS: &str =
@@ -290,7 +290,7 @@ pub(super) const NO_JOINTS: &str = "dir temp motor load err error sigma std acc 
 pub(super) const QUATERNIONS: [&str; 6] =
     ["q", "q_", "quat_", "quaternion_", "rot_", "orientation_"];
 
-/// What stands beside the name of an axis where several points are in one table.
+/// What stands next to the name of an axis where several points are in one table.
 pub(super) const MEASURED: &str = "ist actual act meas measured measurement mess gemessen real tracker laser lt mes mesure mesuré \
     mesurée medido medida misurato";
 pub(super) const WANTED: &str = "soll nom nominal cmd command commanded target wanted ref reference programmed goal desired setpoint \

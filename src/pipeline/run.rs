@@ -318,7 +318,7 @@ pub(super) struct ExecutionSite<'a> {
     pub(crate) run: &'a str,
 }
 
-/// Runs the body of a stage; what it told the person goes into `account`. A panic is a bug with the stage's name.
+/// Runs the body of a stage; its messages go into `account`. A panic is a bug with the stage's name.
 pub(super) fn products(
     state: &RunState,
     index: usize,

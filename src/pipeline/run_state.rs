@@ -203,7 +203,7 @@ pub(super) struct ActionLock {
 }
 
 impl ActionLock {
-    /// Takes the lock of an action, waiting for whoever has it; `waiting` is told once.
+    /// Takes the lock of an action, waiting for whoever has it; `waiting` is called once.
     pub(crate) fn take(store: &Store, action: &ActionId, waiting: &mut dyn FnMut()) -> Self {
         let folder = store.root().join("locks");
         let path = folder.join(format!("{action}.lock"));

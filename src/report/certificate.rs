@@ -1,6 +1,6 @@
 //! The first page: what was calibrated with what, how accurate it is, whether that is accepted, under which conditions, and what was not seen.
 //!
-//! The verdict against the user's limits: figures of the held-out points of the model that stands, each beside what it may be.
+//! The verdict against the user's limits: figures of the held-out points of the model that stands, each next to its limit.
 
 use super::Tables;
 use super::errors::{Steps, before};

@@ -317,11 +317,11 @@ const OFF: f64 = 1e-6;
 const STEP_FEWEST: usize = 10;
 /// A residual smaller than this share of what rounding would leave says that the numbers are exact: commanded so, and not rounded.
 const EXACT: f64 = 0.6;
-/// Beside a residual or a noise this many times larger, rounding is not what matters.
+/// Where residual or noise is this many times larger, rounding does not matter.
 const DROWNED: f64 = 4.0;
 /// What rounding by a step makes, as a standard deviation in steps: that of a uniform distribution.
 const UNIFORM: f64 = 0.288_675;
-/// By what rounded_joints are turned to see how far the point goes, rad or m.
+/// Step of a joint by which the motion of the point is taken, rad or m.
 const TURN: f64 = 1e-4;
 
 /// What rounding does to points, m.

@@ -178,7 +178,7 @@ impl Transfer {
                 "{words}: what was identified besides the geometry makes these points worse, though not those that placed the base, by which it was chosen"
             )),
             (false, true) => {
-                context.warn(format!("{words}: in unvisited cells what was identified besides the geometry makes it worse"))
+                context.warn(format!("{words}: in unvisited cells what was identified in addition to the geometry makes it worse"))
             }
             (false, false) => context.note(words),
         }

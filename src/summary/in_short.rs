@@ -347,7 +347,7 @@ fn folds(rows: &[StatisticsRow]) -> String {
     )
 }
 
-/// Our figures beside those that the pipeline names; nothing where it names none.
+/// Our figures next to those that the pipeline names; nothing where it names none.
 fn references(rows: &[StatisticsRow]) -> String {
     let pair = |ours: f64, theirs| format!("{ours:>7.4} | {:>7}", figure(theirs, ""));
     let cells = rows.iter().filter_map(|row| {

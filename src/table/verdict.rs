@@ -1,6 +1,6 @@
 //! The verdict of a diagnosis, with errors before and after.
 //!
-//! What a diagnosis says beside its verdict.
+//! What a diagnosis says in addition to its verdict.
 
 use super::{Findings, Verdict, VerdictRow, VerdictSentenceRow, VerdictSentences};
 use crate::diagnose::{Diagnosis, ErrorLengths, VerdictKind};

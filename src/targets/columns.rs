@@ -240,7 +240,7 @@ fn role(name: &str, robot: &RobotDescription, units: Units) -> Result<Option<Col
     })
 }
 
-/// The numbers of one row, by what they mean.
+/// The numbers of one row, by their meaning.
 #[derive(Default)]
 pub(super) struct TargetRow {
     target: CommandTarget,

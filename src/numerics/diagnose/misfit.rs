@@ -175,7 +175,7 @@ impl Misfit {
             instrument: (data.noise_basis != NoiseBasis::Inferred).then_some(self.instrument),
             left: self.leftover_rms,
             in_motion: data.in_motion(&self.rows),
-            brought: only_contacts(data, &self.rows),
+            contacts_only: only_contacts(data, &self.rows),
         }
     }
 }

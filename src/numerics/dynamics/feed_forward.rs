@@ -196,7 +196,7 @@ impl TorqueModel {
 
 impl TorqueModel {
     /// Nm, 95 %, row-major (rows x n); `None` where the model carries no covariance. The variance of a torque is that of its numbers, each
-    /// by what it adds (of a shape number to first order), what held-out rows leave beyond it, and the square of what each law adds times how far beyond its range it is used, as a
+    /// through its terms (of a shape number to first order), what held-out rows leave beyond it, and the square of what each law adds times how far beyond its range it is used, as a
     /// share of that range.
     pub(super) fn uncertainty(
         &self,

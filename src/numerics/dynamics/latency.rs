@@ -109,7 +109,7 @@ const MOVED_GAIN: f64 = 30.0;
 /// The same of one joint, to agree.
 const JOINT_LEAD_GAIN: f64 = 10.0;
 
-/// What is left, by which lead and by what change of the latency, s.
+/// Residual, lead, and change of the latency, s.
 type Best = (f64, f64, f64);
 
 /// Looks in finer steps about the best lead.

@@ -16,7 +16,7 @@ use crate::robot::Measurements;
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Steps towards joints that close; each squares what is left of the error.
+/// Steps towards joints that close; each squares the remaining error.
 const STEPS: usize = 12;
 /// m; nothing is left.
 const CLOSED: f64 = 1e-14;

@@ -197,7 +197,7 @@ pub(crate) fn placed_row_error(data: &Measurements, row: usize, placed: &PlacedR
 }
 
 impl Model {
-    /// What is left of every row, where some row measured other than a whole point; empty where all measured just that.
+    /// The residual of every row, where some row measured other than a whole point; empty where all measured just that.
     pub fn row_errors(&self, data: &Measurements) -> Vec<RowError> {
         let plain = data.readings.is_empty() && (0..data.rows()).all(|row| data.has_point(row));
         let rows = if plain { 0 } else { data.rows() };

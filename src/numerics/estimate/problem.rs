@@ -221,7 +221,7 @@ pub(crate) struct ObservationTerm {
 }
 
 impl ObservationTerm {
-    /// With `excess` beside the measurement's own noise. `None` where the row measured none.
+    /// With `excess` in addition to the measurement's noise. `None` where the row measured none.
     pub fn of(
         kind: &'static dyn MeasurementKind,
         data: &Measurements,
@@ -278,7 +278,7 @@ pub(crate) fn huber(error: f64, axes: usize) -> f64 {
     }
 }
 
-/// By what a squared error of so many axes is to be multiplied to have the median of three.
+/// Factor by which a squared error of so many axes has the median of three.
 pub(crate) fn as_of_three(axes: usize) -> f64 {
     MEDIAN_CHI2[3] / MEDIAN_CHI2[axes]
 }

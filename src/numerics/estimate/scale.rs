@@ -133,7 +133,7 @@ pub fn scale(
     })
 }
 
-/// How many errors of earlier links a shift of a link stands for besides its own: a link's error along the axis of its joint is none of its
+/// How many errors of earlier links a shift of a link stands for in addition to its link: a link's error along the axis of its joint is none of its
 /// parameters, since a shift of the next link that is not along its own joint's axis does the same.
 fn carried(robot: &RobotModel, name: &str) -> usize {
     let parts = name

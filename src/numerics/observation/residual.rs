@@ -103,7 +103,7 @@ impl Weight {
         Self::Uniform(1.0 / sigma)
     }
 
-    /// The weight of a row's point with `excess` (m per axis) beside its own noise.
+    /// The weight of a row's point with `excess` (m per axis) in addition to its noise.
     pub fn of(data: &Measurements, row: usize, excess: f64) -> Self {
         let variance = data.points.sigma[row].map(|sigma| sigma * sigma + excess * excess);
         let measured = |axis: usize| data.points.has(row, axis);

@@ -143,7 +143,7 @@ impl Comparison {
 /// Cells of a joint's travel between its least and greatest position.
 const CELLS: f64 = 8.0;
 
-/// Cells of pairs of joints that rows lie in; a pose is visited where each of its pairs of joints lies in one of them or beside it.
+/// Cells of pairs of joints that rows lie in; a pose is visited where each of its pairs of joints lies in one of them or next to one.
 pub(super) struct VisitedCells {
     /// Least position and width of a cell of each joint, rad or m.
     grid: Vec<[f64; 2]>,

@@ -84,7 +84,7 @@ impl Rounds {
         };
         let mut frame = SearchRows::of(view, now, fitter, noise);
         let question = fitter.question;
-        let brought = only_contacts(&fitter.data, question.fit);
+        let contacts_only = only_contacts(&fitter.data, question.fit);
         let keeps = |cell: &cell::CauseCell| is_kept(cell, view, &survey, fitter);
         let all_pairs = if self.pairs.is_none() {
             generated::pairs(&survey, &mut frame)
@@ -140,7 +140,7 @@ impl Rounds {
         if is_last && !(is_open && self.pairs.is_some()) {
             let all: Vec<&Component> = components.iter().collect();
             let state = table.state(&all, None);
-            let unexplained = state.kappa > *UNEXPLAINED && !brought;
+            let unexplained = state.kappa > *UNEXPLAINED && !contacts_only;
             if !is_open {
                 self.is_open = unexplained;
                 is_last = !unexplained;

@@ -29,7 +29,7 @@ pub(crate) struct Ground {
     /// Whether the arm moved while it was measured: no pose can be measured twice.
     pub(crate) in_motion: bool,
     /// Whether nothing was read but joints with the target brought to places: what is stated is how well that closes.
-    pub(crate) brought: bool,
+    pub(crate) contacts_only: bool,
 }
 
 impl Ground {
@@ -41,7 +41,7 @@ impl Ground {
                 counted(self.repeats, "repeat"),
                 self.small(self.noise)
             ),
-            NoiseBasis::Instrument if self.brought => format!(
+            NoiseBasis::Instrument if self.contacts_only => format!(
                 "the stated repeatability of closing, {}",
                 self.small(self.noise)
             ),
@@ -94,7 +94,7 @@ impl Ground {
     fn at_random(&self) -> String {
         let scatter = self.small(self.scatter());
         match self.instrument {
-            Some(closing) if self.brought => {
+            Some(closing) if self.contacts_only => {
                 format!(
                     "{scatter} scatter at random, of which the stated repeatability of closing explains {}",
                     self.number(closing)
@@ -137,7 +137,7 @@ impl Ground {
 
     fn advice(&self) -> &'static str {
         match (self.instrument.is_some(), self.in_motion) {
-            (true, _) if self.brought => "close ten postures twice",
+            (true, _) if self.contacts_only => "close ten postures twice",
             (true, false) => "measure ten poses twice",
             (true, true) => "measure ten poses twice with the arm at rest",
             (false, false) => "state `instrument` in `ingest`, and measure ten poses twice",
@@ -193,14 +193,14 @@ mod tests {
             nameless: false,
             partly_nameless: false,
             in_motion: false,
-            brought: false,
+            contacts_only: false,
         }
     }
 
     #[test]
     fn where_joints_alone_were_recorded_the_noise_is_how_well_it_closes() {
         let ground = Ground {
-            brought: true,
+            contacts_only: true,
             ..ground(NoiseBasis::Instrument, Some(17e-6))
         };
         assert_eq!(

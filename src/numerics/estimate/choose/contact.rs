@@ -375,7 +375,7 @@ fn offsets(robot: &RobotModel, request: &ContactRequest, poses: &Measurements) -
 fn geometry(model: &Model, data: &Measurements, count: usize) -> Vec<f64> {
     let specs = model.stack.specs();
     let is_geometry = |name: &str| GEOMETRY.iter().any(|begins| name.starts_with(begins));
-    // Sockets come first: what is left of the others is given them.
+    // Sockets come first: the others share the remaining places.
     let last: Vec<usize> = (0..specs.len())
         .filter(|k| is_geometry(&specs[*k].name))
         .collect();

@@ -276,7 +276,7 @@ fn is_event(data: &Measurements, run: &[usize], standings: &[LeaveOneOut]) -> bo
     stops >= *LONG_RUN || stops >= *RUN && most <= *ALIKE * least
 }
 
-/// Whether more than the model speaks against a row that is `off` by so much, m.
+/// Whether a row that is `off` by so much (m) is improbable even with the model's uncertainty.
 pub(super) fn is_wrong(data: &Measurements, row: usize, off: f64) -> bool {
     if off > *IMPOSSIBLE {
         return true;
