@@ -1,9 +1,8 @@
 //! Torques by the evidence of the table of causes: a cell is a cause at a place in every shape that it may have; what was accepted stands in the
 //! covariance with its amplitude, and every other cell is compared given these.
 
-use super::cause::{TORQUE_CONSTANT, TorqueForm, UNKNOWN};
+use super::cause::{TorqueForm, UNKNOWN};
 use super::choice::CauseChoice;
-use super::naming::JudgedSet;
 use crate::criteria::cells::{COMMON, NU, SWAPS};
 use crate::criteria::torque::{
     APART, COMPONENTS, EXCHANGES, LEAST_NOISE, PER_METRE, UNFOLDED, USUAL,
@@ -35,9 +34,9 @@ pub(super) struct TorqueComponent {
 
 /// The posterior of a cell given others.
 #[derive(Debug, Clone, Copy)]
-struct CellPosterior {
+pub(super) struct CellPosterior {
     /// ln of its posterior odds.
-    log_odds: f64,
+    pub(super) log_odds: f64,
     best: TorqueComponent,
 }
 
@@ -48,10 +47,10 @@ type FormProducts = (DMatrix<f64>, DVector<f64>);
 type FormKind = fn(&TorqueForm) -> bool;
 
 /// Components in the covariance.
-struct TorqueState {
+pub(super) struct TorqueState {
     known: KnownState,
     /// Their columns and the roots of their prior variances.
-    columns: Vec<(usize, f64)>,
+    pub(super) columns: Vec<(usize, f64)>,
     set: Vec<usize>,
 }
 
@@ -65,7 +64,7 @@ pub(super) struct TorqueTable<'a, 'b> {
     /// Coefficient of each column at unit amplitude.
     unit: Vec<f64>,
     /// Forms that do not leave.
-    kept: Vec<usize>,
+    pub(super) kept: Vec<usize>,
     /// What the base leaves of the products of components' columns with all others.
     left: RefCell<BTreeMap<usize, Rc<Vec<f64>>>>,
 }
@@ -192,7 +191,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
     }
 
     /// Components in the covariance, with the noise that fits them or a stated one.
-    fn state(&self, components: &[TorqueComponent], kappa: Option<f64>) -> TorqueState {
+    pub(super) fn state(&self, components: &[TorqueComponent], kappa: Option<f64>) -> TorqueState {
         let all = &self.choice.problem.all;
         let own = |own: &TorqueComponent| {
             let columns = all.of(own.form);
@@ -311,7 +310,12 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
     }
 
     /// ln of the odds of a component given the others.
-    fn odds_of(&self, components: &[TorqueComponent], place: usize, kappa: f64) -> CellPosterior {
+    pub(super) fn odds_of(
+        &self,
+        components: &[TorqueComponent],
+        place: usize,
+        kappa: f64,
+    ) -> CellPosterior {
         let state = self.state(&without(components, place), Some(kappa));
         let own = components[place];
         let cell = self.cell_of[&own.form];
@@ -352,7 +356,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
     }
 
     /// ln of the posterior of a set of components, up to a constant.
-    fn total(&self, components: &[TorqueComponent]) -> f64 {
+    pub(super) fn total(&self, components: &[TorqueComponent]) -> f64 {
         let state = self.state(components, Some(1.0)).known;
         let mut log = -state.log_determinant();
         for own in components {
@@ -471,7 +475,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
     }
 
     /// Components of given forms.
-    pub(crate) fn components(&self, set: &[usize]) -> Vec<TorqueComponent> {
+    pub(super) fn components(&self, set: &[usize]) -> Vec<TorqueComponent> {
         self.backfit(
             set.iter()
                 .map(|form| TorqueComponent {
@@ -483,7 +487,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
     }
 
     /// The best components that steps from a start lead to.
-    fn searched(&mut self, start: &[usize]) -> Vec<TorqueComponent> {
+    pub(super) fn searched(&mut self, start: &[usize]) -> Vec<TorqueComponent> {
         let components = self.add(self.components(start));
         let components = self.settled(components);
         let components = self.add(components);
@@ -491,7 +495,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
     }
 
     /// Exchanges, merges and removals.
-    fn settled(&mut self, components: Vec<TorqueComponent>) -> Vec<TorqueComponent> {
+    pub(super) fn settled(&mut self, components: Vec<TorqueComponent>) -> Vec<TorqueComponent> {
         // What an arm cannot have is first exchanged for what it can have.
         let components = self.swap(components);
         let components = self.prune(components);
@@ -562,125 +566,8 @@ pub(super) struct CellOdds {
     pub(crate) rivals: Vec<((&'static str, Place), f64)>,
 }
 
-/// Wrong masses, drives and mountings that would stand in place of those of a set, together.
-pub(super) struct OtherInertials {
-    forms: Vec<usize>,
-    /// By how much ln of the posterior with them is less; not below 0.
-    worse: f64,
-}
-
-impl OtherInertials {
-    /// They share the odds that one of them would have as the rival of a finding.
-    pub(crate) fn rivals(
-        &self,
-        choice: &CauseChoice,
-        own: f64,
-    ) -> Vec<((&'static str, Place), f64)> {
-        let log = own - self.worse - (self.forms.len().max(1) as f64).ln();
-        self.forms
-            .iter()
-            .map(|form| {
-                (
-                    (choice.form(*form).cause.name, choice.form(*form).place),
-                    log,
-                )
-            })
-            .collect()
-    }
-}
-
-/// The best set from what hardly an arm is without, and what stands in place of its wrong masses or drives. One factor on the whole torque of
-/// each joint is asked before masses: where factors explain as much, it is these.
-pub(super) fn from_common(choice: &CauseChoice) -> (Vec<usize>, Option<OtherInertials>) {
-    let mut table = TorqueTable::new(choice);
-    let is_drive = |number: &usize| choice.form(*number).cause.name == TORQUE_CONSTANT;
-    let inertial = |set: &[TorqueComponent]| -> Vec<usize> {
-        forms(set)
-            .into_iter()
-            .filter(|number| choice.form(*number).cause.inertial)
-            .collect()
-    };
-    let masses = table.searched(&choice.common());
-    let drives: Vec<usize> = (0..choice.open)
-        .filter(|number| is_drive(number) && choice.form(*number).shape.is_empty())
-        .collect();
-    if drives.is_empty() || inertial(&masses).is_empty() {
-        return (forms(&masses), None);
-    }
-    let scaled = table.searched(
-        &choice
-            .common()
-            .into_iter()
-            .chain(drives)
-            .collect::<Vec<_>>(),
-    );
-    let worse = table.total(&masses) - table.total(&scaled);
-    let most = if inertial(&scaled).iter().all(is_drive) {
-        0.5 * *APART
-    } else {
-        0.0
-    };
-    let (chosen, other, worse) = if worse <= most {
-        (scaled, masses, -worse)
-    } else {
-        (masses, scaled, worse)
-    };
-    let chosen = forms(&chosen);
-    let others: Vec<usize> = inertial(&other)
-        .into_iter()
-        .filter(|number| !chosen.contains(number))
-        .collect();
-    let other = (!others.is_empty()).then_some(OtherInertials {
-        forms: others,
-        worse: worse.max(0.0),
-    });
-    (chosen, other)
-}
-
-/// The best set from a start.
-pub(super) fn search(choice: &CauseChoice, start: &[usize]) -> Vec<usize> {
-    forms(&TorqueTable::new(choice).searched(start))
-}
-
-/// What of a judged set would not be found under the present noise.
-pub(super) fn faint(choice: &CauseChoice, judged: &JudgedSet) -> Vec<usize> {
-    let mut table = TorqueTable::new(choice);
-    table.kept.clone_from(&judged.silent);
-    let components = table.components(&judged.set);
-    let clear = table.prune(components);
-    let kappa = table.noise(&clear);
-    // What others need stays in the set, but not for itself.
-    let pays = |place: &usize| table.odds_of(&clear, *place, kappa).log_odds > table.least();
-    let clear: Vec<usize> = (0..clear.len())
-        .filter(pays)
-        .map(|place| clear[place].form)
-        .collect();
-    let mut faint = judged.set.clone();
-    faint.retain(|number| !clear.contains(number) && !judged.silent.contains(number));
-    faint
-}
-
-/// A set after exchanges, merges and removals.
-pub(super) fn settle(choice: &CauseChoice, set: &[usize]) -> Vec<usize> {
-    settle_with_priors(choice, set).0
-}
-
-/// The same with 1 / variance beforehand of its columns, by the amplitudes that the rows show.
-pub(super) fn settle_with_priors(
-    choice: &CauseChoice,
-    set: &[usize],
-) -> (Vec<usize>, Vec<(usize, f64)>) {
-    let mut table = TorqueTable::new(choice);
-    let components = table.components(set);
-    let settled = table.settled(components);
-    let state = table.state(&settled, None);
-    let seen = state.columns.iter().filter(|(_, root)| *root > 0.0);
-    let priors = seen.map(|(column, root)| (*column, root.powi(-2)));
-    (forms(&settled), priors.collect())
-}
-
-fn forms(components: &[TorqueComponent]) -> Vec<usize> {
-    components.iter().map(|own| own.form).collect()
+pub(super) fn forms(components: &[TorqueComponent]) -> Vec<usize> {
+    components.iter().map(|component| component.form).collect()
 }
 
 fn without(components: &[TorqueComponent], place: usize) -> Vec<TorqueComponent> {

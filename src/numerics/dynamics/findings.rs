@@ -2,10 +2,11 @@
 
 use super::cause::TorqueParameter;
 use super::cause::{COULOMB, TorqueForm, VISCOUS};
-use super::cells::{CellOdds, OtherInertials, TorqueTable};
+use super::cells::{CellOdds, TorqueTable};
 use super::choice::CauseChoice;
 use super::naming::{JudgedSet, fitted};
 use super::problem::TorqueProblem;
+use super::sets::OtherInertials;
 use super::shape_slopes::ShapeSlopes;
 use super::sweep::SweptColumns;
 use super::types::{ContactEvent, TorqueFinding};

@@ -50,6 +50,7 @@ mod refine;
 mod resample;
 mod rich;
 mod scene;
+mod sets;
 mod shape_slopes;
 mod sign_width;
 mod solve;

@@ -2,7 +2,6 @@
 
 use super::arm::DynamicArm;
 use super::cause::TorqueForm;
-use super::cells::{OtherInertials, faint, from_common, search, settle, settle_with_priors};
 use super::choice::CauseChoice;
 use super::clock::RecordingClock;
 use super::contact::{ContactModel, contacts};
@@ -16,6 +15,7 @@ use super::recording::TorqueRecording;
 use super::refine::polish;
 use super::refine::{one_power_of_speed, power_for_curve, refine};
 use super::rich::{basic_forms, noise_apart, noise_left, noise_of_fit, rich_forms};
+use super::sets::{OtherInertials, faint, from_common, search, settle, settle_with_priors};
 use super::shape_slopes::ShapeSlopes;
 use super::sign_width::sign_width;
 use super::sweep::SweptColumns;

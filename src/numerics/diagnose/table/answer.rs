@@ -1,8 +1,9 @@
 //! What a search has found, as findings: which components make one up, how probable its name and its place are, what else it may be; and where
 //! the residual sits before and after.
 
+use super::cause_table::CauseTable;
 use super::evidence::log_sum;
-use super::scan::{CauseTable, CellScan};
+use super::scan::CellScan;
 use super::search::without;
 use super::state::{CellColumns, Component, KnownState};
 use crate::criteria::cells::{BENDS, MISLED, RIVAL};

@@ -1,9 +1,9 @@
 //! What every cell says of one robot given cells that its fleet has accepted: the numbers that a fleet sums.
 
+use super::cause_table::CauseTable;
 use super::cell::CauseCell;
 use super::evidence::log_sum;
 use super::frame::{NoiseShape, SearchRows, product, view as matrix};
-use super::scan::CauseTable;
 use super::search::without;
 use super::state::{CellColumns, Component, KnownState, SeenGroup, shape_keys};
 use super::{by_currents, estimated, is_kept};

@@ -5,6 +5,7 @@
 //! that were accepted sit in the covariance of the rows, and every other cell is asked given them.
 
 mod answer;
+mod cause_table;
 mod cell;
 mod evidence;
 mod forms;
@@ -31,9 +32,9 @@ use crate::criteria::cells::{IDLE, OPEN, ROUNDS, UNEXPLAINED};
 use crate::effect::{Basis, Form, Law, Motion, Place, Survey, names};
 use crate::estimate::Prior;
 use crate::observation::only_contacts;
+use cause_table::CauseTable;
 use cell::FreeShape;
 use frame::{NoiseShape, SearchRows};
-use scan::CauseTable;
 use state::Component;
 
 /// What rounds of searching around better and better models keep.

@@ -1,7 +1,8 @@
 //! The numbers of a shape (an order, a time, a direction) where the rows say most of it.
 
+use super::cause_table::CauseTable;
 use super::cell::{FreeShape, Over, ShapeGroup, Shapes, fields};
-use super::scan::{CauseTable, CellEvidence, CellScan, Refined};
+use super::scan::{CellEvidence, CellScan, Refined};
 use super::state::{Component, KnownState};
 use crate::criteria::cells::{BENDS, LEVELS, STICKS};
 use crate::effect::{Basis, Form, Variable};

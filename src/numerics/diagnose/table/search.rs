@@ -1,8 +1,8 @@
 //! The search for the cells that the rows show: forward, exchange, drop, each by the evidence of a cell given all others.
 
+use super::cause_table::CauseTable;
 use super::cell::{FreeShape, Over, Shapes};
 use super::evidence::AMPLITUDES;
-use super::scan::CauseTable;
 use super::state::{Component, KnownState};
 use crate::criteria::cells::{
     BENDS, CLOSELY, COMPONENTS, COUPLED, EXCHANGES, JOINS, LEAVES, LIKELY, NU, SECOND_ORDER, SWAPS,

@@ -1,0 +1,353 @@
+//! All cells of a recording with their columns, and the products of these with components of a model.
+
+use super::cell::{CauseCell, FreeShape, Over, Shapes};
+use super::frame::SearchRows;
+use super::state::{CellColumns, ColumnProducts, Component, KnownState, PartProducts};
+use super::{generated, listed};
+use crate::criteria::cells::{ALIKE, COMPONENTS, USUAL_MOST};
+use crate::diagnose::types::{KnownCell, Question};
+use crate::effect::{Place, Survey, Variable, cause, names};
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::OnceLock;
+
+/// The table of cells over the rows of a recording.
+pub(super) struct CauseTable<'f, 'a> {
+    pub(crate) frame: &'f SearchRows<'a>,
+    pub(crate) survey: &'f Survey<'f>,
+    pub(crate) cells: Vec<CauseCell>,
+    pub(crate) coarse: Vec<CellColumns>,
+    fine: Vec<OnceLock<CellColumns>>,
+    /// Products of the columns of each component with those of every coarse block.
+    products: BTreeMap<u64, DMatrix<f64>>,
+    pub(crate) parts: PartProducts,
+    known: ColumnProducts,
+    /// The first of all coarse columns of each cell, and their number.
+    pub(crate) first: Vec<usize>,
+    columns: usize,
+    pub(crate) next: u64,
+    /// Variables with numbers that components follow.
+    pub(crate) numbers: Vec<Variable>,
+    /// Cells that were likely at the last look.
+    pub(crate) likely: Vec<usize>,
+    /// Keys of cells that are in the model around which the rows are looked at.
+    pub(crate) from_before: Vec<String>,
+    /// Cells of effects that the user declares.
+    pub(crate) declared: Vec<usize>,
+    /// Motions and variables whose products with others are cells.
+    pub(crate) multiplied: Vec<FreeShape>,
+    /// What a joint that yields out of proportion to its load is called.
+    pub(crate) bent: &'static str,
+}
+
+impl<'f, 'a> CauseTable<'f, 'a> {
+    /// All cells of a recording.
+    pub fn new(
+        frame: &'f mut SearchRows<'a>,
+        survey: &'f Survey<'f>,
+        question: &Question,
+        (shown, pairs): (&[FreeShape], &[FreeShape]),
+        is_open: bool,
+        keeps: impl Fn(&CauseCell) -> bool,
+    ) -> Self {
+        let mut cells = generated::cells(survey, frame, question, is_open);
+        cells.extend(generated::products(shown, survey, frame));
+        let mut known: BTreeSet<String> = cells.iter().map(|cell| cell.key.clone()).collect();
+        cells.extend(
+            generated::pair_cells(pairs)
+                .into_iter()
+                .filter(|cell| known.insert(cell.key.clone())),
+        );
+        let values = |of: Variable| frame.values(of);
+        let mut named = listed::cells(survey, &values, question);
+        named.append(&mut cells);
+        named.retain(keeps);
+        for cell in &mut named {
+            let of = |known: &&KnownCell| known.cell == cell.key;
+            if let Some(known) = question.known.iter().find(of) {
+                // However usual a cause is, a recording has to show something of it.
+                let probability = known.probability.clamp(1e-6, *USUAL_MOST);
+                cell.log_prior = (probability / (1.0 - probability)).ln();
+                cell.between = Some(known.between);
+            }
+        }
+        let mut motions = Vec::new();
+        let mut variables = Vec::new();
+        for form in named
+            .iter()
+            .flat_map(|cell| cell.groups(survey, &values, false))
+            .flat_map(|group| group.forms)
+        {
+            let Some(term) = form.term() else { continue };
+            if !motions.contains(&term.motion()) {
+                motions.push(term.motion());
+            }
+            variables.extend(
+                term.law()
+                    .variables()
+                    .into_iter()
+                    .filter(|of| of.is_single() && !variables.contains(of))
+                    .collect::<Vec<_>>(),
+            );
+        }
+        frame.prepare(&motions, &variables);
+        let frame = &*frame;
+        let values = |of: Variable| frame.values(of);
+        let coarse: Vec<CellColumns> = named
+            .par_iter()
+            .map(|cell| {
+                let block = CellColumns::of(cell.groups(survey, &values, false), frame);
+                block.between(cell.between)
+            })
+            .collect();
+        let fine = named.iter().map(|_| OnceLock::new()).collect();
+        let mut columns = 0;
+        let mut first = Vec::with_capacity(coarse.len());
+        for block in &coarse {
+            first.push(columns);
+            columns += block.columns.values.ncols();
+        }
+        let products = BTreeMap::new();
+        let is_declared = |cell: &CauseCell| cell.is_named() && cause(cell.name).is_none();
+        let declared = (0..named.len())
+            .filter(|cell| is_declared(&named[*cell]))
+            .collect();
+        Self {
+            frame,
+            survey,
+            cells: named,
+            coarse,
+            fine,
+            products,
+            parts: PartProducts::default(),
+            known: ColumnProducts::default(),
+            first,
+            columns,
+            next: 0,
+            numbers: Vec::new(),
+            likely: Vec::new(),
+            declared,
+            from_before: Vec::new(),
+            multiplied: shown.to_vec(),
+            bent: if question
+                .without
+                .iter()
+                .any(|out| out == names::JOINT_HARDENING)
+            {
+                names::UNKNOWN
+            } else {
+                names::JOINT_HARDENING
+            },
+        }
+    }
+
+    /// The cell of a key.
+    pub(crate) fn cell(&self, key: &str) -> Option<usize> {
+        self.cells.iter().position(|cell| cell.key == key)
+    }
+
+    pub(super) fn fine(&self, cell: usize) -> &CellColumns {
+        if !self.cells[cell].is_coarse() {
+            return &self.coarse[cell];
+        }
+        self.fine[cell].get_or_init(|| {
+            let values = |of: Variable| self.frame.values(of);
+            CellColumns::of(
+                self.cells[cell].groups(self.survey, &values, true),
+                self.frame,
+            )
+            .between(self.cells[cell].between)
+        })
+    }
+
+    /// Computes once what scans need of some components.
+    pub(crate) fn know(&mut self, components: &[Component]) {
+        for component in components {
+            if !self.products.contains_key(&component.id) {
+                let with = |block: &CellColumns| {
+                    component.by_part(&self.known.of(&component.values, &block.columns.values))
+                };
+                let all: Vec<DMatrix<f64>> = self.coarse.par_iter().map(with).collect();
+                let values: Vec<f64> = all
+                    .iter()
+                    .flat_map(|products| products.iter().copied())
+                    .collect();
+                self.products.insert(
+                    component.id,
+                    DMatrix::from_vec(component.part.ncols(), self.columns, values),
+                );
+            }
+        }
+        let known: BTreeSet<u64> = components.iter().map(|component| component.id).collect();
+        if self.products.len() > 3 * *COMPONENTS {
+            self.products.retain(|id, _| known.contains(id));
+        }
+    }
+
+    /// L^-1 Z'X of all coarse columns given a state.
+    pub(crate) fn across(&self, state: &KnownState) -> DMatrix<f64> {
+        let all: Vec<usize> = (0..self.cells.len()).collect();
+        self.across_cells(&all, state).0
+    }
+
+    /// The same of some cells, with the first column of each.
+    pub(crate) fn across_cells(
+        &self,
+        cells: &[usize],
+        state: &KnownState,
+    ) -> (DMatrix<f64>, Vec<usize>) {
+        let parts: Vec<&DMatrix<f64>> = state
+            .components
+            .iter()
+            .map(|id| &self.products[id])
+            .collect();
+        let rows: usize = parts.iter().map(|part| part.nrows()).sum();
+        let mut first = Vec::with_capacity(cells.len());
+        let mut columns = Vec::new();
+        for cell in cells {
+            first.push(columns.len());
+            let count = self.coarse[*cell].columns.values.ncols();
+            columns.extend(self.first[*cell]..self.first[*cell] + count);
+        }
+        let solved: Vec<DMatrix<f64>> = columns
+            .par_chunks(512)
+            .map(|some| {
+                let mut values = Vec::with_capacity(rows * some.len());
+                for column in some {
+                    for part in &parts {
+                        let count = part.nrows();
+                        values.extend_from_slice(
+                            &part.as_slice()[column * count..(column + 1) * count],
+                        );
+                    }
+                }
+                state.solved(DMatrix::from_vec(rows, some.len(), values))
+            })
+            .collect();
+        let values = solved
+            .iter()
+            .flat_map(|part| part.iter().copied())
+            .collect();
+        (DMatrix::from_vec(rows, columns.len(), values), first)
+    }
+
+    /// Cells that do much of what a component does.
+    pub(crate) fn alike(&self, component: &Component, most: usize) -> Vec<usize> {
+        // Its likeliest motion, of unit length, in the directions of its part.
+        self.parts.know(&[component], self.frame);
+        let state = KnownState::of(&[component], &self.parts, self.frame, None);
+        let Some(weights) = state.weights() else {
+            return Vec::new();
+        };
+        let motion = &*component.part * &weights;
+        let length = motion.norm().max(f64::MIN_POSITIVE);
+        let Some(products) = self.products.get(&component.id) else {
+            return Vec::new();
+        };
+        let along: Vec<f64> = products
+            .tr_mul(&weights)
+            .iter()
+            .map(|value| value / length)
+            .collect();
+        let overlap = |cell: usize| {
+            let range =
+                self.first[cell]..self.first[cell] + self.coarse[cell].columns.values.ncols();
+            (self.coarse[cell].overlap(&along[range]), cell)
+        };
+        let mut all: Vec<(f64, usize)> = (0..self.cells.len())
+            .into_par_iter()
+            .map(overlap)
+            .filter(|(share, _)| *share > *ALIKE)
+            .collect();
+        all.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        all.into_iter().take(most).map(|(_, cell)| cell).collect()
+    }
+
+    /// Cells with a name at the place of a component, and of a curve those over its variable there or next to it: columns that are looked at
+    /// coarsely do not show how alike fine curves are.
+    pub(crate) fn near(&self, component: &Component) -> Vec<usize> {
+        let of = |cell: &CauseCell| match &cell.shapes {
+            Shapes::Free(FreeShape {
+                of,
+                over: Over::Curve { .. },
+                ..
+            }) => Some(*of),
+            Shapes::Free(_) => None,
+            Shapes::Listed(groups) => {
+                let form = groups.first().and_then(|group| group.forms.first());
+                form.and_then(|form| form.term())
+                    .filter(|term| term.law().times.is_none())
+                    .map(|term| term.law().first.of)
+            }
+        };
+        let joints = self.survey.joints();
+        let along = |place: Place| match place {
+            Place::Base => Some(0),
+            Place::Joint(joint) => Some(2 * joint + 1),
+            Place::Links(first, last) if first == last => Some(2 * first + 2),
+            Place::Tool => Some(2 * joints),
+            _ => None,
+        };
+        let cell = &self.cells[component.cell];
+        let free = matches!(cell.shapes, Shapes::Free(_));
+        let variable = of(cell).filter(|_| free);
+        let near = |other: &CauseCell| match (along(cell.place), along(other.place)) {
+            (Some(place), Some(at)) => {
+                variable.is_some() && of(other) == variable && place.abs_diff(at) <= 2
+            }
+            _ => false,
+        };
+        let named_here = |other: &CauseCell| other.is_named() && other.place == cell.place;
+        (0..self.cells.len())
+            .filter(|k| near(&self.cells[*k]) || named_here(&self.cells[*k]))
+            .collect()
+    }
+
+    /// Other motions over a variable with numbers that a component follows: coarsely asked they have other numbers.
+    pub(crate) fn over_the_same(&self, component: &Component) -> Vec<usize> {
+        let Shapes::Free(free) = &self.cells[component.cell].shapes else {
+            return Vec::new();
+        };
+        let is_curve = |over| matches!(over, Over::Curve { .. });
+        let same = |cell: &CauseCell| match &cell.shapes {
+            Shapes::Free(other) => is_curve(other.over) && other.of.is_alike(free.of),
+            Shapes::Listed(_) => false,
+        };
+        if !is_curve(free.over) || free.near(0).is_empty() {
+            return Vec::new();
+        }
+        (0..self.cells.len())
+            .filter(|cell| same(&self.cells[*cell]))
+            .collect()
+    }
+
+    /// The same of a block's columns, from the components that the state has.
+    pub(crate) fn across_block(
+        &self,
+        block: &CellColumns,
+        state: &KnownState,
+        components: &[&Component],
+    ) -> DMatrix<f64> {
+        let parts: Vec<DMatrix<f64>> = components
+            .iter()
+            .map(|component| {
+                component.by_part(&self.known.of(&component.values, &block.columns.values))
+            })
+            .collect();
+        let rows = parts.iter().map(DMatrix::nrows).sum();
+        let columns = block.columns.values.ncols();
+        let mut values = Vec::with_capacity(rows * columns);
+        for column in 0..columns {
+            for part in &parts {
+                values.extend(part.column(column).iter().copied());
+            }
+        }
+        state.solved(DMatrix::from_vec(rows, columns, values))
+    }
+
+    pub(crate) fn state(&self, components: &[&Component], kappa: Option<f64>) -> KnownState {
+        self.parts.know(components, self.frame);
+        KnownState::of(components, &self.parts, self.frame, kappa)
+    }
+}
