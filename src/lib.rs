@@ -38,7 +38,7 @@
 //! | `init` | what a folder of files is, and the pipeline that reads it | program, raw, robot, stage, yaml |
 //! | [`excitation`] | which motion to record for torques, for a robot file | identified, numerics, stage |
 //! | [`fleet`] | many robots: roster, records, workers, cluster, causes, tables | criteria, effect, estimate, pipeline, raw, report, shell, stage, store, table, yaml |
-//! | [`audit`] | runs told, explained, compared, asked, traced, swept | diff, pipeline, raw, shell, stage, store |
+//! | [`audit`] | runs shown, explained, compared, asked, traced, swept | diff, pipeline, raw, shell, stage, store |
 //! | `proof` | sets of concealed recordings, their seal, diagnoses held against the truth | estimate, raw, robot, table, twin |
 //! | [`poses`] | which poses to measure, for a robot file or for a finding of a run | audit, identified, numerics, pipeline, raw, store, table |
 //! | [`summary`] | what runs, tables and diagnoses say, as text and as JSON | audit, diagnose, diff, effect, pipeline, report, shell, stage, store, table |

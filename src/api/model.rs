@@ -3,7 +3,7 @@
 use super::{Poses, Recording, Robot};
 use crate::compensate::{
     Chain, Circumstance, CommandTarget, CorrectedCommand, CorrectionOptions, Corrector, GateLimits,
-    IdentifiedArm, load_matters, unstated_payload,
+    IdentifiedArm, unstated_payload,
 };
 use crate::error::{Error, Result, instead};
 use crate::identified::IdentifiedModel;
@@ -201,8 +201,7 @@ impl Model {
 
     /// The largest load that was measured, kg, where commands must state theirs: the arm depends on it.
     pub(crate) fn needed_load(&self) -> Option<f64> {
-        let heaviest = self.identified.heaviest();
-        heaviest.filter(|load| load_matters(&self.arm, *load))
+        self.identified.needed_load(&self.arm)
     }
 
     /// Commands with which the real arm comes to where the nominal one would be at these joints. Fails where the model is refused and one does

@@ -3,9 +3,7 @@
 use super::companions::Companions;
 use super::feed_forward::{FeedForward, feed_forward};
 use super::pipeline_arguments::ModelArguments;
-use crate::compensate::{
-    CorrectionOptions, Corrector, Gate, GateLimits, IdentifiedArm, Stated, load_matters,
-};
+use crate::compensate::{CorrectionOptions, Corrector, Gate, GateLimits, IdentifiedArm, Stated};
 use crate::error::{Error, Fault, Result, counted};
 use crate::identified::IdentifiedModel;
 use crate::pipeline::Purpose;
@@ -203,9 +201,7 @@ impl CompensateArguments {
         let load = if self.payload.is_some() {
             None
         } else {
-            identified
-                .heaviest()
-                .filter(|load| load_matters(&arm, *load))
+            identified.needed_load(&arm)
         };
         let units = Units {
             angle: unit(self.angle.as_deref()),

@@ -193,14 +193,7 @@ impl ExecutionArguments {
             selection,
             shown,
         } = task;
-        let progress = Progress::new(
-            shown,
-            plan.stages
-                .iter()
-                .map(|stage| stage.id.len())
-                .max()
-                .unwrap_or(0),
-        );
+        let progress = Progress::new(shown, plan.width_of_ids());
         let options = RunOptions {
             selection,
             jobs: self.jobs(),

@@ -2,7 +2,7 @@
 
 use super::pipeline_arguments::ModelArguments;
 use super::{emit_json, emit_lines, write};
-use crate::compensate::{CorrectionOptions, Corrector, IdentifiedArm, load_matters};
+use crate::compensate::{CorrectionOptions, Corrector, IdentifiedArm};
 use crate::error::{Error, Result, counted};
 use crate::identified::{Achieved, achieved};
 use crate::pipeline::Purpose;
@@ -58,9 +58,7 @@ impl VerifyRobotArguments {
         let load = if self.payload.is_some() {
             None
         } else {
-            identified
-                .heaviest()
-                .filter(|load| load_matters(&arm, *load))
+            identified.needed_load(&arm)
         };
         let layout = Layout {
             place: &place,

@@ -9,7 +9,9 @@ use standing::unexplained_of;
 pub use standing::{convention_of, counted_otherwise, robot_file, standing_of, wrong_setup_of};
 pub use torques::IdentifiedTorques;
 
-use crate::compensate::{Coverage, Gate, GateLimits, IdentifiedArm, Scatter, Uncertainty};
+use crate::compensate::{
+    Coverage, Gate, GateLimits, IdentifiedArm, Scatter, Uncertainty, load_matters,
+};
 use crate::description::RobotDescription;
 use crate::effect::Load;
 use crate::error::{Error, Fault, Result, instead};
@@ -411,9 +413,14 @@ impl IdentifiedModel {
     }
 
     /// The largest load that was measured, kg; none where all rows carried nothing, or no recording is at hand.
-    pub(crate) fn heaviest(&self) -> Option<f64> {
+    fn heaviest(&self) -> Option<f64> {
         let loads = self.data.iter().flat_map(|data| &data.payload).copied();
         loads.filter(|load| *load > 0.0).max_by(f64::total_cmp)
+    }
+
+    /// The same where commands must state theirs: the arm depends on it.
+    pub(crate) fn needed_load(&self, arm: &IdentifiedArm) -> Option<f64> {
+        self.heaviest().filter(|load| load_matters(arm, *load))
     }
 
     /// How joints are counted in what goes out, where that is to be said: none where controller and robot file count alike.

@@ -47,6 +47,12 @@ pub struct PlannedStage {
 }
 
 impl Plan {
+    /// Letters of the longest id of a stage.
+    pub(crate) fn width_of_ids(&self) -> usize {
+        let ids = self.stages.iter().map(|stage| stage.id.len());
+        ids.max().unwrap_or(0)
+    }
+
     /// Reads a pipeline; fails with every fault at once.
     pub fn load(
         file: &Path,

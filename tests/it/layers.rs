@@ -23,15 +23,15 @@ fn source() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
 }
 
-/// Layer -> what it may use, from the rows ``| [`layer`] | holds | may use |``. A use is a module or `module::file`.
+/// Layer -> what it may use, from the rows ``| [`layer`] | holds | may use |``, a private one without brackets. A use is a module or `module::file`.
 fn table() -> BTreeMap<String, BTreeSet<String>> {
     let text = fs::read_to_string(source().join("lib.rs")).unwrap();
     let rows = text
         .lines()
-        .filter_map(|line| line.strip_prefix("//! | [`"));
+        .filter_map(|line| line.strip_prefix("//! | "))
+        .filter(|row| row.starts_with(['[', '`']));
     let mut table = BTreeMap::new();
     for row in rows {
-        let row = format!("[`{row}");
         let cells: Vec<&str> = row.trim_end_matches(" |").split(" | ").collect();
         let [names, _, uses] = cells[..] else {
             continue;

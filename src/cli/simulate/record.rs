@@ -67,14 +67,7 @@ impl RecordArguments {
         } else {
             Verbosity::Normal
         };
-        let progress = Progress::new(
-            verbosity,
-            plan.stages
-                .iter()
-                .map(|stage| stage.id.len())
-                .max()
-                .unwrap_or(0),
-        );
+        let progress = Progress::new(verbosity, plan.width_of_ids());
         let options = RunOptions {
             selection: Selection::default(),
             jobs: cores(),
