@@ -26,7 +26,7 @@ criteria! {
     STRETCHES: usize = 40, "stretches", "count: a bootstrap by signs needs tens of units", "";
     /// The criterion must be better by this much for another belief: strong evidence (Kass and Raftery, 1995), doubled.
     PLAIN: f64 = 20.0, "-2 ln of odds", "literature: strong evidence, doubled, Kass and Raftery (1995)", "changes nothing on 2";
-    /// By how much another belief about the noise must be better; ten times as much while causes are missing, which look like correlated noise.
+    /// By how much another belief about the noise must be better.
     CLEARER: f64 = 8.0, "-2 ln of odds", "literature: strong evidence, Kass and Raftery (1995)", "";
     /// Of autocorrelations whose criterion is within this of the best the longest is taken (95 % of chi-square with one degree
     /// of freedom): too short a noise makes causes of noise.

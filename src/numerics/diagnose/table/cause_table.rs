@@ -305,7 +305,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     }
 
     /// Other motions over a variable with numbers that a component follows: coarsely asked they have other numbers.
-    pub(crate) fn over_the_same(&self, component: &Component) -> Vec<usize> {
+    pub(crate) fn over_its_variable(&self, component: &Component) -> Vec<usize> {
         let Shapes::Free(free) = &self.cells[component.cell].shapes else {
             return Vec::new();
         };

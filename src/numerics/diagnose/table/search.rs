@@ -282,7 +282,7 @@ impl CauseTable<'_, '_> {
                 let alike = self.alike(&components[i], 24);
                 let near: Vec<usize> = std::iter::once(cell)
                     .chain(self.near(&components[i]))
-                    .chain(self.over_the_same(&components[i]))
+                    .chain(self.over_its_variable(&components[i]))
                     .collect();
                 let scan = self.scan_some(&alike, &state, &rest, 5, &near);
                 let Some(best) = scan.best() else { continue };
