@@ -51,6 +51,15 @@ pub enum Basis {
         /// How many functions, the constant among them.
         count: usize,
     },
+    /// One function: the sum of `weights` times those of a [`Basis::Series`] of as many.
+    Curve {
+        /// Lower end of the support.
+        low: f64,
+        /// Upper end of the support.
+        high: f64,
+        /// Of the constant first.
+        weights: [f64; Self::CURVE],
+    },
     /// tanh((u - centre) / width): one level below, another above.
     Rise {
         /// Its middle.
@@ -96,6 +105,9 @@ pub enum Basis {
 const CREEPING: f64 = 2.0;
 
 impl Basis {
+    /// How many functions make up a [`Basis::Curve`].
+    pub const CURVE: usize = 16;
+
     /// The variable itself.
     pub const PROPORTIONAL: Self = Self::Linear {
         zero: 0.0,
@@ -115,7 +127,10 @@ impl Basis {
 
     /// Whether it is a free curve.
     pub(crate) fn is_curve(&self) -> bool {
-        matches!(self, Self::Cosines { .. } | Self::Series { .. })
+        matches!(
+            self,
+            Self::Cosines { .. } | Self::Series { .. } | Self::Curve { .. }
+        )
     }
 
     /// What a function may be off (one standard deviation, for a coefficient of 1) where the variable is `off` beyond the fitted range, which
@@ -127,6 +142,11 @@ impl Basis {
         match *self {
             Self::Cosines { low, high, .. } => departure(k + 1, off / (high - low)),
             Self::Series { low, high, .. } => departure(k, off / (high - low)),
+            Self::Curve { low, high, weights } => {
+                let of = |(k, weight): (usize, &f64)| weight * departure(k, off / (high - low));
+                let squares = weights.iter().enumerate().map(|one| of(one).powi(2));
+                squares.sum::<f64>().sqrt()
+            }
             // Sine and cosine together are their size whatever the phase.
             Self::Wave { .. } | Self::Sway { .. } => share * FRAC_1_SQRT_2,
             Self::Straight { .. } if k == 0 => 0.0,
@@ -162,6 +182,11 @@ impl Basis {
                 cosines(u, [low, high], count.saturating_sub(1))
                     .enumerate()
                     .for_each(|(k, value)| each(k + 1, value));
+            }
+            Self::Curve { low, high, weights } => {
+                let others = cosines(u, [low, high], weights.len() - 1).zip(&weights[1..]);
+                let sum: f64 = others.map(|(value, weight)| value * weight).sum();
+                each(0, weights[0] + sum);
             }
             Self::Rise { centre, width } => each(0, libm::tanh((u - centre) / width)),
             Self::After { at } => each(0, f64::from(u > at)),

@@ -50,7 +50,7 @@ pub(super) struct CellShape {
 }
 
 /// A motion over a variable, or over two.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq)]
 pub(super) struct FreeShape {
     pub(crate) motion: Motion,
     pub(crate) of: Variable,
@@ -120,7 +120,7 @@ impl ShapeGroup {
 }
 
 impl FreeShape {
-    fn term(&self, law: Law) -> Form {
+    pub(crate) fn term(&self, law: Law) -> Form {
         Term::new(&Unknown, self.motion, law).into()
     }
 
@@ -480,7 +480,7 @@ pub(super) fn fields(motion: Motion) -> usize {
 }
 
 /// Shares of functions, for every direction of a motion alike, in the order of its coefficients.
-fn over_fields(shares: Vec<f64>, motion: Motion, fields: usize) -> Vec<f64> {
+pub(super) fn over_fields(shares: Vec<f64>, motion: Motion, fields: usize) -> Vec<f64> {
     let scaled = |share: &f64| share / fields as f64;
     if matches!(
         motion,
@@ -507,7 +507,7 @@ fn matern(count: usize, lengths: usize, motion: Motion) -> Vec<Vec<f64>> {
 }
 
 /// Shares of cosines: the spectral density of a Matern kernel with smoothness 3/2 (Rasmussen and Williams, 2006, ch. 4).
-fn density(count: usize, length: f64) -> Vec<f64> {
+pub(super) fn density(count: usize, length: f64) -> Vec<f64> {
     let of = |k: usize| {
         let wave = PI * k as f64 * length / (1.0 + 2.0 * *MARGIN);
         (3.0 + wave * wave).powi(-2)

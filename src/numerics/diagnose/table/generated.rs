@@ -131,8 +131,7 @@ pub(super) fn products(
     out
 }
 
-/// Products of all pairs of variables that a motion may follow, of which neither need show by itself: one of what sits at a joint is that
-/// joint's own.
+/// Products of all pairs of variables that a motion may follow, of which neither need show by itself.
 pub(super) fn pairs(survey: &Survey, frame: &mut SearchRows) -> Vec<FreeShape> {
     let mut out = Vec::new();
     for place in places(survey) {
@@ -154,15 +153,8 @@ pub(super) fn pairs(survey: &Survey, frame: &mut SearchRows) -> Vec<FreeShape> {
                 }
             }
             frame.prepare(&[motion], &variables);
-            let own = |of: &Variable| match place {
-                Place::Joint(joint) | Place::Links(joint, _) => joint_of(*of) == Some(joint),
-                _ => true,
-            };
-            for (i, of) in variables.iter().enumerate().filter(|(_, of)| own(of)) {
-                let others = variables
-                    .iter()
-                    .enumerate()
-                    .filter(|(k, other)| *k != i && (*k > i || !own(other)));
+            for (i, of) in variables.iter().enumerate() {
+                let others = variables.iter().enumerate().skip(i + 1);
                 out.extend(others.map(|(_, other)| FreeShape {
                     motion,
                     of: *of,
@@ -172,19 +164,6 @@ pub(super) fn pairs(survey: &Survey, frame: &mut SearchRows) -> Vec<FreeShape> {
         }
     }
     out
-}
-
-/// The joint that a variable is of.
-fn joint_of(of: Variable) -> Option<usize> {
-    match of {
-        Variable::Angle { joint }
-        | Variable::Approach { joint }
-        | Variable::Move { joint }
-        | Variable::Load { joint }
-        | Variable::Stretch { joint, .. }
-        | Variable::Recent { joint, .. } => Some(joint),
-        _ => None,
-    }
 }
 
 /// Cells of products that were seen among all pairs.

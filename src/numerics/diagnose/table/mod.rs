@@ -16,6 +16,7 @@ mod listed;
 mod refine;
 mod scan;
 mod search;
+mod separable;
 mod state;
 
 pub(crate) use answer::{Answer, FoundCell};
@@ -47,6 +48,8 @@ pub(crate) struct Rounds {
     is_open: bool,
     /// Products of two variables that show together; none before they were looked for.
     pairs: Option<Vec<FreeShape>>,
+    /// Whether those have come since the last round.
+    has_new_pairs: bool,
     first: Option<(Located, f64)>,
     round: usize,
 }
@@ -123,6 +126,9 @@ impl Rounds {
         if !waits && !components.is_empty() {
             components = table.swap(components);
             components = table.grow(components);
+            if std::mem::take(&mut self.has_new_pairs) {
+                components = table.or_from_named(components);
+            }
             components = table.by_several(components);
         }
         let keys: Vec<String> = components
@@ -146,12 +152,23 @@ impl Rounds {
                 self.is_open = unexplained;
                 is_last = !unexplained;
             } else if self.pairs.is_none() {
-                let seen = if unexplained {
-                    table.seen_pairs(&all_pairs, &state, &all)
-                } else {
-                    Vec::new()
-                };
+                let named: Vec<&Component> = all
+                    .iter()
+                    .copied()
+                    .filter(|component| table.cells[component.cell].is_named())
+                    .collect();
+                let mut seen = Vec::new();
+                if unexplained {
+                    seen = table.seen_pairs(&all_pairs, &state, &all);
+                }
+                // What several components without a name explain may be one product.
+                if named.len() < all.len() {
+                    let state = table.state(&named, None);
+                    let more = table.seen_pairs(&all_pairs, &state, &named);
+                    seen.extend(more.into_iter().filter(|free| !seen.contains(free)).collect::<Vec<_>>());
+                }
                 is_last = seen.is_empty();
+                self.has_new_pairs = !is_last;
                 self.pairs = Some(seen);
             }
         }

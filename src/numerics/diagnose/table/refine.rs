@@ -51,9 +51,9 @@ impl CauseTable<'_, '_> {
             let Some(found) = scan.closely.get_mut(&cell) else {
                 continue;
             };
-            if closer.1 > found.log {
-                found.log = closer.1;
-                scan.log_odds[cell] = prior(cell) + closer.1;
+            if closer.log > found.log {
+                found.log = closer.log;
+                scan.log_odds[cell] = prior(cell) + closer.log;
             }
             found.refined = Some(closer);
         }
@@ -103,15 +103,28 @@ impl CauseTable<'_, '_> {
                         .filter(|(_, forms)| !is_there(forms))
                         .collect::<Vec<_>>()
                 };
-                let refined = climb(*free, start, &near, &value, &|_, _| 0.0)?;
-                let forms = self.forms_of(
-                    refined
-                        .0
-                        .groups(self.survey, &values, true)
-                        .get(found.shape.0)?,
-                    found.shape.1,
-                )?;
-                Some((forms, refined.1, refined.2))
+                let refined = climb(*free, start, &near, &value, &|_, _| 0.0);
+                let as_listed = refined.and_then(|(free, log, amplitude)| {
+                    let groups = free.groups(self.survey, &values, true);
+                    let forms = self.forms_of(groups.get(found.shape.0)?, found.shape.1)?;
+                    Some((
+                        free,
+                        Refined {
+                            forms,
+                            shape: None,
+                            log,
+                            amplitude,
+                        },
+                    ))
+                });
+                let (free, log) = match &as_listed {
+                    Some((free, refined)) => (*free, refined.log),
+                    None => (*free, start.0),
+                };
+                let separable = self.separable(&free, state, others);
+                separable
+                    .filter(|separable| separable.log > log && !is_there(&separable.forms))
+                    .or(as_listed.map(|(_, refined)| refined))
             }
             (Shapes::Listed(_), [form]) if !form.cause().is_nameless() => {
                 let near = |form: &Form, level| {
@@ -130,7 +143,12 @@ impl CauseTable<'_, '_> {
                     }
                 };
                 let (form, log, amplitude) = climb(form.clone(), start, &near, &value, &price)?;
-                Some((vec![form], log, amplitude))
+                Some(Refined {
+                    forms: vec![form],
+                    shape: None,
+                    log,
+                    amplitude,
+                })
             }
             _ => None,
         }

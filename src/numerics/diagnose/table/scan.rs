@@ -1,7 +1,7 @@
 //! What each cell says given the components of a model.
 
 use super::cause_table::CauseTable;
-use super::cell::{FreeShape, Over, Shapes};
+use super::cell::{CellShape, FreeShape, Over, ShapeGroup, Shapes};
 use super::evidence::log_sum;
 use super::frame::UnitColumns;
 use super::state::{CellColumns, Component, KnownState, shape_keys};
@@ -25,8 +25,16 @@ pub(super) struct CellEvidence {
     pub(crate) refined: Option<Refined>,
 }
 
-/// A shape with the numbers of which the rows say most: its forms, ln of its evidence, its amplitude.
-pub(super) type Refined = (Vec<Form>, f64, f64);
+/// A shape with the numbers of which the rows say most.
+#[derive(Clone)]
+pub(super) struct Refined {
+    pub(crate) forms: Vec<Form>,
+    /// Where it is none of the listed ones.
+    pub(crate) shape: Option<CellShape>,
+    /// ln of its evidence.
+    pub(crate) log: f64,
+    pub(crate) amplitude: f64,
+}
 
 /// ln of posterior odds of every cell given a state.
 pub(super) struct CellScan {
@@ -277,18 +285,27 @@ impl CauseTable<'_, '_> {
     /// The component that a cell is in a scan.
     pub(crate) fn component(&mut self, cell: usize, found: &CellEvidence) -> Component {
         let found_component = self.as_found(cell, found);
-        let Some((forms, _, amplitude)) = found.refined.clone() else {
+        let Some(refined) = found.refined.clone() else {
             self.next += 1;
             return found_component.with_part(self.next);
         };
+        let (forms, amplitude) = (refined.forms, refined.amplitude);
         let new = |of: &Variable| !self.numbers.contains(of);
         let variables = forms.iter().flat_map(|form| form.variables()).filter(new);
         self.numbers.extend(variables.collect::<Vec<_>>());
-        let found_component = Component {
+        let mut found_component = Component {
             forms,
             amplitude,
             ..found_component
         };
+        if let Some(shape) = refined.shape {
+            found_component.group = Arc::new(ShapeGroup {
+                forms: found_component.forms.clone(),
+                shapes: vec![shape.clone()],
+                ..(*found_component.group).clone()
+            });
+            found_component.shape = shape;
+        }
         self.component_of(&found_component, cell)
     }
 
@@ -323,8 +340,8 @@ impl CauseTable<'_, '_> {
             .map(|k| block.columns.square[seen.range.start + k])
             .collect();
         let shares = kept.iter().map(|k| shape.shares[*k]).collect();
-        let shape = super::cell::CellShape { shares, ..shape };
-        let group = super::cell::ShapeGroup {
+        let shape = CellShape { shares, ..shape };
+        let group = ShapeGroup {
             forms: forms.clone(),
             shapes: vec![shape],
             ..seen.group.clone()

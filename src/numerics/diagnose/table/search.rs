@@ -306,6 +306,30 @@ impl CauseTable<'_, '_> {
         self.prune(components)
     }
 
+    /// Components, or those that a search from the ones with a name finds, whichever are the more probable: what was taken up before another
+    /// cell was in the table is in the way of it.
+    pub(crate) fn or_from_named(&mut self, components: Vec<Component>) -> Vec<Component> {
+        let named: Vec<Component> = components
+            .iter()
+            .filter(|component| self.cells[component.cell].is_named())
+            .cloned()
+            .collect();
+        if named.len() == components.len() {
+            return components;
+        }
+        let named = self.anew(named);
+        let others = self.grow(named);
+        let others = self.swap(others);
+        let others = self.grow(others);
+        let noise = self.noise(&components).min(self.noise(&others));
+        if self.total(&others, noise) > self.total(&components, noise) {
+            others
+        } else {
+            self.know(&components);
+            components
+        }
+    }
+
     /// ln of the posterior of a set of components, up to a constant, at a noise.
     fn total(&self, components: &[Component], kappa: f64) -> f64 {
         let state = self.state(&components.iter().collect::<Vec<_>>(), Some(kappa));

@@ -582,6 +582,41 @@ impl KnownState {
         (seen, DVector::from_fn(gradient.len(), along))
     }
 
+    /// The likeliest coefficients (SI) of a block of one group in a shape at an amplitude given the components.
+    pub(super) fn likeliest(
+        &self,
+        block: &CellColumns,
+        across: &DMatrix<f64>,
+        (shape, amplitude): (usize, f64),
+    ) -> Option<DVector<f64>> {
+        let [group] = &block.groups[..] else {
+            return None;
+        };
+        let (gram, gradient) = self.seen(group, across, 0);
+        let shares = &group.group.shapes[shape].shares;
+        let roots = DVector::from_iterator(
+            shares.len(),
+            shares.iter().map(|share| amplitude * share.sqrt()),
+        );
+        let mut matrix = DMatrix::from_fn(shares.len(), shares.len(), |i, j| {
+            roots[i] * gram[(i, j)] * roots[j]
+        });
+        (0..shares.len()).for_each(|k| matrix[(k, k)] += 1.0);
+        let weights = matrix
+            .cholesky()?
+            .solve(&roots.component_mul(&gradient))
+            .component_mul(&roots);
+        let scale = |k: usize| {
+            let square = block.columns.square[group.range.start + k];
+            if square > 0.0 {
+                square.sqrt().recip()
+            } else {
+                0.0
+            }
+        };
+        Some(DVector::from_fn(weights.len(), |k, _| weights[k] * scale(k)))
+    }
+
     /// Standard error of each coefficient (SI) of a block of one group given the components.
     pub(super) fn errors(&self, block: &CellColumns, across: &DMatrix<f64>) -> Vec<f64> {
         let [group] = &block.groups[..] else {
