@@ -259,10 +259,10 @@ def run(arguments):
 # ---- what is printed
 
 def told(case, rows, title):
-    grade = {True: "exact", False: "-", None: "not judged"}[case["exact"]]
+    grade = {True: "exact", False: "-", None: "not judged"}[case.get("exact")]
     held = "" if case["ratio"] is None else f", held out {case['ratio']:.3f} of " + ("before" if case["after_nrmse"] is not None else "the noise")
     mean = "" if case["after_mean_mm"] is None else f", mean {case['after_mean_mm']:.4f} max {case['after_max_mm']:.4f} mm"
-    wanted = [f"    wanted {case['wanted'] or 'nothing'}"] if case["exact"] is False else []
+    wanted = [f"    wanted {case['wanted'] or 'nothing'}"] if case.get("exact") is False else []
     out = [f"{title}: {grade}, {case['verdict'] or 'failed: ' + case['fault']}{held}{mean}, {case['parameters']} parameters, {case['cpu_s']:.1f} s", *wanted]
     for row in rows:
         size = f"{row['size_um']:.0f} um" if row["size_um"] is not None else "-" if row["size_nm"] is None else f"{row['size_nm']:.3g} Nm"
@@ -282,7 +282,7 @@ def table(versions):
         first = None
         for label, cases in versions:
             own = {(case["set"], case["case"]): case for case in cases if which in (None, case["set"])}
-            judged = [case for case in own.values() if case["exact"] is not None]
+            judged = [case for case in own.values() if case.get("exact") is not None]
             total = lambda key: sum(case[key] for case in judged)
             nulls = [case for case in judged if case["content"] == "null"]
             error = lambda case: case["after_mean_mm"] or case["after_nrmse"]

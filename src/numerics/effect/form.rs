@@ -87,8 +87,9 @@ pub trait Placed: Send + Sync {
             .map(|of| of.value(0, robot, state).filter(|_| of.is_single()))
             .collect()
     }
-    /// The same with its laws held at the ends of what the fitted rows have of its variables, in their order; none where they go on.
-    fn held_within(&self, _ranges: &[Option<[f64; 2]>]) -> Option<Form> {
+    /// The same with its laws held at the ends of what the fitted rows have of its variables, in their order, and of two of them together; none
+    /// where they go on.
+    fn held_within(&self, _ranges: &[Option<[f64; 2]>], _pairs: &[[f64; 2]]) -> Option<Form> {
         None
     }
     /// What it may be off (one standard deviation) in a row beyond what the fitted rows have of its variables, `within`, and the variable
@@ -274,9 +275,9 @@ impl Form {
         T::deserialize(body).map(Self::from)
     }
 
-    /// The same, fitted to rows that have these ranges of its variables.
-    pub(super) fn fitted_within(&self, ranges: Vec<Option<[f64; 2]>>) -> Self {
-        let held = self.held_within(&ranges);
+    /// The same, fitted to rows that have these ranges of its variables and, of two, these pairs.
+    pub(super) fn fitted_within(&self, ranges: Vec<Option<[f64; 2]>>, pairs: &[[f64; 2]]) -> Self {
+        let held = self.held_within(&ranges, pairs);
         held.unwrap_or_else(|| Self {
             placed: self.placed.clone(),
             within: ranges,

@@ -56,10 +56,18 @@ impl Factor {
         u.clamp(low - further, high + further)
     }
 
-    /// By how much the variable is beyond the fitted range in a row, SI and as a share of that range, at most 1; none inside.
-    fn beyond(&self, robot: &RobotModel, state: &ArmState) -> Option<(f64, f64)> {
+    /// By how much the variable is beyond the fitted range in a row, or from the `nearest` value that was seen, SI and as a share of that range,
+    /// at most 1; none inside.
+    fn beyond(
+        &self,
+        robot: &RobotModel,
+        state: &ArmState,
+        nearest: Option<f64>,
+    ) -> Option<(f64, f64)> {
         let ([low, high], u) = (self.within?, self.of.value(0, robot, state)?);
-        let off = (low - u).max(u - high).max(0.0);
+        let off = nearest.map_or((low - u).max(u - high).max(0.0), |nearest| {
+            (u - nearest).abs()
+        });
         let share = match self.basis {
             // A step has happened.
             Basis::After { .. } => 0.0,
@@ -74,16 +82,21 @@ impl Factor {
     }
 
     /// The values of its functions in a row; zeros where the row does not tell.
-    fn all(&self, robot: &RobotModel, state: &ArmState) -> Vec<f64> {
+    fn all(&self, robot: &RobotModel, state: &ArmState, nearest: Option<f64>) -> Vec<f64> {
         let mut out = vec![0.0; self.count()];
-        self.values(robot, state, &mut |k, value| out[k] = value);
+        self.values(robot, state, nearest, &mut |k, value| out[k] = value);
         out
     }
 
     /// What each function may be off there, one standard deviation, and the share of its range by which the variable is beyond; none inside.
-    fn off(&self, robot: &RobotModel, state: &ArmState) -> Option<(Vec<f64>, f64)> {
-        let (off, share) = self.beyond(robot, state)?;
-        let values = self.all(robot, state).into_iter().enumerate();
+    fn off(
+        &self,
+        robot: &RobotModel,
+        state: &ArmState,
+        nearest: Option<f64>,
+    ) -> Option<(Vec<f64>, f64)> {
+        let (off, share) = self.beyond(robot, state, nearest)?;
+        let values = self.all(robot, state, nearest).into_iter().enumerate();
         Some((
             values
                 .map(|(k, value)| self.basis.off(k, value, off, share))
@@ -97,10 +110,17 @@ impl Factor {
         self.of.components() * self.basis.count()
     }
 
-    fn values(&self, robot: &RobotModel, state: &ArmState, each: &mut dyn FnMut(usize, f64)) {
+    /// The values of its functions in a row, those at `nearest` where that is given.
+    fn values(
+        &self,
+        robot: &RobotModel,
+        state: &ArmState,
+        nearest: Option<f64>,
+        each: &mut dyn FnMut(usize, f64),
+    ) {
         for component in 0..self.of.components() {
             if let Some(u) = self.of.value(component, robot, state) {
-                let u = self.held(u);
+                let u = nearest.unwrap_or_else(|| self.held(u));
                 // Long after the recording a function without a limit counts for nothing.
                 let mut counted = |k: usize, value: f64| {
                     each(
@@ -114,8 +134,61 @@ impl Factor {
     }
 }
 
+/// Parts of each variable's range in which pairs of values are counted.
+const PARTS: usize = 8;
+
+/// Which values of two variables the fitted rows have together: one bit for each of `PARTS` x `PARTS` parts of their ranges, set where a row
+/// has it or one next to it.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+pub(crate) struct SeenTogether(u64);
+
+impl SeenTogether {
+    /// By the shares (0 to 1) of both ranges that rows have.
+    fn of(shares: impl Iterator<Item = [f64; 2]>) -> Self {
+        let mut bits = 0;
+        for [a, b] in shares.map(|shares| shares.map(part)) {
+            for i in a.saturating_sub(1)..=(a + 1).min(PARTS - 1) {
+                for j in b.saturating_sub(1)..=(b + 1).min(PARTS - 1) {
+                    bits |= 1 << (PARTS * i + j);
+                }
+            }
+        }
+        Self(bits)
+    }
+
+    fn has(self, i: usize, j: usize) -> bool {
+        self.0 >> (PARTS * i + j) & 1 == 1
+    }
+
+    /// The nearest shares that were seen together; none where these were, or nothing was.
+    fn nearest(self, shares: [f64; 2]) -> Option<[f64; 2]> {
+        let [a, b] = shares.map(part);
+        if self.has(a, b) {
+            return None;
+        }
+        let held = |share: f64, part: usize| {
+            let width = (PARTS as f64).recip();
+            share.clamp(part as f64 * width, (part + 1) as f64 * width)
+        };
+        (0..PARTS * PARTS)
+            .map(|k| (k / PARTS, k % PARTS))
+            .filter(|(i, j)| self.has(*i, *j))
+            .map(|(i, j)| [held(shares[0], i), held(shares[1], j)])
+            .min_by(|x, y| {
+                let square =
+                    |at: &[f64; 2]| (at[0] - shares[0]).powi(2) + (at[1] - shares[1]).powi(2);
+                square(x).total_cmp(&square(y))
+            })
+    }
+}
+
+/// The part of its range in which a share of it lies.
+fn part(share: f64) -> usize {
+    ((share * PARTS as f64).max(0.0) as usize).min(PARTS - 1)
+}
+
 /// Functions of one or two variables: all products of a function of the first and one of the second.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct Law {
     /// The variable that the cause is about.
     #[serde(flatten)]
@@ -123,6 +196,15 @@ pub struct Law {
     /// What multiplies it, if anything.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub times: Option<Factor>,
+    /// What the fitted rows have of both together: a free product holds the values at the nearest of it. None while the law is sought.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) seen: Option<SeenTogether>,
+}
+
+impl PartialEq for Law {
+    fn eq(&self, other: &Self) -> bool {
+        (self.first, self.times) == (other.first, other.times)
+    }
 }
 
 /// What functions of a law, by their numbers, may be off: groups that are independent of each other.
@@ -134,6 +216,7 @@ impl Law {
         Self {
             first: Factor::new(of, basis),
             times: None,
+            seen: None,
         }
     }
 
@@ -169,6 +252,48 @@ impl Law {
         }
     }
 
+    /// The same, fitted to rows with these ranges and pairs of its variables.
+    pub(super) fn held_within(self, ranges: &[Option<[f64; 2]>], pairs: &[[f64; 2]]) -> Self {
+        let held = |factor: Factor, k: usize| {
+            let range = ranges.get(k).copied().flatten();
+            range.map_or(factor, |range| factor.held_within(range))
+        };
+        let mut out = Self {
+            first: held(self.first, 0),
+            times: self.times.map(|times| held(times, 1)),
+            seen: None,
+        };
+        let is_free = |times: &Factor| self.first.basis.is_curve() || times.basis.is_curve();
+        if self.times.as_ref().is_some_and(is_free) && !pairs.is_empty() {
+            let shares = pairs.iter().filter_map(|pair| out.shares(*pair));
+            out.seen = Some(SeenTogether::of(shares));
+        }
+        out
+    }
+
+    /// Two values of its variables as shares of their fitted ranges.
+    fn shares(&self, [u, v]: [f64; 2]) -> Option<[f64; 2]> {
+        let share = |factor: &Factor, u: f64| {
+            let [low, high] = factor.within.filter(|[low, high]| low < high)?;
+            Some(((u - low) / (high - low)).clamp(0.0, 1.0))
+        };
+        Some([share(&self.first, u)?, share(self.times.as_ref()?, v)?])
+    }
+
+    /// The nearest values of both variables that the fitted rows have together; none where they have those of the row.
+    fn nearest(&self, robot: &RobotModel, state: &ArmState) -> Option<[f64; 2]> {
+        let (seen, times) = (self.seen?, self.times.as_ref()?);
+        let values = [&self.first, times].map(|factor| factor.of.value(0, robot, state));
+        let [Some(u), Some(v)] = values else {
+            return None;
+        };
+        let [a, b] = seen.nearest(self.shares([u, v])?)?;
+        let value = |factor: &Factor, share: f64| {
+            factor.within.map(|[low, high]| low + share * (high - low))
+        };
+        Some([value(&self.first, a)?, value(times, b)?])
+    }
+
     /// How many functions it has.
     pub fn count(&self) -> usize {
         self.factors().map(Factor::count).product()
@@ -191,7 +316,9 @@ impl Law {
         robot: &RobotModel,
         state: &ArmState,
     ) -> Option<(Variable, Departures)> {
-        let first = self.first.off(robot, state);
+        let nearest = self.nearest(robot, state);
+        let [of_first, of_times] = [0, 1].map(|k| nearest.map(|nearest| nearest[k]));
+        let first = self.first.off(robot, state, of_first);
         let Some(times) = &self.times else {
             let (off, _) = first?;
             return Some((
@@ -199,14 +326,14 @@ impl Law {
                 off.into_iter().enumerate().map(|one| vec![one]).collect(),
             ));
         };
-        let second = times.off(robot, state);
+        let second = times.off(robot, state, of_times);
         let share = |off: &Option<(Vec<f64>, f64)>| off.as_ref().map_or(0.0, |(_, share)| *share);
         let (a, b) = (share(&first), share(&second));
         let most = if a >= b { self.first.of } else { times.of };
         let inner = times.count();
         let mut groups = Vec::new();
         for (i, off) in first.into_iter().flat_map(|(off, _)| off).enumerate() {
-            let others = times.all(robot, state).into_iter().enumerate();
+            let others = times.all(robot, state, of_times).into_iter().enumerate();
             groups.push(
                 others
                     .map(|(k, value)| (inner * i + k, off * value))
@@ -214,7 +341,11 @@ impl Law {
             );
         }
         for (k, off) in second.into_iter().flat_map(|(off, _)| off).enumerate() {
-            let others = self.first.all(robot, state).into_iter().enumerate();
+            let others = self
+                .first
+                .all(robot, state, of_first)
+                .into_iter()
+                .enumerate();
             groups.push(
                 others
                     .map(|(i, value)| (inner * i + k, off * value))
@@ -232,11 +363,15 @@ impl Law {
         each: &mut dyn FnMut(usize, f64),
     ) {
         match &self.times {
-            None => self.first.values(robot, state, each),
+            None => self.first.values(robot, state, None, each),
             Some(times) => {
+                let nearest = self.nearest(robot, state);
+                let [of_first, of_times] = [0, 1].map(|k| nearest.map(|nearest| nearest[k]));
                 let inner = times.count();
-                self.first.values(robot, state, &mut |i, x| {
-                    times.values(robot, state, &mut |k, y| each(inner * i + k, x * y))
+                self.first.values(robot, state, of_first, &mut |i, x| {
+                    times.values(robot, state, of_times, &mut |k, y| {
+                        each(inner * i + k, x * y)
+                    })
                 });
             }
         }
@@ -245,7 +380,11 @@ impl Law {
 
 impl From<Factor> for Law {
     fn from(first: Factor) -> Self {
-        Self { first, times: None }
+        Self {
+            first,
+            times: None,
+            seen: None,
+        }
     }
 }
 
@@ -270,8 +409,12 @@ links:
   - {mass: 5, centre: [250, 0, 400]}
 ";
 
-    /// The sum of a factor's functions at one row, and its share beyond the fitted range.
-    fn at(factor: &Factor, angle: f64, [payload, temperature, time]: [f64; 3]) -> (f64, f64) {
+    /// What is asked at one row.
+    fn at_row<T>(
+        angle: f64,
+        [payload, temperature, time]: [f64; 3],
+        ask: impl FnOnce(&RobotModel, &ArmState) -> T,
+    ) -> T {
         let robot = RobotModel::new(
             read_calib(
                 RobotFileText {
@@ -295,14 +438,17 @@ links:
         };
         let posture = Posture::as_stated(&robot, data.q(0), payload);
         let state = ArmState::new(&data, 0, &posture, Vector3::new(2.0 + payload, 0.0, 0.0));
-        let mut sum = 0.0;
-        factor.values(&robot, &state, &mut |_, value| sum += value);
-        (
-            sum,
-            factor
-                .beyond(&robot, &state)
-                .map_or(0.0, |(_, share)| share),
-        )
+        ask(&robot, &state)
+    }
+
+    /// The sum of a factor's functions at one row, and its share beyond the fitted range.
+    fn at(factor: &Factor, angle: f64, circumstances: [f64; 3]) -> (f64, f64) {
+        at_row(angle, circumstances, |robot, state| {
+            let mut sum = 0.0;
+            factor.values(robot, state, None, &mut |_, value| sum += value);
+            let beyond = factor.beyond(robot, state, None);
+            (sum, beyond.map_or(0.0, |(_, share)| share))
+        })
     }
 
     #[test]
@@ -340,6 +486,43 @@ links:
                 assert_eq!(see(within[1] + 5.0 * span).1, 1.0, "{of}");
             }
         }
+    }
+
+    #[test]
+    fn a_free_product_holds_at_the_nearest_values_that_rows_have_together() {
+        // The first half of a session without a payload, the second with one.
+        let halves = |k: usize| [f64::from(k >= 20), k as f64 / 39.0];
+        let seen = SeenTogether::of((0..40).map(halves));
+        assert_eq!(seen.nearest([0.0, 0.1]), None, "seen");
+        assert_eq!(seen.nearest([1.0, 0.9]), None, "seen");
+        assert_eq!(seen.nearest([0.0, 0.45]), None, "next to what was seen");
+        assert_eq!(seen.nearest([0.0, 1.0]), Some([0.0, 0.625]));
+        assert_eq!(SeenTogether::of(std::iter::empty()).nearest([0.0; 2]), None);
+
+        let series = |count| Basis::Series {
+            low: -0.2,
+            high: 1.2,
+            count,
+        };
+        let (angle, time) = (Variable::Angle { joint: 1 }, Variable::Time);
+        let pairs: Vec<[f64; 2]> = (0..40).map(halves).collect();
+        let ranges = [Some([0.0, 1.0]); 2];
+        let product = |first: Basis| {
+            let law = Law::new(angle, first).times(time, series(5));
+            law.held_within(&ranges, &pairs)
+        };
+        let sum = |law: &Law, [angle, time]: [f64; 2]| {
+            at_row(angle, [0.0, 0.0, time], |robot, state| {
+                let mut sum = 0.0;
+                law.values(robot, state, &mut |k, value| sum += (k + 1) as f64 * value);
+                (sum, law.beyond(robot, state).is_some())
+            })
+        };
+        let free = product(series(4));
+        let (value, is_beyond) = sum(&free, [0.0, 1.0]);
+        assert_eq!((value, false), sum(&free, [0.0, 0.625]));
+        assert!(is_beyond, "and says that it was not seen");
+        assert!(!sum(&free, [0.0, 0.3]).1 && !sum(&free, [1.0, 0.8]).1);
     }
 
     #[test]

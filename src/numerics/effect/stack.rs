@@ -57,15 +57,20 @@ impl EffectStack {
         x: &[f64],
     ) -> Self {
         let mut ranges: Vec<Vec<Option<[f64; 2]>>> = vec![Vec::new(); self.effects.len()];
+        let mut pairs: Vec<Vec<[f64; 2]>> = vec![Vec::new(); self.effects.len()];
         let mut scratch = self.scratch(robot);
         for row in rows {
             let point = self.place(robot, data, *row, x, &mut scratch).point;
             let state = ArmState::new(data, *row, &scratch.posture, point);
-            for ((effect, _), ranges) in self.effects.iter().zip(&mut ranges) {
+            let kept = ranges.iter_mut().zip(&mut pairs);
+            for ((effect, _), (ranges, pairs)) in self.effects.iter().zip(kept) {
                 let sizes = effect
                     .form()
                     .map_or_else(Vec::new, |form| form.sizes(robot, &state));
                 ranges.resize(sizes.len(), None);
+                if let [Some(first), Some(second)] = sizes[..] {
+                    pairs.push([first, second]);
+                }
                 for (size, range) in sizes.into_iter().zip(ranges) {
                     if let Some(size) = size.filter(|size| size.is_finite()) {
                         *range = Some(
@@ -75,17 +80,20 @@ impl EffectStack {
                 }
             }
         }
-        let held = |effect: &Arc<dyn Effect>, ranges: Vec<Option<[f64; 2]>>| -> Arc<dyn Effect> {
+        let held = |effect: &Arc<dyn Effect>,
+                    ranges: Vec<Option<[f64; 2]>>,
+                    pairs: &[[f64; 2]]|
+         -> Arc<dyn Effect> {
             effect.form().map_or_else(
                 || effect.clone(),
-                |form| Arc::new(form.fitted_within(ranges)),
+                |form| Arc::new(form.fitted_within(ranges, pairs)),
             )
         };
         let effects = self
             .effects
             .iter()
-            .zip(ranges)
-            .map(|((effect, own), ranges)| (held(effect, ranges), own.clone()));
+            .zip(ranges.into_iter().zip(&pairs))
+            .map(|((effect, own), (ranges, pairs))| (held(effect, ranges, pairs), own.clone()));
         Self::numbered(effects.collect(), self.specs.clone(), self.base)
     }
 

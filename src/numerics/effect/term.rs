@@ -1,7 +1,6 @@
 //! Terms: effect = sum_k c_k * direction(place, row) * law_k(variables of the row; shape numbers).
 
 use super::form::Placed;
-use super::law::Factor;
 use super::{
     ArmState, Basis, BeyondRange, Cause, Deflection, Form, Law, Motion, NumberSpec, Place, Survey,
     Variable,
@@ -169,19 +168,8 @@ impl Placed for Term {
         Some(self)
     }
 
-    fn held_within(&self, ranges: &[Option<[f64; 2]>]) -> Option<Form> {
-        let held = |factor: Factor, k: usize| {
-            ranges
-                .get(k)
-                .copied()
-                .flatten()
-                .map_or(factor, |range| factor.held_within(range))
-        };
-        let law = Law {
-            first: held(self.law.first, 0),
-            times: self.law.times.map(|times| held(times, 1)),
-        };
-        Some(self.with(law).into())
+    fn held_within(&self, ranges: &[Option<[f64; 2]>], pairs: &[[f64; 2]]) -> Option<Form> {
+        Some(self.with(self.law.held_within(ranges, pairs)).into())
     }
 
     fn beyond(

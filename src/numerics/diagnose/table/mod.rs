@@ -165,7 +165,11 @@ impl Rounds {
                 if named.len() < all.len() {
                     let state = table.state(&named, None);
                     let more = table.seen_pairs(&all_pairs, &state, &named);
-                    seen.extend(more.into_iter().filter(|free| !seen.contains(free)).collect::<Vec<_>>());
+                    seen.extend(
+                        more.into_iter()
+                            .filter(|free| !seen.contains(free))
+                            .collect::<Vec<_>>(),
+                    );
                 }
                 is_last = seen.is_empty();
                 self.has_new_pairs = !is_last;

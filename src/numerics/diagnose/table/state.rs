@@ -614,7 +614,9 @@ impl KnownState {
                 0.0
             }
         };
-        Some(DVector::from_fn(weights.len(), |k, _| weights[k] * scale(k)))
+        Some(DVector::from_fn(weights.len(), |k, _| {
+            weights[k] * scale(k)
+        }))
     }
 
     /// Standard error of each coefficient (SI) of a block of one group given the components.
