@@ -449,15 +449,7 @@ fn line_and_curve(
         }
     }
     if rough {
-        // A curve with corners: the spectral density of an exponential kernel.
-        let density = |k: usize| 1.0 / (1.0 + (PI * k as f64 * 0.3).powi(2));
-        let all: Vec<f64> = (1..=curve / line).map(density).collect();
-        let sum: f64 = all.iter().sum();
-        let all = over_fields(
-            all.into_iter().map(|share| share / sum).collect(),
-            motion,
-            line,
-        );
+        let all = over_fields(cornered(curve / line), motion, line);
         let shares = std::iter::repeat_n(0.0, line).chain(all).collect();
         out.push(CellShape {
             shares,
@@ -512,6 +504,14 @@ pub(super) fn density(count: usize, length: f64) -> Vec<f64> {
         let wave = PI * k as f64 * length / (1.0 + 2.0 * *MARGIN);
         (3.0 + wave * wave).powi(-2)
     };
+    let all: Vec<f64> = (1..=count).map(of).collect();
+    let sum: f64 = all.iter().sum();
+    all.into_iter().map(|density| density / sum).collect()
+}
+
+/// The same of a curve with corners: the spectral density of an exponential kernel.
+pub(super) fn cornered(count: usize) -> Vec<f64> {
+    let of = |k: usize| 1.0 / (1.0 + (PI * k as f64 * 0.3).powi(2));
     let all: Vec<f64> = (1..=count).map(of).collect();
     let sum: f64 = all.iter().sum();
     all.into_iter().map(|density| density / sum).collect()

@@ -39,9 +39,9 @@ const CURVE: Over = Over::Curve {
     lengths: 3,
 };
 const SLOW: Over = Over::Curve {
-    count: 8,
+    count: 12,
     first: 4,
-    lengths: 2,
+    lengths: 3,
 };
 
 /// Variables of one kind, which share its prior odds.

@@ -12,6 +12,9 @@ use std::collections::BTreeSet;
 /// ln of the evidence of a shape, and its amplitude.
 type Worth = (f64, f64);
 
+/// Products of a scan that are looked at as one curve times another.
+const SEPARATED: usize = 3;
+
 /// A shape with other numbers, and its forms.
 type Variant<T> = (T, Vec<Form>);
 
@@ -27,14 +30,12 @@ impl CauseTable<'_, '_> {
         let most = scan.best().map_or(0.0, |best| scan.log_odds[best]);
         let best = scan.best();
         let open = best.is_some_and(|best| !self.cells[best].is_named());
-        let near = |cell: &usize| {
-            open && scan.log_odds[*cell] > most - (0.2 * most).max(10.0)
-                && scan.log_odds[*cell] > -5.0
-        };
+        let is_near =
+            |log_odds: f64| open && log_odds > most - (0.2 * most).max(10.0) && log_odds > -5.0;
         let asked = |cell: &usize| {
             Some(*cell) == best
                 || self.declared.contains(cell)
-                || near(cell)
+                || is_near(scan.log_odds[*cell])
                 || self.is_over_numbers(*cell)
         };
         let listed: Vec<usize> = scan.closely.keys().copied().filter(asked).collect();
@@ -56,6 +57,31 @@ impl CauseTable<'_, '_> {
                 scan.log_odds[cell] = prior(cell) + closer.log;
             }
             found.refined = Some(closer);
+        }
+        let mut products: Vec<usize> = scan.closely.keys().copied().collect();
+        products.retain(|cell| {
+            self.is_product(*cell) && (Some(*cell) == best || is_near(scan.log_odds[*cell]))
+        });
+        products.sort_by(|a, b| {
+            scan.log_odds[*b]
+                .total_cmp(&scan.log_odds[*a])
+                .then(a.cmp(b))
+        });
+        products.truncate(SEPARATED);
+        let separated: Vec<(usize, Refined)> = products
+            .into_par_iter()
+            .filter_map(|cell| {
+                let found = &scan.closely[&cell];
+                let separated = self.separable(cell, found, state, components)?;
+                (separated.log > found.log).then_some((cell, separated))
+            })
+            .collect();
+        for (cell, separated) in separated {
+            scan.log_odds[cell] = prior(cell) + separated.log;
+            if let Some(found) = scan.closely.get_mut(&cell) {
+                found.log = separated.log;
+                found.refined = Some(separated);
+            }
         }
     }
 
@@ -103,28 +129,15 @@ impl CauseTable<'_, '_> {
                         .filter(|(_, forms)| !is_there(forms))
                         .collect::<Vec<_>>()
                 };
-                let refined = climb(*free, start, &near, &value, &|_, _| 0.0);
-                let as_listed = refined.and_then(|(free, log, amplitude)| {
-                    let groups = free.groups(self.survey, &values, true);
-                    let forms = self.forms_of(groups.get(found.shape.0)?, found.shape.1)?;
-                    Some((
-                        free,
-                        Refined {
-                            forms,
-                            shape: None,
-                            log,
-                            amplitude,
-                        },
-                    ))
-                });
-                let (free, log) = match &as_listed {
-                    Some((free, refined)) => (*free, refined.log),
-                    None => (*free, start.0),
-                };
-                let separable = self.separable(&free, state, others);
-                separable
-                    .filter(|separable| separable.log > log && !is_there(&separable.forms))
-                    .or(as_listed.map(|(_, refined)| refined))
+                let (free, log, amplitude) = climb(*free, start, &near, &value, &|_, _| 0.0)?;
+                let groups = free.groups(self.survey, &values, true);
+                let forms = self.forms_of(groups.get(found.shape.0)?, found.shape.1)?;
+                Some(Refined {
+                    forms,
+                    shape: None,
+                    log,
+                    amplitude,
+                })
             }
             (Shapes::Listed(_), [form]) if !form.cause().is_nameless() => {
                 let near = |form: &Form, level| {
@@ -152,6 +165,11 @@ impl CauseTable<'_, '_> {
             }
             _ => None,
         }
+    }
+
+    /// Whether a cell is any function of two variables.
+    fn is_product(&self, cell: usize) -> bool {
+        matches!(&self.cells[cell].shapes, Shapes::Free(free) if matches!(free.over, Over::Product(_)))
     }
 
     /// Whether a cell follows a variable with numbers that a component follows with others.

@@ -2,19 +2,27 @@
 //! many as both multiplied, so that curves with corners and jumps are within reach of a recording.
 
 use super::cause_table::CauseTable;
-use super::cell::{CellShape, FreeShape, Over, ShapeGroup, density, fields, over_fields, support};
-use super::scan::Refined;
+use super::cell::{
+    CellShape, FreeShape, Over, ShapeGroup, Shapes, cornered, density, fields, over_fields, support,
+};
+use super::scan::{CellEvidence, Refined};
 use super::state::{CellColumns, Component, KnownState};
 use crate::criteria::cells::{LENGTHS, NU};
-use crate::effect::{Basis, Law, Motion};
+use crate::effect::{Basis, Form, Law, Motion};
 use nalgebra::DMatrix;
+use std::collections::BTreeSet;
 
-/// Functions of each variable.
+/// Functions of each variable while both are estimated.
 const COUNT: usize = Basis::CURVE;
+/// Functions of the one that stays free in the end: what jumps needs many.
+const FINELY: usize = 40;
 /// Turns of estimating one curve given the other.
 const TURNS: usize = 8;
 /// Gain of ln of the evidence below which no further turn is made.
 const ENOUGH: f64 = 0.1;
+
+/// Spectra of a curve: smooth ones of some correlation lengths, and one with corners.
+const SPECTRA: usize = 6;
 
 type Weights = [f64; COUNT];
 
@@ -28,13 +36,25 @@ struct Half {
 }
 
 impl CauseTable<'_, '_> {
-    /// A product as one curve times another, each in its likeliest spectrum; none of what is no product.
+    /// A product as one curve times another, each in its likeliest spectrum and with the numbers of its variables that a scan found; none of what
+    /// is no product.
     pub(crate) fn separable(
         &self,
-        free: &FreeShape,
+        cell: usize,
+        found: &CellEvidence,
         state: &KnownState,
         others: &[&Component],
     ) -> Option<Refined> {
+        let Shapes::Free(free) = &self.cells[cell].shapes else {
+            return None;
+        };
+        let mut free = *free;
+        if let Some(refined) = &found.refined {
+            let law = *refined.forms.first()?.term()?.law();
+            free.of = law.first.of;
+            free.over = Over::Product(law.times?.of);
+        }
+        let free = &free;
         let Over::Product(other) = free.over else {
             return None;
         };
@@ -43,31 +63,51 @@ impl CauseTable<'_, '_> {
             return None;
         };
         let supports = [first, second];
+        let mut curves = [(self.first_curve(free, supports, state, others)?, 0.0); 2];
         let mut best: Option<Refined> = None;
-        let mut weights = self.first_curve(free, supports, state, others)?;
-        let mut cost = 0.0;
         let mut last = f64::NEG_INFINITY;
         for turn in 0..TURNS {
             let given = turn % 2;
-            let mut half = self.half(free, supports, (given, weights), state, others)?;
-            // What the numbers of the curve that is given cost when it was free.
-            if turn > 0 {
-                half.refined.log += cost;
-                if let Some(shape) = &mut half.refined.shape {
-                    shape.log_weight += cost;
-                }
-                let log = half.refined.log;
-                if best.as_ref().is_none_or(|best| log > best.log) {
-                    best = Some(half.refined);
-                }
-                if log < last + ENOUGH && turn > 1 {
-                    break;
-                }
-                last = log;
+            let half = self.half(
+                free,
+                (supports, COUNT),
+                (given, curves[given]),
+                state,
+                others,
+            )?;
+            curves[1 - given] = (half.weights, half.cost);
+            if turn == 0 {
+                continue;
             }
-            (weights, cost) = (half.weights, half.cost);
+            let log = half.refined.log;
+            if best.as_ref().is_none_or(|best| log > best.log) {
+                best = Some(half.refined);
+            }
+            if log < last + ENOUGH {
+                break;
+            }
+            last = log;
         }
-        best
+        for given in 0..2 {
+            let half = self.half(
+                free,
+                (supports, FINELY),
+                (given, curves[given]),
+                state,
+                others,
+            );
+            let half = half.map(|half| half.refined);
+            best = best
+                .into_iter()
+                .chain(half)
+                .max_by(|a, b| a.log.total_cmp(&b.log));
+        }
+        let keys: BTreeSet<String> = others
+            .iter()
+            .flat_map(|component| &component.forms)
+            .map(Form::key)
+            .collect();
+        best.filter(|best| best.forms.iter().all(|form| !keys.contains(&form.key())))
     }
 
     /// A curve of the first variable from the likeliest product of few functions of each.
@@ -111,12 +151,13 @@ impl CauseTable<'_, '_> {
         Some(weights)
     }
 
-    /// The other curve given one of them: of the first variable if `given` is 0, else of the second.
+    /// The other curve, of so many functions, given one of them, of which the numbers cost something when it was free: of the first variable
+    /// if `given` is 0, else of the second.
     fn half(
         &self,
         free: &FreeShape,
-        supports: [[f64; 2]; 2],
-        (given, weights): (usize, Weights),
+        (supports, functions): ([[f64; 2]; 2], usize),
+        (given, (weights, cost)): (usize, (Weights, f64)),
         state: &KnownState,
         others: &[&Component],
     ) -> Option<Half> {
@@ -131,27 +172,27 @@ impl CauseTable<'_, '_> {
                 Basis::Series {
                     low,
                     high,
-                    count: COUNT,
+                    count: functions,
                 }
             }
         };
         let form = free.term(Law::new(free.of, basis(0)).times(other, basis(1)));
         let fields = fields(free.motion);
-        let count = (LENGTHS.len() as f64).ln();
-        let shape = |length: &f64| {
-            let curve = density(COUNT - 1, *length)
-                .into_iter()
-                .map(|share| 0.5 * share);
+        let smooth = LENGTHS.iter().map(|length| density(functions - 1, *length));
+        let spectra: Vec<Vec<f64>> = smooth.chain([cornered(functions - 1)]).collect();
+        let log_weight = cost - (SPECTRA as f64).ln();
+        let shape = |curve: Vec<f64>| {
+            let curve = curve.into_iter().map(|share| 0.5 * share);
             let shares = std::iter::once(0.5).chain(curve).collect();
             CellShape {
                 shares: over_fields(shares, free.motion, fields),
-                log_weight: -count,
+                log_weight,
                 is_bent: false,
             }
         };
         let group = ShapeGroup {
             forms: vec![form.clone()],
-            shapes: LENGTHS.iter().map(shape).collect(),
+            shapes: spectra.into_iter().map(shape).collect(),
             positive: false,
             largest: f64::INFINITY,
         };
@@ -166,14 +207,14 @@ impl CauseTable<'_, '_> {
         });
         let (shape, evidence) = found?;
         let coefficients = state.likeliest(&block, &across, (shape, evidence.amplitude))?;
-        let unfolded = DMatrix::from_fn(COUNT, fields, |k, field| {
-            coefficients[place(free.motion, fields, COUNT, k, field)]
+        let unfolded = DMatrix::from_fn(functions, fields, |k, field| {
+            coefficients[place(free.motion, fields, functions, k, field)]
         });
         let whole = *NU + state.rows.square;
         let gain = -0.5 * (state.rows.freedom + *NU) * (1.0 - evidence.fit / whole).max(1e-9).ln();
         let leading = leading(&unfolded)?;
         let mut weights = [0.0; COUNT];
-        weights.copy_from_slice(&leading);
+        weights.copy_from_slice(&leading[..COUNT]);
         Some(Half {
             refined: Refined {
                 forms: vec![form],
@@ -182,7 +223,7 @@ impl CauseTable<'_, '_> {
                 amplitude: evidence.amplitude,
             },
             weights,
-            cost: log - gain,
+            cost: log - cost - gain,
         })
     }
 }
