@@ -58,10 +58,19 @@ impl CauseTable<'_, '_> {
             }
             found.refined = Some(closer);
         }
+    }
+
+    /// Gives the best cell of a scan and products near it the shape of one curve times another where that says more.
+    pub(crate) fn separate(
+        &self,
+        scan: &mut CellScan,
+        state: &KnownState,
+        components: &[&Component],
+    ) {
+        let Some(best) = scan.best() else { return };
+        let least = 0.8 * scan.log_odds[best];
         let mut products: Vec<usize> = scan.closely.keys().copied().collect();
-        products.retain(|cell| {
-            self.is_product(*cell) && (Some(*cell) == best || is_near(scan.log_odds[*cell]))
-        });
+        products.retain(|cell| self.is_product(*cell) && scan.log_odds[*cell] >= least);
         products.sort_by(|a, b| {
             scan.log_odds[*b]
                 .total_cmp(&scan.log_odds[*a])
@@ -77,8 +86,8 @@ impl CauseTable<'_, '_> {
             })
             .collect();
         for (cell, separated) in separated {
-            scan.log_odds[cell] = prior(cell) + separated.log;
             if let Some(found) = scan.closely.get_mut(&cell) {
+                scan.log_odds[cell] += separated.log - found.log;
                 found.log = separated.log;
                 found.refined = Some(separated);
             }

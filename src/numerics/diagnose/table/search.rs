@@ -97,6 +97,7 @@ impl ComponentSearch for CauseTable<'_, '_> {
         }
         // What was unlikely before is asked again when the likely ones are used up.
         self.likely = scan.order.iter().copied().take(*LIKELY).collect();
+        self.separate(&mut scan, &state, &now);
         let best = scan.best().filter(|best| scan.log_odds[*best] >= price)?;
         let found = &scan.closely[&best];
         let new = components
@@ -284,7 +285,10 @@ impl CauseTable<'_, '_> {
                     .chain(self.near(&components[i]))
                     .chain(self.over_its_variable(&components[i]))
                     .collect();
-                let scan = self.scan_some(&alike, &state, &rest, 5, &near);
+                let mut scan = self.scan_some(&alike, &state, &rest, 5, &near);
+                if scan.best().is_some_and(|best| best != cell) {
+                    self.separate(&mut scan, &state, &rest);
+                }
                 let Some(best) = scan.best() else { continue };
                 let prior = self.log_prior(cell, rest.iter().map(|other| other.cell));
                 let stays = prior + self.log_evidence(&components[i], &state, &rest);
