@@ -203,7 +203,7 @@ fn a_bag_that_is_cut_gives_its_beginning_and_says_that_the_rest_is_lost() {
                 found.len(),
                 all.len()
             );
-            let loss = loss.expect("a loss");
+            let loss = loss.unwrap();
             assert!(loss.contains("lost") && loss.contains("cut"), "{loss}");
             before = found.len();
         }

@@ -35,23 +35,23 @@ stages:
 
 /// Exit code, stdout and stderr of `check` with these files.
 fn checked(robot: &str, pipeline: &str, arm: &str, points: &str) -> (i32, String, String) {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     for (name, text) in [
         ("robot.yaml", robot),
         ("pipeline.yaml", pipeline),
         ("arm.csv", arm),
         ("points.csv", points),
     ] {
-        std::fs::write(folder.path().join(name), text).expect("a file");
+        std::fs::write(folder.path().join(name), text).unwrap();
     }
     let output = calib(folder.path(), &["check", "pipeline.yaml"], "");
     assert!(
         !folder.path().join(".calib").exists(),
         "check writes nothing"
     );
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
     (
-        output.status.code().expect("a code"),
+        output.status.code().unwrap(),
         text(output.stdout),
         text(output.stderr),
     )
@@ -71,14 +71,14 @@ fn a_sound_pipeline_is_ready_and_shows_its_graph_on_demand() {
             "ready     2 stages can run: calib run pipeline.yaml\n"
         )
     );
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     for (name, text) in [
         ("robot.yaml", ROBOT),
         ("pipeline.yaml", PIPELINE),
         ("arm.csv", ARM),
         ("points.csv", POINTS),
     ] {
-        std::fs::write(folder.path().join(name), text).expect("a file");
+        std::fs::write(folder.path().join(name), text).unwrap();
     }
     let out = calib(folder.path(), &["check", "pipeline.yaml", "--details"], "").stdout;
     let out = String::from_utf8_lossy(&out).into_owned();
@@ -166,8 +166,8 @@ fn lines_that_init_marked_are_listed_and_are_no_faults() {
 
 /// Exit code and stderr of a command on the pipeline, with a good robot and data of two days.
 fn told(command: &str, pipeline: &str, tuesday: &str) -> (i32, String) {
-    let folder = tempfile::tempdir().expect("a folder");
-    std::fs::create_dir(folder.path().join("tue")).expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("tue")).unwrap();
     let files = [
         ("robot.yaml", ROBOT),
         ("pipeline.yaml", pipeline),
@@ -178,12 +178,12 @@ fn told(command: &str, pipeline: &str, tuesday: &str) -> (i32, String) {
         .into_iter()
         .chain([("tue/arm.csv", ARM), ("tue/points.csv", tuesday)])
     {
-        std::fs::write(folder.path().join(name), text).expect("a file");
+        std::fs::write(folder.path().join(name), text).unwrap();
     }
     let output = calib(folder.path(), &[command, "pipeline.yaml"], "");
     (
-        output.status.code().expect("a code"),
-        String::from_utf8(output.stderr).expect("UTF-8"),
+        output.status.code().unwrap(),
+        String::from_utf8(output.stderr).unwrap(),
     )
 }
 
@@ -288,7 +288,7 @@ fn check_of_the_data_fits_base_and_geometry_and_names_rows_that_have_no_partner(
         let (s, c) = q[0].to_radians().sin_cos();
         let (t, d) = q[1].to_radians().sin_cos();
         let (along, up) = (800.0 * d, 400.0 - 800.0 * t);
-        writeln!(arm, "P{k},{},{}", q[0], q[1]).expect("text");
+        writeln!(arm, "P{k},{},{}", q[0], q[1]).unwrap();
         // The last five were measured under other names.
         let name = if k < 35 {
             format!("P{k}")
@@ -302,9 +302,9 @@ fn check_of_the_data_fits_base_and_geometry_and_names_rows_that_have_no_partner(
             along * s + 50.0 * c,
             up
         )
-        .expect("text");
+        .unwrap();
     }
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let fits = "  - uses: split\n    with: {by: every, n: 4}\n  - id: nominal\n    uses: identify\n    with: {effects: [base_frame]}\n\
                 \x20 - id: geometry\n    uses: identify\n    with: {effects: [base_frame, tool_offset, joint_offset, link_geometry]}\n";
     let pipeline = format!("{PIPELINE}{fits}");
@@ -314,7 +314,7 @@ fn check_of_the_data_fits_base_and_geometry_and_names_rows_that_have_no_partner(
         ("arm.csv", &arm),
         ("points.csv", &points),
     ] {
-        std::fs::write(folder.path().join(name), text).expect("a file");
+        std::fs::write(folder.path().join(name), text).unwrap();
     }
     let output = calib(
         folder.path(),
@@ -348,7 +348,7 @@ fn check_of_the_data_fits_base_and_geometry_and_names_rows_that_have_no_partner(
     assert!(told.contains("geometry  cached"), "{told}");
     let diagnosed =
         format!("{PIPELINE}  - uses: split\n    with: {{by: every, n: 4}}\n  - uses: diagnose\n");
-    std::fs::write(folder.path().join("diagnosed.yaml"), diagnosed).expect("a file");
+    std::fs::write(folder.path().join("diagnosed.yaml"), diagnosed).unwrap();
     assert_eq!(
         calib(
             folder.path(),

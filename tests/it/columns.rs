@@ -51,7 +51,7 @@ fn line(field: &Value, about: &str) -> String {
                 "0.001"
             };
             let [least, most] =
-                ["min", "max"].map(|end| field["constraints"][end].as_f64().expect("a number"));
+                ["min", "max"].map(|end| field["constraints"][end].as_f64().unwrap());
             format!(
                 "\"constraints\": {{\"min\": {least}, \"max\": {most}}}, \"diff\": {{\"atol\": {close}}}, "
             )

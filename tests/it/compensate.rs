@@ -38,7 +38,7 @@ fn a_cartesian_pose_is_found_and_reached_within_the_limits() {
     assert!((placed.translation - wanted.pose.translation).norm() < 1e-9);
     assert!((placed.rotation - wanted.pose.rotation).norm() < 1e-9);
     for (joint, q) in robot.description().joints.iter().zip(&found) {
-        let [lower, upper] = joint.limits.expect("limits");
+        let [lower, upper] = joint.limits.unwrap();
         assert!((lower..=upper).contains(q));
     }
 }
@@ -75,7 +75,7 @@ fn a_redundant_arm_moves_its_joints_no_more_than_needed() {
         .clone()
         .svd(true, true)
         .solve(&(&jacobian * nalgebra::DVector::from_vec(change)), 1e-12)
-        .expect("a solution");
+        .unwrap();
     assert!((solved.norm_squared() / length - 1.0).abs() < 1e-6);
 }
 
@@ -121,9 +121,9 @@ stages:
 pub fn cell() -> &'static Path {
     static CELL: OnceLock<tempfile::TempDir> = OnceLock::new();
     let folder = CELL.get_or_init(|| {
-        let folder = tempfile::tempdir().expect("a folder");
-        std::fs::write(folder.path().join("robot.yaml"), ROBOT).expect("a file");
-        std::fs::write(folder.path().join("pipeline.yaml"), PIPELINE).expect("a file");
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("robot.yaml"), ROBOT).unwrap();
+        std::fs::write(folder.path().join("pipeline.yaml"), PIPELINE).unwrap();
         let output = calib(folder.path(), &["run", "pipeline.yaml", "--quiet"], "");
         assert!(
             output.status.success(),
@@ -144,16 +144,16 @@ pub fn calib(folder: &Path, arguments: &[&str], input: &str) -> Output {
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
-        .expect("calib");
-    let mut pipe = child.stdin.take().expect("a pipe");
+        .unwrap();
+    let mut pipe = child.stdin.take().unwrap();
     // A program that refuses its arguments does not read.
     let _ = std::io::Write::write_all(&mut pipe, input.as_bytes());
     drop(pipe);
-    child.wait_with_output().expect("calib ends")
+    child.wait_with_output().unwrap()
 }
 
 fn text(bytes: &[u8]) -> String {
-    String::from_utf8(bytes.to_vec()).expect("UTF-8")
+    String::from_utf8(bytes.to_vec()).unwrap()
 }
 
 #[test]
@@ -188,10 +188,10 @@ fn only_the_numbers_of_joints_change_in_a_text_of_targets() {
     let first: f64 = after[1]
         .split(';')
         .nth(1)
-        .expect("a field")
+        .unwrap()
         .replace(',', ".")
         .parse()
-        .expect("a number");
+        .unwrap();
     assert!((first - 10.5).abs() > 1e-3 && (first - 10.5).abs() < 0.5);
 }
 
@@ -206,11 +206,7 @@ fn units_of_targets_are_written_as_in_headers_of_recordings() {
             &input,
         );
         assert!(output.status.success(), "{input}{}", text(&output.stderr));
-        text(&output.stdout)
-            .lines()
-            .nth(1)
-            .expect("a row")
-            .to_string()
+        text(&output.stdout).lines().nth(1).unwrap().to_string()
     };
     let expected = joints(|n| format!("q{n}_deg"));
     assert_ne!(expected, row.trim_end());
@@ -242,11 +238,11 @@ fn what_is_known_of_a_target_stands_behind_it() {
     assert!(
         lines
             .next()
-            .expect("a header")
+            .unwrap()
             .ends_with("q6_deg,uncorrected_mm,residual_mm,iterations,sigma_mm,u95_mm,remark")
     );
-    let first: Vec<&str> = lines.next().expect("a row").split(',').collect();
-    let number = |k: usize| first[k].parse::<f64>().expect("a number");
+    let first: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let number = |k: usize| first[k].parse::<f64>().unwrap();
     assert!((0.1..3.0).contains(&number(6)), "{first:?}");
     assert!(
         number(7) < 1e-5 && (2.0..8.0).contains(&number(8)),
@@ -257,10 +253,7 @@ fn what_is_known_of_a_target_stands_behind_it() {
     assert!((1.6..2.0).contains(&(number(10) / number(9))), "{first:?}");
     assert_eq!(first[11], "");
     assert!(
-        lines
-            .next()
-            .expect("a row")
-            .contains("joint 6 beyond its limits"),
+        lines.next().unwrap().contains("joint 6 beyond its limits"),
         "{said}"
     );
     assert!(text(&output.stderr).contains("1 of them leaves the joint limits"));
@@ -276,7 +269,7 @@ fn joints_and_the_pose_they_stand_for_are_corrected_alike() {
         },
         None,
     )
-    .expect("a robot");
+    .unwrap();
     let q = [10.0f64, 20.0, -30.0, 25.0, 40.0, 10.0].map(f64::to_radians);
     let pose = RobotModel::new(robot.robot).forward(&q);
     let [x, y, z]: [f64; 3] = (pose.translation * 1e3).into();
@@ -299,9 +292,9 @@ fn joints_and_the_pose_they_stand_for_are_corrected_alike() {
         let row: Vec<f64> = said
             .lines()
             .nth(1)
-            .expect("a row")
+            .unwrap()
             .split(',')
-            .map(|cell| cell.parse().expect("a number"))
+            .map(|cell| cell.parse().unwrap())
             .collect();
         row[row.len() - 6..].to_vec()
     };
@@ -391,7 +384,7 @@ fn a_target_that_is_not_reached_gets_no_joints_and_the_others_do() {
         }
         assert_eq!(rows[2][4..10], [""; 6]);
         // The arm reaches 1.4 m from its second axis, which stands 0.4 m above the base.
-        let off: f64 = rows[2][11].parse().expect("a residual");
+        let off: f64 = rows[2][11].parse().unwrap();
         assert!((6000.0..7000.0).contains(&off), "{said}");
         assert!(
             said.lines()
@@ -450,14 +443,13 @@ fn a_target_that_is_not_reached_is_null_in_parquet() {
         ("y_mm", column([40.0; 2])),
         ("z_mm", column([900.0; 2])),
     ];
-    let batch = RecordBatch::try_from_iter(axes).expect("a batch");
-    let file = std::fs::File::create(cell().join("points.parquet")).expect("a file");
-    let mut writer =
-        parquet::arrow::ArrowWriter::try_new(file, batch.schema(), None).expect("a writer");
+    let batch = RecordBatch::try_from_iter(axes).unwrap();
+    let file = std::fs::File::create(cell().join("points.parquet")).unwrap();
+    let mut writer = parquet::arrow::ArrowWriter::try_new(file, batch.schema(), None).unwrap();
     writer
         .write(&batch)
         .and_then(|()| writer.close().map(|_| ()))
-        .expect("written");
+        .unwrap();
     let output = calib(
         cell(),
         &[
@@ -476,27 +468,18 @@ fn a_target_that_is_not_reached_is_null_in_parquet() {
         "{}",
         text(&output.stderr)
     );
-    let file = std::fs::File::open(cell().join("points_c.parquet"))
-        .expect("written though a row is not reached");
-    let builder = parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder::try_new(file)
-        .expect("Parquet");
-    let batch = builder
-        .build()
-        .expect("a reader")
-        .next()
-        .expect("a batch")
-        .expect("rows");
+    let file = std::fs::File::open(cell().join("points_c.parquet")).unwrap();
+    let builder =
+        parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder::try_new(file).unwrap();
+    let batch = builder.build().unwrap().next().unwrap().unwrap();
     for joint in 1..=6 {
         let q = batch
             .column_by_name(&format!("q{joint}_rad"))
-            .expect("a joint")
+            .unwrap()
             .as_primitive::<Float64Type>();
         assert!(q.is_valid(0) && q.value(0).is_finite() && q.is_null(1));
     }
-    let remark = batch
-        .column_by_name("remark")
-        .expect("remarks")
-        .as_string::<i32>();
+    let remark = batch.column_by_name("remark").unwrap().as_string::<i32>();
     assert!(remark.value(0).is_empty() && remark.value(1).starts_with("not reached, 6"));
 }
 
@@ -526,7 +509,7 @@ fn quiet_keeps_warnings_and_takes_the_summary() {
 #[test]
 fn partial_targets_of_a_program_stay_where_that_is_wished_and_nothing_is_written_otherwise() {
     let program = "PTP {A1 10,A2 20,A3 -30,A4 5,A5 40,A6 0}\r\nLIN {X 10,Y 20}\r\nPTP {A1 20}\r\n";
-    std::fs::write(cell().join("partial.src"), program).expect("a file");
+    std::fs::write(cell().join("partial.src"), program).unwrap();
     let run = |more: &[&str]| {
         let output = calib(
             cell(),
@@ -574,8 +557,8 @@ fn partial_targets_of_a_program_stay_where_that_is_wished_and_nothing_is_written
         )),
         "{told}"
     );
-    let written = std::fs::read_to_string(cell().join("partial_c.src")).expect("written");
-    let (mark, rest) = written.split_once('\n').expect("lines");
+    let written = std::fs::read_to_string(cell().join("partial_c.src")).unwrap();
+    let (mark, rest) = written.split_once('\n').unwrap();
     assert!(mark.starts_with("; corrected by calib"), "{mark}");
     assert!(
         rest.starts_with("PTP {A1 10.") || rest.starts_with("PTP {A1 9."),

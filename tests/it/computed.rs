@@ -58,9 +58,9 @@ fn told(minus: &str, noise_mm: f64) -> String {
             point.y,
             point.z
         )
-        .expect("text");
+        .unwrap();
     }
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let minus = if minus.is_empty() {
         String::new()
     } else {
@@ -71,7 +71,7 @@ fn told(minus: &str, noise_mm: f64) -> String {
         ("pipeline.yaml", &PIPELINE.replace("MINUS", &minus)),
         ("data.csv", &text),
     ] {
-        std::fs::write(folder.path().join(name), text).expect("a file");
+        std::fs::write(folder.path().join(name), text).unwrap();
     }
     let output = calib(
         folder.path(),

@@ -40,8 +40,8 @@ fn the_table_has_the_variances_of_the_parameters_and_every_pair_once() {
             .0
             .iter()
             .find(|pair| pair.parameter == row.name && pair.other == row.name)
-            .expect("its variance");
-        let sigma = row.sigma.expect("free");
+            .unwrap();
+        let sigma = row.sigma.unwrap();
         assert!(
             (own.covariance.sqrt() / sigma - 1.0).abs() < 1e-9,
             "{}: {} and {sigma}",
@@ -56,7 +56,7 @@ fn the_table_has_the_variances_of_the_parameters_and_every_pair_once() {
                 .0
                 .iter()
                 .find(|row| row.parameter == name && row.other == name)
-                .expect("there")
+                .unwrap()
                 .covariance
         };
         let bound = (variance(&pair.parameter) * variance(&pair.other)).sqrt();
@@ -65,11 +65,8 @@ fn the_table_has_the_variances_of_the_parameters_and_every_pair_once() {
             "{pair:?}"
         );
     }
-    let frame = table.to_frame().expect("a frame that its schema allows");
-    assert_eq!(
-        CovarianceTable::from_frame(&frame).expect("reads back"),
-        table
-    );
+    let frame = table.to_frame().unwrap();
+    assert_eq!(CovarianceTable::from_frame(&frame).unwrap(), table);
 }
 
 #[test]
@@ -79,14 +76,14 @@ fn a_stored_covariance_says_of_every_point_what_the_fit_said() {
     let parameters = Parameters::of("geometry", &model, &fitted, &[], None);
     let read = parameters
         .model(truth.robot.clone(), &[], Load::GravityTorque)
-        .expect("a model");
+        .unwrap();
     let covariance = CovarianceTable::of(&model, &fitted, None)
         .of_model(&read)
-        .expect("a covariance");
+        .unwrap();
     let want = fitted
         .covariance
         .as_ref()
-        .expect("a covariance")
+        .unwrap()
         .of_predictions(&model, &data);
     let arm = IdentifiedArm::new(read, None);
     let uncertainty = Uncertainty::new(&arm, covariance, Scatter::default());

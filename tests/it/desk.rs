@@ -170,15 +170,12 @@ pub fn missing(why: &str) {
 /// Notes that this test, or a part of it, has nothing to test.
 pub fn skipped(why: &str) {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("skipped");
-    std::fs::create_dir_all(&folder).expect("a folder");
-    let test = std::thread::current()
-        .name()
-        .expect("a test")
-        .replace("::", " ");
+    std::fs::create_dir_all(&folder).unwrap();
+    let test = std::thread::current().name().unwrap().replace("::", " ");
     let mut notes = std::fs::OpenOptions::new()
         .create(true)
         .append(true)
         .open(folder.join(test))
-        .expect("a note");
-    writeln!(notes, "{why}").expect("a note");
+        .unwrap();
+    writeln!(notes, "{why}").unwrap();
 }

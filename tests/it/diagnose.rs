@@ -29,10 +29,10 @@ use std::process::Command;
 type Named = BTreeSet<(String, String)>;
 
 fn wanted(value: &Value) -> Named {
-    let text = |entry: &Value, key: &str| entry[key].as_str().expect("a name").to_string();
+    let text = |entry: &Value, key: &str| entry[key].as_str().unwrap().to_string();
     value
         .as_array()
-        .expect("a list")
+        .unwrap()
         .iter()
         .map(|entry| (text(entry, "effect"), text(entry, "where")))
         .collect()
@@ -45,23 +45,23 @@ fn the_practice_cases_are_solved() {
     };
     let mut wrong = Vec::new();
     for case in std::fs::read_dir(&folder)
-        .expect("the folder")
-        .map(|entry| entry.expect("an entry").path())
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
     {
         let Ok(want) = std::fs::read_to_string(case.join("want.json")) else {
             continue;
         };
-        let want: Value = serde_json::from_str(&want).expect("JSON");
+        let want: Value = serde_json::from_str(&want).unwrap();
         let (inputs, stage): (Inputs, Diagnose) =
             pipeline("case", &[("case", &case.display().to_string())], "diagnose");
-        let robot = RobotModel::new(inputs.robot.to_description().expect("a robot"));
+        let robot = RobotModel::new(inputs.robot.to_description().unwrap());
         let data = inputs.recording.measurements();
         let reads = DiagnoseReads {
             robot: inputs.robot,
             recording: inputs.recording,
             split: inputs.split,
         };
-        let tables = Desk::default().run(&stage, reads).expect("a diagnosis");
+        let tables = Desk::default().run(&stage, reads).unwrap();
         let findings: Findings = table(&tables).remove(0);
         let found: Named = findings
             .0
@@ -71,10 +71,7 @@ fn the_practice_cases_are_solved() {
         let verdict: Verdict = table(&tables).remove(0);
         let row = &verdict.0[0];
         // Held-out rows come down to what a complete model of so many parameters leaves.
-        let (after, floor) = (
-            row.after_rms_mm.expect("held-out rows"),
-            row.noise_floor_mm.expect("lengths"),
-        );
+        let (after, floor) = (row.after_rms_mm.unwrap(), row.noise_floor_mm.unwrap());
         let wanted = wanted(&want["effects"]);
         let is = |(effect, place): &(String, String), found: &(String, String)| {
             effect
@@ -106,9 +103,7 @@ fn the_practice_cases_are_solved() {
         assert!(predictions.0.len() >= 160);
         // The table of parameters alone is the corrected model, but for products of small motions of the base.
         let parameters: Parameters = table(&tables).remove(0);
-        let model = parameters
-            .model(robot, &[], Load::GravityTorque)
-            .expect("a model");
+        let model = parameters.model(robot, &[], Load::GravityTorque).unwrap();
         for (point, row) in model.predict(&data).iter().zip(&predictions.0) {
             let apart = (point * 1e3 - Vector3::new(row.x_mm, row.y_mm, row.z_mm)).norm();
             assert!(
@@ -128,13 +123,13 @@ fn calib(arguments: &[&str], folder: &Path) -> String {
         .args(arguments)
         .current_dir(folder)
         .output()
-        .expect("calib");
+        .unwrap();
     assert!(
         output.status.success(),
         "{arguments:?}: {}",
         String::from_utf8_lossy(&output.stderr)
     );
-    String::from_utf8(output.stdout).expect("UTF-8")
+    String::from_utf8(output.stdout).unwrap()
 }
 
 /// The exit code and what is printed on stdout.
@@ -143,16 +138,16 @@ fn ended(arguments: &[&str], folder: &Path) -> (Option<i32>, String) {
         .args(arguments)
         .current_dir(folder)
         .output()
-        .expect("calib");
+        .unwrap();
     (
         output.status.code(),
-        String::from_utf8(output.stdout).expect("UTF-8"),
+        String::from_utf8(output.stdout).unwrap(),
     )
 }
 
 /// Diagnoses a concealed recording of the twin: the document, and what the seal holds.
 fn blind(family: &str, seed: &str) -> (Value, Value) {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let mut arguments = vec![
         "simulate", "conceal", "--out", "sealed", "--cases", "1", "--seed", seed, "--points", "120",
     ];
@@ -176,11 +171,10 @@ fn blind(family: &str, seed: &str) -> (Value, Value) {
         ],
         folder.path(),
     );
-    let truth =
-        std::fs::read_to_string(folder.path().join("sealed/sealed/c0001.json")).expect("the truth");
+    let truth = std::fs::read_to_string(folder.path().join("sealed/sealed/c0001.json")).unwrap();
     (
-        serde_json::from_str(&said).expect("JSON"),
-        serde_json::from_str(&truth).expect("JSON"),
+        serde_json::from_str(&said).unwrap(),
+        serde_json::from_str(&truth).unwrap(),
     )
 }
 
@@ -192,7 +186,7 @@ fn a_recording_without_a_missing_effect_has_no_findings() {
     assert!(
         said["not_observable"]
             .as_array()
-            .expect("a list")
+            .unwrap()
             .iter()
             .any(|line| line.as_str().unwrap().contains("tracker_scale"))
     );
@@ -215,12 +209,8 @@ fn effects_of_the_twin_are_named_and_placed() {
         let (said, truth) = blind(family, seed);
         let found = wanted(&said["findings"]);
         assert_eq!(found, wanted(&truth["want"]), "{family}: {said:#}");
-        let rms = |when: &str| {
-            said[when]["validate_rms_mm"]
-                .as_f64()
-                .expect("held-out rows")
-        };
-        let floor = said["noise_floor_mm"].as_f64().expect("a number");
+        let rms = |when: &str| said[when]["validate_rms_mm"].as_f64().unwrap();
+        let floor = said["noise_floor_mm"].as_f64().unwrap();
         // What is hardly larger than the noise may gain nothing on some fifty points.
         let visible = rms("before") > 1.2 * floor;
         assert!(
@@ -260,12 +250,12 @@ stages:
 "
     );
     let folder = concealed("backlash", "31", "40");
-    std::fs::write(folder.path().join("p.yaml"), pipeline).expect("written");
+    std::fs::write(folder.path().join("p.yaml"), pipeline).unwrap();
     serde_json::from_str(&calib(
         &["diagnose", "p.yaml", "--json", "--quiet"],
         folder.path(),
     ))
-    .expect("JSON")
+    .unwrap()
 }
 
 #[test]
@@ -275,7 +265,7 @@ fn lost_motion_that_heavy_loads_decide_is_one_cause_with_its_gap_and_its_torque(
         3,
         120,
     );
-    let findings = said["findings"].as_array().expect("a list");
+    let findings = said["findings"].as_array().unwrap();
     assert_eq!(
         wanted(&said["findings"]),
         Named::from([("backlash".into(), "joint 3".into())]),
@@ -283,24 +273,24 @@ fn lost_motion_that_heavy_loads_decide_is_one_cause_with_its_gap_and_its_torque(
     );
     let gap = &findings[0]["parameters"][0];
     let (value, sigma) = (
-        gap["value"].as_f64().expect("a number"),
-        gap["sigma"].as_f64().expect("a number"),
+        gap["value"].as_f64().unwrap(),
+        gap["sigma"].as_f64().unwrap(),
     );
     assert!((value - 30.0).abs() < 3.0 * sigma && sigma < 3.0, "{gap}");
-    let statement = findings[0]["statement"].as_str().expect("a sentence");
+    let statement = findings[0]["statement"].as_str().unwrap();
     let torque: f64 = statement
         .split(" Nm")
         .next()
         .and_then(|text| text.rsplit(' ').next())
-        .expect("Nm")
+        .unwrap()
         .parse()
-        .expect("a number");
+        .unwrap();
     assert!((9.0..=15.0).contains(&torque), "{statement}");
 }
 
 #[test]
 fn a_joint_of_the_wrong_sign_is_named_with_the_line_that_mends_it() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let arguments = [
         "simulate", "conceal", "--out", "sealed", "--cases", "1", "--seed", "901", "--points",
         "120", "--nulls", "1",
@@ -310,21 +300,21 @@ fn a_joint_of_the_wrong_sign_is_named_with_the_line_that_mends_it() {
         folder.path(),
     );
     let file = folder.path().join("sealed/recordings/c0001/controller.csv");
-    let text = std::fs::read_to_string(&file).expect("the log");
+    let text = std::fs::read_to_string(&file).unwrap();
     let column = text
         .lines()
         .next()
         .and_then(|head| head.split(',').position(|name| name == "q4_deg"))
-        .expect("q4_deg");
+        .unwrap();
     let reverse = |(row, line): (usize, &str)| -> String {
         let mut cells: Vec<String> = line.split(',').map(String::from).collect();
         if row > 0 {
-            cells[column] = (-cells[column].parse::<f64>().expect("a number")).to_string();
+            cells[column] = (-cells[column].parse::<f64>().unwrap()).to_string();
         }
         cells.join(",")
     };
     let turned: Vec<String> = text.lines().enumerate().map(reverse).collect();
-    std::fs::write(&file, turned.join("\n")).expect("written");
+    std::fs::write(&file, turned.join("\n")).unwrap();
     let pipeline = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("pipelines/case/pipeline.yaml")
         .display()
@@ -339,8 +329,8 @@ fn a_joint_of_the_wrong_sign_is_named_with_the_line_that_mends_it() {
     ];
     let (code, said) = ended(&asked, folder.path());
     assert_eq!(code, Some(10), "{said}");
-    let said: Value = serde_json::from_str(&said).expect("JSON");
-    let findings = said["findings"].as_array().expect("a list");
+    let said: Value = serde_json::from_str(&said).unwrap();
+    let findings = said["findings"].as_array().unwrap();
     assert_eq!(findings.len(), 1, "{said:#}");
     assert_eq!(
         (&said["verdict"], &findings[0]["effect"]),
@@ -348,10 +338,7 @@ fn a_joint_of_the_wrong_sign_is_named_with_the_line_that_mends_it() {
     );
     let sign = "sign: [1, 1, 1, -1, 1, 1]";
     assert!(
-        findings[0]["statement"]
-            .as_str()
-            .expect("a sentence")
-            .contains(sign),
+        findings[0]["statement"].as_str().unwrap().contains(sign),
         "{said:#}"
     );
     // The line of YAML mends it, and physics is asked.
@@ -367,7 +354,7 @@ fn a_joint_of_the_wrong_sign_is_named_with_the_line_that_mends_it() {
         &[&["diagnose", "p.yaml", "--json", "--quiet"], &CASE[..]].concat(),
         here,
     );
-    let mended: Value = serde_json::from_str(&mended).expect("JSON");
+    let mended: Value = serde_json::from_str(&mended).unwrap();
     assert_eq!(
         (&mended["verdict"], &mended["findings"]),
         (&"nothing_missing".into(), &serde_json::json!([])),
@@ -377,7 +364,7 @@ fn a_joint_of_the_wrong_sign_is_named_with_the_line_that_mends_it() {
 
 #[test]
 fn what_another_simulation_knows_is_not_missing_from_it() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let arguments = [
         "simulate", "conceal", "--out", "sealed", "--cases", "1", "--seed", "931", "--points",
         "120",
@@ -401,7 +388,7 @@ fn what_another_simulation_knows_is_not_missing_from_it() {
     let diagnosed = |simulated: Option<Vec<[f64; 3]>>| {
         let (inputs, stage): (Inputs, Diagnose) =
             pipeline("case", &[("case", &case.display().to_string())], "diagnose");
-        let robot = RobotModel::new(inputs.robot.to_description().expect("a robot"));
+        let robot = RobotModel::new(inputs.robot.to_description().unwrap());
         let data = inputs.recording.measurements();
         let reads = DiagnoseReads {
             recording: inputs.recording,
@@ -415,7 +402,7 @@ fn what_another_simulation_knows_is_not_missing_from_it() {
             },
             ..reads
         };
-        let tables = Desk::default().run(&stage, reads).expect("a diagnosis");
+        let tables = Desk::default().run(&stage, reads).unwrap();
         let findings: Findings = table(&tables).remove(0);
         let found: Named = findings
             .0
@@ -425,16 +412,13 @@ fn what_another_simulation_knows_is_not_missing_from_it() {
         let parameters: Parameters = table(&tables).remove(0);
         (
             found,
-            parameters
-                .model(robot, &[], Load::GravityTorque)
-                .expect("a model"),
+            parameters.model(robot, &[], Load::GravityTorque).unwrap(),
             data,
         )
     };
     let (alone, mut model, data) = diagnosed(None);
-    let truth =
-        std::fs::read_to_string(folder.path().join("sealed/sealed/c0001.json")).expect("the truth");
-    let truth: Value = serde_json::from_str(&truth).expect("JSON");
+    let truth = std::fs::read_to_string(folder.path().join("sealed/sealed/c0001.json")).unwrap();
+    let truth: Value = serde_json::from_str(&truth).unwrap();
     assert_eq!(alone, wanted(&truth["want"]));
     // Beside a rigid arm in a frame of its own the same is missing.
     let rigid = |row: usize| model.robot.forward(data.q(row)).translation;
@@ -465,7 +449,7 @@ fn what_another_simulation_knows_is_not_missing_from_it() {
 
 /// A recording of the twin in `sealed/recordings/c0001` of a new folder.
 fn concealed(family: &str, seed: &str, points: &str) -> tempfile::TempDir {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let arguments = [
         "simulate", "conceal", "--out", "sealed", "--cases", "1", "--seed", seed, "--points",
         points,
@@ -486,7 +470,7 @@ fn refused(arguments: &[&str], folder: &Path) -> (Option<i32>, String) {
         .args(arguments)
         .current_dir(folder)
         .output()
-        .expect("calib");
+        .unwrap();
     (
         output.status.code(),
         String::from_utf8_lossy(&output.stderr).into_owned(),
@@ -498,27 +482,22 @@ fn case_with(folder: &Path, changes: &[(&str, &str)]) {
     let text = std::fs::read_to_string(
         Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/case/pipeline.yaml"),
     )
-    .expect("it");
+    .unwrap();
     let text = changes.iter().fold(text, |text, (from, to)| {
         assert!(text.contains(from), "{from}");
         text.replacen(from, to, 1)
     });
-    std::fs::write(folder.join("p.yaml"), text).expect("written");
+    std::fs::write(folder.join("p.yaml"), text).unwrap();
 }
 
 const CASE: [&str; 2] = ["--set", "case=sealed/recordings/c0001"];
 
 /// The last run of a folder's store, whatever it was for.
 fn newest(folder: &Path) -> String {
-    let runs = std::fs::read_dir(folder.join(".calib/runs")).expect("runs");
-    runs.map(|run| {
-        run.expect("a run")
-            .file_name()
-            .into_string()
-            .expect("UTF-8")
-    })
-    .max()
-    .expect("a run")
+    let runs = std::fs::read_dir(folder.join(".calib/runs")).unwrap();
+    runs.map(|run| run.unwrap().file_name().into_string().unwrap())
+        .max()
+        .unwrap()
 }
 
 #[test]
@@ -535,15 +514,11 @@ fn a_diagnosis_is_shown_again_from_its_run_as_it_was_printed() {
         here,
     );
     let made = [told, calib(&["diagnose", &newest(here), "--json"], here)];
-    let runs = std::fs::read_dir(here.join(".calib/runs"))
-        .expect("runs")
-        .count();
+    let runs = std::fs::read_dir(here.join(".calib/runs")).unwrap().count();
     assert_eq!(calib(&["diagnose", &newest(here)], here), made[0]);
     // Nothing was run, and nothing was computed anew.
     assert_eq!(
-        std::fs::read_dir(here.join(".calib/runs"))
-            .expect("runs")
-            .count(),
+        std::fs::read_dir(here.join(".calib/runs")).unwrap().count(),
         runs
     );
     assert_eq!(
@@ -621,18 +596,18 @@ fn parameters_that_correct_an_outside_simulation_are_not_taken_for_the_robots_ow
     let folder = concealed("joint_compliance", "931", "60");
     let here = folder.path();
     let file = here.join("sealed/recordings/c0001/tracker.csv");
-    let text = std::fs::read_to_string(&file).expect("the tracker's");
+    let text = std::fs::read_to_string(&file).unwrap();
     let column = text
         .lines()
         .next()
         .and_then(|head| head.split(',').position(|name| name == "x_mm"))
-        .expect("x_mm");
+        .unwrap();
     let beside = |(row, line): (usize, &str)| match row {
         0 => format!("{line},sx,sy,sz\n"),
         _ => {
             let cells: Vec<&str> = line.split(',').collect();
             let near = |k: usize| {
-                cells[column + k].parse::<f64>().expect("a number")
+                cells[column + k].parse::<f64>().unwrap()
                     + 0.05 * (row as f64 * (k + 1) as f64).sin()
             };
             format!("{line},{},{},{}\n", near(0), near(1), near(2))
@@ -642,7 +617,7 @@ fn parameters_that_correct_an_outside_simulation_are_not_taken_for_the_robots_ow
         &file,
         text.lines().enumerate().map(beside).collect::<String>(),
     )
-    .expect("written");
+    .unwrap();
     let z = "            z: {column: z_mm, unit: mm}\n";
     let simulated = ["x", "y", "z"]
         .map(|axis| format!("            sim_{axis}: {{column: s{axis}, unit: mm}}\n"))
@@ -652,7 +627,7 @@ fn parameters_that_correct_an_outside_simulation_are_not_taken_for_the_robots_ow
         &[&["diagnose", "p.yaml", "--quiet"], &CASE[..]].concat(),
         here,
     );
-    std::fs::write(here.join("t.csv"), "x_mm,y_mm,z_mm\n600,0,700\n").expect("written");
+    std::fs::write(here.join("t.csv"), "x_mm,y_mm,z_mm\n600,0,700\n").unwrap();
     let table = ".calib/tables/case/diagnose.parameters.parquet";
     let robot = "sealed/recordings/c0001/robot.json";
     let run = newest(here);
@@ -694,8 +669,8 @@ fn parameters_that_correct_an_outside_simulation_are_not_taken_for_the_robots_ow
 /// A table that a run of the pipeline of cases wrote.
 fn table_of<T: calib::table::Table>(folder: &Path, name: &str) -> T {
     let path = folder.join(".calib/tables/case").join(name);
-    calib::table::from_parquet(name, std::fs::read(path).expect("a table"))
-        .expect("a sound table")
+    calib::table::from_parquet(name, std::fs::read(path).unwrap())
+        .unwrap()
         .table
 }
 
@@ -759,7 +734,7 @@ fn proposed_poses_tell_a_finding_from_its_rival_three_times_better_than_random_o
     let command = said
         .lines()
         .find_map(|line| line.trim_start().strip_prefix("calib "))
-        .expect("a command");
+        .unwrap();
     assert!(
         command.ends_with("--separate 1 'link_compliance@link 1'"),
         "{said}"
@@ -769,10 +744,9 @@ fn proposed_poses_tell_a_finding_from_its_rival_three_times_better_than_random_o
         .split(' ')
         .collect();
     let more = ["link_compliance@link 1", "--count", "50", "--json"];
-    let told: Value =
-        serde_json::from_str(&calib(&[&words[..], &more].concat(), here)).expect("JSON");
-    let number = |value: &Value| value.as_f64().expect("a number");
-    let sides = told["separation"].as_array().expect("both");
+    let told: Value = serde_json::from_str(&calib(&[&words[..], &more].concat(), here)).unwrap();
+    let number = |value: &Value| value.as_f64().unwrap();
+    let sides = told["separation"].as_array().unwrap();
     assert_eq!(sides[0]["if"], "base_compliance at base");
     for side in sides {
         assert!(
@@ -784,24 +758,24 @@ fn proposed_poses_tell_a_finding_from_its_rival_three_times_better_than_random_o
     // Measured: recordings without noise, made by the diagnosed model at these poses, and the rival fitted to them with all else.
     let robot = table_of::<Robot>(here, "robot.robot.parquet")
         .to_description()
-        .expect("a robot");
+        .unwrap();
     let parameters: Parameters = table_of(here, "diagnose.parameters.parquet");
     let truth = parameters
         .model(RobotModel::new(robot.clone()), &[], Load::GravityTorque)
-        .expect("a model");
+        .unwrap();
     let data = table_of::<Recording>(here, "ingest.recording.parquet").measurements();
     let prediction: Prediction = table_of(here, "diagnose.prediction.parquet");
     let rows: Vec<usize> = (0..data.rows())
         .filter(|row| !prediction.0[*row].held_out && !prediction.0[*row].suspect)
         .collect();
     let form = told["rival"]["form"].to_string();
-    let parsed: Form = serde_json::from_str(&form).expect("a form");
+    let parsed: Form = serde_json::from_str(&form).unwrap();
     let mut table = parameters.clone();
     let own = table
         .0
         .iter()
         .position(|row| row.effect == "base_compliance")
-        .expect("the finding");
+        .unwrap();
     let row = table.0.remove(own);
     table.0.retain(|row| row.effect != "base_compliance");
     for spec in parsed.parameters(&RobotModel::new(robot.clone())) {
@@ -819,7 +793,7 @@ fn proposed_poses_tell_a_finding_from_its_rival_three_times_better_than_random_o
     }
     let other = table
         .model(RobotModel::new(robot.clone()), &[], Load::GravityTorque)
-        .expect("a model");
+        .unwrap();
     let estimated = |name: &String| {
         table
             .0
@@ -836,7 +810,7 @@ fn proposed_poses_tell_a_finding_from_its_rival_three_times_better_than_random_o
         joints: 6,
         ..Measurements::default()
     };
-    for pose in told["poses"].as_array().expect("poses") {
+    for pose in told["poses"].as_array().unwrap() {
         proposed
             .q
             .extend((1..=6).map(|joint| number(&pose[format!("q{joint}_deg")]).to_radians()));
@@ -861,9 +835,7 @@ fn proposed_poses_tell_a_finding_from_its_rival_three_times_better_than_random_o
         payloads,
     };
     let random = (0..9).map(|seed| {
-        let mut drawn = site
-            .draw(&truth.robot, COUNT, sigma, 70 + seed)
-            .expect("poses");
+        let mut drawn = site.draw(&truth.robot, COUNT, sigma, 70 + seed).unwrap();
         // One payload a pose.
         let count = site.payloads.len();
         let kept: Vec<usize> = (0..COUNT).map(|k| k * count + k % count).collect();
@@ -902,7 +874,7 @@ fn what_no_pose_tells_apart_is_said_with_what_would() {
             &[&["diagnose", "p.yaml", "--quiet", "--json"], &CASE[..]].concat(),
             here,
         );
-        serde_json::from_str(&said).expect("JSON")
+        serde_json::from_str(&said).unwrap()
     };
     // A balancer at a joint of unknown stiffness is a gear error of order 1.
     assert_eq!(
@@ -966,7 +938,7 @@ fn what_no_pose_tells_apart_is_said_with_what_would() {
 #[test]
 fn of_few_rows_no_law_takes_a_size_that_no_gear_has() {
     // 51 rows of an arm with four soft joints and a wrong mass, 34 parameters of the base: gears of 2700 arcsec explained as much of them.
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     case_with(folder.path(), &[]);
     let rows = format!(
         "case={}/tests/it/diagnose/few_rows",
@@ -976,10 +948,10 @@ fn of_few_rows_no_law_takes_a_size_that_no_gear_has() {
         &["diagnose", "p.yaml", "--set", &rows, "--json", "--quiet"],
         folder.path(),
     );
-    let said: Value = serde_json::from_str(&said).expect("JSON");
+    let said: Value = serde_json::from_str(&said).unwrap();
     let findings = said["findings"]
         .as_array()
-        .expect("a list")
+        .unwrap()
         .iter()
         .filter(|finding| finding["effect"] != "outlier");
     let names: Vec<String> = findings

@@ -299,7 +299,7 @@ fn run(entry: &StageEntry, name: &str, settings: &str) -> StageDigest {
             &files
                 .iter()
                 .find(|(name, _)| Path::new(name) == file.0)
-                .expect("a file of the test")
+                .unwrap()
                 .1,
         );
     }
@@ -350,10 +350,7 @@ fn run(entry: &StageEntry, name: &str, settings: &str) -> StageDigest {
 fn equal_inputs_give_equal_tables_unless_the_implementation_has_another_number() {
     let (mut kept, mut unnumbered, mut stale) = (stored(), Vec::new(), Vec::new());
     for (name, folder, settings) in TRIALS {
-        let entry = STAGES
-            .iter()
-            .find(|entry| entry.name == *name)
-            .expect("a stage");
+        let entry = STAGES.iter().find(|entry| entry.name == *name).unwrap();
         let now = run(entry, folder, settings);
         let before = kept.get(*name);
         let moved: Vec<String> = before.map_or(Vec::new(), |before| {

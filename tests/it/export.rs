@@ -17,21 +17,14 @@ fn exported(format: &str) -> String {
         said.contains("not carried: reduction_ratio at joint 3"),
         "{said}"
     );
-    String::from_utf8(output.stdout).expect("UTF-8")
+    String::from_utf8(output.stdout).unwrap()
 }
 
 /// The tool at a joint position by the exported JSON: product of exponentials written out here.
 fn by_json(model: &Value, q: &[f64]) -> [f64; 3] {
-    let three =
-        |value: &Value| -> [f64; 3] { [0, 1, 2].map(|k| value[k].as_f64().expect("a number")) };
+    let three = |value: &Value| -> [f64; 3] { [0, 1, 2].map(|k| value[k].as_f64().unwrap()) };
     let mut point = three(&model["tool"]["point_m"]);
-    for (joint, angle) in model["joints"]
-        .as_array()
-        .expect("joints")
-        .iter()
-        .zip(q)
-        .rev()
-    {
+    for (joint, angle) in model["joints"].as_array().unwrap().iter().zip(q).rev() {
         let (axis, on) = (three(&joint["axis"]), three(&joint["point_m"]));
         let p = [0, 1, 2].map(|k| point[k] - on[k]);
         let cross = [
@@ -52,7 +45,7 @@ fn by_json(model: &Value, q: &[f64]) -> [f64; 3] {
 
 #[test]
 fn tables_and_urdf_are_the_arm_that_was_identified() {
-    let model: Value = serde_json::from_str(&exported("json")).expect("JSON");
+    let model: Value = serde_json::from_str(&exported("json")).unwrap();
     let urdf = exported("urdf");
     let beside = "calib_robot: 1\nname: u\nunits: {length: mm, angle: deg}\nkinematics:\n  urdf: {base: base_link, tip: tool0}\n";
     let label = |text| RobotFileText {
@@ -67,9 +60,9 @@ fn tables_and_urdf_are_the_arm_that_was_identified() {
                 text: &urdf,
             }),
         )
-        .expect("a URDF"),
-        read_calib(label(&exported("dh")), None).expect("a DH table"),
-        read_calib(label(&exported("mdh")), None).expect("a modified DH table"),
+        .unwrap(),
+        read_calib(label(&exported("dh")), None).unwrap(),
+        read_calib(label(&exported("mdh")), None).unwrap(),
     ];
     for robot in robots.map(|imported| RobotModel::new(imported.robot)) {
         for k in 0..50 {
@@ -88,9 +81,9 @@ fn tables_and_urdf_are_the_arm_that_was_identified() {
 
 #[test]
 fn an_sdf_is_the_arm_that_was_identified_and_states_no_limit_that_is_not_known() {
-    let model: Value = serde_json::from_str(&exported("json")).expect("JSON");
+    let model: Value = serde_json::from_str(&exported("json")).unwrap();
     let text = exported("sdf");
-    let document = roxmltree::Document::parse(&text).expect("XML");
+    let document = roxmltree::Document::parse(&text).unwrap();
     let child = |node: roxmltree::Node<'_, '_>, name: &str| -> Vec<f64> {
         let found = node
             .descendants()
@@ -98,9 +91,9 @@ fn an_sdf_is_the_arm_that_was_identified_and_states_no_limit_that_is_not_known()
             .unwrap_or_else(|| panic!("no {name}"));
         found
             .text()
-            .expect("numbers")
+            .unwrap()
             .split(' ')
-            .map(|number| number.parse().expect("a number"))
+            .map(|number| number.parse().unwrap())
             .collect()
     };
     let moving = |node: &roxmltree::Node| {
@@ -108,28 +101,21 @@ fn an_sdf_is_the_arm_that_was_identified_and_states_no_limit_that_is_not_known()
     };
     let joints: Vec<roxmltree::Node> = document.descendants().filter(moving).collect();
     let mut point = [0.0; 3];
-    for (joint, told) in joints
-        .iter()
-        .zip(model["joints"].as_array().expect("joints"))
-    {
+    for (joint, told) in joints.iter().zip(model["joints"].as_array().unwrap()) {
         point = [0, 1, 2].map(|k| point[k] + child(*joint, "pose")[k]);
         for k in 0..3 {
-            assert!((point[k] - told["point_m"][k].as_f64().expect("a number")).abs() < 1e-12);
-            assert_eq!(
-                child(*joint, "xyz")[k],
-                told["axis"][k].as_f64().expect("a number")
-            );
+            assert!((point[k] - told["point_m"][k].as_f64().unwrap()).abs() < 1e-12);
+            assert_eq!(child(*joint, "xyz")[k], told["axis"][k].as_f64().unwrap());
         }
     }
     let tool = document
         .descendants()
         .find(|node| node.has_tag_name("frame"))
-        .expect("a tool");
+        .unwrap();
     for k in 0..3 {
         assert!(
-            (point[k] + child(tool, "pose")[k]
-                - model["tool"]["point_m"][k].as_f64().expect("a number"))
-            .abs()
+            (point[k] + child(tool, "pose")[k] - model["tool"]["point_m"][k].as_f64().unwrap())
+                .abs()
                 < 1e-12
         );
     }
@@ -139,15 +125,15 @@ fn an_sdf_is_the_arm_that_was_identified_and_states_no_limit_that_is_not_known()
 
 #[test]
 fn a_file_says_whose_it_is_and_whether_it_was_edited() {
-    let here = tempfile::tempdir().expect("a folder");
+    let here = tempfile::tempdir().unwrap();
     let held = |name: &str, text: &str| {
         let path = here.path().join(name);
-        std::fs::write(&path, text).expect("a file");
+        std::fs::write(&path, text).unwrap();
         let output = calib(
             cell(),
             &[
                 "check-export",
-                path.to_str().expect("a path"),
+                path.to_str().unwrap(),
                 "--against",
                 "latest",
             ],
@@ -164,7 +150,7 @@ fn a_file_says_whose_it_is_and_whether_it_was_edited() {
             "{format}: {said}"
         );
         // One digit of one number.
-        let at = text.rfind("0.").expect("a number") + 2;
+        let at = text.rfind("0.").unwrap() + 2;
         let digit = if text.as_bytes()[at] == b'7' {
             "8"
         } else {
@@ -179,7 +165,7 @@ fn a_file_says_whose_it_is_and_whether_it_was_edited() {
         );
     }
     let text = exported("urdf");
-    let (start, _) = text.split_once(", model ").expect("a mark");
+    let (start, _) = text.split_once(", model ").unwrap();
     let other = format!(
         "{start}, model 0123456789abcdef{}",
         &text[start.len() + 8 + 16..]
@@ -206,17 +192,17 @@ fn a_file_says_whose_it_is_and_whether_it_was_edited() {
 
 /// A folder with an arm of the library that was identified.
 fn of_the_library(name: &str) -> tempfile::TempDir {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let robot = calib::robot::LibraryArm::find(name)
-        .expect("an arm")
+        .unwrap()
         .text
         .replace("point: [0, 0, 0]", "point: [40, 30, 120]");
-    std::fs::write(folder.path().join("robot.yaml"), robot).expect("a file");
+    std::fs::write(folder.path().join("robot.yaml"), robot).unwrap();
     let pipeline = PIPELINE.replace(
         "[0.4, 0.2, -0.3]",
         "[0.4, 0.2, -0.3], tilt_arcsec: [40, 20, 60]",
     );
-    std::fs::write(folder.path().join("pipeline.yaml"), pipeline).expect("a file");
+    std::fs::write(folder.path().join("pipeline.yaml"), pipeline).unwrap();
     let output = calib(folder.path(), &["run", "pipeline.yaml", "--quiet"], "");
     assert!(
         output.status.success(),
@@ -236,18 +222,15 @@ fn a_drivers_kinematics_are_those_of_the_arm_near_the_frames_of_its_meshes() {
             "{}",
             String::from_utf8_lossy(&output.stderr)
         );
-        String::from_utf8(output.stdout).expect("UTF-8")
+        String::from_utf8(output.stdout).unwrap()
     };
-    let model: Value = serde_json::from_str(&export("json")).expect("JSON");
+    let model: Value = serde_json::from_str(&export("json")).unwrap();
     let text = export("ur_kinematics");
-    let tool = text
-        .split_once("in tool0 it stands at ")
-        .expect("the tool")
-        .1;
+    let tool = text.split_once("in tool0 it stands at ").unwrap().1;
     let tool: Vec<f64> = tool
         .split(' ')
         .take(3)
-        .map(|number| number.parse().expect("a number"))
+        .map(|number| number.parse().unwrap())
         .collect();
     let value = |line: &str| {
         line.trim()
@@ -334,14 +317,14 @@ fn numbers<const N: usize>(element: roxmltree::Node, name: &str) -> [f64; N] {
         .unwrap_or_else(|| panic!("no {name}"));
     let all: Vec<f64> = text
         .split(' ')
-        .map(|number| number.parse().expect("a number"))
+        .map(|number| number.parse().unwrap())
         .collect();
-    all.try_into().expect("as many numbers")
+    all.try_into().unwrap()
 }
 
 /// Place and orientation of the site `tool0`, from body to body as MuJoCo's documentation has them.
 fn by_mjcf(text: &str, q: &[f64]) -> ([f64; 3], Turn) {
-    let document = roxmltree::Document::parse(text).expect("XML");
+    let document = roxmltree::Document::parse(text).unwrap();
     let child = |node: roxmltree::Node<'_, '_>, name: &str| {
         node.children()
             .find(|child| child.has_tag_name(name))
@@ -351,30 +334,25 @@ fn by_mjcf(text: &str, q: &[f64]) -> ([f64; 3], Turn) {
         .root_element()
         .children()
         .find(|node| node.has_tag_name("worldbody"))
-        .expect("a world");
+        .unwrap();
     let (mut place, mut turn, mut joints) = ([0.0; 3], about([0.0, 0.0, 1.0], 0.0), q.iter());
     while let Some(next) = child(body, "body") {
-        body = document.get_node(next).expect("a body");
+        body = document.get_node(next).unwrap();
         if body.has_attribute("pos") {
             let step = turned(turn, numbers(body, "pos"));
             place = [0, 1, 2].map(|k| place[k] + step[k]);
         }
         if let Some(joint) = child(body, "joint") {
-            let joint = document.get_node(joint).expect("a joint");
+            let joint = document.get_node(joint).unwrap();
             assert_eq!(
                 (joint.attribute("type"), numbers(joint, "pos")),
                 (Some("hinge"), [0.0; 3])
             );
-            turn = product(
-                turn,
-                about(numbers(joint, "axis"), *joints.next().expect("an angle")),
-            );
+            turn = product(turn, about(numbers(joint, "axis"), *joints.next().unwrap()));
         }
     }
     assert_eq!(joints.next(), None, "a joint for every angle");
-    let site = document
-        .get_node(child(body, "site").expect("a site"))
-        .expect("a site");
+    let site = document.get_node(child(body, "site").unwrap()).unwrap();
     let [w, x, y, z] = numbers(site, "quat");
     let own = [
         [
@@ -402,19 +380,19 @@ fn a_mujoco_model_is_the_arm_that_was_identified_with_its_limits_and_known_masse
     let heavy = crate::compensate::ROBOT.to_string()
         + "links:\n  - {mass: 90, centre: [10, 0, 200]}\n  - {mass: 60, centre: [0, 20, 650]}\n  - null\n  - null\n  - null\n  - null\n";
     // The cell's arm by another name, of which the table must be a model.
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     std::fs::write(
         here.join("heavy <1>.yaml"),
         heavy.replace("name: small", "name: \"<a & b> ---\""),
     )
-    .expect("a file");
-    let pipeline = std::fs::read_to_string(cell().join("pipeline.yaml")).expect("a file");
+    .unwrap();
+    let pipeline = std::fs::read_to_string(cell().join("pipeline.yaml")).unwrap();
     std::fs::write(
         here.join("pipeline.yaml"),
         pipeline.replace("robot.yaml", "'heavy <1>.yaml'"),
     )
-    .expect("a file");
+    .unwrap();
     let export = |format: &str| {
         let output = calib(here, &["export", "pipeline.yaml", "--format", format], "");
         assert!(
@@ -422,10 +400,10 @@ fn a_mujoco_model_is_the_arm_that_was_identified_with_its_limits_and_known_masse
             "{}",
             String::from_utf8_lossy(&output.stderr)
         );
-        String::from_utf8(output.stdout).expect("UTF-8")
+        String::from_utf8(output.stdout).unwrap()
     };
     let (text, model) = (export("mjcf"), export("json"));
-    let model: Value = serde_json::from_str(&model).expect("JSON");
+    let model: Value = serde_json::from_str(&model).unwrap();
     for k in 0..20 {
         let q: Vec<f64> = (0..6)
             .map(|j| 2.0 * (1.7 * k as f64 + 0.9 * j as f64).sin())
@@ -440,12 +418,10 @@ fn a_mujoco_model_is_the_arm_that_was_identified_with_its_limits_and_known_masse
     let at_zero = by_mjcf(&text, &[0.0; 6]).1;
     for (i, row) in at_zero.iter().enumerate() {
         for (k, found) in row.iter().enumerate() {
-            assert!(
-                (found - model["tool"]["rotation"][i][k].as_f64().expect("a number")).abs() < 1e-12
-            );
+            assert!((found - model["tool"]["rotation"][i][k].as_f64().unwrap()).abs() < 1e-12);
         }
     }
-    let document = roxmltree::Document::parse(&text).expect("XML");
+    let document = roxmltree::Document::parse(&text).unwrap();
     let all = |name: &'static str| {
         document
             .descendants()
@@ -457,7 +433,7 @@ fn a_mujoco_model_is_the_arm_that_was_identified_with_its_limits_and_known_masse
     );
     let masses: Vec<[f64; 1]> = all("inertial").map(|node| numbers(node, "mass")).collect();
     assert_eq!(masses, [[90.0], [60.0]]);
-    let limits: [f64; 2] = numbers(all("joint").nth(1).expect("a joint"), "range");
+    let limits: [f64; 2] = numbers(all("joint").nth(1).unwrap(), "range");
     assert!(
         (limits[0].to_degrees() + 60.0).abs() < 1e-9
             && (limits[1].to_degrees() - 75.0).abs() < 1e-9,
@@ -484,13 +460,13 @@ const RAPID: &str = "MODULE m\n  ! [[1,2\n  CONST jointtarget home:=[[0,-10,20,5
 
 fn program(name: &str, text: &str) -> (Option<i32>, String, String) {
     let path = cell().join(name);
-    std::fs::write(&path, text).expect("a file");
+    std::fs::write(&path, text).unwrap();
     let output = calib(
         cell(),
         &["compensate", "latest", name, "--quiet", "--assume-frames"],
         "",
     );
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
     (
         output.status.code(),
         text(output.stdout),
@@ -524,7 +500,7 @@ fn programs_differ_in_the_numbers_of_targets_and_nothing_else() {
         assert_eq!(code, Some(0), "{said}");
         assert_ne!(corrected, text);
         // The second line is the mark of what was corrected.
-        let mark = corrected.split('\n').nth(1).expect("a line");
+        let mark = corrected.split('\n').nth(1).unwrap();
         assert!(
             mark.starts_with("; corrected by calib") || mark.starts_with("! corrected by calib"),
             "{mark}"

@@ -58,7 +58,7 @@ fn torques(robot: &RobotModel, data: &Measurements) -> Vec<f64> {
     let stack = EffectStack::new(
         robot,
         Pose::identity(),
-        vec![arm_effect("joint_compliance", &setting()).expect("a cause")],
+        vec![arm_effect("joint_compliance", &setting()).unwrap()],
     );
     let mut scratch = stack.scratch(robot);
     for row in 0..data.rows() {
@@ -249,15 +249,15 @@ fn over_all(mut law: impl FnMut(&Survey, &Hypothesis)) -> usize {
 fn stack(robot: &RobotModel, form: &Form, first: bool) -> (EffectStack, std::ops::Range<usize>) {
     let setting = setting();
     let mut effects = vec![
-        arm_effect("joint_compliance", &setting).expect("a cause"),
-        arm_effect("joint_offset", &setting).expect("a cause"),
+        arm_effect("joint_compliance", &setting).unwrap(),
+        arm_effect("joint_offset", &setting).unwrap(),
     ];
     effects.insert(if first { 0 } else { 2 }, Box::new(form.clone()));
     let stack = EffectStack::new(robot, setting.base, effects);
     let range = stack
         .effects()
         .find(|(effect, _)| effect.form().is_some())
-        .expect("the form")
+        .unwrap()
         .1;
     (stack, range)
 }
@@ -301,7 +301,7 @@ fn a_form_without_size_moves_nothing_and_its_partials_are_central_differences() 
         let without = EffectStack::new(robot, setting().base, {
             let names = ["joint_compliance", "joint_offset"];
             names
-                .map(|name| arm_effect(name, &setting()).expect("a cause"))
+                .map(|name| arm_effect(name, &setting()).unwrap())
                 .into()
         });
         let none = at(&stack, &own, &vec![0.0; own.len()]);
@@ -365,14 +365,11 @@ fn the_order_of_forms_is_irrelevant() {
 fn a_form_is_the_same_after_it_was_stored_and_its_neighbours_are_of_its_kind() {
     over_all(|survey, hypothesis| {
         let form = &hypothesis.form;
-        let text = serde_json::to_string(form).expect("numbers and names");
+        let text = serde_json::to_string(form).unwrap();
         let read: Form =
             serde_json::from_str(&text).unwrap_or_else(|error| panic!("{text}: {error}"));
         assert_eq!(read, *form, "{text}");
-        assert_eq!(
-            serde_json::to_string(&read).expect("numbers and names"),
-            text
-        );
+        assert_eq!(serde_json::to_string(&read).unwrap(), text);
         for near in form.near(survey, 0) {
             assert_eq!(
                 (near.name(), near.place()),
@@ -424,7 +421,7 @@ fn a_form_has_named_numbers_a_place_variables_a_cause_and_a_sentence() {
             parameters: &numbers,
             clock: Clock::Seconds { first: 0.0 },
         };
-        let sentence = cause(form.name()).expect("a cause").sentence(&summary);
+        let sentence = cause(form.name()).unwrap().sentence(&summary);
         assert!(sentence.len() > 20, "{sentence}");
     });
     for place in [Place::Base, Place::Tool, Place::Tracker, Place::Recording] {
@@ -493,7 +490,7 @@ fn every_sentence_is_as_it_was_read() {
     let read = include_str!("forms/sentences.txt");
     if said != read {
         let path = std::env::temp_dir().join("sentences.txt");
-        std::fs::write(&path, &said).expect("a file");
+        std::fs::write(&path, &said).unwrap();
         panic!(
             "read {} and put it in place of tests/it/forms/sentences.txt if it reads well",
             path.display()
@@ -537,7 +534,7 @@ fn in_full(hypothesis: &Hypothesis) -> String {
     fn rounded(value: &serde_json::Value) -> String {
         match value {
             serde_json::Value::Number(number) => {
-                format!("{:.4e}", number.as_f64().expect("a number"))
+                format!("{:.4e}", number.as_f64().unwrap())
             }
             serde_json::Value::Array(all) => format!(
                 "[{}]",
@@ -587,9 +584,7 @@ fn every_cause_proposes_the_forms_that_are_listed() {
         if form.name() == "unknown" {
             return;
         }
-        full.get_mut(form.name())
-            .expect("a cause")
-            .push(in_full(hypothesis));
+        full.get_mut(form.name()).unwrap().push(in_full(hypothesis));
         if survey.robot.description().name == "spherical"
             && survey.robot.has_masses()
             && !survey.moves()
@@ -616,8 +611,8 @@ fn every_cause_proposes_the_forms_that_are_listed() {
         let [list, all] =
             ["proposed.txt", "proposed_in_full.txt"].map(|name| std::env::temp_dir().join(name));
         let text: Vec<String> = full.into_values().flatten().collect();
-        std::fs::write(&list, &out).expect("a file");
-        std::fs::write(&all, text.join("\n")).expect("a file");
+        std::fs::write(&list, &out).unwrap();
+        std::fs::write(&all, text.join("\n")).unwrap();
         panic!(
             "other forms are proposed: read {} and {}",
             list.display(),

@@ -10,18 +10,18 @@ use std::fmt::Write;
 
 #[test]
 fn what_init_writes_is_understood_and_never_overwrites() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let mut controller = String::from("Controller log\n\nPoint;A1;A2;A3;A4;A5;A6;load;remark\n");
     let mut tracker = String::from("name,X,Y,Z\n");
     for k in 0..40 {
         let q: Vec<String> = (0..6)
             .map(|j| format!("{:.2}", 50.0 * f64::from(k * 7 + j).sin()).replace('.', ","))
             .collect();
-        writeln!(controller, "P{k};{};10,0;ok", q.join(";")).expect("text");
-        writeln!(tracker, "P{k},{}.5,-200,900", 1500 + k).expect("text");
+        writeln!(controller, "P{k};{};10,0;ok", q.join(";")).unwrap();
+        writeln!(tracker, "P{k},{}.5,-200,900", 1500 + k).unwrap();
     }
-    std::fs::write(folder.path().join("controller.csv"), controller).expect("a file");
-    std::fs::write(folder.path().join("tracker.csv"), tracker).expect("a file");
+    std::fs::write(folder.path().join("controller.csv"), controller).unwrap();
+    std::fs::write(folder.path().join("tracker.csv"), tracker).unwrap();
     let arguments = ["init", ".", "--data", "controller.csv", "tracker.csv"];
     let output = calib(folder.path(), &arguments, "");
     let said = String::from_utf8_lossy(&output.stdout).into_owned();
@@ -34,8 +34,7 @@ fn what_init_writes_is_understood_and_never_overwrites() {
         said.contains("6 joints (A1 to A6)") && said.contains("not used: remark"),
         "{said}"
     );
-    let pipeline =
-        std::fs::read_to_string(folder.path().join("pipeline.yaml")).expect("a pipeline");
+    let pipeline = std::fs::read_to_string(folder.path().join("pipeline.yaml")).unwrap();
     for part in [
         "file: \"controller.csv\"",
         "delimiter: \";\"",
@@ -82,7 +81,7 @@ fn what_init_writes_is_understood_and_never_overwrites() {
 
 #[test]
 fn a_foreign_table_is_understood_as_it_stands_and_what_is_left_to_do_is_said() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let mut table = String::from(
         "Messpunkt;Achse1 [\u{b0}];Achse2 [\u{b0}];Achse3 [\u{b0}];Achse4 [\u{b0}];Achse5 [\u{b0}];Achse6 [\u{b0}];X_soll [mm];Y_soll [mm];Z_soll [mm];X_ist [mm];Y_ist [mm];Z_ist [mm];Bemerkung\r\n",
     );
@@ -95,17 +94,16 @@ fn a_foreign_table_is_understood_as_it_stands_and_what_is_left_to_do_is_said() {
             "P{k:03};{};1000,5;{k},0;900,0;1000,7;{k},1;900,2;ok\r\n",
             q.join(";")
         )
-        .expect("text");
+        .unwrap();
     }
-    std::fs::write(folder.path().join("messung.csv"), table).expect("a file");
+    std::fs::write(folder.path().join("messung.csv"), table).unwrap();
     let output = calib(folder.path(), &["init", ".", "--data", "messung.csv"], "");
     assert!(
         output.status.success(),
         "{}",
         String::from_utf8_lossy(&output.stderr)
     );
-    let pipeline =
-        std::fs::read_to_string(folder.path().join("pipeline.yaml")).expect("a pipeline");
+    let pipeline = std::fs::read_to_string(folder.path().join("pipeline.yaml")).unwrap();
     for part in [
         "point_id: {column: \"Messpunkt\"}",
         "q: {column: \"Achse{j} [\u{b0}]\", unit: deg}\n",
@@ -129,7 +127,7 @@ fn a_foreign_table_is_understood_as_it_stands_and_what_is_left_to_do_is_said() {
     let identified = pipeline
         .replace("# limits:", "limits:")
         .replace("# identity:", "identity:");
-    std::fs::write(folder.path().join("pipeline.yaml"), identified).expect("a file");
+    std::fs::write(folder.path().join("pipeline.yaml"), identified).unwrap();
     let check = calib(folder.path(), &["check", "pipeline.yaml"], "");
     assert!(
         check.status.success(),
@@ -137,7 +135,7 @@ fn a_foreign_table_is_understood_as_it_stands_and_what_is_left_to_do_is_said() {
         String::from_utf8_lossy(&check.stderr)
     );
 
-    std::fs::write(folder.path().join("bare.csv"), "a;b;c;d\n1;2;3;4\n").expect("a file");
+    std::fs::write(folder.path().join("bare.csv"), "a;b;c;d\n1;2;3;4\n").unwrap();
     let output = calib(folder.path(), &["init", "bare", "--data", "bare.csv"], "");
     let said = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(
@@ -151,10 +149,10 @@ fn a_foreign_table_is_understood_as_it_stands_and_what_is_left_to_do_is_said() {
 #[test]
 fn every_kind_of_robot_that_init_writes_is_read() {
     for kind in ["spherical6", "offset6", "seven", "dh6"] {
-        let folder = tempfile::tempdir().expect("a folder");
+        let folder = tempfile::tempdir().unwrap();
         let output = calib(folder.path(), &["init", "--robot", kind], "");
         assert!(output.status.success());
-        let text = std::fs::read_to_string(folder.path().join("robot.yaml")).expect("a robot file");
+        let text = std::fs::read_to_string(folder.path().join("robot.yaml")).unwrap();
         let file = calib::robot::import::RobotFileText {
             label: "robot.yaml",
             text: &text,
@@ -166,7 +164,7 @@ fn every_kind_of_robot_that_init_writes_is_read() {
 
 #[test]
 fn shells_and_readers_of_manuals_are_served() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     for shell in ["bash", "zsh", "fish", "powershell"] {
         let output = calib(folder.path(), &["completions", shell], "");
         assert!(

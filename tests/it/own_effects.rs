@@ -13,7 +13,7 @@ fn output(arguments: &[&str], folder: &Path) -> Output {
         .args(arguments)
         .current_dir(folder)
         .output()
-        .expect("calib")
+        .unwrap()
 }
 
 fn calib(arguments: &[&str], folder: &Path) -> String {
@@ -23,11 +23,11 @@ fn calib(arguments: &[&str], folder: &Path) -> String {
         "{arguments:?}: {}",
         String::from_utf8_lossy(&output.stderr)
     );
-    String::from_utf8(output.stdout).expect("UTF-8")
+    String::from_utf8(output.stdout).unwrap()
 }
 
 fn diagnosed(arguments: &[&str], folder: &Path) -> Value {
-    serde_json::from_str(&calib(arguments, folder)).expect("JSON")
+    serde_json::from_str(&calib(arguments, folder)).unwrap()
 }
 
 /// Findings as `effect at place`.
@@ -41,7 +41,7 @@ fn found(said: &Value) -> Vec<String> {
     };
     said["findings"]
         .as_array()
-        .expect("findings")
+        .unwrap()
         .iter()
         .map(one)
         .collect()
@@ -49,15 +49,14 @@ fn found(said: &Value) -> Vec<String> {
 
 /// The pipeline of cases without its reports, with an effect of one's own.
 fn pipeline(folder: &Path, effect: &str) {
-    let text =
-        std::fs::read_to_string(root().join("pipelines/case/pipeline.yaml")).expect("a pipeline");
-    let (head, _) = text.split_once("  - uses: validate").expect("its end");
+    let text = std::fs::read_to_string(root().join("pipelines/case/pipeline.yaml")).unwrap();
+    let (head, _) = text.split_once("  - uses: validate").unwrap();
     let text = head.replace(
         "  - uses: diagnose\n",
         &format!("  - uses: diagnose\n    with: {{effects: [{effect}]}}\n"),
     );
     assert!(text.contains(effect));
-    std::fs::write(folder.join("p.yaml"), text).expect("written");
+    std::fs::write(folder.join("p.yaml"), text).unwrap();
 }
 
 /// Concealed recordings with a local error at some joint, which the library does not name: their numbers and joints.
@@ -83,25 +82,15 @@ fn bumps(folder: &Path) -> Vec<(String, String)> {
         folder,
     );
     let mut sealed: Vec<PathBuf> = std::fs::read_dir(folder.join("sealed/sealed"))
-        .expect("the truth")
-        .map(|file| file.expect("a file").path())
+        .unwrap()
+        .map(|file| file.unwrap().path())
         .collect();
     sealed.sort();
     let truth = |file: &PathBuf| -> Value {
-        serde_json::from_str(&std::fs::read_to_string(file).unwrap()).expect("JSON")
+        serde_json::from_str(&std::fs::read_to_string(file).unwrap()).unwrap()
     };
-    let name = |file: &PathBuf| {
-        file.file_stem()
-            .expect("a name")
-            .to_string_lossy()
-            .into_owned()
-    };
-    let place = |truth: &Value| {
-        truth["want"][0]["where"]
-            .as_str()
-            .expect("a place")
-            .to_string()
-    };
+    let name = |file: &PathBuf| file.file_stem().unwrap().to_string_lossy().into_owned();
+    let place = |truth: &Value| truth["want"][0]["where"].as_str().unwrap().to_string();
     let of_bumps = sealed
         .iter()
         .map(|file| (name(file), truth(file)))
@@ -113,13 +102,13 @@ fn bumps(folder: &Path) -> Vec<(String, String)> {
 
 #[test]
 fn an_effect_of_ones_own_is_found_at_its_joint_and_stays_with_its_run() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     std::fs::copy(
         root().join("pipelines/case/effects/worn_tooth.yaml"),
         here.join("worn_tooth.yaml"),
     )
-    .expect("a copy");
+    .unwrap();
     pipeline(here, "worn_tooth.yaml");
     let bumps = bumps(here);
     assert_eq!(bumps.len(), 3, "{bumps:?}");
@@ -141,9 +130,7 @@ fn an_effect_of_ones_own_is_found_at_its_joint_and_stays_with_its_run() {
             [format!("worn_tooth at {place}")],
             "{name}: {said:#}"
         );
-        let statement = said["findings"][0]["statement"]
-            .as_str()
-            .expect("a sentence");
+        let statement = said["findings"][0]["statement"].as_str().unwrap();
         assert!(
             statement.starts_with(&format!("a tooth of {place} is worn near ")),
             "{statement}"
@@ -162,13 +149,13 @@ fn an_effect_of_ones_own_is_found_at_its_joint_and_stays_with_its_run() {
     assert!(
         again["stages"]
             .as_array()
-            .expect("stages")
+            .unwrap()
             .iter()
             .all(|stage| stage["status"] == "cached"),
         "{again:#}"
     );
     let targets = "name,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\na,10,-100,20,5,30,0\nb,-20,-70,40,15,-25,60\n";
-    std::fs::write(here.join("targets.csv"), targets).expect("written");
+    std::fs::write(here.join("targets.csv"), targets).unwrap();
     let corrected = || calib(&["compensate", "HEAD", "targets.csv"], here);
     let with_the_file = corrected();
     assert_ne!(
@@ -178,7 +165,7 @@ fn an_effect_of_ones_own_is_found_at_its_joint_and_stays_with_its_run() {
             here
         )
     );
-    std::fs::remove_file(here.join("worn_tooth.yaml")).expect("gone");
+    std::fs::remove_file(here.join("worn_tooth.yaml")).unwrap();
     assert_eq!(corrected(), with_the_file);
     assert_eq!(
         found(&diagnosed(&["diagnose", "HEAD", "--json"], here)),
@@ -195,12 +182,12 @@ fn an_effect_of_ones_own_is_found_at_its_joint_and_stays_with_its_run() {
     }
     // The law as it stood is part of what decides whether a run is the same.
     let law =
-        std::fs::read_to_string(root().join("pipelines/case/effects/worn_tooth.yaml")).expect("it");
+        std::fs::read_to_string(root().join("pipelines/case/effects/worn_tooth.yaml")).unwrap();
     std::fs::write(
         here.join("worn_tooth.yaml"),
         law.replace("to: 1.2", "to: 1.1"),
     )
-    .expect("written");
+    .unwrap();
     let other: Value = serde_json::from_str(&calib(
         &[&["run", "p.yaml", "--quiet", "--json"], &set[..]].concat(),
         here,
@@ -221,7 +208,7 @@ fn an_effect_of_ones_own_is_found_at_its_joint_and_stays_with_its_run() {
 /// What a diagnosis has no name for gets a formula; that one, declared, is the name in the next recording.
 #[test]
 fn a_formula_of_an_unknown_is_found_by_its_name_in_the_next_recording() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     pipeline(here, "");
     let bumps = bumps(here);
@@ -239,7 +226,7 @@ fn a_formula_of_an_unknown_is_found_by_its_name_in_the_next_recording() {
     );
     let finding = &said["findings"][0];
     assert_eq!(finding["where"], bumps[2].1.as_str(), "{said:#}");
-    let forms = finding["forms"].as_array().expect("formulas");
+    let forms = finding["forms"].as_array().unwrap();
     assert!((1..=3).contains(&forms.len()), "{finding:#}");
     let proposed: Vec<&Value> = forms
         .iter()
@@ -260,20 +247,17 @@ fn a_formula_of_an_unknown_is_found_by_its_name_in_the_next_recording() {
                 .iter()
                 .find(|number| number["name"] == name)
                 .expect(name);
-            number[key].as_f64().expect("a number")
+            number[key].as_f64().unwrap()
         };
         [of("value"), of("sigma")]
     };
     // The twin's own: -41 deg, 34 deg.
-    let truth = std::fs::read_to_string(here.join(format!("sealed/sealed/{}.json", bumps[2].0)))
-        .expect("the truth");
-    let truth: Value = serde_json::from_str(&truth).expect("JSON");
+    let truth =
+        std::fs::read_to_string(here.join(format!("sealed/sealed/{}.json", bumps[2].0))).unwrap();
+    let truth: Value = serde_json::from_str(&truth).unwrap();
     let bump = &truth["effects"][0]["physical"][0]["joint_bump"];
     for (name, key) in [("centre", "centre_deg"), ("width", "width_deg")] {
-        let ([value, sigma], expected) = (
-            number(name),
-            bump[key].as_f64().expect("degrees").to_radians(),
-        );
+        let ([value, sigma], expected) = (number(name), bump[key].as_f64().unwrap().to_radians());
         assert!(
             (value - expected).abs() < 4.0 * sigma && sigma < 0.1,
             "{name}: {value} +- {sigma}, truth {expected}"
@@ -313,12 +297,12 @@ fn a_formula_of_an_unknown_is_found_by_its_name_in_the_next_recording() {
         "{}",
         String::from_utf8_lossy(&refused.stderr)
     );
-    let text = std::fs::read_to_string(here.join("mine.yaml")).expect("a file");
+    let text = std::fs::read_to_string(here.join("mine.yaml")).unwrap();
     std::fs::write(
         here.join("mine.yaml"),
         text.replace("bump_of_q", "soft_spot"),
     )
-    .expect("written");
+    .unwrap();
     pipeline(here, "mine.yaml");
     for (name, place) in &bumps {
         let said = diagnosed(
@@ -342,13 +326,13 @@ fn a_formula_of_an_unknown_is_found_by_its_name_in_the_next_recording() {
 
 #[test]
 fn a_fleet_finds_an_effect_of_ones_own() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     std::fs::copy(
         root().join("pipelines/case/effects/worn_tooth.yaml"),
         here.join("worn_tooth.yaml"),
     )
-    .expect("a copy");
+    .unwrap();
     pipeline(here, "worn_tooth.yaml");
     let bumps = bumps(here);
     let robots: Vec<String> = bumps
@@ -367,9 +351,9 @@ fn a_fleet_finds_an_effect_of_ones_own() {
         &["fleet", "run", "f.yaml", "--json", "--quiet"],
         here,
     ))
-    .expect("JSON");
+    .unwrap();
     assert_eq!(said["done"], 3, "{said:#}");
-    for ((name, place), robot) in bumps.iter().zip(said["robots"].as_array().expect("robots")) {
+    for ((name, place), robot) in bumps.iter().zip(said["robots"].as_array().unwrap()) {
         assert!(
             robot
                 .to_string()
@@ -386,7 +370,7 @@ fn a_fleet_finds_an_effect_of_ones_own() {
 /// The same law under a name of the library's and under one's own: declared, it is found where the library may not look for it.
 #[test]
 fn a_cause_left_out_is_found_by_its_declaration() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     let declared = "calib_effect: 1
 name: late_zero
@@ -396,7 +380,7 @@ shape:
   moment: {from: 0, to: 3400}
 unit: arcsec
 ";
-    std::fs::write(here.join("late_zero.yaml"), declared).expect("written");
+    std::fs::write(here.join("late_zero.yaml"), declared).unwrap();
     pipeline(here, "late_zero.yaml], without: [zero_shift");
     let arguments = [
         "simulate", "conceal", "--out", "sealed", "--cases", "1", "--seed", "923", "--points",
@@ -420,7 +404,7 @@ unit: arcsec
     let truth: Value = serde_json::from_str(
         &std::fs::read_to_string(here.join("sealed/sealed/c0001.json")).unwrap(),
     )
-    .expect("JSON");
+    .unwrap();
     let said = diagnosed(
         &[
             "diagnose",
@@ -432,6 +416,6 @@ unit: arcsec
         ],
         here,
     );
-    let place = truth["want"][0]["where"].as_str().expect("a place");
+    let place = truth["want"][0]["where"].as_str().unwrap();
     assert_eq!(found(&said), [format!("late_zero at {place}")], "{said:#}");
 }

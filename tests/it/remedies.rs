@@ -41,7 +41,7 @@ fn remedy(
         .specs()
         .iter()
         .position(|spec| spec.name == name)
-        .expect("a parameter");
+        .unwrap();
     assert!(
         !matches!(fitted.statuses[k], ParameterStatus::Free(_)),
         "{name} is seen"
@@ -53,7 +53,7 @@ fn remedy(
         fitted: &fitted,
     })
     .remove(&k)
-    .expect("hidden parameters have one")
+    .unwrap()
 }
 
 /// A recording of the nominal robot with joints and payload bent.

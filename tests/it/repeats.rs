@@ -86,7 +86,7 @@ fn joint_repeatability_comes_back_from_returns_and_is_not_seen_where_there_is_no
     assert_eq!((poses.all().len(), poses.repeated().count()), (60, 60));
     let found = poses
         .joint_repeatability(&start(&data, &["base_frame"]), &data)
-        .expect("it is there");
+        .unwrap();
     assert!(
         (found / (5.0 * ARCSEC) - 1.0).abs() < 0.12,
         "{:.2} arcsec",
@@ -115,7 +115,7 @@ fn two_exchanged_returns_do_not_spoil_the_repeatability() {
     let rows: Vec<usize> = (0..data.rows()).collect();
     let found = Poses::of(&data, &rows)
         .joint_repeatability(&start(&data, &["base_frame"]), &data)
-        .expect("it is there");
+        .unwrap();
     assert!(
         (found / (5.0 * ARCSEC) - 1.0).abs() < 0.12,
         "{:.2} arcsec",
@@ -129,7 +129,7 @@ fn lack_of_fit_tells_a_complete_model_from_one_without_ratios() {
     let mut chances = Vec::new();
     for seed in 10..30 {
         let (data, _) = visited(40, 2, 1, 0.0, seed);
-        let repeated = identify(&data, &effects).1.repeated.expect("repeats");
+        let repeated = identify(&data, &effects).1.repeated.unwrap();
         assert_eq!(
             (repeated.poses, repeated.freedom, repeated.revisited),
             (40, 120, true)
@@ -139,7 +139,7 @@ fn lack_of_fit_tells_a_complete_model_from_one_without_ratios() {
             "{:e}",
             repeated.noise
         );
-        chances.push(repeated.lack_of_fit.expect("more poses than parameters").1);
+        chances.push(repeated.lack_of_fit.unwrap().1);
     }
     // Uniform under a complete model.
     let below = chances.iter().filter(|chance| **chance < 0.5).count();
@@ -152,7 +152,7 @@ fn lack_of_fit_tells_a_complete_model_from_one_without_ratios() {
         .1
         .repeated
         .and_then(|repeated| repeated.lack_of_fit)
-        .expect("repeats");
+        .unwrap();
     assert!(ratio > 10.0 && chance < 1e-9, "F {ratio}, p {chance:e}");
 }
 
@@ -286,15 +286,15 @@ fn the_stage_weighs_by_the_stated_repeatability_and_tables_what_repeats_say() {
     let mut settings = json!({"on": ["unloaded_fit"], "effects": ["base_frame", "tool_offset"], "repeatability": {"arcsec": 4.0}});
     let run = |settings: &serde_json::Value, recording: &calib::table::Recording, split: &Split| {
         let desk = Desk::default();
-        let stage: Identify = serde_json::from_value(settings.clone()).expect("settings");
+        let stage: Identify = serde_json::from_value(settings.clone()).unwrap();
         assert!(stage.check().is_empty());
         let reads = IdentifyReads {
             robot: of.robot.clone(),
             recording: recording.clone(),
             split: split.clone(),
         };
-        let tables = desk.run(&stage, reads).expect("identify runs");
-        let notes = desk.notes.lock().expect("one thread").clone();
+        let tables = desk.run(&stage, reads).unwrap();
+        let notes = desk.notes.lock().unwrap().clone();
         (
             table::<Observability>(&tables).remove(0),
             table::<Parameters>(&tables).remove(0),
@@ -340,7 +340,7 @@ fn the_stage_weighs_by_the_stated_repeatability_and_tables_what_repeats_say() {
         "{notes:#?}"
     );
     let wrong: Identify =
-        serde_json::from_value(json!({"repeatability": {"arcsec": 0.0}})).expect("settings");
+        serde_json::from_value(json!({"repeatability": {"arcsec": 0.0}})).unwrap();
     assert!(wrong.check().iter().any(|fault| {
         fault
             .to_string()

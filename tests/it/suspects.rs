@@ -25,16 +25,16 @@ pub fn pipeline<T: DeserializeOwned>(
     let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("pipelines")
         .join(name);
-    let text = std::fs::read_to_string(folder.join("pipeline.yaml")).expect("the pipeline");
+    let text = std::fs::read_to_string(folder.join("pipeline.yaml")).unwrap();
     let text = variables.iter().fold(text, |text, (key, value)| {
         text.replace(&format!("${{{key}}}"), value)
     });
-    let whole: Value = serde_saphyr::from_str(&text).expect("YAML");
+    let whole: Value = serde_saphyr::from_str(&text).unwrap();
     let with = |id: &str| {
-        let mut stages = whole["stages"].as_array().expect("stages").iter();
+        let mut stages = whole["stages"].as_array().unwrap().iter();
         let found = stages
             .find(|stage| stage["id"] == id || (stage["id"].is_null() && stage["uses"] == id));
-        let with = found.expect("the stage")["with"].clone();
+        let with = found.unwrap()["with"].clone();
         if with.is_null() {
             serde_json::json!({})
         } else {
@@ -42,11 +42,10 @@ pub fn pipeline<T: DeserializeOwned>(
         }
     };
     let desk = Desk::default();
-    let mut robot: ReadRobot = serde_json::from_value(with("robot")).expect("settings");
+    let mut robot: ReadRobot = serde_json::from_value(with("robot")).unwrap();
     robot.file.0 = folder.join(&robot.file.0);
-    let robot: Robot =
-        table(&desk.run(&robot, RobotReads {}).expect("a good robot file")).remove(0);
-    let ingest: Ingest = serde_json::from_value(with("ingest")).expect("settings");
+    let robot: Robot = table(&desk.run(&robot, RobotReads {}).unwrap()).remove(0);
+    let ingest: Ingest = serde_json::from_value(with("ingest")).unwrap();
     let chunks = table(
         &desk
             .run(
@@ -55,13 +54,13 @@ pub fn pipeline<T: DeserializeOwned>(
                     robot: robot.clone(),
                 },
             )
-            .expect("good files"),
+            .unwrap(),
     );
     let recording: Recording = match <[Recording; 1]>::try_from(chunks) {
         Ok([recording]) => recording,
         Err(chunks) => panic!("{} chunks of a small recording", chunks.len()),
     };
-    let split: SplitBy = serde_json::from_value(with("split")).expect("settings");
+    let split: SplitBy = serde_json::from_value(with("split")).unwrap();
     let split = table(
         &desk
             .run(
@@ -70,7 +69,7 @@ pub fn pipeline<T: DeserializeOwned>(
                     recording: recording.clone(),
                 },
             )
-            .expect("a split"),
+            .unwrap(),
     )
     .remove(0);
     (
@@ -79,7 +78,7 @@ pub fn pipeline<T: DeserializeOwned>(
             recording,
             split,
         },
-        serde_json::from_value(with(stage)).expect("settings"),
+        serde_json::from_value(with(stage)).unwrap(),
     )
 }
 
@@ -98,7 +97,7 @@ fn identify(desk: &Desk, stage: &Identify, inputs: Inputs) -> (Suspects, Predict
                 split,
             },
         )
-        .expect("identify runs");
+        .unwrap();
     (table(&tables).remove(0), table(&tables).remove(0))
 }
 
@@ -154,7 +153,7 @@ fn suspects_are_named_to_the_person_listed_and_still_predicted() {
             .iter()
             .filter(|row| row.set == set)
             .nth(k)
-            .expect("a row")
+            .unwrap()
             .sequence as usize
     };
     let rows = [
@@ -169,7 +168,7 @@ fn suspects_are_named_to_the_person_listed_and_still_predicted() {
             .sequence
             .iter()
             .position(|s| *s as usize == sequence)
-            .expect("a row")
+            .unwrap()
     });
     let mut recording = clean.recording.clone();
     recording.position.swap(a, b);
@@ -237,7 +236,7 @@ fn suspects_are_named_to_the_person_listed_and_still_predicted() {
         (0, 0)
     );
     // Rows that are not set aside count the less the farther off they are, and the note names them.
-    let least = prediction.0[inch].weight.expect("a fitted row");
+    let least = prediction.0[inch].weight.unwrap();
     assert!(
         least < 0.01
             && prediction

@@ -37,7 +37,7 @@ fn nothing(seed: u64) -> TorqueDesign {
 }
 
 fn named(entry: &Value) -> Named {
-    let text = |key: &str| entry[key].as_str().expect("a name").to_string();
+    let text = |key: &str| entry[key].as_str().unwrap().to_string();
     (text("effect"), text("where"))
 }
 
@@ -50,7 +50,7 @@ fn diagnose(case: &Path, store: &Path, more: &[&str]) -> Output {
         .arg(format!("case={}", case.display()))
         .arg("--store")
         .arg(store);
-    command.args(more).arg(pipeline).output().expect("calib")
+    command.args(more).arg(pipeline).output().unwrap()
 }
 
 /// The document of a diagnosis that succeeds.
@@ -61,7 +61,7 @@ fn document(case: &Path, store: &Path) -> Value {
         String::from_utf8_lossy(&output.stderr),
     );
     assert!(output.status.success(), "{}: {out}{told}", case.display());
-    serde_json::from_str(&out).expect("one JSON document")
+    serde_json::from_str(&out).unwrap()
 }
 
 /// What of a diagnosis is missed, and what is named beside.
@@ -73,7 +73,7 @@ struct Marks {
 fn mark(want: &Value, told: &Value) -> Marks {
     let all: Vec<Named> = told["findings"]
         .as_array()
-        .expect("findings")
+        .unwrap()
         .iter()
         .map(named)
         .collect();
@@ -81,16 +81,16 @@ fn mark(want: &Value, told: &Value) -> Marks {
         missed: Vec::new(),
         beside: all.clone(),
     };
-    for entry in want["effects"].as_array().expect("effects") {
+    for entry in want["effects"].as_array().unwrap() {
         let pair = |pair: &Value| {
             (
-                pair[0].as_str().expect("a name").to_string(),
-                pair[1].as_str().expect("a place").to_string(),
+                pair[0].as_str().unwrap().to_string(),
+                pair[1].as_str().unwrap().to_string(),
             )
         };
         let accepted: Vec<Named> = entry["accept"]
             .as_array()
-            .expect("names")
+            .unwrap()
             .iter()
             .map(pair)
             .collect();
@@ -110,14 +110,14 @@ fn mark(want: &Value, told: &Value) -> Marks {
 }
 
 fn write(folder: &Path, files: &[TorqueFile]) {
-    std::fs::create_dir_all(folder).expect("a folder");
+    std::fs::create_dir_all(folder).unwrap();
     files
         .iter()
-        .for_each(|(name, text)| std::fs::write(folder.join(name), text).expect("a file"));
+        .for_each(|(name, text)| std::fs::write(folder.join(name), text).unwrap());
 }
 
 fn json(path: PathBuf) -> Value {
-    serde_json::from_str(&std::fs::read_to_string(path).expect("a file")).expect("JSON")
+    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
 #[test]
@@ -125,11 +125,11 @@ fn the_practice_recordings_of_torques_are_solved() {
     let Some(folder) = shared("practice_dynamics") else {
         return;
     };
-    let store = tempfile::tempdir().expect("a folder");
+    let store = tempfile::tempdir().unwrap();
     let mut wrong = Vec::new();
     let mut cases: Vec<PathBuf> = std::fs::read_dir(&folder)
-        .expect("the folder")
-        .map(|entry| entry.expect("one").path())
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
         .collect();
     cases.sort();
     for case in cases.iter().filter(|case| case.join("want.json").is_file()) {
@@ -147,17 +147,16 @@ fn the_practice_recordings_of_torques_are_solved() {
         // A push begins within 0.3 s of when it did.
         for entry in want["effects"]
             .as_array()
-            .expect("effects")
+            .unwrap()
             .iter()
             .filter(|entry| entry["window"].is_array())
         {
-            let began = entry["window"][0].as_f64().expect("s");
-            let findings = told["findings"].as_array().expect("findings");
+            let began = entry["window"][0].as_f64().unwrap();
+            let findings = told["findings"].as_array().unwrap();
             let contact = findings
                 .iter()
                 .filter(|finding| finding["effect"] == "contact");
-            let starts =
-                contact.flat_map(|finding| finding["parameters"].as_array().expect("numbers"));
+            let starts = contact.flat_map(|finding| finding["parameters"].as_array().unwrap());
             let near = starts
                 .filter(|number| number["name"] == "start")
                 .any(|number| {
@@ -173,20 +172,20 @@ fn the_practice_recordings_of_torques_are_solved() {
 
 #[test]
 fn the_example_of_torques_is_solved_and_reported() {
-    let store = tempfile::tempdir().expect("a folder");
+    let store = tempfile::tempdir().unwrap();
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let example = root.join("pipelines/dynamics/example");
     let told = document(&example, store.path());
     let found: Vec<Named> = told["findings"]
         .as_array()
-        .expect("findings")
+        .unwrap()
         .iter()
         .map(named)
         .collect();
     let hidden = json(example.join("truth.json"));
     let mut wanted: Vec<Named> = hidden["effects"]
         .as_array()
-        .expect("effects")
+        .unwrap()
         .iter()
         .map(named)
         .collect();
@@ -197,7 +196,7 @@ fn the_example_of_torques_is_solved_and_reported() {
         .args(["run", "--quiet", "--store"])
         .arg(store.path())
         .arg(root.join("pipelines/dynamics/pipeline.yaml"));
-    let run = run.output().expect("calib");
+    let run = run.output().unwrap();
     assert!(
         run.status.success(),
         "{}",
@@ -265,16 +264,16 @@ fn declared(case: &TorqueCase) -> (DynamicArm, Vec<f64>) {
     for (link, (joint, moments)) in robot.joints.iter().zip(&robot.inertias.links).enumerate() {
         add(
             link,
-            joint.mass.expect("a mass"),
-            joint.centre.expect("a centre"),
-            moments.expect("an inertia"),
+            joint.mass.unwrap(),
+            joint.centre.unwrap(),
+            moments.unwrap(),
         );
     }
     add(
         last,
         robot.payload_mass,
         robot.payload_centre,
-        robot.inertias.payload.expect("an inertia"),
+        robot.inertias.payload.unwrap(),
     );
     let arm = DynamicArm {
         axes: robot.joints.iter().map(|joint| joint.axis.into()).collect(),

@@ -176,7 +176,7 @@ fn carried(from: &Series, to: &Series) -> [[f64; 2]; 2] {
         .network
         .correction(&from.recording.prismatic)
         .unwrap()
-        .expect("something was learnt");
+        .unwrap();
     let corrected: Vec<Vector3<f64>> = plain
         .iter()
         .enumerate()
@@ -623,9 +623,9 @@ fn findings_that_make_another_recording_worse_than_geometry_alone_are_not_used_t
 
 #[test]
 fn the_closing_lines_state_the_carried_figure() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sr210d");
-    std::fs::copy(root.join("robot.yaml"), folder.path().join("robot.yaml")).expect("the robot");
+    std::fs::copy(root.join("robot.yaml"), folder.path().join("robot.yaml")).unwrap();
     let simulate = |id: &str, seed: u64| {
         format!(
             "  - id: {id}\n    uses: simulate\n    with:\n      truth: {{offset_deg: [0.1, 0.2, -0.1, 0.1, 0.1, 0]}}\n      \
@@ -648,12 +648,12 @@ fn the_closing_lines_state_the_carried_figure() {
         simulate("there", 2),
         split("placed", "there")
     );
-    std::fs::write(folder.path().join("p.yaml"), pipeline).expect("written");
+    std::fs::write(folder.path().join("p.yaml"), pipeline).unwrap();
     let run = std::process::Command::new(env!("CARGO_BIN_EXE_calib"))
         .args(["run", "p.yaml", "--quiet"])
         .current_dir(folder.path())
         .output()
-        .expect("calib");
+        .unwrap();
     let told = String::from_utf8_lossy(&run.stdout);
     assert!(
         run.status.success(),

@@ -42,7 +42,7 @@ fn told(
             },
             None,
         )
-        .expect("a robot")
+        .unwrap()
         .robot,
     );
     let mut text = String::from("q1,q2,q3,q4,q5,q6,x,y,z\n");
@@ -61,13 +61,13 @@ fn told(
                 + "\n"),
         );
     }
-    std::fs::write(folder.join("poses.csv"), text).expect("a file");
-    std::fs::write(folder.join("robot.yaml"), ROBOT).expect("a file");
+    std::fs::write(folder.join("poses.csv"), text).unwrap();
+    std::fs::write(folder.join("robot.yaml"), ROBOT).unwrap();
     std::fs::write(
         folder.join("pipeline.yaml"),
         PIPELINE.replace("USES", uses).replace("STEP", uses),
     )
-    .expect("a file");
+    .unwrap();
     let output = calib(folder, &["run", "pipeline.yaml"], "");
     (
         output.status.code(),
@@ -78,7 +78,7 @@ fn told(
 #[test]
 fn one_pose_measured_fifty_times_is_no_geometry_and_its_creep_is_told() {
     for uses in ["identify", "diagnose"] {
-        let folder = tempfile::tempdir().expect("a folder");
+        let folder = tempfile::tempdir().unwrap();
         let (code, said) = told(
             folder.path(),
             uses,
@@ -96,7 +96,7 @@ fn one_pose_measured_fifty_times_is_no_geometry_and_its_creep_is_told() {
             .unwrap_or_else(|| panic!("{said}"));
         assert!((drift - 0.2).abs() < 0.01, "{said}");
     }
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let (code, said) = told(folder.path(), "identify", |_| [10.0; 6], |_| 0.0);
     assert!(
         code == Some(10) && said.contains("the point does not drift beyond noise"),
@@ -106,7 +106,7 @@ fn one_pose_measured_fifty_times_is_no_geometry_and_its_creep_is_told() {
 
 #[test]
 fn a_joint_that_never_moves_is_said() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let swing = |row: usize, joint: usize| 50.0 * ((1.3 * row as f64 + 0.9 * joint as f64).sin());
     let joints = |row: usize| {
         [0, 1, 2, 3, 4, 5].map(|joint| if joint == 3 { 12.5 } else { swing(row, joint) })

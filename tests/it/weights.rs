@@ -30,7 +30,7 @@ fn stack(robot: &RobotModel) -> EffectStack {
     EffectStack::new(
         robot,
         setting.base,
-        vec![arm_effect("joint_compliance", &setting).expect("a cause")],
+        vec![arm_effect("joint_compliance", &setting).unwrap()],
     )
 }
 
@@ -80,7 +80,7 @@ fn surveyed<T>(robot: &RobotModel, data: &Measurements, tell: impl FnOnce(&Surve
 
 fn windups(robot: &RobotModel, data: &Measurements) -> Vec<Form> {
     let all = surveyed(robot, data, |survey| {
-        cause("joint_compliance").expect("a cause").propose(survey)
+        cause("joint_compliance").unwrap().propose(survey)
     });
     all.into_iter().map(|hypothesis| hypothesis.form).collect()
 }
@@ -121,11 +121,7 @@ fn gravity_torques_of_any_masses_are_made_of_the_moments_of_the_bodies_outwards(
                 continue;
             };
             let turns = turns(&bare, &data, widest);
-            let solved = turns
-                .clone()
-                .svd(true, true)
-                .solve(&own, 1e-10)
-                .expect("a solution");
+            let solved = turns.clone().svd(true, true).solve(&own, 1e-10).unwrap();
             let left = (turns * solved - &own).amax();
             assert!(
                 left < 1e-9 * most,
@@ -185,7 +181,7 @@ fn with_a_payload_the_stiffness_is_said_beside_the_weight() {
         windups(robot, &data)
             .into_iter()
             .find(|form| form.place() == Place::Joint(2))
-            .expect("a form")
+            .unwrap()
     };
     let (weight, load) = (at(&bare(fixture::spherical())), at(&robot));
     let said = |forms: &[Form]| {

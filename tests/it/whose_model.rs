@@ -27,32 +27,32 @@ fn said(folder: &Path, verb: &[&str]) -> (Option<i32>, String, String) {
 
 #[test]
 fn a_model_is_refused_for_another_robot_and_so_is_a_table_that_does_not_say_whose_it_is() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     std::fs::copy(
         cell().join(".calib/tables/small").join(PARAMETERS),
         here.join(PARAMETERS),
     )
-    .expect("a table");
+    .unwrap();
     std::fs::write(
         here.join("own.yaml"),
         ROBOT.replace("limits: [-120, 120]", "limits: [-121, 120]"),
     )
-    .expect("a file");
+    .unwrap();
     std::fs::write(
         here.join("renamed.yaml"),
         ROBOT.replace("name: small", "name: large"),
     )
-    .expect("a file");
+    .unwrap();
     std::fs::write(
         here.join("longer.yaml"),
         ROBOT.replace("[0, 0, 900]", "[0, 0, 901]"),
     )
-    .expect("a file");
+    .unwrap();
     let other = ROBOT
         .replace("name: small", "name: large")
         .replace("[0, 0, 900]", "[0, 0, 901]");
-    std::fs::write(here.join("other.yaml"), other).expect("a file");
+    std::fs::write(here.join("other.yaml"), other).unwrap();
     let verbs = [
         &["compensate", PARAMETERS][..],
         &["export", PARAMETERS, "--format", "urdf"],
@@ -82,17 +82,17 @@ fn a_model_is_refused_for_another_robot_and_so_is_a_table_that_does_not_say_whos
     }
     // As an earlier calib wrote it, without a content hash.
     let mut table = from_file::<Parameters>(&here.join(PARAMETERS))
-        .expect("a table")
+        .unwrap()
         .table;
     table
         .0
         .iter_mut()
         .for_each(|row| (row.robot, row.kinematics) = (None, None));
-    let frame = table.to_frame().expect("a frame");
-    let file = std::fs::File::create(here.join("older.parquet")).expect("a file");
-    let mut writer = ArrowWriter::try_new(file, frame.batch().schema(), None).expect("a writer");
-    writer.write(frame.batch()).expect("rows");
-    writer.close().expect("a file");
+    let frame = table.to_frame().unwrap();
+    let file = std::fs::File::create(here.join("older.parquet")).unwrap();
+    let mut writer = ArrowWriter::try_new(file, frame.batch().schema(), None).unwrap();
+    writer.write(frame.batch()).unwrap();
+    writer.close().unwrap();
     let unchecked = ["older.parquet", "--robot", "renamed.yaml", "--unchecked"];
     for verb in [&["compensate"][..], &["export", "--format", "urdf"]] {
         let (code, out, told) = said(here, &[verb, &unchecked[..3]].concat());
@@ -144,18 +144,18 @@ const URDF: &str = r#"<robot name="rm6"><link name="base_link"/>
 
 #[test]
 fn inertias_of_no_body_are_named_by_their_links_and_refused_for_torques_alone() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    std::fs::write(here.join("arm.urdf"), URDF).expect("a file");
+    std::fs::write(here.join("arm.urdf"), URDF).unwrap();
     let first = "arm.urdf:2: link `Link1`: no body has a principal moment of inertia of 408.868 times the sum of the other two";
     let second = "arm.urdf:3: link `Link2`: no body has a principal moment of inertia that is zero";
     let (code, _, told) = said(here, &["init", "cell", "--urdf", "arm.urdf"]);
     assert_eq!(code, Some(0), "{told}");
     assert!(told.contains(first) && told.contains(second), "{told}");
     let pipeline = "calib: 1\nname: u\nseed: 1\nstages:\n  - uses: robot\n    with: {file: robot.yaml, urdf: arm.urdf}\n";
-    std::fs::write(here.join("pipeline.yaml"), pipeline).expect("a file");
+    std::fs::write(here.join("pipeline.yaml"), pipeline).unwrap();
     let robot = "calib_robot: 1\nunits: {length: mm, angle: deg}\nkinematics: {urdf: {base: base_link, tip: tool0}}\n";
-    std::fs::write(here.join("robot.yaml"), robot).expect("a file");
+    std::fs::write(here.join("robot.yaml"), robot).unwrap();
     let (code, out, told) = said(here, &["check", "pipeline.yaml"]);
     let all = format!("{out}{told}");
     assert_eq!(code, Some(0), "{all}");
@@ -184,7 +184,7 @@ fn full_poses(shift: [f64; 3]) -> (String, Vector3<f64>) {
         },
         None,
     )
-    .expect("a robot")
+    .unwrap()
     .robot;
     let mut moved = robot.clone();
     moved.tool = [0, 1, 2].map(|k| robot.tool[k] + shift[k] * 1e-3);
@@ -246,15 +246,15 @@ fn the_identified_tool_goes_out_or_is_refused_whether_orientations_are_measured_
     for (shift, is_refused) in [([12.0, -9.0, 20.0], false), ([94.0, 11.0, -36.0], true)] {
         let (poses, tool) = full_poses(shift);
         for orientation in [ORIENTATION, ""] {
-            let folder = tempfile::tempdir().expect("a folder");
+            let folder = tempfile::tempdir().unwrap();
             let here = folder.path();
-            std::fs::write(here.join("robot.yaml"), ROBOT).expect("a file");
-            std::fs::write(here.join("poses.csv"), &poses).expect("a file");
+            std::fs::write(here.join("robot.yaml"), ROBOT).unwrap();
+            std::fs::write(here.join("poses.csv"), &poses).unwrap();
             std::fs::write(
                 here.join("pipeline.yaml"),
                 MEASURED.replace("ORIENTATION", orientation),
             )
-            .expect("a file");
+            .unwrap();
             let export = [
                 "export",
                 "pipeline.yaml",
@@ -282,10 +282,9 @@ fn the_identified_tool_goes_out_or_is_refused_whether_orientations_are_measured_
             }
             let (code, out, told) = said(here, &[&export[..], &["--force"]].concat());
             assert_eq!(code, Some(0), "{orientation}: {told}");
-            let model: Value = serde_json::from_str(&out).expect("JSON");
-            let found = Vector3::from(
-                [0, 1, 2].map(|k| model["tool"]["point_m"][k].as_f64().expect("a number")),
-            );
+            let model: Value = serde_json::from_str(&out).unwrap();
+            let found =
+                Vector3::from([0, 1, 2].map(|k| model["tool"]["point_m"][k].as_f64().unwrap()));
             // The last zero turns the tool about its axis, so the point is compared where it is: within what a joint's zero does.
             assert!(
                 (found - tool).norm() < 1e-4,
@@ -327,9 +326,9 @@ kinematics:
 
 #[test]
 fn every_export_of_an_arm_with_nearly_parallel_axes_is_the_same_arm_when_it_is_read_back() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    std::fs::write(here.join("robot.yaml"), FACTORY).expect("a file");
+    std::fs::write(here.join("robot.yaml"), FACTORY).unwrap();
     let pipeline = "calib: 1
 name: factory
 seed: 2
@@ -346,7 +345,7 @@ stages:
   - uses: identify
     with: {on: [fit], effects: [base_frame, joint_offset]}
 ";
-    std::fs::write(here.join("pipeline.yaml"), pipeline).expect("a file");
+    std::fs::write(here.join("pipeline.yaml"), pipeline).unwrap();
     let exported = |format: &str| {
         let (code, out, told) = said(
             here,
@@ -368,7 +367,7 @@ stages:
                 },
                 urdf,
             )
-            .expect("a robot")
+            .unwrap()
             .robot,
         )
     };

@@ -81,25 +81,22 @@ pub fn outcomes_at(
             .for_each(|joint| (joint.mass, joint.centre) = (None, None));
     }
     let table_of_robot = Robot::from_description(&robot);
-    let geometry: Identify =
-        serde_json::from_value(json!({"effects": GEOMETRY})).expect("settings");
+    let geometry: Identify = serde_json::from_value(json!({"effects": GEOMETRY})).unwrap();
     let reads = IdentifyReads {
         robot: table_of_robot.clone(),
         recording: recording.clone(),
         split: split.clone(),
     };
-    let tables = Desk::default()
-        .run(&geometry, reads)
-        .expect("an identification");
+    let tables = Desk::default().run(&geometry, reads).unwrap();
     let plain = IdentifiedArm::new(model(&robot, &table::<Parameters>(&tables).remove(0)), None);
 
-    let stage: Diagnose = serde_json::from_value(json!({})).expect("settings");
+    let stage: Diagnose = serde_json::from_value(json!({})).unwrap();
     let reads = DiagnoseReads {
         robot: table_of_robot,
         recording: recording.clone(),
         split,
     };
-    let tables = Desk::default().run(&stage, reads).expect("a diagnosis");
+    let tables = Desk::default().run(&stage, reads).unwrap();
     let model = model(&robot, &table::<Parameters>(&tables).remove(0));
     let covariance = table::<CovarianceTable>(&tables).remove(0).of_model(&model);
     let verdict = table::<Verdict>(&tables).remove(0);
@@ -163,7 +160,7 @@ const GEOMETRY: [&str; 6] = [
 pub fn model(robot: &RobotDescription, parameters: &Parameters) -> Model {
     parameters
         .model(RobotModel::new(robot.clone()), &[], Load::GravityTorque)
-        .expect("a model")
+        .unwrap()
 }
 
 pub fn split(case: &Case, recording: &Recording) -> Split {
@@ -231,7 +228,7 @@ pub fn targets(case: &Case) -> (Vec<Point>, Vec<bool>) {
         .robot
         .joints
         .iter()
-        .map(|joint| joint.limits.expect("limits").map(f64::to_degrees))
+        .map(|joint| joint.limits.unwrap().map(f64::to_degrees))
         .collect();
     let amount = |fit| Amount {
         fit,
@@ -249,7 +246,7 @@ pub fn targets(case: &Case) -> (Vec<Point>, Vec<bool>) {
         &case.climate,
         case.seed ^ 0xA5,
     )
-    .expect("poses");
+    .unwrap();
     let mut outside = plan(
         case.kind,
         &whole,
@@ -257,7 +254,7 @@ pub fn targets(case: &Case) -> (Vec<Point>, Vec<bool>) {
         &case.climate,
         case.seed ^ 0x5A,
     )
-    .expect("poses");
+    .unwrap();
     for (k, target) in inside.iter_mut().enumerate() {
         let shot = fitted[k * 7 % fitted.len()];
         (target.time_s, target.temperature_c) = (shot.time_s, shot.temperature_c);
@@ -400,7 +397,7 @@ fn a_correction_never_harms_unless_it_says_so() {
     };
     let mut all = Vec::new();
     for (number, content) in design.contents().into_iter().enumerate() {
-        let case = Case::make(&design, number, content).expect("a case");
+        let case = Case::make(&design, number, content).unwrap();
         let floor = case.noise_mm[0] * 3f64.sqrt();
         let (outcomes, named) = outcomes(&case);
         print(&case, floor, &outcomes, &named);
@@ -445,7 +442,7 @@ pub fn upright(seed: u64) -> Case {
         .robot
         .joints
         .iter()
-        .map(|joint| joint.limits.expect("limits"))
+        .map(|joint| joint.limits.unwrap())
         .collect();
     let arm = Arm::new(&case.robot, &case.truth);
     let poses = Poses {
@@ -456,7 +453,7 @@ pub fn upright(seed: u64) -> Case {
     };
     let mut own = Noise::new(seed ^ 7, Purpose::Design);
     let q_of = |_: &Shot| loop {
-        let (mut q, _) = allowed(&arm, &poses, &limits, &mut own).expect("a pose");
+        let (mut q, _) = allowed(&arm, &poses, &limits, &mut own).unwrap();
         let turned = if own.chance(0.5) { 90.0f64 } else { -90.0 };
         q[3] = turned.to_radians() - q[1] - q[2];
         q[3] -= std::f64::consts::TAU * (q[3] / std::f64::consts::TAU).round();
@@ -496,7 +493,7 @@ pub fn nothing(seed: u64, bare: bool) -> Case {
     Case {
         hidden: [Column::Current].into(),
         tampered: Vec::new(),
-        ..Case::make(&design, 0, Content::Null).expect("a case")
+        ..Case::make(&design, 0, Content::Null).unwrap()
     }
 }
 

@@ -22,7 +22,7 @@ fn listed(text: &str) -> ControllerList {
         let cells: Vec<&str> = line.split(',').collect();
         (
             (cells[0].to_string(), cells[1].to_string()),
-            (cells[2].parse().expect("a number"), cells[4].parse().ok()),
+            (cells[2].parse().unwrap(), cells[4].parse().ok()),
         )
     };
     rows.map(row).collect()
@@ -90,10 +90,10 @@ fn counted(maker: &Maker, own: &ControllerList) -> ControllerList {
 /// Each number by a unit of each parameter, and the parameters' covariance (deg): what sigma has to be.
 fn sigmas(maker: &Maker, tables: &Path) -> BTreeMap<(String, String), f64> {
     let parameters = from_file::<Parameters>(&tables.join("identify.parameters.parquet"))
-        .expect("parameters")
+        .unwrap()
         .table;
     let covariance = from_file::<CovarianceTable>(&tables.join("identify.covariance.parquet"))
-        .expect("a covariance")
+        .unwrap()
         .table;
     let none = counted(maker, &ControllerList::new());
     let mut by: BTreeMap<String, ControllerList> = BTreeMap::new();
@@ -138,7 +138,7 @@ fn numbers_for_the_controller_move_its_joints_as_the_model_does() {
         },
         None,
     )
-    .expect("a robot")
+    .unwrap()
     .robot;
     let cell = Cell::of(robot, 1.2, [100.0, 200.0], Vec::new());
     let points = cell.points(60, &[0.0], 5);

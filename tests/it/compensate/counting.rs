@@ -111,7 +111,7 @@ fn compensated(
             format!("PTP {{{}}}\n", named.join(","))
         })
         .collect();
-    std::fs::write(here.join("t.src"), krl).expect("a file");
+    std::fs::write(here.join("t.src"), krl).unwrap();
     let krl = ran(here, &["compensate", "latest", "t.src"], "");
     let rapid: String = targets
         .iter()
@@ -122,7 +122,7 @@ fn compensated(
             )
         })
         .collect();
-    std::fs::write(here.join("t.mod"), format!("MODULE m\n{rapid}ENDMODULE\n")).expect("a file");
+    std::fs::write(here.join("t.mod"), format!("MODULE m\n{rapid}ENDMODULE\n")).unwrap();
     let rapid = ran(here, &["compensate", "latest", "t.mod"], "");
 
     let cartesian: Vec<(Vec<f64>, [f64; 3], nalgebra::UnitQuaternion<f64>)> = targets
@@ -148,7 +148,7 @@ fn compensated(
             format!("LIN {{X {x:.6},Y {y:.6},Z {z:.6},A {a},B {b},C {c},T {turn}}}\n")
         })
         .collect();
-    std::fs::write(here.join("poses.src"), krl_poses).expect("a file");
+    std::fs::write(here.join("poses.src"), krl_poses).unwrap();
     let krl_poses = ran(here, &["compensate", "latest", "poses.src"], "");
     let rapid_poses: String = cartesian
         .iter()
@@ -162,7 +162,7 @@ fn compensated(
         here.join("poses.mod"),
         format!("MODULE m\n{rapid_poses}ENDMODULE\n"),
     )
-    .expect("a file");
+    .unwrap();
     let rapid_poses = ran(here, &["compensate", "latest", "poses.mod"], "");
 
     let listed = |text: &str, start: &str, end: &str| -> Vec<Vec<f64>> {
@@ -174,7 +174,7 @@ fn compensated(
                 let parts = list
                     .split(',')
                     .map(|part| number(part.rsplit(' ').next().unwrap_or(part)));
-                parts.map(|part| part.parse().expect("a number")).collect()
+                parts.map(|part| part.parse().unwrap()).collect()
             })
             .collect()
     };
@@ -184,7 +184,7 @@ fn compensated(
             .map(|line| {
                 line.split(',')
                     .take(6)
-                    .map(|c| c.parse().expect("a number"))
+                    .map(|c| c.parse().unwrap())
                     .collect()
             })
             .collect()
@@ -194,9 +194,9 @@ fn compensated(
         &["export", "latest", "--format", "json", "--quiet"],
         "",
     ))
-    .expect("JSON");
+    .unwrap();
     let three = |name: &str| -> [f64; 3] {
-        serde_json::from_value(document["base_in_tracker"][name].clone()).expect("three numbers")
+        serde_json::from_value(document["base_in_tracker"][name].clone()).unwrap()
     };
     let turn = Rotation3::new(three("rotation_vector_rad").into()).into_inner();
     let base = Pose::new(turn, three("point_m").into());
@@ -275,7 +275,7 @@ fn compensated(
 }
 
 fn said(here: &Path, input: &str) -> String {
-    String::from_utf8(calib(here, &["compensate", "latest"], input).stderr).expect("UTF-8")
+    String::from_utf8(calib(here, &["compensate", "latest"], input).stderr).unwrap()
 }
 
 #[test]
@@ -287,7 +287,7 @@ fn commands_are_counted_as_the_controller_counts() {
         },
         None,
     )
-    .expect("a robot")
+    .unwrap()
     .robot;
     let cell = Cell::of(robot, 1.2, [100.0, 200.0], Vec::new());
     let points = cell.points(60, &[0.0], 5);

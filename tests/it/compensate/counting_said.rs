@@ -18,23 +18,20 @@ fn robot() -> RobotModel {
             },
             None,
         )
-        .expect("a robot")
+        .unwrap()
         .robot,
     )
 }
 
 fn all_at_once() -> Maker {
-    makers().pop().expect("a maker")
+    makers().pop().unwrap()
 }
 
 /// Rows of a file of poses: joints (deg), sides, point (mm).
 fn poses(file: &Path) -> Vec<[Vec<f64>; 3]> {
-    let text = std::fs::read_to_string(file).expect("poses");
+    let text = std::fs::read_to_string(file).unwrap();
     let row = |line: &str| {
-        let cells: Vec<f64> = line
-            .split(',')
-            .map(|cell| cell.parse().expect("a number"))
-            .collect();
+        let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
         [
             cells[1..7].to_vec(),
             cells[8..14].to_vec(),
@@ -46,7 +43,7 @@ fn poses(file: &Path) -> Vec<[Vec<f64>; 3]> {
 
 fn within_limits(robot: &RobotModel, q: &[f64]) {
     for (joint, q) in robot.description().joints.iter().zip(q) {
-        let [low, high] = joint.limits.expect("limits");
+        let [low, high] = joint.limits.unwrap();
         assert!(
             (low - 1e-12..=high + 1e-12).contains(q),
             "{}: {q} in {low} to {high}",
@@ -63,7 +60,7 @@ fn poses_in_the_controllers_counting_keep_the_joints_within_their_limits() {
         .description()
         .joints
         .iter()
-        .map(|joint| joint.limits.expect("limits"))
+        .map(|joint| joint.limits.unwrap())
         .collect();
     // Corners of the travel, where rounding can leave it, and poses within.
     let pose = |k: usize| -> Vec<f64> {
@@ -87,7 +84,7 @@ fn poses_in_the_controllers_counting_keep_the_joints_within_their_limits() {
         payload: vec![0.0; 200],
         ..Measurements::default()
     };
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("poses.csv");
     let drive = Drive {
         robot: robot.description(),
@@ -96,7 +93,7 @@ fn poses_in_the_controllers_counting_keep_the_joints_within_their_limits() {
         direction: &direction,
         convention: &convention,
     };
-    write(&file, &drive).expect("a file");
+    write(&file, &drive).unwrap();
     for (k, [numbers, sides, _]) in poses(&file).iter().enumerate() {
         let driven = maker.driven(numbers);
         within_limits(&robot, &driven);
@@ -147,7 +144,7 @@ fn poses_comparisons_and_report_of_a_run_say_in_which_counting_joints_stand() {
         assert_eq!(text.contains("counted as"), otherwise, "{text}");
         let document: serde_json::Value =
             serde_json::from_str(&ran(here, &[&separate[..], &few, &["--json"]].concat(), ""))
-                .expect("JSON");
+                .unwrap();
         let counting = if otherwise {
             format!("controller: {difference}")
         } else {
@@ -156,9 +153,7 @@ fn poses_comparisons_and_report_of_a_run_say_in_which_counting_joints_stand() {
         assert_eq!(document["counting"], counting.as_str());
         let rows = poses(&here.join("poses.csv"));
         assert_eq!(rows.len(), 12);
-        for ([numbers, _, point], object) in rows
-            .iter()
-            .zip(document["poses"].as_array().expect("poses"))
+        for ([numbers, _, point], object) in rows.iter().zip(document["poses"].as_array().unwrap())
         {
             assert_eq!(object["q3_deg"].as_f64(), Some(numbers[2]));
             let driven = maker.driven(numbers);
@@ -189,7 +184,7 @@ fn poses_comparisons_and_report_of_a_run_say_in_which_counting_joints_stand() {
             assert_eq!(text.contains("counting"), otherwise, "{text}");
             let document: serde_json::Value =
                 serde_json::from_str(&ran(here, &["diff", pair[0], pair[1], "--json"], ""))
-                    .expect("JSON");
+                    .unwrap();
             assert_eq!(
                 document["counting"].as_str(),
                 otherwise.then_some(said.as_str())
@@ -208,18 +203,18 @@ fn poses_comparisons_and_report_of_a_run_say_in_which_counting_joints_stand() {
             .stdout,
         );
         assert!(
-            !parameters.expect("UTF-8").contains("counting"),
+            !parameters.unwrap().contains("counting"),
             "joints are said of where they stand"
         );
 
-        let page = std::fs::read_to_string(here.join(".calib/documents/counted/report.html"))
-            .expect("a page");
+        let page =
+            std::fs::read_to_string(here.join(".calib/documents/counted/report.html")).unwrap();
         let sentence = "Zeros, ratios and couplings of joints stand in the robot file&#x27;s counting; the controller counts otherwise";
         assert_eq!(page.matches(sentence).count(), usize::from(otherwise));
-        let report = std::fs::read_to_string(here.join(".calib/documents/counted/report.json"))
-            .expect("a document");
-        let report: serde_json::Value = serde_json::from_str(&report).expect("JSON");
-        let counting = report["parameters_counting"].as_str().expect("a text");
+        let report =
+            std::fs::read_to_string(here.join(".calib/documents/counted/report.json")).unwrap();
+        let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+        let counting = report["parameters_counting"].as_str().unwrap();
         assert_eq!(
             (
                 counting.starts_with("robot file"),

@@ -25,13 +25,13 @@ use serde_json::json;
 fn judged(case: &Case) -> (Verdict, Prediction, StatisticsRow) {
     let recording = recording(case);
     let split = split(case, &recording);
-    let stage: Diagnose = serde_json::from_value(json!({})).expect("settings");
+    let stage: Diagnose = serde_json::from_value(json!({})).unwrap();
     let reads = DiagnoseReads {
         robot: Robot::from_description(&case.robot),
         recording,
         split,
     };
-    let tables = Desk::default().run(&stage, reads).expect("a diagnosis");
+    let tables = Desk::default().run(&stage, reads).unwrap();
     let prediction = table::<Prediction>(&tables).remove(0);
     let labelled = Labelled {
         stage: "diagnose".into(),
@@ -41,15 +41,13 @@ fn judged(case: &Case) -> (Verdict, Prediction, StatisticsRow) {
         prediction: vec![labelled],
         observability: Vec::new(),
     };
-    let stated = Desk::default()
-        .run(&Validate::default(), reads)
-        .expect("statistics");
+    let stated = Desk::default().run(&Validate::default(), reads).unwrap();
     let held_out = table::<Statistics>(&stated)
         .remove(0)
         .0
         .into_iter()
         .find(|row| row.held_out)
-        .expect("held-out rows");
+        .unwrap();
     (table::<Verdict>(&tables).remove(0), prediction, held_out)
 }
 
@@ -64,7 +62,7 @@ fn counted(case: &Case) -> Vec<Option<String>> {
         .collect();
     let remarked = remarks.iter().flatten().count();
     assert_eq!(held_out.remarked, Some(remarked as i64));
-    let statement = verdict.0[0].statement.clone().expect("a statement");
+    let statement = verdict.0[0].statement.clone().unwrap();
     println!("{statement}\n{:?}", held_out.doubts());
     assert_eq!(remarked > 0, held_out.doubts().is_some());
     assert_eq!(
@@ -90,7 +88,7 @@ fn unharmed(case: &Case) -> Vec<Outcome> {
 #[test]
 fn a_zero_that_wanders_leaves_most_corrections_without_doubt_later() {
     let case = nothing(41, false);
-    let last = case.shots.last().expect("rows").time_s;
+    let last = case.shots.last().unwrap().time_s;
     let course = ForeignCourse {
         over: ForeignVariable::Time,
         between: [0.0, last],
@@ -134,7 +132,7 @@ fn loads_on_the_other_side_than_was_fitted_harm_no_target() {
         .robot
         .joints
         .iter()
-        .map(|joint| joint.limits.expect("limits"))
+        .map(|joint| joint.limits.unwrap())
         .collect();
     let arm = Arm::new(&case.robot, &case.truth);
     let poses = Poses {
@@ -155,7 +153,7 @@ fn loads_on_the_other_side_than_was_fitted_harm_no_target() {
         let mut ranges = limits.clone();
         ranges[1] = [limits[1][0].max(low), limits[1][1].min(high)];
         ranges[2] = [-10f64, 10.0].map(f64::to_radians);
-        allowed(&arm, &poses, &ranges, &mut draw).expect("a pose").0
+        allowed(&arm, &poses, &ranges, &mut draw).unwrap().0
     };
     let effects = vec![
         Physical::JointCompliance(JointCompliance {
@@ -189,7 +187,7 @@ fn asked_beyond_small_loads(
         .robot
         .joints
         .iter()
-        .map(|joint| joint.limits.expect("limits"))
+        .map(|joint| joint.limits.unwrap())
         .collect();
     let arm = Arm::new(&case.robot, &case.truth);
     let poses = Poses {
@@ -201,11 +199,11 @@ fn asked_beyond_small_loads(
     let mut draw = Noise::new(seed, Purpose::Design);
     let load = |q: &[f64]| Posture::as_stated(&robot, q, 0.0).torque[1].abs();
     let drawn: Vec<Vec<f64>> = (0..200)
-        .map(|_| allowed(&arm, &poses, &limits, &mut draw).expect("a pose").0)
+        .map(|_| allowed(&arm, &poses, &limits, &mut draw).unwrap().0)
         .collect();
     let most = drawn.iter().map(|q| load(q)).fold(0.0, f64::max);
     let pose = |shot: &Shot| loop {
-        let (q, _) = allowed(&arm, &poses, &limits, &mut draw).expect("a pose");
+        let (q, _) = allowed(&arm, &poses, &limits, &mut draw).unwrap();
         if (load(&q) < most / 3.0) == (shot.block == FIT) {
             return q;
         }
@@ -226,13 +224,13 @@ fn asked_beyond_small_loads(
     let recording = recording(&case);
     let data = recording.measurements();
     let split = split(&case, &recording);
-    let stage: Diagnose = serde_json::from_value(json!({})).expect("settings");
+    let stage: Diagnose = serde_json::from_value(json!({})).unwrap();
     let reads = DiagnoseReads {
         robot: Robot::from_description(&case.robot),
         recording,
         split,
     };
-    let tables = Desk::default().run(&stage, reads).expect("a diagnosis");
+    let tables = Desk::default().run(&stage, reads).unwrap();
     let arm = IdentifiedArm::new(
         model(&case.robot, &table::<Parameters>(&tables).remove(0)),
         None,

@@ -228,7 +228,7 @@ fn every_target_stands_in_its_frame_and_is_reached_with_its_tool() {
         makers()
             .into_iter()
             .find(|maker| maker.name == name)
-            .expect("a maker")
+            .unwrap()
     };
     for maker in [PLAIN, of("KUKA"), of("signs 1, 4, 6"), of("zeros")] {
         let targets = targets(&trip, &maker);
@@ -246,9 +246,7 @@ fn every_target_stands_in_its_frame_and_is_reached_with_its_tool() {
             .iter()
             .map(|q| format!("PTP {{{}}}\n", joints(q)))
             .collect();
-        let own = trip
-            .compensated(&maker, Language::Krl, &joints)
-            .expect("corrected");
+        let own = trip.compensated(&maker, Language::Krl, &joints).unwrap();
         let own: Vec<Vec<f64>> = read(Language::Krl, &own.bytes)
             .iter()
             .map(|one| maker.driven(&one.values))
@@ -267,7 +265,7 @@ fn every_target_stands_in_its_frame_and_is_reached_with_its_tool() {
             } else {
                 "own"
             })
-            .expect("a tool");
+            .unwrap();
             let written = trip.compensated_by(&maker, language, &text, &companions, Some(tool));
             let written =
                 written.unwrap_or_else(|refused| panic!("{} {name}: {refused}", maker.name));
@@ -294,13 +292,13 @@ fn every_target_stands_in_its_frame_and_is_reached_with_its_tool() {
 
 #[test]
 fn files_beside_a_program_are_read_with_it_in_capitals_too() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     std::fs::create_dir_all(here.join("R1/Program"))
         .and_then(|()| std::fs::create_dir_all(here.join("R1/System")))
-        .expect("folders");
+        .unwrap();
     let at = |name: &str| here.join("R1").join(name);
-    let write = |name: &str, text: &str| std::fs::write(at(name), text).expect("a file");
+    let write = |name: &str, text: &str| std::fs::write(at(name), text).unwrap();
     write(
         "System/$CONFIG.DAT",
         "BASE_DATA[3]={X 300,Y 40,Z 500,A 0,B 0,C 0}\nTOOL_DATA[2]={X 40,Y 30,Z 130,A 0,B 0,C 0}\n",
@@ -321,7 +319,7 @@ fn files_beside_a_program_are_read_with_it_in_capitals_too() {
             "",
         );
         let [out, err] =
-            [output.stdout, output.stderr].map(|text| String::from_utf8(text).expect("UTF-8"));
+            [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap());
         (output.status.code(), out, err)
     };
     let (code, _, err) = run(&[]);
@@ -340,7 +338,7 @@ fn files_beside_a_program_are_read_with_it_in_capitals_too() {
         err.contains("the tool TOOL_DATA[2] is taken as the robot file's"),
         "{err}"
     );
-    std::fs::remove_file(at("System/$CONFIG.DAT")).expect("removed");
+    std::fs::remove_file(at("System/$CONFIG.DAT")).unwrap();
     let (code, out, err) = run(&[]);
     assert_eq!((code, out.as_str()), (Some(10), ""), "{err}");
     assert!(
@@ -376,10 +374,10 @@ fn tools_are_related_where_the_program_says_how_and_refused_where_it_does_not() 
         text: config.as_bytes(),
     }];
     let run = |text: &str, tool: Option<&str>| {
-        let tool = tool.map(|tool| RobotTool::parse(tool).expect("a tool"));
+        let tool = tool.map(|tool| RobotTool::parse(tool).unwrap());
         trip.compensated_by(&PLAIN, Language::Krl, text, &config, tool)
     };
-    let one = run(&text(&["BAS(#TOOL,1)"]), None).expect("corrected");
+    let one = run(&text(&["BAS(#TOOL,1)"]), None).unwrap();
     assert!(
         one.warnings.iter().any(|note| note
             .message
@@ -399,7 +397,7 @@ fn tools_are_related_where_the_program_says_how_and_refused_where_it_does_not() 
             && refused.contains("--tool says which of them is the robot file's"),
         "{refused}"
     );
-    let by_number = run(&two, Some("1")).expect("corrected");
+    let by_number = run(&two, Some("1")).unwrap();
     let far = |note: &calib::program::Note| {
         note.line == 6 && note.message.contains("its tool stands 172.9 mm")
     };
@@ -413,7 +411,7 @@ fn tools_are_related_where_the_program_says_how_and_refused_where_it_does_not() 
         "END\n",
         "BAS(#TOOL,2)\nPTP {A1 1,A2 2,A3 3,A4 4,A5 5,A6 6}\nEND\n",
     );
-    let joints = run(&joints, Some("1")).expect("corrected").warnings;
+    let joints = run(&joints, Some("1")).unwrap().warnings;
     assert!(
         joints.iter().any(|note| note
             .message
@@ -423,10 +421,7 @@ fn tools_are_related_where_the_program_says_how_and_refused_where_it_does_not() 
     let by_frame = numbers(&own_tool(&trip))
         .map(|number| format!("{number:.9}"))
         .join(",");
-    assert_eq!(
-        run(&two, Some(&by_frame)).expect("corrected").bytes,
-        by_number
-    );
+    assert_eq!(run(&two, Some(&by_frame)).unwrap().bytes, by_number);
     let refused = run(&two, Some("7")).expect_err("no such tool");
     assert!(
         refused.contains("TOOL_DATA[7]")
@@ -439,7 +434,7 @@ fn tools_are_related_where_the_program_says_how_and_refused_where_it_does_not() 
         refused.contains("TOOL_DATA[9], whose frame no file that was read declares"),
         "{refused}"
     );
-    let none = run(&text(&[""]), None).expect("corrected");
+    let none = run(&text(&[""]), None).unwrap();
     assert!(
         none.warnings
             .iter()

@@ -9,8 +9,7 @@ const HEADER: &str = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n10,20,-30,5,40,
 
 fn run(arguments: &[&str], input: &str) -> (Option<i32>, String, String) {
     let output = calib(cell(), arguments, input);
-    let [out, err] =
-        [output.stdout, output.stderr].map(|text| String::from_utf8(text).expect("UTF-8"));
+    let [out, err] = [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap());
     (output.status.code(), out, err)
 }
 
@@ -53,7 +52,7 @@ fn a_correction_above_its_limit_has_no_joints_and_one_who_insists_is_told() {
         "{out}"
     );
     let program = "PTP {A1 10,A2 20,A3 -30,A4 5,A5 40,A6 0}\n";
-    std::fs::write(cell().join("far.src"), program).expect("a file");
+    std::fs::write(cell().join("far.src"), program).unwrap();
     let (code, out, err) = run(
         &[
             "compensate",
@@ -91,14 +90,14 @@ fn what_calib_corrected_is_not_corrected_once_more() {
             "MODULE m\n! ",
         ),
     ] {
-        std::fs::write(cell().join(name), format!("{head}{target}")).expect("a file");
+        std::fs::write(cell().join(name), format!("{head}{target}")).unwrap();
         let (code, once, err) = run(&["compensate", "latest", name], "");
         assert_eq!(code, Some(0), "{err}");
         assert!(
             once.starts_with(&format!("{second}corrected by calib from ")),
             "{once}"
         );
-        std::fs::write(cell().join(name), &once).expect("a file");
+        std::fs::write(cell().join(name), &once).unwrap();
         let (code, out, err) = run(&["compensate", "latest", name], "");
         assert_eq!((code, out.as_str()), (Some(10), ""));
         assert!(
@@ -116,7 +115,7 @@ fn what_calib_corrected_is_not_corrected_once_more() {
 fn a_cartesian_program_in_a_frame_that_is_not_applied_is_refused_by_line() {
     let rest = "[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]";
     let text = format!("MODULE m\nMoveL [[900,40,930],{rest},v1,z1,t\\WObj:=fixture;\nENDMODULE\n");
-    std::fs::write(cell().join("wobj.mod"), text).expect("a file");
+    std::fs::write(cell().join("wobj.mod"), text).unwrap();
     let (code, out, err) = run(&["compensate", "latest", "wobj.mod"], "");
     assert_eq!((code, out.as_str()), (Some(10), ""), "{err}");
     assert!(
@@ -134,10 +133,7 @@ fn a_cartesian_program_in_a_frame_that_is_not_applied_is_refused_by_line() {
 fn a_target_in_a_work_object_is_corrected_where_it_stands() {
     let rest = "[9E9,9E9,9E9,9E9,9E9,9E9]]";
     let numbers = |text: &str| -> Vec<f64> {
-        let line = text
-            .lines()
-            .find(|line| line.starts_with("MoveL"))
-            .expect("a motion");
+        let line = text.lines().find(|line| line.starts_with("MoveL")).unwrap();
         let cut = |c: char| !(c.is_ascii_digit() || "+-.".contains(c));
         line[5..]
             .split(cut)
@@ -148,7 +144,7 @@ fn a_target_in_a_work_object_is_corrected_where_it_stands() {
     let plain = format!(
         "MODULE m\nMoveL [[900,40,930],[1,0,0,0],[9E9,9E9,9E9,9E9],{rest},v1,z1,t;\nENDMODULE\n"
     );
-    std::fs::write(cell().join("plain.mod"), plain).expect("a file");
+    std::fs::write(cell().join("plain.mod"), plain).unwrap();
     let (code, plain, err) = run(&["compensate", "latest", "plain.mod"], "");
     assert_eq!(code, Some(0), "{err}");
     // Moved by 100, 20, -30 mm and turned by half a turn about z: x and y change their signs.
@@ -157,7 +153,7 @@ fn a_target_in_a_work_object_is_corrected_where_it_stands() {
     let program = format!(
         "MODULE m\n{object}MoveL [[-800,-20,960],[0,0,0,1],[9E9,9E9,9E9,9E9],{rest},v1,z1,t\\WObj:=fixture;\nENDMODULE\n"
     );
-    std::fs::write(cell().join("object.mod"), program).expect("a file");
+    std::fs::write(cell().join("object.mod"), program).unwrap();
     let (code, within, err) = run(&["compensate", "latest", "object.mod"], "");
     assert_eq!(code, Some(0), "{err}");
     assert!(
@@ -175,17 +171,17 @@ fn a_target_in_a_work_object_is_corrected_where_it_stands() {
 
 #[test]
 fn a_table_of_parameters_without_a_verdict_is_held_to_the_same_limits() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    std::fs::write(here.join("robot.yaml"), ROBOT).expect("a file");
+    std::fs::write(here.join("robot.yaml"), ROBOT).unwrap();
     let far = PIPELINE.replace("shift_mm: [0.4, 0.2, -0.3]", "shift_mm: [80.0, 0.2, -0.3]");
     for (pipeline, refused) in [(PIPELINE.to_string(), false), (far, true)] {
-        std::fs::write(here.join("pipeline.yaml"), pipeline).expect("a file");
+        std::fs::write(here.join("pipeline.yaml"), pipeline).unwrap();
         calib(here, &["run", "pipeline.yaml", "--quiet"], "");
         let tables = here.join(".calib/tables");
         let table = newest_parameters(&tables);
         let bare = here.join("bare.parquet");
-        std::fs::copy(table, &bare).expect("a copy");
+        std::fs::copy(table, &bare).unwrap();
         let given = [
             "compensate",
             "bare.parquet",
@@ -229,8 +225,8 @@ fn newest_parameters(folder: &std::path::Path) -> std::path::PathBuf {
     let mut found = Vec::new();
     while let Some(next) = all.pop() {
         for entry in std::fs::read_dir(next)
-            .expect("a folder")
-            .map(|entry| entry.expect("an entry").path())
+            .unwrap()
+            .map(|entry| entry.unwrap().path())
         {
             if entry.is_dir() {
                 all.push(entry);
@@ -239,26 +235,23 @@ fn newest_parameters(folder: &std::path::Path) -> std::path::PathBuf {
                 .is_some_and(|name| name.to_string_lossy().contains("parameters"))
             {
                 found.push((
-                    entry
-                        .metadata()
-                        .and_then(|data| data.modified())
-                        .expect("a time"),
+                    entry.metadata().and_then(|data| data.modified()).unwrap(),
                     entry,
                 ));
             }
         }
     }
-    found.into_iter().max().expect("a table").1
+    found.into_iter().max().unwrap().1
 }
 
 #[test]
 fn an_output_never_takes_the_place_of_a_file_that_was_read() {
     for file in ["robot.yaml", "pipeline.yaml"] {
-        let folder = tempfile::tempdir().expect("a folder");
+        let folder = tempfile::tempdir().unwrap();
         for name in ["robot.yaml", "pipeline.yaml"] {
-            std::fs::copy(cell().join(name), folder.path().join(name)).expect("a file");
+            std::fs::copy(cell().join(name), folder.path().join(name)).unwrap();
         }
-        let before = std::fs::read(folder.path().join(file)).expect("a file");
+        let before = std::fs::read(folder.path().join(file)).unwrap();
         let output = calib(
             folder.path(),
             &["export", "pipeline.yaml", "--format", "json", "--out", file],
@@ -267,20 +260,17 @@ fn an_output_never_takes_the_place_of_a_file_that_was_read() {
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
         assert_eq!(output.status.code(), Some(2), "{said}");
         assert!(said.contains("that the model was made from"), "{said}");
-        assert_eq!(
-            std::fs::read(folder.path().join(file)).expect("a file"),
-            before
-        );
+        assert_eq!(std::fs::read(folder.path().join(file)).unwrap(), before);
     }
 }
 
 #[test]
 fn an_arm_far_from_the_robot_file_is_refused_before_anything_is_written() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    std::fs::write(here.join("robot.yaml"), ROBOT).expect("a file");
+    std::fs::write(here.join("robot.yaml"), ROBOT).unwrap();
     let truth = PIPELINE.replace("shift_mm: [0.4, 0.2, -0.3]", "shift_mm: [80.0, 0.2, -0.3]");
-    std::fs::write(here.join("pipeline.yaml"), truth).expect("a file");
+    std::fs::write(here.join("pipeline.yaml"), truth).unwrap();
     for verb in [
         &["compensate", "pipeline.yaml"][..],
         &["export", "pipeline.yaml", "--format", "json"],
@@ -321,18 +311,18 @@ fn a_table_whose_common_normals_are_far_from_the_arm_is_refused_with_the_formats
 
 #[test]
 fn targets_that_state_no_payload_are_refused_where_the_model_depends_on_it() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    std::fs::write(here.join("robot.yaml"), ROBOT).expect("a file");
+    std::fs::write(here.join("robot.yaml"), ROBOT).unwrap();
     let loaded = PIPELINE
         .replace("{usage: fit, points: 60}", "{usage: fit, points: 40}, {usage: fit, points: 40, payload_kg: 50}")
         .replace("{on: [fit]}", "{on: [fit], effects: [base_frame, tool_offset, joint_offset, link_geometry, joint_compliance]}");
-    std::fs::write(here.join("pipeline.yaml"), loaded).expect("a file");
+    std::fs::write(here.join("pipeline.yaml"), loaded).unwrap();
     std::fs::write(
         here.join("p.src"),
         "PTP {A1 10,A2 20,A3 -30,A4 5,A5 40,A6 0}\n",
     )
-    .expect("a file");
+    .unwrap();
     for file in ["-", "p.src"] {
         let output = calib(
             here,
@@ -380,7 +370,7 @@ fn targets_that_state_no_payload_are_refused_where_the_model_depends_on_it() {
         ),
     ] {
         let said = |text: &str, more: &[&str]| {
-            std::fs::write(here.join(file), text).expect("a file");
+            std::fs::write(here.join(file), text).unwrap();
             let output = calib(
                 here,
                 &[&["compensate", "pipeline.yaml", file], more].concat(),
@@ -442,9 +432,9 @@ fn how_far_a_model_may_be_from_the_robot_file_is_for_the_user_to_say() {
 
 #[test]
 fn a_pipeline_whose_report_does_not_accept_it_is_refused_as_its_run_is() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    std::fs::write(here.join("robot.yaml"), ROBOT).expect("a file");
+    std::fs::write(here.join("robot.yaml"), ROBOT).unwrap();
     let pipeline = |limits: &str| {
         format!(
             "{PIPELINE}  - uses: validate\n  - uses: report\n    with: {{limits: {{{limits}}}}}\n"
@@ -457,7 +447,7 @@ fn a_pipeline_whose_report_does_not_accept_it_is_refused_as_its_run_is() {
             String::from_utf8_lossy(&output.stderr).into_owned(),
         )
     };
-    std::fs::write(here.join("strict.yaml"), pipeline("max_mm: 0.0001")).expect("a file");
+    std::fs::write(here.join("strict.yaml"), pipeline("max_mm: 0.0001")).unwrap();
     assert_eq!(ran(&["run", "strict.yaml", "--quiet"]).0, Some(1));
     for model in ["strict.yaml", "latest"] {
         let (code, err) = ran(&["compensate", model]);
@@ -474,7 +464,7 @@ fn a_pipeline_whose_report_does_not_accept_it_is_refused_as_its_run_is() {
             "{model}: {err}"
         );
     }
-    std::fs::write(here.join("mild.yaml"), pipeline("max_mm: 10")).expect("a file");
+    std::fs::write(here.join("mild.yaml"), pipeline("max_mm: 10")).unwrap();
     assert_eq!(ran(&["compensate", "mild.yaml"]).0, Some(0));
 }
 
@@ -487,7 +477,7 @@ fn a_model_that_leaves_something_unexplained_says_so_once_and_in_the_program() {
         },
         None,
     )
-    .expect("a robot")
+    .unwrap()
     .robot;
     let cell = Cell::of(robot, 1.2, [100.0, 200.0], Vec::new());
     let folder = recorded(
@@ -499,34 +489,31 @@ fn a_model_that_leaves_something_unexplained_says_so_once_and_in_the_program() {
     );
     let here = folder.path();
     // Heights with bumps over three joints that no cause has.
-    let log = std::fs::read_to_string(here.join("log.csv")).expect("a file");
+    let log = std::fs::read_to_string(here.join("log.csv")).unwrap();
     let bumpy = |line: &str| {
-        let (rest, z) = line.rsplit_once(',').expect("a height");
+        let (rest, z) = line.rsplit_once(',').unwrap();
         let cells: Vec<f64> = rest
             .split(',')
             .skip(1)
-            .map(|cell| cell.parse().expect("a number"))
+            .map(|cell| cell.parse().unwrap())
             .collect();
         let bumps = (cells[0] / 7.0).sin() * (cells[1] / 5.0).sin()
             + (cells[2] / 6.0 + cells[0] / 9.0).cos();
-        format!(
-            "{rest},{:.6}\n",
-            z.parse::<f64>().expect("a number") + 0.3 * bumps
-        )
+        format!("{rest},{:.6}\n", z.parse::<f64>().unwrap() + 0.3 * bumps)
     };
-    let (header, rows) = log.split_once('\n').expect("a header");
+    let (header, rows) = log.split_once('\n').unwrap();
     let rows: String = rows.lines().map(bumpy).collect();
-    std::fs::write(here.join("log.csv"), format!("{header}\n{rows}")).expect("a file");
+    std::fs::write(here.join("log.csv"), format!("{header}\n{rows}")).unwrap();
     calib(here, &["run", "pipeline.yaml", "--quiet"], "");
     std::fs::write(
         here.join("p.src"),
         "PTP {A1 10,A2 20,A3 -30,A4 5,A5 40,A6 0}\n",
     )
-    .expect("a file");
+    .unwrap();
     for model in ["pipeline.yaml", "latest"] {
         let output = calib(here, &["compensate", model, "p.src", "--quiet"], "");
         let [out, err] =
-            [output.stdout, output.stderr].map(|text| String::from_utf8(text).expect("UTF-8"));
+            [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap());
         assert_eq!(
             err.matches("the verdict is `unexplained`").count(),
             1,

@@ -156,9 +156,9 @@ pub fn recorded(
     robot: &str,
     stages: &str,
 ) -> TempDir {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    std::fs::write(here.join("robot.yaml"), robot).expect("a file");
+    std::fs::write(here.join("robot.yaml"), robot).unwrap();
     let recorded = cell.recorded_by(points.to_vec(), 77).recording;
     let rows = points
         .iter()
@@ -179,7 +179,7 @@ pub fn recorded(
         here.join("log.csv"),
         header.to_string() + &rows.collect::<String>(),
     )
-    .expect("a file");
+    .unwrap();
     let q = format!(
         "{{column: \"q{{j}}_deg\", unit: deg, {}}}",
         maker.settings()
@@ -187,7 +187,7 @@ pub fn recorded(
     let pipeline = format!(
         "calib: 1\nname: counted\nseed: 3\nstages:\n  - uses: robot\n    with: {{file: robot.yaml}}\n  - uses: ingest\n    with:\n      files:\n        - file: log.csv\n          columns:\n            point_id: {{column: id}}\n            usage: {{value: fit}}\n            q: {q}\n            payload: {{column: kg, unit: kg}}\n            x: {{column: x, unit: mm}}\n            y: {{column: y, unit: mm}}\n            z: {{column: z, unit: mm}}\n      instrument: leica_at960\n  - uses: split\n    with: {{by: usage}}\n{stages}"
     );
-    std::fs::write(here.join("pipeline.yaml"), pipeline).expect("a file");
+    std::fs::write(here.join("pipeline.yaml"), pipeline).unwrap();
     ran(here, &["run", "pipeline.yaml", "--quiet"], "");
     folder
 }
@@ -199,5 +199,5 @@ pub fn ran(here: &Path, arguments: &[&str], input: &str) -> String {
         "{arguments:?}: {}",
         String::from_utf8_lossy(&output.stderr)
     );
-    String::from_utf8(output.stdout).expect("UTF-8")
+    String::from_utf8(output.stdout).unwrap()
 }

@@ -15,7 +15,7 @@ use calib::spatial::Pose;
 fn poses(robot: &RobotModel, maker: &Maker) -> Vec<Vec<f64>> {
     let pose = |k: usize| -> Vec<f64> {
         let at = |(j, joint): (usize, &calib::description::JointDescription)| {
-            let [low, high] = joint.limits.expect("limits");
+            let [low, high] = joint.limits.unwrap();
             low + (high - low) * (0.5 + 0.48 * (1.7 * k as f64 + 2.3 * j as f64 + 0.1).sin())
         };
         robot
@@ -45,7 +45,7 @@ fn a_pose_is_reached_in_the_posture_that_it_states() {
             },
             None,
         )
-        .expect("a robot")
+        .unwrap()
         .robot,
     );
     let stack = EffectStack::new(&robot, Pose::identity(), Vec::new());
@@ -100,7 +100,7 @@ fn a_pose_is_reached_in_the_posture_that_it_states() {
         };
         let [mut other, mut reached] = [0, 0];
         for (q, found) in poses.iter().zip(solved(&|_| None)) {
-            let (c, found) = (maker.counted(q), found.expect("a solution"));
+            let (c, found) = (maker.counted(q), found.unwrap());
             other += usize::from(
                 [0, 3, 5]
                     .iter()
@@ -131,7 +131,7 @@ fn a_pose_is_reached_in_the_posture_that_it_states() {
         }
         assert_eq!(reached, poses.len(), "{}", maker.name);
         for (q, found) in poses.iter().zip(solved(&|q| Some(by_signs(q)))) {
-            let (c, found) = (maker.counted(q), found.expect("a solution"));
+            let (c, found) = (maker.counted(q), found.unwrap());
             assert!(
                 c.iter().zip(&found).all(|(a, b)| (*a < 0.0) == (*b < 0.0)),
                 "{}: {c:?}, found {found:?}",
@@ -147,14 +147,13 @@ fn a_pose_is_reached_in_the_posture_that_it_states() {
 }
 
 fn run(name: &str, text: &str) -> (Option<i32>, String, String) {
-    std::fs::write(cell().join(name), text).expect("a file");
+    std::fs::write(cell().join(name), text).unwrap();
     let output = calib(
         cell(),
         &["compensate", "latest", name, "--start", "2,3,4,5,40,0"],
         "",
     );
-    let [out, err] =
-        [output.stdout, output.stderr].map(|text| String::from_utf8(text).expect("UTF-8"));
+    let [out, err] = [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap());
     (output.status.code(), out, err)
 }
 
@@ -168,7 +167,7 @@ fn programs_state_postures_and_are_told_once_where_they_do_not() {
             },
             None,
         )
-        .expect("a robot")
+        .unwrap()
         .robot,
     );
     let q = [10.0f64, 15.0, -20.0, 25.0, 40.0, 30.0].map(f64::to_radians);

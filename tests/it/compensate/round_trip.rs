@@ -42,7 +42,7 @@ impl Trip {
             },
             None,
         )
-        .expect("a robot")
+        .unwrap()
         .robot;
         let cell = Cell::of(robot.clone(), 1.2, [100.0, 200.0], Vec::new());
         let arm = IdentifiedArm::new(cell.identified(), None);
@@ -146,7 +146,7 @@ impl Trip {
 /// The targets of a program, values and postures.
 pub fn read(language: Language, bytes: &[u8]) -> Vec<Literal> {
     Program::parse(bytes, language, Partial::Refused)
-        .expect("accepted")
+        .unwrap()
         .literals()
         .to_vec()
 }

@@ -10,14 +10,14 @@ const POOR: &str = "  - {id: poor, uses: identify, with: {effects: [base_frame],
 
 #[test]
 fn a_worse_last_step_is_withdrawn_by_run_report_compensate_and_export() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    std::fs::write(here.join("robot.yaml"), ROBOT).expect("a file");
-    std::fs::write(here.join("pipeline.yaml"), format!("{PIPELINE}{POOR}")).expect("a file");
+    std::fs::write(here.join("robot.yaml"), ROBOT).unwrap();
+    std::fs::write(here.join("pipeline.yaml"), format!("{PIPELINE}{POOR}")).unwrap();
     let said = |arguments: &[&str], input: &str| -> (String, String) {
         let output = calib(here, arguments, input);
         let [out, err] =
-            [output.stdout, output.stderr].map(|text| String::from_utf8(text).expect("UTF-8"));
+            [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap());
         assert!(output.status.success(), "{arguments:?}: {err}");
         (out, err)
     };
@@ -36,8 +36,7 @@ fn a_worse_last_step_is_withdrawn_by_run_report_compensate_and_export() {
         "{err}"
     );
     let document: Value =
-        serde_json::from_str(&said(&["run", "pipeline.yaml", "--json", "--quiet"], "").0)
-            .expect("JSON");
+        serde_json::from_str(&said(&["run", "pipeline.yaml", "--json", "--quiet"], "").0).unwrap();
     assert_eq!(
         (
             &document["standing"]["step"],
@@ -52,29 +51,29 @@ fn a_worse_last_step_is_withdrawn_by_run_report_compensate_and_export() {
     );
     // The figures are those of the statistics.
     let rms = |step: &str| {
-        let rows = document["statistics"].as_array().expect("rows");
+        let rows = document["statistics"].as_array().unwrap();
         let row = rows
             .iter()
             .find(|row| row["step"] == step && row["held_out"] == false)
-            .expect("a row");
-        row["fold_rms_mm"].as_f64().expect("mm")
+            .unwrap();
+        row["fold_rms_mm"].as_f64().unwrap()
     };
     for (figure, step) in [("rms_mm", "poor"), ("than_rms_mm", "identify")] {
         assert!(
-            (gone[figure].as_f64().expect("mm") - rms(step)).abs() < 1e-9,
+            (gone[figure].as_f64().unwrap() - rms(step)).abs() < 1e-9,
             "{gone}"
         );
     }
-    let documents = document["documents"].as_array().expect("files");
+    let documents = document["documents"].as_array().unwrap();
     let read = |ending: &str| {
         let file = documents
             .iter()
             .filter_map(Value::as_str)
             .find(|file| file.ends_with(ending))
-            .expect("a file");
-        std::fs::read_to_string(here.join(file)).expect("a report")
+            .unwrap();
+        std::fs::read_to_string(here.join(file)).unwrap()
     };
-    let report: Value = serde_json::from_str(&read("report.json")).expect("JSON");
+    let report: Value = serde_json::from_str(&read("report.json")).unwrap();
     assert_eq!(
         (&report["standing"], &report["withdrawn"][0]["step"]),
         (&"identify".into(), &"poor".into())
@@ -82,7 +81,7 @@ fn a_worse_last_step_is_withdrawn_by_run_report_compensate_and_export() {
     assert!(
         report["parameters"]
             .as_array()
-            .expect("rows")
+            .unwrap()
             .iter()
             .any(|row| row["name"] == "joint_offset.j2")
     );

@@ -73,15 +73,14 @@ fn a_column_of_parquet_is_held_to_the_same() {
         ("z_mm", 900.0),
         ("payload_kg", -5.0),
     ];
-    let batch = RecordBatch::try_from_iter(columns.map(|(name, value)| (name, column(value))))
-        .expect("a batch");
-    let file = std::fs::File::create(cell().join("loads.parquet")).expect("a file");
-    let mut writer =
-        parquet::arrow::ArrowWriter::try_new(file, batch.schema(), None).expect("a writer");
+    let batch =
+        RecordBatch::try_from_iter(columns.map(|(name, value)| (name, column(value)))).unwrap();
+    let file = std::fs::File::create(cell().join("loads.parquet")).unwrap();
+    let mut writer = parquet::arrow::ArrowWriter::try_new(file, batch.schema(), None).unwrap();
     writer
         .write(&batch)
         .and_then(|()| writer.close().map(|_| ()))
-        .expect("written");
+        .unwrap();
     let (code, said, _) = corrected("", &["loads.parquet", "--out", "loads_c.parquet"]);
     assert_eq!(code, Some(10), "{said}");
     assert!(
@@ -128,15 +127,15 @@ fn degrees_under_a_header_in_rad_are_found_by_the_turns_of_most_rows() {
 
 #[test]
 fn files_that_cannot_be_read_or_written_are_named_before_a_pipeline_is_run_for_them() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     for file in ["robot.yaml", "pipeline.yaml"] {
-        std::fs::copy(cell().join(file), folder.path().join(file)).expect("a copy");
+        std::fs::copy(cell().join(file), folder.path().join(file)).unwrap();
     }
     std::fs::write(
         folder.path().join("t.csv"),
         format!("{HEADER}\n10,20,-30,5,40,0\n"),
     )
-    .expect("a file");
+    .unwrap();
     let refused = |arguments: &[&str]| {
         let output = calib(
             folder.path(),

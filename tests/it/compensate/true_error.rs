@@ -104,8 +104,7 @@ impl Cell {
             })
             .collect();
         let arm = Arm::new(&self.robot, &self.truth);
-        plan(&self.robot, &arm, &self.poses, &blocks, &self.climate, seed)
-            .expect("poses are allowed")
+        plan(&self.robot, &arm, &self.poses, &blocks, &self.climate, seed).unwrap()
     }
 
     fn measure(&self, points: Vec<Point>, tracker: &Tracker, seed: u64) -> Vec<Shot> {
@@ -187,7 +186,7 @@ impl Cell {
         let rigid: Identify = serde_json::from_value(json!({
             "effects": ["base_frame", "tool_offset", "joint_offset", "link_geometry", "reduction_ratio"], "folds": 0,
         }))
-        .expect("settings");
+        .unwrap();
         let tables = Desk::default()
             .run(
                 &rigid,
@@ -197,7 +196,7 @@ impl Cell {
                     split,
                 },
             )
-            .expect("an identification");
+            .unwrap();
         let parameters: Parameters = table(&tables).remove(0);
         parameters
             .model(
@@ -205,12 +204,12 @@ impl Cell {
                 &[],
                 Load::GravityTorque,
             )
-            .expect("a model")
+            .unwrap()
     }
 
     /// What `diagnose` makes of it: the model, its findings, the noise of a measured point, mm.
     fn diagnosed(&self, recorded: Recorded) -> (Model, Findings, f64) {
-        let stage: Diagnose = serde_json::from_value(serde_json::json!({})).expect("settings");
+        let stage: Diagnose = serde_json::from_value(serde_json::json!({})).unwrap();
         let Recorded {
             robot,
             recording,
@@ -221,7 +220,7 @@ impl Cell {
             recording,
             split,
         };
-        let tables = Desk::default().run(&stage, reads).expect("a diagnosis");
+        let tables = Desk::default().run(&stage, reads).unwrap();
         let parameters: Parameters = table(&tables).remove(0);
         let verdict: Verdict = table(&tables).remove(0);
         let findings: Findings = table(&tables).remove(0);
@@ -231,12 +230,8 @@ impl Cell {
                 &[],
                 Load::GravityTorque,
             )
-            .expect("a model");
-        (
-            model,
-            findings,
-            verdict.0[0].noise_floor_mm.expect("lengths"),
-        )
+            .unwrap();
+        (model, findings, verdict.0[0].noise_floor_mm.unwrap())
     }
 
     /// The rigid model, and the joint curves that are learned on top of it.
@@ -250,17 +245,17 @@ impl Cell {
         let rigid: Identify = serde_json::from_value(json!({
             "effects": ["base_frame", "tool_offset", "joint_offset", "link_geometry", "reduction_ratio"], "folds": 0,
         }))
-        .expect("settings");
+        .unwrap();
         let reads = IdentifyReads {
             robot: robot.clone(),
             recording: recording.clone(),
             split: split.clone(),
         };
-        let tables = desk.run(&rigid, reads).expect("an identification");
+        let tables = desk.run(&rigid, reads).unwrap();
         let parameters: Parameters = table(&tables).remove(0);
         let prediction: Prediction = table(&tables).remove(0);
         let learn: Learn =
-            serde_json::from_value(json!({"rivals": ["curves"], "folds": 2})).expect("settings");
+            serde_json::from_value(json!({"rivals": ["curves"], "folds": 2})).unwrap();
         let prismatic = recording.prismatic.clone();
         let reads = LearnReads {
             robot: Some(robot),
@@ -269,15 +264,15 @@ impl Cell {
             parameters: Some(parameters.clone()),
             prediction,
         };
-        let network: Network = table(&desk.run(&learn, reads).expect("a correction")).remove(0);
+        let network: Network = table(&desk.run(&learn, reads).unwrap()).remove(0);
         let model = parameters
             .model(
                 RobotModel::new(self.robot.clone()),
                 &[],
                 Load::GravityTorque,
             )
-            .expect("a model");
-        (model, network.correction(&prismatic).expect("a correction"))
+            .unwrap();
+        (model, network.correction(&prismatic).unwrap())
     }
 
     /// Where (m) the true robot puts its tool in its own base, without the noise of measurement; `base` as it was identified or set up.

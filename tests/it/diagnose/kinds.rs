@@ -132,7 +132,7 @@ fn recorded(
             climate: &climate,
             seed: 11,
         };
-        experiment.record(|| ()).expect("poses")
+        experiment.record(|| ()).unwrap()
     };
     let drawn = [0.0, 120.0].map(|payload_kg| Block {
         points: points / 2,
@@ -289,7 +289,7 @@ impl Recorded {
             &fit,
             &BTreeMap::new(),
         )
-        .expect("anchors");
+        .unwrap();
         let question = Question {
             robot: &robot,
             data,
@@ -334,10 +334,7 @@ fn explains(said: &Diagnosis, concealed: &Named) {
         VerdictKind::Explained
     };
     assert_eq!(said.verdict, verdict, "{}", said.statement);
-    let (before, after) = (
-        said.before.expect("rows").rms,
-        said.after.expect("rows").rms,
-    );
+    let (before, after) = (said.before.unwrap().rms, said.after.unwrap().rms);
     assert!(
         after < 0.5 * before && (0.7..1.3).contains(&(after / said.noise_floor)),
         "{before:e} {after:e} {:e}",

@@ -63,13 +63,13 @@ impl Bins {
 pub fn said(case: &Case, without: &[&str]) -> Said {
     let recording = recording(case);
     let split = split(case, &recording);
-    let stage: Diagnose = serde_json::from_value(json!({"without": without})).expect("settings");
+    let stage: Diagnose = serde_json::from_value(json!({"without": without})).unwrap();
     let reads = DiagnoseReads {
         robot: Robot::from_description(&case.robot),
         recording,
         split,
     };
-    let tables = Desk::default().run(&stage, reads).expect("a diagnosis");
+    let tables = Desk::default().run(&stage, reads).unwrap();
     let verdict = table::<Verdict>(&tables).remove(0).0.remove(0);
     let findings = table::<Findings>(&tables).remove(0);
     let found = findings.0.iter().filter(|row| row.forms != "[]");
@@ -118,7 +118,7 @@ fn what_is_left_out_is_never_named() {
         if !matches!(content, Content::Single(_)) || listed >= count {
             continue;
         }
-        let case = Case::make(&design, number, content).expect("a case");
+        let case = Case::make(&design, number, content).unwrap();
         let one = &case.concealed[0];
         if one.strength < 50.0 || case.concealed.len() > 1 {
             continue;

@@ -72,7 +72,7 @@ fn recorded(robot: &RobotDescription, seed: u64, effects: Value) -> Inputs {
         "blocks": [{"usage": "fit", "points": 48}, {"usage": "validate", "points": 24}],
         "seed": seed,
     });
-    let stage: Simulate = serde_json::from_value(settings).expect("settings");
+    let stage: Simulate = serde_json::from_value(settings).unwrap();
     let tables = Desk::default()
         .run(
             &stage,
@@ -80,7 +80,7 @@ fn recorded(robot: &RobotDescription, seed: u64, effects: Value) -> Inputs {
                 robot: Robot::from_description(robot),
             },
         )
-        .expect("a recording");
+        .unwrap();
     Inputs {
         robot: robot.clone(),
         recording: table(&tables).remove(0),
@@ -96,8 +96,7 @@ struct Said {
 
 fn diagnosed(inputs: &Inputs) -> Result<Said, Error> {
     let desk = Desk::default();
-    let split: SplitBy =
-        serde_json::from_value(json!({"by": "usage", "blank": "fit"})).expect("settings");
+    let split: SplitBy = serde_json::from_value(json!({"by": "usage", "blank": "fit"})).unwrap();
     let split: Split = table(&desk.run(
         &split,
         SplitReads {
@@ -105,7 +104,7 @@ fn diagnosed(inputs: &Inputs) -> Result<Said, Error> {
         },
     )?)
     .remove(0);
-    let stage: Diagnose = serde_json::from_value(json!({})).expect("settings");
+    let stage: Diagnose = serde_json::from_value(json!({})).unwrap();
     let robot = Robot::from_description(&inputs.robot);
     let tables = desk.run(
         &stage,
@@ -118,7 +117,7 @@ fn diagnosed(inputs: &Inputs) -> Result<Said, Error> {
     let verdict: Verdict = table(&tables).remove(0);
     let findings: Findings = table(&tables).remove(0);
     let statement = verdict.0[0].statement.clone().unwrap_or_default();
-    let warnings = desk.warnings.lock().expect("warnings").clone();
+    let warnings = desk.warnings.lock().unwrap().clone();
     Ok(Said {
         verdict: verdict.0[0].verdict.clone(),
         statement,
@@ -254,7 +253,7 @@ const WRONG: [Wrong; 20] = [
         let along: [f64; 3] = std::array::from_fn(|k| to[k] - from[k]);
         let axis = (0..3)
             .max_by(|a, b| along[*a].abs().total_cmp(&along[*b].abs()))
-            .expect("three");
+            .unwrap();
         let by = 0.1 * along[axis].signum();
         i.robot.joints[2..]
             .iter_mut()
@@ -278,7 +277,7 @@ fn twenty_wrong_set_ups_of_three_arms_are_named_before_any_physics() {
                 .and_then(|said| said.findings.first())
                 .filter(|first| first.effect == "setup");
             let forms: Option<Value> =
-                first.map(|first| serde_json::from_str(&first.forms).expect("JSON"));
+                first.map(|first| serde_json::from_str(&first.forms).unwrap());
             // What explains as well does not count.
             let said_first = first.and_then(|first| {
                 first
@@ -373,7 +372,7 @@ fn a_rounded_log_is_named_with_its_step_and_what_it_makes() {
         q.iter_mut()
             .for_each(|q| *q = rounded(q.to_degrees(), 0.1).to_radians())
     });
-    let said = diagnosed(&coarse).expect("a diagnosis");
+    let said = diagnosed(&coarse).unwrap();
     let line = said
         .warnings
         .iter()
@@ -399,7 +398,7 @@ fn a_rounded_log_is_named_with_its_step_and_what_it_makes() {
     );
     let mut coarse = recorded(&fixture::spherical(), 49, json!([]));
     points(&mut coarse, |p| p.map(|x| rounded(x, 1e-3)));
-    let said = diagnosed(&coarse).expect("a diagnosis");
+    let said = diagnosed(&coarse).unwrap();
     let line = "measured points are rounded to 1 mm, which makes up to 0.87 mm";
     assert!(
         said.warnings.iter().any(|own| own.starts_with(line)),
@@ -413,7 +412,7 @@ fn a_rounded_log_is_named_with_its_step_and_what_it_makes() {
             .for_each(|q| *q = rounded(q.to_degrees(), 1e-4).to_radians())
     });
     points(&mut fine, |p| p.map(|x| rounded(x, 1e-6)));
-    let said = diagnosed(&fine).expect("a diagnosis");
+    let said = diagnosed(&fine).unwrap();
     assert!(
         !said.warnings.iter().any(|line| line.contains("rounded")),
         "{:?}",
@@ -427,7 +426,7 @@ fn a_payload_column_that_is_never_or_seldom_filled_is_said() {
     let said = |filled: fn(usize) -> f64| {
         let mut inputs = sound.clone();
         inputs.recording.payload = Some((0..72).map(filled).collect());
-        diagnosed(&inputs).expect("a diagnosis").warnings.join("\n")
+        diagnosed(&inputs).unwrap().warnings.join("\n")
     };
     let empty = said(|_| f64::NAN);
     assert!(
@@ -446,7 +445,7 @@ fn a_payload_column_that_is_never_or_seldom_filled_is_said() {
 fn two_set_up_errors_are_named_together_and_two_reflectors_hide_none() {
     let mut both = recorded(&fixture::offset_wrist(), 44, json!([]));
     joints(&mut both, |q| (q[1], q[3]) = (-q[1], -q[3]));
-    let said = diagnosed(&both).expect("a diagnosis");
+    let said = diagnosed(&both).unwrap();
     let statement = &said.findings[0].statement;
     assert!(
         statement.starts_with("joints 2, 4 turn the other way"),
@@ -459,7 +458,7 @@ fn two_set_up_errors_are_named_together_and_two_reflectors_hide_none() {
     // Two of different kinds.
     let mut both = recorded(&fixture::offset_wrist(), 44, json!([]));
     joints(&mut both, |q| (q[2], q[4]) = (-q[2], q[4] + FRAC_PI_2));
-    let said = diagnosed(&both).expect("a diagnosis");
+    let said = diagnosed(&both).unwrap();
     let statement = &said.findings[0].statement;
     assert!(
         statement.contains("joint 3 turns the other way")
@@ -474,7 +473,7 @@ fn two_set_up_errors_are_named_together_and_two_reflectors_hide_none() {
             .collect(),
     );
     joints(&mut named, |q| q[2] = -q[2]);
-    let said = diagnosed(&named).expect("a diagnosis");
+    let said = diagnosed(&named).unwrap();
     assert!(
         said.findings[0]
             .statement
@@ -492,7 +491,7 @@ fn a_length_by_which_no_arm_is_made_is_an_error_of_the_robot_file() {
         .iter_mut()
         .for_each(|joint| joint.point[2] -= by);
     short.robot.tool[2] -= by;
-    let said = diagnosed(&short).expect("a diagnosis");
+    let said = diagnosed(&short).unwrap();
     assert_eq!(said.verdict, "wrong_setup", "{}", said.statement);
     let statement = &said.findings[0].statement;
     assert!(
@@ -505,7 +504,7 @@ fn a_length_by_which_no_arm_is_made_is_an_error_of_the_robot_file() {
         .iter_mut()
         .for_each(|joint| joint.point[0] -= by);
     short.robot.tool[0] -= by;
-    let said = diagnosed(&short).expect("a diagnosis");
+    let said = diagnosed(&short).unwrap();
     assert_eq!(said.verdict, "wrong_setup", "{}", said.statement);
     assert!(
         said.findings
@@ -527,7 +526,7 @@ fn a_robot_file_in_another_unit_is_blamed_and_not_the_points() {
         (joint.point, joint.centre) = (small(joint.point), joint.centre.map(small))
     });
     inputs.robot.tool = small(inputs.robot.tool);
-    let said = diagnosed(&inputs).expect("a diagnosis");
+    let said = diagnosed(&inputs).unwrap();
     let statement = &said.findings[0].statement;
     assert!(
         statement.starts_with(
@@ -539,9 +538,9 @@ fn a_robot_file_in_another_unit_is_blamed_and_not_the_points() {
         .split("without it ")
         .nth(1)
         .and_then(|text| text.split(" mm").next())
-        .expect("a length");
+        .unwrap();
     assert!(
-        (0.3..3.0).contains(&after.parse::<f64>().expect("mm")),
+        (0.3..3.0).contains(&after.parse::<f64>().unwrap()),
         "{statement}"
     );
 }
@@ -550,7 +549,7 @@ fn a_robot_file_in_another_unit_is_blamed_and_not_the_points() {
 fn a_robot_file_of_another_arm_is_refused_with_what_to_look_at() {
     let mut inputs = recorded(&fixture::offset_wrist(), 7, json!([]));
     inputs.robot = fixture::spherical();
-    let error = diagnosed(&inputs).err().expect("no diagnosis");
+    let error = diagnosed(&inputs).err().unwrap();
     assert_eq!(error.exit_code(), 10, "{error}");
     let said = error.to_string();
     assert!(
@@ -564,7 +563,7 @@ fn points_in_inches_are_not_accepted_and_the_line_that_is_named_mends_them() {
     let folder = concealed("zero_shift", "923", "60");
     let here = folder.path();
     let file = here.join("sealed/recordings/c0001/tracker.csv");
-    let text = std::fs::read_to_string(&file).expect("the log");
+    let text = std::fs::read_to_string(&file).unwrap();
     let inches = |line: &str| -> String {
         let cells = line.split(',').map(|cell| {
             cell.parse::<f64>()
@@ -576,7 +575,7 @@ fn points_in_inches_are_not_accepted_and_the_line_that_is_named_mends_them() {
         &file,
         text.lines().map(inches).collect::<Vec<_>>().join("\n"),
     )
-    .expect("written");
+    .unwrap();
     case_with(here, &[]);
     let (code, told) = ended(&[&["run", "p.yaml"], &CASE[..]].concat(), here);
     assert_eq!(code, Some(10), "{told}");
@@ -609,7 +608,7 @@ fn points_in_inches_are_not_accepted_and_the_line_that_is_named_mends_them() {
         "{code:?} {said}"
     );
     let said: Value =
-        serde_json::from_str(&ended(&["diagnose", "HEAD", "--json"], here).1).expect("JSON");
+        serde_json::from_str(&ended(&["diagnose", "HEAD", "--json"], here).1).unwrap();
     assert_eq!(
         (&said["verdict"], &said["findings"][0]["effect"]),
         (&"wrong_setup".into(), &"setup".into())
@@ -619,9 +618,8 @@ fn points_in_inches_are_not_accepted_and_the_line_that_is_named_mends_them() {
         here,
     );
     assert_eq!(code, Some(10), "{run}");
-    let run: Value = serde_json::from_str(&run).expect("JSON");
-    let page = std::fs::read_to_string(here.join(run["report"].as_str().expect("a report")))
-        .expect("the page");
+    let run: Value = serde_json::from_str(&run).unwrap();
+    let page = std::fs::read_to_string(here.join(run["report"].as_str().unwrap())).unwrap();
     assert!(
         page.contains("Not accepted: the set-up is wrong")
             && !page.contains("The mean position error fell"),
@@ -642,14 +640,14 @@ fn points_in_inches_are_not_accepted_and_the_line_that_is_named_mends_them() {
         &[&["diagnose", "p.yaml", "--json", "--quiet"], &CASE[..]].concat(),
         here,
     );
-    let mended: Value = serde_json::from_str(&mended).expect("JSON");
+    let mended: Value = serde_json::from_str(&mended).unwrap();
     assert_eq!(mended["findings"][0]["effect"], "zero_shift", "{mended:#}");
 }
 
 #[test]
 fn without_link_masses_a_loaded_recording_says_what_is_lost() {
     let mut inputs = recorded(&fixture::spherical(), 5, json!([]));
-    let known = diagnosed(&inputs).expect("a diagnosis");
+    let known = diagnosed(&inputs).unwrap();
     assert!(
         !known.statement.contains("link masses") && known.warnings.is_empty(),
         "{:?}",
@@ -665,7 +663,7 @@ fn without_link_masses_a_loaded_recording_says_what_is_lost() {
             .map(|row| if row % 2 == 0 { 10.0 } else { 0.0 })
             .collect(),
     );
-    let said = diagnosed(&inputs).expect("a diagnosis");
+    let said = diagnosed(&inputs).unwrap();
     let lost = "the robot file gives no link masses, yet gravity loads joints in these poses (24 rows of 48 carry a payload)";
     assert!(said.statement.contains(lost), "{}", said.statement);
     assert!(
@@ -698,7 +696,7 @@ fn two_set_ups_in_one_recording_are_named_with_the_rows_of_each() {
                 point[2],
             ];
         }
-        let said = diagnosed(&inputs).expect("a diagnosis");
+        let said = diagnosed(&inputs).unwrap();
         assert_eq!(said.verdict, "wrong_setup", "{}", said.statement);
         let statement = &said.findings[0].statement;
         assert!(
@@ -801,9 +799,9 @@ fn a_makers_counting_is_found_whole_and_no_healthy_joint_is_mastered_again() {
                 .split("without it ")
                 .nth(1)
                 .and_then(|text| text.split(" mm").next())
-                .expect("a length");
+                .unwrap();
             assert!(
-                after.parse::<f64>().expect("mm") < 12.0,
+                after.parse::<f64>().unwrap() < 12.0,
                 "{} {name}: {statement}",
                 robot.name
             );

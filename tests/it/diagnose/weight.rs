@@ -6,7 +6,7 @@ use std::path::Path;
 
 /// What a diagnosis says of concealed recordings of this kind, with the truth of each.
 fn bare(robot: &str, family: &str, forms: &str, seed: &str) -> (Value, Value) {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let made = [
         "simulate", "conceal", "--out", "set", "--cases", "1", "--points", "120", "--faulty", "0",
         "--bare",
@@ -36,17 +36,16 @@ fn bare(robot: &str, family: &str, forms: &str, seed: &str) -> (Value, Value) {
         ],
         folder.path(),
     );
-    let truth =
-        std::fs::read_to_string(folder.path().join("set/sealed/c0001.json")).expect("the truth");
-    let robot = std::fs::read_to_string(folder.path().join("set/recordings/c0001/robot.json"))
-        .expect("the robot");
+    let truth = std::fs::read_to_string(folder.path().join("set/sealed/c0001.json")).unwrap();
+    let robot =
+        std::fs::read_to_string(folder.path().join("set/recordings/c0001/robot.json")).unwrap();
     assert!(
         !robot.contains("\"mass\"") && !robot.contains("\"com\""),
         "{robot}"
     );
     (
-        serde_json::from_str(&said).expect("JSON"),
-        serde_json::from_str(&truth).expect("JSON"),
+        serde_json::from_str(&said).unwrap(),
+        serde_json::from_str(&truth).unwrap(),
     )
 }
 
@@ -54,13 +53,13 @@ fn bare(robot: &str, family: &str, forms: &str, seed: &str) -> (Value, Value) {
 fn gravity_is_found_where_nobody_knows_the_masses_and_no_hose_is() {
     for robot in ["sr210d", "compact6", "seven7r"] {
         let (said, truth) = bare(robot, "joint_compliance", "1", "61");
-        let findings = said["findings"].as_array().expect("a list");
+        let findings = said["findings"].as_array().unwrap();
         let found: Vec<&str> = findings
             .iter()
             .filter_map(|finding| finding["where"].as_str())
             .collect();
         for finding in findings {
-            let statement = finding["statement"].as_str().expect("a sentence");
+            let statement = finding["statement"].as_str().unwrap();
             assert_eq!(
                 finding["effect"], "joint_compliance",
                 "{robot}: {statement}"
@@ -76,7 +75,7 @@ fn gravity_is_found_where_nobody_knows_the_masses_and_no_hose_is() {
         }
         let plain = truth["effects"]
             .as_array()
-            .expect("a list")
+            .unwrap()
             .iter()
             .filter(|effect| effect["L"].as_f64() > Some(50.0));
         let plain: Vec<&str> = plain
@@ -86,12 +85,8 @@ fn gravity_is_found_where_nobody_knows_the_masses_and_no_hose_is() {
             plain.len() > 1 && plain.iter().all(|place| found.contains(place)),
             "{robot}: {plain:?}, found {found:?}"
         );
-        let rms = |when: &str| {
-            said[when]["validate_rms_mm"]
-                .as_f64()
-                .expect("held-out rows")
-        };
-        let floor = said["noise_floor_mm"].as_f64().expect("a number");
+        let rms = |when: &str| said[when]["validate_rms_mm"].as_f64().unwrap();
+        let floor = said["noise_floor_mm"].as_f64().unwrap();
         assert!(
             rms("after") < 1.2 * floor && rms("before") > 2.0 * rms("after"),
             "{robot}: {} to {}",

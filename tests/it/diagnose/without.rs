@@ -18,7 +18,7 @@ fn said(without: &str, folder: &Path) -> Value {
         &[&["diagnose", "p.yaml", "--quiet", "--json"], &CASE[..]].concat(),
         folder,
     );
-    serde_json::from_str(&said).expect("JSON")
+    serde_json::from_str(&said).unwrap()
 }
 
 #[test]
@@ -26,7 +26,7 @@ fn an_excluded_cause_is_not_named_by_another_form_of_it() {
     for (family, seed) in [("cable_drag", "5"), ("backlash", "32")] {
         let folder = concealed(family, seed, "120");
         let said = said(family, folder.path());
-        let findings = said["findings"].as_array().expect("a list");
+        let findings = said["findings"].as_array().unwrap();
         assert!(!findings.is_empty(), "{family}: {said:#}");
         // Neither as a name, nor as a rival, nor in a sentence.
         assert!(!said.to_string().contains(family), "{family}: {said:#}");
@@ -42,10 +42,10 @@ fn what_an_excluded_cause_explains_takes_no_neighbours_name() {
         let said = said("link_compliance", folder.path());
         let found: Vec<(&str, &str)> = said["findings"]
             .as_array()
-            .expect("a list")
+            .unwrap()
             .iter()
             .map(|finding| {
-                let text = |key: &str| finding[key].as_str().expect("text");
+                let text = |key: &str| finding[key].as_str().unwrap();
                 (text("effect"), text("where"))
             })
             .collect();

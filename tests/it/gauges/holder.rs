@@ -26,7 +26,7 @@ fn said(cell: &Cell, mut data: Measurements) -> Diagnosis {
         &all,
         &BTreeMap::new(),
     )
-    .expect("a robot");
+    .unwrap();
     let question = Question {
         robot: &robot,
         data: &data,

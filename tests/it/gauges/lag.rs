@@ -48,7 +48,7 @@ fn said(cell: &Cell, data: &Measurements) -> Diagnosis {
         &all,
         &BTreeMap::new(),
     )
-    .expect("a robot");
+    .unwrap();
     let question = Question {
         robot: &robot,
         data,
@@ -121,7 +121,7 @@ fn rows_in_another_order_than_their_times_lag_by_their_times() {
             .time
             .as_ref()
             .map(|time| order.iter().map(|row| time[*row]).collect());
-        let times = sorted.time.clone().expect("times");
+        let times = sorted.time.clone().unwrap();
         sorted.sequence = Sequence::by_time(&times, |a, b| sorted.near_pose(a, b));
         for (row, own) in order.iter().enumerate() {
             for joint in 0..data.joints {

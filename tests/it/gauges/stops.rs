@@ -68,7 +68,7 @@ fn a_diagnosis_learns_the_repeatability_from_the_same_target_again() {
         &all,
         &BTreeMap::new(),
     )
-    .expect("a robot");
+    .unwrap();
     let question = Question {
         robot: &robot,
         data: &data,
@@ -137,7 +137,7 @@ fn folds_never_part_the_targets_of_a_pose() {
             model: &model,
             fitted: &fitted,
         };
-        let folds = cross_validate(&session, 5, 3).expect("enough poses");
+        let folds = cross_validate(&session, 5, 3).unwrap();
         let rms = |errors: &[f64]| {
             (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt()
         };
@@ -172,7 +172,7 @@ fn a_pose_with_wrong_joints_is_set_aside_with_all_its_targets_and_no_event() {
         &all,
         &BTreeMap::new(),
     )
-    .expect("a robot");
+    .unwrap();
     let model = model(&robot, base, &GEOMETRY);
     let candidates: Vec<usize> = (0..model.x.len()).collect();
     let options = FitOptions {
@@ -224,19 +224,16 @@ fn near_repeats_count_less_the_known_motion() {
     let poses = Poses::of(&data, &rows(&data));
     assert_eq!((poses.all().len(), poses.repeated().count()), (60, 60));
     let (model, fitted) = cell.fit(&data, |_| BTreeMap::new());
-    let found = poses
-        .joint_repeatability(&model, &data)
-        .expect("it is there")
-        / (5.0 * ARCSEC);
+    let found = poses.joint_repeatability(&model, &data).unwrap() / (5.0 * ARCSEC);
     assert!((0.8..1.2).contains(&found), "{found} of the truth");
-    let repeated = fitted.repeated.expect("repeats");
+    let repeated = fitted.repeated.unwrap();
     assert_eq!(
         (repeated.poses, repeated.freedom, repeated.revisited),
         (60, 180, true)
     );
     let still = returns(5e-4, 0.0);
     let (model, fitted) = cell.fit(&still, |_| BTreeMap::new());
-    let noise = fitted.repeated.expect("repeats").noise;
+    let noise = fitted.repeated.unwrap().noise;
     assert!((noise / SIGMA - 1.0).abs() < 0.15, "{noise:e} m");
     assert_eq!(
         Poses::of(&still, &rows(&still)).joint_repeatability(&model, &still),

@@ -53,7 +53,7 @@ fn on(threads: usize, read: impl FnOnce() -> Taken + Send) -> Taken {
     ThreadPoolBuilder::new()
         .num_threads(threads)
         .build()
-        .expect("threads")
+        .unwrap()
         .install(read)
 }
 
@@ -170,11 +170,11 @@ fn what_is_wrong_with_a_late_row_is_an_error_of_its_line() {
         let pool = ThreadPoolBuilder::new()
             .num_threads(threads)
             .build()
-            .expect("threads");
+            .unwrap();
         let said = pool.install(|| {
             take(&desk, &yaml, robot("rr", 1.0))
                 .err()
-                .expect("a fault")
+                .unwrap()
                 .to_string()
         });
         assert!(

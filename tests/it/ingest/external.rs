@@ -44,7 +44,7 @@ fn an_axis_that_moves_and_that_the_robot_file_does_not_have_is_refused() {
         YAML,
         robot("rr", 1.0),
     )
-    .expect("a recording");
+    .unwrap();
     // An axis that is mapped is the robot's.
     let mapped = YAML.replace(
         "{column: \"q{j}\", unit: deg}",
@@ -55,7 +55,7 @@ fn an_axis_that_moves_and_that_the_robot_file_does_not_have_is_refused() {
         &mapped,
         robot("prr", 1.0),
     )
-    .expect("a recording");
+    .unwrap();
 }
 
 #[test]
@@ -64,8 +64,8 @@ fn joints_beyond_the_limits_are_a_hint_of_their_counting() {
         .map(|row| format!("{},{},1,2,3\n", 120 + 5 * row, 7 * row))
         .collect();
     let desk = Desk::default().with("a.csv", format!("q1,q2,x,y,z\n{text}"));
-    take(&desk, YAML, robot("rr", 0.5)).expect("a recording");
-    let warnings = desk.warnings.lock().expect("warnings").join("\n");
+    take(&desk, YAML, robot("rr", 0.5)).unwrap();
+    let warnings = desk.warnings.lock().unwrap().join("\n");
     assert!(
         warnings.contains("12 rows with a joint beyond the robot's limits, used all the same")
             && warnings.contains("`sign`, `zero`, `coupled` of `q`"),

@@ -41,13 +41,13 @@ fn a_later_measurement_is_joined_by_itself_and_follows() {
         &format!("{DAYS}max_rejected_fraction: 0.6\n"),
         robot("rr", 1.0),
     )
-    .expect("a recording");
+    .unwrap();
     let recording = &taken.recording;
     assert_eq!(recording.point_id, ["P1", "P2", "P1", "P3"]);
     assert_eq!(recording.sequence, [1, 2, 3, 5]);
     // The clock starts again at 5 s: 500 s behind 30 s.
     assert_eq!(
-        recording.time.as_deref().expect("times"),
+        recording.time.as_deref().unwrap(),
         [0.0, 30.0, 530.0, 590.0]
     );
     let x: Vec<f64> = recording
@@ -92,7 +92,7 @@ fn a_clock_that_goes_on_is_left_alone() {
         &format!("{DAYS}max_rejected_fraction: 0.6\n"),
         robot("rr", 1.0),
     );
-    let times = taken.expect("a recording").recording.time.expect("times");
+    let times = taken.unwrap().recording.time.unwrap();
     assert_eq!(times, [0.0, 30.0, 86400.0, 86430.0]);
 }
 
@@ -165,6 +165,6 @@ fn one_log_of_two_days_is_no_copy() {
         .with("joints2.csv", "id,t,q1,q2\nP3,5,12,22\n")
         .with("points1.csv", log);
     let yaml = DAYS.replace("points2.csv", "points1.csv") + "max_rejected_fraction: 0.7\n";
-    let taken = take(&days, &yaml, robot("rr", 1.0)).expect("a recording");
+    let taken = take(&days, &yaml, robot("rr", 1.0)).unwrap();
     assert_eq!(taken.recording.point_id, ["P1", "P2", "P3"]);
 }

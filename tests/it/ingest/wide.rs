@@ -23,10 +23,10 @@ P7,9e9,2,3,4,5,7,8,9,6,10,20
 ";
 
 fn seen(recording: &calib::table::Recording) -> Vec<(i64, &str, &str, [f64; 3])> {
-    let targets = recording.target.as_ref().expect("targets");
+    let targets = recording.target.as_ref().unwrap();
     let millimetres = |row: usize| recording.position[row].map(|value| (value * 1e6).round() / 1e3);
     let row = |row: usize| {
-        let target = targets[row].as_deref().expect("a target");
+        let target = targets[row].as_deref().unwrap();
         (
             recording.sequence[row],
             recording.point_id[row].as_str(),
@@ -58,7 +58,7 @@ fn a_wide_row_is_a_row_for_each_target_that_was_seen() {
         &yaml,
         robot("rr", 1.0),
     )
-    .expect("a recording");
+    .unwrap();
     assert_eq!(seen(&taken.recording), SEEN);
     assert_eq!(taken.recording.q(4), taken.recording.q(3), "P2 stands once");
     let refused: Vec<(i64, &str)> = taken
@@ -95,15 +95,12 @@ fn a_wide_file_of_points_is_joined_to_the_joints_by_its_rows() {
         &first.replace("[7, 8, 9]", "[X3, 8, 9]"),
         robot("rr", 1.0),
     )
-    .expect("a recording");
+    .unwrap();
     assert_eq!(seen(&taken.recording), SEEN);
-    let body = of_points
-        .trim_start()
-        .strip_prefix("files:\n")
-        .expect("files");
+    let body = of_points.trim_start().strip_prefix("files:\n").unwrap();
     let second =
         format!("files:\n{other}{JOINTS}{body}join: {{by: id}}\nmax_rejected_fraction: 0.6\n");
-    let taken = take(&desk(), &second, robot("rr", 1.0)).expect("a recording");
+    let taken = take(&desk(), &second, robot("rr", 1.0)).unwrap();
     let (ids, targets): (Vec<&str>, Vec<&str>) = seen(&taken.recording)
         .iter()
         .map(|row| (row.1, row.2))

@@ -23,7 +23,7 @@ fn a_sheet_is_read_below_its_title_with_its_units_and_blank_rows() {
         &titled(),
         robot("rr", 1.0),
     )
-    .expect("a recording");
+    .unwrap();
     let recording = &taken.recording;
     assert_eq!(recording.point_id, ["P1", "P3"]);
     assert_eq!(
@@ -48,10 +48,10 @@ fn dates_and_times_of_day_in_cells_are_clock_times() {
         "      time: {column: at, unit: clock}\n      q:",
     );
     let data = DATA.replace("five", "5").replace(":0.25", "@45943.75");
-    let taken = take(&book(&[("Data", &data)]), &timed, robot("rr", 1.0)).expect("a recording");
+    let taken = take(&book(&[("Data", &data)]), &timed, robot("rr", 1.0)).unwrap();
     // 2025-10-13 is day 20,374 after 1970-01-01 (45943 less 25569, the number of 1970-01-01 in a workbook).
     let expected = [20374.541, 20374.5421, 20374.75].map(|days: f64| days * 86_400.0);
-    let times = taken.recording.time.expect("times");
+    let times = taken.recording.time.unwrap();
     for (time, expected) in times.iter().zip(expected) {
         assert!((time - expected).abs() < 1e-5, "{time} for {expected}");
     }
@@ -59,8 +59,8 @@ fn dates_and_times_of_day_in_cells_are_clock_times() {
         .replace("five", "5")
         .replace("@45943.5421", ":0.2")
         .replace("@45943.541", ":0.125");
-    let taken = take(&book(&[("Data", &of_day)]), &timed, robot("rr", 1.0)).expect("a recording");
-    let times = taken.recording.time.expect("times");
+    let taken = take(&book(&[("Data", &of_day)]), &timed, robot("rr", 1.0)).unwrap();
+    let times = taken.recording.time.unwrap();
     assert_eq!(times, [10_800.0, 17_280.0, 21_600.0]);
 }
 
@@ -79,7 +79,7 @@ fn of_several_sheets_with_numbers_one_is_named() {
     let two = titled().replace("  - file: a.csv\n", "  - file: a.csv\n    sheet: Two\n");
     assert_eq!(
         take(&book(&sheets), &two, robot("rr", 1.0))
-            .expect("a recording")
+            .unwrap()
             .recording
             .rows(),
         3
@@ -113,7 +113,7 @@ fn texts_in_cells_keep_quotes_and_lose_line_ends_and_numbers_have_the_stated_mar
         &comma,
         robot("rr", 1.0),
     )
-    .expect("a recording");
+    .unwrap();
     assert_eq!(taken.recording.point_id[0], "the \"A\" of B");
     assert_eq!(
         taken.recording.q(0),

@@ -30,7 +30,7 @@ pub(super) fn point(row: usize, delimiter: &str) -> String {
 /// A header and thirty rows.
 pub(super) fn table(header: &str, row: impl Fn(usize) -> String) -> String {
     let mut text = format!("{header}\n");
-    (0..30).for_each(|k| writeln!(text, "{}", row(k)).expect("text"));
+    (0..30).for_each(|k| writeln!(text, "{}", row(k)).unwrap());
     text
 }
 
@@ -41,7 +41,7 @@ fn comma(text: &str) -> String {
 /// Windows-1252 of what fits into Latin-1.
 fn latin(text: &str) -> Vec<u8> {
     text.chars()
-        .map(|letter| u8::try_from(u32::from(letter)).expect("a letter of Latin-1"))
+        .map(|letter| u8::try_from(u32::from(letter)).unwrap())
         .collect()
 }
 
@@ -53,9 +53,9 @@ pub(super) struct Made {
 }
 
 pub(super) fn made(files: &[(&str, Vec<u8>)]) -> Made {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     for (name, content) in files {
-        std::fs::write(folder.path().join(name), content).expect("a file");
+        std::fs::write(folder.path().join(name), content).unwrap();
     }
     let names: Vec<&str> = files.iter().map(|(name, _)| *name).collect();
     let output = calib(
@@ -69,8 +69,7 @@ pub(super) fn made(files: &[(&str, Vec<u8>)]) -> Made {
         "{}",
         String::from_utf8_lossy(&output.stderr)
     );
-    let pipeline =
-        std::fs::read_to_string(folder.path().join("pipeline.yaml")).expect("a pipeline");
+    let pipeline = std::fs::read_to_string(folder.path().join("pipeline.yaml")).unwrap();
     assert!(folder.path().join("robot.yaml").is_file());
     Made {
         folder,
@@ -145,17 +144,14 @@ impl Made {
             String::from_utf8_lossy(&run.stderr),
             self.pipeline
         );
-        let run: serde_json::Value = serde_json::from_slice(&run.stdout).expect("JSON");
-        let stages = run["stages"].as_array().expect("stages");
-        let ingest = stages
-            .iter()
-            .find(|stage| stage["id"] == "ingest")
-            .expect("ingest");
-        let outputs = ingest["outputs"].as_array().expect("outputs");
+        let run: serde_json::Value = serde_json::from_slice(&run.stdout).unwrap();
+        let stages = run["stages"].as_array().unwrap();
+        let ingest = stages.iter().find(|stage| stage["id"] == "ingest").unwrap();
+        let outputs = ingest["outputs"].as_array().unwrap();
         let recording = outputs
             .iter()
             .find(|output| output["port"] == "recording")
-            .expect("a recording");
+            .unwrap();
         assert_eq!(recording["rows"], rows, "{}", self.pipeline);
         self
     }
@@ -174,7 +170,7 @@ fn a_german_controller_in_latin_1_joins_a_spatial_analyzer_export_by_its_points(
     let mut tracker =
         "// SpatialAnalyzer, Einheit mm\n// Collection Group Target X Y Z\n".to_string();
     for k in (0..30).rev() {
-        writeln!(tracker, "A Main M\u{fc}-{k}   {}", point(k, "  ")).expect("text");
+        writeln!(tracker, "A Main M\u{fc}-{k}   {}", point(k, "  ")).unwrap();
         if k == 15 {
             tracker.push_str("// Group of the afternoon\n");
         }
@@ -224,7 +220,7 @@ fn a_spatial_analyzer_export_with_commas_is_understood_too() {
         ],
         "",
     );
-    let again: serde_json::Value = serde_json::from_slice(&again.stdout).expect("JSON");
+    let again: serde_json::Value = serde_json::from_slice(&again.stdout).unwrap();
     assert_eq!(again["rejected_rows"], 0, "a line of remarks is no row");
 }
 
@@ -262,9 +258,7 @@ fn clock_times_are_times() {
 fn a_fast_log_beside_few_points_runs() {
     let controller = {
         let mut text = "time_s,A1,A2,A3,A4,A5,A6\n".to_string();
-        (0..2000).for_each(|k| {
-            writeln!(text, "{:.3},{}", 0.1 * k as f64, joints(k, ",")).expect("text")
-        });
+        (0..2000).for_each(|k| writeln!(text, "{:.3},{}", 0.1 * k as f64, joints(k, ",")).unwrap());
         text
     };
     let tracker = table("time_s,x,y,z", |k| {
@@ -557,9 +551,9 @@ fn the_controllers_own_point_is_not_taken_beside_the_trackers() {
         .filter(|line| line.trim_start().starts_with("x: {column"))
         .collect();
     assert_eq!(places.len(), 1, "{}", made.pipeline);
-    let joints = made.pipeline.find("q: {column").expect("joints");
+    let joints = made.pipeline.find("q: {column").unwrap();
     assert!(
-        made.pipeline.find(places[0]).expect("a point") > joints,
+        made.pipeline.find(places[0]).unwrap() > joints,
         "{}",
         made.pipeline
     );
@@ -577,7 +571,7 @@ fn the_identity_that_init_comments_out_is_nobodys() {
         made.pipeline
     );
     let identified = made.pipeline.replace("# identity:", "identity:");
-    std::fs::write(made.path().join("pipeline.yaml"), identified).expect("a file");
+    std::fs::write(made.path().join("pipeline.yaml"), identified).unwrap();
     let check = calib(made.path(), &["check", "pipeline.yaml"], "");
     assert!(
         check.status.success(),

@@ -10,7 +10,7 @@ fn a_list_of_points_without_a_header_joins_by_the_numbers_in_its_names() {
         format!("Pose {k};{}", joints(k, ";"))
     });
     let mut tracker = String::new();
-    (0..30).for_each(|k| writeln!(tracker, "pt_{k:03} {}", point(k, " ")).expect("text"));
+    (0..30).for_each(|k| writeln!(tracker, "pt_{k:03} {}", point(k, " ")).unwrap());
     let made = made(&[
         ("controller.csv", controller.into()),
         ("tracker.txt", tracker.into()),
@@ -57,12 +57,12 @@ fn a_text_in_utf_16_with_marks_of_thousands_is_read() {
 
 #[test]
 fn what_cannot_be_told_ends_with_code_1_and_a_sentence_and_too_many_files_with_2() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     std::fs::write(
         folder.path().join("notes.csv"),
         "day,weather,mood\nmon,rain,good\ntue,sun,good\n",
     )
-    .expect("a file");
+    .unwrap();
     let output = calib(folder.path(), &["init", ".", "--data", "notes.csv"], "");
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(1), "{told}");
@@ -92,7 +92,7 @@ fn what_cannot_be_told_ends_with_code_1_and_a_sentence_and_too_many_files_with_2
 fn a_wide_file_takes_time_in_proportion_to_its_width() {
     let wide = |columns: usize| {
         let mut header = String::from("Punkt,A1,A2,A3,A4,A5,A6,X,Y,Z");
-        (0..columns).for_each(|k| write!(header, ",channel {k}").expect("text"));
+        (0..columns).for_each(|k| write!(header, ",channel {k}").unwrap());
         let blank = ",0.5".repeat(columns);
         let text = table(&header, |k| {
             format!("P{k},{},{}{blank}", joints(k, ","), point(k, ","))
@@ -160,12 +160,12 @@ const CELL: &str = r#"<robot name="cell"><link name="world"/><link name="carriag
 
 #[test]
 fn the_chain_of_a_urdf_is_read_from_its_first_link_with_joints_that_slide() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let data = table("Punkt,J1_mm,J2_deg,X,Y,Z", |k| {
         format!("P{k},{},{},{}", 40 * k, 3 * k, point(k, ","))
     });
-    std::fs::write(folder.path().join("data.csv"), data).expect("a file");
-    std::fs::write(folder.path().join("cell.urdf"), CELL).expect("a file");
+    std::fs::write(folder.path().join("data.csv"), data).unwrap();
+    std::fs::write(folder.path().join("cell.urdf"), CELL).unwrap();
     let told = |arguments: &[&str]| {
         let output = calib(folder.path(), arguments, "");
         (
@@ -186,7 +186,7 @@ fn the_chain_of_a_urdf_is_read_from_its_first_link_with_joints_that_slide() {
         told(&[&start[..], &["holder"]].concat()),
         (Some(0), String::new())
     );
-    let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).expect("a file");
+    let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
     assert!(
         read("robot.yaml").contains("urdf: {base: \"world\", tip: \"holder\"}"),
         "{}",
@@ -197,8 +197,8 @@ fn the_chain_of_a_urdf_is_read_from_its_first_link_with_joints_that_slide() {
         pipeline.contains("q: {columns: [\"J1_mm\", \"J2_deg\"], unit: deg, linear_unit: mm}"),
         "{pipeline}"
     );
-    std::fs::remove_file(folder.path().join("robot.yaml")).expect("a file");
-    std::fs::remove_file(folder.path().join("pipeline.yaml")).expect("a file");
+    std::fs::remove_file(folder.path().join("robot.yaml")).unwrap();
+    std::fs::remove_file(folder.path().join("pipeline.yaml")).unwrap();
     let (code, said) = told(&[&start[..], &["carriage"]].concat());
     assert_eq!(code, Some(2));
     assert!(
@@ -236,7 +236,7 @@ fn quaternions_are_orientations_to_take_in_and_u95_is_two_standard_deviations() 
         .pipeline
         .replace("# orientation:", "orientation:")
         .replace("# sigma_orientation:", "sigma_orientation:");
-    std::fs::write(made.path().join("pipeline.yaml"), taken).expect("a file");
+    std::fs::write(made.path().join("pipeline.yaml"), taken).unwrap();
     made.runs(30);
 }
 

@@ -17,7 +17,7 @@ fn log(header: &str, count: usize, row: impl Fn(usize, usize) -> String) -> Stri
             0.008 * k as f64,
             cells(count, ",", |column| row(k, column))
         )
-        .expect("text");
+        .unwrap();
     }
     text
 }
@@ -140,7 +140,7 @@ fn lists(count: usize) -> Vec<u8> {
     let state = |k: usize| {
         Some(
             (0..count)
-                .map(|j| Some(wave(k, j).parse::<f32>().expect("a number")))
+                .map(|j| Some(wave(k, j).parse::<f32>().unwrap()))
                 .collect::<Vec<_>>(),
         )
     };
@@ -150,7 +150,7 @@ fn lists(count: usize) -> Vec<u8> {
         .flat_map(|k| {
             point(k, ",")
                 .split(',')
-                .map(|x| x.parse().expect("a number"))
+                .map(|x| x.parse().unwrap())
                 .collect::<Vec<f64>>()
         })
         .collect();
@@ -166,12 +166,12 @@ fn lists(count: usize) -> Vec<u8> {
         ("observation.state", Arc::new(state)),
         ("point", Arc::new(points)),
     ];
-    let batch = RecordBatch::try_from_iter(columns).expect("columns");
+    let batch = RecordBatch::try_from_iter(columns).unwrap();
     let mut bytes = Vec::new();
     let mut writer =
-        parquet::arrow::ArrowWriter::try_new(&mut bytes, batch.schema(), None).expect("a writer");
-    writer.write(&batch).expect("rows");
-    writer.close().expect("a file");
+        parquet::arrow::ArrowWriter::try_new(&mut bytes, batch.schema(), None).unwrap();
+    writer.write(&batch).unwrap();
+    writer.close().unwrap();
     bytes
 }
 
@@ -195,7 +195,7 @@ fn lists_of_a_parquet_file_are_columns_of_which_the_first_are_the_joints() {
                 &format!("{axis}: {{column: \"point[{k}]\","),
             )
         });
-    std::fs::write(made.path().join("pipeline.yaml"), mapped).expect("a file");
+    std::fs::write(made.path().join("pipeline.yaml"), mapped).unwrap();
     made.runs(30);
 }
 
@@ -236,7 +236,7 @@ fn programs_and_bags_are_named_as_what_they_are_by_init_and_by_check() {
 
 #[test]
 fn a_folder_with_a_robot_file_keeps_it_and_joints_are_counted_by_it() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let told = |arguments: &[&str]| {
         let output = calib(folder.path(), arguments, "");
         (
@@ -252,9 +252,9 @@ fn a_folder_with_a_robot_file_keeps_it_and_joints_are_counted_by_it() {
             format!("{},{}", joints(k, ","), point(k, ","))
         }),
     )
-    .expect("a file");
+    .unwrap();
     let robot = told(&["robots", "lrmate_200id"]).1;
-    std::fs::write(folder.path().join("robot.yaml"), &robot).expect("a file");
+    std::fs::write(folder.path().join("robot.yaml"), &robot).unwrap();
     let (code, said) = told(&["init", ".", "--data", "data.csv", "--robot", "ur10e"]);
     assert!(
         code == Some(2) && said.contains("robot.yaml: is already there and would be used"),
@@ -266,7 +266,7 @@ fn a_folder_with_a_robot_file_keeps_it_and_joints_are_counted_by_it() {
             && said.contains("wrote ./pipeline.yaml beside ./robot.yaml, which is used as it is"),
         "{said}"
     );
-    let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).expect("a file");
+    let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
     assert_eq!(read("robot.yaml"), robot);
     // What its controller counts otherwise goes along.
     assert!(
@@ -275,12 +275,12 @@ fn a_folder_with_a_robot_file_keeps_it_and_joints_are_counted_by_it() {
         read("pipeline.yaml")
     );
     assert_eq!(told(&["check", "pipeline.yaml"]).0, Some(0));
-    std::fs::remove_file(folder.path().join("pipeline.yaml")).expect("a file");
+    std::fs::remove_file(folder.path().join("pipeline.yaml")).unwrap();
     std::fs::write(
         folder.path().join("robot.yaml"),
         told(&["robots", "panda"]).1,
     )
-    .expect("a file");
+    .unwrap();
     let (code, said) = told(&["init", ".", "--data", "data.csv"]);
     assert!(
         code == Some(2)

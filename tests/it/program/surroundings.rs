@@ -15,7 +15,7 @@ type Surroundings = (Option<Pose>, Option<f64>);
 
 /// Those of every target; lines that name a frame which is not applied.
 fn read(language: Language, text: &str) -> (Vec<Surroundings>, Vec<String>) {
-    let program = Program::parse(text.as_bytes(), language, Partial::Refused).expect("accepted");
+    let program = Program::parse(text.as_bytes(), language, Partial::Refused).unwrap();
     let literals = program
         .literals()
         .iter()
@@ -175,8 +175,7 @@ fn a_base_and_a_load_that_a_file_sets_once_hold_for_its_targets() {
 fn joints_are_the_same_in_every_frame() {
     let text =
         "$BASE={X 100.0,Y 0.0,Z 0.0,A 0.0,B 0.0,C 0.0}\nPTP {A1 1,A2 2,A3 3,A4 4,A5 5,A6 6}\n";
-    let program =
-        Program::parse(text.as_bytes(), Language::Krl, Partial::Refused).expect("accepted");
+    let program = Program::parse(text.as_bytes(), Language::Krl, Partial::Refused).unwrap();
     assert_eq!(
         (program.literals()[0].kind, program.literals()[0].frame),
         (TargetKind::Joints, None)
@@ -192,8 +191,8 @@ fn the_targets_of_a_file_are_reached_with_one_tool() {
         );
         let text = format!("{targets}MoveL p,v1,z1,gun;\nMoveL r,v1,z1,{tool};");
         let mut program =
-            Program::parse(text.as_bytes(), Language::Rapid, Partial::Refused).expect("accepted");
-        program.relate_tools(&robot, None).expect("related");
+            Program::parse(text.as_bytes(), Language::Rapid, Partial::Refused).unwrap();
+        program.relate_tools(&robot, None).unwrap();
         program
             .frames()
             .iter()

@@ -42,7 +42,7 @@ fn diagnosed_with_sentences(
 ) -> (Vec<String>, VerdictRow, String, String) {
     let split = all(&recording);
     let desk = Desk::default();
-    let stage: Diagnose = serde_saphyr::from_str("{}").expect("every setting has a default");
+    let stage: Diagnose = serde_saphyr::from_str("{}").unwrap();
     let tables = desk
         .run(
             &stage,
@@ -52,7 +52,7 @@ fn diagnosed_with_sentences(
                 split,
             },
         )
-        .expect("diagnosed");
+        .unwrap();
     let findings = desk::table::<Findings>(&tables).remove(0).0;
     let verdict = desk::table::<Verdict>(&tables).remove(0).0.remove(0);
     let named = findings
@@ -143,7 +143,7 @@ fn a_ball_that_was_put_back_elsewhere_is_found() {
     let robot = fixture::seven();
     let before = truth(&robot, 37);
     let mut after = before.clone();
-    after.links.last_mut().expect("links").shift_mm[0] += 1.5;
+    after.links.last_mut().unwrap().shift_mm[0] += 1.5;
     let (mut recording, second) = (
         touched(&robot, &before, &cell(30), 37),
         touched(&robot, &after, &cell(30), 38),

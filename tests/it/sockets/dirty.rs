@@ -41,13 +41,13 @@ pub fn all(recording: &Recording) -> Split {
 fn said(robot: &RobotDescription, recording: Recording, settings: &str) -> (String, Parameters) {
     let split = all(&recording);
     let desk = Desk::default();
-    let stage: Identify = serde_saphyr::from_str(settings).expect("good settings");
+    let stage: Identify = serde_saphyr::from_str(settings).unwrap();
     let reads = IdentifyReads {
         robot: Robot::from_description(robot),
         recording,
         split,
     };
-    let tables = desk.run(&stage, reads).expect("identified");
+    let tables = desk.run(&stage, reads).unwrap();
     let parameters = desk::table::<Parameters>(&tables).remove(0);
     let (warnings, notes) = (
         desk.warnings.into_inner().unwrap(),
@@ -60,7 +60,7 @@ fn said(robot: &RobotDescription, recording: Recording, settings: &str) -> (Stri
 fn rows_of_another_hole_are_named_with_the_hole() {
     let robot = fixture::seven();
     let mut recording = touched(&robot, &truth(&robot, 3), &cell(25), 3);
-    let names = recording.names.get_mut("socket").expect("sockets");
+    let names = recording.names.get_mut("socket").unwrap();
     for row in [30, 31] {
         names[row] = Some("b/0".into());
     }
@@ -95,7 +95,7 @@ fn a_ball_that_was_put_back_elsewhere_is_said_with_the_row() {
     let robot = fixture::seven();
     let before = truth(&robot, 4);
     let mut after = before.clone();
-    after.links.last_mut().expect("links").shift_mm[0] += 1.5;
+    after.links.last_mut().unwrap().shift_mm[0] += 1.5;
     let (first, second) = (
         touched(&robot, &before, &cell(20), 4),
         touched(&robot, &after, &cell(20), 5),
@@ -153,7 +153,7 @@ fn names_that_the_recording_does_not_have_are_refused() {
             "no sphere `ball`; the recording has: a/0",
         ),
     ] {
-        let stage: Identify = serde_saphyr::from_str(more).expect("good settings");
+        let stage: Identify = serde_saphyr::from_str(more).unwrap();
         let reads = IdentifyReads {
             robot: Robot::from_description(&robot),
             recording: recording.clone(),
@@ -215,7 +215,7 @@ fn derivatives_of_sockets_planes_and_spheres_are_central_differences() {
                         row,
                         placed: &placed,
                     };
-                    kind.residual(at).expect("measured").0
+                    kind.residual(at).unwrap().0
                 };
                 let central = (moved(-1e-6) - moved(1e-6)) / 2e-6;
                 let (name, off) = (&model.stack.specs()[k].name, (central - partial).norm());

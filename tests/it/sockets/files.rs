@@ -45,7 +45,7 @@ fn plan(folder: &Path) -> Result<Plan, String> {
 }
 
 fn refused(columns: &str, file: &str) -> String {
-    plan(folder(columns, file).path()).err().expect("refused")
+    plan(folder(columns, file).path()).err().unwrap()
 }
 
 const NAMED: &str = "            socket: {path: \"{position}/hole_{n}.csv\"}\n            sigma_socket: {value: 0.1, unit: mm}\n";
@@ -53,7 +53,7 @@ const NAMED: &str = "            socket: {path: \"{position}/hole_{n}.csv\"}\n  
 #[test]
 fn a_pattern_stands_for_its_files_and_paths_name_the_sockets() {
     let folder = folder(NAMED, "data/*/hole_?.csv");
-    let plan = plan(folder.path()).expect("sound");
+    let plan = plan(folder.path()).unwrap();
     let ingest = &plan.stages[1];
     let named: Vec<String> = ingest
         .files

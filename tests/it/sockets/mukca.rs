@@ -14,7 +14,7 @@ use std::time::Instant;
 
 pub fn panda() -> RobotDescription {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sockets/robot.yaml");
-    let text = std::fs::read_to_string(path).expect("the pipeline's robot file");
+    let text = std::fs::read_to_string(path).unwrap();
     read_calib(
         RobotFileText {
             label: "robot.yaml",
@@ -22,7 +22,7 @@ pub fn panda() -> RobotDescription {
         },
         None,
     )
-    .expect("a good robot file")
+    .unwrap()
     .robot
 }
 
@@ -223,7 +223,7 @@ fn the_scale_agrees_with_the_holes_of_the_table() {
         let (model, fitted) = calibrate(&data, &rows, effects);
         let sigma = scale(&model, &data, &rows, fitted.covariance.as_ref())
             .and_then(|scale| scale.sigma)
-            .expect("a scale");
+            .unwrap();
         let found = against_holes(&model, hole);
         println!("{effects:?}: scale {found:+.2e} of the holes, stated sigma {sigma:.2e}");
         assert!(
@@ -243,7 +243,7 @@ fn the_scale_of_another_arm_agrees_with_the_holes_of_its_table() {
         let (model, fitted) = calibrate(&data, &rows, effects);
         let sigma = scale(&model, &data, &rows, fitted.covariance.as_ref())
             .and_then(|scale| scale.sigma)
-            .expect("a scale");
+            .unwrap();
         let found = against_holes(&model, nearest_hole);
         println!("panda_2 {effects:?}: scale {found:+.2e} of the holes, stated sigma {sigma:.2e}");
         assert!(
@@ -256,7 +256,7 @@ fn the_scale_of_another_arm_agrees_with_the_holes_of_its_table() {
 /// Holes of 25 mm in which the plates of panda_2 stood, forward and to the left of `front_right`; all sockets lie within 2 mm of such a
 /// grid, and the second socket 50 mm to the right.
 fn nearest_hole(name: &str) -> Vector3<f64> {
-    let [forward, left] = match name.split('/').next().expect("a position") {
+    let [forward, left] = match name.split('/').next().unwrap() {
         "back_left" => [-20.0, 22.0],
         "back_right" => [-20.0, -2.0],
         "front_center" => [-1.0, 10.0],

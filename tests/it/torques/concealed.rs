@@ -17,7 +17,7 @@ fn simulate(verb: &str, out: &Path, more: &[&str]) -> Output {
     if verb == "prove" {
         command.args(["--pipeline", pipeline, "--quiet", "--json"]);
     }
-    let done = command.output().expect("calib");
+    let done = command.output().unwrap();
     assert!(
         done.status.success(),
         "{}",
@@ -29,13 +29,13 @@ fn simulate(verb: &str, out: &Path, more: &[&str]) -> Output {
 /// Half of the effects in forms that are not the estimator's. More of them: `calib simulate prove --dynamics --cases 300`.
 #[test]
 fn concealed_torques_are_found_and_nulls_stay_empty() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let done = simulate(
         "prove",
         &folder.path().join("set"),
         &["--seed", "11", "--cases", "4", "--nulls", "0.25"],
     );
-    let board: Value = serde_json::from_slice(&done.stdout).expect("JSON");
+    let board: Value = serde_json::from_slice(&done.stdout).unwrap();
     assert_eq!(
         (&board["recordings"], &board["without_verdict"]),
         (&4.into(), &serde_json::json!([]))
@@ -55,7 +55,7 @@ fn concealed_torques_are_found_and_nulls_stay_empty() {
 
 #[test]
 fn a_seed_gives_the_same_recordings_of_torques_on_one_and_two_threads() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let seals = ["1", "2"].map(|jobs| {
         let out = folder.path().join(jobs);
         simulate(
@@ -74,7 +74,7 @@ fn a_seed_gives_the_same_recordings_of_torques_on_one_and_two_threads() {
                 jobs,
             ],
         );
-        std::fs::read_to_string(out.join("seal.json")).expect("a seal")
+        std::fs::read_to_string(out.join("seal.json")).unwrap()
     });
     // The hash of every file is in it.
     assert_eq!(seals[0], seals[1]);
@@ -94,7 +94,7 @@ fn options_of_points_are_refused_of_torques() {
             "path",
         ])
         .output()
-        .expect("calib");
+        .unwrap();
     assert_eq!(done.status.code(), Some(2));
     assert!(
         String::from_utf8_lossy(&done.stderr).contains("--layout"),

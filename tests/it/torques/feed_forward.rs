@@ -20,14 +20,14 @@ fn told(output: &Output) -> String {
 
 fn answer(output: &Output) -> String {
     assert!(output.status.success(), "{}", told(output));
-    String::from_utf8(output.stdout.clone()).expect("UTF-8")
+    String::from_utf8(output.stdout.clone()).unwrap()
 }
 
 /// A fresh motion of the solved case as a file.
 fn fresh(name: &str) -> std::path::PathBuf {
     let file = solved().path(name);
     let rows = solved().case.clone().on_other_paths(977, 40.0).true_rows();
-    std::fs::write(&file, motion(&rows, 1, true)).expect("a file");
+    std::fs::write(&file, motion(&rows, 1, true)).unwrap();
     file
 }
 
@@ -36,12 +36,12 @@ fn cells<'t>(text: &'t str, name: &str) -> Vec<&'t str> {
     let mut lines = text.lines();
     let place = lines
         .next()
-        .expect("a header")
+        .unwrap()
         .split(',')
         .position(|column| column == name)
-        .expect("the column");
+        .unwrap();
     lines
-        .map(|line| line.splitn(place + 2, ',').nth(place).expect("a cell"))
+        .map(|line| line.splitn(place + 2, ',').nth(place).unwrap())
         .collect()
 }
 
@@ -52,7 +52,7 @@ fn covered(solved: &Solved, seed: u64) -> Vec<f64> {
     let mut within = vec![(0usize, 0usize); n];
     for stretch in [1, 2] {
         let file = solved.path(&format!("fresh_{seed}_{stretch}.csv"));
-        std::fs::write(&file, motion(&rows, stretch, true)).expect("a file");
+        std::fs::write(&file, motion(&rows, stretch, true)).unwrap();
         let text = answer(&fed(solved, &file, &["--quiet", "--force"]));
         let own: Vec<usize> = (0..rows.time.len())
             .filter(|row| rows.trajectory[*row] == stretch)
@@ -121,11 +121,7 @@ fn the_uncertainty_of_torques_covers_the_truth_of_several_arms() {
 #[test]
 fn torques_less_certain_than_allowed_are_refused_and_written_only_with_force() {
     let file = fresh("doubtful.csv");
-    let rows = std::fs::read_to_string(&file)
-        .expect("text")
-        .lines()
-        .count()
-        - 1;
+    let rows = std::fs::read_to_string(&file).unwrap().lines().count() - 1;
     let refused = fed(solved(), &file, &["--max-uncertainty", "1e-6"]);
     assert_eq!(refused.status.code(), Some(10), "{}", told(&refused));
     let said = told(&refused);
@@ -139,7 +135,7 @@ fn torques_less_certain_than_allowed_are_refused_and_written_only_with_force() {
         )),
         "{said}"
     );
-    let text = String::from_utf8(refused.stdout).expect("UTF-8");
+    let text = String::from_utf8(refused.stdout).unwrap();
     assert!(
         cells(&text, "tau2_nm").iter().all(|cell| cell.is_empty())
             && cells(&text, "i2_a").iter().all(|cell| cell.is_empty())
@@ -175,7 +171,7 @@ fn torques_that_were_fed_forward_already_are_no_motion() {
     let file = fresh("once.csv");
     let once = answer(&fed(solved(), &file, &["--quiet"]));
     let twice = solved().path("twice.csv");
-    std::fs::write(&twice, &once).expect("a file");
+    std::fs::write(&twice, &once).unwrap();
     let refused = fed(solved(), &twice, &[]);
     assert_eq!(refused.status.code(), Some(10), "{}", told(&refused));
     assert!(
@@ -189,7 +185,7 @@ fn torques_that_were_fed_forward_already_are_no_motion() {
 
 #[test]
 fn a_motion_beyond_the_recording_is_remarked_row_by_row_with_what_it_exceeds() {
-    let slow = std::fs::read_to_string(fresh("slow.csv")).expect("text");
+    let slow = std::fs::read_to_string(fresh("slow.csv")).unwrap();
     // The same path in a third of the time.
     let path = |line: &str| {
         line.split(',')
@@ -201,16 +197,14 @@ fn a_motion_beyond_the_recording_is_remarked_row_by_row_with_what_it_exceeds() {
     let fast: String = slow
         .lines()
         .map(|line| match line.split_once(',') {
-            Some((time, _)) if time != "time_s" => format!(
-                "{:.5},{}\n",
-                time.parse::<f64>().expect("s") / 3.0,
-                path(line)
-            ),
+            Some((time, _)) if time != "time_s" => {
+                format!("{:.5},{}\n", time.parse::<f64>().unwrap() / 3.0, path(line))
+            }
             _ => format!("time_s,{}\n", path(line)),
         })
         .collect();
     let file = solved().path("fast.csv");
-    std::fs::write(&file, fast).expect("a file");
+    std::fs::write(&file, fast).unwrap();
     let output = fed(solved(), &file, &["--force"]);
     assert!(
         told(&output).contains("beyond the motion that the model was seen in"),
@@ -251,7 +245,7 @@ fn an_arm_whose_recording_says_its_temperature_is_remarked_where_it_is_colder() 
         &file,
         motion(&case.on_other_paths(977, 40.0).true_rows(), 1, false),
     )
-    .expect("a file");
+    .unwrap();
     let cold = answer(&fed(&solved, &file, &["--temperature", "5"]));
     assert!(
         cold.contains("colder than recorded: 5.0 C, the recording begins at 25.0 C"),

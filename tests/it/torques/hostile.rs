@@ -14,7 +14,7 @@ impl Sheet {
         let cells = |line: &str| line.split(',').map(String::from).collect::<Vec<String>>();
         let mut lines = text.lines();
         Self {
-            header: cells(lines.next().expect("a header")),
+            header: cells(lines.next().unwrap()),
             rows: lines.map(cells).collect(),
         }
     }
@@ -25,7 +25,7 @@ impl Sheet {
             .unwrap_or_else(|| panic!("no column {name}"))
     }
     fn number(&self, row: usize, column: usize) -> f64 {
-        self.rows[row][column].parse().expect("a number")
+        self.rows[row][column].parse().unwrap()
     }
     fn change(&mut self, columns: &[String], of: impl Fn(f64) -> f64) {
         for name in columns {
@@ -61,7 +61,7 @@ fn case(robot: &str) -> (TorqueCase, Sheet) {
     let case = (0..20)
         .map(|number| TorqueCase::draw(&nothing(5), number))
         .find(|case| case.robot.name == robot)
-        .expect("one");
+        .unwrap();
     let sheet = Sheet::read(&case.recording()[1].1);
     (case, sheet)
 }
@@ -86,13 +86,13 @@ fn told_of(robot: &str, change: impl FnOnce(&mut Sheet), folder: &Path) -> (i32,
     );
     let output = diagnose(folder, &folder.join("store"), &[]);
     (
-        output.status.code().expect("a code"),
+        output.status.code().unwrap(),
         String::from_utf8_lossy(&output.stderr).into_owned(),
     )
 }
 
 fn refused(change: impl FnOnce(&mut Sheet), words: &[&str]) {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let (code, told) = told(change, folder.path());
     assert!([2, 10].contains(&code), "exit code {code}: {told}");
     for word in words {
@@ -201,7 +201,7 @@ fn rows_that_cannot_be_read_are_counted_and_too_many_are_refused() {
             "`lost` is not a number",
         ],
     );
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let (code, said) = told(spoiled(400), folder.path());
     assert_eq!(code, 0, "{said}");
 }
@@ -209,7 +209,7 @@ fn rows_that_cannot_be_read_are_counted_and_too_many_are_refused() {
 #[test]
 fn a_row_that_is_missing_at_a_low_rate_is_bridged_and_no_row_is_told_twice() {
     // At 25 Hz every row of the clock is judged, one that is made up too.
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let holed = |sheet: &mut Sheet| {
         let mut number = 0..;
         sheet.rows.retain(|_| {
@@ -224,7 +224,7 @@ fn a_row_that_is_missing_at_a_low_rate_is_bridged_and_no_row_is_told_twice() {
 
 #[test]
 fn files_of_one_name_in_two_folders_are_told_apart() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().unwrap();
     let (case, sheet) = case("compact6");
     write(folder.path(), &[case.recording()[0].clone()]);
     let mut spoilt = Sheet {
@@ -240,23 +240,23 @@ fn files_of_one_name_in_two_folders_are_told_apart() {
         );
     }
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/dynamics/pipeline.yaml");
-    let text = std::fs::read_to_string(root).expect("a pipeline");
+    let text = std::fs::read_to_string(root).unwrap();
     let (before, block) = text
         .split_once("        - file: ${case}/recording.csv\n")
-        .expect("a file");
-    let (columns, after) = block.split_once("\n\n").expect("columns");
+        .unwrap();
+    let (columns, after) = block.split_once("\n\n").unwrap();
     let file = |name: &str| format!("        - file: {name}/recording.csv\n{columns}\n");
     let all = ["one", "two", "three"].map(file).concat();
     std::fs::write(
         folder.path().join("p.yaml"),
         format!("{}{all}\n{after}", before.replace("${case}/", "")),
     )
-    .expect("a file");
+    .unwrap();
     let output = std::process::Command::new(env!("CARGO_BIN_EXE_calib"))
         .args(["run", "p.yaml", "--until", "ingest_torques", "--quiet"])
         .current_dir(folder.path())
         .output()
-        .expect("calib");
+        .unwrap();
     assert_eq!(
         output.status.code(),
         Some(0),
@@ -398,7 +398,7 @@ const SPOILED: [Spoiled; 14] = [
 fn spoiled_recordings_are_refused_with_a_code_and_a_sentence() {
     let mut wrong = Vec::new();
     for (robot, what, change, code, words) in SPOILED {
-        let folder = tempfile::tempdir().expect("a folder");
+        let folder = tempfile::tempdir().unwrap();
         let (found, said) = told_of(robot, change, folder.path());
         println!(
             "{what}: code {found}: {}",
