@@ -1,5 +1,6 @@
 //! calib from arrays: to the last digit what a pipeline gives for the same numbers in a file.
 
+use crate::answer::{ends_with, has, starts_with};
 use crate::compensate::{ROBOT, calib, cell};
 use calib::api::{CalibRun, Options, Poses, Recording, Robot, Sigma, diagnose, identify};
 use calib::error::{Error, Result};
@@ -135,15 +136,13 @@ fn arrays_that_are_no_recording_are_refused_with_row_and_what_is_allowed() {
             .iter_mut()
             .for_each(|q| *q = q.to_degrees())
     });
-    assert!(
-        degrees.starts_with("joints, row 0: `joints` is declared in rad, but 8"),
-        "{degrees}"
+    starts_with(
+        &degrees,
+        "joints, row 0: `joints` is declared in rad, but 8",
     );
-    assert!(
-        degrees.ends_with(
-            "allowed: up to 9.42 rad; if the array holds degrees, convert it to radians"
-        ),
-        "{degrees}"
+    ends_with(
+        &degrees,
+        "allowed: up to 9.42 rad; if the array holds degrees, convert it to radians",
     );
     let faults = [
         with(&|one| one.poses.joints_rad[14] = f64::NAN),
@@ -174,7 +173,7 @@ fn arrays_that_are_no_recording_are_refused_with_row_and_what_is_allowed() {
         "NAME: no arm `ur5ee` in the library; did you mean `ur5e`?",
     ];
     for (fault, start) in faults.iter().zip(starts) {
-        assert!(fault.starts_with(start), "{fault}");
+        starts_with(&fault, start);
     }
 }
 
@@ -228,5 +227,5 @@ fn a_served_model_answers_every_line_with_what_the_library_computes() {
     // No row was measured with joint 1 turned by 170 degrees.
     let far = served(&["--predict"], "[2.97, 0.2, -0.4, 0.5, 0.8, -1.0]\n");
     let remark = far[0]["remark"].as_str().unwrap();
-    assert!(remark.contains("joint 1"), "{remark}");
+    has(&remark, "joint 1");
 }

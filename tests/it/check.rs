@@ -1,5 +1,6 @@
 //! `check` reads what it reports on: the robot file, the headers of the data files, and the marks that `init` left.
 
+use crate::answer::has;
 use crate::compensate::calib;
 
 const ROBOT: &str = "calib_robot: 1
@@ -82,20 +83,17 @@ fn a_sound_pipeline_is_ready_and_shows_its_graph_on_demand() {
     }
     let out = calib(folder.path(), &["check", "pipeline.yaml", "--details"], "").stdout;
     let out = String::from_utf8_lossy(&out).into_owned();
-    assert!(out.contains("reads   robot  <- robot.robot"), "{out}");
+    has(&out, "reads   robot  <- robot.robot");
 }
 
 #[test]
 fn a_broken_robot_file_is_a_fault_with_its_place() {
     let (code, _, err) = checked(&ROBOT.replace("tool:", "tol:"), PIPELINE, ARM, POINTS);
     assert_eq!(code, 2, "{err}");
-    assert!(
-        err.contains("robot.yaml:8") && err.contains("did you mean `tool`"),
-        "{err}"
-    );
+    has(&err, ["robot.yaml:8", "did you mean `tool`"]);
     let (code, _, err) = checked("\0 {no YAML: [", PIPELINE, ARM, POINTS);
     assert_eq!(code, 2, "{err}");
-    assert!(err.contains("robot.yaml:1"), "{err}");
+    has(&err, "robot.yaml:1");
 }
 
 #[test]
@@ -104,10 +102,7 @@ fn faults_of_the_yaml_and_of_the_robot_file_are_told_in_one_pass() {
     assert_ne!(pipeline, PIPELINE);
     let (code, _, err) = checked(&ROBOT.replace("tool:", "tol:"), &pipeline, ARM, POINTS);
     assert_eq!(code, 2, "{err}");
-    assert!(
-        err.contains("did you mean `tool`") && err.contains("did you mean `split`"),
-        "{err}"
-    );
+    has(&err, ["did you mean `tool`", "did you mean `split`"]);
 }
 
 #[test]
@@ -129,10 +124,7 @@ fn columns_that_are_not_there_are_named_with_the_nearest_all_at_once() {
         "id,x,y,Z\n",
     );
     assert_eq!(code, 2, "the robot's fault decides: {err}");
-    assert!(
-        err.contains("robot.yaml:7") && err.contains("points.csv:1: no column `z`"),
-        "{err}"
-    );
+    has(&err, ["robot.yaml:7", "points.csv:1: no column `z`"]);
     let (code, _, err) = checked(ROBOT, PIPELINE, "", POINTS);
     assert_eq!(
         (code, err.as_str()),
@@ -271,11 +263,9 @@ fn a_name_that_is_too_long_says_how_long_it_may_be() {
         code == 2 && err.contains(&format!("name: `{name}`: 65 letters; allowed: up to 64")),
         "{err}"
     );
-    assert!(
-        err.contains(&format!(
-            "stages[0].id: `{id}`: 70 letters; allowed: up to 64"
-        )),
-        "{err}"
+    has(
+        &err,
+        &format!("stages[0].id: `{id}`: 70 letters; allowed: up to 64"),
     );
 }
 
@@ -345,7 +335,7 @@ fn check_of_the_data_fits_base_and_geometry_and_names_rows_that_have_no_partner(
         "",
     );
     let told = String::from_utf8_lossy(&run.stderr).into_owned();
-    assert!(told.contains("geometry  cached"), "{told}");
+    has(&told, "geometry  cached");
     let diagnosed =
         format!("{PIPELINE}  - uses: split\n    with: {{by: every, n: 4}}\n  - uses: diagnose\n");
     std::fs::write(folder.path().join("diagnosed.yaml"), diagnosed).unwrap();

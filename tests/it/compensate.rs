@@ -17,6 +17,7 @@ mod stated;
 mod true_error;
 mod within;
 
+use crate::answer::{ends_with, has, starts_with};
 use calib::compensate::{Chain, Nominal, SETTLED, ToolGoal, inverse, least_change};
 use calib::robot::RobotModel;
 use calib::twin::conceal::robots::Kind;
@@ -175,16 +176,10 @@ fn only_the_numbers_of_joints_change_in_a_text_of_targets() {
         (before[0], before[2], before[4]),
         (after[0], after[2], after[4])
     );
-    assert!(
-        after[1].starts_with("P1;10,") && after[1].ends_with(";\"a;b\""),
-        "{}",
-        after[1]
-    );
-    assert!(
-        after[3].starts_with("P2;-") && after[3].ends_with("; x "),
-        "{}",
-        after[3]
-    );
+    starts_with(&after[1], "P1;10,");
+    ends_with(&after[1], ";\"a;b\"");
+    starts_with(&after[3], "P2;-");
+    ends_with(&after[3], "; x ");
     let first: f64 = after[1]
         .split(';')
         .nth(1)
@@ -256,7 +251,7 @@ fn what_is_known_of_a_target_stands_behind_it() {
         lines.next().unwrap().contains("joint 6 beyond its limits"),
         "{said}"
     );
-    assert!(text(&output.stderr).contains("1 of them leaves the joint limits"));
+    has(&text(&output.stderr), "1 of them leaves the joint limits");
 }
 
 #[test]
@@ -316,14 +311,8 @@ fn a_faulty_text_of_targets_is_refused_with_line_and_column() {
     let header = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n";
     let (code, said, _) = run(&format!("{header}1,2,3,4,5,6\n1,2,x,4,5,6\n1,2\n"));
     assert_eq!(code, Some(10));
-    assert!(
-        said.contains("stdin:3: column 5: field 3 is `x`, no number"),
-        "{said}"
-    );
-    assert!(
-        said.contains("stdin:4: has 2 fields, the header 6"),
-        "{said}"
-    );
+    has(&said, "stdin:3: column 5: field 3 is `x`, no number");
+    has(&said, "stdin:4: has 2 fields, the header 6");
     // A quote inside a field is a letter of it; one that begins a field ends it.
     let open = header.replace("q6_deg", "q6_deg,note");
     let (code, said, _) = run(&format!(
@@ -331,31 +320,22 @@ fn a_faulty_text_of_targets_is_refused_with_line_and_column() {
     ));
     assert_eq!(code, Some(10));
     assert_eq!(said.matches("stdin:").count(), 1, "{said}");
-    assert!(
-        said.contains("stdin:3: column 13: `\"` is not closed on its line"),
-        "{said}"
-    );
+    has(&said, "stdin:3: column 13: `\"` is not closed on its line");
     let (code, said, _) = run(&format!("{header}1,2,3,4,5,\"0.25\"0\n"));
     assert_eq!(code, Some(10));
-    assert!(
-        said.contains("stdin:2: column 17: text behind the closing `\"` of a field; allowed:"),
-        "{said}"
+    has(
+        &said,
+        "stdin:2: column 17: text behind the closing `\"` of a field; allowed:",
     );
     let (code, said, _) = run(&header.replace("q6_deg", "\"q6_deg"));
     assert_eq!(code, Some(10));
-    assert!(
-        said.contains("stdin:1: column 36: `\"` is not closed on its line"),
-        "{said}"
-    );
+    has(&said, "stdin:1: column 36: `\"` is not closed on its line");
     let (code, said, _) = run("A1,A2,A3,A4,A5,A6\n1,2,3,4,5,6\n");
     assert_eq!(code, Some(2));
-    assert!(
-        said.contains("`A1` has no unit") && said.contains("--angle deg"),
-        "{said}"
-    );
+    has(&said, ["`A1` has no unit", "--angle deg"]);
     let (code, said, _) = run("foo,bar\n1,2\n");
     assert_eq!(code, Some(2));
-    assert!(said.contains("no targets found"), "{said}");
+    has(&said, "no targets found");
 }
 
 #[test]
@@ -392,16 +372,13 @@ fn a_target_that_is_not_reached_gets_no_joints_and_the_others_do() {
                 .is_some_and(|row| row.contains(",\"not reached, 6") && row.ends_with(" mm off\"")),
             "{said}"
         );
-        assert!(
-            told.contains("stdin:3: not reached, 6")
-                && told.contains(" mm off: no joints are written"),
-            "{told}"
+        has(
+            &told,
+            ["stdin:3: not reached, 6", " mm off: no joints are written"],
         );
-        assert!(
-            told.contains(
-                "warning: 1 of them could not be reached and has no joints (column `remark`)"
-            ),
-            "{told}"
+        has(
+            &told,
+            "warning: 1 of them could not be reached and has no joints (column `remark`)",
         );
     }
     let plain = calib(
@@ -463,10 +440,9 @@ fn a_target_that_is_not_reached_is_null_in_parquet() {
         "",
     );
     assert_eq!(output.status.code(), Some(10));
-    assert!(
-        text(&output.stderr).contains("points.parquet: row 2: not reached, 6"),
-        "{}",
-        text(&output.stderr)
+    has(
+        &text(&output.stderr),
+        "points.parquet: row 2: not reached, 6",
     );
     let file = std::fs::File::open(cell().join("points_c.parquet")).unwrap();
     let builder =
@@ -490,10 +466,7 @@ fn quiet_keeps_warnings_and_takes_the_summary() {
         text(&calib(cell(), &[&["compensate", "latest"], more].concat(), input).stderr)
     };
     let (loud, quiet) = (told(&[]), told(&["-q"]));
-    assert!(
-        loud.contains("model: ") && loud.contains("1 target; "),
-        "{loud}"
-    );
+    has(&loud, ["model: ", "1 target; "]);
     let warnings: String = loud
         .lines()
         .filter(|line| line.starts_with("warning: "))
@@ -532,40 +505,33 @@ fn partial_targets_of_a_program_stay_where_that_is_wished_and_nothing_is_written
     let whole = "a target is corrected whole or not at all";
     let (code, told) = run(&[]);
     assert_eq!(code, Some(10));
-    assert!(
-        told.contains(&format!(
-            "partial.src:2:5: the target has no Z, A, B, C; {whole}"
-        )),
-        "{told}"
+    has(
+        &told,
+        &format!("partial.src:2:5: the target has no Z, A, B, C; {whole}"),
     );
-    assert!(
-        told.contains(&format!(
-            "partial.src:3:5: the target has no A2, A3, A4, A5, A6; {whole}"
-        )),
-        "{told}"
+    has(
+        &told,
+        &format!("partial.src:3:5: the target has no A2, A3, A4, A5, A6; {whole}"),
     );
-    assert!(
-        told.contains("partial.src: partial targets stay as they are with --leave-partial"),
-        "{told}"
+    has(
+        &told,
+        "partial.src: partial targets stay as they are with --leave-partial",
     );
     assert!(!cell().join("partial_c.src").exists());
     let (code, told) = run(&["--leave-partial"]);
     assert_eq!(code, Some(0), "{told}");
-    assert!(
-        told.contains(&format!(
+    has(
+        &told,
+        &format!(
             "warning: partial.src:3:5: left as it is: the target has no A2, A3, A4, A5, A6; {whole}"
-        )),
-        "{told}"
+        ),
     );
     let written = std::fs::read_to_string(cell().join("partial_c.src")).unwrap();
     let (mark, rest) = written.split_once('\n').unwrap();
-    assert!(mark.starts_with("; corrected by calib"), "{mark}");
+    starts_with(&mark, "; corrected by calib");
     assert!(
         rest.starts_with("PTP {A1 10.") || rest.starts_with("PTP {A1 9."),
         "{written}"
     );
-    assert!(
-        written.ends_with("\r\nLIN {X 10,Y 20}\r\nPTP {A1 20}\r\n"),
-        "{written}"
-    );
+    ends_with(&written, "\r\nLIN {X 10,Y 20}\r\nPTP {A1 20}\r\n");
 }

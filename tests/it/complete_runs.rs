@@ -1,5 +1,6 @@
 //! HEAD is the last complete run; runs of other commands are listed as such, addressed by id, and displace no kept run.
 
+use crate::answer::has;
 use crate::compensate::{calib, cell};
 use serde_json::Value;
 use std::path::Path;
@@ -55,10 +56,7 @@ fn what_other_verbs_run_is_not_head_and_is_listed_as_what_it_is() {
     let (code, text) = said(here, &["explain", "identify"]);
     assert_eq!(code, Some(2));
     let only = json(here, &["log"])[0]["run"].as_str().unwrap().to_string();
-    assert!(
-        text.contains("no complete run of `calib run`") && text.contains(&only),
-        "{text}"
-    );
+    has(&text, ["no complete run of `calib run`", &only]);
     for seed in ["seed=1", "seed=2"] {
         done(here, &["run", "pipeline.yaml", "--quiet", "--set", seed]);
     }

@@ -1,5 +1,6 @@
 //! Effects of a user's own: laws as formulas do what the library's do, and declarations survive as JSON.
 
+use crate::answer::has;
 use crate::fixture;
 use calib::effect::{
     Axes, AxisPoint, Basis, DeclaredCause, DeclaredForm, EffectDeclaration, EffectStack, Form, Law,
@@ -255,7 +256,7 @@ fn a_form_carries_its_declaration_wherever_its_json_goes() {
         let error = serde_json::from_str::<Form>(&text.replace(from, to))
             .expect_err("not a form")
             .to_string();
-        assert!(error.contains(said), "{error}");
+        has(&error, said);
     }
 }
 

@@ -12,6 +12,7 @@ mod tool_mass;
 mod weight;
 mod without;
 
+use crate::answer::has;
 use crate::desk::{Desk, shared, table};
 use crate::suspects::{Inputs, pipeline};
 use calib::effect::{Form, Load};
@@ -541,13 +542,10 @@ fn a_diagnosis_is_shown_again_from_its_run_as_it_was_printed() {
     );
     let (code, said) = refused(&["diagnose", &newest(here)], here);
     assert_eq!(code, Some(2), "{said}");
-    assert!(
-        said.contains("never came to its stage `diagnose`"),
-        "{said}"
-    );
-    assert!(
-        said.contains("calib diagnose p.yaml --set seed=9 --set case=sealed/recordings/c0001"),
-        "{said}"
+    has(&said, "never came to its stage `diagnose`");
+    has(
+        &said,
+        "calib diagnose p.yaml --set seed=9 --set case=sealed/recordings/c0001",
     );
     assert_eq!(calib(&["diagnose", "found", "--json"], here), made[1]);
     case_with(here, &[("  - uses: diagnose\n", "")]);
@@ -561,9 +559,9 @@ fn a_diagnosis_is_shown_again_from_its_run_as_it_was_printed() {
     );
     let (code, said) = refused(&["diagnose", &newest(here)], here);
     assert_eq!(code, Some(2), "{said}");
-    assert!(
-        said.contains("has no stage `diagnose`: put `- uses: diagnose` after the split of p.yaml"),
-        "{said}"
+    has(
+        &said,
+        "has no stage `diagnose`: put `- uses: diagnose` after the split of p.yaml",
     );
     case_with(here, &[twice]);
     calib(
@@ -574,9 +572,9 @@ fn a_diagnosis_is_shown_again_from_its_run_as_it_was_printed() {
     for place in [&[run.as_str()][..], &[&["p.yaml"], &CASE[..]].concat()] {
         let (code, said) = refused(&[&["diagnose"], place].concat(), here);
         assert_eq!(code, Some(2), "{said}");
-        assert!(
-            said.contains("has several diagnoses; say which with --step: diagnose, again"),
-            "{said}"
+        has(
+            &said,
+            "has several diagnoses; say which with --step: diagnose, again",
         );
     }
     assert_eq!(
@@ -638,10 +636,9 @@ fn parameters_that_correct_an_outside_simulation_are_not_taken_for_the_robots_ow
     ] {
         let (code, said) = refused(verb, here);
         assert_eq!(code, Some(2), "{said}");
-        assert!(
-            said.contains("correct the simulation of sim_x, sim_y, sim_z")
-                && said.contains("--step"),
-            "{said}"
+        has(
+            &said,
+            ["correct the simulation of sim_x, sim_y, sim_z", "--step"],
         );
     }
     calib(
@@ -892,14 +889,11 @@ fn what_no_pose_tells_apart_is_said_with_what_would() {
         ],
         here,
     );
-    assert!(
-        said.contains("no pose separates gear_cyclic at joint 4 from counterbalance at joint 4"),
-        "{said}"
+    has(
+        &said,
+        "no pose separates gear_cyclic at joint 4 from counterbalance at joint 4",
     );
-    assert!(
-        said.contains("instead: log motor currents at rest"),
-        "{said}"
-    );
+    has(&said, "instead: log motor currents at rest");
     let folder = concealed("zero_shift", "9", "60");
     let here = folder.path();
     case_with(here, &[]);
@@ -909,14 +903,11 @@ fn what_no_pose_tells_apart_is_said_with_what_would() {
         "base_shift"
     );
     let said = calib(&["poses", "--run", &newest(here), "--separate"], here);
-    assert!(
-        said.contains("base_shift at base can imitate zero_shift at joint 1 completely"),
-        "{said}"
+    has(
+        &said,
+        "base_shift at base can imitate zero_shift at joint 1 completely",
     );
-    assert!(
-        said.contains("instead: return to a few anchor poses"),
-        "{said}"
-    );
+    has(&said, "instead: return to a few anchor poses");
     for (names, wanted) in [
         (&["9"][..], "`9` matches no finding of run"),
         (&["zero_shift@joint 7"], "matches no finding of run"),

@@ -8,6 +8,7 @@ mod names;
 mod recalibrated;
 mod rosters;
 
+use crate::answer::{has, starts_with};
 use crate::held_locks;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -152,10 +153,8 @@ fn broken_robots_are_listed_with_their_reasons_and_the_others_finish() {
     assert_eq!(told["computed"].as_u64(), Some(1));
     let (result, _) = output(fleet("status", &file, &store).args(["--robot", "c0002"]));
     let text = String::from_utf8(result.stdout).unwrap();
-    assert!(
-        text.starts_with("c0002: rejected\n") && text.contains("manifest.json"),
-        "{text}"
-    );
+    starts_with(&text, "c0002: rejected\n");
+    has(&text, "manifest.json");
 }
 
 #[test]
@@ -268,9 +267,11 @@ fn every_fault_of_a_fleet_file_comes_at_once_with_its_place() {
         "robots:\n  - folders: nothing/*\noverrides:\n  - {robots: [r7]}\n",
     );
     let (_, said) = output(&mut fleet("run", &file, &store));
-    assert!(
-        said.contains("robots[0].folders: no folder matches")
-            && said.contains("overrides[0].robots[0]: no robot"),
-        "{said}"
+    has(
+        &said,
+        [
+            "robots[0].folders: no folder matches",
+            "overrides[0].robots[0]: no robot",
+        ],
     );
 }

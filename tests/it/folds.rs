@@ -1,5 +1,6 @@
 //! Cross-validation: as honest as held-out points, repeats together, and the same on any number of threads.
 
+use crate::answer::has;
 use crate::desk::{Desk, table};
 use crate::fixture;
 use crate::identify::{GEOMETRY, SIGMA, model, recording};
@@ -284,9 +285,9 @@ fn folds_are_a_number_or_n_and_a_cross_validation_that_is_dropped_is_told() {
     assert_eq!(yaml("\"n\"").unwrap(), FoldSetting::EachPose);
     assert_eq!(yaml("5").unwrap(), FoldSetting::default());
     let wrong = yaml("\"all\"").expect_err("no setting").to_string();
-    assert!(
-        wrong.contains("a number of folds (0 for none), or n for one a pose"),
-        "{wrong}"
+    has(
+        &wrong,
+        "a number of folds (0 for none), or n for one a pose",
     );
     let run = |folds: FoldSetting| {
         let desk = Desk::default();

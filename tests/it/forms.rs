@@ -1,5 +1,6 @@
 //! The laws that every form of every cause obeys, on all fixture arms, standing and moving, with all columns that a recording may have.
 
+use crate::answer::starts_with;
 use crate::fixture;
 use calib::effect::{
     Axes, AxisPoint, Basis, CAUSES, Clock, Effect, EffectContext, EffectStack, Form, Hypothesis,
@@ -399,11 +400,9 @@ fn a_form_has_named_numbers_a_place_variables_a_cause_and_a_sentence() {
             "{form:?} has two numbers of one name"
         );
         for spec in &specs {
-            assert!(
-                spec.name
-                    .starts_with(&format!("{}.{}", form.name(), form.place().tag())),
-                "{}",
-                spec.name
+            starts_with(
+                &spec.name,
+                &format!("{}.{}", form.name(), form.place().tag()),
             );
             assert!(spec.prior_sigma > 0.0 && spec.prior_sigma.is_finite());
             assert_eq!(spec.place, form.place());

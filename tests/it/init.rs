@@ -5,6 +5,7 @@ mod layouts;
 mod lists;
 mod torques;
 
+use crate::answer::has;
 use crate::compensate::calib;
 use std::fmt::Write;
 
@@ -30,10 +31,7 @@ fn what_init_writes_is_understood_and_never_overwrites() {
         "{}",
         String::from_utf8_lossy(&output.stderr)
     );
-    assert!(
-        said.contains("6 joints (A1 to A6)") && said.contains("not used: remark"),
-        "{said}"
-    );
+    has(&said, ["6 joints (A1 to A6)", "not used: remark"]);
     let pipeline = std::fs::read_to_string(folder.path().join("pipeline.yaml")).unwrap();
     for part in [
         "file: \"controller.csv\"",
@@ -120,10 +118,7 @@ fn a_foreign_table_is_understood_as_it_stands_and_what_is_left_to_do_is_said() {
         String::from_utf8_lossy(&check.stderr)
     );
     let said = String::from_utf8_lossy(&check.stdout).into_owned();
-    assert!(
-        said.contains("replace   5 lines: ") && said.contains("          robot.yaml:"),
-        "{said}"
-    );
+    has(&said, ["replace   5 lines: ", "          robot.yaml:"]);
     let identified = pipeline
         .replace("# limits:", "limits:")
         .replace("# identity:", "identity:");
@@ -138,9 +133,9 @@ fn a_foreign_table_is_understood_as_it_stands_and_what_is_left_to_do_is_said() {
     std::fs::write(folder.path().join("bare.csv"), "a;b;c;d\n1;2;3;4\n").unwrap();
     let output = calib(folder.path(), &["init", "bare", "--data", "bare.csv"], "");
     let said = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(
-        said.contains("name columns of joints and the measured point where it says REPLACE"),
-        "{said}"
+    has(
+        &said,
+        "name columns of joints and the measured point where it says REPLACE",
     );
     let check = calib(folder.path(), &["check", "bare/pipeline.yaml"], "");
     assert!(String::from_utf8_lossy(&check.stdout).contains("replace   9 lines: "));

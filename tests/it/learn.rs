@@ -1,5 +1,6 @@
 //! The stage `learn`: what it gains on the twin, what it refuses, and what it says.
 
+use crate::answer::has;
 use crate::desk::{Desk, table};
 use calib::error::Result;
 use calib::robot::import::{RobotFileText, read_calib};
@@ -305,10 +306,7 @@ fn gross_errors_are_not_learnt_and_rows_outside_the_range_are_left_alone() {
     assert!(ratio < 0.5, "{ratio}");
     assert_eq!(after.0[299].dx_mm, arm.2.0[299].dx_mm);
     let notes = desk.notes.lock().unwrap().join("\n");
-    assert!(
-        notes.contains("1 of 200 rows are not learnt from") && notes.contains("silent on 1"),
-        "{notes}"
-    );
+    has(&notes, ["1 of 200 rows are not learnt from", "silent on 1"]);
 }
 
 #[test]
@@ -344,15 +342,12 @@ fn settings_and_sets_that_make_no_sense_are_named() {
         .err()
         .unwrap()
         .to_string();
-    assert!(
-        message.contains("`training`") && message.contains("check, fit"),
-        "{message}"
-    );
+    has(&message, ["`training`", "check, fit"]);
     let message = learn(json!({"payload": true}), &arm, 1, &desk)
         .err()
         .unwrap()
         .to_string();
-    assert!(message.contains("with.payload"), "{message}");
+    has(&message, "with.payload");
     let written = learn(quick(), &arm, 1, &desk).unwrap();
     assert!(written.network.0.is_empty());
     assert!(

@@ -1,6 +1,7 @@
 //! Recordings of a moving arm: clocks apart and joints that trail are named with their size, and a sound arm has nothing missing,
 //! whether the controller logs velocities or they follow from the joints over time.
 
+use crate::answer::{has, starts_with};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -104,11 +105,8 @@ fn clocks_that_are_apart_are_named_with_their_milliseconds() {
         "{value} +- {sigma} ms"
     );
     let said = found["findings"][0]["statement"].as_str().unwrap();
-    assert!(
-        said.starts_with("the tracker's clock is ")
-            && said.contains("ms late relative to the controller's"),
-        "{said}"
-    );
+    starts_with(&said, "the tracker's clock is ");
+    has(&said, "ms late relative to the controller's");
     assert_eq!(found["verdict"], "explained");
     // Told so, ingest carries the joints there and nothing is left.
     let cured = case.diagnose(&format!("      motion: {{later_s: {}}}\n", 1e-3 * value));

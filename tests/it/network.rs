@@ -1,5 +1,6 @@
 //! The perceptron, its gradient, its training, its valid range and the judge of whether it helps.
 
+use crate::answer::has;
 use calib::estimate::network::arm::ScrewArm;
 use calib::estimate::network::correction::{Body, NetworkScaling, Networks, Scaling, features};
 use calib::estimate::network::loss::{Batch, Loss, LossBuffers};
@@ -622,7 +623,7 @@ fn a_correction_comes_back_from_its_table() {
         .0
         .retain(|row| !(row.member == 2 && row.part == "bias" && row.layer == 1 && row.to == 3));
     let message = holed.correction(&prismatic).unwrap_err().to_string();
-    assert!(message.contains("bias"), "{message}");
+    has(&message, "bias");
 }
 
 #[test]

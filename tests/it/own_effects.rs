@@ -1,5 +1,6 @@
 //! A user's own effect in YAML: found by its name on concealed recordings, and kept with its run.
 
+use crate::answer::{has, starts_with};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -55,7 +56,7 @@ fn pipeline(folder: &Path, effect: &str) {
         "  - uses: diagnose\n",
         &format!("  - uses: diagnose\n    with: {{effects: [{effect}]}}\n"),
     );
-    assert!(text.contains(effect));
+    has(&text, effect);
     std::fs::write(folder.join("p.yaml"), text).unwrap();
 }
 
@@ -131,10 +132,7 @@ fn an_effect_of_ones_own_is_found_at_its_joint_and_stays_with_its_run() {
             "{name}: {said:#}"
         );
         let statement = said["findings"][0]["statement"].as_str().unwrap();
-        assert!(
-            statement.starts_with(&format!("a tooth of {place} is worn near ")),
-            "{statement}"
-        );
+        starts_with(&statement, &format!("a tooth of {place} is worn near "));
         assert_eq!(said["findings"][0]["parameters"][0]["unit"], "arcsec");
     }
 

@@ -1,5 +1,6 @@
 //! `calib query`: SQL over the tables of a run gives what the tables hold.
 
+use crate::answer::{ends_with, has};
 use calib::audit::{self, QueryTables};
 use calib::pipeline::{Manifest, find_run};
 use calib::store::Store;
@@ -258,9 +259,9 @@ fn fifty_rows_are_shown_and_the_others_counted() {
     let sql = "SELECT sequence, error_mm FROM geometry_prediction";
     let told = ask(&[sql]);
     assert_eq!(told.lines().count(), 52);
-    assert!(
-        told.ends_with("\n30 more rows: --rows N shows N of them, --csv and --json all\n"),
-        "{told}"
+    ends_with(
+        &told,
+        "\n30 more rows: --rows N shows N of them, --csv and --json all\n",
     );
     assert_eq!(ask(&[sql, "--rows", "0"]).lines().count(), 81);
     assert_eq!(ask(&[sql, "--rows", "3"]).lines().count(), 5);
@@ -273,35 +274,32 @@ fn fifty_rows_are_shown_and_the_others_counted() {
 #[test]
 fn what_is_not_there_is_named_with_what_is() {
     let told = refused("SELECT * FROM geometry_predicton");
-    assert!(
-        told.contains(
-            "no table `geometry_predicton`; did you mean `geometry_prediction`? Its tables: "
-        ),
-        "{told}"
+    has(
+        &told,
+        "no table `geometry_predicton`; did you mean `geometry_prediction`? Its tables: ",
     );
-    assert!(
-        told.contains("simulate_recording") && told.contains("nominal_parameters"),
-        "{told}"
-    );
+    has(&told, ["simulate_recording", "nominal_parameters"]);
     let told = refused("SELECT eror_mm FROM geometry_prediction");
-    assert!(told.contains("no column `eror_mm`; did you mean `error_mm`? Columns of geometry_prediction: sequence, "), "{told}");
+    has(
+        &told,
+        "no column `eror_mm`; did you mean `error_mm`? Columns of geometry_prediction: sequence, ",
+    );
     let told =
         refused("SELECT g.eror_mm FROM geometry_prediction g JOIN recording USING (sequence)");
-    assert!(
-        told.contains("no column `eror_mm`; did you mean `error_mm`?")
-            && told.contains("of recording: "),
-        "{told}"
+    has(
+        &told,
+        [
+            "no column `eror_mm`; did you mean `error_mm`?",
+            "of recording: ",
+        ],
     );
     let told = refused("SELECT sequence FROM prediction");
-    assert!(
-        told.contains("`prediction` is written by several stages; say which: nominal.prediction, geometry.prediction"),
-        "{told}"
+    has(
+        &told,
+        "`prediction` is written by several stages; say which: nominal.prediction, geometry.prediction",
     );
     let told = refused("SELECT step, sum(error_mm FROM geometry_prediction");
-    assert!(
-        told.contains("SQL: Expected: ") && told.contains("Line: 1, Column: "),
-        "{told}"
-    );
+    has(&told, ["SQL: Expected: ", "Line: 1, Column: "]);
     let told = refused("SELECT step FROM geometry_prediction ORDER BY 0");
     assert!(
         told.starts_with("error: SQL: ") && told.lines().count() == 1,
@@ -366,15 +364,11 @@ fn nothing_but_the_tables_of_the_run_is_read_and_nothing_changed() {
         assert!(refused(sql).contains("expected one SELECT"), "{sql}");
     }
     let told = refused("SELECT * FROM read_parquet('other.parquet')");
-    assert!(told.contains("no table `read_parquet`"), "{told}");
+    has(&told, "no table `read_parquet`");
     assert_eq!(objects(STORE.path()), before);
     let output = calib(STORE.path(), &["query", "SELECT * FROM recording"]);
     assert_eq!(output.status.code(), Some(2));
-    assert!(
-        text(&output).contains("the run comes before the SQL"),
-        "{}",
-        text(&output)
-    );
+    has(&text(&output), "the run comes before the SQL");
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! The store: identity, the commit protocol, and what is done about damage, rivals and refusals.
 
+use crate::answer::has;
 use arrow::array::{ArrayRef, Float64Array, Int64Array, StringArray};
 use calib::error::{Error, Result};
 use calib::store::frame::{Frame, FrameBuilder};
@@ -190,7 +191,7 @@ fn a_streamed_table_whose_keys_turn_back_is_refused() {
     let mut writer = store.writer("split").unwrap();
     writer.push(&split(0..10)).unwrap();
     let error = writer.push(&split(9..12)).unwrap_err().to_string();
-    assert!(error.contains("key sequence 9 after sequence 9"), "{error}");
+    has(&error, "key sequence 9 after sequence 9");
 }
 
 #[test]
@@ -300,10 +301,7 @@ fn the_first_record_stands_and_another_content_is_reported() {
     let second = publish(&store, &key("split", 1), &split(0..8)).unwrap();
     assert_eq!(second.record, first.record);
     let conflict = second.conflict.unwrap();
-    assert!(
-        conflict.contains("stage split is not deterministic") && conflict.contains("out"),
-        "{conflict}"
-    );
+    has(&conflict, ["stage split is not deterministic", "out"]);
 }
 
 #[test]
@@ -335,7 +333,7 @@ fn a_torn_record_or_a_damaged_object_is_as_good_as_absent_and_healed_by_publishi
         let Lookup::Damaged(why) = store.action(&key("split", 1)).unwrap() else {
             panic!("damage not seen")
         };
-        assert!(why.contains("the stage runs again"), "{why}");
+        has(&why, "the stage runs again");
         assert_eq!(
             publish(&store, &key("split", 1), &split(0..900))
                 .unwrap()

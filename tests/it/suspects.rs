@@ -1,5 +1,6 @@
 //! What the stages say of rows that do not belong: tables, notes, and silence on good recordings.
 
+use crate::answer::has;
 use crate::desk::{Desk, shared, table};
 use crate::sr210d::{experiment, settings};
 use calib::stage::ingest::{Ingest, IngestReads};
@@ -209,7 +210,7 @@ fn suspects_are_named_to_the_person_listed_and_still_predicted() {
         id(inch),
         id(lost)
     );
-    assert!(said.contains(&sentence), "{said}");
+    has(&said, &sentence);
     let marked = prediction.0.iter().filter(|row| row.suspect).count();
     assert_eq!((prediction.0.len(), marked), (recording.rows(), 4));
     // A row that was looked at to set it aside is no held-out row of the fit's own set.
@@ -247,9 +248,11 @@ fn suspects_are_named_to_the_person_listed_and_still_predicted() {
         "{least}"
     );
     let said = desk.notes.lock().unwrap().join("\n");
-    assert!(
-        said.contains("far off and down-weighted: ")
-            && said.contains(&format!("({} to 0.0", id(inch))),
-        "{said}"
+    has(
+        &said,
+        [
+            "far off and down-weighted: ",
+            &*format!("({} to 0.0", id(inch)),
+        ],
     );
 }

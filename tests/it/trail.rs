@@ -1,5 +1,6 @@
 //! The audit trail: runs listed, explained, compared, traced; a store verified bit by bit, and swept.
 
+use crate::answer::{ends_with, has, starts_with};
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -78,26 +79,20 @@ fn a_changed_setting_is_told_with_its_stage_and_by_how_much() {
     let told = text(&output);
     assert_eq!(output.status.code(), Some(1), "{told}");
     assert!(told.lines().count() < 20, "{told}");
-    assert!(told.contains("settings geometry.effects: "), "{told}");
-    assert!(
-        told.contains("geometry.parameters") && told.contains("geometry.prediction"),
-        "{told}"
-    );
-    assert!(
-        told.contains("error_mm by ")
-            && told.contains(" mm rms, at most ")
-            && told.contains(" mm (")
-            && told.contains(" sigma)"),
-        "{told}"
+    has(&told, "settings geometry.effects: ");
+    has(&told, ["geometry.parameters", "geometry.prediction"]);
+    has(
+        &told,
+        ["error_mm by ", " mm rms, at most ", " mm (", " sigma)"],
     );
     assert!(
         !told.contains("nominal."),
         "what is the same is not told: {told}"
     );
     let explained = said(store, &["explain", "geometry"]);
-    assert!(
-        explained.contains("executed, because: settings changed: geometry.effects"),
-        "{explained}"
+    has(
+        &explained,
+        "executed, because: settings changed: geometry.effects",
     );
     let explained = said(store, &["explain", "validate"]);
     assert!(
@@ -138,11 +133,7 @@ fn of_two_runs_tolerances_hold_in_every_table_that_has_the_column() {
     assert_eq!(with(&[]).status.code(), Some(1));
     let within = with(&["--atol", "1e6"]);
     assert_eq!(within.status.code(), Some(0), "{}", text(&within));
-    assert!(
-        text(&within).contains("within tolerance"),
-        "{}",
-        text(&within)
-    );
+    has(&text(&within), "within tolerance");
     assert_eq!(
         with(&["--atol", "mean_mm=1m", "--rtol", "1e-9"])
             .status
@@ -211,8 +202,9 @@ fn a_limit_that_is_exceeded_is_said_and_ends_with_code_1() {
             .lines()
             .find(|line| line.starts_with("limits    "))
             .unwrap_or_else(|| panic!("{said}"));
-        assert!(
-            line.starts_with("limits    not accepted: beyond the limits at 20 held-out points of set validate, step geometry")
+        starts_with(
+            &line,
+            "limits    not accepted: beyond the limits at 20 held-out points of set validate, step geometry",
         );
         assert!(
             line.contains("mean 0.")
@@ -264,10 +256,9 @@ fn runs_are_listed_shown_tagged_and_their_tables_traced() {
         "{log}"
     );
     let shown = said(store, &["show", "first"]);
-    assert!(
-        shown.contains("set on the command line: seed = 12")
-            && shown.contains("because: never run"),
-        "{shown}"
+    has(
+        &shown,
+        ["set on the command line: seed = 12", "because: never run"],
     );
     assert!(
         said(store, &["show", "first/geometry"])
@@ -283,19 +274,15 @@ fn runs_are_listed_shown_tagged_and_their_tables_traced() {
         json(store, &["show", "first"])["run_id"]
     );
     let traced = said(store, &["lineage", "HEAD/validate/statistics"]);
-    assert!(
-        traced.contains("recording <- simulate.recording") && traced.contains("file robot.yaml"),
-        "{traced}"
+    has(
+        &traced,
+        ["recording <- simulate.recording", "file robot.yaml"],
     );
     let table = store.join("tables/resume/validate.statistics.parquet");
     assert_eq!(said(store, &["lineage", table.to_str().unwrap()]), traced);
     let refused = calib(store, &["show", "fisrt"]);
     assert_eq!(refused.status.code(), Some(2));
-    assert!(
-        text(&refused).contains("did you mean the tag `first`?"),
-        "{}",
-        text(&refused)
-    );
+    has(&text(&refused), "did you mean the tag `first`?");
     assert_eq!(said(store, &["tag", "--delete", "first"]), "");
     assert_eq!(said(store, &["tag"]), "");
 }
@@ -319,10 +306,9 @@ fn a_tag_has_not_the_form_of_an_id_and_says_which_run_it_left() {
     ] {
         let refused = calib(store, &["tag", "HEAD", &name]);
         assert_eq!(refused.status.code(), Some(2), "{}", text(&refused));
-        assert!(
-            text(&refused).contains(&format!("tag {name}: has the form of a run's id")),
-            "{}",
-            text(&refused)
+        has(
+            &text(&refused),
+            &format!("tag {name}: has the form of a run's id"),
         );
     }
     assert_eq!(json(store, &["show", &old])["run_id"], old.as_str());
@@ -373,7 +359,7 @@ fn folders_whose_names_are_no_text_are_used_all_the_same() {
     );
     let manifest = json(&store, &["show", "HEAD"]);
     let path = manifest["stages"][0]["files"][0]["path"].as_str().unwrap();
-    assert!(path.ends_with("/cell\u{fffd}\u{fffd}/robot.yaml"), "{path}");
+    ends_with(&path, "/cell\u{fffd}\u{fffd}/robot.yaml");
     assert!(said(&store, &["log"]).contains("resume  done, 7 run, 0 cached"));
 }
 
@@ -385,10 +371,8 @@ fn one_flipped_bit_in_any_file_is_found() {
     run(store, &["--set", "split.by=every", "--set", "split.n=4"]);
     said(store, &["tag", "HEAD", "kept"]);
     let clean = said(store, &["verify"]);
-    assert!(
-        clean.contains("2 runs, 1 tag,") && clean.ends_with("all as they were written\n"),
-        "{clean}"
-    );
+    ends_with(&clean, "all as they were written\n");
+    has(&clean, "2 runs, 1 tag,");
     let mut random = ChaCha8Rng::seed_from_u64(6);
     let files: Vec<PathBuf> = files(store)
         .into_iter()
@@ -430,11 +414,7 @@ fn one_flipped_bit_in_any_file_is_found() {
     overwrite(&runs[0], forged.as_bytes());
     let output = calib(store, &["verify"]);
     assert_eq!(output.status.code(), Some(1));
-    assert!(
-        text(&output).contains("has changed since this run began"),
-        "{}",
-        text(&output)
-    );
+    has(&text(&output), "has changed since this run began");
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! A correction carried to another series of the same robot, only the base refitted: never worse than none.
 
+use crate::answer::has;
 use crate::desk::{Desk, shared, table};
 use calib::effect::Load;
 use calib::error::Result;
@@ -457,7 +458,7 @@ fn a_carried_model_says_that_its_geometry_alone_is_better() {
         .filter(|row| row.effect == "joint_compliance");
     compliance.for_each(|row| row.value = 3e-6);
     let (_, warnings) = carry(&parameters);
-    assert!(warnings.contains(worse), "{warnings}");
+    has(&warnings, worse);
 }
 
 fn labelled<T>(stage: &str, table: T) -> Labelled<T> {
@@ -569,11 +570,7 @@ fn findings_that_make_another_recording_worse_than_geometry_alone_are_not_used_t
     let carrying = Carrying::new();
     let held = carrying.carry(&carrying.found.0, true);
     assert!(!held.warnings.contains("not used"), "{}", held.warnings);
-    assert!(
-        held.notes.contains("the geometry alone") && held.notes.contains("visited cells"),
-        "{}",
-        held.notes
-    );
+    has(&held.notes, ["the geometry alone", "visited cells"]);
     assert_eq!(of_joints(&held.parameters), of_joints(&carrying.found.0));
     // Too much wind-up: still better than the geometry without it, which left room for it, and worse than geometry found by itself.
     let mut wrong = carrying.found.0.clone();

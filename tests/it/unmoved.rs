@@ -1,5 +1,6 @@
 //! What stands while an arm is measured: one pose is no geometry, and a joint that never moves is said.
 
+use crate::answer::has;
 use crate::compensate::{ROBOT, calib};
 use calib::robot::RobotModel;
 use calib::robot::import::{RobotFileText, read_calib};
@@ -86,7 +87,10 @@ fn one_pose_measured_fifty_times_is_no_geometry_and_its_creep_is_told() {
             |row| 0.2 * row as f64 / 49.0,
         );
         assert_eq!(code, Some(10), "{said}");
-        assert!(said.contains("all 40 rows to fit are of one pose: geometry needs poses in which every joint moves"), "{said}");
+        has(
+            &said,
+            "all 40 rows to fit are of one pose: geometry needs poses in which every joint moves",
+        );
         let drift = said
             .split("the point drifts by ")
             .nth(1)
@@ -113,8 +117,8 @@ fn a_joint_that_never_moves_is_said() {
     };
     let (code, said) = told(folder.path(), "identify", joints, |_| 0.0);
     assert_eq!(code, Some(0), "{said}");
-    assert!(
-        said.contains("never moves in the 40 rows to fit: joint 4 (at 12.500 deg)"),
-        "{said}"
+    has(
+        &said,
+        "never moves in the 40 rows to fit: joint 4 (at 12.500 deg)",
     );
 }

@@ -1,5 +1,6 @@
 //! `verify-robot`: what compensation achieved, from points measured at corrected targets.
 
+use crate::answer::has;
 use crate::compensate::calib;
 use crate::library_of_arms::{REFLECTOR, on_flange, real, recording, tracker};
 use calib::robot::{LibraryArm, RobotModel};
@@ -123,14 +124,11 @@ fn what_compensation_achieved_is_measured_against_the_wanted_points() {
         "--html",
         "verified.html",
     ]);
-    assert!(
-        text.contains("achieved  mean 0.00") && text.contains("the tracker's place found anew"),
-        "{text}"
+    has(
+        &text,
+        ["achieved  mean 0.00", "the tracker's place found anew"],
     );
-    assert!(
-        text.contains("ISO 9283  pose 1, 30 cycles: accuracy AP 0.0"),
-        "{text}"
-    );
+    has(&text, "ISO 9283  pose 1, 30 cycles: accuracy AP 0.0");
     // The page has the figures of the terminal.
     let page = std::fs::read_to_string(folder.path().join("verified.html")).unwrap();
     let line = text

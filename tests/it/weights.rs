@@ -1,5 +1,6 @@
 //! Wind-up of arms whose masses nobody knows: gravity's torque of whatever masses is made of the moments that the form has.
 
+use crate::answer::has;
 use crate::fixture;
 use calib::description::RobotDescription;
 use calib::effect::{
@@ -210,15 +211,19 @@ fn with_a_payload_the_stiffness_is_said_beside_the_weight() {
     };
     // 1e-4 rad are 20.6 arcsec.
     let alone = said(std::slice::from_ref(&weight));
-    assert!(
-        alone.contains("by up to 21 arcsec")
-            && alone.contains("cannot be separated from the links' weight"),
-        "{alone}"
+    has(
+        &alone,
+        [
+            "by up to 21 arcsec",
+            "cannot be separated from the links' weight",
+        ],
     );
     let both = said(&[weight, load]);
-    assert!(
-        both.contains("1.000e-4 rad/Nm, and under its own weight")
-            && both.contains("by up to 21 arcsec"),
-        "{both}"
+    has(
+        &both,
+        [
+            "1.000e-4 rad/Nm, and under its own weight",
+            "by up to 21 arcsec",
+        ],
     );
 }

@@ -1,6 +1,7 @@
 //! A model moves the arm that it is of: tables of another robot are refused, bodies that cannot be are named, and the tool that was
 //! identified is the tool that goes out.
 
+use crate::answer::has;
 use crate::compensate::{ROBOT, calib, cell};
 use crate::desk::shared;
 use calib::robot::RobotModel;
@@ -99,10 +100,7 @@ fn a_model_is_refused_for_another_robot_and_so_is_a_table_that_does_not_say_whos
         assert_eq!((code, out.as_str()), (Some(10), ""), "{told}");
         let (code, _, told) = said(here, &[verb, &unchecked].concat());
         assert_eq!(code, Some(0), "{told}");
-        assert!(
-            told.contains("does not say which robot it is the model of"),
-            "{told}"
-        );
+        has(&told, "does not say which robot it is the model of");
     }
 }
 
@@ -118,10 +116,9 @@ fn a_table_that_does_not_say_whose_model_it_is_is_refused_for_either_robot_unles
         let ask = ["compensate", &table, "--robot", &robot, &targets];
         let (code, out, told) = said(&fault, &ask);
         assert_eq!((code, out.as_str()), (Some(10), ""), "{told}");
-        assert!(
-            told.contains("does not say which robot it is the model of")
-                && told.contains("--unchecked"),
-            "{told}"
+        has(
+            &told,
+            ["does not say which robot it is the model of", "--unchecked"],
         );
         let (code, _, told) = said(&fault, &[&ask[..], &["--unchecked"]].concat());
         assert!(
@@ -151,7 +148,7 @@ fn inertias_of_no_body_are_named_by_their_links_and_refused_for_torques_alone() 
     let second = "arm.urdf:3: link `Link2`: no body has a principal moment of inertia that is zero";
     let (code, _, told) = said(here, &["init", "cell", "--urdf", "arm.urdf"]);
     assert_eq!(code, Some(0), "{told}");
-    assert!(told.contains(first) && told.contains(second), "{told}");
+    has(&told, [first, second]);
     let pipeline = "calib: 1\nname: u\nseed: 1\nstages:\n  - uses: robot\n    with: {file: robot.yaml, urdf: arm.urdf}\n";
     std::fs::write(here.join("pipeline.yaml"), pipeline).unwrap();
     let robot = "calib_robot: 1\nunits: {length: mm, angle: deg}\nkinematics: {urdf: {base: base_link, tip: tool0}}\n";
@@ -159,19 +156,12 @@ fn inertias_of_no_body_are_named_by_their_links_and_refused_for_torques_alone() 
     let (code, out, told) = said(here, &["check", "pipeline.yaml"]);
     let all = format!("{out}{told}");
     assert_eq!(code, Some(0), "{all}");
-    assert!(
-        all.contains(first)
-            && all.contains(second)
-            && all.contains("positions do not depend on it"),
-        "{all}"
-    );
+    has(&all, [first, second, "positions do not depend on it"]);
     let (code, _, told) = said(here, &["excite", "robot.yaml", "--urdf", "arm.urdf"]);
     assert_eq!(code, Some(10), "{told}");
-    assert!(
-        told.contains(
-            "table robot: link 1: no body has a principal moment of inertia of 408.868 times"
-        ),
-        "{told}"
+    has(
+        &told,
+        "table robot: link 1: no body has a principal moment of inertia of 408.868 times",
     );
 }
 
@@ -390,10 +380,8 @@ stages:
 fn a_run_knows_its_robot() {
     let (code, out, told) = said(cell(), &["compensate", "HEAD", "--robot", "other.yaml"]);
     assert_eq!((code, out.as_str()), (Some(2), ""), "{told}");
-    assert!(
-        told.contains(
-            "--robot: is of tables of parameters alone; a run or a pipeline knows its robot"
-        ),
-        "{told}"
+    has(
+        &told,
+        "--robot: is of tables of parameters alone; a run or a pipeline knows its robot",
     );
 }

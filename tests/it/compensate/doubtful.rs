@@ -4,6 +4,7 @@
 use super::concealed::{
     Outcome, again, is_harmed, model, nothing, outcomes_at, recording, split, targets, upright,
 };
+use crate::answer::has;
 use crate::desk::{Desk, table};
 use calib::compensate::{Chain, Circumstance, IdentifiedArm, Nominal};
 use calib::robot::{Posture, RobotModel};
@@ -118,7 +119,7 @@ fn what_depends_on_motor_currents_is_refused_to_targets_that_state_none() {
     let mut case = upright(500);
     case.hidden.clear();
     let (outcomes, named) = outcomes_at(&case, targets(&case));
-    assert!(named.contains("joint_compliance"), "{named}");
+    has(&named, "joint_compliance");
     assert!(
         outcomes.iter().all(|one| one.refused && one.remarked),
         "{named}"

@@ -5,6 +5,7 @@ use super::maker::{Maker, PLAIN, makers};
 use super::round_trip::{Trip, pose, read};
 use super::sides::{confdata, krl, poses, rapid, status, turn};
 use super::{calib, cell};
+use crate::answer::has;
 use calib::compensate::turns;
 use calib::program::{Companion, Language, RobotTool};
 use calib::spatial::Pose;
@@ -324,27 +325,21 @@ fn files_beside_a_program_are_read_with_it_in_capitals_too() {
     };
     let (code, _, err) = run(&[]);
     assert_eq!(code, Some(0), "{err}");
-    assert!(
-        err.contains("read with the program: ")
-            && err.contains("WELD.SRC")
-            && err.contains("$CONFIG.DAT"),
-        "{err}"
+    has(&err, ["read with the program: ", "WELD.SRC", "$CONFIG.DAT"]);
+    has(
+        &err,
+        ["BASE_DATA[3] by FP1 at", "is applied, in the robot's base"],
     );
-    assert!(
-        err.contains("BASE_DATA[3] by FP1 at") && err.contains("is applied, in the robot's base"),
-        "{err}"
-    );
-    assert!(
-        err.contains("the tool TOOL_DATA[2] is taken as the robot file's"),
-        "{err}"
-    );
+    has(&err, "the tool TOOL_DATA[2] is taken as the robot file's");
     std::fs::remove_file(at("System/$CONFIG.DAT")).unwrap();
     let (code, out, err) = run(&[]);
     assert_eq!((code, out.as_str()), (Some(10), ""), "{err}");
-    assert!(
-        err.contains("Weld.dat:2:")
-            && err.contains("BASE_DATA[3], which no file that was read declares"),
-        "{err}"
+    has(
+        &err,
+        [
+            "Weld.dat:2:",
+            "BASE_DATA[3], which no file that was read declares",
+        ],
     );
     write(
         "frames.dat",
@@ -354,7 +349,7 @@ fn files_beside_a_program_are_read_with_it_in_capitals_too() {
     assert_eq!(code, Some(0), "{err}");
     let (code, _, err) = run(&["--tool", "1,2"]);
     assert_eq!(code, Some(2), "{err}");
-    assert!(err.contains("--tool: expected the name of a tool"), "{err}");
+    has(&err, "--tool: expected the name of a tool");
 }
 
 #[test]
@@ -386,16 +381,18 @@ fn tools_are_related_where_the_program_says_how_and_refused_where_it_does_not() 
         one.warnings
     );
     let refused = run(&text(&["BAS(#TOOL,2)"]), None).expect_err("another tool");
-    assert!(
-        refused.contains("the tool stands 65.6 mm from axis 6, the robot file's 50.0 mm"),
-        "{refused}"
+    has(
+        &refused,
+        "the tool stands 65.6 mm from axis 6, the robot file's 50.0 mm",
     );
     let two = text(&["BAS(#TOOL,1)", "BAS(#TOOL,2)"]);
     let refused = run(&two, None).expect_err("two tools");
-    assert!(
-        refused.contains("program:6:")
-            && refused.contains("--tool says which of them is the robot file's"),
-        "{refused}"
+    has(
+        &refused,
+        [
+            "program:6:",
+            "--tool says which of them is the robot file's",
+        ],
     );
     let by_number = run(&two, Some("1")).unwrap();
     let far = |note: &calib::program::Note| {
@@ -423,16 +420,15 @@ fn tools_are_related_where_the_program_says_how_and_refused_where_it_does_not() 
         .join(",");
     assert_eq!(run(&two, Some(&by_frame)).unwrap().bytes, by_number);
     let refused = run(&two, Some("7")).expect_err("no such tool");
-    assert!(
-        refused.contains("TOOL_DATA[7]")
-            && refused.contains("declared: TOOL_DATA[1], TOOL_DATA[2]"),
-        "{refused}"
+    has(
+        &refused,
+        ["TOOL_DATA[7]", "declared: TOOL_DATA[1], TOOL_DATA[2]"],
     );
     let refused = run(&text(&["BAS(#TOOL,1)", "BAS(#TOOL,9)"]), Some("1"))
         .expect_err("a tool without a frame");
-    assert!(
-        refused.contains("TOOL_DATA[9], whose frame no file that was read declares"),
-        "{refused}"
+    has(
+        &refused,
+        "TOOL_DATA[9], whose frame no file that was read declares",
     );
     let none = run(&text(&[""]), None).unwrap();
     assert!(

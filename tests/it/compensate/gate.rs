@@ -3,6 +3,7 @@
 use super::maker::{PLAIN, recorded};
 use super::true_error::Cell;
 use super::{PIPELINE, ROBOT, calib, cell};
+use crate::answer::{ends_with, has, starts_with};
 use calib::robot::import::{RobotFileText, read_calib};
 
 const HEADER: &str = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n10,20,-30,5,40,0\n";
@@ -47,10 +48,7 @@ fn a_correction_above_its_limit_has_no_joints_and_one_who_insists_is_told() {
     );
     let (code, out, _) = run(&["compensate", "latest", "--max-turn", "0.0001"], HEADER);
     assert_eq!(code, Some(10));
-    assert!(
-        out.contains("at most 0.0001 deg allowed (--max-turn)"),
-        "{out}"
-    );
+    has(&out, "at most 0.0001 deg allowed (--max-turn)");
     let program = "PTP {A1 10,A2 20,A3 -30,A4 5,A5 40,A6 0}\n";
     std::fs::write(cell().join("far.src"), program).unwrap();
     let (code, out, err) = run(
@@ -64,7 +62,7 @@ fn a_correction_above_its_limit_has_no_joints_and_one_who_insists_is_told() {
         "",
     );
     assert_eq!((code, out.as_str()), (Some(10), ""));
-    assert!(err.contains("far.src:1:9: refused: corrected by"), "{err}");
+    has(&err, "far.src:1:9: refused: corrected by");
 }
 
 #[test]
@@ -72,10 +70,7 @@ fn what_calib_corrected_is_not_corrected_once_more() {
     let (_, once, err) = run(&["compensate", "latest"], HEADER);
     let (code, out, said) = run(&["compensate", "latest"], &once);
     assert_eq!((code, out.as_str()), (Some(10), ""), "{err}");
-    assert!(
-        said.contains("was compensated by calib already") && said.contains("--force"),
-        "{said}"
-    );
+    has(&said, ["was compensated by calib already", "--force"]);
     for (name, head, target, second) in [
         (
             "twice.src",
@@ -93,17 +88,11 @@ fn what_calib_corrected_is_not_corrected_once_more() {
         std::fs::write(cell().join(name), format!("{head}{target}")).unwrap();
         let (code, once, err) = run(&["compensate", "latest", name], "");
         assert_eq!(code, Some(0), "{err}");
-        assert!(
-            once.starts_with(&format!("{second}corrected by calib from ")),
-            "{once}"
-        );
+        starts_with(&once, &format!("{second}corrected by calib from "));
         std::fs::write(cell().join(name), &once).unwrap();
         let (code, out, err) = run(&["compensate", "latest", name], "");
         assert_eq!((code, out.as_str()), (Some(10), ""));
-        assert!(
-            err.contains(&format!("{name}: was compensated by calib already")),
-            "{err}"
-        );
+        has(&err, &format!("{name}: was compensated by calib already"));
         assert_eq!(
             run(&["compensate", "latest", name, "--force"], "").0,
             Some(0)
@@ -118,15 +107,13 @@ fn a_cartesian_program_in_a_frame_that_is_not_applied_is_refused_by_line() {
     std::fs::write(cell().join("wobj.mod"), text).unwrap();
     let (code, out, err) = run(&["compensate", "latest", "wobj.mod"], "");
     assert_eq!((code, out.as_str()), (Some(10), ""), "{err}");
-    assert!(
-        err.contains("wobj.mod:2:")
-            && err.contains("work object `fixture`")
-            && err.contains("--assume-frames"),
-        "{err}"
+    has(
+        &err,
+        ["wobj.mod:2:", "work object `fixture`", "--assume-frames"],
     );
     let (code, _, err) = run(&["compensate", "latest", "wobj.mod", "--assume-frames"], "");
     assert_eq!(code, Some(0), "{err}");
-    assert!(err.contains("warning: wobj.mod:2:"), "{err}");
+    has(&err, "warning: wobj.mod:2:");
 }
 
 #[test]
@@ -156,9 +143,9 @@ fn a_target_in_a_work_object_is_corrected_where_it_stands() {
     std::fs::write(cell().join("object.mod"), program).unwrap();
     let (code, within, err) = run(&["compensate", "latest", "object.mod"], "");
     assert_eq!(code, Some(0), "{err}");
-    assert!(
-        err.contains("work object `fixture` is applied, in the robot's base"),
-        "{err}"
+    has(
+        &err,
+        "work object `fixture` is applied, in the robot's base",
     );
     let (plain, within) = (numbers(&plain), numbers(&within));
     let there = [100.0 - within[0], 20.0 - within[1], within[2] - 30.0];
@@ -201,10 +188,12 @@ fn a_table_of_parameters_without_a_verdict_is_held_to_the_same_limits() {
         let (code, err, bytes) = said(&[]);
         if refused {
             assert_eq!((code, bytes), (Some(10), 0), "{err}");
-            assert!(
-                err.contains("refused: joint_offset at joint 2 is")
-                    && err.contains("from the robot file's"),
-                "{err}"
+            has(
+                &err,
+                [
+                    "refused: joint_offset at joint 2 is",
+                    "from the robot file's",
+                ],
             );
             let (code, err, _) = said(&["--force"]);
             assert!(
@@ -259,7 +248,7 @@ fn an_output_never_takes_the_place_of_a_file_that_was_read() {
         );
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
         assert_eq!(output.status.code(), Some(2), "{said}");
-        assert!(said.contains("that the model was made from"), "{said}");
+        has(&said, "that the model was made from");
         assert_eq!(std::fs::read(folder.path().join(file)).unwrap(), before);
     }
 }
@@ -282,11 +271,13 @@ fn an_arm_far_from_the_robot_file_is_refused_before_anything_is_written() {
             (Some(10), 0),
             "{said}"
         );
-        assert!(
-            said.contains(" from the robot file's")
-                && said.contains("refused: the set-up is wrong")
-                && said.contains("--force"),
-            "{said}"
+        has(
+            &said,
+            [
+                " from the robot file's",
+                "refused: the set-up is wrong",
+                "--force",
+            ],
         );
         assert!(
             calib(here, &[verb, &["--force"]].concat(), HEADER)
@@ -302,10 +293,7 @@ fn a_table_whose_common_normals_are_far_from_the_arm_is_refused_with_the_formats
     for format in ["dh", "mdh"] {
         let (code, out, err) = run(&["export", "latest", "--format", format], "");
         assert_eq!((code, out.as_str()), (Some(10), ""), "{err}");
-        assert!(
-            err.contains("axes 2 and 3 are") && err.contains("--format urdf or mjcf"),
-            "{err}"
-        );
+        has(&err, ["axes 2 and 3 are", "--format urdf or mjcf"]);
     }
 }
 
@@ -335,10 +323,7 @@ fn targets_that_state_no_payload_are_refused_where_the_model_depends_on_it() {
             (Some(10), 0),
             "{said}"
         );
-        assert!(
-            said.contains("states no payload") && said.contains("measured up to 50 kg"),
-            "{said}"
-        );
+        has(&said, ["states no payload", "measured up to 50 kg"]);
         let stated = calib(
             here,
             &[
@@ -390,12 +375,12 @@ fn targets_that_state_no_payload_are_refused_where_the_model_depends_on_it() {
         assert_eq!((code, out.as_str()), (Some(10), ""), "{err}");
         let (code, by_program, err) = said(&format!("{stating}{target}"), &[]);
         assert_eq!(code, Some(0), "{err}");
-        assert!(err.contains("payload 50 kg, as"), "{err}");
+        has(&err, "payload 50 kg, as");
         assert_eq!(by_program, said(target, &["--payload", "50"]).1);
         let (_, other, err) = said(&format!("{stating}{target}"), &["--payload", "0"]);
-        assert!(
-            err.contains("the program states a payload of 50 kg, --payload 0 kg, which is used"),
-            "{err}"
+        has(
+            &err,
+            "the program states a payload of 50 kg, --payload 0 kg, which is used",
         );
         assert_ne!(by_program, other);
     }
@@ -420,10 +405,7 @@ fn how_far_a_model_may_be_from_the_robot_file_is_for_the_user_to_say() {
         ] {
             let (code, out, err) = run(&[verb, &[option, limit]].concat(), HEADER);
             assert_eq!((code, out.as_str()), (Some(10), ""), "{err}");
-            assert!(
-                err.contains(&format!("at most {limit} {unit} allowed ({option})")),
-                "{err}"
-            );
+            has(&err, &format!("at most {limit} {unit} allowed ({option})"));
         }
         let (code, _, err) = run(&["compensate", "latest", option, "-1"], HEADER);
         assert_eq!(code, Some(2), "{err}");
@@ -523,10 +505,7 @@ fn a_model_that_leaves_something_unexplained_says_so_once_and_in_the_program() {
             .lines()
             .find(|line| line.contains("corrected by calib"))
             .unwrap_or_else(|| panic!("{err}"));
-        assert!(
-            head.ends_with(", verdict of the model: unexplained"),
-            "{head}"
-        );
+        ends_with(&head, ", verdict of the model: unexplained");
         let export = calib(here, &["export", model, "--format", "json", "--quiet"], "");
         assert_eq!(
             String::from_utf8_lossy(&export.stderr)

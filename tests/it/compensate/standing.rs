@@ -1,6 +1,7 @@
 //! A step that is worse than one before it at points predicted by fits without them is withdrawn wherever a run is spoken of or used.
 
 use super::{PIPELINE, ROBOT, calib};
+use crate::answer::has;
 use serde_json::Value;
 
 const POOR: &str = "  - {id: poor, uses: identify, with: {effects: [base_frame], on: [fit]}}
@@ -22,19 +23,10 @@ fn a_worse_last_step_is_withdrawn_by_run_report_compensate_and_export() {
         (out, err)
     };
     let (out, err) = said(&["run", "pipeline.yaml", "--details"], "");
-    assert!(
-        out.contains("\nwarning   poor withdrawn, identify used: "),
-        "{out}"
-    );
-    assert!(
-        out.contains(" at 60 points unseen by either fit\n"),
-        "{out}"
-    );
-    assert!(out.contains("  poor (withdrawn)  validate"), "{out}");
-    assert!(
-        err.contains("`poor` is withdrawn and `identify` used instead: "),
-        "{err}"
-    );
+    has(&out, "\nwarning   poor withdrawn, identify used: ");
+    has(&out, " at 60 points unseen by either fit\n");
+    has(&out, "  poor (withdrawn)  validate");
+    has(&err, "`poor` is withdrawn and `identify` used instead: ");
     let document: Value =
         serde_json::from_str(&said(&["run", "pipeline.yaml", "--json", "--quiet"], "").0).unwrap();
     assert_eq!(
@@ -94,9 +86,9 @@ fn a_worse_last_step_is_withdrawn_by_run_report_compensate_and_export() {
     for model in ["pipeline.yaml", "HEAD"] {
         let targets = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n10,20,-30,5,40,0\n";
         let (taken, err) = said(&["compensate", model, "--quiet"], targets);
-        assert!(
-            err.contains("warning: `poor` is withdrawn and `identify` used instead"),
-            "{err}"
+        has(
+            &err,
+            "warning: `poor` is withdrawn and `identify` used instead",
         );
         let (asked, err) = said(
             &["compensate", model, "--quiet", "--step", "identify"],

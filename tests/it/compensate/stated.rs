@@ -1,6 +1,7 @@
 //! What a table of targets, or an option, must not state; files that cannot be read or written; one of them and several.
 
 use super::{calib, cell, text};
+use crate::answer::has;
 use calib::compensate::CorrectionTotals;
 
 const HEADER: &str = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg";
@@ -43,10 +44,7 @@ fn what_no_target_can_state_is_a_fault_with_row_and_column_and_nothing_is_writte
             &[],
         );
         assert_eq!((code, written.as_str()), (Some(10), ""), "{said}");
-        assert!(
-            said.contains(&format!("stdin:3: column 18: field 7: {allowed}")),
-            "{said}"
-        );
+        has(&said, &format!("stdin:3: column 18: field 7: {allowed}"));
         let (code, said, _) = corrected(
             &format!("{HEADER},{name}\n10,20,-30,5,40,0,0\n10,20,-30,5,40,0,\n"),
             &[],
@@ -59,7 +57,7 @@ fn what_no_target_can_state_is_a_fault_with_row_and_column_and_nothing_is_writte
     ] {
         let (code, said, _) = corrected(&format!("{HEADER}\n10,20,-30,5,40,0\n"), &[option]);
         assert_eq!(code, Some(2), "{said}");
-        assert!(said.contains(allowed), "{said}");
+        has(&said, allowed);
     }
 }
 
@@ -83,11 +81,9 @@ fn a_column_of_parquet_is_held_to_the_same() {
         .unwrap();
     let (code, said, _) = corrected("", &["loads.parquet", "--out", "loads_c.parquet"]);
     assert_eq!(code, Some(10), "{said}");
-    assert!(
-        said.contains(
-            "loads.parquet: row 1: column `payload_kg`: expected a mass of 0 or more, kg, found -5"
-        ),
-        "{said}"
+    has(
+        &said,
+        "loads.parquet: row 1: column `payload_kg`: expected a mass of 0 or more, kg, found -5",
     );
     assert!(!cell().join("loads_c.parquet").exists());
 }
@@ -96,11 +92,9 @@ fn a_column_of_parquet_is_held_to_the_same() {
 fn a_quaternion_of_zeros_is_no_orientation() {
     let (code, said, written) = corrected("x_mm,y_mm,z_mm,qw,qx,qy,qz\n800,40,900,0,0,0,0\n", &[]);
     assert_eq!((code, written.as_str()), (Some(10), ""), "{said}");
-    assert!(
-        said.contains(
-            "stdin:2: columns qw, qx, qy, qz: the quaternion has length 0.0000, expected 1"
-        ),
-        "{said}"
+    has(
+        &said,
+        "stdin:2: columns qw, qx, qy, qz: the quaternion has length 0.0000, expected 1",
     );
     // Angles of zero are one.
     let (_, said, written) = corrected("x_mm,y_mm,z_mm,a_deg,b_deg,c_deg\n800,40,900,0,0,0\n", &[]);
@@ -113,10 +107,7 @@ fn degrees_under_a_header_in_rad_are_found_by_the_turns_of_most_rows() {
     let (code, said, written) = corrected(&format!("{header}\n10,20,30,40,50,60\n"), &[]);
     assert_eq!((code, written.as_str()), (Some(10), ""), "{said}");
     let turned = "stdin:2: in 1 of 1 row a joint is beyond one and a half turns, here joint 1 at 10 rad; allowed: up to 9.42 rad";
-    assert!(
-        said.contains(turned) && said.contains("if these are degrees"),
-        "{said}"
-    );
+    has(&said, [turned, "if these are degrees"]);
     let sound = "0.1,0.2,-0.3,0.1,0.4,0\n";
     let (code, said, _) = corrected(
         &format!("{header}\n{sound}{sound}0.1,0.2,-0.3,0.1,0.4,10\n"),
@@ -152,10 +143,12 @@ fn files_that_cannot_be_read_or_written_are_named_before_a_pipeline_is_run_for_t
         text(&output.stderr)
     };
     let said = refused(&["nofile.csv", "--out", "nodir/x.csv"]);
-    assert!(
-        said.contains("nofile.csv: cannot be read: ")
-            && said.contains("--out: nodir/x.csv: there is no folder nodir;"),
-        "{said}"
+    has(
+        &said,
+        [
+            "nofile.csv: cannot be read: ",
+            "--out: nodir/x.csv: there is no folder nodir;",
+        ],
     );
     assert!(refused(&["t.csv", "--out", "."]).contains("--out: . is a folder: name a file"));
     assert!(

@@ -1,6 +1,7 @@
 //! Two flanks of a gear's teeth that err differently: an error periodic in the joint angle whose sign follows the approach.
 
 use super::{Named, simulated, wanted};
+use crate::answer::has;
 
 #[test]
 fn flanks_that_err_differently_are_named_with_their_order_and_amplitude() {
@@ -26,10 +27,8 @@ fn flanks_that_err_differently_are_named_with_their_order_and_amplitude() {
         assert!(number(k, "sigma") < 4.0, "{finding:#}");
     }
     let statement = finding["statement"].as_str().unwrap();
-    assert!(
-        statement.contains(
-            "the two flanks of the teeth of joint 2 err differently: 5 times a turn by 3"
-        ),
-        "{statement}"
+    has(
+        &statement,
+        "the two flanks of the teeth of joint 2 err differently: 5 times a turn by 3",
     );
 }

@@ -1,6 +1,7 @@
 //! What the numbers of a finding cannot be is no name of it: `unknown` stands at its place, and the statement says why.
 
 use super::{simulated, wanted};
+use crate::answer::{has, starts_with};
 use calib::effect::{Form, Survey};
 use calib::robot::{Measurements, PointReadings, RobotModel};
 use nalgebra::Vector3;
@@ -125,11 +126,8 @@ fn joints_that_lag_by_less_than_nothing_have_no_name_and_the_model_is_the_same()
         "{said:#}"
     );
     let statement = finding["statement"].as_str().unwrap();
-    assert!(
-        statement.starts_with("something unknown acts at recording")
-            && statement.contains("joint_log_lag"),
-        "{statement}"
-    );
+    starts_with(&statement, "something unknown acts at recording");
+    has(&statement, "joint_log_lag");
     let rivals = finding["rivals"].as_array().unwrap();
     assert!(
         rivals

@@ -1,6 +1,7 @@
 //! What a diagnosis says where the recording is poor: without a clock no seconds, of few rows nothing.
 
 use super::{CASE, calib, case_with, concealed, refused, table_of};
+use crate::answer::{has, starts_with};
 use calib::table::{Curves, Findings};
 use serde_json::Value;
 use std::path::Path;
@@ -59,10 +60,7 @@ fn without_a_clock_nothing_is_said_in_seconds() {
     assert_eq!(rows["clock"], "row");
     let first = times.iter().position(|time| *time > step).unwrap() + 1;
     let statement = rows["findings"][0]["statement"].as_str().unwrap();
-    assert!(
-        statement.contains(&format!(" from row {first} (")),
-        "{statement}"
-    );
+    has(&statement, &format!(" from row {first} ("));
     let unseen = rows["not_observable"].as_array().unwrap();
     assert!(
         unseen
@@ -160,8 +158,8 @@ fn of_few_rows_nothing_is_asked_and_the_report_is_written_all_the_same() {
         "what the simulation lacks: 12 rows were fitted, at least 15 are needed to separate it from geometry"
     );
     let text = calib(&["diagnose", "HEAD", "--details"], here);
-    assert!(
-        text.starts_with("not asked (noise basis: instrument)\ntoo few rows were fitted"),
-        "{text}"
+    starts_with(
+        &text,
+        "not asked (noise basis: instrument)\ntoo few rows were fitted",
     );
 }

@@ -1,6 +1,7 @@
 //! Set-up errors come before physics: twenty wrong set-ups of three arms, sound recordings, and a robot file of another arm.
 
 use super::{CASE, calib, case_with, concealed, ended, refused};
+use crate::answer::{has, starts_with};
 use crate::desk::{Desk, table};
 use crate::fixture;
 use calib::description::RobotDescription;
@@ -303,7 +304,7 @@ fn twenty_wrong_set_ups_of_three_arms_are_named_before_any_physics() {
                     "{:?}",
                     said.warnings
                 );
-                assert!(said.statement.contains("set-up"), "{}", said.statement);
+                has(&said.statement, "set-up");
             }
             assert_eq!(forms.unwrap_or_else(|| json!([])), json!([]));
             right += usize::from(named);
@@ -391,11 +392,7 @@ fn a_rounded_log_is_named_with_its_step_and_what_it_makes() {
         "{:?}",
         said.warnings
     );
-    assert!(
-        said.statement.contains("rounded to 0.1 deg"),
-        "{}",
-        said.statement
-    );
+    has(&said.statement, "rounded to 0.1 deg");
     let mut coarse = recorded(&fixture::spherical(), 49, json!([]));
     points(&mut coarse, |p| p.map(|x| rounded(x, 1e-3)));
     let said = diagnosed(&coarse).unwrap();
@@ -429,15 +426,9 @@ fn a_payload_column_that_is_never_or_seldom_filled_is_said() {
         diagnosed(&inputs).unwrap().warnings.join("\n")
     };
     let empty = said(|_| f64::NAN);
-    assert!(
-        empty.contains("the payload column is empty in all 72 rows"),
-        "{empty}"
-    );
+    has(&empty, "the payload column is empty in all 72 rows");
     let half = said(|row| if row % 2 == 0 { 10.0 } else { f64::NAN });
-    assert!(
-        half.contains("the payload column is empty in 36 of 72 rows"),
-        "{half}"
-    );
+    has(&half, "the payload column is empty in 36 of 72 rows");
     assert!(!said(|_| 0.0).contains("payload column"));
 }
 
@@ -447,23 +438,19 @@ fn two_set_up_errors_are_named_together_and_two_reflectors_hide_none() {
     joints(&mut both, |q| (q[1], q[3]) = (-q[1], -q[3]));
     let said = diagnosed(&both).unwrap();
     let statement = &said.findings[0].statement;
-    assert!(
-        statement.starts_with("joints 2, 4 turn the other way"),
-        "{statement}"
-    );
-    assert!(
-        statement.contains("sign: [1, -1, 1, -1, 1, 1]"),
-        "{statement}"
-    );
+    starts_with(&statement, "joints 2, 4 turn the other way");
+    has(&statement, "sign: [1, -1, 1, -1, 1, 1]");
     // Two of different kinds.
     let mut both = recorded(&fixture::offset_wrist(), 44, json!([]));
     joints(&mut both, |q| (q[2], q[4]) = (-q[2], q[4] + FRAC_PI_2));
     let said = diagnosed(&both).unwrap();
     let statement = &said.findings[0].statement;
-    assert!(
-        statement.contains("joint 3 turns the other way")
-            && statement.contains("90 deg at the zero of joint 5"),
-        "{statement}"
+    has(
+        &statement,
+        [
+            "joint 3 turns the other way",
+            "90 deg at the zero of joint 5",
+        ],
     );
 
     let mut named = recorded(&shouldered(), 45, json!([]));
@@ -494,9 +481,9 @@ fn a_length_by_which_no_arm_is_made_is_an_error_of_the_robot_file() {
     let said = diagnosed(&short).unwrap();
     assert_eq!(said.verdict, "wrong_setup", "{}", said.statement);
     let statement = &said.findings[0].statement;
-    assert!(
-        statement.starts_with("a length in the robot file from joint 2 to joint 3 is wrong"),
-        "{statement}"
+    starts_with(
+        &statement,
+        "a length in the robot file from joint 2 to joint 3 is wrong",
     );
     // Two of them at once, of which no one explains the other: each is named as the identified robot has it.
     let by = 0.04;
@@ -511,11 +498,7 @@ fn a_length_by_which_no_arm_is_made_is_an_error_of_the_robot_file() {
             .iter()
             .all(|finding| finding.effect == "setup")
     );
-    assert!(
-        said.findings[0].statement.contains("link_geometry.l"),
-        "{}",
-        said.findings[0].statement
-    );
+    has(&said.findings[0].statement, "link_geometry.l");
 }
 
 #[test]
@@ -528,11 +511,9 @@ fn a_robot_file_in_another_unit_is_blamed_and_not_the_points() {
     inputs.robot.tool = small(inputs.robot.tool);
     let said = diagnosed(&inputs).unwrap();
     let statement = &said.findings[0].statement;
-    assert!(
-        statement.starts_with(
-            "the lengths of the robot file are in metres and were read in millimetres"
-        ),
-        "{statement}"
+    starts_with(
+        &statement,
+        "the lengths of the robot file are in metres and were read in millimetres",
     );
     let after = statement
         .split("without it ")
@@ -552,10 +533,7 @@ fn a_robot_file_of_another_arm_is_refused_with_what_to_look_at() {
     let error = diagnosed(&inputs).err().unwrap();
     assert_eq!(error.exit_code(), 10, "{error}");
     let said = error.to_string();
-    assert!(
-        said.contains("% of its reach") && said.contains("REPLACE") && said.contains("robot file"),
-        "{said}"
-    );
+    has(&said, ["% of its reach", "REPLACE", "robot file"]);
 }
 
 #[test]
@@ -579,9 +557,9 @@ fn points_in_inches_are_not_accepted_and_the_line_that_is_named_mends_them() {
     case_with(here, &[]);
     let (code, told) = ended(&[&["run", "p.yaml"], &CASE[..]].concat(), here);
     assert_eq!(code, Some(10), "{told}");
-    assert!(
-        told.contains("verdict   wrong set-up") && told.contains("the points are in inches"),
-        "{told}"
+    has(
+        &told,
+        ["verdict   wrong set-up", "the points are in inches"],
     );
     assert!(
         !told.lines().any(|line| line.starts_with("after")),
@@ -665,7 +643,7 @@ fn without_link_masses_a_loaded_recording_says_what_is_lost() {
     );
     let said = diagnosed(&inputs).unwrap();
     let lost = "the robot file gives no link masses, yet gravity loads joints in these poses (24 rows of 48 carry a payload)";
-    assert!(said.statement.contains(lost), "{}", said.statement);
+    has(&said.statement, lost);
     assert!(
         said.warnings
             .iter()
@@ -699,14 +677,8 @@ fn two_set_ups_in_one_recording_are_named_with_the_rows_of_each() {
         let said = diagnosed(&inputs).unwrap();
         assert_eq!(said.verdict, "wrong_setup", "{}", said.statement);
         let statement = &said.findings[0].statement;
-        assert!(
-            statement.starts_with("two set-ups are in one recording"),
-            "{statement}"
-        );
-        assert!(
-            statement.contains(first) && statement.contains(second),
-            "{statement}"
-        );
+        starts_with(&statement, "two set-ups are in one recording");
+        has(&statement, [first, second]);
         assert!(
             said.findings
                 .iter()

@@ -1,6 +1,7 @@
 //! `without`: a cause that is excluded is neither tried nor named, whatever looks like it.
 
 use super::{CASE, calib, case_with, concealed, refused, table_of};
+use crate::answer::has;
 use calib::table::{Findings, Parameters};
 use serde_json::Value;
 use std::path::Path;
@@ -84,8 +85,5 @@ fn nothing_is_diagnosed_without_the_frame_of_the_base() {
         folder.path(),
     );
     assert_eq!(code, Some(2), "{said}");
-    assert!(
-        said.contains("`base_frame` places the robot before the instrument"),
-        "{said}"
-    );
+    has(&said, "`base_frame` places the robot before the instrument");
 }

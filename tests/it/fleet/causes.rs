@@ -1,6 +1,7 @@
 //! A fleet's causes: what each recording alone hardly shows, the sum over robots names; a fleet without a cause names nothing.
 
 use super::{fleet, output, write};
+use crate::answer::has;
 use crate::fixture::spread;
 use calib::report::fleet_causes::html;
 use calib::table::{FleetCellRow, FleetCells, FleetFindingRow, FleetFindings, FleetOutliers};
@@ -124,9 +125,9 @@ fn a_prior_of_causes_of_a_fleet_that_was_not_diagnosed_is_a_fault_of_the_file() 
         said
     };
     let lacks = said("{fleet: other, stage: diagnose, by: causes}");
-    assert!(lacks.contains("no fleet `other` was diagnosed"), "{lacks}");
+    has(&lacks, "no fleet `other` was diagnosed");
     let named = said("{fleet: other, stage: diagnose, by: causes, effects: [backlash]}");
-    assert!(named.contains("prior.effects"), "{named}");
+    has(&named, "prior.effects");
 }
 
 fn size(robot: usize) -> FleetCellRow {

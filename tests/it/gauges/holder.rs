@@ -1,6 +1,7 @@
 //! A target that steps on the tool: about the last axis it is a holder that has turned, or that joint's zero; elsewhere it has moved.
 
 use super::Cell;
+use crate::answer::{has, starts_with};
 use crate::fixture;
 use calib::diagnose::{Diagnosis, Question, diagnose};
 use calib::effect::Place;
@@ -63,11 +64,8 @@ fn a_holder_that_turns_about_the_flange_is_one_step_with_two_names() {
             "the holder has turned by {:.2} deg about the flange",
             degrees.abs()
         );
-        assert!(
-            statements[0].starts_with(&size) && statements[0].contains("from row 71"),
-            "{}",
-            statements[0]
-        );
+        starts_with(&statements[0], &size);
+        has(&statements[0], "from row 71");
         let found = &said.findings[0];
         let mut names: Vec<(&str, Place)> = found
             .rivals

@@ -2,6 +2,7 @@
 
 use super::laws::select;
 use super::{Cell, SIGMA, THREE};
+use crate::answer::has;
 use crate::fixture;
 use crate::identify::{GEOMETRY, model, normal};
 use calib::diagnose::{Question, diagnose};
@@ -90,11 +91,7 @@ fn a_diagnosis_learns_the_repeatability_from_the_same_target_again() {
     );
     let ratio = found.repeatability.sigma / (6.0 * ARCSEC);
     assert!((0.8..1.25).contains(&ratio), "{ratio} of the truth");
-    assert!(
-        found.statement.contains("the noise that 120 repeats show"),
-        "{}",
-        found.statement
-    );
+    has(&found.statement, "the noise that 120 repeats show");
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Times as clocks write them.
 
 use super::{refusal, robot, take};
+use crate::answer::has;
 use crate::desk::Desk;
 
 const CLOCK: &str = r#"
@@ -57,10 +58,9 @@ fn what_is_no_clock_time_is_a_rejected_row_and_a_clock_without_its_unit_says_how
         panic!("{:?}", taken.rejected)
     };
     assert_eq!((gone.line, gone.reason.as_str()), (3, "not_a_number"));
-    assert!(
-        gone.detail.contains("`8 o'clock` is no clock time") && gone.detail.contains("08:15:03.25"),
-        "{}",
-        gone.detail
+    has(
+        &gone.detail,
+        ["`8 o'clock` is no clock time", "08:15:03.25"],
     );
     let seconds = CLOCK.replace("unit: clock", "unit: s");
     let said = refusal(
@@ -68,8 +68,8 @@ fn what_is_no_clock_time_is_a_rejected_row_and_a_clock_without_its_unit_says_how
         &seconds,
         robot("rr", 1.0),
     );
-    assert!(
-        said.contains("`08:15:03` is a clock time, not a number; `unit: clock` reads such times"),
-        "{said}"
+    has(
+        &said,
+        "`08:15:03` is a clock time, not a number; `unit: clock` reads such times",
     );
 }

@@ -1,6 +1,7 @@
 //! Controllers that count joints in their own way: other signs, other zeros, and angles that hold a part of another one.
 
 use super::{TWO, refusal, robot, rows, settings, take};
+use crate::answer::has;
 use calib::stage::Stage;
 
 fn with(q: &str) -> String {
@@ -67,17 +68,14 @@ fn ways_of_counting_that_no_robot_has_are_faults() {
     );
     let desk = rows("P1,30,-60,1000,200,3\n");
     let said = refusal(&desk, &with("sign: [1, 1, -1]"), robot("rr", 1.0));
-    assert!(
-        said.contains("`q.sign` lists 3 numbers; the robot has 2 joints"),
-        "{said}"
-    );
+    has(&said, "`q.sign` lists 3 numbers; the robot has 2 joints");
     let said = refusal(
         &desk,
         &with("coupled: [{joint: 3, by: 2, ratio: 1}]"),
         robot("rr", 1.0),
     );
-    assert!(
-        said.contains("`q.coupled` names a joint beyond the last; the robot has 2 joints"),
-        "{said}"
+    has(
+        &said,
+        "`q.coupled` names a joint beyond the last; the robot has 2 joints",
     );
 }

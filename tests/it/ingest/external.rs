@@ -1,6 +1,7 @@
 //! Axes beside the arm's own: a track that moves while the robot file has none is refused, one that stands is not.
 
 use super::{refusal, robot, take};
+use crate::answer::{has, starts_with};
 use crate::desk::Desk;
 
 const YAML: &str = "
@@ -32,7 +33,7 @@ fn an_axis_that_moves_and_that_the_robot_file_does_not_have_is_refused() {
         let sentence = format!(
             "a.csv: column `{name}` is an external axis, in addition to the robot's 2 joints, and moves from 0 to 1100"
         );
-        assert!(said.starts_with(&sentence), "{said}");
+        starts_with(&said, &sentence);
     }
     for (header, value) in [("eax_a", "9E9"), ("E1", "0.004"), ("rail", "")] {
         take(&desk(header, |_| value.into()), YAML, robot("rr", 1.0))
@@ -66,9 +67,11 @@ fn joints_beyond_the_limits_are_a_hint_of_their_counting() {
     let desk = Desk::default().with("a.csv", format!("q1,q2,x,y,z\n{text}"));
     take(&desk, YAML, robot("rr", 0.5)).unwrap();
     let warnings = desk.warnings.lock().unwrap().join("\n");
-    assert!(
-        warnings.contains("12 rows with a joint beyond the robot's limits, used all the same")
-            && warnings.contains("`sign`, `zero`, `coupled` of `q`"),
-        "{warnings}"
+    has(
+        &warnings,
+        [
+            "12 rows with a joint beyond the robot's limits, used all the same",
+            "`sign`, `zero`, `coupled` of `q`",
+        ],
     );
 }

@@ -1,6 +1,7 @@
 //! Targets, orientations, some axes and distances arrive as the file has them; what is missing beside them is said.
 
 use super::{refusal, robot, settings, take};
+use crate::answer::{has, starts_with};
 use crate::desk::Desk;
 use calib::stage::Stage;
 use nalgebra::{Rotation3, Vector3};
@@ -140,10 +141,7 @@ fn distances_need_no_point_and_half_an_orientation_is_refused() {
     let turn = "      orientation: {quaternion: [a, b, c, d], optional: true}\n      sigma_orientation: {value: 1, unit: mrad}\n";
     let desk = Desk::default().with("a.csv", "q1,q2,a,b,c,d\n1,2,1,0,0,\n3,4,1,0,0,0.2\n");
     let message = refusal(&desk, &with(turn), robot("rr", 1.0));
-    assert!(
-        message.contains("the orientation is incomplete"),
-        "{message}"
-    );
+    has(&message, "the orientation is incomplete");
 }
 
 #[test]
@@ -157,24 +155,21 @@ fn what_belongs_together_is_asked_for_together() {
             .join("\n")
     };
     let alone = faults("      distance: {column: l, unit: mm}\n");
-    assert!(
-        alone.contains("map `distance` and `sigma_distance` together"),
-        "{alone}"
-    );
+    has(&alone, "map `distance` and `sigma_distance` together");
     let two = faults(
         "      orientation: {rpy: [a, b, c], quaternion: [d, e, f, g], unit: deg}\n      sigma_orientation: {value: 1, unit: deg}\n",
     );
-    assert!(
-        two.contains("say `quaternion: [w, x, y, z]`, `rpy: [roll, pitch, yaw]`, `euler_xyz"),
-        "{two}"
+    has(
+        &two,
+        "say `quaternion: [w, x, y, z]`, `rpy: [roll, pitch, yaw]`, `euler_xyz",
     );
     let height = faults("      z: {column: z, unit: mm}\n");
-    assert!(height.contains("not mapped: x, y"), "{height}");
+    has(&height, "not mapped: x, y");
     assert_eq!(faults("      z: {column: z, unit: mm}\naxes: [z]\n"), "");
     let unread = faults(&format!("{POINT}axes: [z]\n"));
     let expected = "files[0].columns.x: `axes: [z]` says that x was not measured; take `x` out of `columns`, or add it to `axes`\n\
                     files[0].columns.y: `axes: [z]` says that y";
-    assert!(unread.starts_with(expected), "{unread}");
+    starts_with(&unread, expected);
     assert_eq!(
         faults("      z: {column: z, unit: mm}\naxes: [z, z]\n"),
         "axes[1]: `z` is named twice"
@@ -184,10 +179,7 @@ fn what_belongs_together_is_asked_for_together() {
             .starts_with("axes: no axis; name those that were measured")
     );
     let anchor = faults(&format!("{POINT}      anchor: {{column: box}}\n"));
-    assert!(
-        anchor.contains("an anchor is the end of a `distance`"),
-        "{anchor}"
-    );
+    has(&anchor, "an anchor is the end of a `distance`");
 }
 
 #[test]
@@ -206,8 +198,5 @@ fn both_angles_of_a_level_arrive_and_one_alone_is_refused() {
         .iter()
         .map(ToString::to_string)
         .collect::<String>();
-    assert!(
-        alone.contains("map all of tilt_x, tilt_y, or none"),
-        "{alone}"
-    );
+    has(&alone, "map all of tilt_x, tilt_y, or none");
 }

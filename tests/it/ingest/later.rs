@@ -1,6 +1,7 @@
 //! Measurements of several days: each joined by itself, then appended.
 
 use super::{refusal, robot, settings, take};
+use crate::answer::{has, starts_with};
 use crate::desk::Desk;
 use calib::stage::Stage;
 
@@ -115,10 +116,7 @@ fn what_a_later_measurement_lacks_is_said_with_its_place() {
     );
     let without = desk().with("points2.csv", "id,x,y\nP1,7,8\n");
     let said = refusal(&without, DAYS, robot("rr", 1.0));
-    assert!(
-        said.contains("points2.csv") && said.contains("`z`"),
-        "{said}"
-    );
+    has(&said, ["points2.csv", "`z`"]);
 }
 
 #[test]
@@ -154,7 +152,7 @@ fn points_that_would_be_used_twice_are_refused_whatever_their_file_is_called() {
     let said = refusal(&copied, DAYS, robot("rr", 1.0));
     let expected = "with.later[0].files[1]: `points2.csv` measured what `points1.csv` of `files[1].file` did, and 2 rows would be used \
                     twice";
-    assert!(said.starts_with(expected), "{said}");
+    starts_with(&said, expected);
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Joint positions that a controller's program declares are the joint file of a recording.
 
 use super::{refusal, robot, settings, take};
+use crate::answer::{has, starts_with};
 use crate::desk::{Desk, table};
 use calib::stage::ingest::IngestReads;
 use calib::table::{Intake, Rejected, RejectedRow};
@@ -148,10 +149,7 @@ fn an_external_axis_at_9e9_is_none_and_a_connected_one_is_a_joint() {
         &track.replace("PROGRAM", "cell.prg"),
         robot("prrrrrr", 1.0),
     );
-    assert!(
-        message.contains("cell.prg:1: no column `eax_a`, mapped to `q`"),
-        "{message}"
-    );
+    has(&message, "cell.prg:1: no column `eax_a`, mapped to `q`");
 }
 
 #[test]
@@ -207,14 +205,12 @@ fn faults_of_a_program_have_their_places_and_a_program_without_joints_is_refused
     let message = refused(
         "MODULE a\n CONST robtarget h:=[[6,0,9],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\nENDMODULE\n",
     );
-    assert!(
-        message.starts_with(
-            "cell.mod: declares no joint position (1 pose without joints); allowed: declarations such as `CONST jointtarget"
-        ),
-        "{message}"
+    starts_with(
+        &message,
+        "cell.mod: declares no joint position (1 pose without joints); allowed: declarations such as `CONST jointtarget",
     );
     let far = refused(&RAPID.replace("-12.5", "-12500"));
-    assert!(far.starts_with("cell.mod:4:"), "{far}");
+    starts_with(&far, "cell.mod:4:");
     let cut: String = RAPID.chars().take(330).collect();
     assert!(refused(&cut).starts_with("cell.mod:"));
 }

@@ -1,6 +1,7 @@
 //! Files and settings that are refused as a whole: the message names the place and what is allowed.
 
 use super::{HEAD, TWO, good, refusal, robot, rows, settings, take};
+use crate::answer::{ends_with, has, starts_with};
 use crate::desk::Desk;
 
 fn with(file: &str, yaml: &str) -> String {
@@ -102,44 +103,44 @@ fn a_column_of_two_measured_quantities_or_joints_is_a_fault() {
 #[test]
 fn a_header_of_another_shape_gets_a_hint() {
     let semicolons = with("id;q1;q2;x;y;z\n", TWO);
-    assert!(
-        semicolons.ends_with("found: id;q1;q2;x;y;z (one column; `delimiter: \";\"`?)"),
-        "{semicolons}"
+    ends_with(
+        &semicolons,
+        "found: id;q1;q2;x;y;z (one column; `delimiter: \";\"`?)",
     );
     assert!(with("1,2,3,4,5,6\n", TWO).ends_with("(all numbers; `header: false`?)"));
     let twice = with("id,q1,q2,x,y,z,x\n", TWO);
-    assert!(twice.starts_with("a.csv:1: column `x`, mapped to `x`, stands twice in the header (4 and 7); name it by number"));
+    starts_with(
+        &twice,
+        "a.csv:1: column `x`, mapped to `x`, stands twice in the header (4 and 7); name it by number",
+    );
 }
 
 #[test]
 fn another_number_of_joints_is_an_error_of_the_file() {
     let desk = || rows(&good(3));
     let more = refusal(&desk(), TWO, robot("rrr", 1.0));
-    assert!(
-        more.starts_with(
-            "a.csv:1: `q` has 2 of its columns; the robot has 3 joints\na.csv:1: no column `q3`"
-        ),
-        "{more}"
+    starts_with(
+        &more,
+        "a.csv:1: `q` has 2 of its columns; the robot has 3 joints\na.csv:1: no column `q3`",
     );
     let fewer = refusal(&desk(), TWO, robot("r", 1.0));
-    assert!(
-        fewer
-            .starts_with("a.csv:1: column `q2`, by the pattern of `q`: the robot has 1 joint only"),
-        "{fewer}"
+    starts_with(
+        &fewer,
+        "a.csv:1: column `q2`, by the pattern of `q`: the robot has 1 joint only",
     );
     let listed = refusal(
         &desk(),
         &TWO.replace("column: \"q{j}\"", "columns: [q1, q2]"),
         robot("rrr", 1.0),
     );
-    assert!(
-        listed.starts_with("a.csv:1: `q` lists 2 columns; the robot has 3 joints"),
-        "{listed}"
+    starts_with(
+        &listed,
+        "a.csv:1: `q` lists 2 columns; the robot has 3 joints",
     );
     let linear = refusal(&desk(), TWO, robot("pr", 1.0));
-    assert!(
-        linear.starts_with("a.csv:1: joint 1 is prismatic; say `linear_unit` for `q`"),
-        "{linear}"
+    starts_with(
+        &linear,
+        "a.csv:1: joint 1 is prismatic; say `linear_unit` for `q`",
     );
 }
 
@@ -155,10 +156,9 @@ fn an_unannounced_decimal_comma_is_an_error_that_says_so() {
     assert_eq!(with(file, &yaml), expected);
     let announced = yaml.replace("delimiter", "decimal: comma\n    delimiter");
     let points = with("id;q1;q2;x;y;z\nP1;0.365;1;2;3;4\n", &announced);
-    assert!(
-        points
-            .contains("q1: `0.365` has a decimal point; allowed: `decimal: point` in the settings"),
-        "{points}"
+    has(
+        &points,
+        "q1: `0.365` has a decimal point; allowed: `decimal: point` in the settings",
     );
 }
 
@@ -175,13 +175,11 @@ fn degrees_declared_as_rad_are_an_error_that_says_so() {
         .map(|row| format!("P{row},0.{row},5,1,2,3\n"))
         .collect();
     let message = refusal(&rows(&small), &TWO.replace("deg", "rad"), robot("rr", 1.0));
-    assert!(
-        message.starts_with(
-            "a.csv:2: 10 of 10 rows are beyond the robot's joint limits, here joint 2 (`J2`) at 286.4789 deg, above"
-        ),
-        "{message}"
+    starts_with(
+        &message,
+        "a.csv:2: 10 of 10 rows are beyond the robot's joint limits, here joint 2 (`J2`) at 286.4789 deg, above",
     );
-    assert!(message.ends_with("say `unit: deg`"), "{message}");
+    ends_with(&message, "say `unit: deg`");
     let desk = rows(
         &(1..=10)
             .map(|row| format!("P{row},{row}e-1,1.5,1,2,3\n"))

@@ -1,6 +1,7 @@
 //! Duplicates, joins, shapes of files, and long files.
 
 use super::{HEAD, TWO, good, refusal, robot, rows, settings, take};
+use crate::answer::{has, starts_with};
 use crate::desk::{Desk, table};
 use calib::stage::ingest::IngestReads;
 use calib::table::{Recording, Rejected};
@@ -86,11 +87,11 @@ fn ids_without_a_partner_are_shown_with_an_example_of_each_file() {
     };
     let other = said(["XP1", "XP2"]);
     let expected = "2 unmatched (no partner in run/b_tracker.csv, e.g. `P1` here and `XP1` there: ids must be the same in both files)";
-    assert!(other.contains(expected), "{other}");
+    has(&other, expected);
     let lower = said(["q7", "p2"]);
     let expected =
         "e.g. `P2` here and `p2` there: ids that differ in upper and lower case are different ids";
-    assert!(lower.contains(expected), "{lower}");
+    has(&lower, expected);
 }
 
 #[test]
@@ -617,10 +618,7 @@ fn a_parquet_file_gives_what_its_text_gives() {
         TWO,
         robot("rr", 1.0),
     );
-    assert!(
-        message.starts_with("a.csv: is a Parquet file that cannot be read: "),
-        "{message}"
-    );
+    starts_with(&message, "a.csv: is a Parquet file that cannot be read: ");
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Several targets side by side in a row become rows of their own.
 
 use super::{refusal, robot, settings, take};
+use crate::answer::starts_with;
 use crate::desk::Desk;
 use calib::stage::Stage;
 
@@ -148,8 +149,5 @@ fn faults_of_targets_have_their_places() {
         &whole,
         robot("rr", 1.0),
     );
-    assert!(
-        missing.starts_with("a.csv:1: no column `Y2`, mapped to `smr2`"),
-        "{missing}"
-    );
+    starts_with(&missing, "a.csv:1: no column `Y2`, mapped to `smr2`");
 }

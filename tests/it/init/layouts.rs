@@ -1,5 +1,6 @@
 //! Headers as controllers, trackers and spreadsheets write them: `init` maps them right or asks, and what it wrote runs.
 
+use crate::answer::has;
 use crate::compensate::calib;
 use std::fmt::Write;
 use std::path::Path;
@@ -333,10 +334,7 @@ fn rows_of_unequal_number_are_never_joined_by_order_in_silence() {
     );
     assert_eq!(check.status.code(), Some(10));
     let told = String::from_utf8_lossy(&check.stderr).into_owned();
-    assert!(
-        told.contains("31 data rows, controller.csv has 30"),
-        "{told}"
-    );
+    has(&told, "31 data rows, controller.csv has 30");
     let equal = two(controller, table("x,y,z", |k| point(k, ",")));
     equal.says(&["join: {by: order}", "CHECK"]).runs(30);
 }
@@ -468,7 +466,7 @@ fn a_file_without_a_header_gets_both_files_with_what_was_seen() {
     sheet.says(&["REPLACE", "saved as CSV"]);
     let prose = one("nothing\nto see\n");
     prose.says(&["REPLACE", "nothing", "to see"]);
-    assert!(prose.said.contains("no header found"), "{}", prose.said);
+    has(&prose.said, "no header found");
 }
 
 #[test]
@@ -579,8 +577,5 @@ fn the_identity_that_init_comments_out_is_nobodys() {
         String::from_utf8_lossy(&check.stderr)
     );
     let said = String::from_utf8_lossy(&check.stdout).into_owned();
-    assert!(
-        said.contains("replace   ") && said.contains("          pipeline.yaml:"),
-        "{said}"
-    );
+    has(&said, ["replace   ", "          pipeline.yaml:"]);
 }

@@ -1,6 +1,7 @@
 //! Lists as they come off a tracker's own software: no header, other names than the controller's, UTF-16, marks of thousands, many columns.
 
 use super::layouts::{joints, made, point, table};
+use crate::answer::{has, starts_with};
 use crate::compensate::calib;
 use std::fmt::Write;
 
@@ -66,9 +67,9 @@ fn what_cannot_be_told_ends_with_code_1_and_a_sentence_and_too_many_files_with_2
     let output = calib(folder.path(), &["init", ".", "--data", "notes.csv"], "");
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(1), "{told}");
-    assert!(
-        told.starts_with("error: neither joints nor a measured point were recognised in notes.csv"),
-        "{told}"
+    starts_with(
+        &told,
+        "error: neither joints nor a measured point were recognised in notes.csv",
     );
     let output = calib(
         folder.path(),
@@ -84,7 +85,10 @@ fn what_cannot_be_told_ends_with_code_1_and_a_sentence_and_too_many_files_with_2
     );
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(2), "{told}");
-    assert!(told.contains("--data: 3 files; allowed: one recording, the controller's and the tracker's, the controller's and a list of points in one layout for each of several reflectors, or recordings that have joints and points each"), "{told}");
+    has(
+        &told,
+        "--data: 3 files; allowed: one recording, the controller's and the tracker's, the controller's and a list of points in one layout for each of several reflectors, or recordings that have joints and points each",
+    );
     assert!(!folder.path().join("more").exists());
 }
 
@@ -193,17 +197,17 @@ fn the_chain_of_a_urdf_is_read_from_its_first_link_with_joints_that_slide() {
         read("robot.yaml")
     );
     let pipeline = read("pipeline.yaml");
-    assert!(
-        pipeline.contains("q: {columns: [\"J1_mm\", \"J2_deg\"], unit: deg, linear_unit: mm}"),
-        "{pipeline}"
+    has(
+        &pipeline,
+        "q: {columns: [\"J1_mm\", \"J2_deg\"], unit: deg, linear_unit: mm}",
     );
     std::fs::remove_file(folder.path().join("robot.yaml")).unwrap();
     std::fs::remove_file(folder.path().join("pipeline.yaml")).unwrap();
     let (code, said) = told(&[&start[..], &["carriage"]].concat());
     assert_eq!(code, Some(2));
-    assert!(
-        said.contains("--tip: the chain from `world` to `carriage` has 1 joint, the recording 2"),
-        "{said}"
+    has(
+        &said,
+        "--tip: the chain from `world` to `carriage` has 1 joint, the recording 2",
     );
     let (code, said) = told(&[&start[..], &["tool0"]].concat());
     assert!(

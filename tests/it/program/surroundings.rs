@@ -1,5 +1,6 @@
 //! Frames and loads that a program itself declares.
 
+use crate::answer::has;
 use calib::program::{Language, Partial, Program, TargetKind};
 use calib::robot::RobotModel;
 use calib::spatial::Pose;
@@ -126,16 +127,14 @@ fn a_work_object_that_moves_or_changes_is_not_applied() {
             .contains("work object `bench`")
     );
     let said = refused(OBJECT, &format!("{once}\nMoveL p,v1,z1,gun;"));
-    assert!(
-        said.contains(
-            "its work object differs between the ways to this target: work object `bench` and wobj0"
-        ),
-        "{said}"
+    has(
+        &said,
+        "its work object differs between the ways to this target: work object `bench` and wobj0",
     );
     let said = refused(OBJECT, "MoveL p,v1,z1,gun;\nMoveL p,v1,z1,bare;");
-    assert!(
-        said.contains("its tool differs between the ways to this target: `gun` and `bare`"),
-        "{said}"
+    has(
+        &said,
+        "its tool differs between the ways to this target: `gun` and `bare`",
     );
 }
 
@@ -202,8 +201,8 @@ fn the_targets_of_a_file_are_reached_with_one_tool() {
     };
     assert_eq!(said("gun"), "");
     let two = said("bare");
-    assert!(
-        two.contains("is reached with the tool BARE, another target with GUN: --tool says which"),
-        "{two}"
+    has(
+        &two,
+        "is reached with the tool BARE, another target with GUN: --tool says which",
     );
 }

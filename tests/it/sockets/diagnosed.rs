@@ -2,6 +2,7 @@
 
 use super::dirty::all;
 use super::{fixture, socket, touched, touched_with, truth};
+use crate::answer::has;
 use crate::desk::{self, Desk};
 use calib::description::RobotDescription;
 use calib::stage::{Diagnose, DiagnoseReads};
@@ -83,7 +84,7 @@ fn nothing_is_found_in_a_clean_recording_and_what_cannot_be_known_is_said() {
         "scale of the arm",
         "place of the base",
     ] {
-        assert!(unseen.contains(expected), "{unseen}");
+        has(&unseen, expected);
     }
     assert!(
         !warnings.contains("do not close") && !warnings.contains("sits elsewhere"),

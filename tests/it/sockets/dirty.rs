@@ -1,6 +1,7 @@
 //! Recordings that are not as they should be get an answer in plain words; derivatives of what is closed are those of differences.
 
 use super::{fixture, plane, socket, sphere, touched, truth};
+use crate::answer::has;
 use crate::desk::{self, Desk};
 use calib::description::RobotDescription;
 use calib::observation::{KINDS, RowView, Weight};
@@ -65,16 +66,20 @@ fn rows_of_another_hole_are_named_with_the_hole() {
         names[row] = Some("b/0".into());
     }
     let (text, parameters) = said(&robot, recording, SETTINGS);
-    assert!(
-        text.contains("2 rows do not close within their noise")
-            && text.contains("a/1-0006 to a/1-0007 (2 rows)"),
-        "{text}"
+    has(
+        &text,
+        [
+            "2 rows do not close within their noise",
+            "a/1-0006 to a/1-0007 (2 rows)",
+        ],
     );
-    assert!(text.contains("where `a/1` is"), "{text}");
-    assert!(
-        text.contains("the scale of the arm is known to")
-            && text.contains("by the lengths that were given"),
-        "{text}"
+    has(&text, "where `a/1` is");
+    has(
+        &text,
+        [
+            "the scale of the arm is known to",
+            "by the lengths that were given",
+        ],
     );
     let told = parameters
         .0
@@ -104,9 +109,9 @@ fn a_ball_that_was_put_back_elsewhere_is_said_with_the_row() {
     let half = 40 * first.joints;
     recording.q[half..].copy_from_slice(&second.q[half..]);
     let (text, _) = said(&robot, recording, SETTINGS);
-    assert!(
-        text.contains("on the ball sits elsewhere on the tool") && text.contains("from b/0-000"),
-        "{text}"
+    has(
+        &text,
+        ["on the ball sits elsewhere on the tool", "from b/0-000"],
     );
     let (clean, _) = said(&robot, first, SETTINGS);
     assert!(
@@ -126,10 +131,10 @@ fn five_rows_and_no_length_are_said_to_be_too_little() {
     );
     let bare = "{effects: [anchor, base_frame, tool_offset, joint_offset, link_geometry]}";
     let (text, _) = said(&robot, recording, bare);
-    assert!(text.contains("only 5 points for"), "{text}");
-    assert!(
-        text.contains("the scale of the arm is not observable: no length was given"),
-        "{text}"
+    has(&text, "only 5 points for");
+    has(
+        &text,
+        "the scale of the arm is not observable: no length was given",
     );
 }
 
@@ -163,7 +168,7 @@ fn names_that_the_recording_does_not_have_are_refused() {
             .run(&stage, reads)
             .expect_err("refused")
             .to_string();
-        assert!(message.contains(expected), "{message}");
+        has(&message, expected);
     }
 }
 

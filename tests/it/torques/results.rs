@@ -1,6 +1,7 @@
 //! What a diagnosis of torques is good for: files for simulators and torques that are fed forward, held against the twin's truth.
 
 use super::write;
+use crate::answer::has;
 use calib::twin::torque::{TorqueCase, TorqueDesign, TorqueFile, TorqueRows};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -320,10 +321,7 @@ fn what_a_format_does_not_hold_of_torques_is_said_with_its_size() {
     assert!(stribeck["numbers"]["stribeck"]["sigma"].as_f64().unwrap() > 0.0);
     for format in ["urdf", "mjcf"] {
         let text = exported(format);
-        assert!(
-            text.contains("not carried: stribeck_friction at joint 2, "),
-            "{text}"
-        );
+        has(&text, "not carried: stribeck_friction at joint 2, ");
     }
     let refused = calib(
         &["export", "HEAD", "--format", "dh"],
@@ -331,10 +329,7 @@ fn what_a_format_does_not_hold_of_torques_is_said_with_its_size() {
     );
     let told = String::from_utf8_lossy(&refused.stderr).into_owned();
     assert_eq!(refused.status.code(), Some(2), "{told}");
-    assert!(
-        told.contains("allowed: urdf, json, mjcf, sdf, dynamics"),
-        "{told}"
-    );
+    has(&told, "allowed: urdf, json, mjcf, sdf, dynamics");
 }
 
 /// A motion as its user has it, of one stretch of rows.
