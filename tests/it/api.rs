@@ -1,6 +1,6 @@
 //! calib from arrays: to the last digit what a pipeline gives for the same numbers in a file.
 
-use crate::answer::{ends_with, has, starts_with};
+use crate::answer::{ends_with, has, put, starts_with};
 use crate::compensate::{ROBOT, calib, cell};
 use calib::api::{CalibRun, Options, Poses, Recording, Robot, Sigma, diagnose, identify};
 use calib::error::{Error, Result};
@@ -88,7 +88,7 @@ fn arrays_give_to_the_last_digit_what_a_pipeline_gives_for_the_same_numbers_in_a
         ("pipeline.yaml", PIPELINE),
         ("measured.csv", &csv),
     ] {
-        std::fs::write(folder.path().join(name), text).unwrap();
+        put(folder.path(), name, text);
     }
     let output = calib(folder.path(), &["run", "pipeline.yaml", "--quiet"], "");
     let stderr = String::from_utf8_lossy(&output.stderr);
@@ -173,7 +173,7 @@ fn arrays_that_are_no_recording_are_refused_with_row_and_what_is_allowed() {
         "NAME: no arm `ur5ee` in the library; did you mean `ur5e`?",
     ];
     for (fault, start) in faults.iter().zip(starts) {
-        starts_with(&fault, start);
+        starts_with(fault, start);
     }
 }
 
@@ -227,5 +227,5 @@ fn a_served_model_answers_every_line_with_what_the_library_computes() {
     // No row was measured with joint 1 turned by 170 degrees.
     let far = served(&["--predict"], "[2.97, 0.2, -0.4, 0.5, 0.8, -1.0]\n");
     let remark = far[0]["remark"].as_str().unwrap();
-    has(&remark, "joint 1");
+    has(remark, "joint 1");
 }

@@ -2,7 +2,7 @@
 
 mod write;
 
-use crate::answer::has;
+use crate::answer::{has, put};
 use crate::compensate::calib;
 use calib::error::Result;
 use calib::raw::{BagRows, InputSource, Record, RecordFault, RecordReader, source};
@@ -266,17 +266,13 @@ fn a_folder_of_parts_is_one_recording_in_the_order_of_their_numbers() {
             };
             // One recorder was stopped by force.
             let end = if part == 4 { bag.len() / 2 } else { bag.len() };
-            std::fs::write(
-                folder.path().join(format!("run_{part}.{kind}")),
-                &bag[..end],
-            )
-            .unwrap();
+            put(folder.path(), format!("run_{part}.{kind}"), &bag[..end]);
         }
-        std::fs::write(
-            folder.path().join("metadata.yaml"),
+        put(
+            folder.path(),
+            "metadata.yaml",
             "rosbag2_bagfile_information: {}\n",
-        )
-        .unwrap();
+        );
         let (names, found, loss) = rows_of(source(folder.path()).unwrap(), None).unwrap();
         let x = names
             .iter()
@@ -302,7 +298,7 @@ fn run(here: &Path, pipeline: &str) -> (Recording, Rejected, Intake, String) {
     )
     .unwrap();
     let head = "calib: 1\nname: p\nseed: 1\nstages:\n  - uses: robot\n    with: {file: robot.yaml}\n  - uses: ingest\n    with:\n";
-    std::fs::write(here.join("p.yaml"), format!("{head}{pipeline}")).unwrap();
+    put(here, "p.yaml", format!("{head}{pipeline}"));
     let output = calib(here, &["run", "p.yaml", "--store", "s"], "");
     let answer = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{answer}");
@@ -376,11 +372,11 @@ fn each_message_that_is_not_used_has_its_reason() {
         )
     }));
     let folder = tempfile::tempdir().unwrap();
-    std::fs::write(
-        folder.path().join("run.mcap"),
+    put(
+        folder.path(),
+        "run.mcap",
         mcap(Some(Compression::Lz4), &messages),
-    )
-    .unwrap();
+    );
     let (recording, rejected, intake, _) = run(folder.path(), POSES);
     assert_eq!(recording.rows(), 20);
     let reasons: Vec<(&str, i64)> = rejected
@@ -440,11 +436,11 @@ fn a_folder_of_parts_is_run_as_one_file_and_a_part_that_changed_is_read_again() 
     let parts = folder.path().join("run");
     std::fs::create_dir(&parts).unwrap();
     for (part, messages) in messages.chunks(8).enumerate() {
-        std::fs::write(
-            parts.join(format!("run_{part}.mcap")),
+        put(
+            &parts,
+            format!("run_{part}.mcap"),
             mcap(Some(Compression::Zstd), messages),
-        )
-        .unwrap();
+        );
     }
     let pipeline = POSES.replace("run.mcap", "run");
     let (recording, _, intake, _) = run(folder.path(), &pipeline);
@@ -459,7 +455,7 @@ fn a_folder_of_parts_is_run_as_one_file_and_a_part_that_changed_is_read_again() 
         "{answer}"
     );
     // Two kinds of parts are no recording, nor is a folder of anything else.
-    std::fs::write(parts.join("run_3.db3"), db3(&messages[..8])).unwrap();
+    put(&parts, "run_3.db3", db3(&messages[..8]));
     let output = calib(folder.path(), &["check", "p.yaml"], "");
     let answer = String::from_utf8_lossy(&output.stderr);
     assert!(
@@ -497,7 +493,7 @@ fn two_robots_in_one_topic_are_told_by_their_joints() {
         )
     }));
     let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("run.mcap"), mcap(None, &messages)).unwrap();
+    put(folder.path(), "run.mcap", mcap(None, &messages));
     let (recording, rejected, intake, _) = run(folder.path(), POSES);
     assert_eq!(
         (recording.rows(), rejected.0.len(), intake.0[0].read),
@@ -534,7 +530,7 @@ fn init_reads_a_bag_and_its_pipeline_runs() {
     ] {
         let here = folder.path().join(name.replace('.', "_"));
         std::fs::create_dir(&here).unwrap();
-        std::fs::write(here.join(name), bag).unwrap();
+        put(&here, name, bag);
         let output = calib(&here, &["init", "--robot", "ur10", "--data", name], "");
         let answer = String::from_utf8_lossy(&output.stdout);
         assert!(output.status.success(), "{answer}");

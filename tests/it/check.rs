@@ -1,6 +1,6 @@
 //! `check` reads what it reports on: the robot file, the headers of the data files, and the marks that `init` left.
 
-use crate::answer::has;
+use crate::answer::{has, put};
 use crate::compensate::calib;
 
 const ROBOT: &str = "calib_robot: 1
@@ -43,7 +43,7 @@ fn checked(robot: &str, pipeline: &str, arm: &str, points: &str) -> (i32, String
         ("arm.csv", arm),
         ("points.csv", points),
     ] {
-        std::fs::write(folder.path().join(name), text).unwrap();
+        put(folder.path(), name, text);
     }
     let output = calib(folder.path(), &["check", "pipeline.yaml"], "");
     assert!(
@@ -79,7 +79,7 @@ fn a_sound_pipeline_is_ready_and_shows_its_graph_on_demand() {
         ("arm.csv", ARM),
         ("points.csv", POINTS),
     ] {
-        std::fs::write(folder.path().join(name), text).unwrap();
+        put(folder.path(), name, text);
     }
     let out = calib(folder.path(), &["check", "pipeline.yaml", "--details"], "").stdout;
     let out = String::from_utf8_lossy(&out).into_owned();
@@ -170,7 +170,7 @@ fn told(command: &str, pipeline: &str, tuesday: &str) -> (i32, String) {
         .into_iter()
         .chain([("tue/arm.csv", ARM), ("tue/points.csv", tuesday)])
     {
-        std::fs::write(folder.path().join(name), text).unwrap();
+        put(folder.path(), name, text);
     }
     let output = calib(folder.path(), &[command, "pipeline.yaml"], "");
     (
@@ -304,7 +304,7 @@ fn check_of_the_data_fits_base_and_geometry_and_names_rows_that_have_no_partner(
         ("arm.csv", &arm),
         ("points.csv", &points),
     ] {
-        std::fs::write(folder.path().join(name), text).unwrap();
+        put(folder.path(), name, text);
     }
     let output = calib(
         folder.path(),
@@ -338,7 +338,7 @@ fn check_of_the_data_fits_base_and_geometry_and_names_rows_that_have_no_partner(
     has(&told, "geometry  cached");
     let diagnosed =
         format!("{PIPELINE}  - uses: split\n    with: {{by: every, n: 4}}\n  - uses: diagnose\n");
-    std::fs::write(folder.path().join("diagnosed.yaml"), diagnosed).unwrap();
+    put(folder.path(), "diagnosed.yaml", diagnosed);
     assert_eq!(
         calib(
             folder.path(),

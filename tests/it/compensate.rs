@@ -17,7 +17,7 @@ mod stated;
 mod true_error;
 mod within;
 
-use crate::answer::{ends_with, has, starts_with};
+use crate::answer::{ends_with, has, put, read, starts_with};
 use calib::compensate::{Chain, Nominal, SETTLED, ToolGoal, inverse, least_change};
 use calib::robot::RobotModel;
 use calib::twin::conceal::robots::Kind;
@@ -123,8 +123,8 @@ pub fn cell() -> &'static Path {
     static CELL: OnceLock<tempfile::TempDir> = OnceLock::new();
     let folder = CELL.get_or_init(|| {
         let folder = tempfile::tempdir().unwrap();
-        std::fs::write(folder.path().join("robot.yaml"), ROBOT).unwrap();
-        std::fs::write(folder.path().join("pipeline.yaml"), PIPELINE).unwrap();
+        put(folder.path(), "robot.yaml", ROBOT);
+        put(folder.path(), "pipeline.yaml", PIPELINE);
         let output = calib(folder.path(), &["run", "pipeline.yaml", "--quiet"], "");
         assert!(
             output.status.success(),
@@ -176,10 +176,10 @@ fn only_the_numbers_of_joints_change_in_a_text_of_targets() {
         (before[0], before[2], before[4]),
         (after[0], after[2], after[4])
     );
-    starts_with(&after[1], "P1;10,");
-    ends_with(&after[1], ";\"a;b\"");
-    starts_with(&after[3], "P2;-");
-    ends_with(&after[3], "; x ");
+    starts_with(after[1], "P1;10,");
+    ends_with(after[1], ";\"a;b\"");
+    starts_with(after[3], "P2;-");
+    ends_with(after[3], "; x ");
     let first: f64 = after[1]
         .split(';')
         .nth(1)
@@ -482,7 +482,7 @@ fn quiet_keeps_warnings_and_takes_the_summary() {
 #[test]
 fn partial_targets_of_a_program_stay_where_that_is_wished_and_nothing_is_written_otherwise() {
     let program = "PTP {A1 10,A2 20,A3 -30,A4 5,A5 40,A6 0}\r\nLIN {X 10,Y 20}\r\nPTP {A1 20}\r\n";
-    std::fs::write(cell().join("partial.src"), program).unwrap();
+    put(cell(), "partial.src", program);
     let run = |more: &[&str]| {
         let output = calib(
             cell(),
@@ -526,9 +526,9 @@ fn partial_targets_of_a_program_stay_where_that_is_wished_and_nothing_is_written
             "warning: partial.src:3:5: left as it is: the target has no A2, A3, A4, A5, A6; {whole}"
         ),
     );
-    let written = std::fs::read_to_string(cell().join("partial_c.src")).unwrap();
+    let written = read(cell().join("partial_c.src"));
     let (mark, rest) = written.split_once('\n').unwrap();
-    starts_with(&mark, "; corrected by calib");
+    starts_with(mark, "; corrected by calib");
     assert!(
         rest.starts_with("PTP {A1 10.") || rest.starts_with("PTP {A1 9."),
         "{written}"

@@ -1,6 +1,6 @@
 //! HEAD is the last complete run; runs of other commands are listed as such, addressed by id, and displace no kept run.
 
-use crate::answer::has;
+use crate::answer::{has, read};
 use crate::compensate::{calib, cell};
 use serde_json::Value;
 use std::path::Path;
@@ -201,7 +201,7 @@ fn a_manifest_that_names_no_purpose_is_of_a_run_of_its_own() {
         .unwrap()
         .to_string();
     let path = here.join(".calib/runs").join(&run).join("manifest.json");
-    let text = std::fs::read_to_string(&path).unwrap();
+    let text = read(&path);
     let body =
         text.split(",\n  \"sealed\"")
             .next()
@@ -293,7 +293,6 @@ fn a_run_that_does_nothing_logs_one_line_a_stage() {
     assert_eq!(stages, ["robot", "simulate", "split", "identify"], "{log}");
     assert!(log.lines().all(|line| line.ends_with("  cached")), "{log}");
     let run = json(here, &["log"])[0]["run"].as_str().unwrap().to_string();
-    let events =
-        std::fs::read_to_string(here.join(".calib/runs").join(run).join("events.jsonl")).unwrap();
+    let events = read(here.join(".calib/runs").join(run).join("events.jsonl"));
     assert_eq!(events.lines().count(), 4, "{events}");
 }

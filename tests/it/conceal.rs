@@ -1,6 +1,6 @@
 //! Concealed recordings: what they hide is there, nulls hide nothing, and a seed gives the same bytes whoever works on it.
 
-use crate::answer::has;
+use crate::answer::{has, put, read};
 use calib::twin::conceal::case::Case;
 use calib::twin::conceal::design::{Content, Design};
 use calib::twin::conceal::family::FAMILIES;
@@ -286,7 +286,7 @@ fn judged(root: &Path, say: impl Fn(&Value) -> Vec<Value>) -> (PathBuf, PathBuf)
             "explained"
         };
         let answer = json!({ "verdict": verdict, "findings": findings });
-        std::fs::write(verdicts.join(path.file_name().unwrap()), answer.to_string()).unwrap();
+        put(&verdicts, path.file_name().unwrap(), answer.to_string());
     }
     (set, verdicts)
 }
@@ -632,7 +632,7 @@ fn a_stated_twin_is_written_as_a_case_folder_that_the_estimator_reads() {
     assert!((0.85..1.35).contains(&bare), "{bare}");
     assert!(worn > 5.0 * bare, "{worn} against {bare}");
 
-    let truth = std::fs::read_to_string(root.path().join("worn/truth.csv")).unwrap();
+    let truth = read(root.path().join("worn/truth.csv"));
     has(&truth, "\nbacklash.j2.gap,backlash,joint 2,arcsec,60\n");
     let again = record("worn", "all");
     assert!(

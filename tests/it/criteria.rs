@@ -1,5 +1,6 @@
 //! Numbers by which something is decided stand in one room, each with its meaning, unit and source.
 
+use crate::answer::read;
 use calib::criteria::TABLES;
 use std::collections::BTreeSet;
 
@@ -90,12 +91,11 @@ fn no_number_decides_outside_the_tables() {
         .iter()
         .filter(|source| ROOMS.iter().any(|room| source.file.starts_with(room)))
     {
-        let text = std::fs::read_to_string(format!(
+        let text = read(format!(
             "{}/src/{}",
             env!("CARGO_MANIFEST_DIR"),
             source.file
-        ))
-        .unwrap();
+        ));
         for (at, line) in text.lines().enumerate() {
             let Some((_, rest)) = line.split_once("const ") else {
                 continue;

@@ -12,7 +12,7 @@ mod tool_mass;
 mod weight;
 mod without;
 
-use crate::answer::has;
+use crate::answer::{has, put, read, root};
 use crate::desk::{Desk, shared, table};
 use crate::suspects::{Inputs, pipeline};
 use calib::effect::{Form, Load};
@@ -159,7 +159,7 @@ fn blind(family: &str, seed: &str) -> (Value, Value) {
     }
     arguments.extend(["--robot", "compact6", "--faulty", "0"]);
     calib(&arguments, folder.path());
-    let pipeline = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/case/pipeline.yaml");
+    let pipeline = root("pipelines/case/pipeline.yaml");
     let pipeline = pipeline.display().to_string();
     let said = calib(
         &[
@@ -172,7 +172,7 @@ fn blind(family: &str, seed: &str) -> (Value, Value) {
         ],
         folder.path(),
     );
-    let truth = std::fs::read_to_string(folder.path().join("sealed/sealed/c0001.json")).unwrap();
+    let truth = read(folder.path().join("sealed/sealed/c0001.json"));
     (
         serde_json::from_str(&said).unwrap(),
         serde_json::from_str(&truth).unwrap(),
@@ -251,7 +251,7 @@ stages:
 "
     );
     let folder = concealed("backlash", "31", "40");
-    std::fs::write(folder.path().join("p.yaml"), pipeline).unwrap();
+    put(folder.path(), "p.yaml", pipeline);
     serde_json::from_str(&calib(
         &["diagnose", "p.yaml", "--json", "--quiet"],
         folder.path(),
@@ -301,7 +301,7 @@ fn a_joint_of_the_wrong_sign_is_named_with_the_line_that_mends_it() {
         folder.path(),
     );
     let file = folder.path().join("sealed/recordings/c0001/controller.csv");
-    let text = std::fs::read_to_string(&file).unwrap();
+    let text = read(&file);
     let column = text
         .lines()
         .next()
@@ -316,10 +316,7 @@ fn a_joint_of_the_wrong_sign_is_named_with_the_line_that_mends_it() {
     };
     let turned: Vec<String> = text.lines().enumerate().map(reverse).collect();
     std::fs::write(&file, turned.join("\n")).unwrap();
-    let pipeline = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("pipelines/case/pipeline.yaml")
-        .display()
-        .to_string();
+    let pipeline = root("pipelines/case/pipeline.yaml").display().to_string();
     let asked = [
         "diagnose",
         &pipeline,
@@ -418,7 +415,7 @@ fn what_another_simulation_knows_is_not_missing_from_it() {
         )
     };
     let (alone, mut model, data) = diagnosed(None);
-    let truth = std::fs::read_to_string(folder.path().join("sealed/sealed/c0001.json")).unwrap();
+    let truth = read(folder.path().join("sealed/sealed/c0001.json"));
     let truth: Value = serde_json::from_str(&truth).unwrap();
     assert_eq!(alone, wanted(&truth["want"]));
     // Beside a rigid arm in a frame of its own the same is missing.
@@ -480,15 +477,12 @@ fn refused(arguments: &[&str], folder: &Path) -> (Option<i32>, String) {
 
 /// The pipeline of cases, with one text in place of another.
 fn case_with(folder: &Path, changes: &[(&str, &str)]) {
-    let text = std::fs::read_to_string(
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/case/pipeline.yaml"),
-    )
-    .unwrap();
+    let text = read(root("pipelines/case/pipeline.yaml"));
     let text = changes.iter().fold(text, |text, (from, to)| {
         assert!(text.contains(from), "{from}");
         text.replacen(from, to, 1)
     });
-    std::fs::write(folder.join("p.yaml"), text).unwrap();
+    put(folder, "p.yaml", text);
 }
 
 const CASE: [&str; 2] = ["--set", "case=sealed/recordings/c0001"];
@@ -594,7 +588,7 @@ fn parameters_that_correct_an_outside_simulation_are_not_taken_for_the_robots_ow
     let folder = concealed("joint_compliance", "931", "60");
     let here = folder.path();
     let file = here.join("sealed/recordings/c0001/tracker.csv");
-    let text = std::fs::read_to_string(&file).unwrap();
+    let text = read(&file);
     let column = text
         .lines()
         .next()
@@ -625,7 +619,7 @@ fn parameters_that_correct_an_outside_simulation_are_not_taken_for_the_robots_ow
         &[&["diagnose", "p.yaml", "--quiet"], &CASE[..]].concat(),
         here,
     );
-    std::fs::write(here.join("t.csv"), "x_mm,y_mm,z_mm\n600,0,700\n").unwrap();
+    put(here, "t.csv", "x_mm,y_mm,z_mm\n600,0,700\n");
     let table = ".calib/tables/case/diagnose.parameters.parquet";
     let robot = "sealed/recordings/c0001/robot.json";
     let run = newest(here);

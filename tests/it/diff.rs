@@ -1,5 +1,6 @@
 //! `calib diff` of two files: classes of rows, units, angles, rotations, duplicates, exit codes.
 
+use crate::answer::read;
 use arrow::array::{ArrayRef, Float64Array, Int64Array, RecordBatch, StringArray};
 use arrow::datatypes::{Field, Schema};
 use parquet::arrow::ArrowWriter;
@@ -456,7 +457,7 @@ fn the_page_escapes_names_and_the_table_of_cells_has_a_row_for_each() {
     ];
     let output = diff(&a, &b, &arguments);
     assert_eq!(output.status.code(), Some(1), "{}", said(&output));
-    let html = std::fs::read_to_string(&page).unwrap();
+    let html = read(&page);
     assert!(
         html.contains("&lt;script&gt;") && !html.contains("<script>"),
         "{html}"

@@ -7,6 +7,7 @@
 //! `CALIB_UPDATE=1 cargo test --test it digests` writes the file anew, except for a stage whose number did not move with its tables.
 //! Where a schema has a new major version, run the pipelines in `digests/` and take their tables from the folder `tables` of the store.
 
+use crate::answer::{put, root};
 use crate::desk::Desk;
 use arrow::array::{Array, AsArray};
 use arrow::datatypes::{DataType, Float64Type};
@@ -83,7 +84,7 @@ const TRIALS: &[(&str, &str, &str)] = &[
 ];
 
 fn folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/it/digests")
+    root("tests/it/digests")
 }
 fn short(hasher: &blake3::Hasher) -> String {
     hasher.finalize().to_hex()[..16].to_string()
@@ -380,7 +381,7 @@ fn equal_inputs_give_equal_tables_unless_the_implementation_has_another_number()
             .iter()
             .map(|(name, digest)| format!("{name} {digest}"))
             .collect();
-        std::fs::write(folder().join("digests.txt"), format!("{head}{text}")).unwrap();
+        put(folder(), "digests.txt", format!("{head}{text}"));
         stale.clear();
     }
     assert!(

@@ -1,11 +1,11 @@
 //! A disk that refuses: the run says what to do, keeps what is finished and goes on when it can.
 
-use crate::answer::has;
+use crate::answer::{has, root};
 use std::path::Path;
 use std::process::{Command, Output};
 
 fn pipeline() -> std::path::PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/it/resume/pipeline.yaml")
+    root("tests/it/resume/pipeline.yaml")
 }
 fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()

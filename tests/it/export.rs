@@ -1,6 +1,6 @@
 //! Exports: what is written is read back by calib itself and is the same arm; programs change in the numbers of targets alone.
 
-use crate::answer::has;
+use crate::answer::{has, put, read};
 use crate::compensate::{PIPELINE, calib, cell};
 use calib::robot::RobotModel;
 use calib::robot::import::{RobotFileText, read_calib};
@@ -195,12 +195,12 @@ fn of_the_library(name: &str) -> tempfile::TempDir {
         .unwrap()
         .text
         .replace("point: [0, 0, 0]", "point: [40, 30, 120]");
-    std::fs::write(folder.path().join("robot.yaml"), robot).unwrap();
+    put(folder.path(), "robot.yaml", robot);
     let pipeline = PIPELINE.replace(
         "[0.4, 0.2, -0.3]",
         "[0.4, 0.2, -0.3], tilt_arcsec: [40, 20, 60]",
     );
-    std::fs::write(folder.path().join("pipeline.yaml"), pipeline).unwrap();
+    put(folder.path(), "pipeline.yaml", pipeline);
     let output = calib(folder.path(), &["run", "pipeline.yaml", "--quiet"], "");
     assert!(
         output.status.success(),
@@ -380,17 +380,17 @@ fn a_mujoco_model_is_the_arm_that_was_identified_with_its_limits_and_known_masse
     // The cell's arm by another name, of which the table must be a model.
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    std::fs::write(
-        here.join("heavy <1>.yaml"),
+    put(
+        here,
+        "heavy <1>.yaml",
         heavy.replace("name: small", "name: \"<a & b> ---\""),
-    )
-    .unwrap();
-    let pipeline = std::fs::read_to_string(cell().join("pipeline.yaml")).unwrap();
-    std::fs::write(
-        here.join("pipeline.yaml"),
+    );
+    let pipeline = read(cell().join("pipeline.yaml"));
+    put(
+        here,
+        "pipeline.yaml",
         pipeline.replace("robot.yaml", "'heavy <1>.yaml'"),
-    )
-    .unwrap();
+    );
     let export = |format: &str| {
         let output = calib(here, &["export", "pipeline.yaml", "--format", format], "");
         assert!(

@@ -17,6 +17,7 @@ mod together;
 mod wide;
 mod workbooks;
 
+use crate::answer::read;
 use crate::desk::{Desk, shared, table};
 use calib::error::{Error, Result};
 use calib::robot::SigmaSource;
@@ -289,7 +290,7 @@ fn the_practice_recordings_join_fully() {
     folders.sort();
     assert_eq!(folders.len(), 28);
     for folder in folders {
-        let arm = std::fs::read_to_string(folder.join("robot.json")).unwrap();
+        let arm = read(folder.join("robot.json"));
         let arm: serde_json::Value = serde_json::from_str(&arm).unwrap();
         let joints = arm["axes"].as_array().unwrap().len();
         let desk = Desk::default();

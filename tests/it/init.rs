@@ -5,7 +5,7 @@ mod layouts;
 mod lists;
 mod torques;
 
-use crate::answer::has;
+use crate::answer::{has, put, read};
 use crate::compensate::calib;
 use std::fmt::Write;
 
@@ -21,8 +21,8 @@ fn what_init_writes_is_understood_and_never_overwrites() {
         writeln!(controller, "P{k};{};10,0;ok", q.join(";")).unwrap();
         writeln!(tracker, "P{k},{}.5,-200,900", 1500 + k).unwrap();
     }
-    std::fs::write(folder.path().join("controller.csv"), controller).unwrap();
-    std::fs::write(folder.path().join("tracker.csv"), tracker).unwrap();
+    put(folder.path(), "controller.csv", controller);
+    put(folder.path(), "tracker.csv", tracker);
     let arguments = ["init", ".", "--data", "controller.csv", "tracker.csv"];
     let output = calib(folder.path(), &arguments, "");
     let said = String::from_utf8_lossy(&output.stdout).into_owned();
@@ -32,7 +32,7 @@ fn what_init_writes_is_understood_and_never_overwrites() {
         String::from_utf8_lossy(&output.stderr)
     );
     has(&said, ["6 joints (A1 to A6)", "not used: remark"]);
-    let pipeline = std::fs::read_to_string(folder.path().join("pipeline.yaml")).unwrap();
+    let pipeline = read(folder.path().join("pipeline.yaml"));
     for part in [
         "file: \"controller.csv\"",
         "delimiter: \";\"",
@@ -94,14 +94,14 @@ fn a_foreign_table_is_understood_as_it_stands_and_what_is_left_to_do_is_said() {
         )
         .unwrap();
     }
-    std::fs::write(folder.path().join("messung.csv"), table).unwrap();
+    put(folder.path(), "messung.csv", table);
     let output = calib(folder.path(), &["init", ".", "--data", "messung.csv"], "");
     assert!(
         output.status.success(),
         "{}",
         String::from_utf8_lossy(&output.stderr)
     );
-    let pipeline = std::fs::read_to_string(folder.path().join("pipeline.yaml")).unwrap();
+    let pipeline = read(folder.path().join("pipeline.yaml"));
     for part in [
         "point_id: {column: \"Messpunkt\"}",
         "q: {column: \"Achse{j} [\u{b0}]\", unit: deg}\n",
@@ -122,7 +122,7 @@ fn a_foreign_table_is_understood_as_it_stands_and_what_is_left_to_do_is_said() {
     let identified = pipeline
         .replace("# limits:", "limits:")
         .replace("# identity:", "identity:");
-    std::fs::write(folder.path().join("pipeline.yaml"), identified).unwrap();
+    put(folder.path(), "pipeline.yaml", identified);
     let check = calib(folder.path(), &["check", "pipeline.yaml"], "");
     assert!(
         check.status.success(),
@@ -130,7 +130,7 @@ fn a_foreign_table_is_understood_as_it_stands_and_what_is_left_to_do_is_said() {
         String::from_utf8_lossy(&check.stderr)
     );
 
-    std::fs::write(folder.path().join("bare.csv"), "a;b;c;d\n1;2;3;4\n").unwrap();
+    put(folder.path(), "bare.csv", "a;b;c;d\n1;2;3;4\n");
     let output = calib(folder.path(), &["init", "bare", "--data", "bare.csv"], "");
     let said = String::from_utf8_lossy(&output.stdout).into_owned();
     has(
@@ -147,7 +147,7 @@ fn every_kind_of_robot_that_init_writes_is_read() {
         let folder = tempfile::tempdir().unwrap();
         let output = calib(folder.path(), &["init", "--robot", kind], "");
         assert!(output.status.success());
-        let text = std::fs::read_to_string(folder.path().join("robot.yaml")).unwrap();
+        let text = read(folder.path().join("robot.yaml"));
         let file = calib::robot::import::RobotFileText {
             label: "robot.yaml",
             text: &text,

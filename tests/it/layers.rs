@@ -1,8 +1,9 @@
 //! The map in `src/lib.rs` is true: every layer uses what its row of the table allows, and nothing else.
 
+use crate::answer::{read, root};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use crate::source::{Source, sources, uses};
 
@@ -20,12 +21,12 @@ const NUMERICS: [&str; 8] = [
 ];
 
 fn source() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
+    root("src")
 }
 
 /// Layer -> what it may use, from the rows ``| [`layer`] | holds | may use |``, a private one without brackets. A use is a module or `module::file`.
 fn table() -> BTreeMap<String, BTreeSet<String>> {
-    let text = fs::read_to_string(source().join("lib.rs")).unwrap();
+    let text = read(source().join("lib.rs"));
     let rows = text
         .lines()
         .filter_map(|line| line.strip_prefix("//! | "))
@@ -60,7 +61,7 @@ fn table() -> BTreeMap<String, BTreeSet<String>> {
 #[test]
 fn every_layer_is_a_row_of_the_map_and_every_row_a_layer() {
     let text = ["lib.rs", "foundation/lib.rs", "numerics/lib.rs"]
-        .map(|file| fs::read_to_string(source().join(file)).unwrap())
+        .map(|file| read(source().join(file)))
         .concat();
     let declared: BTreeSet<String> = text
         .lines()
@@ -146,9 +147,7 @@ fn stages_do_not_use_each_other() {
         .unwrap()
         .map(|entry| entry.unwrap().path())
         // What several stages share is no stage.
-        .filter(|path| {
-            path.is_file() && fs::read_to_string(path).unwrap().contains("impl Stage for")
-        })
+        .filter(|path| path.is_file() && read(path).contains("impl Stage for"))
         .map(|path| path.file_stem().unwrap().to_string_lossy().into_owned())
         .collect();
     let mut faults = Vec::new();

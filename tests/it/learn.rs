@@ -1,6 +1,6 @@
 //! The stage `learn`: what it gains on the twin, what it refuses, and what it says.
 
-use crate::answer::has;
+use crate::answer::{has, root};
 use crate::desk::{Desk, table};
 use calib::error::Result;
 use calib::robot::import::{RobotFileText, read_calib};
@@ -15,7 +15,6 @@ use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
-use std::path::Path;
 
 fn settings<S: Stage>(value: Value) -> S {
     serde_json::from_value(value).unwrap()
@@ -37,7 +36,7 @@ fn mean_error(prediction: &Prediction, set: &str) -> f64 {
 
 /// The paper's sequence on the twin of `pipelines/sr210d` up to the network.
 fn paper_sequence(seed: u64) -> (Recording, Split, Prediction) {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sr210d");
+    let folder = root("pipelines/sr210d");
     let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
     let description = read_calib(
         RobotFileText {

@@ -4,7 +4,7 @@ mod diagnose;
 mod identify;
 mod tables;
 
-use crate::answer::has;
+use crate::answer::{has, read, root};
 use crate::fixture;
 use crate::identify::{model, normal};
 use crate::readme::example;
@@ -16,7 +16,6 @@ use calib::robot::{Measurements, PointReadings, RobotModel};
 use calib::spatial::{Pose, Twist};
 use nalgebra::Vector3;
 use serde_json::json;
-use std::path::Path;
 use std::process::Command;
 
 /// m, per axis.
@@ -133,13 +132,13 @@ fn missing_physics_is_named_from_arrays() {
         "{said}"
     );
     let statement = finding["statement"].as_str().unwrap_or_default();
-    has(&statement, "5 times a turn by 21 arcsec");
+    has(statement, "5 times a turn by 21 arcsec");
 }
 
 #[test]
 fn the_tables_of_a_run_are_read_as_rust_values() {
     let store = tempfile::tempdir().unwrap();
-    let pipeline = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/it/resume/pipeline.yaml");
+    let pipeline = root("tests/it/resume/pipeline.yaml");
     let mut command = Command::new(env!("CARGO_BIN_EXE_calib"));
     let output = command
         .arg("run")
@@ -168,8 +167,7 @@ fn the_tables_of_a_run_are_read_as_rust_values() {
 
 #[test]
 fn the_documentation_shows_these_files() {
-    let text =
-        std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("src/lib.rs")).unwrap();
+    let text = read(root("src/lib.rs"));
     for name in ["identify", "diagnose", "tables"] {
         assert!(
             text.contains(&format!(

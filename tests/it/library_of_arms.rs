@@ -1,5 +1,6 @@
 //! The library of arms: reach as published, axes as public models have them, and a run of each from `init --robot`.
 
+use crate::answer::put;
 use crate::compensate::calib;
 use calib::robot::{LIBRARY, RobotModel};
 use calib::spatial::Pose;
@@ -170,11 +171,11 @@ fn every_arm_of_the_library_goes_from_init_to_a_run() {
         let read = arm.read().unwrap();
         let robot = RobotModel::new(read.robot.clone());
         let folder = tempfile::tempdir().unwrap();
-        std::fs::write(
-            folder.path().join("measured.csv"),
+        put(
+            folder.path(),
+            "measured.csv",
             recording(&robot, &read.about.coupled),
-        )
-        .unwrap();
+        );
         let run = |arguments: &[&str]| {
             let output = calib(folder.path(), arguments, "");
             let said = [output.stdout, output.stderr]

@@ -1,9 +1,9 @@
 //! Recordings of a moving arm: clocks apart and joints that trail are named with their size, and a sound arm has nothing missing,
 //! whether the controller logs velocities or they follow from the joints over time.
 
-use crate::answer::{has, starts_with};
+use crate::answer::{has, read, root, starts_with};
 use serde_json::Value;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::Command;
 
 fn calib(arguments: &[&str]) -> String {
@@ -18,7 +18,7 @@ fn calib(arguments: &[&str]) -> String {
 
 /// Something wrong everywhere that a rigid model takes up, and what `effects` and `motion` say besides.
 fn twin(seed: u64, effects: &str, motion: &str, more: &str) -> String {
-    let robot = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sr210d/robot.yaml");
+    let robot = root("pipelines/sr210d/robot.yaml");
     let links = (1..=6).map(|link| {
         format!("{{link: {link}, shift_mm: [0.3, -0.2, 0.4], tilt_arcsec: [40, -60, 20]}}")
     });
@@ -51,8 +51,8 @@ impl Case {
 
     /// `more` are lines of `ingest` beyond those of `pipelines/case`.
     fn diagnose(&self, more: &str) -> Value {
-        let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/case/pipeline.yaml");
-        let text = std::fs::read_to_string(own).unwrap().replace(
+        let own = root("pipelines/case/pipeline.yaml");
+        let text = read(own).replace(
             "      join: {by: id}\n",
             &format!("      join: {{by: id}}\n{more}"),
         );
@@ -105,8 +105,8 @@ fn clocks_that_are_apart_are_named_with_their_milliseconds() {
         "{value} +- {sigma} ms"
     );
     let said = found["findings"][0]["statement"].as_str().unwrap();
-    starts_with(&said, "the tracker's clock is ");
-    has(&said, "ms late relative to the controller's");
+    starts_with(said, "the tracker's clock is ");
+    has(said, "ms late relative to the controller's");
     assert_eq!(found["verdict"], "explained");
     // Told so, ingest carries the joints there and nothing is left.
     let cured = case.diagnose(&format!("      motion: {{later_s: {}}}\n", 1e-3 * value));

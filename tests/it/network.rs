@@ -1,6 +1,6 @@
 //! The perceptron, its gradient, its training, its valid range and the judge of whether it helps.
 
-use crate::answer::has;
+use crate::answer::{has, read, root};
 use calib::estimate::network::arm::ScrewArm;
 use calib::estimate::network::correction::{Body, NetworkScaling, Networks, Scaling, features};
 use calib::estimate::network::loss::{Batch, Loss, LossBuffers};
@@ -206,8 +206,8 @@ fn a_smooth_remainder_is_learnt_and_the_noise_is_not() {
 
 /// The SR210D, its base turned and shifted in the tracker's frame.
 fn sr210d() -> ScrewArm {
-    let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sr210d/robot.yaml");
-    let text = std::fs::read_to_string(file).unwrap();
+    let file = root("pipelines/sr210d/robot.yaml");
+    let text = read(file);
     let robot = RobotModel::new(
         read_calib(
             RobotFileText {

@@ -1,6 +1,6 @@
 //! A user's own effect in YAML: found by its name on concealed recordings, and kept with its run.
 
-use crate::answer::{has, starts_with};
+use crate::answer::{has, put, read, starts_with};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -50,14 +50,14 @@ fn found(said: &Value) -> Vec<String> {
 
 /// The pipeline of cases without its reports, with an effect of one's own.
 fn pipeline(folder: &Path, effect: &str) {
-    let text = std::fs::read_to_string(root().join("pipelines/case/pipeline.yaml")).unwrap();
+    let text = read(root().join("pipelines/case/pipeline.yaml"));
     let (head, _) = text.split_once("  - uses: validate").unwrap();
     let text = head.replace(
         "  - uses: diagnose\n",
         &format!("  - uses: diagnose\n    with: {{effects: [{effect}]}}\n"),
     );
     has(&text, effect);
-    std::fs::write(folder.join("p.yaml"), text).unwrap();
+    put(folder, "p.yaml", text);
 }
 
 /// Concealed recordings with a local error at some joint, which the library does not name: their numbers and joints.
@@ -87,9 +87,7 @@ fn bumps(folder: &Path) -> Vec<(String, String)> {
         .map(|file| file.unwrap().path())
         .collect();
     sealed.sort();
-    let truth = |file: &PathBuf| -> Value {
-        serde_json::from_str(&std::fs::read_to_string(file).unwrap()).unwrap()
-    };
+    let truth = |file: &PathBuf| -> Value { serde_json::from_str(&read(file)).unwrap() };
     let name = |file: &PathBuf| file.file_stem().unwrap().to_string_lossy().into_owned();
     let place = |truth: &Value| truth["want"][0]["where"].as_str().unwrap().to_string();
     let of_bumps = sealed
@@ -132,7 +130,7 @@ fn an_effect_of_ones_own_is_found_at_its_joint_and_stays_with_its_run() {
             "{name}: {said:#}"
         );
         let statement = said["findings"][0]["statement"].as_str().unwrap();
-        starts_with(&statement, &format!("a tooth of {place} is worn near "));
+        starts_with(statement, &format!("a tooth of {place} is worn near "));
         assert_eq!(said["findings"][0]["parameters"][0]["unit"], "arcsec");
     }
 
@@ -153,7 +151,7 @@ fn an_effect_of_ones_own_is_found_at_its_joint_and_stays_with_its_run() {
         "{again:#}"
     );
     let targets = "name,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\na,10,-100,20,5,30,0\nb,-20,-70,40,15,-25,60\n";
-    std::fs::write(here.join("targets.csv"), targets).unwrap();
+    put(here, "targets.csv", targets);
     let corrected = || calib(&["compensate", "HEAD", "targets.csv"], here);
     let with_the_file = corrected();
     assert_ne!(
@@ -179,13 +177,8 @@ fn an_effect_of_ones_own_is_found_at_its_joint_and_stays_with_its_run() {
         calib(verb, here);
     }
     // The law as it stood is part of what decides whether a run is the same.
-    let law =
-        std::fs::read_to_string(root().join("pipelines/case/effects/worn_tooth.yaml")).unwrap();
-    std::fs::write(
-        here.join("worn_tooth.yaml"),
-        law.replace("to: 1.2", "to: 1.1"),
-    )
-    .unwrap();
+    let law = read(root().join("pipelines/case/effects/worn_tooth.yaml"));
+    put(here, "worn_tooth.yaml", law.replace("to: 1.2", "to: 1.1"));
     let other: Value = serde_json::from_str(&calib(
         &[&["run", "p.yaml", "--quiet", "--json"], &set[..]].concat(),
         here,
@@ -250,8 +243,7 @@ fn a_formula_of_an_unknown_is_found_by_its_name_in_the_next_recording() {
         [of("value"), of("sigma")]
     };
     // The twin's own: -41 deg, 34 deg.
-    let truth =
-        std::fs::read_to_string(here.join(format!("sealed/sealed/{}.json", bumps[2].0))).unwrap();
+    let truth = read(here.join(format!("sealed/sealed/{}.json", bumps[2].0)));
     let truth: Value = serde_json::from_str(&truth).unwrap();
     let bump = &truth["effects"][0]["physical"][0]["joint_bump"];
     for (name, key) in [("centre", "centre_deg"), ("width", "width_deg")] {
@@ -295,12 +287,8 @@ fn a_formula_of_an_unknown_is_found_by_its_name_in_the_next_recording() {
         "{}",
         String::from_utf8_lossy(&refused.stderr)
     );
-    let text = std::fs::read_to_string(here.join("mine.yaml")).unwrap();
-    std::fs::write(
-        here.join("mine.yaml"),
-        text.replace("bump_of_q", "soft_spot"),
-    )
-    .unwrap();
+    let text = read(here.join("mine.yaml"));
+    put(here, "mine.yaml", text.replace("bump_of_q", "soft_spot"));
     pipeline(here, "mine.yaml");
     for (name, place) in &bumps {
         let said = diagnosed(
@@ -337,14 +325,14 @@ fn a_fleet_finds_an_effect_of_ones_own() {
         .iter()
         .map(|(name, _)| format!("  - folders: sealed/recordings/{name}\n"))
         .collect();
-    std::fs::write(
-        here.join("f.yaml"),
+    put(
+        here,
+        "f.yaml",
         format!(
             "calib: 1\nname: line\npipeline: p.yaml\nrobots:\n{}",
             robots.concat()
         ),
-    )
-    .unwrap();
+    );
     let said: Value = serde_json::from_str(&calib(
         &["fleet", "run", "f.yaml", "--json", "--quiet"],
         here,
@@ -378,7 +366,7 @@ shape:
   moment: {from: 0, to: 3400}
 unit: arcsec
 ";
-    std::fs::write(here.join("late_zero.yaml"), declared).unwrap();
+    put(here, "late_zero.yaml", declared);
     pipeline(here, "late_zero.yaml], without: [zero_shift");
     let arguments = [
         "simulate", "conceal", "--out", "sealed", "--cases", "1", "--seed", "923", "--points",
@@ -399,10 +387,7 @@ unit: arcsec
         .concat(),
         here,
     );
-    let truth: Value = serde_json::from_str(
-        &std::fs::read_to_string(here.join("sealed/sealed/c0001.json")).unwrap(),
-    )
-    .unwrap();
+    let truth: Value = serde_json::from_str(&read(here.join("sealed/sealed/c0001.json"))).unwrap();
     let said = diagnosed(
         &[
             "diagnose",

@@ -1,6 +1,6 @@
 //! `calib query`: SQL over the tables of a run gives what the tables hold.
 
-use crate::answer::{ends_with, has};
+use crate::answer::{ends_with, has, root};
 use calib::audit::{self, QueryTables};
 use calib::pipeline::{Manifest, find_run};
 use calib::store::Store;
@@ -16,7 +16,7 @@ use crate::bucket::bucket_of;
 /// One run that all tests ask.
 static STORE: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
     let folder = tempfile::tempdir().unwrap();
-    let pipeline = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/it/resume/pipeline.yaml");
+    let pipeline = root("tests/it/resume/pipeline.yaml");
     let output = calib(
         folder.path(),
         &["run", pipeline.to_str().unwrap(), "--quiet"],

@@ -1,5 +1,6 @@
 //! Files that others made: damaged ones are refused with their name, endless ones are not opened, a bug is one line and code 70.
 
+use crate::answer::put;
 use crate::compensate::{calib, cell};
 use arrow::array::{ArrayRef, Float64Array, RecordBatch};
 use calib::raw;
@@ -67,14 +68,14 @@ fn a_decoder_that_gives_up_is_a_fault_of_the_file() {
     // Else this test tests nothing: take other bits.
     assert!(!gives_up.is_empty());
     let folder = cell();
-    std::fs::write(folder.join("damaged.parquet"), &gives_up[0]).unwrap();
-    std::fs::write(
-        folder.join("raw.yaml"),
+    put(folder, "damaged.parquet", &gives_up[0]);
+    put(
+        folder,
+        "raw.yaml",
         "calib: 1\nname: raw\nstages:\n  - uses: robot\n    with: {file: robot.yaml}\n  - uses: ingest\n    with:\n      files:\n        \
          - file: damaged.parquet\n          columns: {q: {column: \"q{j}_rad\", unit: rad}, x: {column: q1_rad, unit: mm}, \
          y: {column: q2_rad, unit: mm}, z: {column: q3_rad, unit: mm}}\n",
-    )
-    .unwrap();
+    );
     for (arguments, code) in [
         (
             &[
@@ -135,17 +136,17 @@ fn what_never_ends_is_not_opened_where_a_file_is_needed() {
     assert!(made.unwrap().success());
     std::fs::copy(cell().join("robot.yaml"), folder.join("robot.yaml")).unwrap();
     let pipeline = "calib: 1\nname: raw\nstages:\n  - uses: robot\n    with: {file: FILE}\n";
-    std::fs::write(
-        folder.join("of_pipe.yaml"),
+    put(
+        folder,
+        "of_pipe.yaml",
         pipeline.replace("FILE", "pipe.yaml"),
-    )
-    .unwrap();
-    std::fs::write(
-        folder.join("of_device.yaml"),
+    );
+    put(
+        folder,
+        "of_device.yaml",
         pipeline.replace("FILE", "/dev/zero"),
-    )
-    .unwrap();
-    std::fs::write(folder.join("of_folder.yaml"), pipeline.replace("FILE", "/")).unwrap();
+    );
+    put(folder, "of_folder.yaml", pipeline.replace("FILE", "/"));
     let model = ["compensate", "pipe.parquet", "--robot", "robot.yaml"];
     for (arguments, what) in [
         (

@@ -1,6 +1,6 @@
 //! A run that is killed goes on where it stood, and ends with the tables of an undisturbed one.
 
-use crate::answer::has;
+use crate::answer::{has, root};
 use crate::held_locks;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use serde_json::Value;
@@ -11,7 +11,7 @@ use std::sync::LazyLock;
 use std::time::Duration;
 
 fn pipeline() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/it/resume/pipeline.yaml")
+    root("tests/it/resume/pipeline.yaml")
 }
 fn calib(store: &Path) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_calib"));

@@ -1,5 +1,6 @@
 //! Robot files: every description of one arm is the same arm, and the same as another program's.
 
+use crate::answer::root;
 use crate::arms::{ARMS, Arm};
 use crate::desk::{Desk, shared};
 use calib::description::{Coupling, JointKind, RobotDescription};
@@ -12,7 +13,6 @@ use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use serde_json::Value;
 use std::f64::consts::FRAC_PI_2;
-use std::path::Path;
 
 // m: 1e-9 mm.
 const EXACT: f64 = 1e-12;
@@ -20,9 +20,7 @@ const EXACT: f64 = 1e-12;
 const HEAD: &str = "calib_robot: 1\nunits: {length: mm, angle: deg}\n";
 
 fn reference(file: &str) -> String {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("tests/reference/kinematics")
-        .join(file);
+    let path = root("tests/reference/kinematics").join(file);
     std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
 }
 

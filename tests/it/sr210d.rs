@@ -1,20 +1,21 @@
 //! The paper's experiment on the twin, stage by stage from the settings of `pipelines/sr210d`.
 
+use crate::answer::{read, root};
 use crate::desk::{Desk, table};
 use calib::stage::{Identify, IdentifyReads, ReadRobot, RobotReads, Simulate, SimulateReads};
 use calib::stage::{Stiffness, StiffnessReads};
 use calib::table::{Parameters, Prediction, Recording, Robot, Split, SplitRow, Truth};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 fn folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sr210d")
+    root("pipelines/sr210d")
 }
 
 /// The settings of a stage of the pipeline, with the variable `remainder` put in.
 pub fn settings<T: DeserializeOwned>(id: &str, remainder: &str) -> T {
-    let text = std::fs::read_to_string(folder().join("pipeline.yaml")).unwrap();
+    let text = read(folder().join("pipeline.yaml"));
     let whole: Value = serde_saphyr::from_str(&text.replace("${remainder}", remainder)).unwrap();
     let stages = whole["stages"].as_array().unwrap();
     let stage = stages

@@ -1,6 +1,6 @@
 //! What the stages say of rows that do not belong: tables, notes, and silence on good recordings.
 
-use crate::answer::has;
+use crate::answer::{has, read, root};
 use crate::desk::{Desk, shared, table};
 use crate::sr210d::{experiment, settings};
 use calib::stage::ingest::{Ingest, IngestReads};
@@ -9,7 +9,6 @@ use calib::stage::{Identify, IdentifyReads, ReadRobot, RobotReads};
 use calib::table::{Prediction, PredictionRow, Recording, Robot, Split, Suspects};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
-use std::path::Path;
 
 pub struct Inputs {
     pub robot: Robot,
@@ -23,10 +22,8 @@ pub fn pipeline<T: DeserializeOwned>(
     variables: &[(&str, &str)],
     stage: &str,
 ) -> (Inputs, T) {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("pipelines")
-        .join(name);
-    let text = std::fs::read_to_string(folder.join("pipeline.yaml")).unwrap();
+    let folder = root("pipelines").join(name);
+    let text = read(folder.join("pipeline.yaml"));
     let text = variables.iter().fold(text, |text, (key, value)| {
         text.replace(&format!("${{{key}}}"), value)
     });

@@ -10,6 +10,7 @@ mod masses;
 mod results;
 mod rigid;
 
+use crate::answer::{put, read};
 use crate::desk::shared;
 use calib::dynamics::{
     DynamicArm, INERTIAL_NUMBERS, InertialTolerance, InverseDynamics, MotionRow,
@@ -113,11 +114,11 @@ fn write(folder: &Path, files: &[TorqueFile]) {
     std::fs::create_dir_all(folder).unwrap();
     files
         .iter()
-        .for_each(|(name, text)| std::fs::write(folder.join(name), text).unwrap());
+        .for_each(|(name, text)| put(folder, name, text));
 }
 
 fn json(path: PathBuf) -> Value {
-    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+    serde_json::from_str(&read(path)).unwrap()
 }
 
 #[test]

@@ -1,13 +1,13 @@
 //! The audit trail: runs listed, explained, compared, traced; a store verified bit by bit, and swept.
 
-use crate::answer::{ends_with, has, starts_with};
+use crate::answer::{ends_with, has, put, root, starts_with};
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 fn pipeline() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/it/resume/pipeline.yaml")
+    root("tests/it/resume/pipeline.yaml")
 }
 fn calib(store: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_calib"))
@@ -203,7 +203,7 @@ fn a_limit_that_is_exceeded_is_said_and_ends_with_code_1() {
             .find(|line| line.starts_with("limits    "))
             .unwrap_or_else(|| panic!("{said}"));
         starts_with(
-            &line,
+            line,
             "limits    not accepted: beyond the limits at 20 held-out points of set validate, step geometry",
         );
         assert!(
@@ -334,12 +334,12 @@ fn folders_whose_names_are_no_text_are_used_all_the_same() {
     let named = |bytes: &[u8]| folder.path().join(std::ffi::OsStr::from_bytes(bytes));
     let (cell, store) = (named(b"cell\xff\xfe"), named(b"store\xff"));
     std::fs::create_dir(&cell).unwrap();
-    let robot = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sr210d/robot.yaml");
+    let robot = root("pipelines/sr210d/robot.yaml");
     std::fs::copy(robot, cell.join("robot.yaml")).unwrap();
     let yaml = std::fs::read_to_string(pipeline())
         .unwrap()
         .replace("../../../pipelines/sr210d/robot.yaml", "robot.yaml");
-    std::fs::write(cell.join("p.yaml"), yaml).unwrap();
+    put(&cell, "p.yaml", yaml);
     let mut run = Command::new(env!("CARGO_BIN_EXE_calib"));
     let output = run
         .arg("run")
@@ -359,7 +359,7 @@ fn folders_whose_names_are_no_text_are_used_all_the_same() {
     );
     let manifest = json(&store, &["show", "HEAD"]);
     let path = manifest["stages"][0]["files"][0]["path"].as_str().unwrap();
-    ends_with(&path, "/cell\u{fffd}\u{fffd}/robot.yaml");
+    ends_with(path, "/cell\u{fffd}\u{fffd}/robot.yaml");
     assert!(said(&store, &["log"]).contains("resume  done, 7 run, 0 cached"));
 }
 

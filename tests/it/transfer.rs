@@ -1,6 +1,6 @@
 //! A correction carried to another series of the same robot, only the base refitted: never worse than none.
 
-use crate::answer::has;
+use crate::answer::{has, put};
 use crate::desk::{Desk, shared, table};
 use calib::effect::Load;
 use calib::error::Result;
@@ -645,7 +645,7 @@ fn the_closing_lines_state_the_carried_figure() {
         simulate("there", 2),
         split("placed", "there")
     );
-    std::fs::write(folder.path().join("p.yaml"), pipeline).unwrap();
+    put(folder.path(), "p.yaml", pipeline);
     let run = std::process::Command::new(env!("CARGO_BIN_EXE_calib"))
         .args(["run", "p.yaml", "--quiet"])
         .current_dir(folder.path())

@@ -1,5 +1,6 @@
 //! The twin: its own kinematics and statics against numbers worked out by hand, its noise, its seeds, and the stage.
 
+use crate::answer::{read, root};
 use calib::description::{JointDescription, JointKind, RobotDescription};
 use calib::error::Result;
 use calib::robot::import::{RobotFileText, read_calib};
@@ -18,13 +19,12 @@ use calib::twin::statics::Row;
 use calib::twin::tracker::{Beam, Scatter, Tracker};
 use calib::twin::truth::{CouplingError, LinkError, TrueRobot};
 use std::f64::consts::{FRAC_PI_2, PI};
-use std::path::Path;
 
 const ARCSEC: f64 = PI / 648_000.0;
 
 pub fn sr210d() -> RobotDescription {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sr210d/robot.yaml");
-    let text = std::fs::read_to_string(&path).unwrap();
+    let path = root("pipelines/sr210d/robot.yaml");
+    let text = read(&path);
     read_calib(
         RobotFileText {
             label: "robot.yaml",

@@ -1,6 +1,6 @@
 //! What stands while an arm is measured: one pose is no geometry, and a joint that never moves is said.
 
-use crate::answer::has;
+use crate::answer::{has, put};
 use crate::compensate::{ROBOT, calib};
 use calib::robot::RobotModel;
 use calib::robot::import::{RobotFileText, read_calib};
@@ -62,13 +62,13 @@ fn told(
                 + "\n"),
         );
     }
-    std::fs::write(folder.join("poses.csv"), text).unwrap();
-    std::fs::write(folder.join("robot.yaml"), ROBOT).unwrap();
-    std::fs::write(
-        folder.join("pipeline.yaml"),
+    put(folder, "poses.csv", text);
+    put(folder, "robot.yaml", ROBOT);
+    put(
+        folder,
+        "pipeline.yaml",
         PIPELINE.replace("USES", uses).replace("STEP", uses),
-    )
-    .unwrap();
+    );
     let output = calib(folder, &["run", "pipeline.yaml"], "");
     (
         output.status.code(),

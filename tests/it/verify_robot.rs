@@ -1,6 +1,6 @@
 //! `verify-robot`: what compensation achieved, from points measured at corrected targets.
 
-use crate::answer::has;
+use crate::answer::{has, put};
 use crate::compensate::calib;
 use crate::library_of_arms::{REFLECTOR, on_flange, real, recording, tracker};
 use calib::robot::{LibraryArm, RobotModel};
@@ -19,11 +19,11 @@ fn what_compensation_achieved_is_measured_against_the_wanted_points() {
         assert!(output.status.success(), "{arguments:?}: {told}");
         String::from_utf8_lossy(&output.stdout).into_owned()
     };
-    std::fs::write(
-        folder.path().join("measured.csv"),
+    put(
+        folder.path(),
+        "measured.csv",
         recording(&robot, &read.about.coupled),
-    )
-    .unwrap();
+    );
     run(&[
         "init",
         "cell",
@@ -64,7 +64,7 @@ fn what_compensation_achieved_is_measured_against_the_wanted_points() {
         )
         .unwrap()
     });
-    std::fs::write(folder.path().join("targets.csv"), &targets).unwrap();
+    put(folder.path(), "targets.csv", &targets);
     run(&[
         "compensate",
         "cell/pipeline.yaml",
@@ -95,7 +95,7 @@ fn what_compensation_achieved_is_measured_against_the_wanted_points() {
         )
         .unwrap();
     }
-    std::fs::write(folder.path().join("second.csv"), second).unwrap();
+    put(folder.path(), "second.csv", second);
     let told: Value = serde_json::from_str(&run(&[
         "verify-robot",
         "cell/pipeline.yaml",

@@ -1,6 +1,6 @@
 //! What reaches a robot is what was identified: tables with a changed bit are refused, or change nothing.
 
-use crate::answer::{has, starts_with};
+use crate::answer::{has, put, starts_with};
 use crate::compensate::{calib, cell};
 use calib::identified::{Files, IdentifiedModel};
 use calib::pipeline::{Manifest, find_run};
@@ -22,7 +22,7 @@ fn taken_along() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     for name in [PARAMETERS, ROBOT] {
         let bytes = std::fs::read(cell().join(".calib/tables/small").join(name)).unwrap();
-        std::fs::write(folder.path().join(name), bytes).unwrap();
+        put(folder.path(), name, bytes);
     }
     folder
 }

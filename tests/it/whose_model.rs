@@ -1,7 +1,7 @@
 //! A model moves the arm that it is of: tables of another robot are refused, bodies that cannot be are named, and the tool that was
 //! identified is the tool that goes out.
 
-use crate::answer::has;
+use crate::answer::{has, put};
 use crate::compensate::{ROBOT, calib, cell};
 use crate::desk::shared;
 use calib::robot::RobotModel;
@@ -35,25 +35,25 @@ fn a_model_is_refused_for_another_robot_and_so_is_a_table_that_does_not_say_whos
         here.join(PARAMETERS),
     )
     .unwrap();
-    std::fs::write(
-        here.join("own.yaml"),
+    put(
+        here,
+        "own.yaml",
         ROBOT.replace("limits: [-120, 120]", "limits: [-121, 120]"),
-    )
-    .unwrap();
-    std::fs::write(
-        here.join("renamed.yaml"),
+    );
+    put(
+        here,
+        "renamed.yaml",
         ROBOT.replace("name: small", "name: large"),
-    )
-    .unwrap();
-    std::fs::write(
-        here.join("longer.yaml"),
+    );
+    put(
+        here,
+        "longer.yaml",
         ROBOT.replace("[0, 0, 900]", "[0, 0, 901]"),
-    )
-    .unwrap();
+    );
     let other = ROBOT
         .replace("name: small", "name: large")
         .replace("[0, 0, 900]", "[0, 0, 901]");
-    std::fs::write(here.join("other.yaml"), other).unwrap();
+    put(here, "other.yaml", other);
     let verbs = [
         &["compensate", PARAMETERS][..],
         &["export", PARAMETERS, "--format", "urdf"],
@@ -143,16 +143,16 @@ const URDF: &str = r#"<robot name="rm6"><link name="base_link"/>
 fn inertias_of_no_body_are_named_by_their_links_and_refused_for_torques_alone() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    std::fs::write(here.join("arm.urdf"), URDF).unwrap();
+    put(here, "arm.urdf", URDF);
     let first = "arm.urdf:2: link `Link1`: no body has a principal moment of inertia of 408.868 times the sum of the other two";
     let second = "arm.urdf:3: link `Link2`: no body has a principal moment of inertia that is zero";
     let (code, _, told) = said(here, &["init", "cell", "--urdf", "arm.urdf"]);
     assert_eq!(code, Some(0), "{told}");
     has(&told, [first, second]);
     let pipeline = "calib: 1\nname: u\nseed: 1\nstages:\n  - uses: robot\n    with: {file: robot.yaml, urdf: arm.urdf}\n";
-    std::fs::write(here.join("pipeline.yaml"), pipeline).unwrap();
+    put(here, "pipeline.yaml", pipeline);
     let robot = "calib_robot: 1\nunits: {length: mm, angle: deg}\nkinematics: {urdf: {base: base_link, tip: tool0}}\n";
-    std::fs::write(here.join("robot.yaml"), robot).unwrap();
+    put(here, "robot.yaml", robot);
     let (code, out, told) = said(here, &["check", "pipeline.yaml"]);
     let all = format!("{out}{told}");
     assert_eq!(code, Some(0), "{all}");
@@ -238,13 +238,13 @@ fn the_identified_tool_goes_out_or_is_refused_whether_orientations_are_measured_
         for orientation in [ORIENTATION, ""] {
             let folder = tempfile::tempdir().unwrap();
             let here = folder.path();
-            std::fs::write(here.join("robot.yaml"), ROBOT).unwrap();
-            std::fs::write(here.join("poses.csv"), &poses).unwrap();
-            std::fs::write(
-                here.join("pipeline.yaml"),
+            put(here, "robot.yaml", ROBOT);
+            put(here, "poses.csv", &poses);
+            put(
+                here,
+                "pipeline.yaml",
                 MEASURED.replace("ORIENTATION", orientation),
-            )
-            .unwrap();
+            );
             let export = [
                 "export",
                 "pipeline.yaml",
@@ -318,7 +318,7 @@ kinematics:
 fn every_export_of_an_arm_with_nearly_parallel_axes_is_the_same_arm_when_it_is_read_back() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    std::fs::write(here.join("robot.yaml"), FACTORY).unwrap();
+    put(here, "robot.yaml", FACTORY);
     let pipeline = "calib: 1
 name: factory
 seed: 2
@@ -335,7 +335,7 @@ stages:
   - uses: identify
     with: {on: [fit], effects: [base_frame, joint_offset]}
 ";
-    std::fs::write(here.join("pipeline.yaml"), pipeline).unwrap();
+    put(here, "pipeline.yaml", pipeline);
     let exported = |format: &str| {
         let (code, out, told) = said(
             here,

@@ -5,6 +5,7 @@ use super::maker::{IDENTIFY, Maker, PLAIN, makers, ran, recorded};
 use super::sides::confdata;
 use super::true_error::Cell;
 use super::{ROBOT, calib};
+use crate::answer::put;
 use calib::compensate::{Nominal, ToolGoal, least_change, turns};
 use calib::robot::RobotModel;
 use calib::robot::import::{RobotFileText, read_calib};
@@ -111,7 +112,7 @@ fn compensated(
             format!("PTP {{{}}}\n", named.join(","))
         })
         .collect();
-    std::fs::write(here.join("t.src"), krl).unwrap();
+    put(here, "t.src", krl);
     let krl = ran(here, &["compensate", "latest", "t.src"], "");
     let rapid: String = targets
         .iter()
@@ -122,7 +123,7 @@ fn compensated(
             )
         })
         .collect();
-    std::fs::write(here.join("t.mod"), format!("MODULE m\n{rapid}ENDMODULE\n")).unwrap();
+    put(here, "t.mod", format!("MODULE m\n{rapid}ENDMODULE\n"));
     let rapid = ran(here, &["compensate", "latest", "t.mod"], "");
 
     let cartesian: Vec<(Vec<f64>, [f64; 3], nalgebra::UnitQuaternion<f64>)> = targets
@@ -148,7 +149,7 @@ fn compensated(
             format!("LIN {{X {x:.6},Y {y:.6},Z {z:.6},A {a},B {b},C {c},T {turn}}}\n")
         })
         .collect();
-    std::fs::write(here.join("poses.src"), krl_poses).unwrap();
+    put(here, "poses.src", krl_poses);
     let krl_poses = ran(here, &["compensate", "latest", "poses.src"], "");
     let rapid_poses: String = cartesian
         .iter()
@@ -158,11 +159,11 @@ fn compensated(
             format!("MoveL [[{x:.6},{y:.6},{z:.6}],[{q}],[{one},{four},{six},{cfx}],[9E9,9E9,9E9,9E9,9E9,9E9]],v1,z1,t;\n")
         })
         .collect();
-    std::fs::write(
-        here.join("poses.mod"),
+    put(
+        here,
+        "poses.mod",
         format!("MODULE m\n{rapid_poses}ENDMODULE\n"),
-    )
-    .unwrap();
+    );
     let rapid_poses = ran(here, &["compensate", "latest", "poses.mod"], "");
 
     let listed = |text: &str, start: &str, end: &str| -> Vec<Vec<f64>> {

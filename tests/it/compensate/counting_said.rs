@@ -3,6 +3,7 @@
 use super::maker::{Maker, PLAIN, makers, ran, recorded};
 use super::true_error::Cell;
 use super::{ROBOT, calib};
+use crate::answer::read;
 use calib::poses::{Drive, write};
 use calib::robot::import::{RobotFileText, read_calib};
 use calib::robot::{Measurements, PointReadings, RobotModel};
@@ -29,7 +30,7 @@ fn all_at_once() -> Maker {
 
 /// Rows of a file of poses: joints (deg), sides, point (mm).
 fn poses(file: &Path) -> Vec<[Vec<f64>; 3]> {
-    let text = std::fs::read_to_string(file).unwrap();
+    let text = read(file);
     let row = |line: &str| {
         let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
         [
@@ -207,12 +208,10 @@ fn poses_comparisons_and_report_of_a_run_say_in_which_counting_joints_stand() {
             "joints are said of where they stand"
         );
 
-        let page =
-            std::fs::read_to_string(here.join(".calib/documents/counted/report.html")).unwrap();
+        let page = read(here.join(".calib/documents/counted/report.html"));
         let sentence = "Zeros, ratios and couplings of joints stand in the robot file&#x27;s counting; the controller counts otherwise";
         assert_eq!(page.matches(sentence).count(), usize::from(otherwise));
-        let report =
-            std::fs::read_to_string(here.join(".calib/documents/counted/report.json")).unwrap();
+        let report = read(here.join(".calib/documents/counted/report.json"));
         let report: serde_json::Value = serde_json::from_str(&report).unwrap();
         let counting = report["parameters_counting"].as_str().unwrap();
         assert_eq!(

@@ -3,7 +3,7 @@
 use super::maker::{PLAIN, recorded};
 use super::true_error::Cell;
 use super::{PIPELINE, ROBOT, calib, cell};
-use crate::answer::{ends_with, has, starts_with};
+use crate::answer::{ends_with, has, put, read, starts_with};
 use calib::robot::import::{RobotFileText, read_calib};
 
 const HEADER: &str = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n10,20,-30,5,40,0\n";
@@ -50,7 +50,7 @@ fn a_correction_above_its_limit_has_no_joints_and_one_who_insists_is_told() {
     assert_eq!(code, Some(10));
     has(&out, "at most 0.0001 deg allowed (--max-turn)");
     let program = "PTP {A1 10,A2 20,A3 -30,A4 5,A5 40,A6 0}\n";
-    std::fs::write(cell().join("far.src"), program).unwrap();
+    put(cell(), "far.src", program);
     let (code, out, err) = run(
         &[
             "compensate",
@@ -85,11 +85,11 @@ fn what_calib_corrected_is_not_corrected_once_more() {
             "MODULE m\n! ",
         ),
     ] {
-        std::fs::write(cell().join(name), format!("{head}{target}")).unwrap();
+        put(cell(), name, format!("{head}{target}"));
         let (code, once, err) = run(&["compensate", "latest", name], "");
         assert_eq!(code, Some(0), "{err}");
         starts_with(&once, &format!("{second}corrected by calib from "));
-        std::fs::write(cell().join(name), &once).unwrap();
+        put(cell(), name, &once);
         let (code, out, err) = run(&["compensate", "latest", name], "");
         assert_eq!((code, out.as_str()), (Some(10), ""));
         has(&err, &format!("{name}: was compensated by calib already"));
@@ -104,7 +104,7 @@ fn what_calib_corrected_is_not_corrected_once_more() {
 fn a_cartesian_program_in_a_frame_that_is_not_applied_is_refused_by_line() {
     let rest = "[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]";
     let text = format!("MODULE m\nMoveL [[900,40,930],{rest},v1,z1,t\\WObj:=fixture;\nENDMODULE\n");
-    std::fs::write(cell().join("wobj.mod"), text).unwrap();
+    put(cell(), "wobj.mod", text);
     let (code, out, err) = run(&["compensate", "latest", "wobj.mod"], "");
     assert_eq!((code, out.as_str()), (Some(10), ""), "{err}");
     has(
@@ -131,7 +131,7 @@ fn a_target_in_a_work_object_is_corrected_where_it_stands() {
     let plain = format!(
         "MODULE m\nMoveL [[900,40,930],[1,0,0,0],[9E9,9E9,9E9,9E9],{rest},v1,z1,t;\nENDMODULE\n"
     );
-    std::fs::write(cell().join("plain.mod"), plain).unwrap();
+    put(cell(), "plain.mod", plain);
     let (code, plain, err) = run(&["compensate", "latest", "plain.mod"], "");
     assert_eq!(code, Some(0), "{err}");
     // Moved by 100, 20, -30 mm and turned by half a turn about z: x and y change their signs.
@@ -140,7 +140,7 @@ fn a_target_in_a_work_object_is_corrected_where_it_stands() {
     let program = format!(
         "MODULE m\n{object}MoveL [[-800,-20,960],[0,0,0,1],[9E9,9E9,9E9,9E9],{rest},v1,z1,t\\WObj:=fixture;\nENDMODULE\n"
     );
-    std::fs::write(cell().join("object.mod"), program).unwrap();
+    put(cell(), "object.mod", program);
     let (code, within, err) = run(&["compensate", "latest", "object.mod"], "");
     assert_eq!(code, Some(0), "{err}");
     has(
@@ -160,10 +160,10 @@ fn a_target_in_a_work_object_is_corrected_where_it_stands() {
 fn a_table_of_parameters_without_a_verdict_is_held_to_the_same_limits() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    std::fs::write(here.join("robot.yaml"), ROBOT).unwrap();
+    put(here, "robot.yaml", ROBOT);
     let far = PIPELINE.replace("shift_mm: [0.4, 0.2, -0.3]", "shift_mm: [80.0, 0.2, -0.3]");
     for (pipeline, refused) in [(PIPELINE.to_string(), false), (far, true)] {
-        std::fs::write(here.join("pipeline.yaml"), pipeline).unwrap();
+        put(here, "pipeline.yaml", pipeline);
         calib(here, &["run", "pipeline.yaml", "--quiet"], "");
         let tables = here.join(".calib/tables");
         let table = newest_parameters(&tables);
@@ -257,9 +257,9 @@ fn an_output_never_takes_the_place_of_a_file_that_was_read() {
 fn an_arm_far_from_the_robot_file_is_refused_before_anything_is_written() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    std::fs::write(here.join("robot.yaml"), ROBOT).unwrap();
+    put(here, "robot.yaml", ROBOT);
     let truth = PIPELINE.replace("shift_mm: [0.4, 0.2, -0.3]", "shift_mm: [80.0, 0.2, -0.3]");
-    std::fs::write(here.join("pipeline.yaml"), truth).unwrap();
+    put(here, "pipeline.yaml", truth);
     for verb in [
         &["compensate", "pipeline.yaml"][..],
         &["export", "pipeline.yaml", "--format", "json"],
@@ -301,16 +301,12 @@ fn a_table_whose_common_normals_are_far_from_the_arm_is_refused_with_the_formats
 fn targets_that_state_no_payload_are_refused_where_the_model_depends_on_it() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    std::fs::write(here.join("robot.yaml"), ROBOT).unwrap();
+    put(here, "robot.yaml", ROBOT);
     let loaded = PIPELINE
         .replace("{usage: fit, points: 60}", "{usage: fit, points: 40}, {usage: fit, points: 40, payload_kg: 50}")
         .replace("{on: [fit]}", "{on: [fit], effects: [base_frame, tool_offset, joint_offset, link_geometry, joint_compliance]}");
-    std::fs::write(here.join("pipeline.yaml"), loaded).unwrap();
-    std::fs::write(
-        here.join("p.src"),
-        "PTP {A1 10,A2 20,A3 -30,A4 5,A5 40,A6 0}\n",
-    )
-    .unwrap();
+    put(here, "pipeline.yaml", loaded);
+    put(here, "p.src", "PTP {A1 10,A2 20,A3 -30,A4 5,A5 40,A6 0}\n");
     for file in ["-", "p.src"] {
         let output = calib(
             here,
@@ -355,7 +351,7 @@ fn targets_that_state_no_payload_are_refused_where_the_model_depends_on_it() {
         ),
     ] {
         let said = |text: &str, more: &[&str]| {
-            std::fs::write(here.join(file), text).unwrap();
+            put(here, file, text);
             let output = calib(
                 here,
                 &[&["compensate", "pipeline.yaml", file], more].concat(),
@@ -416,7 +412,7 @@ fn how_far_a_model_may_be_from_the_robot_file_is_for_the_user_to_say() {
 fn a_pipeline_whose_report_does_not_accept_it_is_refused_as_its_run_is() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    std::fs::write(here.join("robot.yaml"), ROBOT).unwrap();
+    put(here, "robot.yaml", ROBOT);
     let pipeline = |limits: &str| {
         format!(
             "{PIPELINE}  - uses: validate\n  - uses: report\n    with: {{limits: {{{limits}}}}}\n"
@@ -429,7 +425,7 @@ fn a_pipeline_whose_report_does_not_accept_it_is_refused_as_its_run_is() {
             String::from_utf8_lossy(&output.stderr).into_owned(),
         )
     };
-    std::fs::write(here.join("strict.yaml"), pipeline("max_mm: 0.0001")).unwrap();
+    put(here, "strict.yaml", pipeline("max_mm: 0.0001"));
     assert_eq!(ran(&["run", "strict.yaml", "--quiet"]).0, Some(1));
     for model in ["strict.yaml", "latest"] {
         let (code, err) = ran(&["compensate", model]);
@@ -446,7 +442,7 @@ fn a_pipeline_whose_report_does_not_accept_it_is_refused_as_its_run_is() {
             "{model}: {err}"
         );
     }
-    std::fs::write(here.join("mild.yaml"), pipeline("max_mm: 10")).unwrap();
+    put(here, "mild.yaml", pipeline("max_mm: 10"));
     assert_eq!(ran(&["compensate", "mild.yaml"]).0, Some(0));
 }
 
@@ -471,7 +467,7 @@ fn a_model_that_leaves_something_unexplained_says_so_once_and_in_the_program() {
     );
     let here = folder.path();
     // Heights with bumps over three joints that no cause has.
-    let log = std::fs::read_to_string(here.join("log.csv")).unwrap();
+    let log = read(here.join("log.csv"));
     let bumpy = |line: &str| {
         let (rest, z) = line.rsplit_once(',').unwrap();
         let cells: Vec<f64> = rest
@@ -485,13 +481,9 @@ fn a_model_that_leaves_something_unexplained_says_so_once_and_in_the_program() {
     };
     let (header, rows) = log.split_once('\n').unwrap();
     let rows: String = rows.lines().map(bumpy).collect();
-    std::fs::write(here.join("log.csv"), format!("{header}\n{rows}")).unwrap();
+    put(here, "log.csv", format!("{header}\n{rows}"));
     calib(here, &["run", "pipeline.yaml", "--quiet"], "");
-    std::fs::write(
-        here.join("p.src"),
-        "PTP {A1 10,A2 20,A3 -30,A4 5,A5 40,A6 0}\n",
-    )
-    .unwrap();
+    put(here, "p.src", "PTP {A1 10,A2 20,A3 -30,A4 5,A5 40,A6 0}\n");
     for model in ["pipeline.yaml", "latest"] {
         let output = calib(here, &["compensate", model, "p.src", "--quiet"], "");
         let [out, err] =
@@ -505,7 +497,7 @@ fn a_model_that_leaves_something_unexplained_says_so_once_and_in_the_program() {
             .lines()
             .find(|line| line.contains("corrected by calib"))
             .unwrap_or_else(|| panic!("{err}"));
-        ends_with(&head, ", verdict of the model: unexplained");
+        ends_with(head, ", verdict of the model: unexplained");
         let export = calib(here, &["export", model, "--format", "json", "--quiet"], "");
         assert_eq!(
             String::from_utf8_lossy(&export.stderr)

@@ -2,7 +2,7 @@
 
 use super::maker::{Maker, makers};
 use super::{ROBOT, calib, cell};
-use crate::answer::has;
+use crate::answer::{has, put};
 use calib::compensate::{
     CommandTarget, CorrectionOptions, Corrector, IdentifiedArm, StatedPosture,
 };
@@ -148,7 +148,7 @@ fn a_pose_is_reached_in_the_posture_that_it_states() {
 }
 
 fn run(name: &str, text: &str) -> (Option<i32>, String, String) {
-    std::fs::write(cell().join(name), text).unwrap();
+    put(cell(), name, text);
     let output = calib(
         cell(),
         &["compensate", "latest", name, "--start", "2,3,4,5,40,0"],

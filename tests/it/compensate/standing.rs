@@ -1,7 +1,7 @@
 //! A step that is worse than one before it at points predicted by fits without them is withdrawn wherever a run is spoken of or used.
 
 use super::{PIPELINE, ROBOT, calib};
-use crate::answer::has;
+use crate::answer::{has, put};
 use serde_json::Value;
 
 const POOR: &str = "  - {id: poor, uses: identify, with: {effects: [base_frame], on: [fit]}}
@@ -13,8 +13,8 @@ const POOR: &str = "  - {id: poor, uses: identify, with: {effects: [base_frame],
 fn a_worse_last_step_is_withdrawn_by_run_report_compensate_and_export() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    std::fs::write(here.join("robot.yaml"), ROBOT).unwrap();
-    std::fs::write(here.join("pipeline.yaml"), format!("{PIPELINE}{POOR}")).unwrap();
+    put(here, "robot.yaml", ROBOT);
+    put(here, "pipeline.yaml", format!("{PIPELINE}{POOR}"));
     let said = |arguments: &[&str], input: &str| -> (String, String) {
         let output = calib(here, arguments, input);
         let [out, err] =

@@ -1,7 +1,7 @@
 //! What a table of targets, or an option, must not state; files that cannot be read or written; one of them and several.
 
 use super::{calib, cell, text};
-use crate::answer::has;
+use crate::answer::{has, put};
 use calib::compensate::CorrectionTotals;
 
 const HEADER: &str = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg";
@@ -122,11 +122,11 @@ fn files_that_cannot_be_read_or_written_are_named_before_a_pipeline_is_run_for_t
     for file in ["robot.yaml", "pipeline.yaml"] {
         std::fs::copy(cell().join(file), folder.path().join(file)).unwrap();
     }
-    std::fs::write(
-        folder.path().join("t.csv"),
+    put(
+        folder.path(),
+        "t.csv",
         format!("{HEADER}\n10,20,-30,5,40,0\n"),
-    )
-    .unwrap();
+    );
     let refused = |arguments: &[&str]| {
         let output = calib(
             folder.path(),

@@ -28,7 +28,7 @@ fn flanks_that_err_differently_are_named_with_their_order_and_amplitude() {
     }
     let statement = finding["statement"].as_str().unwrap();
     has(
-        &statement,
+        statement,
         "the two flanks of the teeth of joint 2 err differently: 5 times a turn by 3",
     );
 }

@@ -126,8 +126,8 @@ fn joints_that_lag_by_less_than_nothing_have_no_name_and_the_model_is_the_same()
         "{said:#}"
     );
     let statement = finding["statement"].as_str().unwrap();
-    starts_with(&statement, "something unknown acts at recording");
-    has(&statement, "joint_log_lag");
+    starts_with(statement, "something unknown acts at recording");
+    has(statement, "joint_log_lag");
     let rivals = finding["rivals"].as_array().unwrap();
     assert!(
         rivals

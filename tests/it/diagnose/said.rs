@@ -1,7 +1,7 @@
 //! What a diagnosis says where the recording is poor: without a clock no seconds, of few rows nothing.
 
 use super::{CASE, calib, case_with, concealed, refused, table_of};
-use crate::answer::{has, starts_with};
+use crate::answer::{has, put, read, starts_with};
 use calib::table::{Curves, Findings};
 use serde_json::Value;
 use std::path::Path;
@@ -9,7 +9,7 @@ use std::path::Path;
 /// Rewrites the cells of the controller's log, row by row, the head first.
 fn rewritten(folder: &Path, mut change: impl FnMut(usize, &mut Vec<String>)) {
     let file = folder.join("sealed/recordings/c0001/controller.csv");
-    let text = std::fs::read_to_string(&file).unwrap();
+    let text = read(&file);
     let mut line = |(row, line): (usize, &str)| {
         let mut cells: Vec<String> = line.split(',').map(String::from).collect();
         change(row, &mut cells);
@@ -60,7 +60,7 @@ fn without_a_clock_nothing_is_said_in_seconds() {
     assert_eq!(rows["clock"], "row");
     let first = times.iter().position(|time| *time > step).unwrap() + 1;
     let statement = rows["findings"][0]["statement"].as_str().unwrap();
-    has(&statement, &format!(" from row {first} ("));
+    has(statement, &format!(" from row {first} ("));
     let unseen = rows["not_observable"].as_array().unwrap();
     assert!(
         unseen
@@ -83,7 +83,7 @@ fn without_a_clock_nothing_is_said_in_seconds() {
         assert_eq!(named, ("place in the recording", "row"));
         assert!(point.x >= 1.0 && point.x.fract() == 0.0, "{}", point.x);
     }
-    std::fs::write(here.join("t.csv"), "x_mm,y_mm,z_mm\n600,0,700\n").unwrap();
+    put(here, "t.csv", "x_mm,y_mm,z_mm\n600,0,700\n");
     let (code, said) = refused(&["compensate", "HEAD", "t.csv", "--time", "100"], here);
     assert!(
         code == Some(2) && said.contains("--time: the recording of the model has no clock"),
@@ -96,7 +96,7 @@ fn a_diagnosis_that_cannot_make_up_for_missing_masses_does_not_stand_for_the_run
     let folder = concealed("joint_compliance", "12", "120");
     let here = folder.path();
     let file = here.join("sealed/recordings/c0001/robot.json");
-    let mut robot: Value = serde_json::from_str(&std::fs::read_to_string(&file).unwrap()).unwrap();
+    let mut robot: Value = serde_json::from_str(&read(&file)).unwrap();
     let fields = robot.as_object_mut().unwrap();
     assert!(fields.remove("mass").is_some() && fields.remove("com").is_some());
     std::fs::write(&file, robot.to_string()).unwrap();

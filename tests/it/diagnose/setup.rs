@@ -1,7 +1,7 @@
 //! Set-up errors come before physics: twenty wrong set-ups of three arms, sound recordings, and a robot file of another arm.
 
 use super::{CASE, calib, case_with, concealed, ended, refused};
-use crate::answer::{has, starts_with};
+use crate::answer::{has, read, starts_with};
 use crate::desk::{Desk, table};
 use crate::fixture;
 use calib::description::RobotDescription;
@@ -438,15 +438,15 @@ fn two_set_up_errors_are_named_together_and_two_reflectors_hide_none() {
     joints(&mut both, |q| (q[1], q[3]) = (-q[1], -q[3]));
     let said = diagnosed(&both).unwrap();
     let statement = &said.findings[0].statement;
-    starts_with(&statement, "joints 2, 4 turn the other way");
-    has(&statement, "sign: [1, -1, 1, -1, 1, 1]");
+    starts_with(statement, "joints 2, 4 turn the other way");
+    has(statement, "sign: [1, -1, 1, -1, 1, 1]");
     // Two of different kinds.
     let mut both = recorded(&fixture::offset_wrist(), 44, json!([]));
     joints(&mut both, |q| (q[2], q[4]) = (-q[2], q[4] + FRAC_PI_2));
     let said = diagnosed(&both).unwrap();
     let statement = &said.findings[0].statement;
     has(
-        &statement,
+        statement,
         [
             "joint 3 turns the other way",
             "90 deg at the zero of joint 5",
@@ -482,7 +482,7 @@ fn a_length_by_which_no_arm_is_made_is_an_error_of_the_robot_file() {
     assert_eq!(said.verdict, "wrong_setup", "{}", said.statement);
     let statement = &said.findings[0].statement;
     starts_with(
-        &statement,
+        statement,
         "a length in the robot file from joint 2 to joint 3 is wrong",
     );
     // Two of them at once, of which no one explains the other: each is named as the identified robot has it.
@@ -512,7 +512,7 @@ fn a_robot_file_in_another_unit_is_blamed_and_not_the_points() {
     let said = diagnosed(&inputs).unwrap();
     let statement = &said.findings[0].statement;
     starts_with(
-        &statement,
+        statement,
         "the lengths of the robot file are in metres and were read in millimetres",
     );
     let after = statement
@@ -541,7 +541,7 @@ fn points_in_inches_are_not_accepted_and_the_line_that_is_named_mends_them() {
     let folder = concealed("zero_shift", "923", "60");
     let here = folder.path();
     let file = here.join("sealed/recordings/c0001/tracker.csv");
-    let text = std::fs::read_to_string(&file).unwrap();
+    let text = read(&file);
     let inches = |line: &str| -> String {
         let cells = line.split(',').map(|cell| {
             cell.parse::<f64>()
@@ -597,7 +597,7 @@ fn points_in_inches_are_not_accepted_and_the_line_that_is_named_mends_them() {
     );
     assert_eq!(code, Some(10), "{run}");
     let run: Value = serde_json::from_str(&run).unwrap();
-    let page = std::fs::read_to_string(here.join(run["report"].as_str().unwrap())).unwrap();
+    let page = read(here.join(run["report"].as_str().unwrap()));
     assert!(
         page.contains("Not accepted: the set-up is wrong")
             && !page.contains("The mean position error fell"),
@@ -677,8 +677,8 @@ fn two_set_ups_in_one_recording_are_named_with_the_rows_of_each() {
         let said = diagnosed(&inputs).unwrap();
         assert_eq!(said.verdict, "wrong_setup", "{}", said.statement);
         let statement = &said.findings[0].statement;
-        starts_with(&statement, "two set-ups are in one recording");
-        has(&statement, [first, second]);
+        starts_with(statement, "two set-ups are in one recording");
+        has(statement, [first, second]);
         assert!(
             said.findings
                 .iter()

@@ -1,9 +1,8 @@
 //! Arms of unknown masses, as most cells have them: no payload, no currents, no masses in the robot file.
 
 use super::calib;
-use crate::answer::has;
+use crate::answer::{has, read, root};
 use serde_json::Value;
-use std::path::Path;
 
 /// What a diagnosis says of concealed recordings of this kind, with the truth of each.
 fn bare(robot: &str, family: &str, forms: &str, seed: &str) -> (Value, Value) {
@@ -23,10 +22,7 @@ fn bare(robot: &str, family: &str, forms: &str, seed: &str) -> (Value, Value) {
         seed,
     ];
     calib(&[&made[..], &drawn[..]].concat(), folder.path());
-    let pipeline = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("pipelines/case/pipeline.yaml")
-        .display()
-        .to_string();
+    let pipeline = root("pipelines/case/pipeline.yaml").display().to_string();
     let case = format!(
         "case={}",
         folder.path().join("set/recordings/c0001").display()
@@ -37,9 +33,8 @@ fn bare(robot: &str, family: &str, forms: &str, seed: &str) -> (Value, Value) {
         ],
         folder.path(),
     );
-    let truth = std::fs::read_to_string(folder.path().join("set/sealed/c0001.json")).unwrap();
-    let robot =
-        std::fs::read_to_string(folder.path().join("set/recordings/c0001/robot.json")).unwrap();
+    let truth = read(folder.path().join("set/sealed/c0001.json"));
+    let robot = read(folder.path().join("set/recordings/c0001/robot.json"));
     assert!(
         !robot.contains("\"mass\"") && !robot.contains("\"com\""),
         "{robot}"
@@ -65,8 +60,8 @@ fn gravity_is_found_where_nobody_knows_the_masses_and_no_hose_is() {
                 finding["effect"], "joint_compliance",
                 "{robot}: {statement}"
             );
-            has(&statement, "winds up under gravity, by up to ");
-            has(&statement, "cannot be separated from the links' weight");
+            has(statement, "winds up under gravity, by up to ");
+            has(statement, "cannot be separated from the links' weight");
         }
         let plain = truth["effects"]
             .as_array()

@@ -1,7 +1,7 @@
 //! Names of robots are data: never a path, never a command, never markup.
 
 use super::{copy, file, fleet, output, recordings, run};
-use crate::answer::has;
+use crate::answer::{has, read};
 use std::path::Path;
 
 const NAMES: [&str; 10] = [
@@ -71,7 +71,7 @@ fn names_never_become_paths_commands_or_markup() {
             .all(|c| c.is_ascii_alphanumeric() || "._-".contains(c))),
         "{files:?}"
     );
-    let page = std::fs::read_to_string(told["page"].as_str().unwrap()).unwrap();
+    let page = read(told["page"].as_str().unwrap());
     assert!(
         !page.contains("<img") && page.contains("&lt;img src=x"),
         "the name is markup"

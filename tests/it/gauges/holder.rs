@@ -64,8 +64,8 @@ fn a_holder_that_turns_about_the_flange_is_one_step_with_two_names() {
             "the holder has turned by {:.2} deg about the flange",
             degrees.abs()
         );
-        starts_with(&statements[0], &size);
-        has(&statements[0], "from row 71");
+        starts_with(statements[0], &size);
+        has(statements[0], "from row 71");
         let found = &said.findings[0];
         let mut names: Vec<(&str, Place)> = found
             .rivals

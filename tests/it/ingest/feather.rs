@@ -1,6 +1,6 @@
 //! Feather files are read as text is: the same recording, the same diagnosis; what is damaged or compressed otherwise is refused.
 
-use crate::answer::has;
+use crate::answer::{has, put, read};
 use arrow::array::{ArrayRef, Float64Array, RecordBatch, StringArray};
 use arrow_ipc::CompressionType;
 use arrow_ipc::writer::{FileWriter, IpcWriteOptions};
@@ -61,13 +61,11 @@ fn case(here: &Path, written: impl Fn(&str) -> Vec<u8>) {
     let example = root.join("example/r01");
     std::fs::copy(example.join("robot.json"), here.join("robot.json")).unwrap();
     for name in ["controller", "tracker"] {
-        let text = std::fs::read_to_string(example.join(name).with_extension("csv")).unwrap();
+        let text = read(example.join(name).with_extension("csv"));
         std::fs::write(here.join(name).with_extension("feather"), written(&text)).unwrap();
     }
-    let pipeline = std::fs::read_to_string(root.join("pipeline.yaml"))
-        .unwrap()
-        .replace(".csv", ".feather");
-    std::fs::write(here.join("p.yaml"), pipeline.replace("example/r01", ".")).unwrap();
+    let pipeline = read(root.join("pipeline.yaml")).replace(".csv", ".feather");
+    put(here, "p.yaml", pipeline.replace("example/r01", "."));
 }
 
 #[test]

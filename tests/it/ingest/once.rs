@@ -57,7 +57,7 @@ fn text_behind_a_closing_quote_refuses_its_row() {
     );
     let detail = &taken.rejected.0[0].detail;
     starts_with(
-        &detail,
+        detail,
         "column 2: text behind the closing `\"` of a field; allowed:",
     );
     let desk = Desk::default().with("a.csv", format!("\"id\"x,q1,q2,x,y,z\n{}", good(3)));

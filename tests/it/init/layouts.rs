@@ -1,6 +1,6 @@
 //! Headers as controllers, trackers and spreadsheets write them: `init` maps them right or asks, and what it wrote runs.
 
-use crate::answer::has;
+use crate::answer::{has, put, read};
 use crate::compensate::calib;
 use std::fmt::Write;
 use std::path::Path;
@@ -56,7 +56,7 @@ pub(super) struct Made {
 pub(super) fn made(files: &[(&str, Vec<u8>)]) -> Made {
     let folder = tempfile::tempdir().unwrap();
     for (name, content) in files {
-        std::fs::write(folder.path().join(name), content).unwrap();
+        put(folder.path(), name, content);
     }
     let names: Vec<&str> = files.iter().map(|(name, _)| *name).collect();
     let output = calib(
@@ -70,7 +70,7 @@ pub(super) fn made(files: &[(&str, Vec<u8>)]) -> Made {
         "{}",
         String::from_utf8_lossy(&output.stderr)
     );
-    let pipeline = std::fs::read_to_string(folder.path().join("pipeline.yaml")).unwrap();
+    let pipeline = read(folder.path().join("pipeline.yaml"));
     assert!(folder.path().join("robot.yaml").is_file());
     Made {
         folder,
@@ -569,7 +569,7 @@ fn the_identity_that_init_comments_out_is_nobodys() {
         made.pipeline
     );
     let identified = made.pipeline.replace("# identity:", "identity:");
-    std::fs::write(made.path().join("pipeline.yaml"), identified).unwrap();
+    put(made.path(), "pipeline.yaml", identified);
     let check = calib(made.path(), &["check", "pipeline.yaml"], "");
     assert!(
         check.status.success(),

@@ -1,7 +1,7 @@
 //! Lists as they come off a tracker's own software: no header, other names than the controller's, UTF-16, marks of thousands, many columns.
 
 use super::layouts::{joints, made, point, table};
-use crate::answer::{has, starts_with};
+use crate::answer::{has, put, starts_with};
 use crate::compensate::calib;
 use std::fmt::Write;
 
@@ -59,11 +59,11 @@ fn a_text_in_utf_16_with_marks_of_thousands_is_read() {
 #[test]
 fn what_cannot_be_told_ends_with_code_1_and_a_sentence_and_too_many_files_with_2() {
     let folder = tempfile::tempdir().unwrap();
-    std::fs::write(
-        folder.path().join("notes.csv"),
+    put(
+        folder.path(),
+        "notes.csv",
         "day,weather,mood\nmon,rain,good\ntue,sun,good\n",
-    )
-    .unwrap();
+    );
     let output = calib(folder.path(), &["init", ".", "--data", "notes.csv"], "");
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(1), "{told}");
@@ -168,8 +168,8 @@ fn the_chain_of_a_urdf_is_read_from_its_first_link_with_joints_that_slide() {
     let data = table("Punkt,J1_mm,J2_deg,X,Y,Z", |k| {
         format!("P{k},{},{},{}", 40 * k, 3 * k, point(k, ","))
     });
-    std::fs::write(folder.path().join("data.csv"), data).unwrap();
-    std::fs::write(folder.path().join("cell.urdf"), CELL).unwrap();
+    put(folder.path(), "data.csv", data);
+    put(folder.path(), "cell.urdf", CELL);
     let told = |arguments: &[&str]| {
         let output = calib(folder.path(), arguments, "");
         (
@@ -240,7 +240,7 @@ fn quaternions_are_orientations_to_take_in_and_u95_is_two_standard_deviations() 
         .pipeline
         .replace("# orientation:", "orientation:")
         .replace("# sigma_orientation:", "sigma_orientation:");
-    std::fs::write(made.path().join("pipeline.yaml"), taken).unwrap();
+    put(made.path(), "pipeline.yaml", taken);
     made.runs(30);
 }
 

@@ -1,6 +1,7 @@
 //! Recordings of torques, files of columns with lists, files that are known and not read, and folders that have their robot file.
 
 use super::layouts::{cells, joints, made, point, table};
+use crate::answer::put;
 use crate::compensate::calib;
 use arrow::array::{ArrayRef, FixedSizeListArray, Float64Array, ListArray, RecordBatch};
 use arrow::datatypes::{Field, Float32Type};
@@ -195,7 +196,7 @@ fn lists_of_a_parquet_file_are_columns_of_which_the_first_are_the_joints() {
                 &format!("{axis}: {{column: \"point[{k}]\","),
             )
         });
-    std::fs::write(made.path().join("pipeline.yaml"), mapped).unwrap();
+    put(made.path(), "pipeline.yaml", mapped);
     made.runs(30);
 }
 
@@ -246,15 +247,15 @@ fn a_folder_with_a_robot_file_keeps_it_and_joints_are_counted_by_it() {
                 .concat(),
         )
     };
-    std::fs::write(
-        folder.path().join("data.csv"),
+    put(
+        folder.path(),
+        "data.csv",
         table("A1,A2,A3,A4,A5,A6,X,Y,Z", |k| {
             format!("{},{}", joints(k, ","), point(k, ","))
         }),
-    )
-    .unwrap();
+    );
     let robot = told(&["robots", "lrmate_200id"]).1;
-    std::fs::write(folder.path().join("robot.yaml"), &robot).unwrap();
+    put(folder.path(), "robot.yaml", &robot);
     let (code, said) = told(&["init", ".", "--data", "data.csv", "--robot", "ur10e"]);
     assert!(
         code == Some(2) && said.contains("robot.yaml: is already there and would be used"),
@@ -276,11 +277,7 @@ fn a_folder_with_a_robot_file_keeps_it_and_joints_are_counted_by_it() {
     );
     assert_eq!(told(&["check", "pipeline.yaml"]).0, Some(0));
     std::fs::remove_file(folder.path().join("pipeline.yaml")).unwrap();
-    std::fs::write(
-        folder.path().join("robot.yaml"),
-        told(&["robots", "panda"]).1,
-    )
-    .unwrap();
+    put(folder.path(), "robot.yaml", told(&["robots", "panda"]).1);
     let (code, said) = told(&["init", ".", "--data", "data.csv"]);
     assert!(
         code == Some(2)

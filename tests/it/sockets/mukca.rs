@@ -2,6 +2,7 @@
 //! against the figures of an independent solver.
 
 use super::{Named, fitted_with, places_of, priors};
+use crate::answer::read;
 use crate::desk;
 use calib::description::RobotDescription;
 use calib::estimate::{Model, scale};
@@ -14,7 +15,7 @@ use std::time::Instant;
 
 pub fn panda() -> RobotDescription {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sockets/robot.yaml");
-    let text = std::fs::read_to_string(path).unwrap();
+    let text = read(path);
     read_calib(
         RobotFileText {
             label: "robot.yaml",
@@ -45,8 +46,7 @@ fn recording(folder: &str, without: &[&str]) -> Option<(Measurements, Vec<usize>
         .iter()
         .flat_map(|position| [(position, 0), (position, 1)])
     {
-        let text =
-            std::fs::read_to_string(root.join(position).join(format!("hole_{hole}.csv"))).unwrap();
+        let text = read(root.join(position).join(format!("hole_{hole}.csv")));
         for (number, line) in text.lines().enumerate() {
             q.extend(
                 line.split(',')

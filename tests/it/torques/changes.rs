@@ -2,13 +2,14 @@
 
 use super::results::{arm, calib};
 use super::write;
+use crate::answer::root;
 use calib::audit::QueryTables;
 use calib::pipeline::{Manifest, find_run};
 use calib::store::Store;
 use calib::table::{Table, TorqueChangeRow, TorqueChangeTable};
 use calib::twin::torque::{TorqueCase, TorqueDesign};
 use serde_json::json;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Both cases through the pipeline of pairs.
 fn compared(before: &TorqueCase, after: &TorqueCase) -> Vec<TorqueChangeRow> {
@@ -53,7 +54,7 @@ fn changes_of(settings: &[&str]) -> Vec<TorqueChangeRow> {
 }
 
 fn pair() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/dynamics_pair")
+    root("pipelines/dynamics_pair")
 }
 
 fn row<'a>(rows: &'a [TorqueChangeRow], name: &str) -> &'a TorqueChangeRow {

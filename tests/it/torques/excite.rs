@@ -1,7 +1,7 @@
 //! A motion proposed for a recording of torques: it holds its limits, and tells more than a random one.
 
 use super::write;
-use crate::answer::has;
+use crate::answer::{has, read};
 use calib::dynamics::{
     DynamicArm, InverseDynamics, MotionRow, TorqueModel, TorqueQuestion, TorqueRecording, diagnose,
 };
@@ -241,7 +241,7 @@ fn the_file_of_a_motion_is_one_that_compensate_takes() {
         String::from_utf8_lossy(&output.stderr)
     );
     has(&told, ["condition number", "will not determine"]);
-    let text = std::fs::read_to_string(&file).unwrap();
+    let text = read(&file);
     let robot = calib::identified::robot_file(&robot, None).unwrap();
     let trajectory = calib::targets::Trajectory::read("motion.csv", &text, &robot, false).unwrap();
     assert_eq!(trajectory.motion.time.len(), 401);

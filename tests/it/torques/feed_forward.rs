@@ -1,7 +1,7 @@
 //! Torques that are fed forward say how certain they are, and what is not certain is refused: a wrong number moves a robot.
 
 use super::results::{Solved, arm, calib, column, motion, solve, solved};
-use crate::answer::has;
+use crate::answer::{has, read};
 use crate::compensate::concealed::from_environment;
 use calib::twin::torque::TorqueCase;
 use std::path::Path;
@@ -122,7 +122,7 @@ fn the_uncertainty_of_torques_covers_the_truth_of_several_arms() {
 #[test]
 fn torques_less_certain_than_allowed_are_refused_and_written_only_with_force() {
     let file = fresh("doubtful.csv");
-    let rows = std::fs::read_to_string(&file).unwrap().lines().count() - 1;
+    let rows = read(&file).lines().count() - 1;
     let refused = fed(solved(), &file, &["--max-uncertainty", "1e-6"]);
     assert_eq!(refused.status.code(), Some(10), "{}", told(&refused));
     let said = told(&refused);
@@ -178,7 +178,7 @@ fn torques_that_were_fed_forward_already_are_no_motion() {
 
 #[test]
 fn a_motion_beyond_the_recording_is_remarked_row_by_row_with_what_it_exceeds() {
-    let slow = std::fs::read_to_string(fresh("slow.csv")).unwrap();
+    let slow = read(fresh("slow.csv"));
     // The same path in a third of the time.
     let path = |line: &str| {
         line.split(',')

@@ -1,6 +1,7 @@
 //! Bad recordings of torques: each has a clear answer with file, line or place, and is not diagnosed.
 
 use super::{diagnose, nothing, write};
+use crate::answer::put;
 use calib::twin::torque::TorqueCase;
 use std::path::Path;
 
@@ -247,11 +248,11 @@ fn files_of_one_name_in_two_folders_are_told_apart() {
     let (columns, after) = block.split_once("\n\n").unwrap();
     let file = |name: &str| format!("        - file: {name}/recording.csv\n{columns}\n");
     let all = ["one", "two", "three"].map(file).concat();
-    std::fs::write(
-        folder.path().join("p.yaml"),
+    put(
+        folder.path(),
+        "p.yaml",
         format!("{}{all}\n{after}", before.replace("${case}/", "")),
-    )
-    .unwrap();
+    );
     let output = std::process::Command::new(env!("CARGO_BIN_EXE_calib"))
         .args(["run", "p.yaml", "--until", "ingest_torques", "--quiet"])
         .current_dir(folder.path())

@@ -1,7 +1,7 @@
 //! What a diagnosis of torques is good for: files for simulators and torques that are fed forward, held against the twin's truth.
 
 use super::write;
-use crate::answer::has;
+use crate::answer::{has, root};
 use calib::twin::torque::{TorqueCase, TorqueDesign, TorqueFile, TorqueRows};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -40,8 +40,7 @@ pub(super) fn solve(case: TorqueCase) -> Solved {
 pub(super) fn solve_files(case: TorqueCase, files: &[TorqueFile]) -> Solved {
     let folder = tempfile::tempdir().unwrap();
     write(&folder.path().join("case"), files);
-    let pipeline = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("pipelines/dynamics/pipeline.yaml")
+    let pipeline = root("pipelines/dynamics/pipeline.yaml")
         .display()
         .to_string();
     let set = format!("case={}", folder.path().join("case").display());
