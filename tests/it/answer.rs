@@ -20,14 +20,21 @@ pub fn read(path: impl AsRef<Path>) -> String {
     std::fs::read_to_string(path).unwrap()
 }
 
-/// Words of a command line: a text that blanks part, or a list.
+/// Words of a command line: a text that blanks part, but for what stands between single quotes, or a list.
 pub trait Words {
     fn words(&self) -> Vec<OsString>;
 }
 
 impl Words for str {
     fn words(&self) -> Vec<OsString> {
-        self.split_whitespace().map(OsString::from).collect()
+        let mut words = Vec::new();
+        for (part, text) in self.split('\'').enumerate() {
+            match part % 2 {
+                0 => words.extend(text.split_whitespace().map(OsString::from)),
+                _ => words.push(text.into()),
+            }
+        }
+        words
     }
 }
 
@@ -101,6 +108,10 @@ pub fn calib(folder: impl AsRef<Path>, words: &(impl Words + ?Sized)) -> Answer 
 
 /// Runs calib in a folder with a text on its stdin.
 pub fn fed(folder: impl AsRef<Path>, words: &(impl Words + ?Sized), input: &str) -> Answer {
+    Answer::of(output(folder, words, input))
+}
+
+pub fn output(folder: impl AsRef<Path>, words: &(impl Words + ?Sized), input: &str) -> Output {
     let mut child = command(words)
         .current_dir(folder)
         .stdin(Stdio::piped())
@@ -110,7 +121,7 @@ pub fn fed(folder: impl AsRef<Path>, words: &(impl Words + ?Sized), input: &str)
         .unwrap();
     // A program that refuses its arguments does not read.
     let _ = std::io::Write::write_all(&mut child.stdin.take().unwrap(), input.as_bytes());
-    Answer::of(child.wait_with_output().unwrap())
+    child.wait_with_output().unwrap()
 }
 
 /// A run of calib that is not begun.

@@ -1,7 +1,7 @@
 //! calib from arrays: to the last digit what a pipeline gives for the same numbers in a file.
 
-use crate::answer::{ends_with, has, put, starts_with};
-use crate::compensate::{ROBOT, calib, cell};
+use crate::answer::{calib, ends_with, fed, has, put, starts_with};
+use crate::compensate::{ROBOT, cell};
 use calib::api::{CalibRun, Options, Poses, Recording, Robot, Sigma, diagnose, identify};
 use calib::error::{Error, Result};
 use calib::pipeline::StageTables;
@@ -90,9 +90,9 @@ fn arrays_give_to_the_last_digit_what_a_pipeline_gives_for_the_same_numbers_in_a
     ] {
         put(folder.path(), name, text);
     }
-    let output = calib(folder.path(), &["run", "pipeline.yaml", "--quiet"], "");
-    let stderr = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{stderr}");
+    let output = calib(folder.path(), "run pipeline.yaml --quiet");
+    let stderr = output.err;
+    assert!(output.code == Some(0), "{stderr}");
     let run = run(folder.path());
     let identified = identify(&robot(), &recording, &Options::with(json!({}))).unwrap();
     let diagnosed = diagnose(&robot(), &recording, &Options::with(json!({}))).unwrap();
@@ -177,15 +177,13 @@ fn arrays_that_are_no_recording_are_refused_with_row_and_what_is_allowed() {
     }
 }
 
-fn served(arguments: &[&str], input: &str) -> Vec<Value> {
-    let arguments = [&["serve-model", "HEAD", "--quiet"], arguments].concat();
-    let output = calib(cell(), &arguments, input);
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
-    let text = String::from_utf8(output.stdout).unwrap();
+fn served(arguments: &str, input: &str) -> Vec<Value> {
+    let text = fed(
+        cell(),
+        &format!("serve-model HEAD --quiet {arguments}"),
+        input,
+    )
+    .ok();
     text.lines()
         .map(|line| serde_json::from_str(line).unwrap())
         .collect()
@@ -207,7 +205,7 @@ fn a_served_model_answers_every_line_with_what_the_library_computes() {
         json!({ "joints_rad": second, "id": "b" })
     );
     let commands = model.compensate(&poses, false).unwrap();
-    let answers = served(&[], &input);
+    let answers = served("", &input);
     assert_eq!(answers.len(), 3);
     assert_eq!(answers[0]["joints_rad"], json!(commands.joints_rad[..6]));
     assert_eq!(answers[2]["joints_rad"], json!(commands.joints_rad[6..]));
@@ -217,7 +215,7 @@ fn a_served_model_answers_every_line_with_what_the_library_computes() {
         "line 2: joints_rad: 2 numbers; the robot has 6 joints"
     );
     let points = model.predict(&poses).unwrap();
-    let answers = served(&["--predict"], &input);
+    let answers = served("--predict", &input);
     for (answer, point) in [&answers[0], &answers[2]].into_iter().zip(points) {
         for (axis, value) in point.iter().enumerate() {
             let value_mm = answer["point_mm"][axis].as_f64().unwrap();
@@ -225,7 +223,7 @@ fn a_served_model_answers_every_line_with_what_the_library_computes() {
         }
     }
     // No row was measured with joint 1 turned by 170 degrees.
-    let far = served(&["--predict"], "[2.97, 0.2, -0.4, 0.5, 0.8, -1.0]\n");
+    let far = served("--predict", "[2.97, 0.2, -0.4, 0.5, 0.8, -1.0]\n");
     let remark = far[0]["remark"].as_str().unwrap();
     has(remark, "joint 1");
 }

@@ -2,8 +2,7 @@
 
 mod write;
 
-use crate::answer::{has, put};
-use crate::compensate::calib;
+use crate::answer::{calib, has, put};
 use calib::error::Result;
 use calib::raw::{BagRows, InputSource, Record, RecordFault, RecordReader, source};
 use calib::table::{Intake, Recording, Rejected, from_file};
@@ -299,9 +298,9 @@ fn run(here: &Path, pipeline: &str) -> (Recording, Rejected, Intake, String) {
     .unwrap();
     let head = "calib: 1\nname: p\nseed: 1\nstages:\n  - uses: robot\n    with: {file: robot.yaml}\n  - uses: ingest\n    with:\n";
     put(here, "p.yaml", format!("{head}{pipeline}"));
-    let output = calib(here, &["run", "p.yaml", "--store", "s"], "");
-    let answer = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "{answer}");
+    let output = calib(here, "run p.yaml --store s");
+    let answer = output.err.clone();
+    assert!(output.code == Some(0), "{answer}");
     let at = |name: &str| {
         here.join("s/tables/p")
             .join(format!("ingest.{name}.parquet"))
@@ -456,10 +455,10 @@ fn a_folder_of_parts_is_run_as_one_file_and_a_part_that_changed_is_read_again() 
     );
     // Two kinds of parts are no recording, nor is a folder of anything else.
     put(&parts, "run_3.db3", db3(&messages[..8]));
-    let output = calib(folder.path(), &["check", "p.yaml"], "");
-    let answer = String::from_utf8_lossy(&output.stderr);
+    let output = calib(folder.path(), "check p.yaml");
+    let answer = output.err;
     assert!(
-        output.status.code() == Some(2) && answer.contains("all .mcap or all .db3"),
+        output.code == Some(2) && answer.contains("all .mcap or all .db3"),
         "{answer}"
     );
 }
@@ -531,9 +530,9 @@ fn init_reads_a_bag_and_its_pipeline_runs() {
         let here = folder.path().join(name.replace('.', "_"));
         std::fs::create_dir(&here).unwrap();
         put(&here, name, bag);
-        let output = calib(&here, &["init", "--robot", "ur10", "--data", name], "");
-        let answer = String::from_utf8_lossy(&output.stdout);
-        assert!(output.status.success(), "{answer}");
+        let output = calib(&here, &format!("init --robot ur10 --data {name}"));
+        let answer = output.out;
+        assert!(output.code == Some(0), "{answer}");
         has(
             &answer,
             "topic `/image`: sensor_msgs/msg/Image, 1 message; this type is not read",
@@ -551,16 +550,7 @@ fn init_reads_a_bag_and_its_pipeline_runs() {
         ] {
             assert!(pipeline.contains(line), "{line} in\n{pipeline}");
         }
-        let output = calib(
-            &here,
-            &["run", "pipeline.yaml", "--until", "ingest", "--store", "s"],
-            "",
-        );
-        assert!(
-            output.status.success(),
-            "{}",
-            String::from_utf8_lossy(&output.stderr)
-        );
+        calib(&here, "run pipeline.yaml --until ingest --store s").code(0);
         let recordings = glob::glob(
             here.join("s/tables/*/ingest.recording.parquet")
                 .to_str()

@@ -1,7 +1,6 @@
 //! `check` reads what it reports on: the robot file, the headers of the data files, and the marks that `init` left.
 
-use crate::answer::{has, put};
-use crate::compensate::calib;
+use crate::answer::{calib, has, put};
 
 const ROBOT: &str = "calib_robot: 1
 name: arm
@@ -45,17 +44,12 @@ fn checked(robot: &str, pipeline: &str, arm: &str, points: &str) -> (i32, String
     ] {
         put(folder.path(), name, text);
     }
-    let output = calib(folder.path(), &["check", "pipeline.yaml"], "");
+    let output = calib(folder.path(), "check pipeline.yaml");
     assert!(
         !folder.path().join(".calib").exists(),
         "check writes nothing"
     );
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-    (
-        output.status.code().unwrap(),
-        text(output.stdout),
-        text(output.stderr),
-    )
+    (output.code.unwrap(), output.out, output.err)
 }
 
 const ARM: &str = "id,q1,q2\nA,1,2\n";
@@ -81,8 +75,7 @@ fn a_sound_pipeline_is_ready_and_shows_its_graph_on_demand() {
     ] {
         put(folder.path(), name, text);
     }
-    let out = calib(folder.path(), &["check", "pipeline.yaml", "--details"], "").stdout;
-    let out = String::from_utf8_lossy(&out).into_owned();
+    let out = calib(folder.path(), "check pipeline.yaml --details").out;
     has(&out, "reads   robot  <- robot.robot");
 }
 
@@ -172,11 +165,8 @@ fn told(command: &str, pipeline: &str, tuesday: &str) -> (i32, String) {
     {
         put(folder.path(), name, text);
     }
-    let output = calib(folder.path(), &[command, "pipeline.yaml"], "");
-    (
-        output.status.code().unwrap(),
-        String::from_utf8(output.stderr).unwrap(),
-    )
+    let output = calib(folder.path(), &[command, "pipeline.yaml"]);
+    (output.code.unwrap(), output.err)
 }
 
 #[test]
@@ -306,18 +296,9 @@ fn check_of_the_data_fits_base_and_geometry_and_names_rows_that_have_no_partner(
     ] {
         put(folder.path(), name, text);
     }
-    let output = calib(
-        folder.path(),
-        &["check", "pipeline.yaml", "--data", "--store", "kept"],
-        "",
-    );
-    let out = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert_eq!(
-        output.status.code(),
-        Some(0),
-        "{out}{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    let output = calib(folder.path(), "check pipeline.yaml --data --store kept");
+    let out = output.out.clone();
+    assert_eq!(output.code, Some(0), "{out}{}", output.err);
     for part in [
         "rows      35 used, of 35 points\n",
         "ranges    J1 -60.0 deg to 53.0 deg\n",
@@ -329,30 +310,20 @@ fn check_of_the_data_fits_base_and_geometry_and_names_rows_that_have_no_partner(
         assert!(out.contains(part), "{part} in\n{out}");
     }
     assert!(folder.path().join("kept").exists() && !folder.path().join(".calib").exists());
-    let run = calib(
-        folder.path(),
-        &["run", "pipeline.yaml", "--store", "kept"],
-        "",
-    );
-    let told = String::from_utf8_lossy(&run.stderr).into_owned();
+    let run = calib(folder.path(), "run pipeline.yaml --store kept");
+    let told = run.err.clone();
     has(&told, "geometry  cached");
     let diagnosed =
         format!("{PIPELINE}  - uses: split\n    with: {{by: every, n: 4}}\n  - uses: diagnose\n");
     put(folder.path(), "diagnosed.yaml", diagnosed);
     assert_eq!(
-        calib(
-            folder.path(),
-            &["run", "diagnosed.yaml", "--store", "kept"],
-            ""
-        )
-        .status
-        .code(),
+        calib(folder.path(), "run diagnosed.yaml --store kept").code,
         Some(0)
     );
     for what in ["diagnosed.yaml", "HEAD"] {
-        let output = calib(folder.path(), &["diagnose", what, "--store", "kept"], "");
-        let out = String::from_utf8_lossy(&output.stdout).into_owned();
-        let told = String::from_utf8_lossy(&output.stderr);
+        let output = calib(folder.path(), &format!("diagnose {what} --store kept"));
+        let out = output.out.clone();
+        let told = output.err;
         assert!(
             out.contains("rejected  10 rows, each with its reason in kept/tables/"),
             "{out}{told}"

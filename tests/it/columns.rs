@@ -2,7 +2,7 @@
 //!
 //! `CALIB_UPDATE=1 cargo test --test it columns` writes the fields that `schemas/recording.json` lacks.
 
-use crate::answer::{put, read, root};
+use crate::answer::{self, put, read, root};
 use crate::fixture::{poses, spread};
 use crate::identify::normal;
 use crate::twin::sr210d;
@@ -11,7 +11,6 @@ use calib::robot::RobotModel;
 use calib::spatial::{Pose, Twist};
 use calib::table::{Recording, from_file, recording_columns};
 use serde_json::{Value, json};
-use std::process::Command;
 
 /// Fields that the recording's schema must have for a column: name, unit, and range in that unit.
 fn fields(column: &DeclaredColumn) -> Vec<Value> {
@@ -139,24 +138,10 @@ fn a_circumstance_that_is_declared_in_one_line_is_a_law_of_a_users_own_effect() 
                     y: {column: y, unit: m}, z: {column: z, unit: m}}}]\n      instrument: {constant_um: 20, per_metre_um: 0, coverage: 1}\n  \
                     - {uses: split, with: {by: every, n: 5}}\n  - {uses: diagnose, with: {effects: [swelling.yaml]}}\n";
     put(here, "p.yaml", pipeline);
-    let calib = |arguments: &[&str]| {
-        let output = Command::new(env!("CARGO_BIN_EXE_calib"))
-            .args(arguments)
-            .current_dir(here)
-            .output()
-            .unwrap();
-        assert!(
-            output.status.success(),
-            "{}",
-            String::from_utf8_lossy(&output.stderr)
-        );
-        String::from_utf8(output.stdout).unwrap()
-    };
-    calib(&["run", "p.yaml", "--quiet", "--store", "s"]);
-    let said: Value = serde_json::from_str(&calib(&[
-        "diagnose", "p.yaml", "--json", "--quiet", "--store", "s",
-    ]))
-    .unwrap();
+    let calib = |words: &str| answer::calib(here, words).ok();
+    calib("run p.yaml --quiet --store s");
+    let said: Value =
+        serde_json::from_str(&calib("diagnose p.yaml --json --quiet --store s")).unwrap();
     let findings = said["findings"].as_array().unwrap();
     let named: Vec<[&Value; 2]> = findings
         .iter()

@@ -17,13 +17,13 @@ mod stated;
 mod true_error;
 mod within;
 
-use crate::answer::{ends_with, has, put, read, starts_with};
+use crate::answer::{self, ends_with, fed, has, put, read, starts_with};
 use calib::compensate::{Chain, Nominal, SETTLED, ToolGoal, inverse, least_change};
 use calib::robot::RobotModel;
 use calib::twin::conceal::robots::Kind;
 use nalgebra::Vector3;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::Output;
 use std::sync::OnceLock;
 
 #[test]
@@ -125,48 +125,22 @@ pub fn cell() -> &'static Path {
         let folder = tempfile::tempdir().unwrap();
         put(folder.path(), "robot.yaml", ROBOT);
         put(folder.path(), "pipeline.yaml", PIPELINE);
-        let output = calib(folder.path(), &["run", "pipeline.yaml", "--quiet"], "");
-        assert!(
-            output.status.success(),
-            "{}",
-            String::from_utf8_lossy(&output.stderr)
-        );
+        answer::calib(folder.path(), "run pipeline.yaml --quiet").ok();
         folder
     });
     folder.path()
 }
 
-/// Runs calib in a folder with a text on its stdin.
+/// Runs calib as [`answer::fed`] does, for those that look at bytes.
 pub fn calib(folder: &Path, arguments: &[&str], input: &str) -> Output {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_calib"))
-        .args(arguments)
-        .current_dir(folder)
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let mut pipe = child.stdin.take().unwrap();
-    // A program that refuses its arguments does not read.
-    let _ = std::io::Write::write_all(&mut pipe, input.as_bytes());
-    drop(pipe);
-    child.wait_with_output().unwrap()
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8(bytes.to_vec()).unwrap()
+    answer::output(folder, arguments, input)
 }
 
 #[test]
 fn only_the_numbers_of_joints_change_in_a_text_of_targets() {
     let input = "\u{feff}name;A1_deg;A2_deg;A3_deg;A4_deg;A5_deg;A6_deg;note\r\nP1;10,5;20;-30;5;40;0;\"a;b\"\r\n\r\nP2; -10;  20.25;3e1;5;40;1; x \r\n";
-    let output = calib(
-        cell(),
-        &["compensate", "latest", "--plain", "--quiet"],
-        input,
-    );
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    let corrected = text(&output.stdout);
+    let output = fed(cell(), "compensate latest --plain --quiet", input).code(0);
+    let corrected = output.out;
     assert_eq!(corrected.matches('\n').count(), 4);
     let (before, after): (Vec<&str>, Vec<&str>) = (
         input.split("\r\n").collect(),
@@ -195,13 +169,8 @@ fn units_of_targets_are_written_as_in_headers_of_recordings() {
     let row = "10,20,-30,5,40,0\n";
     let joints = |header: fn(usize) -> String| {
         let input = (1..=6).map(header).collect::<Vec<_>>().join(",") + "\n" + row;
-        let output = calib(
-            cell(),
-            &["compensate", "latest", "--plain", "--quiet"],
-            &input,
-        );
-        assert!(output.status.success(), "{input}{}", text(&output.stderr));
-        text(&output.stdout).lines().nth(1).unwrap().to_string()
+        let output = fed(cell(), "compensate latest --plain --quiet", &input).code(0);
+        output.out.lines().nth(1).unwrap().to_string()
     };
     let expected = joints(|n| format!("q{n}_deg"));
     assert_ne!(expected, row.trim_end());
@@ -218,17 +187,15 @@ fn units_of_targets_are_written_as_in_headers_of_recordings() {
     }
     let point = |name: &str| format!("{name} [Millimeter]");
     let input = ["x", "y", "z"].map(point).join(",") + ",x_c\n900,40,930,7\n";
-    let output = calib(cell(), &["compensate", "latest", "--quiet"], &input);
-    assert!(output.status.success(), "{}", text(&output.stderr));
+    fed(cell(), "compensate latest --quiet", &input).code(0);
 }
 
 #[test]
 fn what_is_known_of_a_target_stands_behind_it() {
     let input =
         "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n10,20,-30,5,40,0\n119.999,20,-30,5,40,179\n";
-    let output = calib(cell(), &["compensate", "pipeline.yaml", "-"], input);
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    let said = text(&output.stdout);
+    let output = fed(cell(), "compensate pipeline.yaml -", input).code(0);
+    let said = output.out;
     let mut lines = said.lines();
     assert!(
         lines
@@ -251,7 +218,7 @@ fn what_is_known_of_a_target_stands_behind_it() {
         lines.next().unwrap().contains("joint 6 beyond its limits"),
         "{said}"
     );
-    has(&text(&output.stderr), "1 of them leaves the joint limits");
+    has(&output.err, "1 of them leaves the joint limits");
 }
 
 #[test]
@@ -271,20 +238,16 @@ fn joints_and_the_pose_they_stand_for_are_corrected_alike() {
     let turn = nalgebra::UnitQuaternion::from_matrix(&pose.rotation);
     let [qx, qy, qz, qw]: [f64; 4] = turn.coords.into();
     let cartesian = format!("x_mm,y_mm,z_mm,qw,qx,qy,qz\n{x},{y},{z},{qw},{qx},{qy},{qz}\n");
-    let quiet = ["compensate", "latest", "--plain", "--quiet"];
-    let by_joints = calib(
+    let quiet = "compensate latest --plain --quiet";
+    let by_joints = fed(cell(), &format!("{quiet} --orientation keep"), joints);
+    let by_pose = fed(
         cell(),
-        &[&quiet[..], &["--orientation", "keep"]].concat(),
-        joints,
-    );
-    let by_pose = calib(
-        cell(),
-        &[&quiet[..], &["--start", "12,18,-28,20,45,5"]].concat(),
+        &format!("{quiet} --start 12,18,-28,20,45,5"),
         &cartesian,
     );
-    let last = |output: &Output| -> Vec<f64> {
-        let said = text(&output.stdout);
-        let row: Vec<f64> = said
+    let last = |output: &answer::Answer| -> Vec<f64> {
+        let row: Vec<f64> = output
+            .out
             .lines()
             .nth(1)
             .unwrap()
@@ -301,12 +264,8 @@ fn joints_and_the_pose_they_stand_for_are_corrected_alike() {
 #[test]
 fn a_faulty_text_of_targets_is_refused_with_line_and_column() {
     let run = |input: &str| {
-        let output = calib(cell(), &["compensate", "latest", "--quiet"], input);
-        (
-            output.status.code(),
-            text(&output.stderr),
-            text(&output.stdout),
-        )
+        let output = fed(cell(), "compensate latest --quiet", input);
+        (output.code, output.err, output.out)
     };
     let header = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n";
     let (code, said, _) = run(&format!("{header}1,2,3,4,5,6\n1,2,x,4,5,6\n1,2\n"));
@@ -341,14 +300,9 @@ fn a_faulty_text_of_targets_is_refused_with_line_and_column() {
 #[test]
 fn a_target_that_is_not_reached_gets_no_joints_and_the_others_do() {
     let input = "id,x_mm,y_mm,z_mm\nnear,800,40,900\nfar,7800,40,900\nnear,810,40,900\n";
-    for more in [&[][..], &["--one-step"]] {
-        let output = calib(
-            cell(),
-            &[&["compensate", "latest", "--quiet"], more].concat(),
-            input,
-        );
-        assert_eq!(output.status.code(), Some(10));
-        let (said, told) = (text(&output.stdout), text(&output.stderr));
+    for more in ["", "--one-step"] {
+        let output = fed(cell(), &format!("compensate latest --quiet {more}"), input).code(10);
+        let (said, told) = (output.out, output.err);
         let rows: Vec<Vec<&str>> = said.lines().map(|line| line.split(',').collect()).collect();
         assert_eq!(
             (rows.len(), rows[0][4], rows[0][9]),
@@ -381,25 +335,17 @@ fn a_target_that_is_not_reached_gets_no_joints_and_the_others_do() {
             "warning: 1 of them could not be reached and has no joints (column `remark`)",
         );
     }
-    let plain = calib(
-        cell(),
-        &["compensate", "latest", "--quiet", "--plain"],
-        input,
-    );
-    assert_eq!(plain.status.code(), Some(10));
-    assert_eq!(
-        text(&plain.stdout).lines().nth(2),
-        Some("far,7800,40,900,,,,,,")
-    );
+    let plain = fed(cell(), "compensate latest --quiet --plain", input).code(10);
+    assert_eq!(plain.out.lines().nth(2), Some("far,7800,40,900,,,,,,"));
 }
 
 #[test]
 fn a_pose_that_only_another_orientation_reaches_gets_no_joints() {
     // The wrist's limits do not bind the search: what is out of reach is the point 1.4 m away, with the tool turned back.
     let input = "x_mm,y_mm,z_mm,qw,qx,qy,qz\n1230,0,900,1,0,0,0\n1230,0,900,0,0,0,1\n";
-    let output = calib(cell(), &["compensate", "latest", "--quiet"], input);
-    let (said, told) = (text(&output.stdout), text(&output.stderr));
-    assert_eq!(output.status.code(), Some(10), "{said}{told}");
+    let output = fed(cell(), "compensate latest --quiet", input);
+    let (said, told) = (output.out, output.err);
+    assert_eq!(output.code, Some(10), "{said}{told}");
     assert!(
         said.lines()
             .nth(2)
@@ -427,23 +373,12 @@ fn a_target_that_is_not_reached_is_null_in_parquet() {
         .write(&batch)
         .and_then(|()| writer.close().map(|_| ()))
         .unwrap();
-    let output = calib(
+    let output = answer::calib(
         cell(),
-        &[
-            "compensate",
-            "latest",
-            "points.parquet",
-            "--out",
-            "points_c.parquet",
-            "--quiet",
-        ],
-        "",
-    );
-    assert_eq!(output.status.code(), Some(10));
-    has(
-        &text(&output.stderr),
-        "points.parquet: row 2: not reached, 6",
-    );
+        "compensate latest points.parquet --out points_c.parquet --quiet",
+    )
+    .code(10);
+    has(&output.err, "points.parquet: row 2: not reached, 6");
     let file = std::fs::File::open(cell().join("points_c.parquet")).unwrap();
     let builder =
         parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder::try_new(file).unwrap();
@@ -462,10 +397,8 @@ fn a_target_that_is_not_reached_is_null_in_parquet() {
 #[test]
 fn quiet_keeps_warnings_and_takes_the_summary() {
     let input = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n119.999,20,-30,5,40,179\n";
-    let told = |more: &[&str]| {
-        text(&calib(cell(), &[&["compensate", "latest"], more].concat(), input).stderr)
-    };
-    let (loud, quiet) = (told(&[]), told(&["-q"]));
+    let told = |more: &str| fed(cell(), &format!("compensate latest {more}"), input).err;
+    let (loud, quiet) = (told(""), told("-q"));
     has(&loud, ["model: ", "1 target; "]);
     let warnings: String = loud
         .lines()
@@ -483,27 +416,15 @@ fn quiet_keeps_warnings_and_takes_the_summary() {
 fn partial_targets_of_a_program_stay_where_that_is_wished_and_nothing_is_written_otherwise() {
     let program = "PTP {A1 10,A2 20,A3 -30,A4 5,A5 40,A6 0}\r\nLIN {X 10,Y 20}\r\nPTP {A1 20}\r\n";
     put(cell(), "partial.src", program);
-    let run = |more: &[&str]| {
-        let output = calib(
+    let run = |more: &str| {
+        let output = answer::calib(
             cell(),
-            &[
-                &[
-                    "compensate",
-                    "latest",
-                    "partial.src",
-                    "--out",
-                    "partial_c.src",
-                    "-q",
-                ],
-                more,
-            ]
-            .concat(),
-            "",
+            &format!("compensate latest partial.src --out partial_c.src -q {more}"),
         );
-        (output.status.code(), text(&output.stderr))
+        (output.code, output.err)
     };
     let whole = "a target is corrected whole or not at all";
-    let (code, told) = run(&[]);
+    let (code, told) = run("");
     assert_eq!(code, Some(10));
     has(
         &told,
@@ -518,7 +439,7 @@ fn partial_targets_of_a_program_stay_where_that_is_wished_and_nothing_is_written
         "partial.src: partial targets stay as they are with --leave-partial",
     );
     assert!(!cell().join("partial_c.src").exists());
-    let (code, told) = run(&["--leave-partial"]);
+    let (code, told) = run("--leave-partial");
     assert_eq!(code, Some(0), "{told}");
     has(
         &told,

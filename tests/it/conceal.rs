@@ -1,13 +1,12 @@
 //! Concealed recordings: what they hide is there, nulls hide nothing, and a seed gives the same bytes whoever works on it.
 
-use crate::answer::{has, put, read};
+use crate::answer::{calib, has, put, read};
 use calib::twin::conceal::case::Case;
 use calib::twin::conceal::design::{Content, Design};
 use calib::twin::conceal::family::FAMILIES;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 
 /// Names of the list of effects that a diagnosis may use.
 const NAMES: [&str; 20] = [
@@ -199,13 +198,6 @@ fn shares_are_kept_and_pairs_sit_in_two_places() {
     }
 }
 
-fn calib(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_calib"))
-        .args(arguments)
-        .output()
-        .unwrap()
-}
-
 fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {
     let mut out = Vec::new();
     let mut folders = vec![folder.to_path_buf()];
@@ -235,15 +227,11 @@ fn a_seed_gives_the_same_bytes_on_one_and_two_threads() {
         .map(|jobs| {
             let out = root.path().join(jobs);
             let text = out.to_string_lossy().into_owned();
-            let done = calib(&[
-                "simulate", "conceal", "--out", &text, "--cases", "4", "--points", "30", "--jobs",
-                jobs,
-            ]);
-            assert!(
-                done.status.success(),
-                "{}",
-                String::from_utf8_lossy(&done.stderr)
-            );
+            calib(
+                ".",
+                &format!("simulate conceal --out {text} --cases 4 --points 30 --jobs {jobs}"),
+            )
+            .code(0);
             files(&out)
         })
         .into();
@@ -254,27 +242,14 @@ fn a_seed_gives_the_same_bytes_on_one_and_two_threads() {
 /// Recordings with single effects, pairs, open ones and nulls, and verdicts that say what `say` makes of each truth.
 fn judged(root: &Path, say: impl Fn(&Value) -> Vec<Value>) -> (PathBuf, PathBuf) {
     let (set, verdicts) = (root.join("set"), root.join("verdicts"));
-    let done = calib(&[
-        "simulate",
-        "conceal",
-        "--out",
-        &set.to_string_lossy(),
-        "--cases",
-        "12",
-        "--points",
-        "30",
-        "--nulls",
-        "0.25",
-        "--pairs",
-        "0.25",
-        "--open",
-        "0.1",
-    ]);
-    assert!(
-        done.status.success(),
-        "{}",
-        String::from_utf8_lossy(&done.stderr)
-    );
+    calib(
+        ".",
+        &format!(
+            "simulate conceal --out {} --cases 12 --points 30 --nulls 0.25 --pairs 0.25 --open 0.1",
+            set.display()
+        ),
+    )
+    .code(0);
     std::fs::create_dir(&verdicts).unwrap();
     for entry in std::fs::read_dir(set.join("sealed")).unwrap() {
         let path = entry.unwrap().path();
@@ -296,20 +271,16 @@ fn wanted(truth: &Value) -> Vec<Value> {
 }
 
 fn score(set: &Path, verdicts: &Path) -> Value {
-    let done = calib(&[
-        "simulate",
-        "reveal",
-        &set.to_string_lossy(),
-        "--verdicts",
-        &verdicts.to_string_lossy(),
-        "--json",
-    ]);
-    assert!(
-        done.status.success(),
-        "{}",
-        String::from_utf8_lossy(&done.stderr)
-    );
-    serde_json::from_slice(&done.stdout).unwrap()
+    let done = calib(
+        ".",
+        &format!(
+            "simulate reveal {} --verdicts {} --json",
+            set.display(),
+            verdicts.display()
+        ),
+    )
+    .code(0);
+    done.json()
 }
 
 fn total(board: &Value, outcome: &str) -> u64 {
@@ -440,32 +411,34 @@ fn one_changed_byte_breaks_the_seal() {
         let last = after.iter().rposition(u8::is_ascii_digit).unwrap();
         after[last] = if after[last] == b'1' { b'2' } else { b'1' };
         std::fs::write(&path, after).unwrap();
-        let done = calib(&[
-            "simulate",
-            "reveal",
-            &set.to_string_lossy(),
-            "--verdicts",
-            &verdicts.to_string_lossy(),
-        ]);
-        let said = String::from_utf8_lossy(&done.stderr).into_owned();
-        assert_eq!(done.status.code(), Some(10), "{said}");
+        let done = calib(
+            ".",
+            &format!(
+                "simulate reveal {} --verdicts {}",
+                set.display(),
+                verdicts.display()
+            ),
+        );
+        let said = done.err.clone();
+        assert_eq!(done.code, Some(10), "{said}");
         assert!(
             said.contains(&format!("{name}: was changed since it was sealed"))
-                && done.stdout.is_empty(),
+                && done.out.is_empty(),
             "{said}"
         );
         std::fs::write(&path, before).unwrap();
     }
     std::fs::remove_file(set.join("recordings/c0001/robot.json")).unwrap();
-    let done = calib(&[
-        "simulate",
-        "reveal",
-        &set.to_string_lossy(),
-        "--verdicts",
-        &verdicts.to_string_lossy(),
-    ]);
+    let done = calib(
+        ".",
+        &format!(
+            "simulate reveal {} --verdicts {}",
+            set.display(),
+            verdicts.display()
+        ),
+    );
     assert!(
-        String::from_utf8_lossy(&done.stderr)
+        done.err
             .contains("recordings/c0001/robot.json: was sealed, but cannot be read")
     );
 }
@@ -476,20 +449,15 @@ fn the_scoreboard_is_a_table_with_a_row_for_each_effect() {
     let (set, verdicts) = judged(root.path(), wanted);
     let out = root.path().join("scoreboard.parquet");
     let text = out.to_string_lossy();
-    let done = calib(&[
-        "simulate",
-        "reveal",
-        &set.to_string_lossy(),
-        "--verdicts",
-        &verdicts.to_string_lossy(),
-        "--out",
-        &text,
-    ]);
-    assert!(
-        done.status.success(),
-        "{}",
-        String::from_utf8_lossy(&done.stderr)
-    );
+    calib(
+        ".",
+        &format!(
+            "simulate reveal {} --verdicts {} --out {text}",
+            set.display(),
+            verdicts.display()
+        ),
+    )
+    .code(0);
     let reader =
         ParquetRecordBatchReaderBuilder::try_new(std::fs::File::open(&out).unwrap()).unwrap();
     let rows: usize = reader
@@ -513,40 +481,27 @@ fn an_interrupted_proof_goes_on_where_it_stood_and_only_with_the_same_set() {
     std::fs::rename(verdicts, set.join("verdicts")).unwrap();
     let pipeline = concat!(env!("CARGO_MANIFEST_DIR"), "/pipelines/case/pipeline.yaml");
     let prove = |cases: &str| {
-        calib(&[
-            "simulate",
-            "prove",
-            "--out",
-            &set.to_string_lossy(),
-            "--cases",
-            cases,
-            "--points",
-            "30",
-            "--nulls",
-            "0.25",
-            "--pairs",
-            "0.25",
-            "--open",
-            "0.1",
-            "--pipeline",
-            pipeline,
-            "--json",
-        ])
+        calib(
+            ".",
+            &format!(
+                "simulate prove --out {} --cases {cases} --points 30 --nulls 0.25 --pairs 0.25 --open 0.1 --pipeline {pipeline} --json",
+                set.display()
+            ),
+        )
     };
     let done = prove("12");
-    let said = String::from_utf8_lossy(&done.stderr).into_owned();
+    let said = done.err.clone();
     assert!(
-        done.status.success() && said.matches("diagnosed before").count() == 12,
+        done.code == Some(0) && said.matches("diagnosed before").count() == 12,
         "{said}"
     );
-    let board: Value = serde_json::from_slice(&done.stdout).unwrap();
+    let board: Value = done.json();
     assert_eq!(
         (&board["recordings"], &board["failures"]),
         (&json!(12), &json!([]))
     );
-    let other = prove("11");
-    assert_eq!(other.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&other.stderr).contains("holds a set made with other options"));
+    let other = prove("11").code(2);
+    assert!(other.err.contains("holds a set made with other options"));
 }
 
 const STATED: &str = "
@@ -575,42 +530,44 @@ fn a_stated_twin_is_written_as_a_case_folder_that_the_estimator_reads() {
     std::fs::write(path("stated.yaml"), STATED).unwrap();
     let record = |out: &str, remainder: &str| {
         let remainder = format!("simulate.remainder={remainder}");
-        calib(&[
-            "simulate",
-            "record",
-            &path("stated.yaml"),
-            "--out",
-            &path(out),
-            "--store",
-            &path("store"),
-            "--set",
-            &remainder,
-            "--quiet",
-        ])
+        calib(
+            ".",
+            &[
+                "simulate",
+                "record",
+                &path("stated.yaml"),
+                "--out",
+                &path(out),
+                "--store",
+                &path("store"),
+                "--set",
+                &remainder,
+                "--quiet",
+            ],
+        )
     };
     let held_out = |out: &str| {
         let (case, variable) = (
             format!("{pipelines}/case/pipeline.yaml"),
             format!("case={}", path(out)),
         );
-        let done = calib(&[
-            "run",
-            &case,
-            "--set",
-            &variable,
-            "--store",
-            &path("store"),
-            "--until",
-            "validate",
-            "--json",
-            "--quiet",
-        ]);
-        assert!(
-            done.status.success(),
-            "{}",
-            String::from_utf8_lossy(&done.stderr)
-        );
-        let document: Value = serde_json::from_slice(&done.stdout).unwrap();
+        let done = calib(
+            ".",
+            &[
+                "run",
+                &case,
+                "--set",
+                &variable,
+                "--store",
+                &path("store"),
+                "--until",
+                "validate",
+                "--json",
+                "--quiet",
+            ],
+        )
+        .code(0);
+        let document: Value = done.json();
         let rows = document["statistics"].as_array().unwrap().clone();
         let row = rows
             .iter()
@@ -620,12 +577,7 @@ fn a_stated_twin_is_written_as_a_case_folder_that_the_estimator_reads() {
         row["rms_mm"].as_f64().unwrap() / row["noise_rms_mm"].as_f64().unwrap()
     };
     for (out, remainder) in [("bare", "none"), ("worn", "all")] {
-        let done = record(out, remainder);
-        assert!(
-            done.status.success(),
-            "{}",
-            String::from_utf8_lossy(&done.stderr)
-        );
+        record(out, remainder).code(0);
     }
     // 60 points leave the 34 numbers of geometry uncertain by a quarter of the noise; 30 arcsec at 2 m are 0.3 mm.
     let (bare, worn) = (held_out("bare"), held_out("worn"));
@@ -635,10 +587,7 @@ fn a_stated_twin_is_written_as_a_case_folder_that_the_estimator_reads() {
     let truth = read(root.path().join("worn/truth.csv"));
     has(&truth, "\nbacklash.j2.gap,backlash,joint 2,arcsec,60\n");
     let again = record("worn", "all");
-    assert!(
-        again.status.code() == Some(2)
-            && String::from_utf8_lossy(&again.stderr).contains("is not empty")
-    );
+    assert!(again.code == Some(2) && again.err.contains("is not empty"));
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! The covariance of a fit as a table: the same numbers on the way to and from it, and what `compensate` makes of it.
 
-use crate::fixture;
+use crate::fixture::{self, fit_all};
 use crate::identify::{GEOMETRY, model, recording};
 use calib::compensate::{Circumstance, IdentifiedArm, Scatter, Uncertainty};
 use calib::effect::Load;
@@ -11,15 +11,7 @@ use calib::table::{CovarianceTable, Parameters, Table};
 fn fitted(data: &Measurements, robot: &calib::robot::RobotModel) -> (Model, Fitted) {
     let rows: Vec<usize> = (0..data.rows()).collect();
     let model = model(robot, align(robot, data, &rows), &GEOMETRY);
-    let candidates: Vec<usize> = (0..model.x.len()).collect();
-    fit(
-        &model,
-        data,
-        &FitOptions {
-            rows: &rows,
-            candidates: &candidates,
-        },
-    )
+    fit_all(&model, data, &rows)
 }
 
 #[test]

@@ -12,7 +12,7 @@ mod tool_mass;
 mod weight;
 mod without;
 
-use crate::answer::{has, put, read, root};
+use crate::answer::{self, has, put, read, root};
 use crate::desk::{Desk, shared, table};
 use crate::suspects::{Inputs, pipeline};
 use calib::effect::{Form, Load};
@@ -25,7 +25,6 @@ use nalgebra::Vector3;
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::Path;
-use std::process::Command;
 
 type Named = BTreeSet<(String, String)>;
 
@@ -119,57 +118,33 @@ fn the_practice_cases_are_solved() {
     assert!(wrong.len() <= 1, "{}", wrong.join("\n"));
 }
 
-fn calib(arguments: &[&str], folder: &Path) -> String {
-    let output = Command::new(env!("CARGO_BIN_EXE_calib"))
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .unwrap();
-    assert!(
-        output.status.success(),
-        "{arguments:?}: {}",
-        String::from_utf8_lossy(&output.stderr)
-    );
-    String::from_utf8(output.stdout).unwrap()
+fn calib(words: &str, folder: &Path) -> String {
+    answer::calib(folder, words).ok()
 }
 
 /// The exit code and what is printed on stdout.
-fn ended(arguments: &[&str], folder: &Path) -> (Option<i32>, String) {
-    let output = Command::new(env!("CARGO_BIN_EXE_calib"))
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .unwrap();
-    (
-        output.status.code(),
-        String::from_utf8(output.stdout).unwrap(),
-    )
+fn ended(words: &str, folder: &Path) -> (Option<i32>, String) {
+    let answer = answer::calib(folder, words);
+    (answer.code, answer.out)
 }
 
 /// Diagnoses a concealed recording of the twin: the document, and what the seal holds.
 fn blind(family: &str, seed: &str) -> (Value, Value) {
     let folder = tempfile::tempdir().unwrap();
-    let mut arguments = vec![
-        "simulate", "conceal", "--out", "sealed", "--cases", "1", "--seed", seed, "--points", "120",
-    ];
-    match family {
-        "nothing" => arguments.extend(["--nulls", "1"]),
-        "wandering" => arguments.extend(["--nulls", "1", "--scatter", "wandering"]),
-        family => arguments.extend(["--family", family]),
-    }
-    arguments.extend(["--robot", "compact6", "--faulty", "0"]);
-    calib(&arguments, folder.path());
+    let hidden = match family {
+        "nothing" => "--nulls 1".into(),
+        "wandering" => "--nulls 1 --scatter wandering".into(),
+        family => format!("--family {family}"),
+    };
+    let made = format!("simulate conceal --out sealed --cases 1 --seed {seed} --points 120");
+    calib(
+        &format!("{made} {hidden} --robot compact6 --faulty 0"),
+        folder.path(),
+    );
     let pipeline = root("pipelines/case/pipeline.yaml");
-    let pipeline = pipeline.display().to_string();
+    let pipeline = pipeline.display();
     let said = calib(
-        &[
-            "diagnose",
-            &pipeline,
-            "--set",
-            "case=sealed/recordings/c0001",
-            "--json",
-            "--quiet",
-        ],
+        &format!("diagnose {pipeline} --set case=sealed/recordings/c0001 --json --quiet"),
         folder.path(),
     );
     let truth = read(folder.path().join("sealed/sealed/c0001.json"));
@@ -252,11 +227,7 @@ stages:
     );
     let folder = concealed("backlash", "31", "40");
     put(folder.path(), "p.yaml", pipeline);
-    serde_json::from_str(&calib(
-        &["diagnose", "p.yaml", "--json", "--quiet"],
-        folder.path(),
-    ))
-    .unwrap()
+    serde_json::from_str(&calib("diagnose p.yaml --json --quiet", folder.path())).unwrap()
 }
 
 #[test]
@@ -292,12 +263,9 @@ fn lost_motion_that_heavy_loads_decide_is_one_cause_with_its_gap_and_its_torque(
 #[test]
 fn a_joint_of_the_wrong_sign_is_named_with_the_line_that_mends_it() {
     let folder = tempfile::tempdir().unwrap();
-    let arguments = [
-        "simulate", "conceal", "--out", "sealed", "--cases", "1", "--seed", "901", "--points",
-        "120", "--nulls", "1",
-    ];
+    let arguments = "simulate conceal --out sealed --cases 1 --seed 901 --points 120 --nulls 1";
     calib(
-        &[&arguments[..], &["--robot", "compact6", "--faulty", "0"]].concat(),
+        &format!("{arguments} --robot compact6 --faulty 0"),
         folder.path(),
     );
     let file = folder.path().join("sealed/recordings/c0001/controller.csv");
@@ -317,15 +285,8 @@ fn a_joint_of_the_wrong_sign_is_named_with_the_line_that_mends_it() {
     let turned: Vec<String> = text.lines().enumerate().map(reverse).collect();
     std::fs::write(&file, turned.join("\n")).unwrap();
     let pipeline = root("pipelines/case/pipeline.yaml").display().to_string();
-    let asked = [
-        "diagnose",
-        &pipeline,
-        "--set",
-        "case=sealed/recordings/c0001",
-        "--json",
-        "--quiet",
-    ];
-    let (code, said) = ended(&asked, folder.path());
+    let asked = &format!("diagnose {pipeline} --set case=sealed/recordings/c0001 --json --quiet");
+    let (code, said) = ended(asked, folder.path());
     assert_eq!(code, Some(10), "{said}");
     let said: Value = serde_json::from_str(&said).unwrap();
     let findings = said["findings"].as_array().unwrap();
@@ -348,10 +309,7 @@ fn a_joint_of_the_wrong_sign_is_named_with_the_line_that_mends_it() {
             &format!("unit: deg, linear_unit: mm, {sign}}}"),
         )],
     );
-    let mended = calib(
-        &[&["diagnose", "p.yaml", "--json", "--quiet"], &CASE[..]].concat(),
-        here,
-    );
+    let mended = calib(&format!("diagnose p.yaml --json --quiet {CASE}"), here);
     let mended: Value = serde_json::from_str(&mended).unwrap();
     assert_eq!(
         (&mended["verdict"], &mended["findings"]),
@@ -363,23 +321,9 @@ fn a_joint_of_the_wrong_sign_is_named_with_the_line_that_mends_it() {
 #[test]
 fn what_another_simulation_knows_is_not_missing_from_it() {
     let folder = tempfile::tempdir().unwrap();
-    let arguments = [
-        "simulate", "conceal", "--out", "sealed", "--cases", "1", "--seed", "931", "--points",
-        "120",
-    ];
+    let arguments = "simulate conceal --out sealed --cases 1 --seed 931 --points 120";
     calib(
-        &[
-            &arguments[..],
-            &[
-                "--family",
-                "joint_compliance",
-                "--robot",
-                "compact6",
-                "--faulty",
-                "0",
-            ],
-        ]
-        .concat(),
+        &format!("{arguments} --family joint_compliance --robot compact6 --faulty 0"),
         folder.path(),
     );
     let case = folder.path().join("sealed/recordings/c0001");
@@ -448,31 +392,18 @@ fn what_another_simulation_knows_is_not_missing_from_it() {
 /// A recording of the twin in `sealed/recordings/c0001` of a new folder.
 fn concealed(family: &str, seed: &str, points: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    let arguments = [
-        "simulate", "conceal", "--out", "sealed", "--cases", "1", "--seed", seed, "--points",
-        points,
-    ];
+    let arguments =
+        &format!("simulate conceal --out sealed --cases 1 --seed {seed} --points {points}");
     calib(
-        &[
-            &arguments[..],
-            &["--family", family, "--robot", "compact6", "--faulty", "0"],
-        ]
-        .concat(),
+        &format!("{arguments} --family {family} --robot compact6 --faulty 0"),
         folder.path(),
     );
     folder
 }
 
-fn refused(arguments: &[&str], folder: &Path) -> (Option<i32>, String) {
-    let output = Command::new(env!("CARGO_BIN_EXE_calib"))
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .unwrap();
-    (
-        output.status.code(),
-        String::from_utf8_lossy(&output.stderr).into_owned(),
-    )
+fn refused(words: &str, folder: &Path) -> (Option<i32>, String) {
+    let answer = answer::calib(folder, words);
+    (answer.code, answer.err)
 }
 
 /// The pipeline of cases, with one text in place of another.
@@ -485,7 +416,7 @@ fn case_with(folder: &Path, changes: &[(&str, &str)]) {
     put(folder, "p.yaml", text);
 }
 
-const CASE: [&str; 2] = ["--set", "case=sealed/recordings/c0001"];
+const CASE: &str = "--set case=sealed/recordings/c0001";
 
 /// The last run of a folder's store, whatever it was for.
 fn newest(folder: &Path) -> String {
@@ -504,67 +435,48 @@ fn a_diagnosis_is_shown_again_from_its_run_as_it_was_printed() {
         "  - {id: again, uses: diagnose}\n\n  - uses: validate\n",
     );
     case_with(here, &[]);
-    let told = calib(
-        &[&["diagnose", "p.yaml", "--quiet"], &CASE[..]].concat(),
-        here,
-    );
-    let made = [told, calib(&["diagnose", &newest(here), "--json"], here)];
+    let told = calib(&format!("diagnose p.yaml --quiet {CASE}"), here);
+    let made = [
+        told,
+        calib(&format!("diagnose {} --json", newest(here)), here),
+    ];
     let runs = std::fs::read_dir(here.join(".calib/runs")).unwrap().count();
-    assert_eq!(calib(&["diagnose", &newest(here)], here), made[0]);
+    assert_eq!(calib(&format!("diagnose {}", newest(here)), here), made[0]);
     // Nothing was run, and nothing was computed anew.
     assert_eq!(
         std::fs::read_dir(here.join(".calib/runs")).unwrap().count(),
         runs
     );
     assert_eq!(
-        calib(
-            &[&["diagnose", "p.yaml", "--quiet", "--json"], &CASE[..]].concat(),
-            here
-        ),
+        calib(&format!("diagnose p.yaml --quiet --json {CASE}"), here),
         made[1]
     );
-    calib(&["tag", &newest(here), "found"], here);
+    calib(&format!("tag {} found", newest(here)), here);
     calib(
-        &[
-            &[
-                "run", "p.yaml", "--quiet", "--until", "geometry", "--set", "seed=9",
-            ],
-            &CASE[..],
-        ]
-        .concat(),
+        &format!("run p.yaml --quiet --until geometry --set seed=9 {CASE}"),
         here,
     );
-    let (code, said) = refused(&["diagnose", &newest(here)], here);
+    let (code, said) = refused(&format!("diagnose {}", newest(here)), here);
     assert_eq!(code, Some(2), "{said}");
     has(&said, "never came to its stage `diagnose`");
     has(
         &said,
         "calib diagnose p.yaml --set seed=9 --set case=sealed/recordings/c0001",
     );
-    assert_eq!(calib(&["diagnose", "found", "--json"], here), made[1]);
+    assert_eq!(calib("diagnose found --json", here), made[1]);
     case_with(here, &[("  - uses: diagnose\n", "")]);
-    calib(
-        &[
-            &["run", "p.yaml", "--quiet", "--until", "geometry"],
-            &CASE[..],
-        ]
-        .concat(),
-        here,
-    );
-    let (code, said) = refused(&["diagnose", &newest(here)], here);
+    calib(&format!("run p.yaml --quiet --until geometry {CASE}"), here);
+    let (code, said) = refused(&format!("diagnose {}", newest(here)), here);
     assert_eq!(code, Some(2), "{said}");
     has(
         &said,
         "has no stage `diagnose`: put `- uses: diagnose` after the split of p.yaml",
     );
     case_with(here, &[twice]);
-    calib(
-        &[&["run", "p.yaml", "--quiet", "--until", "again"], &CASE[..]].concat(),
-        here,
-    );
+    calib(&format!("run p.yaml --quiet --until again {CASE}"), here);
     let run = newest(here);
-    for place in [&[run.as_str()][..], &[&["p.yaml"], &CASE[..]].concat()] {
-        let (code, said) = refused(&[&["diagnose"], place].concat(), here);
+    for place in [run.clone(), format!("p.yaml {CASE}")] {
+        let (code, said) = refused(&format!("diagnose {place}"), here);
         assert_eq!(code, Some(2), "{said}");
         has(
             &said,
@@ -572,10 +484,10 @@ fn a_diagnosis_is_shown_again_from_its_run_as_it_was_printed() {
         );
     }
     assert_eq!(
-        calib(&["diagnose", &format!("{run}/again"), "--json"], here),
-        calib(&["diagnose", &run, "--step", "again", "--json"], here)
+        calib(&format!("diagnose {run}/again --json"), here),
+        calib(&format!("diagnose {run} --step again --json"), here)
     );
-    let (code, said) = refused(&["diagnose", &run, "--set", "seed=2"], here);
+    let (code, said) = refused(&format!("diagnose {run} --set seed=2"), here);
     assert_eq!(
         (code, said.contains("a finished run cannot be changed")),
         (Some(2), true),
@@ -615,44 +527,29 @@ fn parameters_that_correct_an_outside_simulation_are_not_taken_for_the_robots_ow
         .map(|axis| format!("            sim_{axis}: {{column: s{axis}, unit: mm}}\n"))
         .concat();
     case_with(here, &[(z, &format!("{z}{simulated}"))]);
-    calib(
-        &[&["diagnose", "p.yaml", "--quiet"], &CASE[..]].concat(),
-        here,
-    );
+    calib(&format!("diagnose p.yaml --quiet {CASE}"), here);
     put(here, "t.csv", "x_mm,y_mm,z_mm\n600,0,700\n");
     let table = ".calib/tables/case/diagnose.parameters.parquet";
     let robot = "sealed/recordings/c0001/robot.json";
     let run = newest(here);
     for verb in [
-        &["compensate", &run, "t.csv"][..],
-        &["export", &run, "--format", "json"],
-        &["export", table, "--robot", robot, "--format", "json"],
+        format!("compensate {run} t.csv"),
+        format!("export {run} --format json"),
+        format!("export {table} --robot {robot} --format json"),
     ] {
-        let (code, said) = refused(verb, here);
+        let (code, said) = refused(&verb, here);
         assert_eq!(code, Some(2), "{said}");
         has(
             &said,
             ["correct the simulation of sim_x, sim_y, sim_z", "--step"],
         );
     }
+    calib(&format!("run p.yaml --quiet --until geometry {CASE}"), here);
     calib(
-        &[
-            &["run", "p.yaml", "--quiet", "--until", "geometry"],
-            &CASE[..],
-        ]
-        .concat(),
-        here,
-    );
-    calib(
-        &[
-            "export",
-            &newest(here),
-            "--step",
-            "geometry",
-            "--format",
-            "json",
-            "--quiet",
-        ],
+        &format!(
+            "export {} --step geometry --format json --quiet",
+            newest(here)
+        ),
         here,
     );
 }
@@ -717,10 +614,7 @@ fn proposed_poses_tell_a_finding_from_its_rival_three_times_better_than_random_o
     let folder = concealed("base_compliance", "14", "60");
     let here = folder.path();
     case_with(here, &[]);
-    let said = calib(
-        &[&["diagnose", "p.yaml", "--quiet"], &CASE[..]].concat(),
-        here,
-    );
+    let said = calib(&format!("diagnose p.yaml --quiet {CASE}"), here);
     // The command is printed as it is to be typed.
     let command = said
         .lines()
@@ -730,12 +624,8 @@ fn proposed_poses_tell_a_finding_from_its_rival_three_times_better_than_random_o
         command.ends_with("--separate 1 'link_compliance@link 1'"),
         "{said}"
     );
-    let words: Vec<&str> = command
-        .trim_end_matches(" 'link_compliance@link 1'")
-        .split(' ')
-        .collect();
-    let more = ["link_compliance@link 1", "--count", "50", "--json"];
-    let told: Value = serde_json::from_str(&calib(&[&words[..], &more].concat(), here)).unwrap();
+    let told: Value =
+        serde_json::from_str(&calib(&format!("{command} --count 50 --json"), here)).unwrap();
     let number = |value: &Value| value.as_f64().unwrap();
     let sides = told["separation"].as_array().unwrap();
     assert_eq!(sides[0]["if"], "base_compliance at base");
@@ -861,10 +751,7 @@ fn what_no_pose_tells_apart_is_said_with_what_would() {
     let here = folder.path();
     case_with(here, &[]);
     let found = |here: &Path| -> Value {
-        let said = calib(
-            &[&["diagnose", "p.yaml", "--quiet", "--json"], &CASE[..]].concat(),
-            here,
-        );
+        let said = calib(&format!("diagnose p.yaml --quiet --json {CASE}"), here);
         serde_json::from_str(&said).unwrap()
     };
     // A balancer at a joint of unknown stiffness is a gear error of order 1.
@@ -873,14 +760,10 @@ fn what_no_pose_tells_apart_is_said_with_what_would() {
         "counterbalance"
     );
     let said = calib(
-        &[
-            "poses",
-            "--run",
-            &newest(here),
-            "--separate",
-            "gear_cyclic",
-            "counterbalance@j4",
-        ],
+        &format!(
+            "poses --run {} --separate gear_cyclic counterbalance@j4",
+            newest(here)
+        ),
         here,
     );
     has(
@@ -896,24 +779,24 @@ fn what_no_pose_tells_apart_is_said_with_what_would() {
         found(here)["findings"][0]["rivals"][0]["effect"],
         "base_shift"
     );
-    let said = calib(&["poses", "--run", &newest(here), "--separate"], here);
+    let said = calib(&format!("poses --run {} --separate", newest(here)), here);
     has(
         &said,
         "base_shift at base can imitate zero_shift at joint 1 completely",
     );
     has(&said, "instead: return to a few anchor poses");
     for (names, wanted) in [
-        (&["9"][..], "`9` matches no finding of run"),
-        (&["zero_shift@joint 7"], "matches no finding of run"),
-        (&["1", "gear_cyclc@joint 1"], "did you mean `gear_cyclic`?"),
+        ("9", "`9` matches no finding of run"),
+        ("'zero_shift@joint 7'", "matches no finding of run"),
+        ("1 'gear_cyclc@joint 1'", "did you mean `gear_cyclic`?"),
         (
-            &["1", "gear_cyclic@joint 9"],
+            "1 'gear_cyclic@joint 9'",
             "gear_cyclic has no place `joint 9` here; allowed: joint 1, joint 2",
         ),
-        (&["1", "gear_cyclic"], "say where, e.g. 'gear_cyclic@"),
+        ("1 gear_cyclic", "say where, e.g. 'gear_cyclic@"),
     ] {
         let (code, said) = refused(
-            &[&["poses", "--run", &newest(here), "--separate"], names].concat(),
+            &format!("poses --run {} --separate {names}", newest(here)),
             here,
         );
         assert_eq!((code, said.contains(wanted)), (Some(2), true), "{said}");
@@ -930,7 +813,7 @@ fn of_few_rows_no_law_takes_a_size_that_no_gear_has() {
         env!("CARGO_MANIFEST_DIR")
     );
     let said = calib(
-        &["diagnose", "p.yaml", "--set", &rows, "--json", "--quiet"],
+        &format!("diagnose p.yaml --set {rows} --json --quiet"),
         folder.path(),
     );
     let said: Value = serde_json::from_str(&said).unwrap();

@@ -1,21 +1,17 @@
 //! Exports: what is written is read back by calib itself and is the same arm; programs change in the numbers of targets alone.
 
-use crate::answer::{has, put, read};
-use crate::compensate::{PIPELINE, calib, cell};
+use crate::answer::{calib, has, put, read};
+use crate::compensate::{PIPELINE, cell};
 use calib::robot::RobotModel;
 use calib::robot::import::{RobotFileText, read_calib};
 use serde_json::Value;
 
 fn exported(format: &str) -> String {
-    let output = calib(
-        cell(),
-        &["export", "latest", "--format", format, "--force"],
-        "",
-    );
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "{said}");
+    let output = calib(cell(), &format!("export latest --format {format} --force"));
+    let said = output.err.clone();
+    assert!(output.code == Some(0), "{said}");
     has(&said, "not carried: reduction_ratio at joint 3");
-    String::from_utf8(output.stdout).unwrap()
+    output.out
 }
 
 /// The tool at a joint position by the exported JSON: product of exponentials written out here.
@@ -135,10 +131,8 @@ fn a_file_says_whose_it_is_and_whether_it_was_edited() {
                 "--against",
                 "latest",
             ],
-            "",
         );
-        let said = String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned();
-        (output.status.code(), said)
+        (output.code, output.both())
     };
     for format in ["urdf", "dh", "mdh", "json", "mjcf", "sdf", "controller"] {
         let text = exported(format);
@@ -201,12 +195,7 @@ fn of_the_library(name: &str) -> tempfile::TempDir {
         "[0.4, 0.2, -0.3], tilt_arcsec: [40, 20, 60]",
     );
     put(folder.path(), "pipeline.yaml", pipeline);
-    let output = calib(folder.path(), &["run", "pipeline.yaml", "--quiet"], "");
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    calib(folder.path(), "run pipeline.yaml --quiet").code(0);
     folder
 }
 
@@ -214,13 +203,8 @@ fn of_the_library(name: &str) -> tempfile::TempDir {
 fn a_drivers_kinematics_are_those_of_the_arm_near_the_frames_of_its_meshes() {
     let folder = of_the_library("ur10e");
     let export = |format: &str| {
-        let output = calib(folder.path(), &["export", "latest", "--format", format], "");
-        assert!(
-            output.status.success(),
-            "{}",
-            String::from_utf8_lossy(&output.stderr)
-        );
-        String::from_utf8(output.stdout).unwrap()
+        let output = calib(folder.path(), &format!("export latest --format {format}")).code(0);
+        output.out
     };
     let model: Value = serde_json::from_str(&export("json")).unwrap();
     let text = export("ur_kinematics");
@@ -277,15 +261,8 @@ fn a_drivers_kinematics_are_those_of_the_arm_near_the_frames_of_its_meshes() {
             "{point:?} {wanted:?}"
         );
     }
-    let other = calib(
-        cell(),
-        &["export", "latest", "--format", "ur_kinematics"],
-        "",
-    );
-    assert!(
-        other.status.code() == Some(10)
-            && String::from_utf8_lossy(&other.stderr).contains("is no arm of Universal Robots")
-    );
+    let other = calib(cell(), "export latest --format ur_kinematics");
+    assert!(other.code == Some(10) && other.err.contains("is no arm of Universal Robots"));
 }
 
 type Turn = [[f64; 3]; 3];
@@ -392,13 +369,8 @@ fn a_mujoco_model_is_the_arm_that_was_identified_with_its_limits_and_known_masse
         pipeline.replace("robot.yaml", "'heavy <1>.yaml'"),
     );
     let export = |format: &str| {
-        let output = calib(here, &["export", "pipeline.yaml", "--format", format], "");
-        assert!(
-            output.status.success(),
-            "{}",
-            String::from_utf8_lossy(&output.stderr)
-        );
-        String::from_utf8(output.stdout).unwrap()
+        let output = calib(here, &format!("export pipeline.yaml --format {format}")).code(0);
+        output.out
     };
     let (text, model) = (export("mjcf"), export("json"));
     let model: Value = serde_json::from_str(&model).unwrap();
@@ -455,15 +427,9 @@ fn program(name: &str, text: &str) -> (Option<i32>, String, String) {
     std::fs::write(&path, text).unwrap();
     let output = calib(
         cell(),
-        &["compensate", "latest", name, "--quiet", "--assume-frames"],
-        "",
+        &format!("compensate latest {name} --quiet --assume-frames"),
     );
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-    (
-        output.status.code(),
-        text(output.stdout),
-        text(output.stderr),
-    )
+    (output.code, output.out, output.err)
 }
 
 /// The text with every number taken out, where `keep` does not hold for its line.

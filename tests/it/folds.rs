@@ -2,12 +2,10 @@
 
 use crate::answer::has;
 use crate::desk::{Desk, table};
-use crate::fixture;
+use crate::fixture::{self, fit_all};
 use crate::identify::{GEOMETRY, SIGMA, model, recording};
 use crate::sr210d::{experiment, settings};
-use calib::estimate::{
-    FitOptions, Fitted, Folds, Model, Session, align, cross_validate, fit, leave_one_out,
-};
+use calib::estimate::{Fitted, Folds, Model, Session, align, cross_validate, leave_one_out};
 use calib::robot::{Measurements, RobotModel};
 use calib::stage::{
     FoldSetting, Identify, IdentifyReads, Labelled, Stage, Validate, ValidateReads,
@@ -18,15 +16,7 @@ fn identify(data: &Measurements, effects: &[&str]) -> (Model, Fitted) {
     let robot = RobotModel::new(fixture::offset_wrist());
     let rows: Vec<usize> = (0..data.rows()).collect();
     let model = model(&robot, align(&robot, data, &rows), effects);
-    let candidates: Vec<usize> = (0..model.x.len()).collect();
-    fit(
-        &model,
-        data,
-        &FitOptions {
-            rows: &rows,
-            candidates: &candidates,
-        },
-    )
+    fit_all(&model, data, &rows)
 }
 
 fn folds(data: &Measurements, effects: &[&str], count: usize) -> Option<Folds> {
@@ -91,15 +81,7 @@ fn a_fold_is_what_a_fit_without_its_rows_says() {
         for block in 0..5 {
             let kept: Vec<usize> = (0..80).filter(|row| row / 16 != block).collect();
             let start = model(&robot, align(&robot, &data, &kept), &effects);
-            let candidates: Vec<usize> = (0..start.x.len()).collect();
-            let (model, _) = fit(
-                &start,
-                &data,
-                &FitOptions {
-                    rows: &kept,
-                    candidates: &candidates,
-                },
-            );
+            let (model, _) = fit_all(&start, &data, &kept);
             let predicted = model.predict(&data);
             differences.extend(
                 (16 * block..16 * (block + 1))
@@ -248,15 +230,7 @@ fn with_one_fold_a_pose_each_is_predicted_by_a_fit_to_all_others() {
     for left in [0, 17, 39] {
         let kept: Vec<usize> = (0..40).filter(|row| *row != left).collect();
         let start = model(&robot, align(&robot, &data, &kept), &GEOMETRY);
-        let candidates: Vec<usize> = (0..start.x.len()).collect();
-        let (model, _) = fit(
-            &start,
-            &data,
-            &FitOptions {
-                rows: &kept,
-                candidates: &candidates,
-            },
-        );
+        let (model, _) = fit_all(&start, &data, &kept);
         let error = (data.points.position[left] - model.predict(&data)[left]).norm();
         assert!(
             (found.random[left] - error).abs() < 0.02 * SIGMA,

@@ -5,8 +5,7 @@ mod layouts;
 mod lists;
 mod torques;
 
-use crate::answer::{has, put, read};
-use crate::compensate::calib;
+use crate::answer::{calib, has, put, read};
 use std::fmt::Write;
 
 #[test]
@@ -23,14 +22,10 @@ fn what_init_writes_is_understood_and_never_overwrites() {
     }
     put(folder.path(), "controller.csv", controller);
     put(folder.path(), "tracker.csv", tracker);
-    let arguments = ["init", ".", "--data", "controller.csv", "tracker.csv"];
-    let output = calib(folder.path(), &arguments, "");
-    let said = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    let arguments = "init . --data controller.csv tracker.csv";
+    let output = calib(folder.path(), arguments);
+    let said = output.out.clone();
+    assert!(output.code == Some(0), "{}", output.err);
     has(&said, ["6 joints (A1 to A6)", "not used: remark"]);
     let pipeline = read(folder.path().join("pipeline.yaml"));
     for part in [
@@ -43,38 +38,15 @@ fn what_init_writes_is_understood_and_never_overwrites() {
     ] {
         assert!(pipeline.contains(part), "{part} in\n{pipeline}");
     }
-    let check = calib(folder.path(), &["check", "pipeline.yaml"], "");
-    assert!(
-        check.status.success(),
-        "{}",
-        String::from_utf8_lossy(&check.stderr)
-    );
-    let ingest = calib(
-        folder.path(),
-        &["run", "pipeline.yaml", "--until", "split", "--quiet"],
-        "",
-    );
-    assert!(
-        ingest.status.success(),
-        "{}",
-        String::from_utf8_lossy(&ingest.stderr)
-    );
-    let again = calib(folder.path(), &arguments, "");
-    assert_eq!(again.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&again.stderr).contains("is already there"));
+    calib(folder.path(), "check pipeline.yaml").code(0);
+    calib(folder.path(), "run pipeline.yaml --until split --quiet").code(0);
+    let again = calib(folder.path(), arguments).code(2);
+    assert!(again.err.contains("is already there"));
     let seven = calib(
         folder.path(),
-        &[
-            "init",
-            "other",
-            "--data",
-            "controller.csv",
-            "--robot",
-            "seven",
-        ],
-        "",
+        "init other --data controller.csv --robot seven",
     );
-    assert!(String::from_utf8_lossy(&seven.stderr).contains("seven has 7 joints, the recording 6"));
+    assert!(seven.err.contains("seven has 7 joints, the recording 6"));
 }
 
 #[test]
@@ -95,12 +67,7 @@ fn a_foreign_table_is_understood_as_it_stands_and_what_is_left_to_do_is_said() {
         .unwrap();
     }
     put(folder.path(), "messung.csv", table);
-    let output = calib(folder.path(), &["init", ".", "--data", "messung.csv"], "");
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    calib(folder.path(), "init . --data messung.csv").code(0);
     let pipeline = read(folder.path().join("pipeline.yaml"));
     for part in [
         "point_id: {column: \"Messpunkt\"}",
@@ -111,42 +78,31 @@ fn a_foreign_table_is_understood_as_it_stands_and_what_is_left_to_do_is_said() {
     ] {
         assert!(pipeline.contains(part), "{part} in\n{pipeline}");
     }
-    let check = calib(folder.path(), &["check", "pipeline.yaml"], "");
-    assert!(
-        check.status.success(),
-        "{}",
-        String::from_utf8_lossy(&check.stderr)
-    );
-    let said = String::from_utf8_lossy(&check.stdout).into_owned();
+    let check = calib(folder.path(), "check pipeline.yaml").code(0);
+    let said = check.out.clone();
     has(&said, ["replace   5 lines: ", "          robot.yaml:"]);
     let identified = pipeline
         .replace("# limits:", "limits:")
         .replace("# identity:", "identity:");
     put(folder.path(), "pipeline.yaml", identified);
-    let check = calib(folder.path(), &["check", "pipeline.yaml"], "");
-    assert!(
-        check.status.success(),
-        "the commented settings are none: {}",
-        String::from_utf8_lossy(&check.stderr)
-    );
+    calib(folder.path(), "check pipeline.yaml").code(0);
 
     put(folder.path(), "bare.csv", "a;b;c;d\n1;2;3;4\n");
-    let output = calib(folder.path(), &["init", "bare", "--data", "bare.csv"], "");
-    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    let output = calib(folder.path(), "init bare --data bare.csv");
+    let said = output.out.clone();
     has(
         &said,
         "name columns of joints and the measured point where it says REPLACE",
     );
-    let check = calib(folder.path(), &["check", "bare/pipeline.yaml"], "");
-    assert!(String::from_utf8_lossy(&check.stdout).contains("replace   9 lines: "));
+    let check = calib(folder.path(), "check bare/pipeline.yaml");
+    assert!(check.out.contains("replace   9 lines: "));
 }
 
 #[test]
 fn every_kind_of_robot_that_init_writes_is_read() {
     for kind in ["spherical6", "offset6", "seven", "dh6"] {
         let folder = tempfile::tempdir().unwrap();
-        let output = calib(folder.path(), &["init", "--robot", kind], "");
-        assert!(output.status.success());
+        calib(folder.path(), &format!("init --robot {kind}")).code(0);
         let text = read(folder.path().join("robot.yaml"));
         let file = calib::robot::import::RobotFileText {
             label: "robot.yaml",
@@ -161,14 +117,10 @@ fn every_kind_of_robot_that_init_writes_is_read() {
 fn shells_and_readers_of_manuals_are_served() {
     let folder = tempfile::tempdir().unwrap();
     for shell in ["bash", "zsh", "fish", "powershell"] {
-        let output = calib(folder.path(), &["completions", shell], "");
-        assert!(
-            String::from_utf8_lossy(&output.stdout).contains("compensate"),
-            "{shell}"
-        );
+        let output = calib(folder.path(), &format!("completions {shell}"));
+        assert!(output.out.contains("compensate"), "{shell}");
     }
-    let page = calib(folder.path(), &["man", "compensate"], "");
-    assert!(String::from_utf8_lossy(&page.stdout).contains(".TH calib-compensate"));
-    let wrong = calib(folder.path(), &["man", "compensat"], "");
-    assert_eq!(wrong.status.code(), Some(2));
+    let page = calib(folder.path(), "man compensate");
+    assert!(page.out.contains(".TH calib-compensate"));
+    calib(folder.path(), "man compensat").code(2);
 }

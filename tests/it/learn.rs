@@ -2,8 +2,8 @@
 
 use crate::answer::{has, root};
 use crate::desk::{Desk, table};
+use crate::fixture::robot_of;
 use calib::error::Result;
-use calib::robot::import::{RobotFileText, read_calib};
 use calib::stage::split::{SplitBy, SplitReads};
 use calib::stage::{Context, Learn, LearnReads, LearnWrites, Stage};
 use calib::stage::{Identify, IdentifyReads, Simulate, SimulateReads, Stiffness, StiffnessReads};
@@ -38,15 +38,7 @@ fn mean_error(prediction: &Prediction, set: &str) -> f64 {
 fn paper_sequence(seed: u64) -> (Recording, Split, Prediction) {
     let folder = root("pipelines/sr210d");
     let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
-    let description = read_calib(
-        RobotFileText {
-            label: "robot.yaml",
-            text: &read("robot.yaml"),
-        },
-        None,
-    )
-    .unwrap()
-    .robot;
+    let description = robot_of(&read("robot.yaml"));
     let robot = Robot::from_description(&description);
     let yaml: Value =
         serde_saphyr::from_str(&read("pipeline.yaml").replace("${remainder}", "all")).unwrap();

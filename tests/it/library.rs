@@ -4,19 +4,17 @@ mod diagnose;
 mod identify;
 mod tables;
 
-use crate::answer::{has, read, root};
-use crate::fixture;
+use crate::answer::{calib, has, read, root};
+use crate::fixture::{self, robot_of};
 use crate::identify::{model, normal};
 use crate::readme::example;
 use calib::api::{Poses, Recording, Robot, Sigma};
 use calib::effect::{Effect, EffectContext, EffectStack, Form, Load, arm_effect};
 use calib::estimate::Model;
-use calib::robot::import::{RobotFileText, read_calib};
 use calib::robot::{Measurements, PointReadings, RobotModel};
 use calib::spatial::{Pose, Twist};
 use nalgebra::Vector3;
 use serde_json::json;
-use std::process::Command;
 
 /// m, per axis.
 const NOISE: f64 = 10e-6;
@@ -38,17 +36,7 @@ fn rows(robot: &RobotModel, count: usize) -> Measurements {
 #[test]
 fn an_arm_is_identified_from_arrays() {
     let text = example("calib_robot:");
-    let robot = RobotModel::new(
-        read_calib(
-            RobotFileText {
-                label: "page",
-                text: &text,
-            },
-            None,
-        )
-        .unwrap()
-        .robot,
-    );
+    let robot = RobotModel::new(robot_of(&text));
     let mut data = rows(&robot, 60);
     let mut truth = model(&robot, base(), &["joint_offset"]);
     let third = truth
@@ -139,19 +127,12 @@ fn missing_physics_is_named_from_arrays() {
 fn the_tables_of_a_run_are_read_as_rust_values() {
     let store = tempfile::tempdir().unwrap();
     let pipeline = root("tests/it/resume/pipeline.yaml");
-    let mut command = Command::new(env!("CARGO_BIN_EXE_calib"));
-    let output = command
-        .arg("run")
-        .arg(pipeline)
-        .args(["--quiet", "--store"])
-        .arg(store.path())
-        .output()
-        .unwrap();
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    let store_name = store.path().display();
+    calib(
+        ".",
+        &format!("run {} --quiet --store {store_name}", pipeline.display()),
+    )
+    .ok();
     let worst = |step| tables::worst_points(store.path(), "HEAD", step).unwrap();
     let (nominal, geometry) = (worst("nominal"), worst("geometry"));
     assert_eq!((nominal.len(), geometry.len()), (20, 20));

@@ -1,7 +1,6 @@
 //! The library of arms: reach as published, axes as public models have them, and a run of each from `init --robot`.
 
-use crate::answer::put;
-use crate::compensate::calib;
+use crate::answer::{calib, put};
 use calib::robot::{LIBRARY, RobotModel};
 use calib::spatial::Pose;
 use calib::table::{Prediction, from_parquet};
@@ -176,37 +175,16 @@ fn every_arm_of_the_library_goes_from_init_to_a_run() {
             "measured.csv",
             recording(&robot, &read.about.coupled),
         );
-        let run = |arguments: &[&str]| {
-            let output = calib(folder.path(), arguments, "");
-            let said = [output.stdout, output.stderr]
-                .map(|bytes| String::from_utf8_lossy(&bytes).into_owned())
-                .concat();
-            assert!(
-                output.status.success(),
-                "{}: {arguments:?}: {said}",
-                arm.name
-            );
-            said
-        };
-        run(&[
-            "init",
-            "cell",
-            "--data",
-            "measured.csv",
-            "--robot",
-            arm.name,
-        ]);
+        let run = |arguments: &str| calib(folder.path(), arguments).code(0).both();
+        run(&format!(
+            "init cell --data measured.csv --robot {}",
+            arm.name
+        ));
         let file = folder.path().join("cell/robot.yaml");
         let text = std::fs::read_to_string(&file).unwrap();
         std::fs::write(&file, on_flange(&text, arm.name, &robot)).unwrap();
-        run(&["check", "cell/pipeline.yaml"]);
-        run(&[
-            "run",
-            "cell/pipeline.yaml",
-            "--until",
-            "geometry",
-            "--quiet",
-        ]);
+        run("check cell/pipeline.yaml");
+        run("run cell/pipeline.yaml --until geometry --quiet");
         let name = "geometry.prediction.parquet";
         let bytes = std::fs::read(folder.path().join(".calib/tables/cell").join(name)).unwrap();
         let prediction: Prediction = from_parquet(name, bytes).unwrap().table;

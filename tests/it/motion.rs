@@ -1,19 +1,12 @@
 //! Recordings of a moving arm: clocks apart and joints that trail are named with their size, and a sound arm has nothing missing,
 //! whether the controller logs velocities or they follow from the joints over time.
 
-use crate::answer::{has, read, root, starts_with};
+use crate::answer::{self, has, read, root, starts_with};
 use serde_json::Value;
 use std::path::PathBuf;
-use std::process::Command;
 
-fn calib(arguments: &[&str]) -> String {
-    let output = Command::new(env!("CARGO_BIN_EXE_calib"))
-        .args(arguments)
-        .output()
-        .unwrap();
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{said}");
-    String::from_utf8(output.stdout).unwrap()
+fn calib(words: &str) -> String {
+    answer::calib(".", words).ok()
 }
 
 /// Something wrong everywhere that a rigid model takes up, and what `effects` and `motion` say besides.
@@ -39,9 +32,9 @@ impl Case {
         std::fs::write(case.path("twin.yaml"), twin).unwrap();
         let [twin, out, store] =
             ["twin.yaml", "case", "store"].map(|name| case.path(name).display().to_string());
-        calib(&[
-            "simulate", "record", &twin, "--out", &out, "--store", &store, "--quiet",
-        ]);
+        calib(&format!(
+            "simulate record {twin} --out {out} --store {store} --quiet"
+        ));
         case
     }
 
@@ -59,16 +52,9 @@ impl Case {
         std::fs::write(self.path("pipeline.yaml"), text).unwrap();
         let [pipeline, case, store] =
             ["pipeline.yaml", "case", "store"].map(|name| self.path(name).display().to_string());
-        let said = calib(&[
-            "diagnose",
-            &pipeline,
-            "--set",
-            &format!("case={case}"),
-            "--store",
-            &store,
-            "--json",
-            "--quiet",
-        ]);
+        let said = calib(&format!(
+            "diagnose {pipeline} --set case={case} --store {store} --json --quiet"
+        ));
         serde_json::from_str(&said).unwrap()
     }
 }
@@ -216,25 +202,7 @@ fn what_a_standing_arm_cannot_show_is_refused_in_its_twin() {
         path.display().to_string(),
         folder.path().join("out").display().to_string(),
     );
-    let arguments = [
-        "simulate",
-        "record",
-        &path,
-        "--out",
-        &out,
-        "--store",
-        &format!("{out}-store"),
-        "--quiet",
-    ];
-    let output = Command::new(env!("CARGO_BIN_EXE_calib"))
-        .args(arguments)
-        .output()
-        .unwrap();
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(
-        output.status.code() == Some(2)
-            && said.contains("effects[0]")
-            && said.contains("moving arm only"),
-        "{said}"
-    );
+    let arguments = &format!("simulate record {path} --out {out} --store {out}-store --quiet");
+    let refused = answer::calib(".", arguments).code(2);
+    has(&refused.err, ["effects[0]", "moving arm only"]);
 }

@@ -1,6 +1,7 @@
 //! The perceptron, its gradient, its training, its valid range and the judge of whether it helps.
 
 use crate::answer::{has, read, root};
+use crate::fixture::robot_of;
 use calib::estimate::network::arm::ScrewArm;
 use calib::estimate::network::correction::{Body, NetworkScaling, Networks, Scaling, features};
 use calib::estimate::network::loss::{Batch, Loss, LossBuffers};
@@ -12,7 +13,6 @@ use calib::estimate::network::{
 };
 use calib::estimate::swarm::Algorithm;
 use calib::robot::RobotModel;
-use calib::robot::import::{RobotFileText, read_calib};
 use calib::spatial::Pose;
 use calib::table::{Network, Table};
 use rand::rngs::ChaCha8Rng;
@@ -208,17 +208,7 @@ fn a_smooth_remainder_is_learnt_and_the_noise_is_not() {
 fn sr210d() -> ScrewArm {
     let file = root("pipelines/sr210d/robot.yaml");
     let text = read(file);
-    let robot = RobotModel::new(
-        read_calib(
-            RobotFileText {
-                label: "robot.yaml",
-                text: &text,
-            },
-            None,
-        )
-        .unwrap()
-        .robot,
-    );
+    let robot = RobotModel::new(robot_of(&text));
     ScrewArm::of(
         &robot,
         &Pose::from_rotation_vector([0.02, -0.03, 2.0].into(), [4.5, -1.8, 0.9].into()),

@@ -1,33 +1,14 @@
 //! A user's own effect in YAML: found by its name on concealed recordings, and kept with its run.
 
-use crate::answer::{has, put, read, starts_with};
+use crate::answer::{self, has, put, read, root, starts_with};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
+fn calib(words: &str, folder: &Path) -> String {
+    answer::calib(folder, words).ok()
 }
 
-fn output(arguments: &[&str], folder: &Path) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_calib"))
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .unwrap()
-}
-
-fn calib(arguments: &[&str], folder: &Path) -> String {
-    let output = output(arguments, folder);
-    assert!(
-        output.status.success(),
-        "{arguments:?}: {}",
-        String::from_utf8_lossy(&output.stderr)
-    );
-    String::from_utf8(output.stdout).unwrap()
-}
-
-fn diagnosed(arguments: &[&str], folder: &Path) -> Value {
+fn diagnosed(arguments: &str, folder: &Path) -> Value {
     serde_json::from_str(&calib(arguments, folder)).unwrap()
 }
 
@@ -50,7 +31,7 @@ fn found(said: &Value) -> Vec<String> {
 
 /// The pipeline of cases without its reports, with an effect of one's own.
 fn pipeline(folder: &Path, effect: &str) {
-    let text = read(root().join("pipelines/case/pipeline.yaml"));
+    let text = read(root("pipelines/case/pipeline.yaml"));
     let (head, _) = text.split_once("  - uses: validate").unwrap();
     let text = head.replace(
         "  - uses: diagnose\n",
@@ -62,26 +43,9 @@ fn pipeline(folder: &Path, effect: &str) {
 
 /// Concealed recordings with a local error at some joint, which the library does not name: their numbers and joints.
 fn bumps(folder: &Path) -> Vec<(String, String)> {
-    let cases = [
-        "--cases",
-        "12",
-        "--open",
-        "1",
-        "--seed",
-        "41",
-        "--points",
-        "120",
-        "--robot",
-        "compact6",
-        "--faulty",
-        "0",
-        "--natural",
-        "1",
-    ];
-    calib(
-        &[&["simulate", "conceal", "--out", "sealed"], &cases[..]].concat(),
-        folder,
-    );
+    let cases =
+        "--cases 12 --open 1 --seed 41 --points 120 --robot compact6 --faulty 0 --natural 1";
+    calib(&format!("simulate conceal --out sealed {cases}"), folder);
     let mut sealed: Vec<PathBuf> = std::fs::read_dir(folder.join("sealed/sealed"))
         .unwrap()
         .map(|file| file.unwrap().path())
@@ -104,7 +68,7 @@ fn an_effect_of_ones_own_is_found_at_its_joint_and_stays_with_its_run() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     std::fs::copy(
-        root().join("pipelines/case/effects/worn_tooth.yaml"),
+        root("pipelines/case/effects/worn_tooth.yaml"),
         here.join("worn_tooth.yaml"),
     )
     .unwrap();
@@ -114,14 +78,7 @@ fn an_effect_of_ones_own_is_found_at_its_joint_and_stays_with_its_run() {
     let case = |name: &str| format!("case=sealed/recordings/{name}");
     for (name, place) in &bumps {
         let said = diagnosed(
-            &[
-                "diagnose",
-                "p.yaml",
-                "--json",
-                "--quiet",
-                "--set",
-                &case(name),
-            ],
+            &format!("diagnose p.yaml --json --quiet --set {}", case(name)),
             here,
         );
         assert_eq!(
@@ -135,13 +92,10 @@ fn an_effect_of_ones_own_is_found_at_its_joint_and_stays_with_its_run() {
     }
 
     // From the store, and without the file.
-    let set = ["--set", &case(&bumps[0].0)];
-    calib(&[&["run", "p.yaml", "--quiet"], &set[..]].concat(), here);
-    let again: Value = serde_json::from_str(&calib(
-        &[&["run", "p.yaml", "--quiet", "--json"], &set[..]].concat(),
-        here,
-    ))
-    .unwrap();
+    let set = format!("--set {}", case(&bumps[0].0));
+    calib(&format!("run p.yaml --quiet {set}"), here);
+    let again: Value =
+        serde_json::from_str(&calib(&format!("run p.yaml --quiet --json {set}"), here)).unwrap();
     assert!(
         again["stages"]
             .as_array()
@@ -152,38 +106,27 @@ fn an_effect_of_ones_own_is_found_at_its_joint_and_stays_with_its_run() {
     );
     let targets = "name,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\na,10,-100,20,5,30,0\nb,-20,-70,40,15,-25,60\n";
     put(here, "targets.csv", targets);
-    let corrected = || calib(&["compensate", "HEAD", "targets.csv"], here);
+    let corrected = || calib("compensate HEAD targets.csv", here);
     let with_the_file = corrected();
     assert_ne!(
         with_the_file,
-        calib(
-            &["compensate", "HEAD", "--step", "geometry", "targets.csv"],
-            here
-        )
+        calib("compensate HEAD --step geometry targets.csv", here)
     );
     std::fs::remove_file(here.join("worn_tooth.yaml")).unwrap();
     assert_eq!(corrected(), with_the_file);
     assert_eq!(
-        found(&diagnosed(&["diagnose", "HEAD", "--json"], here)),
+        found(&diagnosed("diagnose HEAD --json", here)),
         [format!("worn_tooth at {}", bumps[0].1)]
     );
-    calib(&["diff", "HEAD~1", "HEAD"], here);
-    for verb in [
-        &["show", "HEAD"][..],
-        &["log"],
-        &["export", "HEAD", "--format", "json"],
-        &["verify"],
-    ] {
+    calib("diff HEAD~1 HEAD", here);
+    for verb in ["show HEAD", "log", "export HEAD --format json", "verify"] {
         calib(verb, here);
     }
     // The law as it stood is part of what decides whether a run is the same.
-    let law = read(root().join("pipelines/case/effects/worn_tooth.yaml"));
+    let law = read(root("pipelines/case/effects/worn_tooth.yaml"));
     put(here, "worn_tooth.yaml", law.replace("to: 1.2", "to: 1.1"));
-    let other: Value = serde_json::from_str(&calib(
-        &[&["run", "p.yaml", "--quiet", "--json"], &set[..]].concat(),
-        here,
-    ))
-    .unwrap();
+    let other: Value =
+        serde_json::from_str(&calib(&format!("run p.yaml --quiet --json {set}"), here)).unwrap();
     let computed: Vec<&Value> = other["stages"]
         .as_array()
         .unwrap()
@@ -205,14 +148,7 @@ fn a_formula_of_an_unknown_is_found_by_its_name_in_the_next_recording() {
     let bumps = bumps(here);
     let case = |name: &str| format!("case=sealed/recordings/{name}");
     let said = diagnosed(
-        &[
-            "diagnose",
-            "p.yaml",
-            "--json",
-            "--quiet",
-            "--set",
-            &case(&bumps[2].0),
-        ],
+        &format!("diagnose p.yaml --json --quiet --set {}", case(&bumps[2].0)),
         here,
     );
     let finding = &said["findings"][0];
@@ -270,36 +206,15 @@ fn a_formula_of_an_unknown_is_found_by_its_name_in_the_next_recording() {
     );
 
     let set = case(&bumps[2].0);
-    let export = [
-        "diagnose",
-        "p.yaml",
-        "--quiet",
-        "--set",
-        &set,
-        "--export-effect",
-        "mine.yaml",
-    ];
-    calib(&export, here);
-    let refused = output(&export, here);
-    assert_eq!(
-        refused.status.code(),
-        Some(2),
-        "{}",
-        String::from_utf8_lossy(&refused.stderr)
-    );
+    let export = &format!("diagnose p.yaml --quiet --set {set} --export-effect mine.yaml");
+    calib(export, here);
+    answer::calib(here, export).code(2);
     let text = read(here.join("mine.yaml"));
     put(here, "mine.yaml", text.replace("bump_of_q", "soft_spot"));
     pipeline(here, "mine.yaml");
     for (name, place) in &bumps {
         let said = diagnosed(
-            &[
-                "diagnose",
-                "p.yaml",
-                "--json",
-                "--quiet",
-                "--set",
-                &case(name),
-            ],
+            &format!("diagnose p.yaml --json --quiet --set {}", case(name)),
             here,
         );
         assert_eq!(
@@ -315,7 +230,7 @@ fn a_fleet_finds_an_effect_of_ones_own() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     std::fs::copy(
-        root().join("pipelines/case/effects/worn_tooth.yaml"),
+        root("pipelines/case/effects/worn_tooth.yaml"),
         here.join("worn_tooth.yaml"),
     )
     .unwrap();
@@ -333,11 +248,8 @@ fn a_fleet_finds_an_effect_of_ones_own() {
             robots.concat()
         ),
     );
-    let said: Value = serde_json::from_str(&calib(
-        &["fleet", "run", "f.yaml", "--json", "--quiet"],
-        here,
-    ))
-    .unwrap();
+    let said: Value =
+        serde_json::from_str(&calib("fleet run f.yaml --json --quiet", here)).unwrap();
     assert_eq!(said["done"], 3, "{said:#}");
     for ((name, place), robot) in bumps.iter().zip(said["robots"].as_array().unwrap()) {
         assert!(
@@ -348,7 +260,7 @@ fn a_fleet_finds_an_effect_of_ones_own() {
         );
     }
     assert_eq!(
-        diagnosed(&["fleet", "run", "f.yaml", "--json", "--quiet"], here)["computed"],
+        diagnosed("fleet run f.yaml --json --quiet", here)["computed"],
         0
     );
 }
@@ -368,35 +280,14 @@ unit: arcsec
 ";
     put(here, "late_zero.yaml", declared);
     pipeline(here, "late_zero.yaml], without: [zero_shift");
-    let arguments = [
-        "simulate", "conceal", "--out", "sealed", "--cases", "1", "--seed", "923", "--points",
-        "120",
-    ];
+    let arguments = "simulate conceal --out sealed --cases 1 --seed 923 --points 120";
     calib(
-        &[
-            &arguments[..],
-            &[
-                "--family",
-                "zero_shift",
-                "--robot",
-                "compact6",
-                "--faulty",
-                "0",
-            ],
-        ]
-        .concat(),
+        &format!("{arguments} --family zero_shift --robot compact6 --faulty 0"),
         here,
     );
     let truth: Value = serde_json::from_str(&read(here.join("sealed/sealed/c0001.json"))).unwrap();
     let said = diagnosed(
-        &[
-            "diagnose",
-            "p.yaml",
-            "--json",
-            "--quiet",
-            "--set",
-            "case=sealed/recordings/c0001",
-        ],
+        "diagnose p.yaml --json --quiet --set case=sealed/recordings/c0001",
         here,
     );
     let place = truth["want"][0]["where"].as_str().unwrap();

@@ -1,11 +1,11 @@
 //! Poses measured more than once: the joints' repeatability, the floor, lack of fit, and sigmas that allow for shared errors.
 
 use crate::desk::{Desk, table};
-use crate::fixture;
+use crate::fixture::{self, all_rows, fit_all, question};
 use crate::identify::{GEOMETRY, SIGMA, model, normal, recording};
 use crate::sr210d::experiment;
-use calib::diagnose::{Diagnosis, Question, diagnose};
-use calib::estimate::{FitOptions, Fitted, Model, ParameterStatus, Poses, align, fit, spread};
+use calib::diagnose::{Diagnosis, diagnose};
+use calib::estimate::{Fitted, Model, ParameterStatus, Poses, align, spread};
 use calib::robot::{Measurements, NoiseBasis, PointReadings, RobotModel};
 use calib::stage::{Identify, IdentifyReads, Stage};
 use calib::table::{Observability, Parameters, Split};
@@ -67,15 +67,7 @@ fn start(data: &Measurements, effects: &[&str]) -> Model {
 fn identify(data: &Measurements, effects: &[&str]) -> (Model, Fitted) {
     let model = start(data, effects);
     let rows: Vec<usize> = (0..data.rows()).collect();
-    let candidates: Vec<usize> = (0..model.x.len()).collect();
-    fit(
-        &model,
-        data,
-        &FitOptions {
-            rows: &rows,
-            candidates: &candidates,
-        },
-    )
+    fit_all(&model, data, &rows)
 }
 
 #[test]
@@ -164,22 +156,8 @@ fn diagnosed(data: &Measurements, stated: f64) -> Diagnosis {
         .sigma
         .iter_mut()
         .for_each(|sigma| *sigma *= stated);
-    let fit: Vec<usize> = (0..data.rows()).collect();
-    let question = Question {
-        robot: &robot,
-        data: &data,
-        fit: &fit,
-        validate: &[],
-        set: &vec![0; data.rows()],
-        prior_weight: 1.0,
-        open_world: 0.3,
-        without: &[],
-        own: &[],
-        beside_simulation: false,
-        known: &[],
-        seed: 1,
-    };
-    diagnose(&question, |_| ())
+    let fit = all_rows(&data);
+    diagnose(&question(&robot, &data, &fit), |_| ())
 }
 
 #[test]

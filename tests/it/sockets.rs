@@ -11,7 +11,7 @@ mod postures;
 mod rank;
 mod twins;
 
-use crate::fixture;
+use crate::fixture::{self, fit_all};
 use crate::identify::{GEOMETRY, model, normal};
 use calib::description::RobotDescription;
 use calib::effect::names;
@@ -209,15 +209,7 @@ fn calibrated_knowing(
             },
         );
     }
-    let candidates: Vec<usize> = (0..model.x.len()).collect();
-    fit(
-        &model,
-        data,
-        &FitOptions {
-            rows: &rows,
-            candidates: &candidates,
-        },
-    )
+    fit_all(&model, data, &rows)
 }
 
 /// What a socket's known place (mm) says of its parameters.

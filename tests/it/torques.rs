@@ -10,7 +10,7 @@ mod masses;
 mod results;
 mod rigid;
 
-use crate::answer::{put, read};
+use crate::answer::{Answer, calib, put, read, root};
 use crate::desk::shared;
 use calib::dynamics::{
     DynamicArm, INERTIAL_NUMBERS, InertialTolerance, InverseDynamics, MotionRow,
@@ -18,7 +18,6 @@ use calib::dynamics::{
 use calib::twin::torque::{TorqueCase, TorqueDesign, TorqueFile};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 
 /// An effect and where it sits.
 type Named = (String, String);
@@ -43,26 +42,18 @@ fn named(entry: &Value) -> Named {
 }
 
 /// `calib diagnose` of a folder, with a store beside it.
-fn diagnose(case: &Path, store: &Path, more: &[&str]) -> Output {
-    let pipeline = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/dynamics/pipeline.yaml");
-    let mut command = Command::new(env!("CARGO_BIN_EXE_calib"));
-    command
-        .args(["diagnose", "--quiet", "--set"])
-        .arg(format!("case={}", case.display()))
-        .arg("--store")
-        .arg(store);
-    command.args(more).arg(pipeline).output().unwrap()
+fn diagnose(case: &Path, store: &Path, more: &str) -> Answer {
+    let pipeline = root("pipelines/dynamics/pipeline.yaml");
+    let (case, store, pipeline) = (case.display(), store.display(), pipeline.display());
+    calib(
+        ".",
+        &format!("diagnose --quiet --set case={case} --store {store} {more} {pipeline}"),
+    )
 }
 
 /// The document of a diagnosis that succeeds.
 fn document(case: &Path, store: &Path) -> Value {
-    let output = diagnose(case, store, &["--json"]);
-    let (out, told) = (
-        String::from_utf8_lossy(&output.stdout),
-        String::from_utf8_lossy(&output.stderr),
-    );
-    assert!(output.status.success(), "{}: {out}{told}", case.display());
-    serde_json::from_str(&out).unwrap()
+    serde_json::from_str(&diagnose(case, store, "--json").ok()).unwrap()
 }
 
 /// What of a diagnosis is missed, and what is named beside.
@@ -192,17 +183,15 @@ fn the_example_of_torques_is_solved_and_reported() {
         .collect();
     wanted.retain(|one| !found.contains(one));
     assert_eq!(wanted, Vec::<Named>::new(), "hidden and not found");
-    let mut command = Command::new(env!("CARGO_BIN_EXE_calib"));
-    let run = command
-        .args(["run", "--quiet", "--store"])
-        .arg(store.path())
-        .arg(root.join("pipelines/dynamics/pipeline.yaml"));
-    let run = run.output().unwrap();
-    assert!(
-        run.status.success(),
-        "{}",
-        String::from_utf8_lossy(&run.stderr)
+    let (store, pipeline) = (
+        store.path().display(),
+        root.join("pipelines/dynamics/pipeline.yaml"),
     );
+    calib(
+        ".",
+        &format!("run --quiet --store {store} {}", pipeline.display()),
+    )
+    .ok();
 }
 
 /// Two mathematics that share nothing: sums over the bodies beyond each joint, and the estimator's recursion.

@@ -1,9 +1,9 @@
 //! The twin: its own kinematics and statics against numbers worked out by hand, its noise, its seeds, and the stage.
 
 use crate::answer::{read, root};
+use crate::fixture::robot_of;
 use calib::description::{JointDescription, JointKind, RobotDescription};
 use calib::error::Result;
-use calib::robot::import::{RobotFileText, read_calib};
 use calib::stage::{
     Context, OpenedInput, RawFile, Remainder, Services, Simulate, SimulateReads, SimulateWrites,
     Sink, Stage,
@@ -25,15 +25,7 @@ const ARCSEC: f64 = PI / 648_000.0;
 pub fn sr210d() -> RobotDescription {
     let path = root("pipelines/sr210d/robot.yaml");
     let text = read(&path);
-    read_calib(
-        RobotFileText {
-            label: "robot.yaml",
-            text: &text,
-        },
-        None,
-    )
-    .unwrap()
-    .robot
+    robot_of(&text)
 }
 
 /// One joint with axis -y at the origin and 2 m of massless arm along x, 100 kg at its end: a weight turns it by -m g r cos q.

@@ -1,9 +1,9 @@
 //! What stands while an arm is measured: one pose is no geometry, and a joint that never moves is said.
 
-use crate::answer::{has, put};
-use crate::compensate::{ROBOT, calib};
+use crate::answer::{calib, has, put};
+use crate::compensate::ROBOT;
+use crate::fixture::robot_of;
 use calib::robot::RobotModel;
-use calib::robot::import::{RobotFileText, read_calib};
 use std::path::Path;
 
 const PIPELINE: &str = "calib: 1
@@ -35,17 +35,7 @@ fn told(
     joints: impl Fn(usize) -> [f64; 6],
     creep: impl Fn(usize) -> f64,
 ) -> (Option<i32>, String) {
-    let arm = RobotModel::new(
-        read_calib(
-            RobotFileText {
-                label: "robot.yaml",
-                text: ROBOT,
-            },
-            None,
-        )
-        .unwrap()
-        .robot,
-    );
+    let arm = RobotModel::new(robot_of(ROBOT));
     let mut text = String::from("q1,q2,q3,q4,q5,q6,x,y,z\n");
     for row in 0..50 {
         let q = joints(row);
@@ -69,11 +59,8 @@ fn told(
         "pipeline.yaml",
         PIPELINE.replace("USES", uses).replace("STEP", uses),
     );
-    let output = calib(folder, &["run", "pipeline.yaml"], "");
-    (
-        output.status.code(),
-        String::from_utf8_lossy(&output.stderr).into_owned(),
-    )
+    let output = calib(folder, "run pipeline.yaml");
+    (output.code, output.err.clone())
 }
 
 #[test]

@@ -1,7 +1,6 @@
 //! `verify-robot`: what compensation achieved, from points measured at corrected targets.
 
-use crate::answer::{has, put};
-use crate::compensate::calib;
+use crate::answer::{calib, has, put};
 use crate::library_of_arms::{REFLECTOR, on_flange, real, recording, tracker};
 use calib::robot::{LibraryArm, RobotModel};
 use serde_json::Value;
@@ -13,25 +12,21 @@ fn what_compensation_achieved_is_measured_against_the_wanted_points() {
     let read = arm.read().unwrap();
     let robot = RobotModel::new(read.robot.clone());
     let folder = tempfile::tempdir().unwrap();
-    let run = |arguments: &[&str]| {
-        let output = calib(folder.path(), arguments, "");
-        let told = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(output.status.success(), "{arguments:?}: {told}");
-        String::from_utf8_lossy(&output.stdout).into_owned()
+    let run = |arguments: &str| {
+        let output = calib(folder.path(), arguments);
+        let told = output.err.clone();
+        assert!(output.code == Some(0), "{arguments:?}: {told}");
+        output.out.clone()
     };
     put(
         folder.path(),
         "measured.csv",
         recording(&robot, &read.about.coupled),
     );
-    run(&[
-        "init",
-        "cell",
-        "--data",
-        "measured.csv",
-        "--robot",
-        arm.name,
-    ]);
+    run(&format!(
+        "init cell --data measured.csv --robot {}",
+        arm.name
+    ));
     let [file, pipeline] =
         ["cell/robot.yaml", "cell/pipeline.yaml"].map(|name| folder.path().join(name));
     std::fs::write(
@@ -65,14 +60,7 @@ fn what_compensation_achieved_is_measured_against_the_wanted_points() {
         .unwrap()
     });
     put(folder.path(), "targets.csv", &targets);
-    run(&[
-        "compensate",
-        "cell/pipeline.yaml",
-        "targets.csv",
-        "--out",
-        "corrected.csv",
-        "--quiet",
-    ]);
+    run("compensate cell/pipeline.yaml targets.csv --out corrected.csv --quiet");
     let corrected = std::fs::read_to_string(folder.path().join("corrected.csv")).unwrap();
     let mut second = targets.lines().next().unwrap().to_string() + ",x_mm,y_mm,z_mm\n";
     for (line, target) in corrected.lines().skip(1).zip(targets.lines().skip(1)) {
@@ -96,13 +84,8 @@ fn what_compensation_achieved_is_measured_against_the_wanted_points() {
         .unwrap();
     }
     put(folder.path(), "second.csv", second);
-    let told: Value = serde_json::from_str(&run(&[
-        "verify-robot",
-        "cell/pipeline.yaml",
-        "second.csv",
-        "--json",
-    ]))
-    .unwrap();
+    let told: Value =
+        serde_json::from_str(&run("verify-robot cell/pipeline.yaml second.csv --json")).unwrap();
     let figure = |row: &str, name: &str| told[row][name].as_f64().unwrap();
     assert!(figure("before", "mean_mm") > 0.5, "{told:#}");
     assert!(figure("achieved", "max_mm") < 0.02, "{told:#}");
@@ -115,15 +98,8 @@ fn what_compensation_achieved_is_measured_against_the_wanted_points() {
         (Some(42), Some(30)),
         "{told:#}"
     );
-    let text = run(&[
-        "verify-robot",
-        "cell/pipeline.yaml",
-        "second.csv",
-        "--new-base",
-        "--quiet",
-        "--html",
-        "verified.html",
-    ]);
+    let text =
+        run("verify-robot cell/pipeline.yaml second.csv --new-base --quiet --html verified.html");
     has(
         &text,
         ["achieved  mean 0.00", "the tracker's place found anew"],

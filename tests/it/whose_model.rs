@@ -1,9 +1,10 @@
 //! A model moves the arm that it is of: tables of another robot are refused, bodies that cannot be are named, and the tool that was
 //! identified is the tool that goes out.
 
-use crate::answer::{has, put};
-use crate::compensate::{ROBOT, calib, cell};
+use crate::answer::{fed, has, put};
+use crate::compensate::{ROBOT, cell};
 use crate::desk::shared;
+use crate::fixture::robot_of;
 use calib::robot::RobotModel;
 use calib::robot::import::{RobotFileText, read_calib};
 use calib::spatial::Pose;
@@ -16,14 +17,9 @@ use std::path::Path;
 const PARAMETERS: &str = "identify.parameters.parquet";
 const TARGETS: &str = "A1_deg,A2_deg,A3_deg,A4_deg,A5_deg,A6_deg\n10,20,-30,5,40,0\n";
 
-fn said(folder: &Path, verb: &[&str]) -> (Option<i32>, String, String) {
-    let output = calib(folder, verb, TARGETS);
-    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-    (
-        output.status.code(),
-        text(&output.stdout),
-        text(&output.stderr),
-    )
+fn said(folder: &Path, verb: &str) -> (Option<i32>, String, String) {
+    let output = fed(folder, verb, TARGETS);
+    (output.code, output.out, output.err)
 }
 
 #[test]
@@ -55,12 +51,12 @@ fn a_model_is_refused_for_another_robot_and_so_is_a_table_that_does_not_say_whos
         .replace("[0, 0, 900]", "[0, 0, 901]");
     put(here, "other.yaml", other);
     let verbs = [
-        &["compensate", PARAMETERS][..],
-        &["export", PARAMETERS, "--format", "urdf"],
+        format!("compensate {PARAMETERS}"),
+        format!("export {PARAMETERS} --format urdf"),
     ];
     for verb in verbs {
         // Limits are no part of what a model is of.
-        let (code, _, told) = said(here, &[verb, &["--robot", "own.yaml"]].concat());
+        let (code, _, told) = said(here, &format!("{verb} --robot own.yaml"));
         assert_eq!(code, Some(0), "{told}");
         for (robot, sentence) in [
             (
@@ -76,7 +72,7 @@ fn a_model_is_refused_for_another_robot_and_so_is_a_table_that_does_not_say_whos
                 "is the model of the robot `small`, and this robot file is of `large`, whose axes are the same",
             ),
         ] {
-            let (code, out, told) = said(here, &[verb, &["--robot", robot]].concat());
+            let (code, out, told) = said(here, &format!("{verb} --robot {robot}"));
             assert_eq!((code, out.as_str()), (Some(10), ""), "{robot}: {told}");
             assert!(told.contains(sentence), "{robot}: {told}");
         }
@@ -94,11 +90,13 @@ fn a_model_is_refused_for_another_robot_and_so_is_a_table_that_does_not_say_whos
     let mut writer = ArrowWriter::try_new(file, frame.batch().schema(), None).unwrap();
     writer.write(frame.batch()).unwrap();
     writer.close().unwrap();
-    let unchecked = ["older.parquet", "--robot", "renamed.yaml", "--unchecked"];
-    for verb in [&["compensate"][..], &["export", "--format", "urdf"]] {
-        let (code, out, told) = said(here, &[verb, &unchecked[..3]].concat());
+    for verb in ["compensate", "export --format urdf"] {
+        let (code, out, told) = said(here, &format!("{verb} older.parquet --robot renamed.yaml"));
         assert_eq!((code, out.as_str()), (Some(10), ""), "{told}");
-        let (code, _, told) = said(here, &[verb, &unchecked].concat());
+        let (code, _, told) = said(
+            here,
+            &format!("{verb} older.parquet --robot renamed.yaml --unchecked"),
+        );
         assert_eq!(code, Some(0), "{told}");
         has(&told, "does not say which robot it is the model of");
     }
@@ -113,14 +111,14 @@ fn a_table_that_does_not_say_whose_model_it_is_is_refused_for_either_robot_unles
     let path = |name: &str| fault.join(name).display().to_string();
     let [table, targets] = ["parameters.parquet", "tg.csv"].map(path);
     for robot in ["irb.yaml", "kr6.yaml"].map(path) {
-        let ask = ["compensate", &table, "--robot", &robot, &targets];
-        let (code, out, told) = said(&fault, &ask);
+        let ask = &format!("compensate {table} --robot {robot} {targets}");
+        let (code, out, told) = said(&fault, ask);
         assert_eq!((code, out.as_str()), (Some(10), ""), "{told}");
         has(
             &told,
             ["does not say which robot it is the model of", "--unchecked"],
         );
-        let (code, _, told) = said(&fault, &[&ask[..], &["--unchecked"]].concat());
+        let (code, _, told) = said(&fault, &format!("{ask} --unchecked"));
         assert!(
             code == Some(0) && told.contains("does not say which robot it is the model of"),
             "{told}"
@@ -146,18 +144,18 @@ fn inertias_of_no_body_are_named_by_their_links_and_refused_for_torques_alone() 
     put(here, "arm.urdf", URDF);
     let first = "arm.urdf:2: link `Link1`: no body has a principal moment of inertia of 408.868 times the sum of the other two";
     let second = "arm.urdf:3: link `Link2`: no body has a principal moment of inertia that is zero";
-    let (code, _, told) = said(here, &["init", "cell", "--urdf", "arm.urdf"]);
+    let (code, _, told) = said(here, "init cell --urdf arm.urdf");
     assert_eq!(code, Some(0), "{told}");
     has(&told, [first, second]);
     let pipeline = "calib: 1\nname: u\nseed: 1\nstages:\n  - uses: robot\n    with: {file: robot.yaml, urdf: arm.urdf}\n";
     put(here, "pipeline.yaml", pipeline);
     let robot = "calib_robot: 1\nunits: {length: mm, angle: deg}\nkinematics: {urdf: {base: base_link, tip: tool0}}\n";
     put(here, "robot.yaml", robot);
-    let (code, out, told) = said(here, &["check", "pipeline.yaml"]);
+    let (code, out, told) = said(here, "check pipeline.yaml");
     let all = format!("{out}{told}");
     assert_eq!(code, Some(0), "{all}");
     has(&all, [first, second, "positions do not depend on it"]);
-    let (code, _, told) = said(here, &["excite", "robot.yaml", "--urdf", "arm.urdf"]);
+    let (code, _, told) = said(here, "excite robot.yaml --urdf arm.urdf");
     assert_eq!(code, Some(10), "{told}");
     has(
         &told,
@@ -167,15 +165,7 @@ fn inertias_of_no_body_are_named_by_their_links_and_refused_for_torques_alone() 
 
 /// Poses of the cell's arm with its tool elsewhere, measured in full; the tool's point is shifted by `shift` (mm), its frame turned by 30 deg.
 fn full_poses(shift: [f64; 3]) -> (String, Vector3<f64>) {
-    let robot = read_calib(
-        RobotFileText {
-            label: "robot.yaml",
-            text: ROBOT,
-        },
-        None,
-    )
-    .unwrap()
-    .robot;
+    let robot = robot_of(ROBOT);
     let mut moved = robot.clone();
     moved.tool = [0, 1, 2].map(|k| robot.tool[k] + shift[k] * 1e-3);
     let arm = RobotModel::new(moved.clone());
@@ -245,15 +235,8 @@ fn the_identified_tool_goes_out_or_is_refused_whether_orientations_are_measured_
                 "pipeline.yaml",
                 MEASURED.replace("ORIENTATION", orientation),
             );
-            let export = [
-                "export",
-                "pipeline.yaml",
-                "--step",
-                "geometry",
-                "--format",
-                "json",
-            ];
-            let (code, out, told) = said(here, &export);
+            let export = "export pipeline.yaml --step geometry --format json";
+            let (code, out, told) = said(here, export);
             if is_refused {
                 assert_eq!(
                     (code, out.as_str()),
@@ -261,8 +244,7 @@ fn the_identified_tool_goes_out_or_is_refused_whether_orientations_are_measured_
                     "{orientation}: {told}"
                 );
                 assert!(told.contains("tool is 101."), "{orientation}: {told}");
-                let (code, _, told) =
-                    said(here, &["compensate", "pipeline.yaml", "--step", "geometry"]);
+                let (code, _, told) = said(here, "compensate pipeline.yaml --step geometry");
                 assert!(
                     code == Some(10) && told.contains("tool is 101."),
                     "{orientation}: {told}"
@@ -270,7 +252,7 @@ fn the_identified_tool_goes_out_or_is_refused_whether_orientations_are_measured_
             } else {
                 assert_eq!(code, Some(0), "{orientation}: {told}");
             }
-            let (code, out, told) = said(here, &[&export[..], &["--force"]].concat());
+            let (code, out, told) = said(here, &format!("{export} --force"));
             assert_eq!(code, Some(0), "{orientation}: {told}");
             let model: Value = serde_json::from_str(&out).unwrap();
             let found =
@@ -339,7 +321,7 @@ stages:
     let exported = |format: &str| {
         let (code, out, told) = said(
             here,
-            &["export", "pipeline.yaml", "--format", format, "--force"],
+            &format!("export pipeline.yaml --format {format} --force"),
         );
         assert_eq!(code, Some(0), "{told}");
         out
@@ -378,7 +360,7 @@ stages:
 
 #[test]
 fn a_run_knows_its_robot() {
-    let (code, out, told) = said(cell(), &["compensate", "HEAD", "--robot", "other.yaml"]);
+    let (code, out, told) = said(cell(), "compensate HEAD --robot other.yaml");
     assert_eq!((code, out.as_str()), (Some(2), ""), "{told}");
     has(
         &told,

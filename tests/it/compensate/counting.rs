@@ -1,14 +1,14 @@
 //! One counting: a controller that counts its joints otherwise than the robot file gets commands as it counts them. The same simulated robot
 //! is recorded, identified and compensated under every convention; where it really goes is the same to a micrometre.
 
+use super::ROBOT;
 use super::maker::{IDENTIFY, Maker, PLAIN, makers, ran, recorded};
 use super::sides::confdata;
 use super::true_error::Cell;
-use super::{ROBOT, calib};
-use crate::answer::put;
+use crate::answer::{fed, put};
+use crate::fixture::robot_of;
 use calib::compensate::{Nominal, ToolGoal, least_change, turns};
 use calib::robot::RobotModel;
-use calib::robot::import::{RobotFileText, read_calib};
 use calib::spatial::Pose;
 use calib::twin::plan::Point;
 use nalgebra::{Matrix3, Rotation3, Vector3};
@@ -59,7 +59,7 @@ fn compensated(
         .collect();
     let table = ran(
         here,
-        &["compensate", "latest", "--plain"],
+        "compensate latest --plain",
         &format!("{header}\n{lines}"),
     );
     let said = said(here, &format!("{header}\n{lines}"));
@@ -91,7 +91,7 @@ fn compensated(
         .collect();
     let poses = ran(
         here,
-        &["compensate", "latest", "--plain", "--target", "pose"],
+        "compensate latest --plain --target pose",
         &format!("{header},x_mm,y_mm,z_mm,qw,qx,qy,qz\n{poses}"),
     );
     let six = |q: &[f64]| {
@@ -113,7 +113,7 @@ fn compensated(
         })
         .collect();
     put(here, "t.src", krl);
-    let krl = ran(here, &["compensate", "latest", "t.src"], "");
+    let krl = ran(here, "compensate latest t.src", "");
     let rapid: String = targets
         .iter()
         .map(|target| {
@@ -124,7 +124,7 @@ fn compensated(
         })
         .collect();
     put(here, "t.mod", format!("MODULE m\n{rapid}ENDMODULE\n"));
-    let rapid = ran(here, &["compensate", "latest", "t.mod"], "");
+    let rapid = ran(here, "compensate latest t.mod", "");
 
     let cartesian: Vec<(Vec<f64>, [f64; 3], nalgebra::UnitQuaternion<f64>)> = targets
         .iter()
@@ -150,7 +150,7 @@ fn compensated(
         })
         .collect();
     put(here, "poses.src", krl_poses);
-    let krl_poses = ran(here, &["compensate", "latest", "poses.src"], "");
+    let krl_poses = ran(here, "compensate latest poses.src", "");
     let rapid_poses: String = cartesian
         .iter()
         .map(|(counted, [x, y, z], turn)| {
@@ -164,7 +164,7 @@ fn compensated(
         "poses.mod",
         format!("MODULE m\n{rapid_poses}ENDMODULE\n"),
     );
-    let rapid_poses = ran(here, &["compensate", "latest", "poses.mod"], "");
+    let rapid_poses = ran(here, "compensate latest poses.mod", "");
 
     let listed = |text: &str, start: &str, end: &str| -> Vec<Vec<f64>> {
         let number = |part: &str| part.trim().trim_start_matches('A').to_string();
@@ -190,12 +190,8 @@ fn compensated(
             })
             .collect()
     };
-    let document: serde_json::Value = serde_json::from_str(&ran(
-        here,
-        &["export", "latest", "--format", "json", "--quiet"],
-        "",
-    ))
-    .unwrap();
+    let document: serde_json::Value =
+        serde_json::from_str(&ran(here, "export latest --format json --quiet", "")).unwrap();
     let three = |name: &str| -> [f64; 3] {
         serde_json::from_value(document["base_in_tracker"][name].clone()).unwrap()
     };
@@ -276,20 +272,12 @@ fn compensated(
 }
 
 fn said(here: &Path, input: &str) -> String {
-    String::from_utf8(calib(here, &["compensate", "latest"], input).stderr).unwrap()
+    fed(here, "compensate latest", input).err
 }
 
 #[test]
 fn commands_are_counted_as_the_controller_counts() {
-    let robot = read_calib(
-        RobotFileText {
-            label: "robot.yaml",
-            text: ROBOT,
-        },
-        None,
-    )
-    .unwrap()
-    .robot;
+    let robot = robot_of(ROBOT);
     let cell = Cell::of(robot, 1.2, [100.0, 200.0], Vec::new());
     let points = cell.points(60, &[0.0], 5);
     let targets = cell.targets_by(20, &[0.0], 99);

@@ -1,27 +1,17 @@
 //! What is not a command says in which counting its joints stand: proposed poses, comparisons of runs, the report.
 
+use super::ROBOT;
 use super::maker::{Maker, PLAIN, makers, ran, recorded};
 use super::true_error::Cell;
-use super::{ROBOT, calib};
-use crate::answer::read;
+use crate::answer::{calib, read};
+use crate::fixture::robot_of;
 use calib::poses::{Drive, write};
-use calib::robot::import::{RobotFileText, read_calib};
 use calib::robot::{Measurements, PointReadings, RobotModel};
 use calib::twin::effect::{JointCompliance, Physical};
 use std::path::Path;
 
 fn robot() -> RobotModel {
-    RobotModel::new(
-        read_calib(
-            RobotFileText {
-                label: "robot.yaml",
-                text: ROBOT,
-            },
-            None,
-        )
-        .unwrap()
-        .robot,
-    )
+    RobotModel::new(robot_of(ROBOT))
 }
 
 fn all_at_once() -> Maker {
@@ -128,24 +118,16 @@ fn poses_comparisons_and_report_of_a_run_say_in_which_counting_joints_stand() {
         let difference = "sign [-1, 1, 1, -1, 1, -1], zero [10, -90, 90, 30, -45, 180] deg, joint 3 with -1 times joint 2, joint 6 with 0.5 times joint 5";
         let otherwise = maker.name != PLAIN.name;
 
-        let separate = [
-            "poses",
-            "--run",
-            "HEAD",
-            "--separate",
-            "1",
-            "link_compliance@link 2",
-        ];
-        let few = ["--count", "12", "--candidates", "100", "--out", "poses.csv"];
-        let text = ran(here, &[&separate[..], &few].concat(), "");
+        let separate = "poses --run HEAD --separate 1 'link_compliance@link 2'";
+        let few = "--count 12 --candidates 100 --out poses.csv";
+        let text = ran(here, &format!("{separate} {few}"), "");
         let sentence = format!(
             "joints and directions of the poses are counted as at the controller: {difference}\n"
         );
         assert_eq!(text.contains(&sentence), otherwise, "{text}");
         assert_eq!(text.contains("counted as"), otherwise, "{text}");
         let document: serde_json::Value =
-            serde_json::from_str(&ran(here, &[&separate[..], &few, &["--json"]].concat(), ""))
-                .unwrap();
+            serde_json::from_str(&ran(here, &format!("{separate} {few} --json"), "")).unwrap();
         let counting = if otherwise {
             format!("controller: {difference}")
         } else {
@@ -176,35 +158,31 @@ fn poses_comparisons_and_report_of_a_run_say_in_which_counting_joints_stand() {
         let tables = ["latest/ingest/recording", "latest/ingest/recording"]
             .map(|name| name.replace("latest", "HEAD"));
         for pair in [["HEAD", "HEAD"], [tables[0].as_str(), tables[1].as_str()]] {
-            let text = ran(here, &["diff", pair[0], pair[1]], "");
+            let text = ran(here, &format!("diff {} {}", pair[0], pair[1]), "");
             assert_eq!(
                 text.lines().filter(|line| **line == said).count(),
                 usize::from(otherwise),
                 "{text}"
             );
             assert_eq!(text.contains("counting"), otherwise, "{text}");
-            let document: serde_json::Value =
-                serde_json::from_str(&ran(here, &["diff", pair[0], pair[1], "--json"], ""))
-                    .unwrap();
+            let document: serde_json::Value = serde_json::from_str(&ran(
+                here,
+                &format!("diff {} {} --json", pair[0], pair[1]),
+                "",
+            ))
+            .unwrap();
             assert_eq!(
                 document["counting"].as_str(),
                 otherwise.then_some(said.as_str())
             );
         }
-        let parameters = String::from_utf8(
-            calib(
-                here,
-                &[
-                    "diff",
-                    "HEAD/diagnose/parameters",
-                    "HEAD/diagnose/parameters",
-                ],
-                "",
-            )
-            .stdout,
-        );
+        let parameters = calib(
+            here,
+            "diff HEAD/diagnose/parameters HEAD/diagnose/parameters",
+        )
+        .out;
         assert!(
-            !parameters.unwrap().contains("counting"),
+            !parameters.contains("counting"),
             "joints are said of where they stand"
         );
 

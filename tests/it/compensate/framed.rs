@@ -1,11 +1,11 @@
 //! Programs with several frames and tools: every target stands in the frame, and is reached with the tool, that is in force where it is moved
 //! to. The true robot goes to the same points as with the targets stated as joints.
 
+use super::cell;
 use super::maker::{Maker, PLAIN, makers};
 use super::round_trip::{Trip, pose, read};
 use super::sides::{confdata, krl, poses, rapid, status, turn};
-use super::{calib, cell};
-use crate::answer::has;
+use crate::answer::{calib, has};
 use calib::compensate::turns;
 use calib::program::{Companion, Language, RobotTool};
 use calib::spatial::Pose;
@@ -313,17 +313,8 @@ fn files_beside_a_program_are_read_with_it_in_capitals_too() {
         "DEFDAT WELD\nDECL E6POS XP1={X 600,Y 0,Z 430,A 0,B 0,C 0}\nDECL FDAT FP1={TOOL_NO 2,BASE_NO 3,IPO_FRAME #BASE}\nENDDAT\n",
     );
     let program = at("Program/Weld.dat").display().to_string();
-    let run = |more: &[&str]| {
-        let output = calib(
-            cell(),
-            &[&["compensate", "latest", program.as_str()], more].concat(),
-            "",
-        );
-        let [out, err] =
-            [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap());
-        (output.status.code(), out, err)
-    };
-    let (code, _, err) = run(&[]);
+    let run = |more: &str| calib(cell(), &format!("compensate latest {program} {more}")).parts();
+    let (code, _, err) = run("");
     assert_eq!(code, Some(0), "{err}");
     has(&err, ["read with the program: ", "WELD.SRC", "$CONFIG.DAT"]);
     has(
@@ -332,7 +323,7 @@ fn files_beside_a_program_are_read_with_it_in_capitals_too() {
     );
     has(&err, "the tool TOOL_DATA[2] is taken as the robot file's");
     std::fs::remove_file(at("System/$CONFIG.DAT")).unwrap();
-    let (code, out, err) = run(&[]);
+    let (code, out, err) = run("");
     assert_eq!((code, out.as_str()), (Some(10), ""), "{err}");
     has(
         &err,
@@ -345,9 +336,9 @@ fn files_beside_a_program_are_read_with_it_in_capitals_too() {
         "frames.dat",
         "BASE_DATA[3]={X 300,Y 40,Z 500,A 0,B 0,C 0}\nTOOL_DATA[2]={X 40,Y 30,Z 130,A 0,B 0,C 0}\n",
     );
-    let (code, _, err) = run(&["--with", &at("frames.dat").display().to_string()]);
+    let (code, _, err) = run(&format!("--with {}", at("frames.dat").display()));
     assert_eq!(code, Some(0), "{err}");
-    let (code, _, err) = run(&["--tool", "1,2"]);
+    let (code, _, err) = run("--tool 1,2");
     assert_eq!(code, Some(2), "{err}");
     has(&err, "--tool: expected the name of a tool");
 }

@@ -2,24 +2,19 @@
 
 use super::maker::{PLAIN, recorded};
 use super::true_error::Cell;
-use super::{PIPELINE, ROBOT, calib, cell};
-use crate::answer::{ends_with, has, put, read, starts_with};
-use calib::robot::import::{RobotFileText, read_calib};
+use super::{PIPELINE, ROBOT, cell};
+use crate::answer::{calib, ends_with, fed, has, put, read, starts_with};
+use crate::fixture::robot_of;
 
 const HEADER: &str = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n10,20,-30,5,40,0\n";
 
-fn run(arguments: &[&str], input: &str) -> (Option<i32>, String, String) {
-    let output = calib(cell(), arguments, input);
-    let [out, err] = [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap());
-    (output.status.code(), out, err)
+fn run(arguments: &str, input: &str) -> (Option<i32>, String, String) {
+    fed(cell(), arguments, input).parts()
 }
 
 #[test]
 fn a_correction_above_its_limit_has_no_joints_and_one_who_insists_is_told() {
-    let (code, out, err) = run(
-        &["compensate", "latest", "--max-correction", "0.01"],
-        HEADER,
-    );
+    let (code, out, err) = run("compensate latest --max-correction 0.01", HEADER);
     assert_eq!(code, Some(10), "{err}");
     assert!(
         out.lines()
@@ -31,44 +26,26 @@ fn a_correction_above_its_limit_has_no_joints_and_one_who_insists_is_told() {
         out.contains("at most 0.01 mm allowed (--max-correction)") && err.contains("refused"),
         "{out}{err}"
     );
-    let (code, out, err) = run(
-        &[
-            "compensate",
-            "latest",
-            "--max-correction",
-            "0.01",
-            "--force",
-        ],
-        HEADER,
-    );
+    let (code, out, err) = run("compensate latest --max-correction 0.01 --force", HEADER);
     assert_eq!(code, Some(0), "{err}");
     assert!(
         out.contains("written because of --force: corrected by") && !out.contains(",,,"),
         "{out}"
     );
-    let (code, out, _) = run(&["compensate", "latest", "--max-turn", "0.0001"], HEADER);
+    let (code, out, _) = run("compensate latest --max-turn 0.0001", HEADER);
     assert_eq!(code, Some(10));
     has(&out, "at most 0.0001 deg allowed (--max-turn)");
     let program = "PTP {A1 10,A2 20,A3 -30,A4 5,A5 40,A6 0}\n";
     put(cell(), "far.src", program);
-    let (code, out, err) = run(
-        &[
-            "compensate",
-            "latest",
-            "far.src",
-            "--max-correction",
-            "0.01",
-        ],
-        "",
-    );
+    let (code, out, err) = run("compensate latest far.src --max-correction 0.01", "");
     assert_eq!((code, out.as_str()), (Some(10), ""));
     has(&err, "far.src:1:9: refused: corrected by");
 }
 
 #[test]
 fn what_calib_corrected_is_not_corrected_once_more() {
-    let (_, once, err) = run(&["compensate", "latest"], HEADER);
-    let (code, out, said) = run(&["compensate", "latest"], &once);
+    let (_, once, err) = run("compensate latest", HEADER);
+    let (code, out, said) = run("compensate latest", &once);
     assert_eq!((code, out.as_str()), (Some(10), ""), "{err}");
     has(&said, ["was compensated by calib already", "--force"]);
     for (name, head, target, second) in [
@@ -86,15 +63,15 @@ fn what_calib_corrected_is_not_corrected_once_more() {
         ),
     ] {
         put(cell(), name, format!("{head}{target}"));
-        let (code, once, err) = run(&["compensate", "latest", name], "");
+        let (code, once, err) = run(&format!("compensate latest {name}"), "");
         assert_eq!(code, Some(0), "{err}");
         starts_with(&once, &format!("{second}corrected by calib from "));
         put(cell(), name, &once);
-        let (code, out, err) = run(&["compensate", "latest", name], "");
+        let (code, out, err) = run(&format!("compensate latest {name}"), "");
         assert_eq!((code, out.as_str()), (Some(10), ""));
         has(&err, &format!("{name}: was compensated by calib already"));
         assert_eq!(
-            run(&["compensate", "latest", name, "--force"], "").0,
+            run(&format!("compensate latest {name} --force"), "").0,
             Some(0)
         );
     }
@@ -105,13 +82,13 @@ fn a_cartesian_program_in_a_frame_that_is_not_applied_is_refused_by_line() {
     let rest = "[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]";
     let text = format!("MODULE m\nMoveL [[900,40,930],{rest},v1,z1,t\\WObj:=fixture;\nENDMODULE\n");
     put(cell(), "wobj.mod", text);
-    let (code, out, err) = run(&["compensate", "latest", "wobj.mod"], "");
+    let (code, out, err) = run("compensate latest wobj.mod", "");
     assert_eq!((code, out.as_str()), (Some(10), ""), "{err}");
     has(
         &err,
         ["wobj.mod:2:", "work object `fixture`", "--assume-frames"],
     );
-    let (code, _, err) = run(&["compensate", "latest", "wobj.mod", "--assume-frames"], "");
+    let (code, _, err) = run("compensate latest wobj.mod --assume-frames", "");
     assert_eq!(code, Some(0), "{err}");
     has(&err, "warning: wobj.mod:2:");
 }
@@ -132,7 +109,7 @@ fn a_target_in_a_work_object_is_corrected_where_it_stands() {
         "MODULE m\nMoveL [[900,40,930],[1,0,0,0],[9E9,9E9,9E9,9E9],{rest},v1,z1,t;\nENDMODULE\n"
     );
     put(cell(), "plain.mod", plain);
-    let (code, plain, err) = run(&["compensate", "latest", "plain.mod"], "");
+    let (code, plain, err) = run("compensate latest plain.mod", "");
     assert_eq!(code, Some(0), "{err}");
     // Moved by 100, 20, -30 mm and turned by half a turn about z: x and y change their signs.
     let object =
@@ -141,7 +118,7 @@ fn a_target_in_a_work_object_is_corrected_where_it_stands() {
         "MODULE m\n{object}MoveL [[-800,-20,960],[0,0,0,1],[9E9,9E9,9E9,9E9],{rest},v1,z1,t\\WObj:=fixture;\nENDMODULE\n"
     );
     put(cell(), "object.mod", program);
-    let (code, within, err) = run(&["compensate", "latest", "object.mod"], "");
+    let (code, within, err) = run("compensate latest object.mod", "");
     assert_eq!(code, Some(0), "{err}");
     has(
         &err,
@@ -164,28 +141,17 @@ fn a_table_of_parameters_without_a_verdict_is_held_to_the_same_limits() {
     let far = PIPELINE.replace("shift_mm: [0.4, 0.2, -0.3]", "shift_mm: [80.0, 0.2, -0.3]");
     for (pipeline, refused) in [(PIPELINE.to_string(), false), (far, true)] {
         put(here, "pipeline.yaml", pipeline);
-        calib(here, &["run", "pipeline.yaml", "--quiet"], "");
+        calib(here, "run pipeline.yaml --quiet");
         let tables = here.join(".calib/tables");
         let table = newest_parameters(&tables);
         let bare = here.join("bare.parquet");
         std::fs::copy(table, &bare).unwrap();
-        let given = [
-            "compensate",
-            "bare.parquet",
-            "--robot",
-            "robot.yaml",
-            "--angle",
-            "deg",
-        ];
-        let said = |more: &[&str]| {
-            let output = calib(here, &[&given[..], more].concat(), HEADER);
-            (
-                output.status.code(),
-                String::from_utf8_lossy(&output.stderr).into_owned(),
-                output.stdout.len(),
-            )
+        let given = "compensate bare.parquet --robot robot.yaml --angle deg";
+        let said = |more: &str| {
+            let output = fed(here, &format!("{given} {more}"), HEADER);
+            (output.code, output.err.clone(), output.out.len())
         };
-        let (code, err, bytes) = said(&[]);
+        let (code, err, bytes) = said("");
         if refused {
             assert_eq!((code, bytes), (Some(10), 0), "{err}");
             has(
@@ -195,15 +161,15 @@ fn a_table_of_parameters_without_a_verdict_is_held_to_the_same_limits() {
                     "from the robot file's",
                 ],
             );
-            let (code, err, _) = said(&["--force"]);
+            let (code, err, _) = said("--force");
             assert!(
                 code != Some(2) && err.contains("used because of --force: joint_offset at joint 2"),
                 "{err}"
             );
         } else {
             assert_eq!(code, Some(0), "{err}");
-            assert_eq!(said(&["--max-correction", "0.01"]).0, Some(10));
-            assert_eq!(said(&["--max-shift", "0.001"]).0, Some(10));
+            assert_eq!(said("--max-correction 0.01").0, Some(10));
+            assert_eq!(said("--max-shift 0.001").0, Some(10));
         }
     }
 }
@@ -243,11 +209,10 @@ fn an_output_never_takes_the_place_of_a_file_that_was_read() {
         let before = std::fs::read(folder.path().join(file)).unwrap();
         let output = calib(
             folder.path(),
-            &["export", "pipeline.yaml", "--format", "json", "--out", file],
-            "",
+            &format!("export pipeline.yaml --format json --out {file}"),
         );
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(2), "{said}");
+        let said = output.err.clone();
+        assert_eq!(output.code, Some(2), "{said}");
         has(&said, "that the model was made from");
         assert_eq!(std::fs::read(folder.path().join(file)).unwrap(), before);
     }
@@ -261,16 +226,12 @@ fn an_arm_far_from_the_robot_file_is_refused_before_anything_is_written() {
     let truth = PIPELINE.replace("shift_mm: [0.4, 0.2, -0.3]", "shift_mm: [80.0, 0.2, -0.3]");
     put(here, "pipeline.yaml", truth);
     for verb in [
-        &["compensate", "pipeline.yaml"][..],
-        &["export", "pipeline.yaml", "--format", "json"],
+        "compensate pipeline.yaml",
+        "export pipeline.yaml --format json",
     ] {
-        let output = calib(here, verb, HEADER);
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(
-            (output.status.code(), output.stdout.len()),
-            (Some(10), 0),
-            "{said}"
-        );
+        let output = fed(here, verb, HEADER);
+        let said = output.err.clone();
+        assert_eq!((output.code, output.out.len()), (Some(10), 0), "{said}");
         has(
             &said,
             [
@@ -279,19 +240,14 @@ fn an_arm_far_from_the_robot_file_is_refused_before_anything_is_written() {
                 "--force",
             ],
         );
-        assert!(
-            calib(here, &[verb, &["--force"]].concat(), HEADER)
-                .status
-                .code()
-                != Some(2)
-        );
+        assert!(fed(here, &format!("{verb} --force"), HEADER).code != Some(2));
     }
 }
 
 #[test]
 fn a_table_whose_common_normals_are_far_from_the_arm_is_refused_with_the_formats_that_carry_it() {
     for format in ["dh", "mdh"] {
-        let (code, out, err) = run(&["export", "latest", "--format", format], "");
+        let (code, out, err) = run(&format!("export latest --format {format}"), "");
         assert_eq!((code, out.as_str()), (Some(10), ""), "{err}");
         has(&err, ["axes 2 and 3 are", "--format urdf or mjcf"]);
     }
@@ -308,36 +264,20 @@ fn targets_that_state_no_payload_are_refused_where_the_model_depends_on_it() {
     put(here, "pipeline.yaml", loaded);
     put(here, "p.src", "PTP {A1 10,A2 20,A3 -30,A4 5,A5 40,A6 0}\n");
     for file in ["-", "p.src"] {
-        let output = calib(
+        let output = fed(
             here,
-            &["compensate", "pipeline.yaml", file, "--quiet"],
+            &format!("compensate pipeline.yaml {file} --quiet"),
             HEADER,
         );
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(
-            (output.status.code(), output.stdout.len()),
-            (Some(10), 0),
-            "{said}"
-        );
+        let said = output.err.clone();
+        assert_eq!((output.code, output.out.len()), (Some(10), 0), "{said}");
         has(&said, ["states no payload", "measured up to 50 kg"]);
-        let stated = calib(
+        fed(
             here,
-            &[
-                "compensate",
-                "pipeline.yaml",
-                file,
-                "--quiet",
-                "--payload",
-                "0",
-            ],
+            &format!("compensate pipeline.yaml {file} --quiet --payload 0"),
             HEADER,
-        );
-        assert_eq!(
-            stated.status.code(),
-            Some(0),
-            "{}",
-            String::from_utf8_lossy(&stated.stderr)
-        );
+        )
+        .code(0);
     }
     // A program says it by the tool of its motions, or by $LOAD.
     let joints = "MoveAbsJ [[10,20,-30,5,40,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v1,z1,gun;\n";
@@ -350,30 +290,25 @@ fn targets_that_state_no_payload_are_refused_where_the_model_depends_on_it() {
             "PTP {A1 10,A2 20,A3 -30,A4 5,A5 40,A6 0}\n",
         ),
     ] {
-        let said = |text: &str, more: &[&str]| {
+        let said = |text: &str, more: &str| {
             put(here, file, text);
-            let output = calib(
-                here,
-                &[&["compensate", "pipeline.yaml", file], more].concat(),
-                "",
-            );
-            let [out, err] = [output.stdout, output.stderr]
-                .map(|text| String::from_utf8_lossy(&text).into_owned());
+            let output = calib(here, &format!("compensate pipeline.yaml {file} {more}"));
+            let (code, out, err) = output.parts();
             (
-                output.status.code(),
+                code,
                 out.lines()
                     .filter(|line| line.contains("20.") || line.contains("19."))
                     .collect::<String>(),
                 err,
             )
         };
-        let (code, out, err) = said(target, &[]);
+        let (code, out, err) = said(target, "");
         assert_eq!((code, out.as_str()), (Some(10), ""), "{err}");
-        let (code, by_program, err) = said(&format!("{stating}{target}"), &[]);
+        let (code, by_program, err) = said(&format!("{stating}{target}"), "");
         assert_eq!(code, Some(0), "{err}");
         has(&err, "payload 50 kg, as");
-        assert_eq!(by_program, said(target, &["--payload", "50"]).1);
-        let (_, other, err) = said(&format!("{stating}{target}"), &["--payload", "0"]);
+        assert_eq!(by_program, said(target, "--payload 50").1);
+        let (_, other, err) = said(&format!("{stating}{target}"), "--payload 0");
         has(
             &err,
             "the program states a payload of 50 kg, --payload 0 kg, which is used",
@@ -382,9 +317,7 @@ fn targets_that_state_no_payload_are_refused_where_the_model_depends_on_it() {
     }
     let column = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,payload_kg\n10,20,-30,5,40,0,50\n";
     assert_eq!(
-        calib(here, &["compensate", "pipeline.yaml", "--quiet"], column)
-            .status
-            .code(),
+        fed(here, "compensate pipeline.yaml --quiet", column).code,
         Some(0)
     );
 }
@@ -395,15 +328,12 @@ fn how_far_a_model_may_be_from_the_robot_file_is_for_the_user_to_say() {
         ("--max-shift", "0.001", "mm"),
         ("--max-tilt", "0.0001", "deg"),
     ] {
-        for verb in [
-            &["compensate", "latest"][..],
-            &["export", "latest", "--format", "json"],
-        ] {
-            let (code, out, err) = run(&[verb, &[option, limit]].concat(), HEADER);
+        for verb in ["compensate latest", "export latest --format json"] {
+            let (code, out, err) = run(&format!("{verb} {option} {limit}"), HEADER);
             assert_eq!((code, out.as_str()), (Some(10), ""), "{err}");
             has(&err, &format!("at most {limit} {unit} allowed ({option})"));
         }
-        let (code, _, err) = run(&["compensate", "latest", option, "-1"], HEADER);
+        let (code, _, err) = run(&format!("compensate latest {option} -1"), HEADER);
         assert_eq!(code, Some(2), "{err}");
     }
 }
@@ -418,24 +348,21 @@ fn a_pipeline_whose_report_does_not_accept_it_is_refused_as_its_run_is() {
             "{PIPELINE}  - uses: validate\n  - uses: report\n    with: {{limits: {{{limits}}}}}\n"
         )
     };
-    let ran = |arguments: &[&str]| {
-        let output = calib(here, arguments, HEADER);
-        (
-            output.status.code(),
-            String::from_utf8_lossy(&output.stderr).into_owned(),
-        )
+    let ran = |arguments: &str| {
+        let output = fed(here, arguments, HEADER);
+        (output.code, output.err.clone())
     };
     put(here, "strict.yaml", pipeline("max_mm: 0.0001"));
-    assert_eq!(ran(&["run", "strict.yaml", "--quiet"]).0, Some(1));
+    assert_eq!(ran("run strict.yaml --quiet").0, Some(1));
     for model in ["strict.yaml", "latest"] {
-        let (code, err) = ran(&["compensate", model]);
+        let (code, err) = ran(&format!("compensate {model}"));
         assert_eq!(code, Some(10), "{model}: {err}");
         assert!(
             err.contains("refused: not accepted") && err.contains("at most 0.0001 mm allowed"),
             "{model}: {err}"
         );
-        assert_eq!(ran(&["export", model, "--format", "json"]).0, Some(10));
-        let (code, err) = ran(&["compensate", model, "--force"]);
+        assert_eq!(ran(&format!("export {model} --format json")).0, Some(10));
+        let (code, err) = ran(&format!("compensate {model} --force"));
         assert_eq!(code, Some(0), "{model}: {err}");
         assert!(
             err.contains("warning: used because of --force: not accepted"),
@@ -443,20 +370,12 @@ fn a_pipeline_whose_report_does_not_accept_it_is_refused_as_its_run_is() {
         );
     }
     put(here, "mild.yaml", pipeline("max_mm: 10"));
-    assert_eq!(ran(&["compensate", "mild.yaml"]).0, Some(0));
+    assert_eq!(ran("compensate mild.yaml").0, Some(0));
 }
 
 #[test]
 fn a_model_that_leaves_something_unexplained_says_so_once_and_in_the_program() {
-    let robot = read_calib(
-        RobotFileText {
-            label: "robot.yaml",
-            text: ROBOT,
-        },
-        None,
-    )
-    .unwrap()
-    .robot;
+    let robot = robot_of(ROBOT);
     let cell = Cell::of(robot, 1.2, [100.0, 200.0], Vec::new());
     let folder = recorded(
         &PLAIN,
@@ -482,12 +401,11 @@ fn a_model_that_leaves_something_unexplained_says_so_once_and_in_the_program() {
     let (header, rows) = log.split_once('\n').unwrap();
     let rows: String = rows.lines().map(bumpy).collect();
     put(here, "log.csv", format!("{header}\n{rows}"));
-    calib(here, &["run", "pipeline.yaml", "--quiet"], "");
+    calib(here, "run pipeline.yaml --quiet");
     put(here, "p.src", "PTP {A1 10,A2 20,A3 -30,A4 5,A5 40,A6 0}\n");
     for model in ["pipeline.yaml", "latest"] {
-        let output = calib(here, &["compensate", model, "p.src", "--quiet"], "");
-        let [out, err] =
-            [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap());
+        let output = calib(here, &format!("compensate {model} p.src --quiet"));
+        let (_code, out, err) = output.parts();
         assert_eq!(
             err.matches("the verdict is `unexplained`").count(),
             1,
@@ -498,11 +416,9 @@ fn a_model_that_leaves_something_unexplained_says_so_once_and_in_the_program() {
             .find(|line| line.contains("corrected by calib"))
             .unwrap_or_else(|| panic!("{err}"));
         ends_with(head, ", verdict of the model: unexplained");
-        let export = calib(here, &["export", model, "--format", "json", "--quiet"], "");
+        let export = calib(here, &format!("export {model} --format json --quiet"));
         assert_eq!(
-            String::from_utf8_lossy(&export.stderr)
-                .matches("the verdict is `unexplained`")
-                .count(),
+            export.err.matches("the verdict is `unexplained`").count(),
             1
         );
     }

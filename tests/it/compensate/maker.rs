@@ -1,8 +1,7 @@
 //! Makers of controllers that count joints each in their way, and a simulated robot recorded and identified in a way of theirs.
 
-use super::calib;
 use super::true_error::Cell;
-use crate::answer::put;
+use crate::answer::{fed, put};
 use calib::robot::{CountedCoupling, JointConvention};
 use calib::twin::plan::Point;
 use calib::units::Unit;
@@ -189,16 +188,11 @@ pub fn recorded(
         "calib: 1\nname: counted\nseed: 3\nstages:\n  - uses: robot\n    with: {{file: robot.yaml}}\n  - uses: ingest\n    with:\n      files:\n        - file: log.csv\n          columns:\n            point_id: {{column: id}}\n            usage: {{value: fit}}\n            q: {q}\n            payload: {{column: kg, unit: kg}}\n            x: {{column: x, unit: mm}}\n            y: {{column: y, unit: mm}}\n            z: {{column: z, unit: mm}}\n      instrument: leica_at960\n  - uses: split\n    with: {{by: usage}}\n{stages}"
     );
     put(here, "pipeline.yaml", pipeline);
-    ran(here, &["run", "pipeline.yaml", "--quiet"], "");
+    ran(here, "run pipeline.yaml --quiet", "");
     folder
 }
 
-pub fn ran(here: &Path, arguments: &[&str], input: &str) -> String {
-    let output = calib(here, arguments, input);
-    assert!(
-        output.status.success(),
-        "{arguments:?}: {}",
-        String::from_utf8_lossy(&output.stderr)
-    );
-    String::from_utf8(output.stdout).unwrap()
+pub fn ran(here: &Path, arguments: &str, input: &str) -> String {
+    let output = fed(here, arguments, input).code(0);
+    output.out
 }

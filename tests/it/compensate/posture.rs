@@ -1,15 +1,15 @@
 //! A Cartesian target is reached in the posture that it states, as the controller counts, or not at all.
 
 use super::maker::{Maker, makers};
-use super::{ROBOT, calib, cell};
-use crate::answer::{has, put};
+use super::{ROBOT, cell};
+use crate::answer::{calib, has, put};
+use crate::fixture::robot_of;
 use calib::compensate::{
     CommandTarget, CorrectionOptions, Corrector, IdentifiedArm, StatedPosture,
 };
 use calib::effect::EffectStack;
 use calib::estimate::Model;
 use calib::robot::RobotModel;
-use calib::robot::import::{RobotFileText, read_calib};
 use calib::spatial::Pose;
 
 /// Poses within the limits, 5 deg off every border of a quadrant and of a limit.
@@ -38,17 +38,7 @@ fn poses(robot: &RobotModel, maker: &Maker) -> Vec<Vec<f64>> {
 
 #[test]
 fn a_pose_is_reached_in_the_posture_that_it_states() {
-    let robot = RobotModel::new(
-        read_calib(
-            RobotFileText {
-                label: "robot.yaml",
-                text: ROBOT,
-            },
-            None,
-        )
-        .unwrap()
-        .robot,
-    );
+    let robot = RobotModel::new(robot_of(ROBOT));
     let stack = EffectStack::new(&robot, Pose::identity(), Vec::new());
     let arm = IdentifiedArm::new(Model::nominal(robot.clone(), stack), None);
     for maker in makers()
@@ -149,28 +139,16 @@ fn a_pose_is_reached_in_the_posture_that_it_states() {
 
 fn run(name: &str, text: &str) -> (Option<i32>, String, String) {
     put(cell(), name, text);
-    let output = calib(
+    calib(
         cell(),
-        &["compensate", "latest", name, "--start", "2,3,4,5,40,0"],
-        "",
-    );
-    let [out, err] = [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap());
-    (output.status.code(), out, err)
+        &format!("compensate latest {name} --start 2,3,4,5,40,0"),
+    )
+    .parts()
 }
 
 #[test]
 fn programs_state_postures_and_are_told_once_where_they_do_not() {
-    let robot = RobotModel::new(
-        read_calib(
-            RobotFileText {
-                label: "robot.yaml",
-                text: ROBOT,
-            },
-            None,
-        )
-        .unwrap()
-        .robot,
-    );
+    let robot = RobotModel::new(robot_of(ROBOT));
     let q = [10.0f64, 15.0, -20.0, 25.0, 40.0, 30.0].map(f64::to_radians);
     let pose = robot.forward(&q);
     let turn = nalgebra::UnitQuaternion::from_matrix(&pose.rotation);

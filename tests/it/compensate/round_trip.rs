@@ -3,6 +3,7 @@
 use super::ROBOT;
 use super::maker::Maker;
 use super::true_error::Cell;
+use crate::fixture::robot_of;
 use calib::compensate::{
     CorrectionOptions, Corrector, Gate, IdentifiedArm, Nominal, ToolGoal, least_change, turns,
 };
@@ -11,7 +12,6 @@ use calib::program::{
     Rewritten, RobotTool, corrected,
 };
 use calib::robot::RobotModel;
-use calib::robot::import::{RobotFileText, read_calib};
 use calib::spatial::Pose;
 use calib::twin::plan::Point;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -35,15 +35,7 @@ impl Trip {
         let text = wide
             .into_iter()
             .fold(ROBOT.to_string(), |text, (from, to)| text.replace(from, to));
-        let robot = read_calib(
-            RobotFileText {
-                label: "robot.yaml",
-                text: &text,
-            },
-            None,
-        )
-        .unwrap()
-        .robot;
+        let robot = robot_of(&text);
         let cell = Cell::of(robot.clone(), 1.2, [100.0, 200.0], Vec::new());
         let arm = IdentifiedArm::new(cell.identified(), None);
         Self {

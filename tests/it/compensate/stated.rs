@@ -1,23 +1,15 @@
 //! What a table of targets, or an option, must not state; files that cannot be read or written; one of them and several.
 
-use super::{calib, cell, text};
-use crate::answer::{has, put};
+use super::cell;
+use crate::answer::{calib, fed, has, put};
 use calib::compensate::CorrectionTotals;
 
 const HEADER: &str = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg";
 
 /// Code, stderr and stdout of targets on stdin.
-fn corrected(input: &str, more: &[&str]) -> (Option<i32>, String, String) {
-    let output = calib(
-        cell(),
-        &[&["compensate", "latest", "--quiet"], more].concat(),
-        input,
-    );
-    (
-        output.status.code(),
-        text(&output.stderr),
-        text(&output.stdout),
-    )
+fn corrected(input: &str, more: &str) -> (Option<i32>, String, String) {
+    let output = fed(cell(), &format!("compensate latest --quiet {more}"), input);
+    (output.code, output.err, output.out)
 }
 
 #[test]
@@ -41,13 +33,13 @@ fn what_no_target_can_state_is_a_fault_with_row_and_column_and_nothing_is_writte
     ] {
         let (code, said, written) = corrected(
             &format!("{HEADER},{name}\n10,20,-30,5,40,0,1\n10,20,-30,5,40,0,{value}\n"),
-            &[],
+            "",
         );
         assert_eq!((code, written.as_str()), (Some(10), ""), "{said}");
         has(&said, &format!("stdin:3: column 18: field 7: {allowed}"));
         let (code, said, _) = corrected(
             &format!("{HEADER},{name}\n10,20,-30,5,40,0,0\n10,20,-30,5,40,0,\n"),
-            &[],
+            "",
         );
         assert_eq!(code, Some(0), "{said}");
     }
@@ -55,7 +47,7 @@ fn what_no_target_can_state_is_a_fault_with_row_and_column_and_nothing_is_writte
         ("--payload=-5", "--payload: expected a mass"),
         ("--temperature=-500", "--temperature: expected a temp"),
     ] {
-        let (code, said, _) = corrected(&format!("{HEADER}\n10,20,-30,5,40,0\n"), &[option]);
+        let (code, said, _) = corrected(&format!("{HEADER}\n10,20,-30,5,40,0\n"), option);
         assert_eq!(code, Some(2), "{said}");
         has(&said, allowed);
     }
@@ -79,7 +71,7 @@ fn a_column_of_parquet_is_held_to_the_same() {
         .write(&batch)
         .and_then(|()| writer.close().map(|_| ()))
         .unwrap();
-    let (code, said, _) = corrected("", &["loads.parquet", "--out", "loads_c.parquet"]);
+    let (code, said, _) = corrected("", "loads.parquet --out loads_c.parquet");
     assert_eq!(code, Some(10), "{said}");
     has(
         &said,
@@ -90,28 +82,28 @@ fn a_column_of_parquet_is_held_to_the_same() {
 
 #[test]
 fn a_quaternion_of_zeros_is_no_orientation() {
-    let (code, said, written) = corrected("x_mm,y_mm,z_mm,qw,qx,qy,qz\n800,40,900,0,0,0,0\n", &[]);
+    let (code, said, written) = corrected("x_mm,y_mm,z_mm,qw,qx,qy,qz\n800,40,900,0,0,0,0\n", "");
     assert_eq!((code, written.as_str()), (Some(10), ""), "{said}");
     has(
         &said,
         "stdin:2: columns qw, qx, qy, qz: the quaternion has length 0.0000, expected 1",
     );
     // Angles of zero are one.
-    let (_, said, written) = corrected("x_mm,y_mm,z_mm,a_deg,b_deg,c_deg\n800,40,900,0,0,0\n", &[]);
+    let (_, said, written) = corrected("x_mm,y_mm,z_mm,a_deg,b_deg,c_deg\n800,40,900,0,0,0\n", "");
     assert_eq!(written.lines().count(), 2, "{said}");
 }
 
 #[test]
 fn degrees_under_a_header_in_rad_are_found_by_the_turns_of_most_rows() {
     let header = HEADER.replace("deg", "rad");
-    let (code, said, written) = corrected(&format!("{header}\n10,20,30,40,50,60\n"), &[]);
+    let (code, said, written) = corrected(&format!("{header}\n10,20,30,40,50,60\n"), "");
     assert_eq!((code, written.as_str()), (Some(10), ""), "{said}");
     let turned = "stdin:2: in 1 of 1 row a joint is beyond one and a half turns, here joint 1 at 10 rad; allowed: up to 9.42 rad";
     has(&said, [turned, "if these are degrees"]);
     let sound = "0.1,0.2,-0.3,0.1,0.4,0\n";
     let (code, said, _) = corrected(
         &format!("{header}\n{sound}{sound}0.1,0.2,-0.3,0.1,0.4,10\n"),
-        &[],
+        "",
     );
     assert_eq!(code, Some(0), "one row of three may be odd: {said}");
 }
@@ -127,22 +119,16 @@ fn files_that_cannot_be_read_or_written_are_named_before_a_pipeline_is_run_for_t
         "t.csv",
         format!("{HEADER}\n10,20,-30,5,40,0\n"),
     );
-    let refused = |arguments: &[&str]| {
+    let refused = |arguments: &str| {
         let output = calib(
             folder.path(),
-            &[&["compensate", "pipeline.yaml", "-q"], arguments].concat(),
-            "",
-        );
-        assert_eq!(
-            output.status.code(),
-            Some(2),
-            "{arguments:?}: {}",
-            text(&output.stderr)
-        );
+            &format!("compensate pipeline.yaml -q {arguments}"),
+        )
+        .code(2);
         assert!(!folder.path().join(".calib").exists(), "{arguments:?}");
-        text(&output.stderr)
+        output.err
     };
-    let said = refused(&["nofile.csv", "--out", "nodir/x.csv"]);
+    let said = refused("nofile.csv --out nodir/x.csv");
     has(
         &said,
         [
@@ -150,10 +136,9 @@ fn files_that_cannot_be_read_or_written_are_named_before_a_pipeline_is_run_for_t
             "--out: nodir/x.csv: there is no folder nodir;",
         ],
     );
-    assert!(refused(&["t.csv", "--out", "."]).contains("--out: . is a folder: name a file"));
+    assert!(refused("t.csv --out .").contains("--out: . is a folder: name a file"));
     assert!(
-        refused(&["t.csv", "--out", "x.parquet"])
-            .contains("--out: must have the format of the targets")
+        refused("t.csv --out x.parquet").contains("--out: must have the format of the targets")
     );
 }
 

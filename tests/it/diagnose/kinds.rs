@@ -1,6 +1,7 @@
 //! Causes are named from whatever was measured: a level's inclinations, distances from anchors, points beside distances. The twin conceals them.
 
 use super::Named;
+use crate::fixture::question;
 use crate::identify::normal;
 use crate::twin::sr210d;
 use calib::description::RobotDescription;
@@ -291,18 +292,9 @@ impl Recorded {
         )
         .unwrap();
         let question = Question {
-            robot: &robot,
-            data,
-            fit: &fit,
             validate: &validate,
-            set: &vec![0; data.rows()],
-            prior_weight: 1.0,
-            open_world: 0.3,
-            without: &[],
-            own: &[],
-            beside_simulation: false,
-            known: &[],
             seed: 7,
+            ..question(&robot, data, &fit)
         };
         assert!(wrong_setup(&question).is_none());
         diagnose(&question, |_| ())

@@ -20,10 +20,7 @@ fn rewritten(folder: &Path, mut change: impl FnMut(usize, &mut Vec<String>)) {
 }
 
 fn diagnosed(folder: &Path) -> Value {
-    let said = calib(
-        &[&["diagnose", "p.yaml", "--quiet", "--json"], &CASE[..]].concat(),
-        folder,
-    );
+    let said = calib(&format!("diagnose p.yaml --quiet --json {CASE}"), folder);
     serde_json::from_str(&said).unwrap()
 }
 
@@ -74,7 +71,7 @@ fn without_a_clock_nothing_is_said_in_seconds() {
             && goes_with.iter().all(|by| by["name"] != "time"),
         "{goes_with:?}"
     );
-    calib(&[&["run", "p.yaml", "--quiet"], &CASE[..]].concat(), here);
+    calib(&format!("run p.yaml --quiet {CASE}"), here);
     let curves: Curves = table_of(here, "report.curves.parquet");
     let own: Vec<_> = curves.0.iter().filter(|point| point.rank == 1).collect();
     assert!(!own.is_empty());
@@ -84,7 +81,7 @@ fn without_a_clock_nothing_is_said_in_seconds() {
         assert!(point.x >= 1.0 && point.x.fract() == 0.0, "{}", point.x);
     }
     put(here, "t.csv", "x_mm,y_mm,z_mm\n600,0,700\n");
-    let (code, said) = refused(&["compensate", "HEAD", "t.csv", "--time", "100"], here);
+    let (code, said) = refused("compensate HEAD t.csv --time 100", here);
     assert!(
         code == Some(2) && said.contains("--time: the recording of the model has no clock"),
         "{said}"
@@ -101,11 +98,8 @@ fn a_diagnosis_that_cannot_make_up_for_missing_masses_does_not_stand_for_the_run
     assert!(fields.remove("mass").is_some() && fields.remove("com").is_some());
     std::fs::write(&file, robot.to_string()).unwrap();
     case_with(here, &[]);
-    let run: Value = serde_json::from_str(&calib(
-        &[&["run", "p.yaml", "--quiet", "--json"], &CASE[..]].concat(),
-        here,
-    ))
-    .unwrap();
+    let run: Value =
+        serde_json::from_str(&calib(&format!("run p.yaml --quiet --json {CASE}"), here)).unwrap();
     let rms = |step: &Value| {
         let rows = run["statistics"].as_array().unwrap();
         let row = rows
@@ -122,7 +116,7 @@ fn a_diagnosis_that_cannot_make_up_for_missing_masses_does_not_stand_for_the_run
         rms(standing),
         rms(&"joint".into())
     );
-    let (_, said) = refused(&["compensate", "HEAD", "--quiet", "p.yaml"], here);
+    let (_, said) = refused("compensate HEAD --quiet p.yaml", here);
     assert_eq!(
         said.contains("warning: `diagnose` is withdrawn"),
         *standing != "diagnose",
@@ -146,7 +140,7 @@ fn of_few_rows_nothing_is_asked_and_the_report_is_written_all_the_same() {
         }
     });
     case_with(here, &[]);
-    calib(&[&["run", "p.yaml", "--quiet"], &CASE[..]].concat(), here);
+    calib(&format!("run p.yaml --quiet {CASE}"), here);
     let said = diagnosed(here);
     assert_eq!(
         (&said["verdict"], &said["findings"]),
@@ -157,7 +151,7 @@ fn of_few_rows_nothing_is_asked_and_the_report_is_written_all_the_same() {
         said["not_observable"][0],
         "what the simulation lacks: 12 rows were fitted, at least 15 are needed to separate it from geometry"
     );
-    let text = calib(&["diagnose", "HEAD", "--details"], here);
+    let text = calib("diagnose HEAD --details", here);
     starts_with(
         &text,
         "not asked (noise basis: instrument)\ntoo few rows were fitted",

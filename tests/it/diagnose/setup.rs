@@ -555,7 +555,7 @@ fn points_in_inches_are_not_accepted_and_the_line_that_is_named_mends_them() {
     )
     .unwrap();
     case_with(here, &[]);
-    let (code, told) = ended(&[&["run", "p.yaml"], &CASE[..]].concat(), here);
+    let (code, told) = ended(&format!("run p.yaml {CASE}"), here);
     assert_eq!(code, Some(10), "{told}");
     has(
         &told,
@@ -565,36 +565,30 @@ fn points_in_inches_are_not_accepted_and_the_line_that_is_named_mends_them() {
         !told.lines().any(|line| line.starts_with("after")),
         "{told}"
     );
-    let (code, said) = refused(&["compensate", "HEAD", "p.yaml"], here);
+    let (code, said) = refused("compensate HEAD p.yaml", here);
     assert!(
         code == Some(10) && said.contains("the set-up is wrong: the points are in inches"),
         "{code:?} {said}"
     );
     // A step that is asked for by its name is refused as well; one who insists is told what it warned of when it ran.
-    let step = [
-        "export", "HEAD", "--step", "joint", "--format", "json", "--quiet",
-    ];
-    let (code, said) = refused(&step, here);
+    let step = "export HEAD --step joint --format json --quiet";
+    let (code, said) = refused(step, here);
     assert!(
         code == Some(10) && said.contains("refused: the set-up is wrong: the points are in inches"),
         "{code:?} {said}"
     );
-    let (code, said) = refused(&[&step[..], &["--force"]].concat(), here);
+    let (code, said) = refused(&format!("{step} --force"), here);
     assert!(
         code == Some(0)
             && said.contains("warning: joint: the set-up is wrong: the points are in inches"),
         "{code:?} {said}"
     );
-    let said: Value =
-        serde_json::from_str(&ended(&["diagnose", "HEAD", "--json"], here).1).unwrap();
+    let said: Value = serde_json::from_str(&ended("diagnose HEAD --json", here).1).unwrap();
     assert_eq!(
         (&said["verdict"], &said["findings"][0]["effect"]),
         (&"wrong_setup".into(), &"setup".into())
     );
-    let (code, run) = ended(
-        &[&["run", "p.yaml", "--json", "--quiet"], &CASE[..]].concat(),
-        here,
-    );
+    let (code, run) = ended(&format!("run p.yaml --json --quiet {CASE}"), here);
     assert_eq!(code, Some(10), "{run}");
     let run: Value = serde_json::from_str(&run).unwrap();
     let page = read(here.join(run["report"].as_str().unwrap()));
@@ -614,10 +608,7 @@ fn points_in_inches_are_not_accepted_and_the_line_that_is_named_mends_them() {
         .map(|(from, to)| (from.as_str(), to.as_str()))
         .collect();
     case_with(here, &axes);
-    let mended = calib(
-        &[&["diagnose", "p.yaml", "--json", "--quiet"], &CASE[..]].concat(),
-        here,
-    );
+    let mended = calib(&format!("diagnose p.yaml --json --quiet {CASE}"), here);
     let mended: Value = serde_json::from_str(&mended).unwrap();
     assert_eq!(mended["findings"][0]["effect"], "zero_shift", "{mended:#}");
 }

@@ -1,38 +1,24 @@
 //! Arms of unknown masses, as most cells have them: no payload, no currents, no masses in the robot file.
 
-use super::calib;
-use crate::answer::{has, read, root};
+use crate::answer::{calib, has, read, root};
 use serde_json::Value;
 
 /// What a diagnosis says of concealed recordings of this kind, with the truth of each.
 fn bare(robot: &str, family: &str, forms: &str, seed: &str) -> (Value, Value) {
     let folder = tempfile::tempdir().unwrap();
-    let made = [
-        "simulate", "conceal", "--out", "set", "--cases", "1", "--points", "120", "--faulty", "0",
-        "--bare",
-    ];
-    let drawn = [
-        "--robot",
-        robot,
-        "--family",
-        family,
-        "--other-forms",
-        forms,
-        "--seed",
-        seed,
-    ];
-    calib(&[&made[..], &drawn[..]].concat(), folder.path());
+    let made = "simulate conceal --out set --cases 1 --points 120 --faulty 0 --bare";
+    let drawn = &format!("--robot {robot} --family {family} --other-forms {forms} --seed {seed}");
+    calib(folder.path(), &format!("{made} {drawn}")).ok();
     let pipeline = root("pipelines/case/pipeline.yaml").display().to_string();
     let case = format!(
         "case={}",
         folder.path().join("set/recordings/c0001").display()
     );
     let said = calib(
-        &[
-            "diagnose", &pipeline, "--set", &case, "--json", "--quiet", "--store", "store",
-        ],
         folder.path(),
-    );
+        &format!("diagnose {pipeline} --set {case} --json --quiet --store store"),
+    )
+    .ok();
     let truth = read(folder.path().join("set/sealed/c0001.json"));
     let robot = read(folder.path().join("set/recordings/c0001/robot.json"));
     assert!(

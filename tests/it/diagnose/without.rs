@@ -15,10 +15,7 @@ fn said(without: &str, folder: &Path) -> Value {
             &format!("  - uses: diagnose\n    with: {{without: [{without}]}}\n"),
         )],
     );
-    let said = calib(
-        &[&["diagnose", "p.yaml", "--quiet", "--json"], &CASE[..]].concat(),
-        folder,
-    );
+    let said = calib(&format!("diagnose p.yaml --quiet --json {CASE}"), folder);
     serde_json::from_str(&said).unwrap()
 }
 
@@ -80,10 +77,7 @@ fn nothing_is_diagnosed_without_the_frame_of_the_base() {
             "  - uses: diagnose\n    with: {without: [base_frame]}\n",
         )],
     );
-    let (code, said) = refused(
-        &[&["diagnose", "p.yaml", "--quiet"], &CASE[..]].concat(),
-        folder.path(),
-    );
+    let (code, said) = refused(&format!("diagnose p.yaml --quiet {CASE}"), folder.path());
     assert_eq!(code, Some(2), "{said}");
     has(&said, "`base_frame` places the robot before the instrument");
 }

@@ -2,12 +2,10 @@
 
 use super::Cell;
 use crate::answer::{has, starts_with};
-use crate::fixture;
-use calib::diagnose::{Diagnosis, Question, diagnose};
+use crate::fixture::{self, diagnosed};
+use calib::diagnose::Diagnosis;
 use calib::effect::Place;
-use calib::estimate::gauge;
 use calib::robot::{Measurements, RobotModel};
-use std::collections::BTreeMap;
 
 const ROWS: usize = 120;
 const STEP: usize = 70;
@@ -20,29 +18,7 @@ fn cell(seed: usize) -> (Cell, Measurements) {
 
 fn said(cell: &Cell, mut data: Measurements) -> Diagnosis {
     cell.disturb(&mut data);
-    let all: Vec<usize> = (0..ROWS).collect();
-    let (robot, _) = gauge(
-        RobotModel::new(cell.description.clone()),
-        &data,
-        &all,
-        &BTreeMap::new(),
-    )
-    .unwrap();
-    let question = Question {
-        robot: &robot,
-        data: &data,
-        fit: &all,
-        validate: &[],
-        set: &[0; ROWS],
-        prior_weight: 1.0,
-        open_world: 0.3,
-        without: &[],
-        own: &[],
-        beside_simulation: false,
-        known: &[],
-        seed: 1,
-    };
-    diagnose(&question, |_| ())
+    diagnosed(&cell.description, &data)
 }
 
 #[test]

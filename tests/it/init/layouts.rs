@@ -1,7 +1,6 @@
 //! Headers as controllers, trackers and spreadsheets write them: `init` maps them right or asks, and what it wrote runs.
 
-use crate::answer::{has, put, read};
-use crate::compensate::calib;
+use crate::answer::{calib, has, put, read};
 use std::fmt::Write;
 use std::path::Path;
 use tempfile::TempDir;
@@ -62,20 +61,15 @@ pub(super) fn made(files: &[(&str, Vec<u8>)]) -> Made {
     let output = calib(
         folder.path(),
         &[&["init", ".", "--data"], names.as_slice()].concat(),
-        "",
     );
     // 1 where nothing was understood: the files to fill in are written all the same.
-    assert!(
-        output.status.code().is_some_and(|code| code <= 1),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    assert!(output.code.is_some_and(|code| code <= 1), "{}", output.err);
     let pipeline = read(folder.path().join("pipeline.yaml"));
     assert!(folder.path().join("robot.yaml").is_file());
     Made {
         folder,
         pipeline,
-        said: String::from_utf8_lossy(&output.stdout).into_owned(),
+        said: output.out.clone(),
     }
 }
 
@@ -124,28 +118,15 @@ impl Made {
     }
     /// `check` finds nothing wrong, and the recording has so many rows.
     pub fn runs(&self, rows: usize) -> &Self {
-        let check = calib(self.path(), &["check", "pipeline.yaml"], "");
-        let told = String::from_utf8_lossy(&check.stderr).into_owned();
-        assert!(check.status.success(), "{told}\n{}", self.pipeline);
+        let check = calib(self.path(), "check pipeline.yaml");
+        let told = check.err.clone();
+        assert!(check.code == Some(0), "{told}\n{}", self.pipeline);
         let run = calib(
             self.path(),
-            &[
-                "run",
-                "pipeline.yaml",
-                "--until",
-                "split",
-                "--json",
-                "--quiet",
-            ],
-            "",
-        );
-        assert!(
-            run.status.success(),
-            "{}\n{}",
-            String::from_utf8_lossy(&run.stderr),
-            self.pipeline
-        );
-        let run: serde_json::Value = serde_json::from_slice(&run.stdout).unwrap();
+            "run pipeline.yaml --until split --json --quiet",
+        )
+        .code(0);
+        let run: serde_json::Value = run.json();
         let stages = run["stages"].as_array().unwrap();
         let ingest = stages.iter().find(|stage| stage["id"] == "ingest").unwrap();
         let outputs = ingest["outputs"].as_array().unwrap();
@@ -211,17 +192,9 @@ fn a_spatial_analyzer_export_with_commas_is_understood_too() {
     made.lacks(&["// Collection"]).runs(30);
     let again = calib(
         made.path(),
-        &[
-            "run",
-            "pipeline.yaml",
-            "--until",
-            "split",
-            "--json",
-            "--quiet",
-        ],
-        "",
+        "run pipeline.yaml --until split --json --quiet",
     );
-    let again: serde_json::Value = serde_json::from_slice(&again.stdout).unwrap();
+    let again: serde_json::Value = again.json();
     assert_eq!(again["rejected_rows"], 0, "a line of remarks is no row");
 }
 
@@ -327,13 +300,8 @@ fn rows_of_unequal_number_are_never_joined_by_order_in_silence() {
     let tracker = table("x,y,z", |k| point(k, ",")) + "1,2,3\n";
     let made = two(controller.clone(), tracker);
     made.says(&["join: {by: order}", "REPLACE", "30 and 31 rows"]);
-    let check = calib(
-        made.path(),
-        &["run", "pipeline.yaml", "--until", "split", "--quiet"],
-        "",
-    );
-    assert_eq!(check.status.code(), Some(10));
-    let told = String::from_utf8_lossy(&check.stderr).into_owned();
+    let check = calib(made.path(), "run pipeline.yaml --until split --quiet").code(10);
+    let told = check.err.clone();
     has(&told, "31 data rows, controller.csv has 30");
     let equal = two(controller, table("x,y,z", |k| point(k, ",")));
     equal.says(&["join: {by: order}", "CHECK"]).runs(30);
@@ -570,12 +538,7 @@ fn the_identity_that_init_comments_out_is_nobodys() {
     );
     let identified = made.pipeline.replace("# identity:", "identity:");
     put(made.path(), "pipeline.yaml", identified);
-    let check = calib(made.path(), &["check", "pipeline.yaml"], "");
-    assert!(
-        check.status.success(),
-        "{}",
-        String::from_utf8_lossy(&check.stderr)
-    );
-    let said = String::from_utf8_lossy(&check.stdout).into_owned();
+    let check = calib(made.path(), "check pipeline.yaml").code(0);
+    let said = check.out.clone();
     has(&said, ["replace   ", "          pipeline.yaml:"]);
 }

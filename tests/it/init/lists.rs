@@ -1,8 +1,7 @@
 //! Lists as they come off a tracker's own software: no header, other names than the controller's, UTF-16, marks of thousands, many columns.
 
 use super::layouts::{joints, made, point, table};
-use crate::answer::{has, put, starts_with};
-use crate::compensate::calib;
+use crate::answer::{calib, has, put, starts_with};
 use std::fmt::Write;
 
 #[test]
@@ -64,27 +63,19 @@ fn what_cannot_be_told_ends_with_code_1_and_a_sentence_and_too_many_files_with_2
         "notes.csv",
         "day,weather,mood\nmon,rain,good\ntue,sun,good\n",
     );
-    let output = calib(folder.path(), &["init", ".", "--data", "notes.csv"], "");
-    let told = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(1), "{told}");
+    let output = calib(folder.path(), "init . --data notes.csv");
+    let told = output.err.clone();
+    assert_eq!(output.code, Some(1), "{told}");
     starts_with(
         &told,
         "error: neither joints nor a measured point were recognised in notes.csv",
     );
     let output = calib(
         folder.path(),
-        &[
-            "init",
-            "more",
-            "--data",
-            "notes.csv",
-            "notes.csv",
-            "notes.csv",
-        ],
-        "",
+        "init more --data notes.csv notes.csv notes.csv",
     );
-    let told = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(2), "{told}");
+    let told = output.err.clone();
+    assert_eq!(output.code, Some(2), "{told}");
     has(
         &told,
         "--data: 3 files; allowed: one recording, the controller's and the tracker's, the controller's and a list of points in one layout for each of several reflectors, or recordings that have joints and points each",
@@ -170,26 +161,12 @@ fn the_chain_of_a_urdf_is_read_from_its_first_link_with_joints_that_slide() {
     });
     put(folder.path(), "data.csv", data);
     put(folder.path(), "cell.urdf", CELL);
-    let told = |arguments: &[&str]| {
-        let output = calib(folder.path(), arguments, "");
-        (
-            output.status.code(),
-            String::from_utf8_lossy(&output.stderr).into_owned(),
-        )
+    let told = |arguments: &str| {
+        let output = calib(folder.path(), arguments);
+        (output.code, output.err.clone())
     };
-    let start = [
-        "init",
-        ".",
-        "--data",
-        "data.csv",
-        "--urdf",
-        "cell.urdf",
-        "--tip",
-    ];
-    assert_eq!(
-        told(&[&start[..], &["holder"]].concat()),
-        (Some(0), String::new())
-    );
+    let start = "init . --data data.csv --urdf cell.urdf --tip";
+    assert_eq!(told(&[start, "holder"].concat()), (Some(0), String::new()));
     let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
     assert!(
         read("robot.yaml").contains("urdf: {base: \"world\", tip: \"holder\"}"),
@@ -203,13 +180,13 @@ fn the_chain_of_a_urdf_is_read_from_its_first_link_with_joints_that_slide() {
     );
     std::fs::remove_file(folder.path().join("robot.yaml")).unwrap();
     std::fs::remove_file(folder.path().join("pipeline.yaml")).unwrap();
-    let (code, said) = told(&[&start[..], &["carriage"]].concat());
+    let (code, said) = told(&[start, "carriage"].concat());
     assert_eq!(code, Some(2));
     has(
         &said,
         "--tip: the chain from `world` to `carriage` has 1 joint, the recording 2",
     );
-    let (code, said) = told(&[&start[..], &["tool0"]].concat());
+    let (code, said) = told(&[start, "tool0"].concat());
     assert!(
         code == Some(2)
             && said.contains("no link `tool0`")

@@ -1,8 +1,7 @@
 //! Recordings of torques, files of columns with lists, files that are known and not read, and folders that have their robot file.
 
 use super::layouts::{cells, joints, made, point, table};
-use crate::answer::put;
-use crate::compensate::calib;
+use crate::answer::{calib, put};
 use arrow::array::{ArrayRef, FixedSizeListArray, Float64Array, ListArray, RecordBatch};
 use arrow::datatypes::{Field, Float32Type};
 use std::fmt::Write;
@@ -67,13 +66,7 @@ fn torques_under_any_name_make_a_pipeline_that_reads_torques() {
             "time: {column: \"time_s\", unit: s}",
         ]);
         made.lacks(&["uses: ingest\n", "instrument", "split"]);
-        let check = calib(made.path(), &["check", "pipeline.yaml"], "");
-        assert!(
-            check.status.success(),
-            "{}\n{}",
-            String::from_utf8_lossy(&check.stderr),
-            made.pipeline
-        );
+        calib(made.path(), "check pipeline.yaml").code(0);
     }
 }
 
@@ -226,10 +219,10 @@ fn programs_and_bags_are_named_as_what_they_are_by_init_and_by_check() {
     ] {
         let made = made(&[(name, content.to_vec())]);
         assert!(made.said.contains(said), "{name}: {}", made.said);
-        let check = calib(made.path(), &["check", "pipeline.yaml"], "");
-        let told = String::from_utf8_lossy(&check.stderr).into_owned();
+        let check = calib(made.path(), "check pipeline.yaml");
+        let told = check.err.clone();
         assert!(
-            check.status.code() == Some(10) && told.contains(said),
+            check.code == Some(10) && told.contains(said),
             "{name}: {told}"
         );
     }
@@ -238,14 +231,9 @@ fn programs_and_bags_are_named_as_what_they_are_by_init_and_by_check() {
 #[test]
 fn a_folder_with_a_robot_file_keeps_it_and_joints_are_counted_by_it() {
     let folder = tempfile::tempdir().unwrap();
-    let told = |arguments: &[&str]| {
-        let output = calib(folder.path(), arguments, "");
-        (
-            output.status.code(),
-            [output.stdout, output.stderr]
-                .map(|text| String::from_utf8_lossy(&text).into_owned())
-                .concat(),
-        )
+    let told = |arguments: &str| {
+        let output = calib(folder.path(), arguments);
+        (output.code, output.both())
     };
     put(
         folder.path(),
@@ -254,14 +242,14 @@ fn a_folder_with_a_robot_file_keeps_it_and_joints_are_counted_by_it() {
             format!("{},{}", joints(k, ","), point(k, ","))
         }),
     );
-    let robot = told(&["robots", "lrmate_200id"]).1;
+    let robot = told("robots lrmate_200id").1;
     put(folder.path(), "robot.yaml", &robot);
-    let (code, said) = told(&["init", ".", "--data", "data.csv", "--robot", "ur10e"]);
+    let (code, said) = told("init . --data data.csv --robot ur10e");
     assert!(
         code == Some(2) && said.contains("robot.yaml: is already there and would be used"),
         "{said}"
     );
-    let (code, said) = told(&["init", ".", "--data", "data.csv"]);
+    let (code, said) = told("init . --data data.csv");
     assert!(
         code == Some(0)
             && said.contains("wrote ./pipeline.yaml beside ./robot.yaml, which is used as it is"),
@@ -275,10 +263,10 @@ fn a_folder_with_a_robot_file_keeps_it_and_joints_are_counted_by_it() {
         "{}",
         read("pipeline.yaml")
     );
-    assert_eq!(told(&["check", "pipeline.yaml"]).0, Some(0));
+    assert_eq!(told("check pipeline.yaml").0, Some(0));
     std::fs::remove_file(folder.path().join("pipeline.yaml")).unwrap();
-    put(folder.path(), "robot.yaml", told(&["robots", "panda"]).1);
-    let (code, said) = told(&["init", ".", "--data", "data.csv"]);
+    put(folder.path(), "robot.yaml", told("robots panda").1);
+    let (code, said) = told("init . --data data.csv");
     assert!(
         code == Some(2)
             && said.contains("has 7 joints, the recording 6; put the robot of the recording there"),

@@ -4,9 +4,9 @@
 use super::{Named, fitted_with, places_of, priors};
 use crate::answer::read;
 use crate::desk;
+use crate::fixture::robot_of;
 use calib::description::RobotDescription;
 use calib::estimate::{Model, scale};
-use calib::robot::import::{RobotFileText, read_calib};
 use calib::robot::{Measurements, PointReadings, Readings};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
@@ -16,15 +16,7 @@ use std::time::Instant;
 pub fn panda() -> RobotDescription {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sockets/robot.yaml");
     let text = read(path);
-    read_calib(
-        RobotFileText {
-            label: "robot.yaml",
-            text: &text,
-        },
-        None,
-    )
-    .unwrap()
-    .robot
+    robot_of(&text)
 }
 
 /// A folder's rows with the number of each in its own file; nothing, said, where the data are not at hand.

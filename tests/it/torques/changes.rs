@@ -18,22 +18,14 @@ fn compared(before: &TorqueCase, after: &TorqueCase) -> Vec<TorqueChangeRow> {
     write(&at("before"), &before.recording());
     write(&at("after"), &after.recording());
     let sets = ["before", "after"].map(|name| format!("{name}={}", at(name).display()));
-    changes_of(&["--set", &sets[0], "--set", &sets[1]])
+    changes_of(&format!("--set {} --set {}", sets[0], sets[1]))
 }
 
 /// What the pipeline of pairs says with some settings.
-fn changes_of(settings: &[&str]) -> Vec<TorqueChangeRow> {
+fn changes_of(settings: &str) -> Vec<TorqueChangeRow> {
     let folder = tempfile::tempdir().unwrap();
     let pipeline = pair().join("pipeline.yaml").display().to_string();
-    let output = calib(
-        &[&["run", "--quiet", &pipeline], settings].concat(),
-        folder.path(),
-    );
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    calib(&format!("run --quiet {pipeline} {settings}"), folder.path()).code(0);
     let store = Store::open(folder.path()).unwrap();
     let run = find_run(&store, "HEAD").unwrap();
     let tables = QueryTables::of(&Manifest::of(&store, &run).unwrap());
@@ -173,7 +165,7 @@ fn the_example_of_a_pair_shows_the_tool_that_was_added() {
         );
     }
     let truth = super::json(example.join("truth.json"));
-    let rows = changes_of(&[]);
+    let rows = changes_of("");
     let found = row(&rows, "payload.mass");
     let mass = truth["payload_kg"].as_f64().unwrap();
     assert_eq!(found.rank, Some(1));

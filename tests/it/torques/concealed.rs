@@ -1,30 +1,20 @@
 //! Recordings of the twin whose physics is concealed, diagnosed blind through the real command and marked.
 
-use crate::answer::read;
+use crate::answer::{Answer, calib, has, read, root};
 use serde_json::Value;
 use std::path::Path;
-use std::process::{Command, Output};
 
-fn simulate(verb: &str, out: &Path, more: &[&str]) -> Output {
-    let pipeline = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/pipelines/dynamics/pipeline.yaml"
-    );
-    let mut command = Command::new(env!("CARGO_BIN_EXE_calib"));
-    command
-        .args(["simulate", verb, "--dynamics", "--out"])
-        .arg(out)
-        .args(more);
-    if verb == "prove" {
-        command.args(["--pipeline", pipeline, "--quiet", "--json"]);
-    }
-    let done = command.output().unwrap();
-    assert!(
-        done.status.success(),
-        "{}",
-        String::from_utf8_lossy(&done.stderr)
-    );
-    done
+fn simulate(verb: &str, out: &Path, more: &str) -> Answer {
+    let pipeline = match verb {
+        "prove" => format!(
+            "--pipeline {} --quiet --json",
+            root("pipelines/dynamics/pipeline.yaml").display()
+        ),
+        _ => String::new(),
+    };
+    let out = out.display();
+    let words = format!("simulate {verb} --dynamics --out {out} {more} {pipeline}");
+    calib(".", &words).code(0)
 }
 
 /// Half of the effects in forms that are not the estimator's. More of them: `calib simulate prove --dynamics --cases 300`.
@@ -34,9 +24,9 @@ fn concealed_torques_are_found_and_nulls_stay_empty() {
     let done = simulate(
         "prove",
         &folder.path().join("set"),
-        &["--seed", "11", "--cases", "4", "--nulls", "0.25"],
+        "--seed 11 --cases 4 --nulls 0.25",
     );
-    let board: Value = serde_json::from_slice(&done.stdout).unwrap();
+    let board: Value = done.json();
     assert_eq!(
         (&board["recordings"], &board["without_verdict"]),
         (&4.into(), &serde_json::json!([]))
@@ -62,18 +52,7 @@ fn a_seed_gives_the_same_recordings_of_torques_on_one_and_two_threads() {
         simulate(
             "conceal",
             &out,
-            &[
-                "--cases",
-                "3",
-                "--seconds",
-                "16",
-                "--rate",
-                "20",
-                "--open",
-                "0.4",
-                "--jobs",
-                jobs,
-            ],
+            &format!("--cases 3 --seconds 16 --rate 20 --open 0.4 --jobs {jobs}"),
         );
         read(out.join("seal.json"))
     });
@@ -84,22 +63,6 @@ fn a_seed_gives_the_same_recordings_of_torques_on_one_and_two_threads() {
 
 #[test]
 fn options_of_points_are_refused_of_torques() {
-    let done = Command::new(env!("CARGO_BIN_EXE_calib"))
-        .args([
-            "simulate",
-            "conceal",
-            "--dynamics",
-            "--out",
-            "never",
-            "--layout",
-            "path",
-        ])
-        .output()
-        .unwrap();
-    assert_eq!(done.status.code(), Some(2));
-    assert!(
-        String::from_utf8_lossy(&done.stderr).contains("--layout"),
-        "{}",
-        String::from_utf8_lossy(&done.stderr)
-    );
+    let refused = calib(".", "simulate conceal --dynamics --out never --layout path").code(2);
+    has(&refused.err, "--layout");
 }

@@ -85,11 +85,8 @@ fn told_of(robot: &str, change: impl FnOnce(&mut Sheet), folder: &Path) -> (i32,
         folder,
         &[case.recording()[0].clone(), ("recording.csv", sheet.text())],
     );
-    let output = diagnose(folder, &folder.join("store"), &[]);
-    (
-        output.status.code().unwrap(),
-        String::from_utf8_lossy(&output.stderr).into_owned(),
-    )
+    let output = diagnose(folder, &folder.join("store"), "");
+    (output.code.unwrap(), output.err)
 }
 
 fn refused(change: impl FnOnce(&mut Sheet), words: &[&str]) {

@@ -67,15 +67,7 @@ fn ratios(inertials: &str, share: f64) -> ([f64; 2], [f64; 2]) {
     write(&at("believed"), &[(name, file.to_string()), recording]);
     let pipeline = at("pipeline.yaml");
     std::fs::write(&pipeline, PIPELINE.replace("INERTIALS", inertials)).unwrap();
-    let output = calib(
-        &["run", "--quiet", &pipeline.display().to_string()],
-        &at("store"),
-    );
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    calib(&format!("run --quiet {}", pipeline.display()), &at("store")).code(0);
     let found = |stage: &str| compliances(&at("store"), stage);
     let of = |found: [f64; 2]| [found[0] / TRULY[0], found[1] / TRULY[1]];
     let masses: Robot = table(&at("store"), "masses/robot");

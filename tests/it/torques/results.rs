@@ -1,11 +1,10 @@
 //! What a diagnosis of torques is good for: files for simulators and torques that are fed forward, held against the twin's truth.
 
 use super::write;
-use crate::answer::{has, root};
+use crate::answer::{self, Answer, has, root};
 use calib::twin::torque::{TorqueCase, TorqueDesign, TorqueFile, TorqueRows};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 use std::sync::OnceLock;
 
 /// A diagnosed case.
@@ -44,15 +43,11 @@ pub(super) fn solve_files(case: TorqueCase, files: &[TorqueFile]) -> Solved {
         .display()
         .to_string();
     let set = format!("case={}", folder.path().join("case").display());
-    let output = calib(
-        &["run", "--quiet", "--set", &set, &pipeline],
+    calib(
+        &format!("run --quiet --set {set} {pipeline}"),
         &folder.path().join("store"),
-    );
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    )
+    .code(0);
     Solved { folder, case }
 }
 
@@ -101,28 +96,17 @@ pub(super) fn cases(count: usize) -> Vec<TorqueCase> {
         .collect()
 }
 
-pub(super) fn calib(arguments: &[&str], store: &Path) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_calib"));
-    command
-        .args(arguments)
-        .arg("--store")
-        .arg(store)
-        .output()
-        .unwrap()
+pub(super) fn calib(words: &str, store: &Path) -> Answer {
+    answer::calib(".", &format!("{words} --store {}", store.display()))
 }
 
-fn text(output: Output) -> String {
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
-    String::from_utf8(output.stdout).unwrap()
+fn text(answer: Answer) -> String {
+    answer.ok()
 }
 
 fn exported(format: &str) -> String {
     text(calib(
-        &["export", "HEAD", "--quiet", "--format", format],
+        &format!("export HEAD --quiet --format {format}"),
         &solved().path("store"),
     ))
 }
@@ -255,7 +239,7 @@ fn files_say_nothing_of_friction_that_was_not_found() {
         .with_drag(2, coulomb[1]);
     let solved = solve(case);
     let found: Value = serde_json::from_str(&text(calib(
-        &["export", "HEAD", "--quiet", "--format", "dynamics"],
+        "export HEAD --quiet --format dynamics",
         &solved.path("store"),
     )))
     .unwrap();
@@ -264,7 +248,7 @@ fn files_say_nothing_of_friction_that_was_not_found() {
         ("mjcf", "joint", ["damping", "frictionloss"]),
     ] {
         let text = text(calib(
-            &["export", "HEAD", "--quiet", "--format", format],
+            &format!("export HEAD --quiet --format {format}"),
             &solved.path("store"),
         ));
         let file = roxmltree::Document::parse(&text).unwrap();
@@ -322,12 +306,9 @@ fn what_a_format_does_not_hold_of_torques_is_said_with_its_size() {
         let text = exported(format);
         has(&text, "not carried: stribeck_friction at joint 2, ");
     }
-    let refused = calib(
-        &["export", "HEAD", "--format", "dh"],
-        &solved().path("store"),
-    );
-    let told = String::from_utf8_lossy(&refused.stderr).into_owned();
-    assert_eq!(refused.status.code(), Some(2), "{told}");
+    let refused = calib("export HEAD --format dh", &solved().path("store"));
+    let told = refused.err.clone();
+    assert_eq!(refused.code, Some(2), "{told}");
     has(&told, "allowed: urdf, json, mjcf, sdf, dynamics");
 }
 
@@ -397,13 +378,7 @@ fn torques_fed_forward_are_those_of_the_twin_on_fresh_motions() {
         let file = solved.path(&format!("motion_{stretch}_{derivatives}.csv"));
         std::fs::write(&file, motion(&rows, stretch, derivatives)).unwrap();
         let told = text(calib(
-            &[
-                "compensate",
-                "HEAD",
-                &file.display().to_string(),
-                "--torque",
-                "--quiet",
-            ],
+            &format!("compensate HEAD {} --torque --quiet", file.display()),
             &solved.path("store"),
         ));
         let own: Vec<usize> = (0..rows.time.len())
@@ -465,19 +440,11 @@ fn a_motion_that_cannot_be_fed_forward_is_refused_at_its_line() {
         change(&mut lines);
         std::fs::write(&file, lines.join("\n")).unwrap();
         let output = calib(
-            &[
-                "compensate",
-                "HEAD",
-                &file.display().to_string(),
-                "--torque",
-            ],
+            &format!("compensate HEAD {} --torque", file.display()),
             &solved.path("store"),
         );
-        let told = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(
-            [Some(2), Some(10)].contains(&output.status.code()),
-            "{told}"
-        );
+        let told = output.err.clone();
+        assert!([Some(2), Some(10)].contains(&output.code), "{told}");
         words
             .iter()
             .for_each(|word| assert!(told.contains(word), "no `{word}` in: {told}"));
@@ -501,11 +468,8 @@ fn a_motion_that_cannot_be_fed_forward_is_refused_at_its_line() {
     changed(&|lines| lines.truncate(5), &["at least 10"]);
     // Without --torque there is nothing to correct.
     let output = calib(
-        &["compensate", "HEAD", &file.display().to_string()],
+        &format!("compensate HEAD {}", file.display()),
         &solved.path("store"),
     );
-    assert!(
-        String::from_utf8_lossy(&output.stderr).contains("--torque"),
-        "{output:?}"
-    );
+    assert!(output.err.contains("--torque"), "{output:?}");
 }
