@@ -2,11 +2,11 @@
 
 use calib::error::{Error, Result};
 use calib::stage::{
-    Context, ErasedStage, InputTable, OpenedInput, Output, Port, RawFile, Services, Sink, Stage,
-    StageEntry, Streamed, Writes,
+    Context, DiagnoseReads, ErasedStage, IdentifyReads, InputTable, OpenedInput, Output, Port,
+    RawFile, Services, Sink, Stage, StageEntry, Streamed, Writes,
 };
 use calib::store::frame::Frame;
-use calib::table::Table;
+use calib::table::{Recording, Robot, Split, Table};
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -178,4 +178,20 @@ pub fn skipped(why: &str) {
         .open(folder.join(test))
         .unwrap();
     writeln!(notes, "{why}").unwrap();
+}
+
+pub fn identify_reads(robot: Robot, recording: Recording, split: Split) -> IdentifyReads {
+    IdentifyReads {
+        robot,
+        recording,
+        split,
+    }
+}
+
+pub fn diagnose_reads(robot: Robot, recording: Recording, split: Split) -> DiagnoseReads {
+    DiagnoseReads {
+        robot,
+        recording,
+        split,
+    }
 }

@@ -13,7 +13,7 @@ mod weight;
 mod without;
 
 use crate::answer::{self, has, put, read, root};
-use crate::desk::{Desk, shared, table};
+use crate::desk::{Desk, diagnose_reads, shared, table};
 use crate::suspects::{Inputs, pipeline};
 use calib::effect::{Form, Load};
 use calib::estimate::choose::{Site, median};
@@ -56,12 +56,12 @@ fn the_practice_cases_are_solved() {
             pipeline("case", &[("case", &case.display().to_string())], "diagnose");
         let robot = RobotModel::new(inputs.robot.to_description().unwrap());
         let data = inputs.recording.measurements();
-        let reads = DiagnoseReads {
-            robot: inputs.robot,
-            recording: inputs.recording,
-            split: inputs.split,
-        };
-        let tables = Desk::default().run(&stage, reads).unwrap();
+        let tables = Desk::default()
+            .run(
+                &stage,
+                diagnose_reads(inputs.robot, inputs.recording, inputs.split),
+            )
+            .unwrap();
         let findings: Findings = table(&tables).remove(0);
         let found: Named = findings
             .0

@@ -1,15 +1,13 @@
 //! Cross-validation: as honest as held-out points, repeats together, and the same on any number of threads.
 
 use crate::answer::has;
-use crate::desk::{Desk, table};
+use crate::desk::{Desk, identify_reads, table};
 use crate::fixture::{self, fit_all};
 use crate::identify::{GEOMETRY, SIGMA, model, recording};
 use crate::sr210d::{experiment, settings};
 use calib::estimate::{Fitted, Folds, Model, Session, align, cross_validate, leave_one_out};
 use calib::robot::{Measurements, RobotModel};
-use calib::stage::{
-    FoldSetting, Identify, IdentifyReads, Labelled, Stage, Validate, ValidateReads,
-};
+use calib::stage::{FoldSetting, Identify, Labelled, Stage, Validate, ValidateReads};
 use calib::table::{Observability, Prediction, Statistics};
 
 fn identify(data: &Measurements, effects: &[&str]) -> (Model, Fitted) {
@@ -143,12 +141,12 @@ fn any_number_of_threads_gives_the_same_folds() {
 fn statistics_have_the_folds_of_fitted_rows_and_of_no_others() {
     let of = experiment("none", 5);
     let stage: Identify = settings("geometry", "none");
-    let reads = IdentifyReads {
-        robot: of.robot.clone(),
-        recording: of.recording.clone(),
-        split: of.split.clone(),
-    };
-    let tables = Desk::default().run(&stage, reads).unwrap();
+    let tables = Desk::default()
+        .run(
+            &stage,
+            identify_reads(of.robot.clone(), of.recording.clone(), of.split.clone()),
+        )
+        .unwrap();
     let prediction: Prediction = table(&tables).remove(0);
     assert!(
         prediction
@@ -269,12 +267,12 @@ fn folds_are_a_number_or_n_and_a_cross_validation_that_is_dropped_is_told() {
             folds,
             ..settings("geometry", "none")
         };
-        let reads = IdentifyReads {
-            robot: of.robot.clone(),
-            recording: of.recording.clone(),
-            split: of.split.clone(),
-        };
-        let tables = desk.run(&stage, reads).unwrap();
+        let tables = desk
+            .run(
+                &stage,
+                identify_reads(of.robot.clone(), of.recording.clone(), of.split.clone()),
+            )
+            .unwrap();
         let observability: Observability = table(&tables).remove(0);
         let value = |quantity: &str| {
             observability

@@ -1,12 +1,12 @@
 //! The stage `learn`: what it gains on the twin, what it refuses, and what it says.
 
 use crate::answer::{has, root};
-use crate::desk::{Desk, table};
+use crate::desk::{Desk, identify_reads, table};
 use crate::fixture::robot_of;
 use calib::error::Result;
 use calib::stage::split::{SplitBy, SplitReads};
 use calib::stage::{Context, Learn, LearnReads, LearnWrites, Stage};
-use calib::stage::{Identify, IdentifyReads, Simulate, SimulateReads, Stiffness, StiffnessReads};
+use calib::stage::{Identify, Simulate, SimulateReads, Stiffness, StiffnessReads};
 use calib::store::frame::Frame;
 use calib::table::{
     Parameters, Prediction, PredictionRow, Recording, Robot, Split, SplitRow, Table,
@@ -76,12 +76,12 @@ fn paper_sequence(seed: u64) -> (Recording, Split, Prediction) {
         "on": ["unloaded_fit"], "load": "current",
         "effects": ["base_frame", "tool_offset", "joint_offset", "link_geometry", "reduction_ratio", "coupling_ratio"],
     }));
-    let reads = IdentifyReads {
-        robot: robot.clone(),
-        recording: recording.clone(),
-        split: split.clone(),
-    };
-    let tables = desk.run(&geometry, reads).unwrap();
+    let tables = desk
+        .run(
+            &geometry,
+            identify_reads(robot.clone(), recording.clone(), split.clone()),
+        )
+        .unwrap();
     let reads = StiffnessReads {
         robot,
         recording: recording.clone(),

@@ -1,6 +1,6 @@
 //! Parameters free, held, bounded or known beforehand, by name: in the numerics, and as settings of a stage.
 
-use crate::desk::{Desk, table};
+use crate::desk::{Desk, identify_reads, table};
 use crate::fixture;
 use crate::identify::{GEOMETRY, model, recording};
 use crate::sr210d::experiment;
@@ -8,7 +8,7 @@ use calib::estimate::{
     Bounds, CONFLICT, FitOptions, Fitted, Known, Model, ParameterStatus, Prior, align, fit,
 };
 use calib::robot::{Measurements, RobotModel};
-use calib::stage::{Identify, IdentifyReads, Stage};
+use calib::stage::{Identify, Stage};
 use calib::table::{ParameterRow, Parameters};
 use serde_json::json;
 
@@ -256,12 +256,12 @@ fn settings_by_name_are_found_again_in_the_table_and_what_matches_nothing_is_sai
             .unwrap()
             .extend(settings.as_object().cloned().unwrap());
         let desk = Desk::default();
-        let reads = IdentifyReads {
-            robot: of.robot.clone(),
-            recording: of.recording.clone(),
-            split: of.split.clone(),
-        };
-        let tables = desk.run(&stage(all), reads).unwrap();
+        let tables = desk
+            .run(
+                &stage(all),
+                identify_reads(of.robot.clone(), of.recording.clone(), of.split.clone()),
+            )
+            .unwrap();
         let warnings = desk.warnings.lock().unwrap().clone();
         (table::<Parameters>(&tables).remove(0), warnings)
     };

@@ -1,13 +1,13 @@
 //! Poses measured more than once: the joints' repeatability, the floor, lack of fit, and sigmas that allow for shared errors.
 
-use crate::desk::{Desk, table};
+use crate::desk::{Desk, identify_reads, table};
 use crate::fixture::{self, all_rows, fit_all, question};
 use crate::identify::{GEOMETRY, SIGMA, model, normal, recording};
 use crate::sr210d::experiment;
 use calib::diagnose::{Diagnosis, diagnose};
 use calib::estimate::{Fitted, Model, ParameterStatus, Poses, align, spread};
 use calib::robot::{Measurements, NoiseBasis, PointReadings, RobotModel};
-use calib::stage::{Identify, IdentifyReads, Stage};
+use calib::stage::{Identify, Stage};
 use calib::table::{Observability, Parameters, Split};
 use nalgebra::Vector3;
 use serde_json::json;
@@ -266,12 +266,12 @@ fn the_stage_weighs_by_the_stated_repeatability_and_tables_what_repeats_say() {
         let desk = Desk::default();
         let stage: Identify = serde_json::from_value(settings.clone()).unwrap();
         assert!(stage.check().is_empty());
-        let reads = IdentifyReads {
-            robot: of.robot.clone(),
-            recording: recording.clone(),
-            split: split.clone(),
-        };
-        let tables = desk.run(&stage, reads).unwrap();
+        let tables = desk
+            .run(
+                &stage,
+                identify_reads(of.robot.clone(), recording.clone(), split.clone()),
+            )
+            .unwrap();
         let notes = desk.notes.lock().unwrap().clone();
         (
             table::<Observability>(&tables).remove(0),

@@ -1,8 +1,8 @@
 //! The paper's experiment on the twin, stage by stage from the settings of `pipelines/sr210d`.
 
 use crate::answer::{read, root};
-use crate::desk::{Desk, table};
-use calib::stage::{Identify, IdentifyReads, ReadRobot, RobotReads, Simulate, SimulateReads};
+use crate::desk::{Desk, identify_reads, table};
+use calib::stage::{Identify, ReadRobot, RobotReads, Simulate, SimulateReads};
 use calib::stage::{Stiffness, StiffnessReads};
 use calib::table::{Parameters, Prediction, Recording, Robot, Split, SplitRow, Truth};
 use serde::de::DeserializeOwned;
@@ -89,12 +89,12 @@ fn identified(of: &Experiment, id: &str, remainder: &str) -> (Parameters, Predic
         split,
         ..
     } = of;
-    let reads = IdentifyReads {
-        robot: robot.clone(),
-        recording: recording.clone(),
-        split: split.clone(),
-    };
-    let tables = Desk::default().run(&stage, reads).unwrap();
+    let tables = Desk::default()
+        .run(
+            &stage,
+            identify_reads(robot.clone(), recording.clone(), split.clone()),
+        )
+        .unwrap();
     (table(&tables).remove(0), table(&tables).remove(0))
 }
 
@@ -219,13 +219,11 @@ fn where_gears_are_exact_and_only_the_arms_weight_bends_it_ratios_are_not_believ
         twin["seed"] = seed.into();
         let of = experiment_on(serde_json::from_value(twin).unwrap());
         let desk = Desk::default();
-        let reads = IdentifyReads {
-            robot: of.robot,
-            recording: of.recording,
-            split: of.split,
-        };
-        desk.run(&settings::<Identify>("geometry", "none"), reads)
-            .unwrap();
+        desk.run(
+            &settings::<Identify>("geometry", "none"),
+            identify_reads(of.robot, of.recording, of.split),
+        )
+        .unwrap();
         let warned = desk.warnings.lock().unwrap().join("\n");
         assert!(
             warned.contains("the data favour compliance"),

@@ -1,11 +1,11 @@
 //! What the stages say of rows that do not belong: tables, notes, and silence on good recordings.
 
 use crate::answer::{has, read, root};
-use crate::desk::{Desk, shared, table};
+use crate::desk::{Desk, identify_reads, shared, table};
 use crate::sr210d::{experiment, settings};
 use calib::stage::ingest::{Ingest, IngestReads};
 use calib::stage::split::{SplitBy, SplitReads};
-use calib::stage::{Identify, IdentifyReads, ReadRobot, RobotReads};
+use calib::stage::{Identify, ReadRobot, RobotReads};
 use calib::table::{Prediction, PredictionRow, Recording, Robot, Split, Suspects};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -87,14 +87,7 @@ fn identify(desk: &Desk, stage: &Identify, inputs: Inputs) -> (Suspects, Predict
         split,
     } = inputs;
     let tables = desk
-        .run(
-            stage,
-            IdentifyReads {
-                robot,
-                recording,
-                split,
-            },
-        )
+        .run(stage, identify_reads(robot, recording, split))
         .unwrap();
     (table(&tables).remove(0), table(&tables).remove(0))
 }

@@ -1,7 +1,7 @@
 //! A correction carried to another series of the same robot, only the base refitted: never worse than none.
 
 use crate::answer::{calib, has, put};
-use crate::desk::{Desk, shared, table};
+use crate::desk::{Desk, diagnose_reads, identify_reads, shared, table};
 use calib::effect::Load;
 use calib::error::Result;
 use calib::estimate::Model;
@@ -10,8 +10,8 @@ use calib::spatial::Pose;
 use calib::stage::ingest::{Ingest, IngestReads};
 use calib::stage::split::{SplitBy, SplitReads};
 use calib::stage::{
-    Context, Diagnose, DiagnoseReads, Identify, IdentifyReads, Labelled, Learn, LearnReads,
-    LearnWrites, ReadRobot, RobotReads, Simulate, SimulateReads, Stage, Transfer, TransferReads,
+    Context, Diagnose, Identify, Labelled, Learn, LearnReads, LearnWrites, ReadRobot, RobotReads,
+    Simulate, SimulateReads, Stage, Transfer, TransferReads,
 };
 use calib::store::frame::Frame;
 use calib::table::{Parameters, Prediction, Recording, Robot, Split};
@@ -87,12 +87,10 @@ fn series(file: &str, every: usize) -> Result<Series> {
     let geometry = settings::<Identify>(json!({
         "effects": ["base_frame", "tool_offset", "joint_offset", "link_geometry"], "folds": 0,
     }));
-    let reads = IdentifyReads {
-        robot: robot.clone(),
-        recording: recording.clone(),
-        split: split.clone(),
-    };
-    let tables = desk.run(&geometry, reads)?;
+    let tables = desk.run(
+        &geometry,
+        identify_reads(robot.clone(), recording.clone(), split.clone()),
+    )?;
     let parameters: Parameters = table(&tables).remove(0);
     let prediction: Prediction = table(&tables).remove(0);
     let learn = settings::<Learn>(
@@ -213,12 +211,15 @@ fn transferred(parameters: &Parameters, to: &Series) -> Result<[f64; 2]> {
 
 /// The model with the causes that were found in a series.
 fn diagnosed(series: &Series) -> Result<Parameters> {
-    let reads = DiagnoseReads {
-        robot: series.robot.clone(),
-        recording: series.recording.clone(),
-        split: series.split.clone(),
-    };
-    Ok(table(&Desk::default().run(&settings::<Diagnose>(json!({})), reads)?).remove(0))
+    Ok(table(&Desk::default().run(
+        &settings::<Diagnose>(json!({})),
+        diagnose_reads(
+            series.robot.clone(),
+            series.recording.clone(),
+            series.split.clone(),
+        ),
+    )?)
+    .remove(0))
 }
 
 #[test]
@@ -322,12 +323,9 @@ fn a_model_holds_on_a_later_recording_from_where_the_tracker_stands_then() {
         "coupling_ratio",
     ];
     let identify = settings::<Identify>(json!({"effects": effects, "folds": 0}));
-    let reads = IdentifyReads {
-        robot: robot.clone(),
-        recording,
-        split,
-    };
-    let tables = desk.run(&identify, reads).unwrap();
+    let tables = desk
+        .run(&identify, identify_reads(robot.clone(), recording, split))
+        .unwrap();
     let parameters: Parameters = table(&tables).remove(0);
     let unseen = |tables: &BTreeMap<&'static str, Vec<Frame>>| {
         let prediction: Prediction = table(tables).remove(0);
@@ -392,12 +390,15 @@ fn a_carried_model_says_that_its_geometry_alone_is_better() {
     let robot: Robot = table(&desk.run(&read, RobotReads {}).unwrap()).remove(0);
     let (recording, split) = measured(&robot, 3);
     let identify = settings::<Identify>(json!({"folds": 0}));
-    let reads = IdentifyReads {
-        robot: robot.clone(),
-        recording: recording.clone(),
-        split: split.clone(),
-    };
-    let mut parameters: Parameters = table(&desk.run(&identify, reads).unwrap()).remove(0);
+    let mut parameters: Parameters = table(
+        &desk
+            .run(
+                &identify,
+                identify_reads(robot.clone(), recording.clone(), split.clone()),
+            )
+            .unwrap(),
+    )
+    .remove(0);
     // Where the first joint stood on its negative side, as if nothing else had been measured.
     let there: Vec<usize> = (0..recording.rows())
         .filter(|row| recording.q(*row)[0] < 0.0)
@@ -501,12 +502,12 @@ impl Carrying {
         ];
         let model = |effects: &[&str]| {
             let identify = settings::<Identify>(json!({"effects": effects, "folds": 0}));
-            let reads = IdentifyReads {
-                robot: robot.clone(),
-                recording: here.clone(),
-                split: split.clone(),
-            };
-            let tables = Desk::default().run(&identify, reads).unwrap();
+            let tables = Desk::default()
+                .run(
+                    &identify,
+                    identify_reads(robot.clone(), here.clone(), split.clone()),
+                )
+                .unwrap();
             (table(&tables).remove(0), table(&tables).remove(0))
         };
         let geometry = model(&effects);

@@ -2,7 +2,7 @@
 //!
 //! `CALIB_RECORDINGS=100 cargo test --release --test it -- compensate::concealed --nocapture` prints the whole table.
 
-use crate::desk::{Desk, table};
+use crate::desk::{Desk, diagnose_reads, identify_reads, table};
 use calib::compensate::{
     CommandTarget, CorrectedCommand, CorrectionOptions, Corrector, Coverage, IdentifiedArm,
     Scatter, Uncertainty,
@@ -11,7 +11,7 @@ use calib::description::RobotDescription;
 use calib::effect::Load;
 use calib::estimate::Model;
 use calib::robot::{JointConvention, RobotModel};
-use calib::stage::{Diagnose, DiagnoseReads, Identify, IdentifyReads};
+use calib::stage::{Diagnose, Identify};
 use calib::table::{
     CovarianceTable, Findings, Parameters, Prediction, Recording, Robot, Split, SplitRow, Verdict,
 };
@@ -82,21 +82,21 @@ pub fn outcomes_at(
     }
     let table_of_robot = Robot::from_description(&robot);
     let geometry: Identify = serde_json::from_value(json!({"effects": GEOMETRY})).unwrap();
-    let reads = IdentifyReads {
-        robot: table_of_robot.clone(),
-        recording: recording.clone(),
-        split: split.clone(),
-    };
-    let tables = Desk::default().run(&geometry, reads).unwrap();
+    let tables = Desk::default()
+        .run(
+            &geometry,
+            identify_reads(table_of_robot.clone(), recording.clone(), split.clone()),
+        )
+        .unwrap();
     let plain = IdentifiedArm::new(model(&robot, &table::<Parameters>(&tables).remove(0)), None);
 
     let stage: Diagnose = serde_json::from_value(json!({})).unwrap();
-    let reads = DiagnoseReads {
-        robot: table_of_robot,
-        recording: recording.clone(),
-        split,
-    };
-    let tables = Desk::default().run(&stage, reads).unwrap();
+    let tables = Desk::default()
+        .run(
+            &stage,
+            diagnose_reads(table_of_robot, recording.clone(), split),
+        )
+        .unwrap();
     let model = model(&robot, &table::<Parameters>(&tables).remove(0));
     let covariance = table::<CovarianceTable>(&tables).remove(0).of_model(&model);
     let verdict = table::<Verdict>(&tables).remove(0);

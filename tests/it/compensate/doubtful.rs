@@ -5,10 +5,10 @@ use super::concealed::{
     Outcome, again, is_harmed, model, nothing, outcomes_at, recording, split, targets, upright,
 };
 use crate::answer::has;
-use crate::desk::{Desk, table};
+use crate::desk::{Desk, diagnose_reads, table};
 use calib::compensate::{Chain, Circumstance, IdentifiedArm, Nominal};
 use calib::robot::{Posture, RobotModel};
-use calib::stage::{Diagnose, DiagnoseReads, Labelled, Validate, ValidateReads};
+use calib::stage::{Diagnose, Labelled, Validate, ValidateReads};
 use calib::table::{Parameters, Prediction, Robot, Statistics, StatisticsRow, Verdict};
 use calib::twin::arm::Arm;
 use calib::twin::conceal::case::Case;
@@ -27,12 +27,12 @@ fn judged(case: &Case) -> (Verdict, Prediction, StatisticsRow) {
     let recording = recording(case);
     let split = split(case, &recording);
     let stage: Diagnose = serde_json::from_value(json!({})).unwrap();
-    let reads = DiagnoseReads {
-        robot: Robot::from_description(&case.robot),
-        recording,
-        split,
-    };
-    let tables = Desk::default().run(&stage, reads).unwrap();
+    let tables = Desk::default()
+        .run(
+            &stage,
+            diagnose_reads(Robot::from_description(&case.robot), recording, split),
+        )
+        .unwrap();
     let prediction = table::<Prediction>(&tables).remove(0);
     let labelled = Labelled {
         stage: "diagnose".into(),
@@ -226,12 +226,12 @@ fn asked_beyond_small_loads(
     let data = recording.measurements();
     let split = split(&case, &recording);
     let stage: Diagnose = serde_json::from_value(json!({})).unwrap();
-    let reads = DiagnoseReads {
-        robot: Robot::from_description(&case.robot),
-        recording,
-        split,
-    };
-    let tables = Desk::default().run(&stage, reads).unwrap();
+    let tables = Desk::default()
+        .run(
+            &stage,
+            diagnose_reads(Robot::from_description(&case.robot), recording, split),
+        )
+        .unwrap();
     let arm = IdentifiedArm::new(
         model(&case.robot, &table::<Parameters>(&tables).remove(0)),
         None,

@@ -1,6 +1,6 @@
 //! The true robot, a twin that shares no kinematics with the model, goes where it was wanted: every kind of effect that acts.
 
-use crate::desk::{Desk, table};
+use crate::desk::{Desk, diagnose_reads, identify_reads, table};
 use calib::compensate::{
     Circumstance, IdentifiedArm as Identified, Nominal, Reach, SETTLED, ToolGoal, least_change,
     one_step,
@@ -10,7 +10,7 @@ use calib::effect::Load;
 use calib::estimate::Model;
 use calib::estimate::network::Correction;
 use calib::robot::{RobotModel, RowTime};
-use calib::stage::{Diagnose, DiagnoseReads, Identify, IdentifyReads, Learn, LearnReads};
+use calib::stage::{Diagnose, Identify, Learn, LearnReads};
 use calib::table::{
     Findings, Network, Parameters, Prediction, Recording, Robot, Split, SplitRow, Verdict,
 };
@@ -188,14 +188,7 @@ impl Cell {
         }))
         .unwrap();
         let tables = Desk::default()
-            .run(
-                &rigid,
-                IdentifyReads {
-                    robot,
-                    recording,
-                    split,
-                },
-            )
+            .run(&rigid, identify_reads(robot, recording, split))
             .unwrap();
         let parameters: Parameters = table(&tables).remove(0);
         parameters
@@ -215,12 +208,9 @@ impl Cell {
             recording,
             split,
         } = recorded;
-        let reads = DiagnoseReads {
-            robot,
-            recording,
-            split,
-        };
-        let tables = Desk::default().run(&stage, reads).unwrap();
+        let tables = Desk::default()
+            .run(&stage, diagnose_reads(robot, recording, split))
+            .unwrap();
         let parameters: Parameters = table(&tables).remove(0);
         let verdict: Verdict = table(&tables).remove(0);
         let findings: Findings = table(&tables).remove(0);
@@ -246,12 +236,12 @@ impl Cell {
             "effects": ["base_frame", "tool_offset", "joint_offset", "link_geometry", "reduction_ratio"], "folds": 0,
         }))
         .unwrap();
-        let reads = IdentifyReads {
-            robot: robot.clone(),
-            recording: recording.clone(),
-            split: split.clone(),
-        };
-        let tables = desk.run(&rigid, reads).unwrap();
+        let tables = desk
+            .run(
+                &rigid,
+                identify_reads(robot.clone(), recording.clone(), split.clone()),
+            )
+            .unwrap();
         let parameters: Parameters = table(&tables).remove(0);
         let prediction: Prediction = table(&tables).remove(0);
         let learn: Learn =

@@ -1,13 +1,13 @@
 //! Of targets that no fit has seen, the true robot hits 95 % within the radius that is stated for them.
 
 use super::true_error::Cell;
-use crate::desk::{Desk, table};
+use crate::desk::{Desk, identify_reads, table};
 use calib::compensate::{IdentifiedArm, SETTLED, Scatter, Uncertainty, least_change};
 use calib::effect::{EffectStack, Form, Law, Load, Motion, Term, Unknown, Variable};
 use calib::estimate::Model;
 use calib::robot::{CircumstanceName, RobotModel};
 use calib::spatial::Pose;
-use calib::stage::{Identify, IdentifyReads};
+use calib::stage::Identify;
 use calib::table::{CovarianceTable, Parameters, Prediction};
 use calib::twin::conceal::robots::Kind;
 use calib::twin::effect::{JointCompliance, Physical};
@@ -23,12 +23,12 @@ fn within(cell: &Cell, effects: &[&str], payload_kg: &[f64]) -> f64 {
     let mut hits = 0;
     for seed in 0..RECORDINGS {
         let recorded = cell.recorded_by(cell.points(80, payload_kg, 1000 + seed), 2000 + seed);
-        let reads = IdentifyReads {
-            robot: recorded.robot,
-            recording: recorded.recording,
-            split: recorded.split,
-        };
-        let tables = Desk::default().run(&stage, reads).unwrap();
+        let tables = Desk::default()
+            .run(
+                &stage,
+                identify_reads(recorded.robot, recorded.recording, recorded.split),
+            )
+            .unwrap();
         let parameters: Parameters = table(&tables).remove(0);
         let covariance: CovarianceTable = table(&tables).remove(0);
         let prediction: Prediction = table(&tables).remove(0);

@@ -2,12 +2,12 @@
 
 use super::{CASE, calib, case_with, concealed, ended, refused};
 use crate::answer::{has, read, starts_with};
-use crate::desk::{Desk, table};
+use crate::desk::{Desk, diagnose_reads, table};
 use crate::fixture;
 use calib::description::RobotDescription;
 use calib::error::Error;
 use calib::stage::split::{SplitBy, SplitReads};
-use calib::stage::{Diagnose, DiagnoseReads, Simulate, SimulateReads};
+use calib::stage::{Diagnose, Simulate, SimulateReads};
 use calib::table::{FindingRow, Findings, Recording, Robot, Split, Verdict};
 use serde_json::{Value, json};
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -109,11 +109,7 @@ fn diagnosed(inputs: &Inputs) -> Result<Said, Error> {
     let robot = Robot::from_description(&inputs.robot);
     let tables = desk.run(
         &stage,
-        DiagnoseReads {
-            robot,
-            recording: inputs.recording.clone(),
-            split,
-        },
+        diagnose_reads(robot, inputs.recording.clone(), split),
     )?;
     let verdict: Verdict = table(&tables).remove(0);
     let findings: Findings = table(&tables).remove(0);

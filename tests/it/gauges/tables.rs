@@ -1,7 +1,7 @@
 //! Targets, orientations and distances as tables: identified, stored and read back.
 
 use super::{Cell, THREE};
-use crate::desk::{Desk, table};
+use crate::desk::{Desk, identify_reads, table};
 use crate::fixture;
 use calib::effect::Load;
 use calib::robot::{Measurements, Named, RobotModel};
@@ -59,11 +59,11 @@ fn tables(cell: &Cell, data: &Measurements) -> IdentifyReads {
         point_id: format!("P{row}"),
         set: "fit".into(),
     };
-    IdentifyReads {
-        robot: Robot::from_description(&cell.description),
+    identify_reads(
+        Robot::from_description(&cell.description),
         recording,
-        split: Split((0..rows).map(split).collect()),
-    }
+        Split((0..rows).map(split).collect()),
+    )
 }
 
 /// What is beside points, by setting.

@@ -1,6 +1,6 @@
 //! Axes beside the arm's own: a track that moves while the robot file has none is refused, one that stands is not.
 
-use super::{refusal, robot, take};
+use super::{refusal, robot, rr, take};
 use crate::answer::{has, starts_with};
 use crate::desk::Desk;
 
@@ -25,27 +25,18 @@ fn desk(header: &str, axis: impl Fn(usize) -> String) -> Desk {
 #[test]
 fn an_axis_that_moves_and_that_the_robot_file_does_not_have_is_refused() {
     for (header, name) in [("eax_a", "eax_a"), ("E1", "E1"), ("track_mm", "track_mm")] {
-        let said = refusal(
-            &desk(header, |row| format!("{}", 100 * row)),
-            YAML,
-            robot("rr", 1.0),
-        );
+        let said = refusal(&desk(header, |row| format!("{}", 100 * row)), YAML, rr());
         let sentence = format!(
             "a.csv: column `{name}` is an external axis, in addition to the robot's 2 joints, and moves from 0 to 1100"
         );
         starts_with(&said, &sentence);
     }
     for (header, value) in [("eax_a", "9E9"), ("E1", "0.004"), ("rail", "")] {
-        take(&desk(header, |_| value.into()), YAML, robot("rr", 1.0))
+        take(&desk(header, |_| value.into()), YAML, rr())
             .unwrap_or_else(|error| panic!("{header}: {error}"));
     }
     // What is called otherwise is none of calib's business.
-    take(
-        &desk("speed", |row| format!("{row}")),
-        YAML,
-        robot("rr", 1.0),
-    )
-    .unwrap();
+    take(&desk("speed", |row| format!("{row}")), YAML, rr()).unwrap();
     // An axis that is mapped is the robot's.
     let mapped = YAML.replace(
         "{column: \"q{j}\", unit: deg}",

@@ -1,10 +1,9 @@
 //! The noise of a recording is its own: recorded, by uncertainty, by instrument, or said to be inferred.
 
-use super::{robot, settings, take};
+use super::{faults_of, rr, take};
 use crate::desk::Desk;
 use crate::workbook::workbook;
 use calib::robot::{INSTRUMENTS, NoiseBasis, SigmaSource};
-use calib::stage::Stage;
 use calib::table::{Recording, Table};
 
 /// Three rows at 5 m, and beside the point two columns more.
@@ -12,7 +11,7 @@ fn taken(more: &str, instrument: &str) -> (Recording, Vec<String>) {
     let text = "id,q1,q2,x,y,z,u,v\nP1,10,20,3000,4000,0,0.06,0.08\nP2,11,21,3000,0,4000,,\nP3,12,22,0,3000,4000,0,0\n";
     let desk = Desk::default().with("a.csv", text);
     let yaml = format!("{}      {more}\n{instrument}\n", super::TWO);
-    let recording = take(&desk, &yaml, robot("rr", 1.0)).unwrap().recording;
+    let recording = take(&desk, &yaml, rr()).unwrap().recording;
     let notes = desk.notes.lock().unwrap().clone();
     (
         Recording::from_frame(&recording.to_frame().unwrap()).unwrap(),
@@ -22,11 +21,7 @@ fn taken(more: &str, instrument: &str) -> (Recording, Vec<String>) {
 
 fn faults(more: &str, instrument: &str) -> Vec<String> {
     let yaml = format!("{}      {more}\n{instrument}\n", super::TWO);
-    settings(&yaml)
-        .check()
-        .iter()
-        .map(ToString::to_string)
-        .collect()
+    faults_of(&yaml)
 }
 
 fn sigmas_um(recording: &Recording) -> Vec<[f64; 3]> {
@@ -210,7 +205,7 @@ fn a_coordinate_of_exactly_zero_keeps_its_stated_uncertainty() {
         ),
         (desk, format!("{apart}join: {{by: id}}\n")),
     ] {
-        let recording = take(&desk, &yaml, robot("rr", 1.0)).unwrap().recording;
+        let recording = take(&desk, &yaml, rr()).unwrap().recording;
         let recording = Recording::from_frame(&recording.to_frame().unwrap()).unwrap();
         is_near(&sigmas_um(&recording), &expected);
         assert_eq!(

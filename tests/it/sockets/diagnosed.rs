@@ -3,9 +3,9 @@
 use super::dirty::all;
 use super::{fixture, socket, touched, touched_with, truth};
 use crate::answer::has;
-use crate::desk::{self, Desk};
+use crate::desk::{self, Desk, diagnose_reads};
 use calib::description::RobotDescription;
-use calib::stage::{Diagnose, DiagnoseReads};
+use calib::stage::Diagnose;
 use calib::table::{
     Findings, Recording, Robot, Verdict, VerdictRow, VerdictSentences, VerdictTopic,
 };
@@ -47,11 +47,7 @@ fn diagnosed_with_sentences(
     let tables = desk
         .run(
             &stage,
-            DiagnoseReads {
-                robot: Robot::from_description(robot),
-                recording,
-                split,
-            },
+            diagnose_reads(Robot::from_description(robot), recording, split),
         )
         .unwrap();
     let findings = desk::table::<Findings>(&tables).remove(0).0;

@@ -2,10 +2,10 @@
 
 use super::{fixture, plane, socket, sphere, touched, truth};
 use crate::answer::has;
-use crate::desk::{self, Desk};
+use crate::desk::{self, Desk, identify_reads};
 use calib::description::RobotDescription;
 use calib::observation::{KINDS, RowView, Weight};
-use calib::stage::{Identify, IdentifyReads};
+use calib::stage::Identify;
 use calib::table::{Parameters, Recording, Robot, Split, SplitRow};
 use nalgebra::Vector3;
 
@@ -43,12 +43,12 @@ fn said(robot: &RobotDescription, recording: Recording, settings: &str) -> (Stri
     let split = all(&recording);
     let desk = Desk::default();
     let stage: Identify = serde_saphyr::from_str(settings).unwrap();
-    let reads = IdentifyReads {
-        robot: Robot::from_description(robot),
-        recording,
-        split,
-    };
-    let tables = desk.run(&stage, reads).unwrap();
+    let tables = desk
+        .run(
+            &stage,
+            identify_reads(Robot::from_description(robot), recording, split),
+        )
+        .unwrap();
     let parameters = desk::table::<Parameters>(&tables).remove(0);
     let (warnings, notes) = (
         desk.warnings.into_inner().unwrap(),
@@ -159,13 +159,15 @@ fn names_that_the_recording_does_not_have_are_refused() {
         ),
     ] {
         let stage: Identify = serde_saphyr::from_str(more).unwrap();
-        let reads = IdentifyReads {
-            robot: Robot::from_description(&robot),
-            recording: recording.clone(),
-            split: split.clone(),
-        };
         let message = Desk::default()
-            .run(&stage, reads)
+            .run(
+                &stage,
+                identify_reads(
+                    Robot::from_description(&robot),
+                    recording.clone(),
+                    split.clone(),
+                ),
+            )
             .expect_err("refused")
             .to_string();
         has(&message, expected);

@@ -1,10 +1,10 @@
 //! A model of sockets, planes and spheres is the same when it is read from its tables again.
 
 use super::{dirty, fixture, plane, socket, sphere, touched, truth};
-use crate::desk::{self, Desk};
+use crate::desk::{self, Desk, identify_reads};
 use calib::effect::Load;
 use calib::robot::{Anchor, RobotModel};
-use calib::stage::{Identify, IdentifyReads};
+use calib::stage::Identify;
 use calib::table::{Parameters, Prediction, Robot};
 use nalgebra::Vector3;
 
@@ -21,12 +21,12 @@ fn planes_and_spheres_stand_where_they_were_identified() {
     let recording = touched(&robot, &truth(&robot, 12), &things, 12);
     let stage: Identify = serde_saphyr::from_str(dirty::SETTINGS).unwrap();
     let (data, split) = (recording.measurements(), dirty::all(&recording));
-    let reads = IdentifyReads {
-        robot: Robot::from_description(&robot),
-        recording,
-        split,
-    };
-    let tables = Desk::default().run(&stage, reads).unwrap();
+    let tables = Desk::default()
+        .run(
+            &stage,
+            identify_reads(Robot::from_description(&robot), recording, split),
+        )
+        .unwrap();
     let parameters = desk::table::<Parameters>(&tables).remove(0);
     let prediction = desk::table::<Prediction>(&tables).remove(0);
     let model = parameters

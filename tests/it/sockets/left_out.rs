@@ -2,9 +2,9 @@
 
 use super::dirty::{SETTINGS, cell};
 use super::{fixture, touched, truth};
-use crate::desk::{Desk, table};
+use crate::desk::{Desk, identify_reads, table};
+use calib::stage::Identify;
 use calib::stage::split::{SplitBy, SplitReads};
-use calib::stage::{Identify, IdentifyReads};
 use calib::table::{Prediction, PredictionRow, Recording, Robot, Split};
 use calib::twin::touch::Fixture;
 
@@ -28,12 +28,12 @@ fn a_place_that_no_row_was_fitted_to_closes_as_well_as_the_others() {
     let recording = touched(&robot, &truth(&robot, 6), &cell(30), 6);
     let split = split("{by: named, column: socket, names: [b/*]}", &recording).unwrap();
     let stage: Identify = serde_saphyr::from_str(SETTINGS).unwrap();
-    let reads = IdentifyReads {
-        robot: Robot::from_description(&robot),
-        recording,
-        split,
-    };
-    let tables = Desk::default().run(&stage, reads).unwrap();
+    let tables = Desk::default()
+        .run(
+            &stage,
+            identify_reads(Robot::from_description(&robot), recording, split),
+        )
+        .unwrap();
     let rows = table::<Prediction>(&tables).remove(0).0;
     let mean = |rows: &[&PredictionRow], error: fn(&PredictionRow) -> Option<f64>| {
         let all: Vec<f64> = rows.iter().filter_map(|row| error(row)).collect();
@@ -61,14 +61,16 @@ fn blocks_of_a_cross_validation_are_whole_places() {
     let recording = touched(&robot, &truth(&robot, 8), &cell(30), 8);
     let all = split("{by: order, sets: [{set: fit}]}", &recording).unwrap();
     let stage: Identify = serde_saphyr::from_str(SETTINGS).unwrap();
-    let reads = IdentifyReads {
-        robot: Robot::from_description(&robot),
-        recording,
-        split: all,
-    };
-    let rows = table::<Prediction>(&Desk::default().run(&stage, reads).unwrap())
-        .remove(0)
-        .0;
+    let rows = table::<Prediction>(
+        &Desk::default()
+            .run(
+                &stage,
+                identify_reads(Robot::from_description(&robot), recording, all),
+            )
+            .unwrap(),
+    )
+    .remove(0)
+    .0;
     let mean = |error: fn(&PredictionRow) -> Option<f64>| {
         rows.iter().filter_map(error).sum::<f64>() / rows.len() as f64
     };
