@@ -51,7 +51,7 @@ fn series(file: &str, every: usize) -> Result<Series> {
         .find(|stage| stage["uses"] == "ingest")
         .unwrap();
     let mut with = stage["with"].clone();
-    with["files"][0]["file"] = json!(root.join("../shared/data/ipa_ur10").join(file));
+    with["files"][0]["file"] = json!(shared("data/ipa_ur10").unwrap().join(file));
     let whole: Recording = table(&desk.run(
         &settings::<Ingest>(with),
         IngestReads {

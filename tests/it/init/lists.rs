@@ -166,7 +166,7 @@ fn the_chain_of_a_urdf_is_read_from_its_first_link_with_joints_that_slide() {
         (output.code, output.err.clone())
     };
     let start = "init . --data data.csv --urdf cell.urdf --tip";
-    assert_eq!(told(&[start, "holder"].concat()), (Some(0), String::new()));
+    assert_eq!(told(&format!("{start} holder")), (Some(0), String::new()));
     let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
     assert!(
         read("robot.yaml").contains("urdf: {base: \"world\", tip: \"holder\"}"),
@@ -180,13 +180,13 @@ fn the_chain_of_a_urdf_is_read_from_its_first_link_with_joints_that_slide() {
     );
     std::fs::remove_file(folder.path().join("robot.yaml")).unwrap();
     std::fs::remove_file(folder.path().join("pipeline.yaml")).unwrap();
-    let (code, said) = told(&[start, "carriage"].concat());
+    let (code, said) = told(&format!("{start} carriage"));
     assert_eq!(code, Some(2));
     has(
         &said,
         "--tip: the chain from `world` to `carriage` has 1 joint, the recording 2",
     );
-    let (code, said) = told(&[start, "tool0"].concat());
+    let (code, said) = told(&format!("{start} tool0"));
     assert!(
         code == Some(2)
             && said.contains("no link `tool0`")
