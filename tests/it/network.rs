@@ -588,6 +588,28 @@ fn a_correction_comes_back_from_its_table() {
         left: 1e-4,
     };
     let table = Network::of(&correction, &prismatic);
+    // Lengths are stored in mm, their factors per mm.
+    let stored = |part: &str, place: [i64; 3]| {
+        let mut rows = table.0.iter().filter(|row| row.member == 0);
+        let found = rows.find(|row| row.part == part && [row.layer, row.to, row.from] == place);
+        found.unwrap().value
+    };
+    let valid = correction.region.ranges[0].upper;
+    let factor = &correction.region.jointly.as_ref().unwrap().factor[1];
+    let Body::Networks(scaling, _) = &correction.body else {
+        unreachable!()
+    };
+    let (input, output) = (scaling.inputs[0].scale, scaling.outputs[2].mean);
+    for (part, place, value) in [
+        ("left", [0, 0, 0], 0.1),
+        ("valid_upper", [0, 1, 0], valid * 1e3),
+        ("joint_factor", [0, 2, 1], factor[0] / 1e3),
+        ("joint_factor", [0, 2, 2], factor[1]),
+        ("input_scale", [0, 1, 0], input * 1e3),
+        ("output_mean", [0, 3, 0], output * 1e3),
+    ] {
+        assert_eq!(stored(part, place), value, "{part}");
+    }
     let back = Network::from_frame(&table.to_frame().unwrap())
         .unwrap()
         .correction(&prismatic)
