@@ -89,50 +89,32 @@ fn nothing_is_found_in_a_clean_recording_and_what_cannot_be_known_is_said() {
 }
 
 #[test]
-fn wind_up_under_gravity_is_named_at_its_joint() {
+fn wind_up_cyclic_errors_and_lost_motion_are_named_at_their_joints() {
     let robot = fixture::seven();
-    let truth = TrueRobot {
-        compliance_rad_nm: vec![0.0, 3e-5, 0.0, 6e-5, 0.0, 0.0, 0.0],
-        ..truth(&robot, 32)
-    };
-    let (named, verdict, _) = diagnosed(&robot, touched(&robot, &truth, &cell(30), 32));
-    for expected in ["joint_compliance at joint 2", "joint_compliance at joint 4"] {
-        assert!(
-            named.iter().any(|name| name == expected),
-            "{named:?}, {:?}",
-            verdict.statement
-        );
+    let compliance = vec![0.0, 3e-5, 0.0, 6e-5, 0.0, 0.0, 0.0];
+    let gear = "[{gear_cyclic: {joint: 2, order: 3, amplitude_arcsec: 150, phase_deg: 40}}]";
+    let gap = "[{backlash: {joint: 2, gap_arcsec: 250}}]";
+    for (seed, compliance_rad_nm, effects, expected) in [
+        (
+            32,
+            compliance,
+            "[]",
+            &["joint_compliance at joint 2", "joint_compliance at joint 4"][..],
+        ),
+        (33, Vec::new(), gear, &["gear_cyclic at joint 2"]),
+        (36, Vec::new(), gap, &["backlash at joint 2"]),
+    ] {
+        let truth = TrueRobot {
+            compliance_rad_nm,
+            ..truth(&robot, seed)
+        };
+        let recording = touched_with(&robot, &truth, effects, &cell(30), seed);
+        let (named, verdict, _) = diagnosed(&robot, recording);
+        for expected in expected {
+            let found = named.iter().any(|name| name == expected);
+            assert!(found, "{named:?}, {:?}", verdict.statement);
+        }
     }
-}
-
-#[test]
-fn a_cyclic_error_of_a_gear_is_named_at_its_joint() {
-    let robot = fixture::seven();
-    let effects = "[{gear_cyclic: {joint: 2, order: 3, amplitude_arcsec: 150, phase_deg: 40}}]";
-    let (named, verdict, _) = diagnosed(
-        &robot,
-        touched_with(&robot, &truth(&robot, 33), effects, &cell(30), 33),
-    );
-    assert!(
-        named.iter().any(|name| name == "gear_cyclic at joint 2"),
-        "{named:?}, {:?}",
-        verdict.statement
-    );
-}
-
-#[test]
-fn lost_motion_is_named_at_its_joint() {
-    let robot = fixture::seven();
-    let effects = "[{backlash: {joint: 2, gap_arcsec: 250}}]";
-    let (named, verdict, _) = diagnosed(
-        &robot,
-        touched_with(&robot, &truth(&robot, 36), effects, &cell(30), 36),
-    );
-    assert!(
-        named.iter().any(|name| name == "backlash at joint 2"),
-        "{named:?}, {:?}",
-        verdict.statement
-    );
 }
 
 #[test]
