@@ -98,17 +98,7 @@ impl Trip {
 
     /// Joints by which the controller reaches a pose of the robot file's tool, near to `near` (rad).
     pub fn driven(&self, pose: Pose, near: &[f64]) -> Vec<f64> {
-        let found = least_change(
-            &mut Nominal::new(&self.robot),
-            &ToolGoal {
-                pose,
-                oriented: true,
-            },
-            near,
-            near,
-        );
-        assert!(found.residual < 1e-6, "{}", found.residual);
-        found.q
+        driven(&self.robot, pose, near)
     }
 
     /// How far (mm) the true robot is from where each target's joints should bring a point of the tool, with the joints that are driven; the
@@ -133,6 +123,16 @@ impl Trip {
     fn still(&self) -> Point {
         self.cell.targets_by(1, &[0.0], 3).remove(0)
     }
+}
+
+pub fn driven(robot: &RobotModel, pose: Pose, near: &[f64]) -> Vec<f64> {
+    let goal = ToolGoal {
+        pose,
+        oriented: true,
+    };
+    let found = least_change(&mut Nominal::new(robot), &goal, near, near);
+    assert!(found.residual < 1e-6, "{}", found.residual);
+    found.q
 }
 
 /// The targets of a program, values and postures.
