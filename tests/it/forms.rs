@@ -11,7 +11,7 @@ use calib::robot::{LoadCorrection, Measurements, PointReadings, Posture, RobotMo
 use calib::spatial::{Pose, Twist};
 use calib::units::Unit;
 use nalgebra::Vector3;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 const ROWS: usize = 120;
 /// Rows at which a form is evaluated; the first has no way to it.
@@ -526,98 +526,6 @@ fn a_joint_that_slides_errs_at_millimetres_and_has_no_turns() {
         })
     };
     assert!(by_length(0) && !by_length(1));
-}
-
-/// A form with its prior weight and its bounds, numbers to five digits: what differs in one of them is another proposal.
-fn in_full(hypothesis: &Hypothesis) -> String {
-    fn rounded(value: &serde_json::Value) -> String {
-        match value {
-            serde_json::Value::Number(number) => {
-                format!("{:.4e}", number.as_f64().unwrap())
-            }
-            serde_json::Value::Array(all) => format!(
-                "[{}]",
-                all.iter().map(rounded).collect::<Vec<_>>().join(",")
-            ),
-            serde_json::Value::Object(all) => {
-                let each = all
-                    .iter()
-                    .map(|(key, value)| format!("{key}:{}", rounded(value)));
-                format!("{{{}}}", each.collect::<Vec<_>>().join(","))
-            }
-            other => other.to_string(),
-        }
-    }
-    let Hypothesis {
-        form,
-        tried,
-        prior_penalty,
-        positive,
-        largest,
-        ..
-    } = hypothesis;
-    let body = rounded(&form.body());
-    format!(
-        "{} {body} {tried} {prior_penalty:.3} {positive} {largest:.3e}",
-        form.key()
-    )
-}
-
-/// Fowler, Noll and Vo's hash of some lines (FNV-1a, 64 bits).
-fn digest(lines: &[String]) -> u64 {
-    let bytes = lines.iter().flat_map(|line| line.bytes());
-    bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-    })
-}
-
-#[test]
-fn every_cause_proposes_the_forms_that_are_listed() {
-    let mut cells: BTreeMap<String, usize> = BTreeMap::new();
-    let mut full: BTreeMap<&str, Vec<String>> = CAUSES
-        .iter()
-        .map(|cause| (cause.name(), Vec::new()))
-        .collect();
-    over_all(|survey, hypothesis| {
-        let form = &hypothesis.form;
-        if form.name() == "unknown" {
-            return;
-        }
-        full.get_mut(form.name()).unwrap().push(in_full(hypothesis));
-        if survey.robot.description().name == "spherical"
-            && survey.robot.has_masses()
-            && !survey.moves()
-        {
-            *cells
-                .entry(format!("{}@{}", form.name(), form.place()))
-                .or_default() += 1;
-        }
-    });
-    let mut out = String::new();
-    for (name, all) in &mut full {
-        all.sort();
-        out.push_str(&format!(
-            "{name}: {} forms, {:016x}\n",
-            all.len(),
-            digest(all)
-        ));
-    }
-    out.push_str("\nOf an arm that stands:\n");
-    for (cell, count) in cells {
-        out.push_str(&format!("{cell} {count}\n"));
-    }
-    if out != include_str!("forms/proposed.txt") {
-        let [list, all] =
-            ["proposed.txt", "proposed_in_full.txt"].map(|name| std::env::temp_dir().join(name));
-        let text: Vec<String> = full.into_values().flatten().collect();
-        std::fs::write(&list, &out).unwrap();
-        std::fs::write(&all, text.join("\n")).unwrap();
-        panic!(
-            "other forms are proposed: read {} and {}",
-            list.display(),
-            all.display()
-        );
-    }
 }
 
 #[test]
