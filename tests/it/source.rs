@@ -109,7 +109,7 @@ pub fn uses(text: &str, module: &[String], modules: &[Vec<String>]) -> Vec<Use> 
         } else if is_word(&tokens[at]) && before != Some("::") {
             let mut path = vec![tokens[at].clone()];
             while tokens.get(at + 1).is_some_and(|token| token == "::")
-                && tokens.get(at + 2).is_some_and(is_word)
+                && tokens.get(at + 2).is_some_and(|token| is_word(token))
             {
                 path.push(tokens[at + 2].clone());
                 at += 2;
@@ -271,7 +271,7 @@ fn flatten(stream: TokenStream, found: &mut Vec<String>) {
     }
 }
 
-fn is_word(token: &String) -> bool {
+fn is_word(token: &str) -> bool {
     token.starts_with(|c: char| c.is_alphabetic() || c == '_')
 }
 
