@@ -501,7 +501,7 @@ fn an_interrupted_proof_goes_on_where_it_stood_and_only_with_the_same_set() {
         (&json!(12), &json!([]))
     );
     let other = prove("11").code(2);
-    assert!(other.err.contains("holds a set made with other options"));
+    has(&other.err, "holds a set made with other options");
 }
 
 const STATED: &str = "
@@ -529,44 +529,16 @@ fn a_stated_twin_is_written_as_a_case_folder_that_the_estimator_reads() {
     std::fs::copy(format!("{pipelines}/sr210d/robot.yaml"), path("robot.yaml")).unwrap();
     std::fs::write(path("stated.yaml"), STATED).unwrap();
     let record = |out: &str, remainder: &str| {
-        let remainder = format!("simulate.remainder={remainder}");
-        calib(
-            ".",
-            &[
-                "simulate",
-                "record",
-                &path("stated.yaml"),
-                "--out",
-                &path(out),
-                "--store",
-                &path("store"),
-                "--set",
-                &remainder,
-                "--quiet",
-            ],
-        )
+        let set = format!("--set simulate.remainder={remainder} --store store --quiet");
+        let words = format!("simulate record stated.yaml --out {out} {set}");
+        calib(root.path(), &words)
     };
     let held_out = |out: &str| {
-        let (case, variable) = (
-            format!("{pipelines}/case/pipeline.yaml"),
-            format!("case={}", path(out)),
+        let words = format!(
+            "run {pipelines}/case/pipeline.yaml --set case={} --store store --until validate --json --quiet",
+            path(out)
         );
-        let done = calib(
-            ".",
-            &[
-                "run",
-                &case,
-                "--set",
-                &variable,
-                "--store",
-                &path("store"),
-                "--until",
-                "validate",
-                "--json",
-                "--quiet",
-            ],
-        )
-        .code(0);
+        let done = calib(root.path(), &words).code(0);
         let document: Value = done.json();
         let rows = document["statistics"].as_array().unwrap().clone();
         let row = rows

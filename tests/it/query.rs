@@ -1,6 +1,6 @@
 //! `calib query`: SQL over the tables of a run gives what the tables hold.
 
-use crate::answer::{ends_with, has, root};
+use crate::answer::{self, Answer, ends_with, has, root};
 use calib::audit::{self, QueryTables};
 use calib::pipeline::{Manifest, find_run};
 use calib::store::Store;
@@ -8,7 +8,6 @@ use calib::table::{Prediction, PredictionRow, Recording, Table};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 use std::sync::LazyLock;
 
 use crate::bucket::bucket_of;
@@ -17,39 +16,22 @@ use crate::bucket::bucket_of;
 static STORE: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
     let folder = tempfile::tempdir().unwrap();
     let pipeline = root("tests/it/resume/pipeline.yaml");
-    let output = calib(
-        folder.path(),
-        &["run", pipeline.to_str().unwrap(), "--quiet"],
-    );
-    assert!(output.status.success(), "{}", text(&output));
+    let run = ["run", pipeline.to_str().unwrap(), "--quiet"];
+    calib(folder.path(), &run).ok();
     folder
 });
 
-fn calib(store: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_calib"))
-        .args(arguments)
-        .arg("--store")
-        .arg(store)
-        .output()
-        .unwrap()
+fn calib(store: &Path, words: &[&str]) -> Answer {
+    let store = store.to_str().unwrap();
+    answer::calib(".", &[words, &["--store", store]].concat())
 }
-fn text(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr)
-}
-fn ask(arguments: &[&str]) -> String {
-    let output = calib(STORE.path(), &[&["query", "HEAD"], arguments].concat());
-    assert!(output.status.success(), "{arguments:?}: {}", text(&output));
-    String::from_utf8(output.stdout).unwrap()
+fn ask(words: &[&str]) -> String {
+    calib(STORE.path(), &[&["query", "HEAD"], words].concat()).ok()
 }
 fn refused(sql: &str) -> String {
-    let output = calib(STORE.path(), &["query", "HEAD", sql]);
-    assert_eq!(
-        (output.status.code(), output.stdout.len()),
-        (Some(2), 0),
-        "{sql}: {}",
-        text(&output)
-    );
-    String::from_utf8(output.stderr).unwrap()
+    let answer = calib(STORE.path(), &["query", "HEAD", sql]).code(2);
+    assert_eq!(answer.out, "", "{sql}");
+    answer.err
 }
 /// The objects of `--json`.
 fn rows(sql: &str) -> Vec<Value> {
@@ -314,14 +296,14 @@ fn under_json_a_fault_is_a_document_too() {
         STORE.path(),
         &["query", "HEAD", "SELECT * FROM nosuch", "--json"],
     );
-    let said: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let said = output.json();
     assert_eq!(
-        (output.status.code(), &said["status"], &said["exit_code"]),
+        (output.code, &said["status"], &said["exit_code"]),
         (Some(2), &"failed".into(), &2.into())
     );
     let message = said["faults"][0]["message"].as_str().unwrap();
     assert!(message.contains("no table `nosuch`"), "{said}");
-    assert!(String::from_utf8_lossy(&output.stderr).contains(message));
+    has(&output.err, message);
 }
 
 #[test]
@@ -367,8 +349,7 @@ fn nothing_but_the_tables_of_the_run_is_read_and_nothing_changed() {
     has(&told, "no table `read_parquet`");
     assert_eq!(objects(STORE.path()), before);
     let output = calib(STORE.path(), &["query", "SELECT * FROM recording"]);
-    assert_eq!(output.status.code(), Some(2));
-    has(&text(&output), "the run comes before the SQL");
+    has(&output.code(2).err, "the run comes before the SQL");
 }
 
 #[test]
