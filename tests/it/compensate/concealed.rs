@@ -438,22 +438,10 @@ fn a_correction_never_harms_unless_it_says_so() {
 pub fn upright(seed: u64) -> Case {
     let case = nothing(seed, true);
     let mut draw = Noise::new(seed, Purpose::Design);
-    let limits: Vec<[f64; 2]> = case
-        .robot
-        .joints
-        .iter()
-        .map(|joint| joint.limits.unwrap())
-        .collect();
-    let arm = Arm::new(&case.robot, &case.truth);
-    let poses = Poses {
-        range_deg: Vec::new(),
-        floor_mm: 20.0,
-        clearance_mm: 150.0,
-        candidates: 1,
-    };
+    let (limits, room) = (limits(&case), Room::of(&case));
     let mut own = Noise::new(seed ^ 7, Purpose::Design);
     let q_of = |_: &Shot| loop {
-        let (mut q, _) = allowed(&arm, &poses, &limits, &mut own).unwrap();
+        let mut q = room.pose(&limits, &mut own);
         let turned = if own.chance(0.5) { 90.0f64 } else { -90.0 };
         q[3] = turned.to_radians() - q[1] - q[2];
         q[3] -= std::f64::consts::TAU * (q[3] / std::f64::consts::TAU).round();
@@ -476,6 +464,31 @@ pub fn upright(seed: u64) -> Case {
     });
     let effects = yields.into_iter().chain(gears).collect();
     again(case, effects, seed, q_of)
+}
+
+/// Of the joints, rad.
+pub fn limits(case: &Case) -> Vec<[f64; 2]> {
+    let joints = case.robot.joints.iter();
+    joints.map(|joint| joint.limits.unwrap()).collect()
+}
+
+/// Where an arm may be.
+pub struct Room(Arm, Poses);
+
+impl Room {
+    pub fn of(case: &Case) -> Self {
+        let poses = Poses {
+            range_deg: Vec::new(),
+            floor_mm: 20.0,
+            clearance_mm: 150.0,
+            candidates: 1,
+        };
+        Self(Arm::new(&case.robot, &case.truth), poses)
+    }
+
+    pub fn pose(&self, ranges: &[[f64; 2]], draw: &mut Noise) -> Vec<f64> {
+        allowed(&self.0, &self.1, ranges, draw).unwrap().0
+    }
 }
 
 /// A desktop arm with nothing concealed, unless without masses.
