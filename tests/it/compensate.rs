@@ -14,7 +14,7 @@ mod round_trip;
 mod sides;
 mod standing;
 mod stated;
-mod true_error;
+pub mod true_error;
 mod within;
 
 use crate::answer::{self, ends_with, fed, has, put, read, starts_with};
