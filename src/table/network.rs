@@ -224,7 +224,7 @@ fn place(shape: LayerSizes, index: usize) -> (&'static str, [usize; 3]) {
     }
 }
 
-/// What a correction consists of, beside its numbers: part, and layer, to, from.
+/// What a correction consists of, apart from its numbers: part, and layer, to, from.
 fn marks(body: &Body, mut mark: impl FnMut(&'static str, [usize; 3])) {
     match body {
         Body::Networks(scaling, _) | Body::Process(scaling, _) => {
@@ -292,7 +292,7 @@ fn shaped(numbers: &Numbers, prismatic: &[bool]) -> Result<Correction> {
             let process = Process::remember(vec![1.0; inputs], 1.0, 1.0, blank, alpha);
             Body::Process(
                 scaling,
-                process.expect("noise on its own is no singular matrix"),
+                process.expect("a matrix of noise alone is not singular"),
             )
         } else {
             Body::Networks(scaling, networks(numbers, inputs, prismatic)?)

@@ -94,7 +94,7 @@ impl TorqueCase {
         text
     }
 
-    /// What the robot file of points states, with what moving bodies take beside it.
+    /// What the robot file of points states, and what moving bodies take.
     fn robot_json(&self) -> Value {
         let (robot, moments) = (&self.robot, &self.robot.inertias);
         let mut out = robot_json(robot).expect("an arm of the library has such a file");

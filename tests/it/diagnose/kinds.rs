@@ -390,7 +390,7 @@ fn causes_are_named_from_every_kind_of_measurement() {
         assert!(dimension.is_none_or(|dimension| said.dimension == dimension));
         let in_angles = said.statement.contains("arcsec") && !said.statement.contains(" um");
         assert!(count < 700 || in_angles, "{}", said.statement);
-        // How well joints repeat is seen beside the causes.
+        // How well joints repeat is seen, too.
         let repeatability = said.repeatability.sigma.to_degrees() * 3600.0;
         assert!(
             play_arcsec < 3.0 || (3.0..5.2).contains(&repeatability),
